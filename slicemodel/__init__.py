@@ -1,0 +1,32 @@
+"""The shared nouns (scenario, trajectory, observables) and the paper's slice model.
+
+Importing this package loads neither numba nor SciPy; the compiled loop is made inside the first ``solve``.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from slicemodel.scenario import Bottle, Scenario, ScenarioError
+
+if TYPE_CHECKING:
+    from slicemodel.solver import solve
+    from slicemodel.trajectory import Impact, Impacts, Trajectory
+
+__all__ = ["Bottle", "Impact", "Impacts", "Scenario", "ScenarioError", "Trajectory", "solve"]
+
+_HOMES = {
+    "solve": "slicemodel.solver",
+    "Impact": "slicemodel.trajectory",
+    "Impacts": "slicemodel.trajectory",
+    "Trajectory": "slicemodel.trajectory",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import what is asked for on first use (PEP 562), so that start-up stays light."""
+    if name in _HOMES:
+        from importlib import import_module
+
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'slicemodel' has no attribute {name!r}")

@@ -1,0 +1,53 @@
+"""What is read off slice positions: definitions only, no equation of motion.
+
+These are the nouns that all solvers share. A solver that needs the centre of mass or the moment of
+inertia inside its own equations computes them itself; the tests compare the two.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from slicemodel.scenario import Scenario
+from slicemodel.trajectory import FloatArray
+
+
+def centre_of_mass(scenario: Scenario, r: ArrayLike) -> FloatArray:
+    """Distance of the centre of mass of bottle and water from the cap [m] (Eq. 10).
+
+    Parameters
+    ----------
+    r : array, shape (..., N) - slice positions [m]
+
+    Returns
+    -------
+    array, shape (...)
+    """
+    bottle = scenario.bottle
+    water = np.asarray(r, dtype=np.float64).sum(axis=-1) * scenario.slice_mass
+    return np.asarray((water + bottle.mass * bottle.length / 2) / scenario.total_mass)
+
+
+def moment_of_inertia(scenario: Scenario, r: ArrayLike) -> FloatArray:
+    """Moment of inertia of bottle and water about their centre of mass [kg m^2] (Eq. 11b, 11c).
+
+    Parameters
+    ----------
+    r : array, shape (..., N) - slice positions [m]
+
+    Returns
+    -------
+    array, shape (...)
+    """
+    positions = np.asarray(r, dtype=np.float64)
+    r_cm = centre_of_mass(scenario, positions)
+    water = scenario.slice_mass * ((positions - r_cm[..., np.newaxis]) ** 2).sum(axis=-1)
+    bottle = scenario.bottle
+    about_own_centre = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
+    return np.asarray(water + about_own_centre + bottle.mass * (bottle.length / 2 - r_cm) ** 2)
+
+
+def initial_moment_of_inertia(scenario: Scenario) -> float:
+    """J_0 of the bottle at release, slices stacked on the base [kg m^2]."""
+    return float(moment_of_inertia(scenario, scenario.initial_positions()))

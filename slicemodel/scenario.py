@@ -1,0 +1,352 @@
+"""What is thrown: the bottle, the water cut into slices, and the throw.
+
+    y                                  theta is the angle of u_r (cap to base) from the
+    ^                                  downward vertical; theta = 0: the bottle stands upright.
+    |      cap  r = 0                  omega = d theta/dt > 0 turns counter-clockwise.
+    |        \\
+    |         \\  u_r = (sin theta, -cos theta)
+    |          \\
+    +------> x  base  r = L
+
+Units are SI throughout:
+
+==================  =======  ======  ===============================================
+field               paper    unit    meaning
+==================  =======  ======  ===============================================
+bottle.length       L        m       cap to base
+bottle.radius       R        m       radius of the thin cylinder
+bottle.mass         M_b      kg      empty bottle
+bottle.capacity     M_max    kg      water that fills it
+water_mass          M_w      kg      all slices together
+n_slices            N        1       point slices of equal mass on the axis
+drag                alpha    kg/s    drag coefficient of one slice
+restitution         -beta    1       e: speed after an impact over speed before
+omega0              omega_0  rad/s   angular velocity at release
+theta0              theta_0  rad     angle at release
+duration            T        s       time from release
+gravity             g        m/s^2   0 is allowed
+launch_velocity     v_0      m/s     (v_x, v_y) of the centre of mass at release
+frozen              (ice)    -       True: no slice may move
+==================  =======  ======  ===============================================
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
+from difflib import get_close_matches
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+class ScenarioError(ValueError):
+    """A value no bottle can have; the message names field, value and admissible range."""
+
+
+class _Checks:
+    """Collects every problem of one object, so that the user sees all of them at once."""
+
+    def __init__(self, where: str = "") -> None:
+        self.where = where
+        self.problems: list[str] = []
+
+    def number(
+        self,
+        name: str,
+        value: object,
+        unit: str,
+        *,
+        above: float | None = None,
+        least: float | None = None,
+        most: float | None = None,
+    ) -> float | None:
+        """Return ``value`` as float if it is a finite number in range, else note why not."""
+        admissible = _range_words(above, least, most)
+        shown = f"{self.where}{name} = {value!r}"
+        if isinstance(value, bool) or not isinstance(value, numbers.Real):
+            self.problems.append(f"{shown} is not a number (admissible: {admissible} {unit})".replace(" )", ")"))
+            return None
+        number = float(value)
+        # Written as "not inside", because NaN passes every "outside" test.
+        inside = math.isfinite(number)
+        inside = inside and (above is None or number > above)
+        inside = inside and (least is None or number >= least)
+        inside = inside and (most is None or number <= most)
+        if not inside:
+            self.problems.append(f"{self.where}{name} = {number!r} {unit} is outside {admissible}".replace("  ", " "))
+            return None
+        return number
+
+    def whole(self, name: str, value: object, *, least: int) -> int | None:
+        """Return ``value`` as int if it is a whole number of at least ``least``."""
+        if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < least:
+            self.problems.append(f"{self.where}{name} = {value!r} is not a whole number of at least {least}")
+            return None
+        return int(value)
+
+    def refuse(self) -> None:
+        """Raise one ScenarioError that states all problems, if there are any."""
+        if self.problems:
+            raise ScenarioError("; ".join(self.problems))
+
+
+def _range_words(above: float | None, least: float | None, most: float | None) -> str:
+    low = "(-inf" if above is None and least is None else f"({above:g}" if least is None else f"[{least:g}"
+    high = "inf)" if most is None else f"{most:g}]"
+    return f"{low}, {high}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bottle:
+    """A rigid thin-walled cylinder; the defaults are the paper's bottle (section 5).
+
+    Parameters
+    ----------
+    length, radius : float
+        Cap to base, and radius of the cylinder [m]; positive.
+    mass : float
+        Empty bottle [kg]; positive.
+    capacity : float
+        Water that fills it [kg]; positive. The paper's 1 kg is less than
+        ``rho pi R^2 L`` = 1.407 kg of the cylinder it describes.
+
+    Raises
+    ------
+    ScenarioError
+        Naming every field that no bottle can have, its value and the admissible range.
+    """
+
+    length: float = 0.28
+    radius: float = 0.04
+    mass: float = 0.028
+    capacity: float = 1.0
+
+    def __post_init__(self) -> None:
+        checks = _Checks("bottle.")
+        for name, unit in (("length", "m"), ("radius", "m"), ("mass", "kg"), ("capacity", "kg")):
+            object.__setattr__(self, name, checks.number(name, getattr(self, name), unit, above=0.0))
+        checks.refuse()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scenario:
+    """One throw. The defaults are the paper's own: half full, 500 slices of 1 g.
+
+    Parameters
+    ----------
+    bottle : Bottle
+    water_mass : float
+        Mass of all slices [kg], in (0, bottle.capacity].
+    n_slices : int
+        Number of slices, at least 1.
+    drag : float
+        alpha, drag coefficient of one slice [kg/s] (the paper's program says kg/m), >= 0.
+    restitution : float
+        e = -beta, in [0, 1].
+    omega0 : float
+        Angular velocity at release [rad/s]; not 0 (a bottle that does not spin has no flip).
+        Negative values spin the other way.
+    theta0 : float
+        Angle at release [rad].
+    duration : float
+        Time from release to landing [s], positive.
+    gravity : float
+        [m/s^2], >= 0.
+    launch_velocity : tuple of two floats
+        Velocity of the centre of mass at release [m/s]. The default has the paper's
+        |v_0| of about 2 m/s. It moves the bottle through the lab and nothing else.
+    frozen : bool
+        The ice case: no slice may move.
+
+    Raises
+    ------
+    ScenarioError
+        Naming every impossible field, its value and the admissible range.
+    """
+
+    bottle: Bottle = field(default_factory=Bottle)
+    water_mass: float = 0.5
+    n_slices: int = 500
+    drag: float = 0.01
+    restitution: float = 0.5
+    omega0: float = 20.0
+    theta0: float = math.pi / 2
+    duration: float = 0.5
+    gravity: float = 9.81
+    launch_velocity: tuple[float, float] = (0.5, 1.94)
+    frozen: bool = False
+
+    def __post_init__(self) -> None:
+        checks = _Checks()
+        if not isinstance(self.bottle, Bottle):
+            raise ScenarioError(f"bottle = {self.bottle!r} is not a Bottle")
+        checked: dict[str, object] = {
+            "water_mass": self._checked_water_mass(checks),
+            "n_slices": checks.whole("n_slices", self.n_slices, least=1),
+            "drag": checks.number("drag", self.drag, "kg/s", least=0.0),
+            "restitution": checks.number("restitution", self.restitution, "", least=0.0, most=1.0),
+            "omega0": checks.number("omega0", self.omega0, "rad/s"),
+            "theta0": checks.number("theta0", self.theta0, "rad"),
+            "duration": checks.number("duration", self.duration, "s", above=0.0),
+            "gravity": checks.number("gravity", self.gravity, "m/s^2", least=0.0),
+            "launch_velocity": self._checked_launch_velocity(checks),
+        }
+        if checked["omega0"] == 0.0:
+            checks.problems.append("omega0 = 0.0 rad/s does not spin: any finite value but 0 is admissible")
+        if not isinstance(self.frozen, bool):
+            checks.problems.append(f"frozen = {self.frozen!r} is neither true nor false")
+        checks.refuse()
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+
+    def _checked_water_mass(self, checks: _Checks) -> float | None:
+        water_mass = checks.number("water_mass", self.water_mass, "kg", above=0.0)
+        capacity = self.bottle.capacity
+        if water_mass is not None and water_mass > capacity:
+            checks.problems.append(
+                f"water_mass = {water_mass!r} kg exceeds the bottle's capacity {capacity!r} kg "
+                f"(admissible: (0, {capacity:g}] kg)"
+            )
+        return water_mass
+
+    def _checked_launch_velocity(self, checks: _Checks) -> tuple[float | None, ...]:
+        components = self.launch_velocity
+        if isinstance(components, str) or not isinstance(components, Iterable) or len(tuple(components)) != 2:
+            checks.problems.append(f"launch_velocity = {components!r} is not a pair (v_x, v_y) of numbers in m/s")
+            return ()
+        return tuple(
+            checks.number(f"launch_velocity.{axis}", component, "m/s")
+            for axis, component in zip("xy", components, strict=True)
+        )
+
+    # ------------------------------------------------------------------ derived geometry
+
+    @property
+    def slice_mass(self) -> float:
+        """m = M_w / N [kg]."""
+        return self.water_mass / self.n_slices
+
+    @property
+    def total_mass(self) -> float:
+        """M_b + M_w [kg]."""
+        return self.bottle.mass + self.water_mass
+
+    @property
+    def fill_fraction(self) -> float:
+        """M_tilde = M_w / M_max, dimensionless."""
+        return self.water_mass / self.bottle.capacity
+
+    @property
+    def slice_height(self) -> float:
+        """h / N with h = M_tilde L [m]."""
+        return self.fill_fraction * self.bottle.length / self.n_slices
+
+    @property
+    def r_min(self) -> float:
+        """Smallest admissible slice position h / 2N, in contact with the cap [m]."""
+        return self.slice_height / 2
+
+    @property
+    def r_max(self) -> float:
+        """Largest admissible slice position L - h / 2N, in contact with the base [m]."""
+        return self.bottle.length - self.slice_height / 2
+
+    @property
+    def damping_rate(self) -> float:
+        """gamma = alpha / 2m [1/s]."""
+        return self.drag / (2 * self.slice_mass)
+
+    def initial_positions(self) -> NDArray[np.float64]:
+        """Slices stacked on the base, slice 0 in contact with it (Eq. 3a); shape (N,) [m]."""
+        import numpy as np
+
+        return self.bottle.length - self.slice_height / 2 - np.arange(self.n_slices) * self.slice_height
+
+    # ------------------------------------------------------------------ variations
+
+    def with_slices(self, n_slices: int) -> Scenario:
+        """Return the same throw cut into ``n_slices`` slices, damping rate alpha/2m unchanged."""
+        if isinstance(n_slices, bool) or not isinstance(n_slices, numbers.Integral) or n_slices < 1:
+            raise ScenarioError(f"n_slices = {n_slices!r} is not a whole number of at least 1")
+        return replace(self, n_slices=int(n_slices), drag=self.drag * self.n_slices / int(n_slices))
+
+    # ------------------------------------------------------------------ files
+
+    @classmethod
+    def from_toml(cls, path: str | PathLike[str]) -> Scenario:
+        """Read a scenario file with the tables ``[scenario]`` and ``[bottle]``, both optional.
+
+        Raises
+        ------
+        ScenarioError
+            Naming file, table and key: unreadable file, bad TOML, unknown table or key
+            (with the nearest known name), impossible value.
+        """
+        name = str(path)
+        try:
+            document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        except OSError as error:
+            raise ScenarioError(f"{name}: cannot be read ({error.strerror or error})") from None
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise ScenarioError(f"{name}: is not valid TOML ({error})") from None
+        return cls.from_mapping(document, source=name)
+
+    @classmethod
+    def from_mapping(cls, document: Mapping[str, Any], *, source: str = "scenario") -> Scenario:
+        """Build a scenario from ``{"scenario": {...}, "bottle": {...}}``; errors name ``source``."""
+        _refuse_unknown(document, ("scenario", "bottle"), f"{source}: table")
+        for table in document:
+            if not isinstance(document[table], Mapping):
+                raise ScenarioError(f"{source}: {table} = {document[table]!r} is not a table; write [{table}]")
+        bottle_table = document.get("bottle", {})
+        scenario_table = dict(document.get("scenario", {}))
+        _refuse_unknown(bottle_table, [f.name for f in fields(Bottle)], f"{source}: [bottle] key")
+        known = [f.name for f in fields(cls) if f.name != "bottle"]
+        _refuse_unknown(scenario_table, known, f"{source}: [scenario] key")
+        if isinstance(scenario_table.get("launch_velocity"), list):
+            scenario_table["launch_velocity"] = tuple(scenario_table["launch_velocity"])
+        try:
+            bottle = Bottle(**bottle_table)
+        except ScenarioError as error:
+            raise ScenarioError(f"{source}: [bottle] {str(error).replace('bottle.', '')}") from None
+        try:
+            return cls(bottle=bottle, **scenario_table)
+        except ScenarioError as error:
+            raise ScenarioError(f"{source}: [scenario] {error}") from None
+
+    def to_mapping(self) -> dict[str, dict[str, Any]]:
+        """Return the mapping that ``from_mapping`` reads back to an equal scenario."""
+        scenario = asdict(self)
+        bottle = scenario.pop("bottle")
+        scenario["launch_velocity"] = list(self.launch_velocity)
+        return {"bottle": bottle, "scenario": scenario}
+
+    def to_toml(self) -> str:
+        """Return the scenario as the text of a file that ``from_toml`` reads back exactly."""
+        lines: list[str] = []
+        for table, entries in self.to_mapping().items():
+            lines.append(f"[{table}]")
+            lines += [f"{key} = {_toml_value(value)}" for key, value in entries.items()]
+            lines.append("")
+        return "\n".join(lines)
+
+
+def _toml_value(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else repr(value)
+
+
+def _refuse_unknown(given: Iterable[str], known: Iterable[str], what: str) -> None:
+    known = list(known)
+    for name in given:
+        if name not in known:
+            nearest = get_close_matches(name, known, n=1)
+            advice = f"did you mean {nearest[0]!r}?" if nearest else f"known: {', '.join(known)}"
+            raise ScenarioError(f"{what} {name!r} is unknown; {advice}")

@@ -1,0 +1,194 @@
+"""What every solver returns: one trajectory on a time grid, with how it was made."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from slicemodel.scenario import Scenario
+
+FloatArray = NDArray[np.float64]
+
+BASE: Final = 1
+CAP: Final = -1
+
+STATUSES: Final = MappingProxyType(
+    {
+        "ok": "the run is complete",
+        "escaped": "a slice left the bottle; the run goes on as its scheme says",
+        "overflow": "a number exceeded the floating-point range; returned up to the last finite point",
+        "diverged": "an invariant of the solver broke; returned up to the last point it held",
+        "stalled": "events accumulate without time passing; returned up to the last point reached",
+    }
+)
+"""Reason codes of a trajectory."""
+
+
+@dataclass(frozen=True, slots=True)
+class Impact:
+    """One slice striking one end: ``end`` is "base" or "cap"; speeds are relative to the bottle [m/s], >= 0."""
+
+    time: float
+    slice: int
+    end: str
+    speed_before: float
+    speed_after: float
+
+
+@dataclass(frozen=True, slots=True)
+class Impacts:
+    """Impacts in order of time, held as arrays of shape (K,); iterating gives ``Impact`` records.
+
+    ``slice`` counts from 0 (the slice that starts on the base); ``end`` is +1 for the base, -1 for the cap.
+    """
+
+    time: FloatArray
+    slice: NDArray[np.int64]
+    end: NDArray[np.int64]
+    speed_before: FloatArray
+    speed_after: FloatArray
+
+    def __post_init__(self) -> None:
+        for name, kind in (
+            ("time", np.float64),
+            ("slice", np.int64),
+            ("end", np.int64),
+            ("speed_before", np.float64),
+            ("speed_after", np.float64),
+        ):
+            array = np.array(getattr(self, name), dtype=kind)
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+        if len({getattr(self, name).shape for name in self.__slots__}) != 1 or self.time.ndim != 1:
+            raise ValueError("impact arrays must be one-dimensional and of one length")
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __iter__(self) -> Iterator[Impact]:
+        for k in range(len(self)):
+            yield Impact(
+                float(self.time[k]),
+                int(self.slice[k]),
+                "base" if self.end[k] == BASE else "cap",
+                float(self.speed_before[k]),
+                float(self.speed_after[k]),
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Trajectory:
+    """The motion of one throw as one solver sees it. Time is axis 0; arrays are read-only.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    solver : str
+        "slicemodel", "ode_reference" or "engine_check".
+    method : str
+        Scheme, model or engine: "exact-step", "eq8", "pymunk".
+    t : (P,) [s], theta : (P,) [rad], omega : (P,) [rad/s]
+    r, v : (P, N)
+        Position [m] and velocity [m/s] of every slice along the axis, from the cap, relative
+        to the bottle. A run stored as "summary" holds shape (0, N).
+    r_cm : (P,) [m], inertia : (P,) [kg m^2]
+        Centre of mass from the cap; moment of inertia about it.
+    impacts : Impacts or None
+        None where the solver does not know them (an engine resolves contacts, not impacts).
+    status : str
+        "ok" or a reason code of ``STATUSES``.
+    message : str
+        What happened, where and when, in words.
+    settings : mapping
+        The exact settings that made this run; enough to repeat it.
+    diagnostics : mapping
+        What the solver measured of itself: counts, residuals, drifts.
+
+    Raises
+    ------
+    ValueError
+        If shapes disagree, time does not increase, the status is unknown or a value is not finite.
+    """
+
+    scenario: Scenario
+    solver: str
+    method: str
+    t: FloatArray
+    theta: FloatArray
+    omega: FloatArray
+    r: FloatArray
+    v: FloatArray
+    r_cm: FloatArray
+    inertia: FloatArray
+    impacts: Impacts | None = None
+    status: str = "ok"
+    message: str = ""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    diagnostics: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.status not in STATUSES:
+            raise ValueError(f"status = {self.status!r} is unknown; known: {', '.join(STATUSES)}")
+        for name in ("t", "theta", "omega", "r", "v", "r_cm", "inertia"):
+            object.__setattr__(self, name, _read_only(getattr(self, name)))
+        object.__setattr__(self, "settings", MappingProxyType(dict(self.settings)))
+        object.__setattr__(self, "diagnostics", MappingProxyType(dict(self.diagnostics)))
+        points, n = len(self.t), self.scenario.n_slices
+        for name in ("theta", "omega", "r_cm", "inertia"):
+            if getattr(self, name).shape != (points,):
+                raise ValueError(f"{name} has shape {getattr(self, name).shape}, not {(points,)}")
+        for name in ("r", "v"):
+            if getattr(self, name).shape not in ((points, n), (0, n)):
+                raise ValueError(f"{name} has shape {getattr(self, name).shape}, not {(points, n)}")
+        if not np.all(np.diff(self.t) > 0):
+            raise ValueError("t does not increase")
+        for name in ("t", "theta", "omega", "r", "v", "r_cm", "inertia"):
+            if not np.all(np.isfinite(getattr(self, name))):
+                raise ValueError(f"{name} holds values that are not finite; return the run up to its last finite point")
+
+    @property
+    def ok(self) -> bool:
+        """True if the run is complete and its slices stayed in the bottle."""
+        return self.status == "ok"
+
+    @property
+    def label(self) -> str:
+        """The method's name, as figures and tables print it."""
+        return self.method
+
+
+def _read_only(values: ArrayLike) -> FloatArray:
+    """Return ``values`` as a C-contiguous float64 array that cannot be written; copies only if it must."""
+    array = np.ascontiguousarray(values, dtype=np.float64)
+    if array.flags.writeable:
+        array = array.view()
+        array.flags.writeable = False
+    return array
+
+
+def output_times(scenario: Scenario, times: ArrayLike | None, default_points: int = 1000) -> FloatArray:
+    """Return the output times of a run [s]: ``times`` if given, else uniform points with both ends.
+
+    Raises
+    ------
+    ValueError
+        If a time is not finite, outside [0, duration], or not larger than the one before.
+    """
+    if times is None:
+        return np.linspace(0.0, scenario.duration, default_points)
+    values = np.array(times, dtype=np.float64)
+    if values.ndim != 1 or len(values) == 0:
+        raise ValueError(f"times has shape {values.shape}; a non-empty one-dimensional list of seconds is needed")
+    outside = ~((values >= 0.0) & (values <= scenario.duration))
+    if outside.any():
+        raise ValueError(f"times = {values[outside][0]!r} s is outside [0, {scenario.duration:g}] s (the duration)")
+    late = np.flatnonzero(~(np.diff(values) > 0))
+    if late.size:
+        k = int(late[0])
+        raise ValueError(f"times must increase: times[{k + 1}] = {values[k + 1]!r} s follows {values[k]!r} s")
+    return values
