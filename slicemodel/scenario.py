@@ -1,11 +1,11 @@
-"""What is thrown: the bottle, the water cut into slices, and the throw.
+r"""What is thrown: the bottle, the water cut into slices, and the throw.
 
     y                                  theta is the angle of u_r (cap to base) from the
     ^                                  downward vertical; theta = 0: the bottle stands upright.
     |      cap  r = 0                  omega = d theta/dt > 0 turns counter-clockwise.
-    |        \\
-    |         \\  u_r = (sin theta, -cos theta)
-    |          \\
+    |        \
+    |         \  u_r = (sin theta, -cos theta)
+    |          \
     +------> x  base  r = L
 
 Units are SI throughout:
@@ -268,7 +268,9 @@ class Scenario:
         """Slices stacked on the base, slice 0 in contact with it (Eq. 3a); shape (N,) [m]."""
         import numpy as np
 
-        return self.bottle.length - self.slice_height / 2 - np.arange(self.n_slices) * self.slice_height
+        return (
+            self.bottle.length - self.slice_height / 2 - np.arange(self.n_slices, dtype=np.float64) * self.slice_height
+        )
 
     # ------------------------------------------------------------------ variations
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -151,6 +151,11 @@ class Trajectory:
             if not np.all(np.isfinite(getattr(self, name))):
                 raise ValueError(f"{name} holds values that are not finite; return the run up to its last finite point")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Read-only views of mappings do not pickle; worker processes send trajectories home.
+        state = {f.name: getattr(self, f.name) for f in fields(self)}
+        return _rebuild, (state | {"settings": dict(self.settings), "diagnostics": dict(self.diagnostics)},)
+
     @property
     def ok(self) -> bool:
         """True if the run is complete and its slices stayed in the bottle."""
@@ -160,6 +165,10 @@ class Trajectory:
     def label(self) -> str:
         """The method's name, as figures and tables print it."""
         return self.method
+
+
+def _rebuild(state: dict[str, Any]) -> Trajectory:
+    return Trajectory(**state)
 
 
 def _read_only(values: ArrayLike) -> FloatArray:

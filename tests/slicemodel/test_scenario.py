@@ -1,0 +1,151 @@
+"""What may be thrown, what may not, and what the refusal says."""
+
+import dataclasses
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+from slicemodel import Bottle, Scenario, ScenarioError
+
+
+def test_defaults_are_the_papers_own_throw():
+    scenario = Scenario()
+    assert dataclasses.asdict(scenario.bottle) == {"length": 0.28, "radius": 0.04, "mass": 0.028, "capacity": 1.0}
+    assert (scenario.water_mass, scenario.n_slices, scenario.drag, scenario.restitution) == (0.5, 500, 0.01, 0.5)
+    assert (scenario.omega0, scenario.theta0, scenario.duration, scenario.gravity) == (20.0, math.pi / 2, 0.5, 9.81)
+    assert scenario.frozen is False
+    assert math.hypot(*scenario.launch_velocity) == pytest.approx(2.0, abs=0.01)
+
+
+def test_is_frozen_and_keyword_only():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        Scenario().drag = 1.0
+    with pytest.raises(TypeError):
+        Scenario(Bottle())
+    with pytest.raises(TypeError):
+        Bottle(0.28)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"water_mass": 1.4}, ["water_mass = 1.4 kg", "capacity 1.0 kg"]),
+        ({"water_mass": 0.0}, ["water_mass = 0.0 kg", "(0, inf)"]),
+        ({"water_mass": -0.1}, ["water_mass = -0.1 kg"]),
+        ({"n_slices": 0}, ["n_slices = 0", "at least 1"]),
+        ({"n_slices": 2.5}, ["n_slices = 2.5", "whole number"]),
+        ({"n_slices": True}, ["n_slices = True"]),
+        ({"drag": -1e-9}, ["drag = -1e-09 kg/s", "[0, inf)"]),
+        ({"drag": "much"}, ["drag = 'much'", "not a number"]),
+        ({"restitution": 1.01}, ["restitution = 1.01", "[0, 1]"]),
+        ({"restitution": -0.5}, ["restitution = -0.5", "[0, 1]"]),
+        ({"omega0": 0}, ["omega0 = 0.0 rad/s", "any finite value but 0"]),
+        ({"duration": 0.0}, ["duration = 0.0 s", "(0, inf)"]),
+        ({"gravity": -9.81}, ["gravity = -9.81 m/s^2", "[0, inf)"]),
+        ({"theta0": math.inf}, ["theta0 = inf rad", "(-inf, inf)"]),
+        ({"launch_velocity": (1.0, math.nan)}, ["launch_velocity.y = nan m/s"]),
+        ({"launch_velocity": (1.0,)}, ["launch_velocity = (1.0,)", "pair"]),
+        ({"launch_velocity": "12"}, ["launch_velocity = '12'", "pair"]),
+        ({"frozen": 1}, ["frozen = 1"]),
+        ({"bottle": None}, ["bottle = None"]),
+    ],
+)
+def test_impossible_values_are_refused_by_field_value_and_range(changes, words):
+    with pytest.raises(ScenarioError) as refusal:
+        Scenario(**changes)
+    for word in words:
+        assert word in str(refusal.value)
+
+
+@pytest.mark.parametrize("field", ["water_mass", "drag", "restitution", "omega0", "theta0", "duration", "gravity"])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_no_field_takes_nan_or_infinity(field, value):
+    with pytest.raises(ScenarioError, match=field):
+        Scenario(**{field: value})
+
+
+@pytest.mark.parametrize("field", ["length", "radius", "mass", "capacity"])
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf, "1", None])
+def test_no_bottle_is_impossible(field, value):
+    with pytest.raises(ScenarioError, match=rf"bottle\.{field}"):
+        Bottle(**{field: value})
+
+
+def test_all_problems_are_told_at_once():
+    with pytest.raises(ScenarioError) as refusal:
+        Scenario(water_mass=math.nan, n_slices=0, restitution=7)
+    assert all(name in str(refusal.value) for name in ("water_mass", "n_slices", "restitution"))
+    assert "\n" not in str(refusal.value)
+
+
+def test_other_spin_and_no_gravity_are_possible():
+    assert Scenario(omega0=-20.0, gravity=0.0, drag=0.0, restitution=0.0, n_slices=1).omega0 == -20.0
+
+
+def test_geometry():
+    scenario = Scenario(n_slices=100)
+    r = scenario.initial_positions()
+    assert r.shape == (100,)
+    assert r[0] == scenario.r_max == 0.28 - 0.14 / 200
+    assert r[-1] == pytest.approx(0.14 + 0.14 / 200, rel=1e-14)
+    assert scenario.r_min == pytest.approx(0.14 / 200, rel=1e-14)
+    assert scenario.damping_rate == pytest.approx(0.01 / (2 * 0.005))
+    np.testing.assert_allclose(np.diff(r), -scenario.slice_height, rtol=1e-12)
+
+
+def test_with_slices_keeps_the_damping_rate():
+    scenario = Scenario().with_slices(50)
+    assert scenario.n_slices == 50
+    assert scenario.damping_rate == pytest.approx(5.0, rel=1e-14)
+    assert scenario.water_mass == 0.5
+    with pytest.raises(ScenarioError, match="n_slices = 0"):
+        Scenario().with_slices(0)
+
+
+def test_toml_round_trip(tmp_path):
+    scenario = Scenario(bottle=Bottle(length=0.22), theta0=1.1, launch_velocity=(1, 2), frozen=True)
+    file = tmp_path / "throw.toml"
+    file.write_text(scenario.to_toml(), encoding="utf-8")
+    assert Scenario.from_toml(file) == scenario
+
+
+def test_empty_file_is_the_default_throw(tmp_path):
+    file = tmp_path / "empty.toml"
+    file.write_text("", encoding="utf-8")
+    assert Scenario.from_toml(str(file)) == Scenario()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[scenario]\nwater_mas = 1", ["[scenario] key 'water_mas'", "did you mean 'water_mass'?"]),
+        ("[bottle]\nlenght = 1", ["[bottle] key 'lenght'", "did you mean 'length'?"]),
+        ("[botle]\nlength = 1", ["table 'botle'", "did you mean 'bottle'?"]),
+        ("[engine]\nx = 1", ["table 'engine'", "known: scenario, bottle"]),
+        ("scenario = 3", ["scenario = 3 is not a table"]),
+        ("[bottle]\nradius = -1", ["[bottle] radius = -1.0 m"]),
+        ("[scenario]\nrestitution = 2", ["[scenario] restitution = 2.0", "[0, 1]"]),
+        ("[scenario]\nduration = nan", ["[scenario] duration = nan s"]),
+        ("[scenario\n", ["not valid TOML"]),
+    ],
+)
+def test_toml_errors_name_file_table_and_key(tmp_path, text, words):
+    file = tmp_path / "throw.toml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(ScenarioError) as refusal:
+        Scenario.from_toml(file)
+    for word in [str(file), *words]:
+        assert word in str(refusal.value)
+
+
+def test_missing_file_is_named(tmp_path):
+    with pytest.raises(ScenarioError, match=r"nowhere\.toml: cannot be read"):
+        Scenario.from_toml(tmp_path / "nowhere.toml")
+    with pytest.raises(ScenarioError, match="cannot be read"):
+        Scenario.from_toml(tmp_path)
+
+
+def test_pickles():
+    assert pickle.loads(pickle.dumps(Scenario(drag=0.3))) == Scenario(drag=0.3)
