@@ -1,0 +1,166 @@
+"""Claims: each one function that turns evidence into a finding. The tests call the same functions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from reports.findings import Finding
+from reports.studies.differences import Difference
+from reports.studies.ice import IceDrift
+from reports.studies.step_size import StepSize
+from slicemodel import Trajectory
+
+VECTOR_TOLERANCE = {"published-python": 1e-10, "published-matlab": 1e-8}
+"""Relative; the two sides differ by the order of additions and, for MATLAB, by amplified round-off."""
+
+ICE_TOLERANCE = {"slicemodel": 1e-12, "ode_reference": 1e-12, "engine_check": 1e-6}
+"""max |omega/omega_0 - 1|: round-off where omega is computed from J, the engine's own drift where it is not."""
+
+REFERENCE_BAND = 1e-7
+"""Fraction of omega_0 by which the reference may change when rtol and rest speed are cut tenfold."""
+
+GRAVITY_BAND = 1e-9
+"""Relative change of a free engine's omega(t) when gravity is switched off."""
+
+ORDER_BEFORE_IMPACT = (0.9, 1.1)
+ORDER_ACROSS_IMPACTS = (0.8, 1.2)
+
+
+def claim_vectors(name: str, scheme: str, deviations: Mapping[str, float]) -> Finding:
+    """The scheme reproduces what the published program prints, in every column and over the whole run."""
+    worst = max(deviations, key=lambda column: _nan_is_largest(deviations[column]))
+    return Finding(
+        id=f"vectors-{name}",
+        title=f"{scheme} reproduces the published run {name}",
+        value=float(deviations[worst]),
+        unit="relative",
+        kind="regression",
+        admissible=(0.0, VECTOR_TOLERANCE[scheme]),
+        note=f"largest in column {worst}, over {len(deviations)} columns",
+    )
+
+
+def _nan_is_largest(value: float) -> float:
+    return math.inf if math.isnan(value) else value
+
+
+def claim_ice(ice: IceDrift) -> Finding:
+    """With frozen water omega stays what it was."""
+    return Finding(
+        id=f"ice-{ice.label.replace(' ', '-')}",
+        title=f"ice: {ice.label} keeps ω constant",
+        value=ice.largest,
+        unit="of ω₀",
+        kind="regression",
+        admissible=(0.0, ICE_TOLERANCE[ice.package]),
+    )
+
+
+def claim_welded_order(dt: list[float], drifts: list[IceDrift], printed_order: float) -> Finding:
+    """Ice made of masses welded on by joints drifts, and the drift falls with dt at the engine's printed order."""
+    sizes = np.array([drift.largest for drift in drifts])
+    order = float(np.polyfit(np.log(dt), np.log(sizes), 1)[0]) if np.all(sizes > 0) else math.nan
+    return Finding(
+        id="ice-welded-order",
+        title="ice: drift of the welded engine falls with Δt at its printed order",
+        value=order,
+        unit="(order)",
+        kind="regression",
+        admissible=(printed_order - 0.3, printed_order + 0.3),
+        note="drift " + ", ".join(f"{size:.2g} at {step:g} s" for step, size in zip(dt, sizes, strict=True)),
+    )
+
+
+def claim_order(study: StepSize, where: str, admissible: tuple[float, float]) -> Finding:
+    """The scheme converges to its equation at first order, every refinement being better than the one before."""
+    return Finding(
+        id=f"order-{study.scheme}-{where.replace(' ', '-')}",
+        title=f"{study.scheme} converges to {study.model} at order 1, {where}",
+        value=study.order if study.refined else math.nan,
+        unit="(order)",
+        kind="regression",
+        admissible=admissible,
+        band=study.order_error,
+        note=f"error {study.mean_error[0]:.2g} → {study.mean_error[-1]:.2g} of ω₀ "
+        f"from Δt = {study.mean_dt[0]:.2g} s to {study.mean_dt[-1]:.2g} s"
+        + ("" if study.refined else "; refinement does not always help"),
+    )
+
+
+def claim_reference_converged(usual: Trajectory, tight: Trajectory) -> Finding:
+    """The reference does not change when its tolerances are cut tenfold."""
+    return Finding(
+        id=f"reference-{usual.method}",
+        title=f"{usual.method}: ω(t) is converged in rtol and rest speed together",
+        value=largest_change(usual, tight),
+        unit="of ω₀",
+        kind="regression",
+        admissible=(0.0, REFERENCE_BAND),
+        note=f"rtol {usual.settings['rtol']:g} → {tight.settings['rtol']:g}, "
+        f"rest speed {usual.settings['rest_speed']:g} → {tight.settings['rest_speed']:g} m/s",
+    )
+
+
+def claim_second_method(usual: Trajectory, other: Trajectory) -> Finding:
+    """A second integration method gives the same flight."""
+    return Finding(
+        id=f"second-method-{usual.method}",
+        title=f"{usual.method}: {other.settings['method']} gives the same ω(t) as {usual.settings['method']}",
+        value=largest_change(usual, other),
+        unit="of ω₀",
+        kind="regression",
+        admissible=(0.0, REFERENCE_BAND),
+    )
+
+
+def claim_gravity_cancels(with_gravity: Trajectory, without: Trajectory) -> Finding:
+    """A free engine spins the same with and without gravity."""
+    return Finding(
+        id="engine-gravity",
+        title=f"{with_gravity.method}: free flight is the same with g = 0",
+        value=largest_change(with_gravity, without),
+        unit="of ω₀",
+        kind="regression",
+        admissible=(0.0, GRAVITY_BAND),
+    )
+
+
+def claim_explosion_is_reported(trajectory: Trajectory) -> Finding:
+    """At the engine's default of 10 iterations the run explodes, and is reported as diverged instead of shown."""
+    diverged = trajectory.status == "diverged"
+    return Finding(
+        id="engine-default-iterations",
+        title=f"{trajectory.method} with its default 10 iterations: time at which an invariant breaks",
+        value=float(trajectory.t[-1]) if diverged else None,
+        unit="s",
+        kind="observation",
+        note=trajectory.message or "the run did not diverge",
+    )
+
+
+def claim_difference(difference: Difference) -> Finding:
+    """How far two solvers part: an observation with a band and a moment."""
+    return Finding(
+        id=f"difference-{difference.first}-{difference.second}",
+        title=f"{difference.name}: {difference.first} against {difference.second}",
+        value=difference.largest,
+        unit="of ω₀",
+        kind="observation",
+        band=difference.band,
+        note=f"largest at t = {difference.largest_time * 1e3:.1f} ms; {difference.moment}",
+    )
+
+
+def largest_change(first: Trajectory, second: Trajectory) -> float:
+    """Return max |omega_second - omega_first| / |omega_0|; NaN if either run is not complete or the grids differ."""
+    if len(first.t) != len(second.t) or not np.array_equal(first.t, second.t) or not (first.ok and second.ok):
+        return math.nan
+    return float(np.abs(second.omega - first.omega).max() / abs(first.scenario.omega0))
+
+
+def not_evaluated(id_: str, title: str, reason: str) -> Finding:
+    """A regression claim whose evidence is missing; it fails."""
+    return Finding(id=id_, title=title, value=None, unit="", kind="regression", note=reason)

@@ -1,0 +1,245 @@
+"""The command ``flipproof``. Heavy packages load only inside the command that needs them."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import signal
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+DEFAULT_OUT = Path("reports/latest")
+
+MANUAL = """\
+flipproof throws one bottle with many solvers and names every difference between them.
+
+The slice model of a flipping water bottle (closed-form steps, omega held constant over each)
+is compared with an event-driven integration of the paper's Eq. 8 and with a rigid tube full
+of sliding masses in the pymunk physics engine.
+
+commands:
+  report     run everything and write a validation report (HTML, JSON, CSV, SVG, PNG)
+  simulate   run one solver and write its trajectory as CSV
+  compare    compare two solvers, or two CSV files, in numbers
+  models     list every scheme, model and engine with its equation and reason
+"""
+
+EXAMPLES = """\
+examples:
+  flipproof report                              the paper's own throw, report in reports/latest
+  flipproof report throw.toml --out my-report   another throw
+  flipproof simulate --solver eq8 --out eq8.csv
+  flipproof compare published-python eq8
+  flipproof compare eq8.csv measured.csv
+
+exit status:
+  0  done; for a report: every claim was evaluated and no regression claim failed
+  1  a regression claim failed (ice constancy, published vectors, convergence)
+  2  bad input; one line on standard error says what and where
+"""
+
+SCENARIO_HELP = "scenario file (TOML with tables [scenario] and [bottle]); default: the paper's own throw"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; return the exit status (0, 1 or 2)."""
+    options = parser().parse_args(arguments)
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        status = options.action(options)
+        sys.stdout.flush()
+        return int(status)
+    except BrokenPipeError:
+        # The reader of our output went away (a closed pager): not an error of ours.
+        sys.stderr.close()
+        return 0
+    except KeyboardInterrupt:
+        print("flipproof: interrupted; nothing was overwritten", file=sys.stderr)
+        return 130
+    except (ValueError, OSError, MemoryError) as error:
+        print(f"flipproof: error: {' '.join(str(error).split()) or type(error).__name__}", file=sys.stderr)
+        return 2
+
+
+def _interrupt(*_: object) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the whole command line."""
+    top = argparse.ArgumentParser(
+        prog="flipproof", description=MANUAL, epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    top.add_argument("--version", action="version", version=f"flipproof {_version()}")
+    commands = top.add_subparsers(metavar="COMMAND", required=True)
+
+    report = _command(commands, "report", "Run everything and write a validation report.", command_report)
+    report.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
+    report.add_argument("--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="folder (default %(default)s)")
+    report.add_argument("--quick", action="store_true", help="fewer refinements, no second integration method")
+    report.add_argument(
+        "--slices", type=_count, metavar="N", help="slices at which solvers are compared (default 50, or the file's "
+        "number if smaller)",
+    )  # fmt: skip
+    report.add_argument("--jobs", type=_count, metavar="N", help="worker processes (default: one per core)")
+
+    simulate = _command(commands, "simulate", "Run one solver and write its trajectory as CSV.", command_simulate)
+    simulate.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
+    simulate.add_argument("--solver", default="exact-step", metavar="NAME", help="see 'flipproof models' (%(default)s)")
+    simulate.add_argument("--steps", type=_count, metavar="P", help="points of a scheme's grid (default 1000)")
+    simulate.add_argument("--slices", type=_count, metavar="N", help="cut the throw into N slices, alpha/2m unchanged")
+    simulate.add_argument("--out", type=Path, metavar="FILE.csv", help="file to write (default: standard output)")
+
+    compare = _command(commands, "compare", "Compare two solvers, or two CSV files, in numbers.", command_compare)
+    compare.add_argument("first", metavar="A", help="a solver's name, or a CSV file with columns t, theta, omega, r_cm")
+    compare.add_argument("second", metavar="B", help="the same; differences are B minus A")
+    compare.add_argument("--scenario", metavar="SCENARIO.toml", help=SCENARIO_HELP)
+    compare.add_argument("--slices", type=_count, metavar="N", help="slices for both solvers (default 50)")
+
+    _command(commands, "models", "List every scheme, model and engine.", command_models)
+    return top
+
+
+def _command(
+    commands: Any, name: str, description: str, action: Callable[[argparse.Namespace], int]
+) -> argparse.ArgumentParser:
+    command: argparse.ArgumentParser = commands.add_parser(name, description=description, help=description)
+    command.set_defaults(action=action)
+    return command
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
+    return int(text)
+
+
+def _version() -> str:
+    from importlib import metadata
+
+    try:
+        return metadata.version("flipproof")
+    except metadata.PackageNotFoundError:
+        return "from a checkout"
+
+
+def _scenario(path: str | None, slices: int | None = None) -> Any:
+    from slicemodel import Scenario
+
+    scenario = Scenario.from_toml(path) if path else Scenario()
+    return scenario.with_slices(slices) if slices else scenario
+
+
+def command_report(options: argparse.Namespace) -> int:
+    """Write a report; return 1 if a regression claim failed."""
+    scenario = _scenario(options.scenario)
+    from reports.output import check_replaceable, replaced_folder
+
+    check_replaceable(options.out)
+
+    from tqdm import tqdm
+
+    from reports.build import build, write
+    from reports.evidence import FULL, QUICK, gather, with_slices
+    from reports.provenance import provenance
+
+    began = time.perf_counter()
+    size = QUICK if options.quick else FULL
+    size = with_slices(size, options.slices or min(size.slices, scenario.n_slices))
+    command = shlex.join(["flipproof", *sys.argv[1:]])
+    with replaced_folder(options.out) as folder:
+        with tqdm(desc="runs", unit="run", disable=None, leave=False) as bar:
+
+            def progress(made: int, planned: int, tag: str) -> None:
+                bar.total = planned
+                bar.set_postfix_str(tag, refresh=False)
+                bar.update(made - bar.n)
+
+            evidence = gather(scenario, size, progress, options.jobs)
+        report = build(evidence, provenance(command))
+        write(report, folder)
+    _print_report(report, options.out, time.perf_counter() - began)
+    return 1 if report.failed else 0
+
+
+def _print_report(report: Any, out: Path, seconds: float) -> None:
+    print("Largest |difference in omega| / omega_0:")
+    for finding in report.findings:
+        if finding.id.startswith("difference-"):
+            print(f"  {finding.value:8.3%}  {finding.title}")
+    regressions = [finding for finding in report.findings if finding.kind == "regression"]
+    for finding in report.failed:
+        print(f"FAIL  {finding.title}: {finding.value_text} (threshold {finding.threshold_text}) {finding.note}")
+    print(f"{len(regressions) - len(report.failed)} of {len(regressions)} regression claims hold.")
+    print(f"Report: {out / 'index.html'} ({seconds:.0f} s)")
+
+
+def command_simulate(options: argparse.Namespace) -> int:
+    """Run one solver and write CSV."""
+    from reports.output import write_text
+    from reports.solvers import find, solve
+    from reports.tables import trajectory_csv
+
+    scenario = _scenario(options.scenario, options.slices)
+    solver = find(options.solver)
+    settings: dict[str, Any] = {}
+    if options.steps is not None:
+        if solver.package != "slicemodel":
+            raise ValueError(f"--steps {options.steps}: {solver.name} is not a scheme and chooses its own steps")
+        settings["steps"] = options.steps
+    if options.out and not options.out.parent.is_dir():
+        raise ValueError(f"--out {options.out}: the folder {options.out.parent} does not exist")
+    trajectory = solve(solver.name, scenario, **settings)
+    table = trajectory_csv(trajectory)
+    if options.out:
+        write_text(options.out, table)
+    else:
+        sys.stdout.write(table)
+    if not trajectory.ok:
+        print(f"flipproof: {solver.name}: {trajectory.status}: {trajectory.message}", file=sys.stderr)
+    return 0
+
+
+def command_compare(options: argparse.Namespace) -> int:
+    """Compare two solvers or files and print the differences."""
+    from reports.comparison import compare, table
+    from reports.solvers import find, solve
+    from reports.tables import Curve, read_curve
+
+    scenario = _scenario(options.scenario, options.slices)
+    if options.slices is None:
+        scenario = scenario.with_slices(min(50, scenario.n_slices))
+
+    def load(name: str) -> Curve:
+        path = Path(name)
+        if path.suffix or path.is_file():
+            return read_curve(path)
+        return Curve.of(solve(find(name).name, scenario))
+
+    print(table(compare(load(options.first), load(options.second))))
+    return 0
+
+
+def command_models(options: argparse.Namespace) -> int:
+    """List every solver with its equation and the reason it is there."""
+    del options
+    import textwrap
+
+    from reports.solvers import catalogue
+
+    package = ""
+    for solver in catalogue().values():
+        if solver.package != package:
+            package = solver.package
+            print(f"\n{package}.solve(scenario, {solver.keyword}=...)\n")
+        print(f"  {solver.name}")
+        for text in (solver.equation, solver.reason):
+            print(textwrap.fill(text, width=100, initial_indent="      ", subsequent_indent="      "))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,276 @@
+"""The runs that a report needs, made on all cores, and the studies that read them."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+
+from reports import vectors
+from reports.solvers import Made, Run, find, make, without_gravity
+from reports.studies.differences import Difference, study_difference
+from reports.studies.ice import IceDrift, plan_ice, plan_welded, study_ice
+from reports.studies.slices import SliceCount, plan_slices, study_slices
+from reports.studies.step_size import StepSize, before_first_impact, plan_step_size, study_step_size
+from slicemodel import Scenario, Trajectory
+
+Progress = Callable[[int, int, str], None]
+"""Called with runs made, runs planned and the last run's tag."""
+
+ENGINE = "pymunk"
+FLIGHTS = ("published-python", "published-limit", "exact-step", "eq8", ENGINE)
+OTHER_SCHEMES = ("published-matlab", "paper-typeset", "signs-corrected", "roots-corrected")
+MODELS = ("published-limit", "eq8")
+
+LIMITS = {"published-python": "published-limit", "exact-step": "eq8"}
+"""Scheme -> the model it converges to."""
+
+TOTAL = "everything: published program to free flight"
+
+DIFFERENCES = (
+    ("step size of the published program", "published-python", "published-limit"),
+    ("step size of the exact step", "exact-step", "eq8"),
+    ("algebra: signs, roots, drag reference", "published-limit", "eq8"),
+    ("model form: gravity, moving origin, drag, recoil", "eq8", ENGINE),
+    (TOTAL, "published-python", ENGINE),
+)
+"""Name, first, second. The first four walk from the published program to free flight; the last is their total."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Size:
+    """How much work a report does."""
+
+    name: str
+    slices: int = 50
+    steps: int = 1000
+    coarsest: int = 500
+    levels: int
+    start_coarsest: int = 8
+    counts: tuple[int, ...]
+    welded_dt: tuple[float, ...]
+    second_method: str | None
+
+
+FULL = Size(
+    name="full",
+    levels=6,
+    counts=(5, 10, 20, 50, 100, 200, 500),
+    welded_dt=(4e-4, 2e-4, 1e-4),
+    second_method="Radau",
+)
+QUICK = Size(name="quick", levels=4, counts=(5, 20, 50, 200), welded_dt=(4e-4, 2e-4, 1e-4), second_method=None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evidence:
+    """Everything a report is written from. A study is missing from its mapping if a run it needs failed."""
+
+    scenario: Scenario
+    throw: Scenario
+    size: Size
+    made: Mapping[str, Made]
+    differences: tuple[Difference, ...]
+    flights_by_step: Mapping[str, StepSize]
+    starts_by_step: Mapping[str, StepSize]
+    ice: tuple[IceDrift, ...]
+    welded: tuple[IceDrift, ...]
+    slices: Mapping[str, SliceCount]
+    vectors: Mapping[str, Mapping[str, float]]
+
+    def trajectory(self, tag: str) -> Trajectory | None:
+        """Return the trajectory of a run, or None if it failed."""
+        return self.made[tag].trajectory if tag in self.made else None
+
+
+def plan(throw: Scenario, size: Size) -> list[Run]:
+    """Return the runs of the report but for the step sizes, the slowest first."""
+    tight = {"rtol": 1e-11, "atol": 1e-14, "rest_speed": 1e-6}
+    runs = [
+        Run(f"{ENGINE}, finer", ENGINE, throw, _finer_engine(throw)),
+        Run(f"{ENGINE}, no gravity", ENGINE, without_gravity(throw)),
+        Run(ENGINE, ENGINE, throw),
+    ]
+    if size.second_method:
+        runs += [Run(f"{m}, {size.second_method}", m, throw, {"method": size.second_method}) for m in MODELS]
+    runs += [Run(f"{model}, tighter", model, throw, tight) for model in MODELS]
+    runs += [Run(model, model, throw) for model in MODELS]
+    runs += plan_welded(throw, ENGINE, size.welded_dt)
+    runs.append(Run(f"{ENGINE}, 10 iterations", ENGINE, throw, {"iterations": 10}))
+    runs += plan_ice(throw, tuple(LIMITS), MODELS, ENGINE)
+    for scheme in (*LIMITS, *OTHER_SCHEMES):
+        runs.append(Run(scheme, scheme, throw, {"steps": size.steps}))
+    for scheme in LIMITS:
+        runs += plan_slices(throw, scheme, size.counts)
+    runs += [
+        Run(f"vector {vector.name}", vector.scheme, vector.scenario, {"steps": vector.steps})
+        for vector in vectors.load_all()
+    ]
+    return runs
+
+
+def _finer_engine(throw: Scenario) -> dict[str, Any]:
+    """Half the engine's default step and twice its default iterations, refined together."""
+    from engine_check.settings import DEFAULT_DT, default_iterations
+
+    return {"dt": DEFAULT_DT / 2, "iterations": 2 * default_iterations(throw.n_slices, DEFAULT_DT)}
+
+
+def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None = None) -> Evidence:
+    """Make every run of a report and study them.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The throw as given; solvers are compared on it cut into ``size.slices`` slices.
+    size : Size
+    progress : callable (made, planned, tag)
+    jobs : int or None
+        Worker processes for the reference and the engine; None: one per core.
+    """
+    throw = scenario.with_slices(size.slices)
+    runs = plan(throw, size)
+    steps = {s: plan_step_size(throw, s, size.coarsest, size.levels) for s in LIMITS}
+    flat = runs + [run for levels in steps.values() for level in levels for run in level]
+    made = make_all(flat, progress, jobs)
+
+    def trajectory(tag: str) -> Trajectory | None:
+        return made[tag].trajectory
+
+    starts = {}
+    for scheme, model in LIMITS.items():
+        study = _study_start(throw, scheme, trajectory(model), size)
+        if study is not None:
+            starts[scheme] = study
+    return Evidence(
+        scenario=scenario,
+        throw=throw,
+        size=size,
+        made=made,
+        differences=tuple(_differences(made)),
+        flights_by_step={
+            scheme: study
+            for scheme, levels in steps.items()
+            if (study := _study_levels(trajectory(LIMITS[scheme]), levels, made)) is not None
+        },
+        starts_by_step=starts,
+        ice=tuple(_ice(made, [run.tag for run in runs if run.tag.startswith("ice,") and "welded" not in run.tag])),
+        welded=tuple(_ice(made, [run.tag for run in plan_welded(throw, ENGINE, size.welded_dt)])),
+        slices={
+            scheme: study
+            for scheme in LIMITS
+            if (study := _study_counts(made, [run.tag for run in plan_slices(throw, scheme, size.counts)])) is not None
+        },
+        vectors={
+            vector.name: vectors.deviations(vector, run)
+            for vector in vectors.load_all()
+            if (run := trajectory(f"vector {vector.name}")) is not None
+        },
+    )
+
+
+def make_all(runs: Iterable[Run], progress: Progress, jobs: int | None = None) -> dict[str, Made]:
+    """Make runs; the slice model's here, the slower ones in worker processes meanwhile."""
+    runs = list(runs)
+    made: dict[str, Made] = {}
+    here = [run for run in runs if find(run.solver).package == "slicemodel"]
+    away = [run for run in runs if find(run.solver).package != "slicemodel"]
+
+    def note(result: Made) -> None:
+        made[result.run.tag] = result
+        progress(len(made), len(runs), result.run.tag)
+
+    with workers(jobs) as pool:
+        pending = [pool.submit(make, run) for run in away]
+        for run in here:
+            note(make(run))
+        for future in as_completed(pending):
+            note(future.result())
+    return made
+
+
+@contextmanager
+def workers(jobs: int | None) -> Iterator[Executor]:
+    """Give a pool of worker processes; on any exception end them at once instead of waiting for their runs."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    pool = ProcessPoolExecutor(
+        max_workers=jobs or cores,
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=signal.signal,
+        initargs=(signal.SIGINT, signal.SIG_IGN),
+    )
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for child in multiprocessing.active_children():
+            child.terminate()
+        raise
+    pool.shutdown()
+
+
+def run_bands(made: Mapping[str, Made]) -> dict[str, float]:
+    """Return each flight's numerical band as a fraction of omega_0.
+
+    A scheme at its number of steps is a definite program: its step error is a difference with a bar of its own, so its
+    band is zero. For a model the change under tenfold tighter tolerances is the band; for the engine, of first order,
+    twice the change when step and iterations are refined together.
+    """
+    bands = dict.fromkeys(LIMITS, 0.0)
+    refined = {**{model: (f"{model}, tighter", 1.0) for model in MODELS}, ENGINE: (f"{ENGINE}, finer", 2.0)}
+    for tag, (finer, factor) in refined.items():
+        usual, better = made[tag].trajectory, made[finer].trajectory
+        if usual is not None and better is not None and usual.ok and better.ok:
+            bands[tag] = factor * study_difference(tag, usual, better).largest
+    return bands
+
+
+def _differences(made: Mapping[str, Made]) -> Iterator[Difference]:
+    bands = run_bands(made)
+    for name, first, second in DIFFERENCES:
+        one, other = made[first].trajectory, made[second].trajectory
+        if one is None or other is None:
+            continue
+        band = bands[first] + bands[second] if first in bands and second in bands else None
+        yield study_difference(name, one, other, band=band)
+
+
+def _study_levels(reference: Trajectory | None, levels: list[list[Run]], made: Mapping[str, Made]) -> StepSize | None:
+    runs = [[made[run.tag].trajectory for run in level] for level in levels]
+    complete = [[run for run in level if run is not None] for level in runs]
+    if reference is None or [len(level) for level in complete] != [len(level) for level in runs]:
+        return None
+    return study_step_size(reference, complete)
+
+
+def _study_start(throw: Scenario, scheme: str, reference: Trajectory | None, size: Size) -> StepSize | None:
+    """Study the step size on the part of the flight before any impact."""
+    start = before_first_impact(throw, reference) if reference is not None and reference.impacts is not None else None
+    if reference is None or start is None:
+        return None
+    levels = plan_step_size(start, scheme, size.start_coarsest, size.levels)
+    made = {run.tag: make(run) for level in levels for run in level}
+    short = make(Run("start", reference.method, start)).trajectory
+    return _study_levels(short, levels, made)
+
+
+def _ice(made: Mapping[str, Made], tags: Iterable[str]) -> Iterator[IceDrift]:
+    for tag in tags:
+        trajectory = made[tag].trajectory
+        if trajectory is not None:
+            yield study_ice(tag.removeprefix("ice, "), trajectory)
+
+
+def _study_counts(made: Mapping[str, Made], tags: list[str]) -> SliceCount | None:
+    runs = [trajectory for tag in tags if (trajectory := made[tag].trajectory) is not None]
+    return study_slices(runs) if len(runs) == len(tags) else None
+
+
+def with_slices(size: Size, slices: int) -> Size:
+    """Return the same amount of work at another number of slices."""
+    return replace(size, slices=slices)

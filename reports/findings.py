@@ -1,0 +1,89 @@
+"""A finding: one number, what it was held against, and the verdict."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+Kind = Literal["regression", "observation"]
+Verdict = Literal["pass", "fail", "not evaluated", "observed"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """One evaluated claim or observation.
+
+    Parameters
+    ----------
+    id : str
+        Stable name, an anchor of the page.
+    title : str
+        The claim in words.
+    value : float or None
+        None if it could not be computed.
+    unit : str
+    admissible : (low, high)
+        Closed interval the value must lie in; (-inf, inf) for an observation.
+    kind : {"regression", "observation"}
+        A failed regression sets the exit status; an observation cannot fail.
+    band : float or None
+        Numerical uncertainty of the value.
+    note : str
+        Where and when, or why it could not be evaluated.
+    """
+
+    id: str
+    title: str
+    value: float | None
+    unit: str
+    kind: Kind
+    admissible: tuple[float, float] = (-math.inf, math.inf)
+    band: float | None = None
+    note: str = ""
+
+    @property
+    def verdict(self) -> Verdict:
+        """Return the verdict; NaN is not inside any interval and fails."""
+        if self.value is None:
+            return "not evaluated"
+        if self.kind == "observation":
+            return "observed"
+        low, high = self.admissible
+        return "pass" if low <= self.value <= high else "fail"
+
+    @property
+    def failed(self) -> bool:
+        """True if a regression claim failed or could not be evaluated."""
+        return self.kind == "regression" and self.verdict != "pass"
+
+    @property
+    def threshold_text(self) -> str:
+        """The admissible interval as the table prints it."""
+        low, high = self.admissible
+        if math.isinf(low) and math.isinf(high):
+            return "none"
+        if math.isinf(low) or low == 0.0:
+            return f"≤ {high:.3g}"
+        if math.isinf(high):
+            return f"≥ {low:.3g}"
+        return f"{low:.3g} to {high:.3g}"
+
+    @property
+    def value_text(self) -> str:
+        """The value with its unit."""
+        return "–" if self.value is None else f"{self.value:.3g} {self.unit}".strip()
+
+    @property
+    def band_text(self) -> str:
+        """The numerical band, or a dash."""
+        return "–" if self.band is None else f"± {self.band:.1g}"
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the finding as JSON-ready data; infinite bounds become null."""
+        mapping = asdict(self)
+        mapping["admissible"] = [None if math.isinf(bound) else bound for bound in self.admissible]
+        if self.value is not None and not math.isfinite(self.value):
+            mapping["value"] = str(self.value)
+        mapping["verdict"] = self.verdict
+        return mapping

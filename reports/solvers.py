@@ -1,0 +1,102 @@
+"""Every solver of the three packages under one name, and runs of them as data."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from typing import Any
+
+from slicemodel import Scenario, Trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class Solver:
+    """A scheme, model or engine by name, with the package whose ``solve`` takes it."""
+
+    name: str
+    package: str
+    keyword: str
+    equation: str
+    reason: str
+
+
+def catalogue() -> dict[str, Solver]:
+    """Return every solver by name: the schemes, the models of the reference, the engines."""
+    from engine_check.solver import ENGINES
+    from ode_reference.models import MODELS
+    from slicemodel.schemes import SCHEMES
+
+    solvers = [Solver(s.name, "slicemodel", "scheme", s.limit, s.reason) for s in SCHEMES.values()]
+    solvers += [Solver(m.name, "ode_reference", "model", m.equation, m.reason) for m in MODELS.values()]
+    solvers += [Solver(e.name, "engine_check", "engine", e.equation, e.reason) for e in ENGINES.values()]
+    return {solver.name: solver for solver in solvers}
+
+
+def find(name: str) -> Solver:
+    """Return the solver of that name.
+
+    Raises
+    ------
+    ValueError
+        If there is none; the message names the nearest.
+    """
+    solvers = catalogue()
+    if name not in solvers:
+        nearest = get_close_matches(name, solvers, n=1)
+        advice = f"did you mean {nearest[0]!r}?" if nearest else f"known: {', '.join(solvers)}"
+        raise ValueError(f"solver {name!r} is unknown; {advice}")
+    return solvers[name]
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One run to make: solver, scenario and settings. ``tag`` tells runs of one solver apart; it must be unique."""
+
+    tag: str
+    solver: str
+    scenario: Scenario
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """A run that was made, and the seconds it took. ``trajectory`` is None if it failed for ``reason``."""
+
+    run: Run
+    trajectory: Trajectory | None
+    seconds: float
+    reason: str = ""
+
+
+def make(run: Run) -> Made:
+    """Make one run; whatever it raises becomes its reason, so that a report can show the failure in place."""
+    began = time.perf_counter()
+    try:
+        trajectory = solve(run.solver, run.scenario, **run.settings)
+    except (ValueError, ArithmeticError, MemoryError, RuntimeError) as error:
+        return Made(run, None, time.perf_counter() - began, f"{type(error).__name__}: {error}")
+    return Made(run, trajectory, time.perf_counter() - began)
+
+
+def solve(name: str, scenario: Scenario, **settings: Any) -> Trajectory:
+    """Run the named solver with its package's own ``solve``."""
+    solver = find(name)
+    settings = {solver.keyword: name, **settings}
+    if solver.package == "slicemodel":
+        import slicemodel
+
+        return slicemodel.solve(scenario, **settings)
+    if solver.package == "ode_reference":
+        import ode_reference
+
+        return ode_reference.solve(scenario, **settings)
+    import engine_check
+
+    return engine_check.solve(scenario, **settings)
+
+
+def without_gravity(scenario: Scenario) -> Scenario:
+    """Return the same throw far from any planet."""
+    return replace(scenario, gravity=0.0)

@@ -1,0 +1,134 @@
+"""Where two trajectories part: how much, when, and after which impact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from slicemodel import Impact, Trajectory
+from slicemodel.trajectory import FloatArray
+
+PARTING_BAND = 0.01
+"""Two solvers part when their omega differ by this fraction of omega_0."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Difference:
+    """Two runs of one throw, compared on their common times.
+
+    Parameters
+    ----------
+    name : str
+        The assumption that separates the two.
+    first, second : str
+        Labels of the runs.
+    t : (P,) [s]
+    omega : (P,)
+        (omega_second - omega_first) / omega_0, signed.
+    theta : (P,) [rad], r_cm : (P,)
+        Signed differences; r_cm as a fraction of the bottle's length.
+    largest : float
+        max |omega| over time, at ``largest_time``.
+    final : float
+        omega at the last common time.
+    parting_time : float or None
+        First time |omega| exceeds PARTING_BAND, interpolated [s]; None if it never does.
+    parting_impact : Impact or None
+        Last impact at or before the parting that one of the two knows (the reference's, if it has any).
+    band : float or None
+        Numerical uncertainty of ``largest``: the sum of the two runs' own.
+    """
+
+    name: str
+    first: str
+    second: str
+    t: FloatArray
+    omega: FloatArray
+    theta: FloatArray
+    r_cm: FloatArray
+    largest: float
+    largest_time: float
+    final: float
+    parting_time: float | None
+    parting_impact: Impact | None
+    band: float | None = None
+
+    @property
+    def moment(self) -> str:
+        """The parting in words."""
+        if self.parting_time is None:
+            return f"stay within {PARTING_BAND:.0%} of ω₀"
+        words = f"part at t = {self.parting_time * 1e3:.1f} ms"
+        if self.parting_impact is not None:
+            impact = self.parting_impact
+            words += f", after slice {impact.slice} hit the {impact.end} at {impact.time * 1e3:.1f} ms"
+        return words
+
+
+def study_difference(name: str, first: Trajectory, second: Trajectory, *, band: float | None = None) -> Difference:
+    """Compare two runs of one throw.
+
+    The two are compared on the first run's times, up to where the shorter one ends; the second is interpolated
+    linearly if its times differ.
+    """
+    end = min(first.t[-1], second.t[-1])
+    t = first.t[first.t <= end]
+    points = len(t)
+    omega0 = first.scenario.omega0
+    omega = (_at(t, second.t, second.omega) - first.omega[:points]) / omega0
+    size = np.abs(omega)
+    k = int(size.argmax())
+    parting = first_crossing(t, size, PARTING_BAND)
+    return Difference(
+        name=name,
+        first=first.label,
+        second=second.label,
+        t=t,
+        omega=omega,
+        theta=_at(t, second.t, second.theta) - first.theta[:points],
+        r_cm=(_at(t, second.t, second.r_cm) - first.r_cm[:points]) / first.scenario.bottle.length,
+        largest=float(size[k]),
+        largest_time=float(t[k]),
+        final=float(omega[-1]),
+        parting_time=parting,
+        parting_impact=None if parting is None else _last_impact(parting, first, second),
+        band=band,
+    )
+
+
+def _at(t: FloatArray, times: FloatArray, values: FloatArray) -> FloatArray:
+    if len(times) >= len(t) and np.array_equal(times[: len(t)], t):
+        return values[: len(t)]
+    return np.asarray(np.interp(t, times, values))
+
+
+def first_crossing(t: FloatArray, size: FloatArray, band: float) -> float | None:
+    """Return when ``size`` first exceeds ``band``, linear between points; None if never."""
+    above = size > band
+    if not above.any():
+        return None
+    k = int(above.argmax())
+    if k == 0:
+        return float(t[0])
+    share = (band - size[k - 1]) / (size[k] - size[k - 1])
+    return float(t[k - 1] + share * (t[k] - t[k - 1]))
+
+
+def _last_impact(parting: float, *trajectories: Trajectory) -> Impact | None:
+    """Return the last impact up to ``parting``, from the run whose impacts are located most finely."""
+    known = [t for t in trajectories if t.impacts is not None and len(t.impacts)]
+    known.sort(key=lambda trajectory: trajectory.solver != "ode_reference")
+    for trajectory in known:
+        assert trajectory.impacts is not None
+        k = int(np.searchsorted(trajectory.impacts.time, parting, side="right"))
+        if k:
+            impacts = trajectory.impacts
+            return Impact(
+                float(impacts.time[k - 1]),
+                int(impacts.slice[k - 1]),
+                "base" if impacts.end[k - 1] > 0 else "cap",
+                float(impacts.speed_before[k - 1]),
+                float(impacts.speed_after[k - 1]),
+            )
+    return None

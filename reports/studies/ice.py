@@ -1,0 +1,46 @@
+"""The ice case: nothing moves inside the bottle, so every change of omega is the solver's own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from reports.solvers import Run
+from slicemodel import Scenario, Trajectory
+from slicemodel.trajectory import FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IceDrift:
+    """|omega / omega_0 - 1| of one frozen run over time, and its maximum."""
+
+    label: str
+    package: str
+    t: FloatArray
+    drift: FloatArray
+    largest: float
+
+
+def frozen(scenario: Scenario) -> Scenario:
+    """Return the same throw with its water frozen."""
+    return replace(scenario, frozen=True)
+
+
+def plan_ice(scenario: Scenario, schemes: tuple[str, ...], models: tuple[str, ...], engine: str) -> list[Run]:
+    """Return frozen runs of the schemes, the models and the engine as one rigid body."""
+    ice = frozen(scenario)
+    runs = [Run(f"ice, {name}", name, ice) for name in (*schemes, *models)]
+    return [*runs, Run(f"ice, {engine} rigid", engine, ice, {"ice": "rigid"})]
+
+
+def plan_welded(scenario: Scenario, engine: str, steps: tuple[float, ...]) -> list[Run]:
+    """Return frozen runs of the engine with the masses welded on by joints, one per step size [s]."""
+    ice = frozen(scenario)
+    return [Run(f"ice, {engine} welded, dt = {dt:g} s", engine, ice, {"ice": "welded", "dt": dt}) for dt in steps]
+
+
+def study_ice(label: str, trajectory: Trajectory) -> IceDrift:
+    """Return the drift of one frozen run."""
+    drift = np.abs(trajectory.omega / trajectory.scenario.omega0 - 1.0)
+    return IceDrift(label=label, package=trajectory.solver, t=trajectory.t, drift=drift, largest=float(drift.max()))

@@ -1,0 +1,156 @@
+"""Studies on made-up curves whose answers are known."""
+
+import math
+
+import numpy as np
+import pytest
+
+from reports import claims
+from reports.findings import Finding
+from reports.studies.differences import first_crossing, study_difference
+from reports.studies.ice import study_ice
+from reports.studies.slices import study_slices
+from reports.studies.step_size import PHASES, levels, observed_order, study_step_size
+from slicemodel import Impacts, Scenario, Trajectory
+
+SCENARIO = Scenario(n_slices=1)
+
+
+def curve(omega, *, method="made-up", solver="slicemodel", impacts=None, t=None, status="ok", **settings) -> Trajectory:
+    omega = np.asarray(omega, dtype=float)
+    points = len(omega)
+    return Trajectory(
+        scenario=SCENARIO,
+        solver=solver,
+        method=method,
+        t=np.linspace(0.0, 0.5, points) if t is None else t,
+        theta=np.zeros(points),
+        omega=omega,
+        r=np.full((points, 1), 0.1),
+        v=np.zeros((points, 1)),
+        r_cm=np.full(points, 0.1),
+        inertia=np.ones(points),
+        impacts=impacts,
+        status=status,
+        settings=settings,
+    )
+
+
+def test_parting_is_interpolated_and_follows_the_last_impact():
+    t = np.linspace(0.0, 0.5, 6)
+    first = curve(np.full(6, 20.0))
+    impacts = Impacts(
+        time=[0.05, 0.26, 0.3], slice=[3, 7, 1], end=[1, -1, 1], speed_before=[1] * 3, speed_after=[1] * 3
+    )
+    # 0, 0, 0, 0.08, 0.4, 0.8 rad/s: crosses 0.2 rad/s = 1 % a part of (0.2 - 0.08)/(0.4 - 0.08) after 0.3 s.
+    second = curve(20.0 - np.array([0, 0, 0, 0.08, 0.4, 0.8]), solver="ode_reference", impacts=impacts)
+    difference = study_difference("x", first, second)
+    assert difference.parting_time == pytest.approx(0.3 + 0.1 * 0.375)
+    assert difference.parting_impact.slice == 1
+    assert difference.parting_impact.end == "base"
+    assert difference.largest == pytest.approx(0.04)
+    assert difference.largest_time == t[-1]
+    assert difference.final == pytest.approx(-0.04)
+
+
+def test_no_parting_is_said_so():
+    difference = study_difference("x", curve([20, 20]), curve([20, 20.1]))
+    assert difference.parting_time is None
+    assert "stay within" in difference.moment
+
+
+def test_a_shorter_run_is_compared_while_it_lasts():
+    short = curve([20, 20, 30], t=[0.0, 0.1, 0.2], status="diverged")
+    difference = study_difference("x", curve(np.full(6, 20.0)), short)
+    assert difference.t[-1] == pytest.approx(0.2)
+    assert difference.largest == pytest.approx(0.5)
+
+
+def test_first_crossing_at_the_first_point_and_never():
+    t = np.array([0.0, 1.0])
+    assert first_crossing(t, np.array([0.5, 0.6]), 0.1) == 0.0
+    assert first_crossing(t, np.array([0.0, 0.1]), 0.1) is None
+
+
+def test_levels_double_and_spread():
+    grids = levels(100, 3)
+    assert [grid[0] for grid in grids] == [100, 200, 400]
+    assert all(len(set(grid)) == PHASES for grid in grids)
+
+
+@pytest.mark.parametrize("order", [0.5, 1.0, 2.0])
+def test_observed_order_finds_the_order(order):
+    dt = np.outer(2.0 ** -np.arange(5), [1.0, 0.9])
+    slope, error = observed_order(dt, 3 * dt**order)
+    assert slope == pytest.approx(order, abs=1e-3)
+    assert error < 1e-3
+
+
+@pytest.mark.parametrize("spoil", [math.nan, math.inf, 1e-16])
+def test_an_order_of_nonsense_is_nan_and_fails(spoil):
+    dt = np.outer(2.0 ** -np.arange(4), [1.0, 0.9])
+    error = dt.copy()
+    error[2, 1] = spoil
+    assert math.isnan(observed_order(dt, error)[0])
+    assert not 0.9 <= observed_order(dt, error)[0] <= 1.1
+
+
+def step_runs(error_of_dt):
+    return [
+        [curve(20 + np.array([0.0, 0.0, 20 * error_of_dt(dt)]), method="scheme", dt=dt) for dt in (h, 0.9 * h)]
+        for h in (0.1, 0.05, 0.025, 0.0125)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("error_of_dt", "verdict"),
+    [
+        (lambda dt: 0.3 * dt, "pass"),
+        (lambda dt: 0.3 * dt**2, "fail"),  # too good is wrong too
+        (lambda dt: 0.3 * dt**0.5, "fail"),
+        (lambda dt: 0.01 + 0.3 * dt, "fail"),  # converges, but to another equation
+        (lambda dt: 0.3 * dt * (5 if dt < 0.02 else 1), "fail"),  # refinement stops helping
+    ],
+)
+def test_claim_order_accepts_first_order_and_nothing_else(error_of_dt, verdict):
+    reference = curve([20.0, 20.0, 20.0], method="limit")
+    study = study_step_size(reference, step_runs(error_of_dt))
+    assert claims.claim_order(study, "here", (0.9, 1.1)).verdict == verdict
+
+
+def test_a_run_that_ends_early_has_no_order():
+    reference = curve([20.0, 20.0, 20.0])
+    runs = step_runs(lambda dt: dt)
+    runs[1][0] = curve([20, 20], t=[0.0, 0.1], method="scheme", status="overflow", dt=0.05)
+    study = study_step_size(reference, runs)
+    assert math.isnan(study.order)
+    assert claims.claim_order(study, "here", (0.9, 1.1)).failed
+
+
+def test_ice_and_slices():
+    assert study_ice("x", curve([20, 20.2])).largest == pytest.approx(0.01)
+    study = study_slices([curve([20, 10]), curve([20, 12])])
+    assert study.distance == pytest.approx([0.1, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("value", "verdict", "failed"),
+    [(0.5, "pass", False), (1.5, "fail", True), (math.nan, "fail", True), (None, "not evaluated", True)],
+)
+def test_verdicts(value, verdict, failed):
+    finding = Finding(id="x", title="x", value=value, unit="", kind="regression", admissible=(0.0, 1.0))
+    assert (finding.verdict, finding.failed) == (verdict, failed)
+
+
+def test_an_observation_cannot_fail_and_json_holds_no_infinity():
+    finding = Finding(id="x", title="x", value=math.inf, unit="", kind="observation")
+    assert not finding.failed
+    assert finding.to_mapping()["admissible"] == [None, None]
+    assert finding.to_mapping()["value"] == "inf"
+
+
+def test_largest_change_of_incomparable_runs_is_nan():
+    whole = curve([20, 20, 20])
+    assert claims.largest_change(whole, curve([20, 20, 20.2])) == pytest.approx(0.01)
+    assert math.isnan(claims.largest_change(whole, curve([20, 20])))
+    assert math.isnan(claims.largest_change(whole, curve([20, 20, 20], status="diverged")))
