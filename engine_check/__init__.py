@@ -1,0 +1,31 @@
+"""The same throw in a rigid-body engine: a free tube in the lab frame, masses sliding in it.
+
+Importing this package loads no engine; the engine's own package is imported inside the first ``solve``.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from engine_check.pymunk_settings import PymunkKnobs
+    from engine_check.solver import DEFAULT_DT, ENGINES, SetupError, solve
+
+__all__ = ["DEFAULT_DT", "ENGINES", "PymunkKnobs", "SetupError", "solve"]
+
+_HOMES = {
+    "DEFAULT_DT": "engine_check.solver",
+    "ENGINES": "engine_check.solver",
+    "PymunkKnobs": "engine_check.pymunk_settings",
+    "SetupError": "engine_check.solver",
+    "solve": "engine_check.solver",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import what is asked for on first use (PEP 562), so that start-up stays light."""
+    if name in _HOMES:
+        from importlib import import_module
+
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'engine_check' has no attribute {name!r}")

@@ -116,9 +116,9 @@ def _ice_findings(evidence: Evidence) -> Iterator[Finding]:
     trajectories = [made.trajectory for made in runs if made.trajectory is not None]
     if len(trajectories) == len(runs):
         yield claims.claim_welded_order(
-            [trajectory.settings["dt"] for trajectory in trajectories],
+            [trajectory.settings["step"] for trajectory in trajectories],
             list(evidence.welded),
-            trajectories[0].diagnostics["welded_order"],
+            trajectories[0].diagnostics["weld_order"],
         )
     else:
         yield _missing(evidence, "ice-welded-order", "drift of welded ice", *(made.run.tag for made in runs))

@@ -19,12 +19,6 @@ flipproof throws one bottle with many solvers and names every difference between
 The slice model of a flipping water bottle (closed-form steps, omega held constant over each)
 is compared with an event-driven integration of the paper's Eq. 8 and with a rigid tube full
 of sliding masses in the pymunk physics engine.
-
-commands:
-  report     run everything and write a validation report (HTML, JSON, CSV, SVG, PNG)
-  simulate   run one solver and write its trajectory as CSV
-  compare    compare two solvers, or two CSV files, in numbers
-  models     list every scheme, model and engine with its equation and reason
 """
 
 EXAMPLES = """\
@@ -74,7 +68,7 @@ def parser() -> argparse.ArgumentParser:
         prog="flipproof", description=MANUAL, epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     top.add_argument("--version", action="version", version=f"flipproof {_version()}")
-    commands = top.add_subparsers(metavar="COMMAND", required=True)
+    commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
     report = _command(commands, "report", "Run everything and write a validation report.", command_report)
     report.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)

@@ -116,9 +116,10 @@ def plan(throw: Scenario, size: Size) -> list[Run]:
 
 def _finer_engine(throw: Scenario) -> dict[str, Any]:
     """Half the engine's default step and twice its default iterations, refined together."""
-    from engine_check.settings import DEFAULT_DT, default_iterations
+    from engine_check.pymunk_settings import enough_iterations
+    from engine_check.solver import DEFAULT_DT
 
-    return {"dt": DEFAULT_DT / 2, "iterations": 2 * default_iterations(throw.n_slices, DEFAULT_DT)}
+    return {"dt": DEFAULT_DT / 2, "iterations": 2 * enough_iterations(throw)}
 
 
 def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None = None) -> Evidence:

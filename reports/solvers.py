@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from typing import Any
 
 from slicemodel import Scenario, Trajectory
+from slicemodel.scenario import unknown_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ def catalogue() -> dict[str, Solver]:
     from slicemodel.schemes import SCHEMES
 
     solvers = [Solver(s.name, "slicemodel", "scheme", s.limit, s.reason) for s in SCHEMES.values()]
-    solvers += [Solver(m.name, "ode_reference", "model", m.equation, m.reason) for m in MODELS.values()]
+    solvers += [Solver(m, "ode_reference", "model", "eq", "re") for m in MODELS]
     solvers += [Solver(e.name, "engine_check", "engine", e.equation, e.reason) for e in ENGINES.values()]
     return {solver.name: solver for solver in solvers}
 
@@ -44,9 +44,7 @@ def find(name: str) -> Solver:
     """
     solvers = catalogue()
     if name not in solvers:
-        nearest = get_close_matches(name, solvers, n=1)
-        advice = f"did you mean {nearest[0]!r}?" if nearest else f"known: {', '.join(solvers)}"
-        raise ValueError(f"solver {name!r} is unknown; {advice}")
+        raise ValueError(unknown_name("solver", name, solvers))
     return solvers[name]
 
 

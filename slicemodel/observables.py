@@ -51,3 +51,25 @@ def moment_of_inertia(scenario: Scenario, r: ArrayLike) -> FloatArray:
 def initial_moment_of_inertia(scenario: Scenario) -> float:
     """J_0 of the bottle at release, slices stacked on the base [kg m^2]."""
     return float(moment_of_inertia(scenario, scenario.initial_positions()))
+
+
+def plateau(t: ArrayLike, omega: ArrayLike, omega0: float) -> float:
+    """Mean of omega / omega_0 over the second half of the flight, by the trapezoidal rule.
+
+    Parameters
+    ----------
+    t : array, shape (P,) [s]
+    omega : array, shape (P,) [rad/s]
+    omega0 : float [rad/s]
+
+    Returns
+    -------
+    float
+        Independent of the grid up to the rule's second-order error.
+    """
+    times, values = np.asarray(t, dtype=np.float64), np.asarray(omega, dtype=np.float64)
+    middle = (times[0] + times[-1]) / 2
+    late = times > middle
+    grid = np.concatenate(([middle], times[late]))
+    curve = np.concatenate(([np.interp(middle, times, values)], values[late]))
+    return float(np.trapezoid(curve, grid) / (grid[-1] - grid[0]) / omega0)

@@ -345,10 +345,21 @@ def _toml_value(value: object) -> str:
     return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
+def unknown_name(what: str, given: object, known: Iterable[str]) -> str:
+    """Return the message for a name that is not known: the nearest one that is, or all of them.
+
+    ``what`` leads to the name, such as "scheme =" or "throw.toml: [bottle] key".
+    """
+    by_lower_case = {name.lower(): name for name in known}
+    nearest = get_close_matches(str(given).lower(), by_lower_case, n=1)
+    advice = (
+        f"did you mean {by_lower_case[nearest[0]]!r}?" if nearest else f"known: {', '.join(by_lower_case.values())}"
+    )
+    return f"{what} {given!r} is unknown; {advice}"
+
+
 def _refuse_unknown(given: Iterable[str], known: Iterable[str], what: str) -> None:
     known = list(known)
     for name in given:
         if name not in known:
-            nearest = get_close_matches(name, known, n=1)
-            advice = f"did you mean {nearest[0]!r}?" if nearest else f"known: {', '.join(known)}"
-            raise ScenarioError(f"{what} {name!r} is unknown; {advice}")
+            raise ScenarioError(unknown_name(what, name, known))

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numbers
-from difflib import get_close_matches
 from typing import Any, Literal, get_args
 
 import numpy as np
 
-from slicemodel.scenario import Scenario
+from slicemodel.scenario import Scenario, unknown_name
 from slicemodel.schemes import SCHEMES, Scheme, StepConstants
 from slicemodel.trajectory import FloatArray, Impacts, Trajectory
 
@@ -53,13 +52,11 @@ def solve(
     are frozen at the start of the step, across impacts because a rebound waits for the grid.
     """
     if scheme not in SCHEMES:
-        nearest = get_close_matches(scheme, SCHEMES, n=1)
-        advice = f"did you mean {nearest[0]!r}?" if nearest else f"known: {', '.join(SCHEMES)}"
-        raise ValueError(f"scheme = {scheme!r} is unknown; {advice}")
+        raise ValueError(unknown_name("scheme =", scheme, SCHEMES))
     if isinstance(steps, bool) or not isinstance(steps, numbers.Integral) or steps < 2:
         raise ValueError(f"steps = {steps!r} is not a whole number of at least 2 (points of the grid)")
     if store not in get_args(Store):
-        raise ValueError(f"store = {store!r} is unknown; known: {', '.join(get_args(Store))}")
+        raise ValueError(unknown_name("store =", store, get_args(Store)))
     return _run(scenario, SCHEMES[scheme], int(steps), store)
 
 

@@ -1,0 +1,133 @@
+"""Every knob of the pymunk world: value, unit and reason, in one place.
+
+pymunk's defaults are made for games in pixels; none is left to stand. How Chipmunk steps explains most
+reasons below. ``space.step(dt)`` does, in this order::
+
+    x += (v + v_bias) dt      positions, with the velocities of the step before
+    find contacts             at the new positions; no swept test
+    prestep                   effective masses, bounce speed e * v_normal, bias speeds
+    v += g dt                 velocities
+    warm start                the impulses that contacts and joints kept from the step before
+    iterate                   all contacts, then all joints in order of insertion, ``iterations`` times
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Final
+
+from slicemodel.scenario import Scenario, unknown_name
+
+CAP_ELASTICITY: Final = 1.0
+"""The engine multiplies the elasticities of the two partners [1] (default 0): slices carry e, so caps carry 1."""
+
+LEAST_ITERATIONS: Final = 50
+ITERATIONS_MARGIN: Final = 1.0
+"""Twice the measured threshold of 0.4-0.5 (see ``enough_iterations``)."""
+
+
+def enough_iterations(scenario: Scenario) -> int:
+    """Return the solver iterations that a scenario needs: ``max(50, M_w / M_b * sqrt(N))``.
+
+    The solver is a Gauss-Seidel sweep. Many slices hang on one light tube, so the tube's velocity is
+    passed on N times per sweep, and convergence slows with the mass ratio and with N. Measured threshold
+    at which omega(T) settles in all printed digits, at e = 0.5, alpha/m = 10 /s, dt = 1e-4 s:
+
+    ==========  ====  ====  ====  ====  =====  =====
+    N           10    20    50    100   200    50
+    M_w / M_b   18    18    18    18    18     36
+    threshold   30    40    65    75    110    120
+    returned    57    80    127   179   253    253
+    ==========  ====  ====  ====  ====  =====  =====
+
+    Below the threshold the joints open and omega jumps; a smaller ``dt`` does not help. Above it more
+    iterations change nothing, because the warm start carries the impulses from step to step.
+    """
+    mass_ratio = scenario.water_mass / scenario.bottle.mass
+    return max(LEAST_ITERATIONS, math.ceil(ITERATIONS_MARGIN * mass_ratio * math.sqrt(scenario.n_slices)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PymunkKnobs:
+    """The settings of the pymunk world apart from ``dt`` and ``iterations``.
+
+    Parameters
+    ----------
+    collision_bias : float
+        Share of a penetration that is left after one second [1], in [0, 1]; pymunk's default 0.0018.
+        1: penetration is never pushed back. Pushing back moves bodies without changing their velocities,
+        which breaks angular momentum (by 5e-4 at full correction in the default throw, 1e-13 at 1).
+    collision_slop : float
+        Penetration that is left alone [m]; pymunk's default 0.1 would be a third of the bottle.
+    collision_persistence : int
+        Steps for which a contact's impulse is kept after separation; pymunk's default 3. A slice that comes
+        back must not start from the impulse of its last impact (omega differs by up to 3e-3 rad/s in 0.5 s);
+        1 forgets at once, 0 would forget contacts in use.
+    error_bias : float
+        Share of a joint's position error that is left after one second [1], in [0, 1]; pymunk's default 0.0018.
+        0 removes it within one step. The correction acts on real velocities, so it supplies the half of the
+        Coriolis force that a velocity constraint at the start of the step lacks: theta becomes order 2.
+    damping : float
+        Share of every velocity that is left after one second [1]; 1: space itself brakes nothing.
+    friction : float
+        Friction of caps and slices [1]; contacts act along the axis only.
+    cap_thickness : float
+        Thickness of the end caps beyond the inner face [L]. There is no swept test: a slice must not cross
+        the cap within one step (5 m/s at 1e-4 s is 5e-4 m, the cap 0.14 m).
+    groove_reach : float
+        Ends of the groove from the tube's centre [L], above 0.5. They are dead stops, so they lie outside the tube.
+    anchor_distance : float
+        Anchor of the drag damper from the tube's centre along the axis [L], above 0.5: on one side of all
+        slices, so that the damper's direction is the axis; no farther, because digits are lost to distance.
+    """
+
+    collision_bias: float = 1.0
+    collision_slop: float = 0.0
+    collision_persistence: int = 1
+    error_bias: float = 0.0
+    damping: float = 1.0
+    friction: float = 0.0
+    cap_thickness: float = 0.5
+    groove_reach: float = 1.0
+    anchor_distance: float = 10.0
+
+    def __post_init__(self) -> None:
+        problems = [
+            f"{name} = {getattr(self, name)!r} is outside {_range_words(*_RANGES[name])}"
+            for name in _RANGES
+            if not _RANGES[name][0] <= getattr(self, name) <= _RANGES[name][1]
+        ]
+        if problems:
+            raise ValueError("; ".join(problems))
+
+    @classmethod
+    def from_overrides(cls, overrides: Mapping[str, float]) -> PymunkKnobs:
+        """Return the defaults with some knobs changed; an unknown name raises ValueError with the nearest."""
+        known = [f.name for f in fields(cls)]
+        for name in overrides:
+            if name not in known:
+                raise ValueError(unknown_name("knob =", name, known))
+        return cls(**overrides)  # type: ignore[arg-type]
+
+    def to_mapping(self) -> dict[str, float]:
+        """Return all knobs by name."""
+        return asdict(self)
+
+
+def _range_words(low: float, high: float) -> str:
+    return f"[{low:g}, inf)" if math.isinf(high) else f"[{low:g}, {high:g}]"
+
+
+_RANGES: Final[Mapping[str, tuple[float, float]]] = {
+    "collision_bias": (0.0, 1.0),
+    "collision_slop": (0.0, math.inf),
+    "collision_persistence": (1, 1_000_000),
+    "error_bias": (0.0, 1.0),
+    "damping": (0.0, 1.0),
+    "friction": (0.0, math.inf),
+    "cap_thickness": (0.0, math.inf),
+    "groove_reach": (0.0, math.inf),
+    "anchor_distance": (0.0, math.inf),
+}

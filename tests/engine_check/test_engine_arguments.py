@@ -1,0 +1,121 @@
+"""What the public verb refuses, and what it says."""
+
+import math
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import engine_check
+from engine_check import ENGINES, PymunkKnobs, solve
+from engine_check.pymunk_settings import enough_iterations
+from slicemodel.scenario import Scenario
+
+ROOT = Path(__file__).resolve().parents[2]
+THROW = replace(Scenario(), n_slices=2, duration=0.01)
+
+
+def test_an_unknown_engine_is_named_with_the_nearest():
+    with pytest.raises(ValueError, match=r"engine = 'pymonk' is unknown; did you mean 'pymunk'\?"):
+        solve(THROW, engine="pymonk")
+
+
+def test_an_engine_unlike_any_lists_all():
+    with pytest.raises(ValueError, match="known: pymunk"):
+        solve(THROW, engine="xyz")
+
+
+@pytest.mark.parametrize("dt", [0.0, -1e-4, math.nan, math.inf, 0.011])
+def test_dt_out_of_range_is_named_with_the_range(dt):
+    with pytest.raises(ValueError, match=r"dt = .* s is outside \(0, 0.01\] s"):
+        solve(THROW, dt=dt)
+
+
+@pytest.mark.parametrize("dt", ["1e-4", None, True])
+def test_dt_must_be_a_number(dt):
+    with pytest.raises(ValueError, match=r"dt = .* is not a number"):
+        solve(THROW, dt=dt)
+
+
+@pytest.mark.parametrize("iterations", [0, -1, 1.5, math.nan, True, "10", 10**7])
+def test_iterations_out_of_range_are_named_with_the_range(iterations):
+    with pytest.raises(ValueError, match=r"iterations = .* is not a whole number in \[1, 1000000\]"):
+        solve(THROW, iterations=iterations)
+
+
+@pytest.mark.parametrize(
+    ("times", "words"),
+    [([0.0, 0.02], "outside"), ([0.005, 0.005], "increase"), ([], "non-empty"), ([math.nan], "outside")],
+)
+def test_times_are_checked(times, words):
+    with pytest.raises(ValueError, match=words):
+        solve(THROW, times=times)
+
+
+def test_an_unknown_ice_model_is_named_with_the_nearest():
+    with pytest.raises(ValueError, match=r"ice = 'weld' is unknown; did you mean 'welded'\?"):
+        solve(THROW, ice="weld")
+
+
+def test_an_unknown_knob_is_named_with_the_nearest():
+    with pytest.raises(ValueError, match=r"knob = 'colision_slop' is unknown; did you mean 'collision_slop'\?"):
+        solve(THROW, colision_slop=0.1)
+
+
+@pytest.mark.parametrize(
+    ("knob", "value"), [("collision_bias", 1.5), ("collision_slop", -1.0), ("error_bias", math.nan), ("damping", 2.0)]
+)
+def test_a_knob_out_of_range_is_named_with_the_range(knob, value):
+    with pytest.raises(ValueError, match=rf"{knob} = .* is outside \[0"):
+        solve(THROW, **{knob: value})
+
+
+def test_iterations_grow_with_mass_ratio_and_slices_and_are_stated():
+    assert enough_iterations(Scenario().with_slices(50)) == 127
+    assert enough_iterations(replace(Scenario(), water_mass=1.0).with_slices(50)) == 253
+    assert enough_iterations(replace(Scenario(), n_slices=2)) == 50
+    assert solve(THROW).settings["iterations"] == 50
+    assert solve(THROW, iterations=60).settings["iterations"] == 60
+
+
+def test_settings_hold_every_knob_and_the_versions():
+    settings = solve(THROW, collision_slop=1e-6).settings
+    assert set(PymunkKnobs().to_mapping()) <= set(settings)
+    assert settings["collision_slop"] == 1e-6
+    assert settings["pymunk_version"].startswith("7.")
+    assert settings["chipmunk_version"]
+    assert settings["reads"] == "batch"
+
+
+def test_the_defaults_are_those_whose_reasons_are_written_down():
+    assert PymunkKnobs().to_mapping() == {
+        "collision_bias": 1.0,
+        "collision_slop": 0.0,
+        "collision_persistence": 1,
+        "error_bias": 0.0,
+        "damping": 1.0,
+        "friction": 0.0,
+        "cap_thickness": 0.5,
+        "groove_reach": 1.0,
+        "anchor_distance": 10.0,
+    }
+
+
+def test_importing_the_package_loads_no_engine():
+    code = "import sys, engine_check; sys.exit(any(name in sys.modules for name in ('pymunk', 'numpy')))"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
+    code = "import sys; from engine_check import solve, PymunkKnobs; sys.exit('pymunk' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
+
+
+def test_an_unknown_export_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="no attribute 'resolve'"):
+        _ = engine_check.resolve
+
+
+def test_every_registered_engine_runs():
+    for engine in ENGINES:
+        assert np.all(np.isfinite(solve(THROW, engine=engine).omega))
