@@ -67,10 +67,10 @@ def claim_welded_order(dt: list[float], drifts: list[IceDrift], printed_order: f
         id="ice-welded-order",
         title="ice: drift of the welded engine falls with Δt at its printed order",
         value=order,
-        unit="(order)",
+        unit="",
         kind="regression",
         admissible=(printed_order - 0.3, printed_order + 0.3),
-        note="drift " + ", ".join(f"{size:.2g} at {step:g} s" for step, size in zip(dt, sizes, strict=True)),
+        note="drift " + ", ".join(f"{size:.2g} at Δt = {step:.2g} s" for step, size in zip(dt, sizes, strict=True)),
     )
 
 
@@ -80,7 +80,7 @@ def claim_order(study: StepSize, where: str, admissible: tuple[float, float]) ->
         id=f"order-{study.scheme}-{where.replace(' ', '-')}",
         title=f"{study.scheme} converges to {study.model} at order 1, {where}",
         value=study.order if study.refined else math.nan,
-        unit="(order)",
+        unit="",
         kind="regression",
         admissible=admissible,
         band=study.order_error,
@@ -133,7 +133,7 @@ def claim_explosion_is_reported(trajectory: Trajectory) -> Finding:
     diverged = trajectory.status == "diverged"
     return Finding(
         id="engine-default-iterations",
-        title=f"{trajectory.method} with its default 10 iterations: time at which an invariant breaks",
+        title=f"{trajectory.method} with its default 10 iterations: last output time before an invariant breaks",
         value=float(trajectory.t[-1]) if diverged else None,
         unit="s",
         kind="observation",

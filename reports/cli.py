@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 DEFAULT_OUT = Path("reports/latest")
+INTERRUPTED = 130
 
 MANUAL = """\
 flipproof throws one bottle with many solvers and names every difference between them.
@@ -33,6 +34,7 @@ exit status:
   0  done; for a report: every claim was evaluated and no regression claim failed
   1  a regression claim failed (ice constancy, published vectors, convergence)
   2  bad input; one line on standard error says what and where
+  130  interrupted; an older report is as it was
 """
 
 SCENARIO_HELP = "scenario file (TOML with tables [scenario] and [bottle]); default: the paper's own throw"
@@ -41,7 +43,8 @@ SCENARIO_HELP = "scenario file (TOML with tables [scenario] and [bottle]); defau
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status (0, 1 or 2)."""
     options = parser().parse_args(arguments)
-    signal.signal(signal.SIGTERM, _interrupt)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _interrupt)
     try:
         status = options.action(options)
         sys.stdout.flush()
@@ -52,13 +55,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except KeyboardInterrupt:
         print("flipproof: interrupted; nothing was overwritten", file=sys.stderr)
-        return 130
+        return INTERRUPTED
     except (ValueError, OSError, MemoryError) as error:
         print(f"flipproof: error: {' '.join(str(error).split()) or type(error).__name__}", file=sys.stderr)
         return 2
 
 
 def _interrupt(*_: object) -> NoReturn:
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)  # a second one must not break the cleaning up
     raise KeyboardInterrupt
 
 
@@ -117,7 +122,7 @@ def _version() -> str:
     try:
         return metadata.version("flipproof")
     except metadata.PackageNotFoundError:
-        return "from a checkout"
+        return "checkout"
 
 
 def _scenario(path: str | None, slices: int | None = None) -> Any:

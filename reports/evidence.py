@@ -42,6 +42,10 @@ DIFFERENCES = (
 """Name, first, second. The first four walk from the published program to free flight; the last is their total."""
 
 
+MODEL_FLOOR = 1e-9
+"""Least band of a model, fraction of omega_0: the digits that independent methods share; none finer is claimed."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Size:
     """How much work a report does."""
@@ -53,7 +57,6 @@ class Size:
     levels: int
     start_coarsest: int = 8
     counts: tuple[int, ...]
-    welded_dt: tuple[float, ...]
     second_method: str | None
 
 
@@ -61,10 +64,9 @@ FULL = Size(
     name="full",
     levels=6,
     counts=(5, 10, 20, 50, 100, 200, 500),
-    welded_dt=(4e-4, 2e-4, 1e-4),
     second_method="Radau",
 )
-QUICK = Size(name="quick", levels=4, counts=(5, 20, 50, 200), welded_dt=(4e-4, 2e-4, 1e-4), second_method=None)
+QUICK = Size(name="quick", levels=4, counts=(5, 20, 50, 200), second_method=None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,7 +102,7 @@ def plan(throw: Scenario, size: Size) -> list[Run]:
         runs += [Run(f"{m}, {size.second_method}", m, throw, {"method": size.second_method}) for m in MODELS]
     runs += [Run(f"{model}, tighter", model, throw, tight) for model in MODELS]
     runs += [Run(model, model, throw) for model in MODELS]
-    runs += plan_welded(throw, ENGINE, size.welded_dt)
+    runs += plan_welded(throw, ENGINE)
     runs.append(Run(f"{ENGINE}, 10 iterations", ENGINE, throw, {"iterations": 10}))
     runs += plan_ice(throw, tuple(LIMITS), MODELS, ENGINE)
     for scheme in (*LIMITS, *OTHER_SCHEMES):
@@ -138,16 +140,11 @@ def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None 
     runs = plan(throw, size)
     steps = {s: plan_step_size(throw, s, size.coarsest, size.levels) for s in LIMITS}
     flat = runs + [run for levels in steps.values() for level in levels for run in level]
-    made = make_all(flat, progress, jobs)
+    with workers(jobs) as pool:
+        made = make_all(pool, flat, progress)
+        pending = {s: pool.submit(_study_start, throw, s, made[model].trajectory, size) for s, model in LIMITS.items()}
+        starts = {scheme: study for scheme, future in pending.items() if (study := future.result()) is not None}
 
-    def trajectory(tag: str) -> Trajectory | None:
-        return made[tag].trajectory
-
-    starts = {}
-    for scheme, model in LIMITS.items():
-        study = _study_start(throw, scheme, trajectory(model), size)
-        if study is not None:
-            starts[scheme] = study
     return Evidence(
         scenario=scenario,
         throw=throw,
@@ -157,47 +154,48 @@ def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None 
         flights_by_step={
             scheme: study
             for scheme, levels in steps.items()
-            if (study := _study_levels(trajectory(LIMITS[scheme]), levels, made)) is not None
+            if (study := _study_levels(made[LIMITS[scheme]].trajectory, levels, made)) is not None
         },
         starts_by_step=starts,
         ice=tuple(_ice(made, [run.tag for run in runs if run.tag.startswith("ice,") and "welded" not in run.tag])),
-        welded=tuple(_ice(made, [run.tag for run in plan_welded(throw, ENGINE, size.welded_dt)])),
+        welded=tuple(_ice(made, [run.tag for run in plan_welded(throw, ENGINE)])),
         slices={
-            scheme: study
+            scheme: counted
             for scheme in LIMITS
-            if (study := _study_counts(made, [run.tag for run in plan_slices(throw, scheme, size.counts)])) is not None
+            if (counted := _study_counts(made, [r.tag for r in plan_slices(throw, scheme, size.counts)])) is not None
         },
         vectors={
             vector.name: vectors.deviations(vector, run)
             for vector in vectors.load_all()
-            if (run := trajectory(f"vector {vector.name}")) is not None
+            if (run := made[f"vector {vector.name}"].trajectory) is not None
         },
     )
 
 
-def make_all(runs: Iterable[Run], progress: Progress, jobs: int | None = None) -> dict[str, Made]:
-    """Make runs; the slice model's here, the slower ones in worker processes meanwhile."""
+def make_all(pool: Executor, runs: Iterable[Run], progress: Progress) -> dict[str, Made]:
+    """Make runs in worker processes: one job for each slow run, one for all of the slice model's.
+
+    This process only waits, so that it can be interrupted at any time; the slice model compiles in one worker only.
+    """
     runs = list(runs)
+    quick = [run for run in runs if find(run.solver).package == "slicemodel"]
+    jobs = [[run] for run in runs if find(run.solver).package != "slicemodel"]
     made: dict[str, Made] = {}
-    here = [run for run in runs if find(run.solver).package == "slicemodel"]
-    away = [run for run in runs if find(run.solver).package != "slicemodel"]
-
-    def note(result: Made) -> None:
-        made[result.run.tag] = result
-        progress(len(made), len(runs), result.run.tag)
-
-    with workers(jobs) as pool:
-        pending = [pool.submit(make, run) for run in away]
-        for run in here:
-            note(make(run))
-        for future in as_completed(pending):
-            note(future.result())
+    for future in as_completed([pool.submit(make_each, job) for job in ([quick] if quick else []) + jobs]):
+        for result in future.result():
+            made[result.run.tag] = result
+            progress(len(made), len(runs), result.run.tag)
     return made
+
+
+def make_each(runs: Iterable[Run]) -> list[Made]:
+    """Make runs one after the other."""
+    return [make(run) for run in runs]
 
 
 @contextmanager
 def workers(jobs: int | None) -> Iterator[Executor]:
-    """Give a pool of worker processes; on any exception end them at once instead of waiting for their runs."""
+    """Give a pool of worker processes; when interrupted, end them at once instead of waiting for their runs."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     pool = ProcessPoolExecutor(
         max_workers=jobs or cores,
@@ -208,9 +206,9 @@ def workers(jobs: int | None) -> Iterator[Executor]:
     try:
         yield pool
     except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
         for child in multiprocessing.active_children():
-            child.terminate()
+            child.kill()
+        pool.shutdown(cancel_futures=True)
         raise
     pool.shutdown()
 
@@ -219,15 +217,16 @@ def run_bands(made: Mapping[str, Made]) -> dict[str, float]:
     """Return each flight's numerical band as a fraction of omega_0.
 
     A scheme at its number of steps is a definite program: its step error is a difference with a bar of its own, so its
-    band is zero. For a model the change under tenfold tighter tolerances is the band; for the engine, of first order,
-    twice the change when step and iterations are refined together.
+    band is zero. For a model it is the change under tenfold tighter tolerances or another method, and never less than
+    MODEL_FLOOR; for the engine, of first order, twice the change when step and iterations are refined together.
     """
     bands = dict.fromkeys(LIMITS, 0.0)
-    refined = {**{model: (f"{model}, tighter", 1.0) for model in MODELS}, ENGINE: (f"{ENGINE}, finer", 2.0)}
-    for tag, (finer, factor) in refined.items():
-        usual, better = made[tag].trajectory, made[finer].trajectory
+    checks = [(model, other, 1.0) for model in MODELS for other in made if other.startswith(f"{model}, ")]
+    for tag, other, factor in [*checks, (ENGINE, f"{ENGINE}, finer", 2.0)]:
+        usual, better = made[tag].trajectory, made[other].trajectory
         if usual is not None and better is not None and usual.ok and better.ok:
-            bands[tag] = factor * study_difference(tag, usual, better).largest
+            change = factor * study_difference(tag, usual, better).largest
+            bands[tag] = max(bands.get(tag, MODEL_FLOOR), change)
     return bands
 
 
@@ -238,7 +237,8 @@ def _differences(made: Mapping[str, Made]) -> Iterator[Difference]:
         if one is None or other is None:
             continue
         band = bands[first] + bands[second] if first in bands and second in bands else None
-        yield study_difference(name, one, other, band=band)
+        # The moments come from the equation behind the first run, whose impacts are located, not gridded.
+        yield study_difference(name, one, other, impacts_of=made[LIMITS.get(first, first)].trajectory, band=band)
 
 
 def _study_levels(reference: Trajectory | None, levels: list[list[Run]], made: Mapping[str, Made]) -> StepSize | None:

@@ -72,7 +72,9 @@ class Finding:
     @property
     def value_text(self) -> str:
         """The value with its unit."""
-        return "–" if self.value is None else f"{self.value:.3g} {self.unit}".strip()
+        if self.value is None:
+            return "–"
+        return f"{self.value:#.3g} {self.unit}".strip() if self.value else f"0 {self.unit}".strip()
 
     @property
     def band_text(self) -> str:

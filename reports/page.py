@@ -2,39 +2,32 @@
 
 from __future__ import annotations
 
-import base64
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from reports.evidence import TOTAL, Evidence
-from reports.figures import Drawing
+from reports.exhibits import Exhibit
 from reports.findings import Finding
 
+SYMBOLS = {
+    "omega_0": "ω₀", "omega0": "ω₀", "omega": "ω", "theta": "θ", "gamma": "γ", "alpha": "α", "epsilon": "ε",
+    "^2": "²", " +- ": " ± ", "<<": "≪", " - ": " − ", "-gamma": "−γ",
+}  # fmt: skip
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Shown:
-    """A figure as the page shows it."""
 
-    name: str
-    section: str
-    title: str
-    caption: str
-    alt: str
-    drawing: Drawing
-
-    @property
-    def source(self) -> str:
-        """The figure as a data URI: an image of its own, so that ids of two figures cannot collide."""
-        return "data:image/svg+xml;base64," + base64.b64encode(self.drawing.svg.encode("utf-8")).decode("ascii")
+def typeset(text: str) -> str:
+    """Return plain-text mathematics with Greek letters and signs; the command line prints it as it is."""
+    pattern = "|".join(re.escape(word) for word in sorted(SYMBOLS, key=len, reverse=True))
+    return re.sub(pattern, lambda match: SYMBOLS[match.group()], text)
 
 
 def render(
     evidence: Evidence,
     findings: Sequence[Finding],
-    shown: Sequence[Shown],
+    exhibits: Sequence[Exhibit],
     solvers: Sequence[Mapping[str, Any]],
     provenance: Mapping[str, str],
 ) -> str:
@@ -47,6 +40,7 @@ def render(
         lstrip_blocks=True,
     )
     differences = sorted(evidence.differences, key=lambda difference: -difference.largest)
+    environment.filters["typeset"] = typeset
     regressions = [finding for finding in findings if finding.kind == "regression"]
     return environment.get_template("report.html.j2").render(
         scenario=evidence.scenario,
@@ -58,7 +52,7 @@ def render(
         regressions=regressions,
         observations=[finding for finding in findings if finding.kind == "observation"],
         failed=[finding for finding in regressions if finding.failed],
-        figures=shown,
+        exhibits=exhibits,
         steps=evidence.flights_by_step,
         slices=evidence.slices,
         solvers=solvers,

@@ -21,7 +21,7 @@ def provenance(command: str) -> dict[str, str]:
         try:
             facts[package] = metadata.version(package)
         except metadata.PackageNotFoundError:
-            facts[package] = "not installed as a package (run from a checkout)"
+            facts[package] = "checkout"
     facts["system"] = f"{platform.system()} {platform.machine()}"
     facts["processor"] = _processor()
     facts["cores"] = str(_cores())

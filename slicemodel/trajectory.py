@@ -70,15 +70,17 @@ class Impacts:
     def __len__(self) -> int:
         return len(self.time)
 
+    def __getitem__(self, k: int) -> Impact:
+        return Impact(
+            float(self.time[k]),
+            int(self.slice[k]),
+            "base" if self.end[k] == BASE else "cap",
+            float(self.speed_before[k]),
+            float(self.speed_after[k]),
+        )
+
     def __iter__(self) -> Iterator[Impact]:
-        for k in range(len(self)):
-            yield Impact(
-                float(self.time[k]),
-                int(self.slice[k]),
-                "base" if self.end[k] == BASE else "cap",
-                float(self.speed_before[k]),
-                float(self.speed_after[k]),
-            )
+        return (self[k] for k in range(len(self)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

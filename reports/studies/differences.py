@@ -35,7 +35,7 @@ class Difference:
     parting_time : float or None
         First time |omega| exceeds PARTING_BAND, interpolated [s]; None if it never does.
     parting_impact : Impact or None
-        Last impact at or before the parting that one of the two knows (the reference's, if it has any).
+        Last impact at or before the parting, in the run given for it.
     band : float or None
         Numerical uncertainty of ``largest``: the sum of the two runs' own.
     """
@@ -66,11 +66,18 @@ class Difference:
         return words
 
 
-def study_difference(name: str, first: Trajectory, second: Trajectory, *, band: float | None = None) -> Difference:
+def study_difference(
+    name: str,
+    first: Trajectory,
+    second: Trajectory,
+    *,
+    impacts_of: Trajectory | None = None,
+    band: float | None = None,
+) -> Difference:
     """Compare two runs of one throw.
 
     The two are compared on the first run's times, up to where the shorter one ends; the second is interpolated
-    linearly if its times differ.
+    linearly if its times differ. ``impacts_of`` is the run whose impacts the parting is set against.
     """
     end = min(first.t[-1], second.t[-1])
     t = first.t[first.t <= end]
@@ -92,7 +99,7 @@ def study_difference(name: str, first: Trajectory, second: Trajectory, *, band: 
         largest_time=float(t[k]),
         final=float(omega[-1]),
         parting_time=parting,
-        parting_impact=None if parting is None else _last_impact(parting, first, second),
+        parting_impact=_last_impact(parting, impacts_of),
         band=band,
     )
 
@@ -115,20 +122,10 @@ def first_crossing(t: FloatArray, size: FloatArray, band: float) -> float | None
     return float(t[k - 1] + share * (t[k] - t[k - 1]))
 
 
-def _last_impact(parting: float, *trajectories: Trajectory) -> Impact | None:
-    """Return the last impact up to ``parting``, from the run whose impacts are located most finely."""
-    known = [t for t in trajectories if t.impacts is not None and len(t.impacts)]
-    known.sort(key=lambda trajectory: trajectory.solver != "ode_reference")
-    for trajectory in known:
-        assert trajectory.impacts is not None
-        k = int(np.searchsorted(trajectory.impacts.time, parting, side="right"))
-        if k:
-            impacts = trajectory.impacts
-            return Impact(
-                float(impacts.time[k - 1]),
-                int(impacts.slice[k - 1]),
-                "base" if impacts.end[k - 1] > 0 else "cap",
-                float(impacts.speed_before[k - 1]),
-                float(impacts.speed_after[k - 1]),
-            )
-    return None
+def _last_impact(parting: float | None, trajectory: Trajectory | None) -> Impact | None:
+    """Return the last impact up to ``parting``, if there is one."""
+    if parting is None or trajectory is None or trajectory.impacts is None:
+        return None
+    impacts = trajectory.impacts
+    k = int(np.searchsorted(impacts.time, parting, side="right"))
+    return impacts[k - 1] if k else None

@@ -44,7 +44,7 @@ def test_parting_is_interpolated_and_follows_the_last_impact():
     )
     # 0, 0, 0, 0.08, 0.4, 0.8 rad/s: crosses 0.2 rad/s = 1 % a part of (0.2 - 0.08)/(0.4 - 0.08) after 0.3 s.
     second = curve(20.0 - np.array([0, 0, 0, 0.08, 0.4, 0.8]), solver="ode_reference", impacts=impacts)
-    difference = study_difference("x", first, second)
+    difference = study_difference("x", first, second, impacts_of=second)
     assert difference.parting_time == pytest.approx(0.3 + 0.1 * 0.375)
     assert difference.parting_impact.slice == 1
     assert difference.parting_impact.end == "base"

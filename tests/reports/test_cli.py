@@ -1,0 +1,100 @@
+"""The command line as people meet it: help, results, and one line for every mistake."""
+
+import re
+
+import pytest
+
+from reports import cli
+
+
+def run(capsys, *arguments):
+    try:
+        status = cli.main(arguments)
+    except SystemExit as end:
+        status = end.code
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+def test_help_reads_like_a_manual(capsys):
+    status, out, _ = run(capsys, "--help")
+    assert status == 0
+    for word in ("report", "simulate", "compare", "models", "exit status", "examples"):
+        assert word in out
+    for command in ("report", "simulate", "compare", "models"):
+        status, out, _ = run(capsys, command, "--help")
+        assert status == 0
+        assert "usage: flipproof" in out
+
+
+def test_simulate_writes_csv(capsys, tmp_path):
+    status, out, err = run(capsys, "simulate", "--solver", "exact-step", "--slices", "3", "--steps", "10")
+    assert (status, err) == (0, "")
+    assert out.splitlines()[0] == "t,theta,omega,r_cm,inertia,r_0,r_1,r_2,v_0,v_1,v_2"
+    assert len(out.splitlines()) == 11
+    file = tmp_path / "a.csv"
+    status, out, _ = run(capsys, "simulate", "--solver", "eq8", "--slices", "3", "--out", str(file))
+    assert (status, out) == (0, "")
+    assert len(file.read_text().splitlines()) == 1001
+
+
+def test_simulate_says_when_a_run_is_not_whole(capsys):
+    status, _, err = run(capsys, "simulate", "--solver", "published-matlab", "--slices", "20")
+    assert status == 0
+    assert "published-matlab: " in err
+    assert "left the bottle at t = " in err
+
+
+def test_compare_solvers_and_files(capsys, tmp_path):
+    status, out, _ = run(capsys, "compare", "published-python", "eq8", "--slices", "5")
+    assert status == 0
+    assert re.search(r"largest \|difference in omega\|: \d", out)
+    assert "first more than 1% of omega_0 apart: " in out
+    file = tmp_path / "a.csv"
+    run(capsys, "simulate", "--slices", "5", "--out", str(file))
+    status, out, _ = run(capsys, "compare", str(file), "exact-step", "--slices", "5")
+    assert status == 0
+    assert "apart: never" in out
+    assert "0.000%" in out
+
+
+def test_models_lists_everything_with_reasons(capsys):
+    status, out, _ = run(capsys, "models")
+    assert status == 0
+    for name in ("published-python", "exact-step", "published-limit", "eq8", "pymunk"):
+        assert re.search(rf"^  {name}$", out, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["report", "nowhere.toml"], ["nowhere.toml", "cannot be read"]),
+        (["report", "{bad}"], ["[scenario] water_mass = 1.4 kg", "capacity 1.0 kg"]),
+        (["report", "--out", "{bad}"], ["is a file"]),
+        (["report", "--out", "{full}"], ["not a flipproof report"]),
+        (["simulate", "--solver", "eq9"], ["solver 'eq9' is unknown", "did you mean 'eq8'?"]),
+        (["simulate", "--solver", "eq8", "--steps", "5"], ["eq8 is not a scheme"]),
+        (["simulate", "--steps", "1"], ["steps = 1", "at least 2"]),
+        (["simulate", "--out", "nowhere/a.csv"], ["the folder nowhere does not exist"]),
+        (["compare", "eq8", "missing.csv"], ["missing.csv: cannot be read"]),
+        (["compare", "eq8", "zzz"], ["solver 'zzz' is unknown", "known: "]),
+        (["compare", "--scenario", "{bad}", "eq8", "eq8"], ["water_mass"]),
+        (["report", "--slices", "0"], ["'0' is not a whole number of at least 1"]),
+        (["report", "--slices", "few"], ["'few' is not a whole number"]),
+        (["fly"], ["invalid choice: 'fly'"]),
+        ([], ["required: COMMAND"]),
+    ],
+)
+def test_every_mistake_is_one_line_and_status_2(capsys, tmp_path, arguments, words):
+    bad = tmp_path / "bad.toml"
+    bad.write_text("[scenario]\nwater_mass = 1.4\n")
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "mine.txt").write_text("mine")
+    places = {"bad": str(bad), "full": str(tmp_path / "full")}
+    status, out, err = run(capsys, *(argument.format(**places) for argument in arguments))
+    assert status == 2
+    assert out == ""
+    assert "Traceback" not in err
+    assert len([line for line in err.splitlines() if "error:" in line]) == 1
+    for word in words:
+        assert word in err

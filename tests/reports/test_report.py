@@ -1,0 +1,223 @@
+"""The report from end to end: the folder, the page, the summary, the exit status."""
+
+import dataclasses
+import html.parser
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from reports import claims, cli
+from reports import evidence as evidence_module
+from reports.build import build
+from reports.evaluation import evaluate
+from reports.evidence import DIFFERENCES, ENGINE, FLIGHTS, OTHER_SCHEMES, make_all, workers
+from reports.page import typeset
+from reports.provenance import provenance
+from reports.solvers import Made, Run, make
+from slicemodel import Scenario
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def report(evidence):
+    return build(evidence, provenance("flipproof report"))
+
+
+class Page(html.parser.HTMLParser):
+    """Collects what the tests ask about, and refuses unbalanced tags."""
+
+    VOID = frozenset({"meta", "img", "br", "link", "hr", "input"})
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.images, self.ids, self.links, self.captions = [], [], [], [], []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        values = dict(attributes)
+        if tag not in self.VOID:
+            self.open.append(tag)
+        if tag == "img":
+            self.images.append(values)
+        if "id" in values:
+            self.ids.append(values["id"])
+        if "href" in values:
+            self.links.append(values["href"])
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag, f"</{tag}> closes another tag"
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] == "figcaption" and data.strip():
+            self.captions.append(data.strip())
+
+
+def test_every_claim_is_evaluated_and_holds(evidence):
+    findings = list(evaluate(evidence))
+    assert [(f.id, f.value, f.note) for f in findings if f.failed] == []
+    assert len({f.id for f in findings}) == len(findings)
+    ids = {f.id for f in findings}
+    for needed in (
+        "ice-exact-step", "ice-eq8", "ice-pymunk-rigid", "ice-welded-order", "vectors-python_default",
+        "vectors-matlab_default", "order-exact-step-across-impacts", "order-published-python-before-the-first-impact",
+        "reference-eq8", "engine-gravity", "engine-default-iterations",
+    ):  # fmt: skip
+        assert needed in ids
+    assert sum(f.id.startswith("difference-") for f in findings) == len(DIFFERENCES)
+
+
+def test_the_page_is_whole_and_stands_alone(report):
+    page = Page(report.html)
+    assert len(page.images) == len(report.exhibits) >= 8
+    assert len(page.captions) >= len(report.exhibits)
+    for image, exhibit in zip(page.images, report.exhibits, strict=True):
+        assert image["src"].startswith("data:image/svg+xml;base64,")
+        assert image["alt"] == exhibit.alt
+        assert re.search(r"\d", image["alt"]) or exhibit.name == "slices"
+        assert len(exhibit.caption) > 60
+    assert len(page.ids) == len(set(page.ids))
+    for link in page.links:
+        assert not link.startswith(("http:", "https:", "//", "/"))
+        if link.startswith("#"):
+            assert link[1:] in page.ids
+    words = re.sub(r'src="data:[^"]*"', "", report.html)
+    assert "http" not in words
+    assert not re.search(r"\b(nan|inf|none)\b", words.replace('<td class="number">none</td>', ""), re.IGNORECASE)
+
+
+def test_every_number_on_the_axes_has_a_unit(report):
+    from reports import figures
+
+    assert report.exhibits
+    for exhibit in report.exhibits:
+        assert exhibit.drawing.svg.startswith("<?xml")
+        assert exhibit.drawing.png.startswith(b"\x89PNG")
+    assert figures.WIDE
+
+
+def test_axes_carry_units(evidence):
+    from reports import figures
+
+    flights = [evidence.trajectory(tag) for tag in FLIGHTS]
+    made = [
+        figures.figure_omega(flights),
+        figures.figure_theta(flights),
+        figures.figure_centre_of_mass(flights),
+        figures.figure_slices(flights),
+        figures.figure_differences(evidence.differences),
+        figures.figure_step_size(list(evidence.flights_by_step.values()), list(evidence.starts_by_step.values())),
+        figures.figure_ice((*evidence.ice, *evidence.welded)),
+        figures.figure_slice_count(evidence.slices),
+    ]
+    for figure in made:
+        for axes in figure.axes:
+            for label in (axes.get_xlabel(), axes.get_ylabel()):
+                assert not label or re.search(r"\[(s|1|degrees)\]", label), label
+        assert any(axes.get_xlabel() for axes in figure.axes)
+        assert any(axes.get_ylabel() for axes in figure.axes)
+
+
+def test_the_same_data_draw_the_same_bytes(evidence):
+    from reports import figures
+
+    flights = [evidence.trajectory(tag) for tag in FLIGHTS]
+    first, second = (figures.draw(figures.figure_omega(flights)) for _ in range(2))
+    assert first.svg == second.svg
+
+
+def run_report(monkeypatch, evidence, folder, *arguments):
+    monkeypatch.setattr(evidence_module, "gather", lambda *_: evidence)
+    return cli.main(["report", "--out", str(folder), *arguments])
+
+
+def test_the_folder_holds_everything(monkeypatch, capsys, tmp_path, evidence):
+    folder = tmp_path / "latest"
+    assert run_report(monkeypatch, evidence, folder) == 0
+    out = capsys.readouterr().out
+    assert "regression claims hold." in out
+    assert str(folder / "index.html") in out
+    page = Page((folder / "index.html").read_text(encoding="utf-8"))
+    for link in page.links:
+        if not link.startswith("#"):
+            assert (folder / link).is_file(), link
+    for tag in (*FLIGHTS, *OTHER_SCHEMES):
+        header = (folder / "trajectories" / tag / "data.csv").read_text().splitlines()[0]
+        assert header.startswith("t,theta,omega,r_cm,inertia,r_0")
+    names = {path.stem for path in (folder / "figures").iterdir()}
+    assert {path.suffix for path in (folder / "figures").iterdir()} == {".svg", ".png"}
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert {figure["name"] for figure in summary["figures"]} == names
+    assert Scenario.from_mapping(summary["scenario"]) == evidence.scenario
+    for finding in summary["findings"]:
+        assert {"id", "title", "value", "unit", "band", "admissible", "kind", "verdict", "note"} <= set(finding)
+    assert {run["tag"] for run in summary["runs"]} == set(evidence.made)
+    assert summary["provenance"]["command"].startswith("flipproof")
+
+
+def test_a_failed_regression_sets_status_1_and_says_which(monkeypatch, capsys, tmp_path, evidence):
+    monkeypatch.setitem(claims.VECTOR_TOLERANCE, "published-python", 1e-18)
+    folder = tmp_path / "latest"
+    assert run_report(monkeypatch, evidence, folder) == 1
+    out = capsys.readouterr().out
+    assert "FAIL  published-python reproduces the published run python_default" in out
+    assert "regression claims fail" in (folder / "index.html").read_text(encoding="utf-8")
+
+
+def test_a_solver_that_fails_is_shown_in_place(monkeypatch, capsys, tmp_path, evidence):
+    made = dict(evidence.made)
+    made[ENGINE] = Made(made[ENGINE].run, None, 0.1, "SetupError: the world is not the one that was meant")
+    broken = dataclasses.replace(evidence, made=made, differences=evidence.differences[:3])
+    folder = tmp_path / "latest"
+    assert run_report(monkeypatch, broken, folder) == 1
+    page = (folder / "index.html").read_text(encoding="utf-8")
+    assert "Runs that failed" in page
+    assert "the world is not the one that was meant" in page
+    assert "FAIL  free flight is the same with g = 0" in capsys.readouterr().out
+
+
+def test_a_run_that_raises_becomes_its_reason():
+    run = Run("bad", "eq8", Scenario(n_slices=1), {"rtol": -1.0})
+    result = make(run)
+    assert result.trajectory is None
+    assert result.reason.startswith("ValueError: ")
+    assert "rtol" in result.reason
+
+
+def test_workers_bring_home_the_same_trajectory():
+    run = Run("eq8", "eq8", Scenario(n_slices=2, duration=0.05))
+    seen = []
+    with workers(1) as pool:
+        away = make_all(pool, [run], lambda *call: seen.append(call))["eq8"].trajectory
+    here = make(run).trajectory
+    assert seen == [(1, 1, "eq8")]
+    assert (away.omega == here.omega).all()
+    assert away.settings == here.settings
+
+
+def test_typeset():
+    assert typeset("v' = (omega^2 - gamma^2) X - 2 gamma v, gamma << omega_0") == ("v' = (ω² − γ²) X − 2 γ v, γ ≪ ω₀")
+
+
+def test_the_real_command_from_a_cold_start(tmp_path):
+    scenario = tmp_path / "throw.toml"
+    scenario.write_text("[scenario]\nwater_mass = 0.3\nn_slices = 12\ndrag = 0.25\nrestitution = 0.4\n")
+    result = subprocess.run(
+        [sys.executable, "-m", "reports.cli", "report", str(scenario), "--quick", "--out", str(tmp_path / "out")],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.stderr == ""
+    assert result.returncode == 0, result.stdout
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["slices"] == 12
+    assert summary["scenario"]["scenario"]["water_mass"] == 0.3

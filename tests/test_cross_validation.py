@@ -1,0 +1,106 @@
+"""Case by pair: what two solvers that share no formula must agree on, and at which order."""
+
+import numpy as np
+import pytest
+
+import engine_check
+import ode_reference
+import slicemodel
+from reports import claims
+from reports.evidence import LIMITS
+from reports.studies.step_size import before_first_impact, plan_step_size, study_step_size
+from slicemodel import Bottle, Scenario, observables
+
+# Other bottles, fillings, angles, spins and restitutions; each shifts the phase of every impact.
+THROWS = {
+    "the paper's": Scenario().with_slices(20),
+    "fuller, softer": Scenario(water_mass=0.7, n_slices=20, drag=0.2, restitution=0.35),
+    "small bottle": Scenario(
+        bottle=Bottle(length=0.22, radius=0.033, mass=0.024, capacity=0.75),
+        water_mass=0.3,
+        n_slices=20,
+        drag=0.12,
+        omega0=16.0,
+        theta0=1.1,
+        duration=0.45,
+    ),
+}
+
+
+def refine(throw, scheme, reference, coarsest, count):
+    levels = plan_step_size(throw, scheme, coarsest, count)
+    runs = [[slicemodel.solve(run.scenario, run.solver, **run.settings) for run in level] for level in levels]
+    return study_step_size(reference, runs)
+
+
+@pytest.mark.parametrize("scheme", LIMITS)
+@pytest.mark.parametrize("name", THROWS)
+def test_order_1_before_the_first_impact(name, scheme):
+    throw = THROWS[name]
+    start = before_first_impact(throw, ode_reference.solve(throw, LIMITS[scheme]))
+    study = refine(start, scheme, ode_reference.solve(start, LIMITS[scheme]), 32, 5)
+    finding = claims.claim_order(study, "before the first impact", claims.ORDER_BEFORE_IMPACT)
+    assert finding.verdict == "pass", finding
+
+
+@pytest.mark.parametrize("scheme", LIMITS)
+def test_order_1_across_impacts_over_an_ensemble_of_impact_phases(scheme):
+    """Grids of other phases and throws of other phases: the mean order is 1, though single ones scatter."""
+    orders = []
+    for throw in THROWS.values():
+        study = refine(throw, scheme, ode_reference.solve(throw, LIMITS[scheme]), 1000, 5)
+        assert study.refined, study
+        assert 0.75 <= study.order <= 1.25, study
+        orders.append(study.order)
+    assert 0.9 <= float(np.mean(orders)) <= 1.1, orders
+
+
+@pytest.mark.parametrize("scheme", LIMITS)
+def test_a_scheme_does_not_converge_to_the_other_equation(scheme):
+    """The order test can fail: against the wrong equation refinement stops helping."""
+    throw = THROWS["the paper's"]
+    other = next(model for model in LIMITS.values() if model != LIMITS[scheme])
+    study = refine(throw, scheme, ode_reference.solve(throw, other), 1000, 4)
+    assert claims.claim_order(study, "here", claims.ORDER_ACROSS_IMPACTS).failed
+
+
+def test_all_three_start_from_the_same_state():
+    throw = THROWS["small bottle"]
+    runs = [slicemodel.solve(throw), ode_reference.solve(throw), engine_check.solve(throw)]
+    for run in runs:
+        np.testing.assert_allclose(run.r[0], throw.initial_positions(), rtol=0, atol=1e-12)
+        assert run.theta[0] == pytest.approx(throw.theta0, rel=1e-12)
+        assert run.omega[0] == pytest.approx(throw.omega0, rel=1e-6)
+        assert run.r_cm[0] == pytest.approx(float(observables.centre_of_mass(throw, throw.initial_positions())))
+        assert run.inertia[0] == pytest.approx(observables.initial_moment_of_inertia(throw), rel=1e-12)
+
+
+def test_own_formulas_of_every_package_agree_with_the_shared_definitions():
+    throw = THROWS["fuller, softer"]
+    for run in (slicemodel.solve(throw), ode_reference.solve(throw), engine_check.solve(throw)):
+        np.testing.assert_allclose(run.r_cm, observables.centre_of_mass(throw, run.r), rtol=1e-6)
+        np.testing.assert_allclose(run.inertia, observables.moment_of_inertia(throw, run.r), rtol=1e-5)
+
+
+def test_without_gravity_drag_and_water_motion_all_three_turn_alike():
+    """A tube so heavy that nothing inside matters: omega stays omega_0 in all three until round-off or drift."""
+    throw = Scenario(bottle=Bottle(mass=1e6), n_slices=3, gravity=0.0, drag=0.0, duration=0.1)
+    for run in (slicemodel.solve(throw), ode_reference.solve(throw), engine_check.solve(throw)):
+        np.testing.assert_allclose(run.omega, throw.omega0, rtol=1e-6)
+
+
+@pytest.mark.parametrize("solver", ["slicemodel", "ode_reference", "engine_check"])
+def test_ice_in_every_package(solver):
+    ice = Scenario(n_slices=20, frozen=True)
+    module = {"slicemodel": slicemodel, "ode_reference": ode_reference, "engine_check": engine_check}[solver]
+    run = module.solve(ice)
+    assert np.abs(run.omega / ice.omega0 - 1).max() <= claims.ICE_TOLERANCE[solver]
+    np.testing.assert_allclose(run.theta, ice.theta0 + ice.omega0 * run.t, rtol=1e-9)
+
+
+def test_the_models_that_move_a_bottle_agree_before_anything_can_differ():
+    """At t -> 0 all equations share omega and theta; they part by their accelerations, of order t^2."""
+    throw = Scenario(n_slices=20, drag=0.25, duration=0.002)
+    runs = [slicemodel.solve(throw), ode_reference.solve(throw), engine_check.solve(throw, dt=1e-6)]
+    for run in runs[1:]:
+        assert np.abs(run.omega - runs[0].omega).max() < 2e-3 * abs(throw.omega0)
