@@ -196,6 +196,8 @@ def make_each(runs: Iterable[Run]) -> list[Made]:
 @contextmanager
 def workers(jobs: int | None) -> Iterator[Executor]:
     """Give a pool of worker processes; when interrupted, end them at once instead of waiting for their runs."""
+    # One linear-algebra thread per worker: two workers with two each wait for one another.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     pool = ProcessPoolExecutor(
         max_workers=jobs or cores,

@@ -29,7 +29,7 @@ def catalogue() -> dict[str, Solver]:
     from slicemodel.schemes import SCHEMES
 
     solvers = [Solver(s.name, "slicemodel", "scheme", s.limit, s.reason) for s in SCHEMES.values()]
-    solvers += [Solver(m, "ode_reference", "model", "eq", "re") for m in MODELS]
+    solvers += [Solver(m.name, "ode_reference", "model", m.equation, m.reason) for m in MODELS.values()]
     solvers += [Solver(e.name, "engine_check", "engine", e.equation, e.reason) for e in ENGINES.values()]
     return {solver.name: solver for solver in solvers}
 
@@ -75,6 +75,8 @@ def make(run: Run) -> Made:
         trajectory = solve(run.solver, run.scenario, **run.settings)
     except (ValueError, ArithmeticError, MemoryError, RuntimeError) as error:
         return Made(run, None, time.perf_counter() - began, f"{type(error).__name__}: {error}")
+    if len(trajectory.t) == 0:
+        return Made(run, None, time.perf_counter() - began, f"{trajectory.status}: {trajectory.message}")
     return Made(run, trajectory, time.perf_counter() - began)
 
 

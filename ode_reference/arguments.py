@@ -1,0 +1,41 @@
+"""Checks of what a caller hands to ``solve``: every message names the argument, its value and what is admissible."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Mapping
+from typing import Any
+
+from slicemodel.scenario import unknown_name
+
+
+def known_name(what: str, name: object, known: Mapping[str, Any]) -> str:
+    """Return ``name`` if it is a key of ``known``, else raise ValueError with the nearest key."""
+    if isinstance(name, str) and name in known:
+        return name
+    raise ValueError(unknown_name(f"{what} =", name, known))
+
+
+def number_above(name: str, value: object, above: float, most: float, unit: str = "") -> float:
+    """Return ``value`` as float if it lies in (above, most], else raise ValueError; NaN lies in no range."""
+    number = _finite(value)
+    if not above < number <= most:
+        raise ValueError(f"{name} = {value!r}{unit} is outside ({above:g}, {most:g}]{unit}")
+    return number
+
+
+def number_within(name: str, value: object, least: float, most: float = math.inf, unit: str = "") -> float:
+    """Return ``value`` as float if it is finite and lies in [least, most], else raise ValueError."""
+    number = _finite(value)
+    if not least <= number <= most:
+        upper = f"{most:g}]" if most < math.inf else "inf)"
+        raise ValueError(f"{name} = {value!r}{unit} is outside [{least:g}, {upper}{unit}")
+    return number
+
+
+def _finite(value: object) -> float:
+    """Return ``value`` as float, NaN for whatever is no finite number."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
+        return math.nan
+    return float(value)

@@ -1,0 +1,174 @@
+"""The contract of ``solve``: shapes, times, settings, statuses, refusals."""
+
+from __future__ import annotations
+
+import math
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import ode_reference.solver
+from ode_reference import METHODS, MODELS, solve
+from slicemodel import observables
+from slicemodel.scenario import Bottle, Scenario
+from slicemodel.trajectory import Trajectory
+
+SMALL = Scenario(n_slices=7, drag=0.7, duration=0.3)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("model", MODELS)
+def test_every_model_and_method_returns_a_full_trajectory(model, method):
+    found = solve(SMALL, model, method=method)
+    assert isinstance(found, Trajectory)
+    assert (found.solver, found.method, found.status) == ("ode_reference", model, "ok")
+    assert found.scenario is SMALL
+    assert found.t.shape == found.theta.shape == found.omega.shape == (1000,)
+    assert found.r.shape == found.v.shape == (1000, 7)
+    assert (found.t[0], found.t[-1]) == (0.0, 0.3)
+    assert found.theta[0] == SMALL.theta0
+    np.testing.assert_array_equal(found.r[0], SMALL.initial_positions())
+    np.testing.assert_array_equal(found.v[0], 0.0)
+    assert found.omega[0] == pytest.approx(SMALL.omega0, rel=1e-15)
+    np.testing.assert_allclose(found.r_cm, observables.centre_of_mass(SMALL, found.r), rtol=1e-14)
+    np.testing.assert_allclose(found.inertia, observables.moment_of_inertia(SMALL, found.r), rtol=1e-13)
+    # theta is the integral of omega: by Simpson's rule, which the kinks of omega at impacts limit
+    third = (found.t[2] - found.t[0]) / 6
+    integral = third * (found.omega[:-2:2] + 4 * found.omega[1:-1:2] + found.omega[2::2]).sum()
+    assert found.theta[998] - found.theta[0] == pytest.approx(integral, abs=1e-5)
+    assert found.diagnostics["impacts"] == len(found.impacts) > 0
+
+
+def test_settings_repeat_the_run_bit_for_bit():
+    first = solve(SMALL, "published-limit", rtol=1e-8, rest_speed=1e-4)
+    again = solve(SMALL, **first.settings)
+    np.testing.assert_array_equal(first.r, again.r)
+    np.testing.assert_array_equal(first.omega, again.omega)
+    assert dict(first.settings) == dict(again.settings)
+    assert first.settings["max_step"] == 0.01 / 20
+
+
+@pytest.mark.parametrize("times", [[0.0], [0.3], [0.1], [0.0, 0.3], [1e-9, 0.123456, 0.3]])
+def test_output_at_arbitrary_times_equals_the_full_run(times):
+    dense = solve(SMALL, times=sorted({*times, *np.linspace(0, 0.3, 50)}))
+    found = solve(SMALL, times=times)
+    np.testing.assert_array_equal(found.t, times)
+    pick = np.searchsorted(dense.t, times)
+    np.testing.assert_array_equal(found.r, dense.r[pick])
+
+
+def test_state_at_the_time_of_an_impact_is_the_one_before_it():
+    hit = next(iter(solve(SMALL).impacts))
+    found = solve(SMALL, times=[hit.time, hit.time + 1e-12])
+    assert abs(found.v[0, hit.slice]) == pytest.approx(hit.speed_before, rel=1e-12)
+    assert abs(found.v[1, hit.slice]) == pytest.approx(hit.speed_after, rel=1e-6)
+    assert found.v[0, hit.slice] * found.v[1, hit.slice] < 0
+
+
+def test_mirrored_spin_and_angle_give_the_mirrored_motion():
+    scenario = Scenario(n_slices=7, drag=0.7, duration=0.3, omega0=-20.0, theta0=-SMALL.theta0)
+    found, mirrored = solve(SMALL), solve(scenario)
+    np.testing.assert_allclose(mirrored.r, found.r, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(mirrored.omega, -found.omega, rtol=1e-13)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_slice_as_long_as_the_bottle_cannot_move(model):
+    found = solve(Scenario(n_slices=1, water_mass=1.0, drag=0.1), model)
+    assert found.ok
+    assert np.ptp(found.r) == 0.0
+    assert np.ptp(found.omega) == 0.0
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    "scenario",
+    [
+        Scenario(n_slices=5, omega0=1e160),
+        Scenario(n_slices=5, drag=1e300),
+        Scenario(n_slices=5, gravity=1e300),
+        Scenario(n_slices=5, bottle=Bottle(length=1e200)),
+        Scenario(n_slices=5, omega0=1e-300),
+        Scenario(n_slices=5, duration=1e-300),
+    ],
+    ids=["omega0", "drag", "gravity", "length", "slow", "short"],
+)
+def test_extreme_scenarios_end_with_a_status_and_finite_numbers(model, scenario, monkeypatch):
+    monkeypatch.setattr(ode_reference.solver, "WATCH", 300)
+    found = solve(scenario, model, times=np.linspace(0, 1, 5) * scenario.duration if scenario.duration > 1e-9 else None)
+    assert found.status in ("ok", "overflow", "stalled")
+    assert found.ok or ("t = " in found.message and model in found.message)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_overflow_is_named_and_nothing_is_returned_beyond_it(method):
+    found = solve(Scenario(n_slices=5, omega0=1e160), method=method)
+    assert found.status == "overflow"
+    assert len(found.t) == 0
+    assert "omega0 = 1e+160 rad/s" in found.message
+
+
+def test_a_run_in_which_time_stops_passing_is_stalled(monkeypatch):
+    monkeypatch.setattr(ode_reference.solver, "WATCH", 50)
+    monkeypatch.setattr(ode_reference.solver, "STEP_LIMIT", 200)
+    found = solve(SMALL)
+    assert found.status == "stalled"
+    assert "200 steps" in found.message
+    assert "slices of the last impacts: " in found.message
+    assert 0 < len(found.t) < 1000
+    assert found.t[-1] < 0.3
+    whole = solve(SMALL, max_step=0.3)
+    assert whole.ok
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"model": "eq-8"}, ["model = 'eq-8'", "did you mean 'eq8'"]),
+        ({"model": "zzz"}, ["known: eq8, published-limit"]),
+        ({"model": None}, ["model = None"]),
+        ({"model": ["eq8"]}, ["model = ['eq8']"]),
+        ({"method": "radau"}, ["method = 'radau'", "did you mean 'Radau'"]),
+        ({"method": "RK23"}, ["known: DOP853, LSODA, Radau"]),
+        ({"rtol": 0.0}, ["rtol = 0.0", "[1e-13, 0.01]"]),
+        ({"rtol": math.nan}, ["rtol = nan", "[1e-13, 0.01]"]),
+        ({"rtol": "1e-9"}, ["rtol = '1e-9'"]),
+        ({"atol": 0}, ["atol = 0", "(0, 0.01]"]),
+        ({"atol": -1e-9}, ["atol = -1e-09"]),
+        ({"atol": math.nan}, ["atol = nan"]),
+        ({"rest_speed": 0.0}, ["rest_speed = 0.0 m/s", "[1e-08, 0.1] m/s"]),
+        ({"rest_speed": math.nan}, ["rest_speed = nan"]),
+        ({"rest_speed": True}, ["rest_speed = True"]),
+        ({"max_step": 0.0}, ["max_step = 0.0 s", "[3e-07, inf) s"]),
+        ({"max_step": math.inf}, ["max_step = inf"]),
+        ({"max_step": math.nan}, ["max_step = nan"]),
+        ({"max_step": -1}, ["max_step = -1"]),
+        ({"times": [0.1, 0.1]}, ["times must increase"]),
+        ({"times": [0.1, 0.4]}, ["outside [0, 0.3]"]),
+        ({"times": [math.nan]}, ["times = "]),
+        ({"times": []}, ["times has shape"]),
+    ],
+)
+def test_bad_arguments_are_refused_by_name_value_and_range(arguments, words):
+    with pytest.raises(ValueError, match=re.escape(words[0])) as caught:
+        solve(SMALL, **arguments)
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_a_scenario_is_needed():
+    with pytest.raises(ValueError, match=r"scenario = \{\} is not a slicemodel.Scenario"):
+        solve({})
+
+
+def test_importing_the_package_does_not_load_scipy():
+    code = "import ode_reference, sys; sys.exit('scipy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_unknown_attribute_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        ode_reference.nothing  # noqa: B018

@@ -1,0 +1,87 @@
+"""How far omega(t) of the reference can be trusted: refinement, other steppers, known numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ode_reference import solve
+from slicemodel.scenario import Scenario
+
+BAND = 1e-7
+"""Of omega_0: what the reference promises for omega(t)."""
+
+PAPER = [("eq8", 20), ("eq8", 50), ("published-limit", 20), ("published-limit", 50)]
+
+
+def largest_difference(found, reference):
+    assert found.ok, found.message
+    assert reference.ok, reference.message
+    return np.abs(found.omega - reference.omega).max() / abs(reference.scenario.omega0)
+
+
+@pytest.mark.parametrize(("model", "n_slices"), PAPER)
+def test_cutting_rtol_and_rest_speed_tenfold_leaves_omega_in_the_band(paper_runs, model, n_slices):
+    coarse = paper_runs(model, n_slices)
+    fine = solve(coarse.scenario, model, rtol=1e-11, rest_speed=1e-6)
+    assert largest_difference(coarse, fine) < BAND
+    assert len(fine.impacts) >= len(coarse.impacts)
+
+
+@pytest.mark.parametrize(
+    ("model", "n_slices", "method"),
+    [
+        *((model, n, "LSODA") for model, n in PAPER),
+        ("eq8", 20, "Radau"),
+        ("published-limit", 20, "Radau"),
+        # Its linear algebra on 101 unknowns takes a second alone and a minute on a crowded machine.
+        pytest.param("eq8", 50, "Radau", marks=pytest.mark.slow),
+        pytest.param("published-limit", 50, "Radau", marks=pytest.mark.slow),
+    ],
+)
+def test_other_steppers_agree_within_the_band(paper_runs, model, n_slices, method):
+    other = solve(Scenario().with_slices(n_slices), model, method=method)
+    assert largest_difference(other, paper_runs(model, n_slices)) < BAND
+    assert len(other.impacts) == len(paper_runs(model, n_slices).impacts)
+
+
+def test_step_bound_and_output_times_do_not_matter(paper_runs):
+    reference = paper_runs("eq8", 20)
+    for max_step in (2e-4, 2e-3, 0.5):
+        assert largest_difference(solve(reference.scenario, max_step=max_step), reference) < BAND
+    sparse = solve(reference.scenario, times=reference.t[[0, 500, 999]])
+    np.testing.assert_array_equal(sparse.omega, reference.omega[[0, 500, 999]])
+    np.testing.assert_array_equal(sparse.impacts.time, reference.impacts.time)
+
+
+@pytest.mark.parametrize(("model", "omega"), [("eq8", 6.4108), ("published-limit", 5.6380)])
+def test_final_omega_of_the_papers_throw(paper_runs, model, omega):
+    assert paper_runs(model, 50).omega[-1] == pytest.approx(omega, abs=5e-5)
+
+
+@pytest.mark.parametrize("rest_speed", [1e-4, 1e-5, 1e-6, 1e-7])
+def test_hard_case_keeps_all_its_impacts(hard_scenario, rest_speed):
+    found = solve(hard_scenario, rest_speed=rest_speed)
+    assert found.omega[-1] == pytest.approx(15.947334, abs=5e-7)
+    # The rest speed decides how many of the last, faint bounces are made, and never how many loud ones.
+    assert (found.impacts.speed_before > 1e-3).sum() == 116
+
+
+def test_hard_case_with_unbounded_steps_loses_no_impact(hard_scenario):
+    found = solve(hard_scenario, rtol=1e-9, max_step=hard_scenario.duration)
+    assert found.omega[-1] == pytest.approx(15.947334, abs=1e-6)
+    assert (found.impacts.speed_before > 1e-3).sum() == 116
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("model", "means"),
+    [
+        ("published-limit", (0.6199, 0.2818, 0.2889, 0.4072, 0.4162)),
+        ("eq8", (0.7921, 0.3337, 0.5203, 0.3913, 0.4021)),
+    ],
+)
+def test_plateau_at_five_fillings_and_a_hundred_slices(model, means):
+    for fill, mean in zip((0.1, 0.25, 0.5, 0.75, 1.0), means, strict=True):
+        found = solve(Scenario(water_mass=fill, n_slices=100, drag=0.1 * fill), model)
+        assert found.omega[found.t >= 0.25].mean() / 20.0 == pytest.approx(mean, abs=1e-4)
