@@ -25,6 +25,13 @@ def compiled(function: Callable[..., Any]) -> Any:
         return numba.njit(function, error_model="numpy", nogil=True)
 
 
+REST_SPEED = 1e-6
+"""In-step rebounds: a slice slower than this that its end pushes back stays there [m/s]; it would hop 1e-14 m."""
+
+MOST_HITS = 1000
+"""In-step rebounds of one slice in one step after which it is left at the end it hit."""
+
+
 class Frame(NamedTuple):
     """Geometry and masses that do not change during a flight (SI)."""
 
@@ -52,6 +59,9 @@ class Run(NamedTuple):
     escape_slice: int
 
 
+# ---------------------------------------------------------------------- the closed form of one slice
+
+
 @compiled
 def step_coefficients(  # type: ignore[no-untyped-def]
     form, constants, omega: float, dt: float
@@ -75,6 +85,64 @@ def step_coefficients(  # type: ignore[no-untyped-def]
 
 
 @compiled
+def path(form, constants, omega: float, x: float, v: float, t: float):  # type: ignore[no-untyped-def]
+    """Return distance from the centre and velocity after time t, from distance x and velocity v."""
+    a_minus_1, b, c, d = step_coefficients(form, constants, omega, t)
+    return x + (a_minus_1 * x + b * v), c * x + d * v
+
+
+@compiled
+def turning_time(gamma: float, omega: float, x: float, v: float) -> float:
+    """Return when the velocity changes sign, or infinity: tanh(k t) = k v / (gamma v - omega^2 x), once at most."""
+    k = math.sqrt(omega * omega + gamma * gamma)
+    ratio = k * v / (gamma * v - omega * omega * x)
+    return math.atanh(ratio) / k if 0.0 < ratio < 1.0 else math.inf
+
+
+@compiled
+def hit_time(  # type: ignore[no-untyped-def]
+    form, constants, omega: float, x: float, v: float, wall: float, low: float, high: float
+):
+    """Return when the path crosses ``wall`` between ``low`` and ``high``, which lie on its two sides.
+
+    Newton's method on the closed form, kept inside the bracket; the path is monotone there.
+    """
+    side = path(form, constants, omega, x, v, high)[0] - wall
+    t = high
+    for _ in range(100):
+        at, speed = path(form, constants, omega, x, v, t)
+        gap = at - wall
+        if gap * side > 0.0:
+            high = t
+        else:
+            low = t
+        better = t - gap / speed
+        if not low < better < high:
+            better = 0.5 * (low + high)
+        if abs(better - t) <= 1e-16 + 4e-16 * t:
+            return better
+        t = better
+    return t
+
+
+# ---------------------------------------------------------------------- one step of all slices
+
+
+@compiled
+def logged(log, count: int, time: float, i: int, end: int, v: float):  # type: ignore[no-untyped-def]
+    """Append a rebound (time, slice, end, velocity before); the log doubles when full, so that none is lost."""
+    if count == len(log):
+        longer = np.empty((2 * count, 4))
+        longer[:count] = log
+        log = longer
+    log[count, 0] = time
+    log[count, 1] = i
+    log[count, 2] = end
+    log[count, 3] = v
+    return log, count + 1
+
+
+@compiled
 def move(  # type: ignore[no-untyped-def]
     r: FloatArray, v: FloatArray, r_new: FloatArray, v_new: FloatArray, coefficients, centre: float, frame
 ) -> bool:
@@ -92,13 +160,10 @@ def move(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def rebound(  # type: ignore[no-untyped-def]
-    k: int, r: FloatArray, r_new: FloatArray, v_new: FloatArray, form, restitution: float, frame, log, logged: int
+def rebound_on_grid(  # type: ignore[no-untyped-def]
+    time: float, r: FloatArray, r_new: FloatArray, v_new: FloatArray, form, restitution: float, frame, log, count: int
 ):
-    """Apply [C.S.] to the slices past an end, log each as (step, slice, end, velocity); return the log and its length.
-
-    The log doubles when full, so a run of any length keeps every rebound.
-    """
+    """Apply [C.S.] to the slices past an end; return the log of rebounds and its length."""
     for i in range(len(r)):
         x = r_new[i]
         if form.strict:
@@ -107,19 +172,95 @@ def rebound(  # type: ignore[no-untyped-def]
             end = int(x >= frame.r_max) - int(x <= frame.r_min)
         if end == 0:
             continue
-        if logged == len(log):
-            longer = np.empty((2 * logged, 4))
-            longer[:logged] = log
-            log = longer
-        log[logged, 0] = k
-        log[logged, 1] = i
-        log[logged, 2] = end
-        log[logged, 3] = v_new[i]
-        logged += 1
+        log, count = logged(log, count, time, i, end, v_new[i])
         v_new[i] *= -restitution
         if form.keeps_position:
             r_new[i] = r[i]
-    return log, logged
+    return log, count
+
+
+@compiled
+def rebound_in_step(  # type: ignore[no-untyped-def]
+    form, constants, frame, omega: float, centre: float, start: float, dt: float, i: int, r: float, v: float, log, count
+):
+    """Follow one slice through a step with its hits located by the closed form; return r, v, log and its length.
+
+    Coefficients stay frozen over the whole step. A path turns at most once, so the stretch before the turning point and
+    the one after it are each searched for the end the slice then moves to.
+    """
+    elapsed = 0.0
+    gamma = constants.gamma
+    for _ in range(MOST_HITS):
+        x = r - centre
+        left = dt - elapsed
+        if abs(v) <= REST_SPEED and ((r == frame.r_max and x > 0.0) or (r == frame.r_min and x < 0.0)):
+            return r, 0.0, log, count
+        at_end, v_end = path(form, constants, omega, x, v, left)
+        turn = turning_time(gamma, omega, x, v)
+        end = 0
+        low, high = 0.0, left
+        if turn < left:
+            farthest = centre + path(form, constants, omega, x, v, turn)[0]
+            if (v > 0.0 and farthest > frame.r_max) or (v < 0.0 and farthest < frame.r_min):
+                end, high = (1 if v > 0.0 else -1), turn
+            else:
+                low = turn
+        if end == 0:
+            end = int(centre + at_end > frame.r_max) - int(centre + at_end < frame.r_min)
+        if end == 0:
+            return centre + at_end, v_end, log, count
+        wall = frame.r_max if end > 0 else frame.r_min
+        tau = hit_time(form, constants, omega, x, v, wall - centre, low, high)
+        v_hit = path(form, constants, omega, x, v, tau)[1]
+        log, count = logged(log, count, start + elapsed + tau, i, end, v_hit)
+        elapsed += tau
+        r, v = wall, -constants.restitution * v_hit
+    return r, 0.0, log, count
+
+
+@compiled
+def advance(  # type: ignore[no-untyped-def]
+    form,
+    constants,
+    frame,
+    r,
+    v,
+    r_new,
+    v_new,
+    omega: float,
+    centre: float,
+    start: float,
+    end: float,
+    dt: float,
+    log,
+    count,
+):
+    """Write one step of all slices with their rebounds to ``r_new``, ``v_new``; return the log and its length."""
+    reached = move(r, v, r_new, v_new, step_coefficients(form, constants, omega, dt), centre, frame)
+    if form.in_step:
+        for i in range(len(r)):
+            # A dip through an end and back leaves no trace at the end of the step but a reversed velocity.
+            if r_new[i] <= frame.r_min or r_new[i] >= frame.r_max or v[i] * v_new[i] < 0.0:
+                r_new[i], v_new[i], log, count = rebound_in_step(
+                    form, constants, frame, omega, centre, start, dt, i, r[i], v[i], log, count
+                )
+    elif reached:
+        log, count = rebound_on_grid(end, r, r_new, v_new, form, constants.restitution, frame, log, count)
+    return log, count
+
+
+@compiled
+def centre_of_repulsion(  # type: ignore[no-untyped-def]
+    form, constants, r_cm: float, v_cm: float, theta: float, omega: float
+):
+    """Return r* (module docstring of ``schemes.form``)."""
+    pull = constants.gravity * math.cos(theta)
+    if form.follows_cm:
+        pull += 2.0 * constants.gamma * v_cm
+    return r_cm - pull / (omega * omega)
+
+
+# ---------------------------------------------------------------------- the whole flight
 
 
 @compiled
@@ -160,15 +301,18 @@ def inertia_about(frame, n: int, first: float, second: float, offset: float):  #
 
 
 @compiled
-def fly(form, constants, frame, r, v, steps: int, dt: float) -> Run:  # type: ignore[no-untyped-def]
-    """Advance the slices over a uniform grid of ``steps`` points.
+def fly(form, constants, frame, r, v, t, dt: float) -> Run:  # type: ignore[no-untyped-def]
+    """Advance the slices over the uniform grid ``t`` of step ``dt``.
 
     ``r`` and ``v`` have shape (rows, N) with the start in row 0. Step k is written to row k modulo rows:
-    ``rows = steps`` keeps everything, ``rows = 2`` only what the next step needs.
+    ``rows = len(t)`` keeps everything, ``rows = 2`` only what the next step needs.
     """
     rows, n = r.shape
+    steps = len(t)
     theta, omega, r_cm, inertia = np.empty(steps), np.empty(steps), np.empty(steps), np.empty(steps)
-    log, logged = np.empty((1024, 4)), 0
+    log, count = np.empty((1024, 4)), 0
+    unread = np.empty((1024, 4))
+    r_end, v_end = np.empty(n), np.empty(n)
     escape_step = escape_slice = -1
     middle = frame.length / 2
     water_share = (1.0 - constants.bottle_share) / n
@@ -177,6 +321,7 @@ def fly(form, constants, frame, r, v, steps: int, dt: float) -> Run:  # type: ig
     theta[0], omega[0] = frame.theta0, frame.omega0
     r_cm[0] = middle + water_share * first
     inertia[0] = inertia_about(frame, n, first, second, water_share * first)
+    momentum = inertia[0] * frame.omega0
     points = 1
 
     for k in range(1, steps):
@@ -186,15 +331,24 @@ def fly(form, constants, frame, r, v, steps: int, dt: float) -> Run:  # type: ig
             r[new] = r[now]
             v[new] = 0.0
         else:
-            centre = r_cm[k - 1] - constants.gravity / (w * w) * math.cos(theta[k - 1])
-            if form.follows_cm:
-                centre -= 2.0 * constants.gamma / (w * w) * (water_share * speed)
-            coefficients = step_coefficients(form, constants, w, dt)
-            if move(r[now], v[now], r[new], v[new], coefficients, centre, frame):
-                log, logged = rebound(k, r[now], r[new], v[new], form, constants.restitution, frame, log, logged)
-                if not form.keeps_position and escape_step < 0:
-                    escape_slice = first_outside(r[new], frame.length)
-                    escape_step = k if escape_slice >= 0 else -1
+            centre = centre_of_repulsion(form, constants, r_cm[k - 1], water_share * speed, theta[k - 1], w)
+            if form.midpoint:
+                # A step as the exact step would make it predicts the end. Means over the step are then known up to
+                # second order, that of v_CM from the way of C_M, because v_CM itself jumps at an impact.
+                unread, _ = advance(
+                    form, constants, frame, r[now], v[now], r_end, v_end, w, centre, 0.0, 0.0, dt, unread, 0
+                )
+                end_first, end_second, _ = moments(r_end, v_end, middle)
+                way = water_share * (end_first - first)
+                mid_theta = theta[k - 1] + 0.5 * dt * w
+                w = 0.5 * (w + momentum / inertia_about(frame, n, end_first, end_second, water_share * end_first))
+                centre = centre_of_repulsion(form, constants, r_cm[k - 1] + 0.5 * way, way / dt, mid_theta, w)
+            log, count = advance(
+                form, constants, frame, r[now], v[now], r[new], v[new], w, centre, t[k - 1], t[k], dt, log, count
+            )
+            if not form.keeps_position and escape_step < 0:
+                escape_slice = first_outside(r[new], frame.length)
+                escape_step = k if escape_slice >= 0 else -1
 
         # A lagged program weighs the slices of the step before, about the centre of mass it knew then.
         lagged_first, lagged_second = first, second
@@ -205,7 +359,7 @@ def fly(form, constants, frame, r, v, steps: int, dt: float) -> Run:  # type: ig
         else:
             r_cm[k] = middle + water_share * first
             inertia[k] = inertia_about(frame, n, first, second, water_share * first)
-        omega[k] = inertia[0] * frame.omega0 / inertia[k]
+        omega[k] = momentum / inertia[k]
         theta[k] = theta[k - 1] + w * dt
         if not (math.isfinite(omega[k]) and math.isfinite(theta[k]) and math.isfinite(second + speed)):
             break
@@ -216,7 +370,7 @@ def fly(form, constants, frame, r, v, steps: int, dt: float) -> Run:  # type: ig
         omega[:points],
         r_cm[:points],
         inertia[:points],
-        log[:logged],
+        log[:count],
         points,
         escape_step,
         escape_slice,

@@ -8,10 +8,11 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from slicemodel.scenario import Scenario, unknown_name
-from slicemodel.schemes import SCHEMES, Scheme, StepConstants
+from slicemodel.schemes import SCHEMES, Scheme, StepConstants, StepForm
 from slicemodel.trajectory import FloatArray, Impacts, Trajectory
 
 Store = Literal["full", "summary"]
+Rebound = Literal["grid", "in-step"]
 
 
 def solve(
@@ -19,6 +20,8 @@ def solve(
     scheme: str = "exact-step",
     steps: int = 1000,
     store: Store = "full",
+    *,
+    rebound: Rebound | None = None,
 ) -> Trajectory:
     """Advance the slice model on a uniform grid of ``steps`` points over [0, duration].
 
@@ -34,6 +37,10 @@ def solve(
         Points of the grid including both ends, at least 2, as in both published programs: dt = T / (steps - 1).
     store : {"full", "summary"}
         "summary" keeps theta, omega, r_cm and inertia only.
+    rebound : {"grid", "in-step"} or None
+        Where a slice that hits an end rebounds: at the next grid point ([C.S.]), or at the hit itself, located by the
+        closed form. "in-step" needs a scheme with exact roots. None: as the scheme does, "in-step" for ``midpoint``,
+        "grid" for the others.
 
     Returns
     -------
@@ -44,12 +51,13 @@ def solve(
     Raises
     ------
     ValueError
-        Unknown scheme or store, or fewer than 2 steps.
+        Unknown scheme, store or rebound, "in-step" for a scheme without exact roots, or fewer than 2 steps.
 
     Accuracy
     --------
     Order 1 in dt against the equation named by the scheme's ``limit``: before the first impact because the coefficients
-    are frozen at the start of the step, across impacts because a rebound waits for the grid.
+    are frozen at the start of the step, across impacts because a rebound waits for the grid. ``midpoint`` is of order 2
+    before the first impact and, with rebounds in the step, close to it across impacts.
     """
     if scheme not in SCHEMES:
         raise ValueError(unknown_name("scheme =", scheme, SCHEMES))
@@ -57,10 +65,17 @@ def solve(
         raise ValueError(f"steps = {steps!r} is not a whole number of at least 2 (points of the grid)")
     if store not in get_args(Store):
         raise ValueError(unknown_name("store =", store, get_args(Store)))
-    return _run(scenario, SCHEMES[scheme], int(steps), store)
+    if rebound is not None and rebound not in get_args(Rebound):
+        raise ValueError(unknown_name("rebound =", rebound, get_args(Rebound)))
+    chosen = SCHEMES[scheme]
+    if rebound == "in-step" and not chosen.form.exact_roots:
+        able = ", ".join(name for name, other in SCHEMES.items() if other.form.exact_roots)
+        raise ValueError(f"rebound = 'in-step' needs a scheme with exact roots ({able}), not {scheme!r}")
+    form = chosen.form if rebound is None else chosen.form._replace(in_step=rebound == "in-step")
+    return _run(scenario, chosen, form, int(steps), store)
 
 
-def _run(scenario: Scenario, scheme: Scheme, steps: int, store: Store) -> Trajectory:
+def _run(scenario: Scenario, scheme: Scheme, form: StepForm, steps: int, store: Store) -> Trajectory:
     from slicemodel import kernel
 
     bottle = scenario.bottle
@@ -78,7 +93,7 @@ def _run(scenario: Scenario, scheme: Scheme, steps: int, store: Store) -> Trajec
     )
     t, dt = np.linspace(0.0, scenario.duration, steps, retstep=True)
     r, v = kernel.start(scenario.initial_positions(), steps if store == "full" else 2)
-    run = kernel.fly(scheme.form, constants, frame, r, v, steps, float(dt))
+    run = kernel.fly(form, constants, frame, r, v, t, float(dt))
     kept = run.points if store == "full" else 0
     status, message = _verdict(run, t)
     return Trajectory(
@@ -92,10 +107,17 @@ def _run(scenario: Scenario, scheme: Scheme, steps: int, store: Store) -> Trajec
         v=v[:kept],
         r_cm=run.r_cm,
         inertia=run.inertia,
-        impacts=_impacts(run, t, constants),
+        impacts=_impacts(run, constants),
         status=status,
         message=message,
-        settings=_settings(scheme, constants, steps, float(dt), store),
+        settings={
+            "scheme": scheme.name,
+            "steps": steps,
+            "dt": float(dt),
+            "store": store,
+            "rebound": "in-step" if form.in_step else "grid",
+            **constants._asdict(),
+        },
         diagnostics={"rebounds": len(run.rebounds)},
     )
 
@@ -112,18 +134,14 @@ def _verdict(run: Any, t: FloatArray) -> tuple[str, str]:
     return ("escaped", escape) if escape else ("ok", "")
 
 
-def _impacts(run: Any, t: FloatArray, constants: StepConstants) -> Impacts:
-    step, slice_index, end, velocity = run.rebounds.T
+def _impacts(run: Any, constants: StepConstants) -> Impacts:
+    rebounds = run.rebounds[np.argsort(run.rebounds[:, 0], kind="stable")]
+    time, slice_index, end, velocity = rebounds.T
     speed = np.abs(velocity)
     return Impacts(
-        time=t[step.astype(np.int64)],
+        time=time,
         slice=slice_index,
         end=end,
         speed_before=speed,
         speed_after=constants.restitution * speed,
     )
-
-
-def _settings(scheme: Scheme, constants: StepConstants, steps: int, dt: float, store: Store) -> dict[str, Any]:
-    """Return everything that, with the scenario, repeats the run; a scheme's own constants override the scenario's."""
-    return {"scheme": scheme.name, "steps": steps, "dt": dt, "store": store, **constants._asdict()}

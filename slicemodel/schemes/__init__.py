@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 from slicemodel.schemes.corrected import EXACT_STEP, ROOTS_CORRECTED, SIGNS_CORRECTED
 from slicemodel.schemes.form import Scheme, StepConstants, StepForm
+from slicemodel.schemes.midpoint import MIDPOINT
 from slicemodel.schemes.published import PAPER_TYPESET, PUBLISHED_MATLAB, PUBLISHED_PYTHON
 
 __all__ = ["SCHEMES", "Scheme", "StepConstants", "StepForm"]
@@ -20,6 +21,7 @@ SCHEMES = MappingProxyType(
             SIGNS_CORRECTED,
             ROOTS_CORRECTED,
             EXACT_STEP,
+            MIDPOINT,
         )
     }
 )

@@ -45,6 +45,10 @@ class StepForm(NamedTuple):
         Rebound: a slice past an end returns to its previous position. If false, it stays outside.
     strict : bool
         Rebound only past the end (<, >), not at it (<=, >=).
+    midpoint : bool
+        Coefficients are frozen at a predicted mid-step, not at the start of the step.
+    in_step : bool
+        Hits are located inside the step by the closed form, and a rebound does not wait for the grid.
     """
 
     exact_roots: bool
@@ -54,6 +58,8 @@ class StepForm(NamedTuple):
     lagged: bool
     keeps_position: bool
     strict: bool
+    midpoint: bool = False
+    in_step: bool = False
 
 
 class StepConstants(NamedTuple):

@@ -1,0 +1,115 @@
+"""Hits located inside the step by the closed form, against a dense sampling of the same closed form and by hand."""
+
+import math
+
+import numpy as np
+import pytest
+
+import slicemodel
+from slicemodel import Bottle, Scenario, kernel
+from slicemodel.schemes import SCHEMES
+
+IN_STEP = ["roots-corrected", "exact-step", "midpoint"]
+
+
+def heavy(**changes) -> Scenario:
+    """A tube so heavy that nothing the slices do can change omega or r_CM."""
+    values = {"bottle": Bottle(mass=1e12), "gravity": 0.0, "omega0": 10.0, "n_slices": 2, "water_mass": 0.1}
+    return Scenario(**(values | changes))
+
+
+def flight_time(scenario: Scenario) -> float:
+    """When slice 1 of a heavy tube first reaches the base, from rest: a scalar root found by bisection."""
+    gamma, omega = scenario.damping_rate, abs(scenario.omega0)
+    up, down = -gamma + math.hypot(gamma, omega), -gamma - math.hypot(gamma, omega)
+    x0 = scenario.initial_positions()[1] - scenario.bottle.length / 2
+    wall = scenario.r_max - scenario.bottle.length / 2
+    low, high = 0.0, 1.0
+    for _ in range(200):
+        t = (low + high) / 2
+        x = x0 * (up * math.exp(down * t) - down * math.exp(up * t)) / (up - down)
+        low, high = (low, t) if x > wall else (t, high)
+    return low
+
+
+@pytest.mark.parametrize("scheme", IN_STEP)
+@pytest.mark.parametrize("drag", [0.0, 0.4])
+@pytest.mark.parametrize("steps", [2, 7])
+def test_the_first_hit_is_exact_for_any_step(scheme, drag, steps):
+    scenario = heavy(drag=drag, duration=0.2)
+    expected = flight_time(scenario)
+    assert 0.01 < expected < 0.2
+    run = slicemodel.solve(scenario, scheme, steps, rebound="in-step")
+    first = run.impacts[0]
+    assert (first.slice, first.end) == (1, "base")
+    assert first.time == pytest.approx(expected, abs=1e-12)
+    assert first.speed_after == pytest.approx(0.5 * first.speed_before)
+
+
+@pytest.mark.parametrize("scheme", IN_STEP)
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+def test_many_hits_in_one_step_equal_many_steps(scheme, restitution):
+    """In a heavy tube one step of any size is exact, however often a slice bounces inside it."""
+    scenario = heavy(drag=0.2, duration=0.3, restitution=restitution, water_mass=0.2)
+    one = slicemodel.solve(scenario, scheme, 2, rebound="in-step")
+    many = slicemodel.solve(scenario, scheme, 3001, rebound="in-step")
+    assert len(one.impacts) >= (1 if restitution == 0.0 else 2)
+    np.testing.assert_allclose(one.r[-1], many.r[-1], atol=1e-9)
+    np.testing.assert_allclose(one.v[-1], many.v[-1], atol=1e-7)
+    fast = one.impacts.speed_before > 1e-3
+    np.testing.assert_allclose(one.impacts.time[fast], many.impacts.time[many.impacts.speed_before > 1e-3], atol=1e-9)
+
+
+def test_a_dip_through_the_end_and_back_within_one_step_is_found():
+    form = SCHEMES["exact-step"].form._replace(in_step=True)
+    scenario = heavy(duration=0.05, drag=0.0)
+    constants = SCHEMES["exact-step"].constants(scenario)
+    frame = kernel.Frame(
+        length=0.28, r_min=0.01, r_max=0.27, slice_mass=0.05, bottle_mass=1.0, bottle_inertia=1.0,
+        omega0=10.0, theta0=0.0, frozen=False,
+    )  # fmt: skip
+    # The centre lies beyond the base, so that the slice is thrown back: it would turn 2 mm behind the wall.
+    centre, r, omega = 0.5, 0.25, 10.0
+    x = r - centre
+    v = math.sqrt(omega**2 * (x**2 - (0.272 - centre) ** 2))
+    turn = kernel.turning_time(constants.gamma, omega, x, v)
+    assert centre + kernel.path(form, constants, omega, x, v, turn)[0] > 0.27
+    assert centre + kernel.path(form, constants, omega, x, v, 2 * turn)[0] < 0.27
+    log = np.empty((4, 4))
+    new, speed, log, count = kernel.rebound_in_step(
+        form, constants, frame, omega, centre, 1.0, 2 * turn, 5, r, v, log, 0
+    )
+    assert count == 1
+    assert tuple(log[0, 1:3]) == (5.0, 1.0)
+    assert 1.0 < log[0, 0] < 1.0 + turn
+    # Energy of the closed form without drag: v^2 - omega^2 x^2 is constant, so the speed at the wall is known.
+    assert log[0, 3] ** 2 == pytest.approx(v**2 - omega**2 * x**2 + omega**2 * (0.27 - centre) ** 2, rel=1e-9)
+    assert new < 0.27
+    assert speed < 0.0
+
+
+@pytest.mark.parametrize("scheme", IN_STEP)
+def test_slices_stay_inside_and_resting_ones_rest(scheme):
+    scenario = Scenario().with_slices(30)
+    run = slicemodel.solve(scenario, scheme, 200, rebound="in-step")
+    assert run.settings["rebound"] == "in-step"
+    assert run.r.min() >= scenario.r_min - 1e-15
+    assert run.r.max() <= scenario.r_max + 1e-15
+    early = run.t < 0.02
+    assert (run.r[early, 0] == scenario.r_max).all()
+    assert not run.v[early, 0].any()
+    assert np.all(np.diff(run.impacts.time) >= 0)
+
+
+def test_only_exact_roots_know_their_path_inside_a_step():
+    with pytest.raises(ValueError, match=r"exact roots \(roots-corrected, exact-step, midpoint\)") as e:
+        slicemodel.solve(Scenario(n_slices=2), "published-python", rebound="in-step")
+    assert "published-python" in str(e.value)
+    with pytest.raises(ValueError, match="did you mean 'in-step'"):
+        slicemodel.solve(Scenario(n_slices=2), rebound="instep")
+
+
+def test_defaults_of_rebound():
+    assert slicemodel.solve(Scenario(n_slices=2), "midpoint").settings["rebound"] == "in-step"
+    assert slicemodel.solve(Scenario(n_slices=2), "exact-step").settings["rebound"] == "grid"
+    assert slicemodel.solve(Scenario(n_slices=2), "midpoint", rebound="grid").settings["rebound"] == "grid"
