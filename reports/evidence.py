@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from reports import vectors
 from reports.solvers import Made, Run, find, make, without_gravity
 from reports.studies.differences import Difference, study_difference
@@ -26,6 +28,12 @@ ENGINE = "pymunk"
 FLIGHTS = ("published-python", "published-limit", "exact-step", "eq8", ENGINE)
 OTHER_SCHEMES = ("published-matlab", "paper-typeset", "signs-corrected", "roots-corrected")
 MODELS = ("published-limit", "eq8")
+
+COMMON = 37
+"""Intervals that all grids of a step-size study share; a divisor of the 999 intervals of the default output times."""
+
+COMMON_START = 9
+"""The same, before the first impact."""
 
 LIMITS = {"published-python": "published-limit", "exact-step": "eq8"}
 """Scheme -> the model it converges to."""
@@ -53,20 +61,18 @@ class Size:
     name: str
     slices: int = 50
     steps: int = 1000
-    coarsest: int = 500
     levels: int
-    start_coarsest: int = 8
     counts: tuple[int, ...]
     second_method: str | None
 
 
 FULL = Size(
     name="full",
-    levels=6,
+    levels=7,
     counts=(5, 10, 20, 50, 100, 200, 500),
     second_method="Radau",
 )
-QUICK = Size(name="quick", levels=4, counts=(5, 20, 50, 200), second_method=None)
+QUICK = Size(name="quick", levels=6, counts=(5, 20, 50, 200), second_method=None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,7 +144,7 @@ def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None 
     """
     throw = scenario.with_slices(size.slices)
     runs = plan(throw, size)
-    steps = {s: plan_step_size(throw, s, size.coarsest, size.levels) for s in LIMITS}
+    steps = {s: plan_step_size(throw, s, COMMON, 27, size.levels) for s in LIMITS}
     flat = runs + [run for levels in steps.values() for level in levels for run in level]
     with workers(jobs) as pool:
         made = make_all(pool, flat, progress)
@@ -256,9 +262,10 @@ def _study_start(throw: Scenario, scheme: str, reference: Trajectory | None, siz
     start = before_first_impact(throw, reference) if reference is not None and reference.impacts is not None else None
     if reference is None or start is None:
         return None
-    levels = plan_step_size(start, scheme, size.start_coarsest, size.levels)
+    levels = plan_step_size(start, scheme, COMMON_START, 8, size.levels)
     made = {run.tag: make(run) for level in levels for run in level}
-    short = make(Run("start", reference.method, start)).trajectory
+    times = np.linspace(0.0, start.duration, COMMON_START + 1)
+    short = make(Run("start", reference.method, start, {"times": times})).trajectory
     return _study_levels(short, levels, made)
 
 

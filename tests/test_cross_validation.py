@@ -27,20 +27,33 @@ THROWS = {
 }
 
 
-def refine(throw, scheme, reference, coarsest, count):
-    levels = plan_step_size(throw, scheme, coarsest, count)
+COMMON = 9
+
+
+def refine(throw, scheme, model, multiple, count):
+    levels = plan_step_size(throw, scheme, COMMON, multiple, count)
     runs = [[slicemodel.solve(run.scenario, run.solver, **run.settings) for run in level] for level in levels]
+    reference = ode_reference.solve(throw, model, times=np.linspace(0.0, throw.duration, COMMON + 1))
     return study_step_size(reference, runs)
+
+
+def start_of(throw, model):
+    return before_first_impact(throw, ode_reference.solve(throw, model))
 
 
 @pytest.mark.parametrize("scheme", LIMITS)
 @pytest.mark.parametrize("name", THROWS)
 def test_order_1_before_the_first_impact(name, scheme):
-    throw = THROWS[name]
-    start = before_first_impact(throw, ode_reference.solve(throw, LIMITS[scheme]))
-    study = refine(start, scheme, ode_reference.solve(start, LIMITS[scheme]), 32, 5)
+    study = refine(start_of(THROWS[name], LIMITS[scheme]), scheme, LIMITS[scheme], 8, 5)
     finding = claims.claim_order(study, "before the first impact", claims.ORDER_BEFORE_IMPACT)
     assert finding.verdict == "pass", finding
+
+
+@pytest.mark.parametrize("name", THROWS)
+def test_midpoint_has_order_2_before_the_first_impact(name):
+    study = refine(start_of(THROWS[name], "eq8"), "midpoint", "eq8", 2, 5)
+    assert study.refined
+    assert 1.9 <= study.order <= 2.1, study
 
 
 @pytest.mark.parametrize("scheme", LIMITS)
@@ -48,11 +61,59 @@ def test_order_1_across_impacts_over_an_ensemble_of_impact_phases(scheme):
     """Grids of other phases and throws of other phases: the mean order is 1, though single ones scatter."""
     orders = []
     for throw in THROWS.values():
-        study = refine(throw, scheme, ode_reference.solve(throw, LIMITS[scheme]), 1000, 5)
+        study = refine(throw, scheme, LIMITS[scheme], 220, 6)
         assert study.refined, study
         assert 0.75 <= study.order <= 1.25, study
         orders.append(study.order)
     assert 0.9 <= float(np.mean(orders)) <= 1.1, orders
+
+
+def random_throws(count, seed):
+    """Throws no scheme was tuned on: other bottles, fillings, spins, angles, drags and restitutions."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        bottle = Bottle(
+            length=rng.uniform(0.18, 0.35),
+            radius=rng.uniform(0.025, 0.05),
+            mass=rng.uniform(0.015, 0.06),
+            capacity=rng.uniform(0.5, 1.5),
+        )
+        water_mass, n = rng.uniform(0.1, 0.9) * bottle.capacity, int(rng.integers(10, 50))
+        yield Scenario(
+            bottle=bottle,
+            water_mass=water_mass,
+            n_slices=n,
+            drag=2 * rng.uniform(0.0, 10.0) * water_mass / n,
+            restitution=float(rng.choice([0.0, 0.35, 0.5, 0.7])),
+            omega0=rng.uniform(12.0, 25.0),
+            theta0=rng.uniform(0.3, 2.5),
+            duration=rng.uniform(0.3, 0.6),
+        )
+
+
+def test_midpoint_at_200_steps_has_at_most_a_tenth_of_the_error_of_exact_step_on_the_grid():
+    ratios = []
+    for throw in random_throws(16, seed=1):
+        reference = ode_reference.solve(throw, "eq8", times=np.linspace(0.0, throw.duration, 201))
+        errors = [
+            np.abs(slicemodel.solve(throw, scheme, 201).omega - reference.omega).max()
+            for scheme in ("midpoint", "exact-step")
+        ]
+        ratios.append(errors[0] / errors[1])
+    assert max(ratios) <= 0.1, ratios
+    assert float(np.median(ratios)) <= 0.03, ratios
+
+
+@pytest.mark.parametrize("rebound", ["grid", "in-step"])
+def test_both_rebounds_of_the_exact_step_converge_to_eq8(rebound):
+    throw = THROWS["small bottle"]
+    times = np.linspace(0.0, throw.duration, 21)
+    reference = ode_reference.solve(throw, "eq8", times=times)
+    errors = []
+    for steps in (4000, 64000):
+        run = slicemodel.solve(throw, "exact-step", steps + 1, rebound=rebound)
+        errors.append(np.abs(run.omega[:: steps // 20] - reference.omega).max())
+    assert 8 < errors[0] / errors[1] < 32, errors
 
 
 @pytest.mark.parametrize("scheme", LIMITS)
@@ -60,7 +121,7 @@ def test_a_scheme_does_not_converge_to_the_other_equation(scheme):
     """The order test can fail: against the wrong equation refinement stops helping."""
     throw = THROWS["the paper's"]
     other = next(model for model in LIMITS.values() if model != LIMITS[scheme])
-    study = refine(throw, scheme, ode_reference.solve(throw, other), 1000, 4)
+    study = refine(throw, scheme, other, 220, 4)
     assert claims.claim_order(study, "here", claims.ORDER_ACROSS_IMPACTS).failed
 
 

@@ -2,11 +2,13 @@
 
 A rebound waits for the grid, so the error at one step size depends on where in its step each impact falls. Single runs
 then scatter by more than a factor of two, and an order read off them is luck. Each step size is therefore an ensemble
-of grids whose step differs by a few per cent: every member has other impact phases, and the mean error has an order.
+of grids: every member has other impact phases, and their mean error has an order. All grids of a study share a set of
+times, and errors are taken there: an interpolation would have an error of its own, larger than that of a good scheme.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -16,11 +18,11 @@ from reports.solvers import Run
 from slicemodel import Scenario, Trajectory
 from slicemodel.trajectory import FloatArray
 
-PHASES = 16
+PHASES = 8
 """Members of the ensemble at each step size."""
 
-PHASE_SPREAD = 0.5
-"""The members' steps are spread over this fraction of the step size."""
+LEAST_COMMON = 8
+"""Common times, less one, that a run and its reference must share at the least."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,20 +53,19 @@ class StepSize:
         return np.asarray(np.sqrt((self.error**2).mean(axis=1)))
 
 
-def levels(coarsest: int, count: int) -> list[list[int]]:
-    """Return the numbers of steps of every level: each level twice as fine, its members spread over PHASE_SPREAD."""
-    spread = 1.0 + PHASE_SPREAD * np.arange(PHASES) / PHASES
-    return [[round(coarsest * 2**level * factor) for factor in spread] for level in range(count)]
+def levels(base: int, multiple: int, count: int) -> list[list[int]]:
+    """Return the numbers of steps of every level: multiples of ``base`` from ``multiple`` on, doubled at each level."""
+    return [[base * (multiple + phase) * 2**level for phase in range(PHASES)] for level in range(count)]
 
 
-def plan_step_size(scenario: Scenario, scheme: str, coarsest: int, count: int) -> list[list[Run]]:
-    """Return the runs of every level: ``coarsest`` steps in the first, doubled ``count - 1`` times."""
+def plan_step_size(scenario: Scenario, scheme: str, base: int, multiple: int, count: int) -> list[list[Run]]:
+    """Return the runs of every level; all their grids share ``base + 1`` times."""
     return [
         [
             Run(f"{scheme}, {steps} steps", scheme, scenario, {"steps": steps + 1, "store": "summary"})
             for steps in members
         ]
-        for members in levels(coarsest, count)
+        for members in levels(base, multiple, count)
     ]
 
 
@@ -74,14 +75,14 @@ def study_step_size(reference: Trajectory, runs: Sequence[Sequence[Trajectory]])
     Parameters
     ----------
     reference : Trajectory
-        The scheme's limit equation, on any times.
+        The scheme's limit equation, on uniform times that each run shares at least LEAST_COMMON intervals with.
     runs : levels of phases
         Trajectories of one scheme as planned by ``plan_step_size``.
 
-    Accuracy
-    --------
-    The runs are interpolated linearly to the reference's times; that error is of second order in dt and does not
-    touch an order of 1.
+    Raises
+    ------
+    ValueError
+        If a run and the reference share too few times.
     """
     omega0 = reference.scenario.omega0
     error = np.array([[_error(reference, run, omega0) for run in level] for level in runs])
@@ -103,9 +104,14 @@ def study_step_size(reference: Trajectory, runs: Sequence[Sequence[Trajectory]])
 
 
 def _error(reference: Trajectory, run: Trajectory, omega0: float) -> float:
-    if run.t[-1] < reference.t[-1] or not run.ok:
+    if not (run.ok and reference.ok):
         return float("nan")
-    return float(np.abs(np.interp(reference.t, run.t, run.omega) - reference.omega).max() / abs(omega0))
+    fine, coarse = len(run.t) - 1, len(reference.t) - 1
+    common = math.gcd(fine, coarse)
+    if common < LEAST_COMMON:
+        raise ValueError(f"{fine} steps and {coarse} reference intervals share only {common} intervals")
+    difference = run.omega[:: fine // common] - reference.omega[:: coarse // common]
+    return float(np.abs(difference).max() / abs(omega0))
 
 
 def observed_order(dt: FloatArray, error: FloatArray) -> tuple[float, float]:

@@ -73,9 +73,10 @@ def test_first_crossing_at_the_first_point_and_never():
 
 
 def test_levels_double_and_spread():
-    grids = levels(100, 3)
+    grids = levels(10, 10, 3)
     assert [grid[0] for grid in grids] == [100, 200, 400]
     assert all(len(set(grid)) == PHASES for grid in grids)
+    assert all(steps % 10 == 0 for grid in grids for steps in grid)
 
 
 @pytest.mark.parametrize("order", [0.5, 1.0, 2.0])
@@ -97,7 +98,7 @@ def test_an_order_of_nonsense_is_nan_and_fails(spoil):
 
 def step_runs(error_of_dt):
     return [
-        [curve(20 + np.array([0.0, 0.0, 20 * error_of_dt(dt)]), method="scheme", dt=dt) for dt in (h, 0.9 * h)]
+        [curve(20 + 20 * error_of_dt(dt) * np.linspace(0, 1, 9), method="scheme", dt=dt) for dt in (h, 0.9 * h)]
         for h in (0.1, 0.05, 0.025, 0.0125)
     ]
 
@@ -113,13 +114,19 @@ def step_runs(error_of_dt):
     ],
 )
 def test_claim_order_accepts_first_order_and_nothing_else(error_of_dt, verdict):
-    reference = curve([20.0, 20.0, 20.0], method="limit")
+    reference = curve(np.full(9, 20.0), method="limit")
     study = study_step_size(reference, step_runs(error_of_dt))
     assert claims.claim_order(study, "here", (0.9, 1.1)).verdict == verdict
 
 
+def test_runs_that_share_too_few_times_are_refused():
+    runs = step_runs(lambda dt: dt)
+    with pytest.raises(ValueError, match="8 steps and 9 reference intervals share only 1"):
+        study_step_size(curve(np.full(10, 20.0)), runs)
+
+
 def test_a_run_that_ends_early_has_no_order():
-    reference = curve([20.0, 20.0, 20.0])
+    reference = curve(np.full(9, 20.0))
     runs = step_runs(lambda dt: dt)
     runs[1][0] = curve([20, 20], t=[0.0, 0.1], method="scheme", status="overflow", dt=0.05)
     study = study_step_size(reference, runs)
