@@ -11,11 +11,13 @@ from slicemodel.scenario import Bottle, Scenario, ScenarioError
 
 if TYPE_CHECKING:
     from slicemodel.solver import solve
+    from slicemodel.step_advice import required_steps
     from slicemodel.trajectory import Impact, Impacts, Trajectory
 
-__all__ = ["Bottle", "Impact", "Impacts", "Scenario", "ScenarioError", "Trajectory", "solve"]
+__all__ = ["Bottle", "Impact", "Impacts", "Scenario", "ScenarioError", "Trajectory", "required_steps", "solve"]
 
 _HOMES = {
+    "required_steps": "slicemodel.step_advice",
     "solve": "slicemodel.solver",
     "Impact": "slicemodel.trajectory",
     "Impacts": "slicemodel.trajectory",

@@ -165,3 +165,34 @@ def test_the_models_that_move_a_bottle_agree_before_anything_can_differ():
     runs = [slicemodel.solve(throw), ode_reference.solve(throw), engine_check.solve(throw, dt=1e-6)]
     for run in runs[1:]:
         assert np.abs(run.omega - runs[0].omega).max() < 2e-3 * abs(throw.omega0)
+
+
+@pytest.mark.parametrize(
+    ("scheme", "model", "tolerance"),
+    [
+        ("exact-step", "eq8", 1e-2),
+        ("exact-step", "eq8", 2e-3),
+        ("midpoint", "eq8", 1e-3),
+        ("midpoint", "eq8", 1e-4),
+        ("published-python", "published-limit", 5e-3),
+    ],
+)
+def test_required_steps_keeps_its_promise_on_throws_it_has_not_seen(scheme, model, tolerance):
+    for throw in random_throws(6, seed=2026):
+        steps = slicemodel.required_steps(throw, tolerance, scheme)
+        for points in (steps, int(1.13 * steps) + 1, int(1.71 * steps) + 3):
+            times = np.linspace(0.0, throw.duration, points)
+            run = slicemodel.solve(throw, scheme, points, "summary")
+            error = np.abs(run.omega - ode_reference.solve(throw, model, times=times).omega).max() / throw.omega0
+            assert error <= tolerance, (throw, points, error)
+
+
+def test_required_steps_does_not_ask_for_far_too_much():
+    """At an eighth of the steps asked for, most throws miss the tolerance: the answer is not just a big number."""
+    missed = []
+    for throw in random_throws(6, seed=2026):
+        points = (slicemodel.required_steps(throw, 2e-3) - 1) // 8 + 1
+        times = np.linspace(0.0, throw.duration, points)
+        error = np.abs(slicemodel.solve(throw, steps=points).omega - ode_reference.solve(throw, times=times).omega)
+        missed.append(bool(error.max() / throw.omega0 > 2e-3))
+    assert sum(missed) >= 4, missed

@@ -1,0 +1,102 @@
+"""How many steps does a throw need? Answered by the scheme itself, before anyone believes its result."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from slicemodel.scenario import Scenario, unknown_name
+from slicemodel.schemes import SCHEMES
+from slicemodel.solver import Rebound, solve
+from slicemodel.trajectory import FloatArray
+
+BASE = 64
+"""All trial grids are multiples of this, so that they share times to be compared at."""
+
+MEMBERS = 8
+"""Grids tried per octave: an error depends on where in its step each impact falls, and one grid may be lucky."""
+
+SAFETY = 1.5
+"""The worst of an octave times this must meet the tolerance; covers phases of impact that were not tried."""
+
+REFINEMENT = 32
+"""The scheme's own limit is taken from a run this many times finer than the octave under trial."""
+
+MOST_STEPS = 1 << 20
+"""Steps beyond which no answer is looked for."""
+
+
+def required_steps(
+    scenario: Scenario, tolerance: float, scheme: str = "exact-step", *, rebound: Rebound | None = None
+) -> int:
+    """Return ``steps`` for ``solve`` so that omega(t) is within ``tolerance`` of the scheme's own limit.
+
+    Grids are refined octave by octave, eight per octave, until the worst of one octave and of the next finer one meet
+    the tolerance with a margin; the limit is the same scheme, 32 times finer. The answer is the start of an octave, so
+    it may be up to twice what is needed.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    tolerance : float
+        Largest admissible max |omega - omega_limit| / |omega_0| over the flight, in (0, 1).
+    scheme : str
+        One of ``slicemodel.schemes.SCHEMES`` that converges: not "published-matlab", whose slices escape.
+    rebound : {"grid", "in-step"} or None
+        As in ``solve``.
+
+    Returns
+    -------
+    int
+        Points of the grid, as ``solve`` counts them. Finer grids keep the tolerance too.
+
+    Raises
+    ------
+    ValueError
+        Tolerance out of range, unknown scheme, a run that escapes or overflows, or a tolerance that more than a
+        million steps would not meet.
+
+    Accuracy
+    --------
+    The step error only. The scheme's limit is an equation of its own and may be far from free flight.
+    """
+    # Written as "not inside", because NaN passes every "outside" test.
+    if isinstance(tolerance, bool) or not isinstance(tolerance, (int, float)) or not 0.0 < tolerance < 1.0:
+        raise ValueError(f"tolerance = {tolerance!r} is outside (0, 1) (a fraction of omega_0)")
+    if scheme not in SCHEMES:
+        raise ValueError(unknown_name("scheme =", scheme, SCHEMES))
+    octave = 1
+    good: int | None = None
+    while octave * BASE <= MOST_STEPS:
+        worst = _worst_of_octave(scenario, scheme, rebound, octave)
+        if worst * SAFETY <= tolerance:
+            if good is not None:
+                return good + 1
+            good = octave * BASE
+        else:
+            good = None
+        octave *= 2
+    raise ValueError(
+        f"tolerance = {tolerance:g} needs more than {MOST_STEPS} steps of {scheme} "
+        f"(error {worst:.2g} at {octave * BASE // 2} steps); a scheme of second order is 'midpoint'"
+    )
+
+
+def _worst_of_octave(scenario: Scenario, scheme: str, rebound: Rebound | None, octave: int) -> float:
+    """Return the largest error of the octave's grids, max |d omega| / |omega_0| at the times shared with the limit."""
+    limit = _omega(scenario, scheme, rebound, octave * BASE * REFINEMENT)
+    worst = 0.0
+    for member in range(MEMBERS):
+        steps = octave * BASE * (MEMBERS + member) // MEMBERS
+        common = math.gcd(steps, len(limit) - 1)
+        difference = _omega(scenario, scheme, rebound, steps)[:: steps // common] - limit[:: (len(limit) - 1) // common]
+        worst = max(worst, float(np.abs(difference).max()))
+    return worst / abs(scenario.omega0)
+
+
+def _omega(scenario: Scenario, scheme: str, rebound: Rebound | None, steps: int) -> FloatArray:
+    run = solve(scenario, scheme, steps + 1, "summary", rebound=rebound)
+    if not run.ok:
+        raise ValueError(f"{scheme} has no step size to ask for on this throw: {run.status}: {run.message}")
+    return run.omega

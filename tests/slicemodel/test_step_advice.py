@@ -1,0 +1,39 @@
+"""What ``required_steps`` refuses; that it keeps its promise stands in the cross-validation."""
+
+import math
+
+import pytest
+
+from slicemodel import Scenario, required_steps
+
+SMALL = Scenario().with_slices(5)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1e-3, 1.0, math.nan, math.inf, "small", True])
+def test_tolerance_out_of_range_is_named(tolerance):
+    with pytest.raises(ValueError, match=r"tolerance = .* is outside \(0, 1\)"):
+        required_steps(SMALL, tolerance)
+
+
+def test_unknown_scheme_is_named():
+    with pytest.raises(ValueError, match="did you mean 'midpoint'"):
+        required_steps(SMALL, 1e-3, "midpont")
+
+
+def test_a_scheme_whose_slices_escape_has_no_answer():
+    with pytest.raises(ValueError, match="published-matlab has no step size to ask for on this throw: "):
+        required_steps(SMALL, 1e-3, "published-matlab")
+
+
+def test_a_tolerance_out_of_reach_is_said_so(monkeypatch):
+    monkeypatch.setattr("slicemodel.step_advice.MOST_STEPS", 256)
+    with pytest.raises(ValueError, match=r"more than 256 steps of exact-step .* second order is .midpoint."):
+        required_steps(SMALL, 1e-9)
+
+
+def test_ice_needs_the_fewest():
+    assert required_steps(Scenario(n_slices=3, frozen=True), 1e-6) == 65
+
+
+def test_second_order_needs_fewer():
+    assert required_steps(SMALL, 1e-3, "midpoint") * 4 <= required_steps(SMALL, 1e-3, "exact-step")
