@@ -10,9 +10,10 @@ import base64
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from reports import figures
 from reports.evidence import FLIGHTS, Evidence
-from reports.figures import Drawing
+from reports.figures import flights as flight_figures
+from reports.figures import numerics as numeric_figures
+from reports.figures.style import Drawing, draw
 from reports.studies.step_size import PHASES
 from slicemodel import Trajectory
 
@@ -58,7 +59,7 @@ def _draw_flights(flights: list[Trajectory]) -> Iterator[Exhibit]:
         caption="Compare each solid scheme with the dashed equation of the same hue: between them lies the step size. "
         "What lies between the hues comes from the equations; pymunk is free flight.",
         alt=f"Line plot of omega over omega_0 against time. Values at the end: {ends}.",
-        drawing=figures.draw(figures.figure_omega(flights)),
+        drawing=draw(flight_figures.figure_omega(flights)),
     )
     turns = ", ".join(f"{run.label} {run.theta[-1]:.2f} rad" for run in flights)
     yield Exhibit(
@@ -68,7 +69,7 @@ def _draw_flights(flights: list[Trajectory]) -> Iterator[Exhibit]:
         caption="The angle is the integral of the curve above: what differs in ω for half a second decides how far the "
         "bottle has turned on landing (360° is upright after one flip).",
         alt=f"Line plot of the angle theta in degrees against time. Values at the end: {turns}.",
-        drawing=figures.draw(figures.figure_theta(flights)),
+        drawing=draw(flight_figures.figure_theta(flights)),
     )
     centres = ", ".join(f"{run.label} {run.r_cm[-1] / run.scenario.bottle.length:.3f}" for run in flights)
     yield Exhibit(
@@ -78,7 +79,7 @@ def _draw_flights(flights: list[Trajectory]) -> Iterator[Exhibit]:
         caption="The centre of mass leaves the base as slices are thrown to the cap; where it settles decides how "
         "easily the landing bottle topples.",
         alt=f"Line plot of the centre of mass from the cap, as a fraction of the length. At the end: {centres}.",
-        drawing=figures.draw(figures.figure_centre_of_mass(flights)),
+        drawing=draw(flight_figures.figure_centre_of_mass(flights)),
     )
     yield Exhibit(
         name="slices",
@@ -87,7 +88,7 @@ def _draw_flights(flights: list[Trajectory]) -> Iterator[Exhibit]:
         caption="The first slice starts on the base and rests there until something pulls it off; the last one starts "
         "nearest the centre of mass, where the push is weakest, so it shows differences between the equations first.",
         alt="Three line plots of position against time, cap at the top: first, middle and last slice, every solver.",
-        drawing=figures.draw(figures.figure_slices([run for run in flights if len(run.r)])),
+        drawing=draw(flight_figures.figure_slices([run for run in flights if len(run.r)])),
     )
 
 
@@ -100,7 +101,7 @@ def _draw_differences(evidence: Evidence) -> Exhibit:
         caption="Each curve is one assumption. A marker on the dotted line is the moment at which that assumption has "
         "cost 1 % of ω₀. Curves that stay below the line are assumptions that can be trusted for this bottle.",
         alt=f"Logarithmic line plot of the differences in omega. {words}.".replace("ω₀", "omega_0"),
-        drawing=figures.draw(figures.figure_differences(evidence.differences)),
+        drawing=draw(flight_figures.figure_differences(evidence.differences)),
     )
 
 
@@ -116,7 +117,7 @@ def _draw_step_size(evidence: Evidence) -> Exhibit:
         f"{PHASES} grids per step size, each with other impact phases, because a rebound waits for the grid. A scheme "
         "that converges does so to its own equation, not to free flight.",
         alt=f"Two log-log plots of error against step. Over the whole flight: {words}.",
-        drawing=figures.draw(figures.figure_step_size(studies, starts)),
+        drawing=draw(numeric_figures.figure_step_size(studies, starts)),
     )
 
 
@@ -130,7 +131,7 @@ def _draw_ice(evidence: Evidence) -> Exhibit:
         caption="Nothing moves inside a bottle of ice, so every drift is the solver's own: its largest value stands in "
         "the legend. Masses welded on by joints give in a little at the start, a quarter as much at half the step.",
         alt=f"Logarithmic plot of the drift of omega. Largest drift: {words}.",
-        drawing=figures.draw(figures.figure_ice(drifts)),
+        drawing=draw(numeric_figures.figure_ice(drifts)),
     )
 
 
@@ -146,5 +147,5 @@ def _draw_slices(evidence: Evidence) -> Exhibit:
         caption="The same water cut finer and finer at the same damping rate: read off from which number of slices on "
         "the curve no longer moves by more than the differences above.",
         alt=f"Line plots of omega for several numbers of slices. Distance from the finest cut: {words}.",
-        drawing=figures.draw(figures.figure_slice_count(evidence.slices)),
+        drawing=draw(numeric_figures.figure_slice_count(evidence.slices)),
     )

@@ -1,0 +1,96 @@
+"""The flights themselves, and where they part."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from reports.figures.style import ASSUMPTIONS, MARKERS, new_figure, shared_legend, shown_name, solver_style, styled
+from reports.studies.differences import PARTING_BAND, Difference
+from slicemodel import Trajectory
+
+
+def _over_time(trajectories: Iterable[Trajectory], quantity: str, label: str) -> Figure:
+    figure, axes = new_figure()
+    for k, trajectory in enumerate(trajectories):
+        scenario = trajectory.scenario
+        values = {
+            "omega": trajectory.omega / scenario.omega0,
+            "theta": np.degrees(trajectory.theta),
+            "r_cm": trajectory.r_cm / scenario.bottle.length,
+        }[quantity]
+        axes.plot(trajectory.t, values, label=shown_name(trajectory), **solver_style(trajectory.label, k))
+    axes.set_xlabel("time t [s]")
+    axes.set_ylabel(label)
+    axes.margins(x=0.01)
+    shared_legend(figure, axes)
+    return figure
+
+
+@styled
+def figure_omega(trajectories: Iterable[Trajectory]) -> Figure:
+    """Angular velocity over time."""
+    figure = _over_time(trajectories, "omega", "angular velocity ω / ω₀ [1]")
+    figure.axes[0].set_ylim(bottom=0.0)
+    return figure
+
+
+@styled
+def figure_theta(trajectories: Iterable[Trajectory]) -> Figure:
+    """Angle of the bottle over time."""
+    return _over_time(trajectories, "theta", "angle θ [degrees]")
+
+
+@styled
+def figure_centre_of_mass(trajectories: Iterable[Trajectory]) -> Figure:
+    """Centre of mass over time."""
+    return _over_time(trajectories, "r_cm", "centre of mass r_CM / L [1], cap = 0")
+
+
+@styled
+def figure_slices(trajectories: Sequence[Trajectory]) -> Figure:
+    """Paths of the first, the middle and the last slice, one panel each."""
+    figure, panels = new_figure(3, size=(8.0, 7.2), sharex=True, sharey=True)
+    n = trajectories[0].scenario.n_slices
+    chosen = (("first slice (starts on the base)", 0), ("middle slice", n // 2), ("last slice", n - 1))
+    for axes, (words, i) in zip(panels, chosen, strict=True):
+        for k, trajectory in enumerate(trajectories):
+            length = trajectory.scenario.bottle.length
+            axes.plot(
+                trajectory.t,
+                trajectory.r[:, i] / length,
+                label=shown_name(trajectory),
+                **solver_style(trajectory.label, k),
+            )
+        axes.set_title(f"{words}, number {i}", fontsize=10, loc="left")
+        axes.set_ylabel("r / L [1]")
+        axes.set_ylim(1.03, -0.03)
+        axes.margins(x=0.01)
+    panels[-1].set_xlabel("time t [s]")
+    shared_legend(figure, panels[0])
+    return figure
+
+
+@styled
+def figure_differences(differences: Sequence[Difference]) -> Figure:
+    """Size of every difference over time on a logarithmic scale, with the parting band and moments."""
+    figure, axes = new_figure(size=(8.0, 4.6))
+    axes.axhline(PARTING_BAND, color="#444444", linewidth=1.0, linestyle=":")
+    axes.text(1.005, PARTING_BAND, f"{PARTING_BAND:.0%}", transform=axes.get_yaxis_transform(), va="center", fontsize=9)
+    for k, difference in enumerate(differences):
+        colour = ASSUMPTIONS[k % len(ASSUMPTIONS)]
+        size = np.maximum(np.abs(difference.omega), 1e-12)
+        axes.plot(difference.t, size, color=colour, linewidth=1.4, label=difference.name)
+        if difference.parting_time is not None:
+            axes.plot(
+                difference.parting_time, PARTING_BAND, MARKERS[k], color=colour, markeredgecolor="white", markersize=8
+            )
+    axes.set_yscale("log")
+    axes.set_ylim(1e-7, 2.0)
+    axes.set_xlabel("time t [s]")
+    axes.set_ylabel("|difference in ω| / ω₀ [1]")
+    axes.margins(x=0.01)
+    shared_legend(figure, axes, columns=2)
+    return figure

@@ -1,0 +1,102 @@
+"""The look of every figure: style, colours by meaning, and how a figure becomes SVG and PNG.
+
+Never pyplot, nothing global, nothing saved here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
+from io import BytesIO
+from typing import Any, TypeVar, cast
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from slicemodel import Trajectory
+
+WIDE = (8.0, 3.9)
+
+# One hue per family, so that a scheme and the equation it converges to are seen as a pair (Okabe-Ito colours,
+# told apart by most colour-blind readers; line style and marker carry the same information).
+STYLES: dict[str, dict[str, Any]] = {
+    "published-python": {"color": "#D55E00", "linestyle": "-", "linewidth": 1.6},
+    "published-limit": {"color": "#7A3600", "linestyle": (0, (5, 3)), "linewidth": 1.4},
+    "exact-step": {"color": "#56B4E9", "linestyle": "-", "linewidth": 2.4},
+    "eq8": {"color": "#00466E", "linestyle": (0, (5, 3)), "linewidth": 1.4},
+    "pymunk": {"color": "#009E73", "linestyle": "-", "linewidth": 1.6},
+}
+ASSUMPTIONS = ("#E69F00", "#6A5ACD", "#CC79A7", "#882255", "#000000")
+ICE_FLOOR = 1e-18
+OTHERS = ("#CC79A7", "#E69F00", "#000000", "#999933", "#882255")
+MARKERS = "os^Dv<>"
+
+STYLE: dict[Any, Any] = {
+    "font.size": 10.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "legend.fontsize": 9.0,
+    "svg.hashsalt": "flipproof",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """One finished figure as SVG text and PNG bytes."""
+
+    svg: str
+    png: bytes
+
+
+Maker = TypeVar("Maker", bound=Callable[..., Any])
+
+
+def styled(function: Maker) -> Maker:
+    """Run a function under the report's style without touching matplotlib's global settings."""
+
+    @wraps(function)
+    def run(*arguments: Any, **options: Any) -> Any:
+        with mpl.rc_context(STYLE):
+            return function(*arguments, **options)
+
+    return cast(Maker, run)
+
+
+@styled
+def draw(figure: Figure) -> Drawing:
+    """Render a figure; the same data give the same bytes (fixed ids, no date)."""
+    svg, png = BytesIO(), BytesIO()
+    figure.savefig(svg, format="svg", metadata={"Date": None})
+    figure.savefig(png, format="png", dpi=160)
+    return Drawing(svg.getvalue().decode("utf-8"), png.getvalue())
+
+
+def solver_style(label: str, k: int = 0) -> dict[str, Any]:
+    """Return line colour, style and width of a solver; one the report has no colour for takes the ``k``-th of the others."""
+    return STYLES.get(label, {"color": OTHERS[k % len(OTHERS)], "linestyle": "-.", "linewidth": 1.4})
+
+
+def new_figure(
+    rows: int = 1, columns: int = 1, *, size: tuple[float, float] = WIDE, **options: Any
+) -> tuple[Figure, Any]:
+    """Return a figure and its axes, laid out so that nothing overlaps."""
+    figure = Figure(figsize=size, layout="constrained")
+    return figure, figure.subplots(rows, columns, **options)
+
+
+def shared_legend(figure: Figure, axes: Axes, columns: int = 5) -> None:
+    """Put one legend for all panels below the figure, from the entries of ``axes``."""
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+
+
+def shown_name(trajectory: Trajectory) -> str:
+    """Return the name of a run for legends, with its status if that is not "ok"."""
+    return trajectory.label if trajectory.ok else f"{trajectory.label} ({trajectory.status})"
