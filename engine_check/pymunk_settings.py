@@ -18,6 +18,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Final
 
+from engine_check.solver import MOST_ITERATIONS
 from slicemodel.scenario import Scenario, unknown_name
 
 CAP_ELASTICITY: Final = 1.0
@@ -46,7 +47,13 @@ def enough_iterations(scenario: Scenario) -> int:
     iterations change nothing, because the warm start carries the impulses from step to step.
     """
     mass_ratio = scenario.water_mass / scenario.bottle.mass
-    return max(LEAST_ITERATIONS, math.ceil(ITERATIONS_MARGIN * mass_ratio * math.sqrt(scenario.n_slices)))
+    enough = ITERATIONS_MARGIN * mass_ratio * math.sqrt(scenario.n_slices)
+    if enough > MOST_ITERATIONS:
+        raise ValueError(
+            f"water_mass / bottle.mass = {mass_ratio:.3g} needs {enough:.3g} iterations of the engine per step, "
+            f"more than {MOST_ITERATIONS}"
+        )
+    return max(LEAST_ITERATIONS, math.ceil(enough))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -32,7 +32,7 @@ def intended(scenario: Scenario, knobs: PymunkKnobs, iterations: int, ice: str) 
     bottle = scenario.bottle
     inertia = observables.initial_moment_of_inertia(scenario)
     one_body = scenario.frozen and ice == "rigid"
-    tube_moment = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
+    tube_moment = bottle.mass * (bottle.radius * bottle.radius / 2 + bottle.length * bottle.length / 12)
     meant = {
         "iterations": float(iterations),
         "gravity_x": 0.0,

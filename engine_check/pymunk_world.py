@@ -66,7 +66,7 @@ def build(scenario: Scenario, knobs: PymunkKnobs, iterations: int, ice: str) -> 
     positions = scenario.initial_positions()
     first_moment = bottle.mass * bottle.length / 2 + scenario.slice_mass * positions.sum()
     centre = float(first_moment / scenario.total_mass)
-    tube_moment = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
+    tube_moment = bottle.mass * (bottle.radius * bottle.radius / 2 + bottle.length * bottle.length / 12)
 
     if scenario.frozen and ice == "rigid":
         about_centre = tube_moment + bottle.mass * (bottle.length / 2 - centre) ** 2

@@ -9,13 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from reports.evaluation import evaluate
-from reports.evidence import FLIGHTS, OTHER_SCHEMES, Evidence
+from reports.evidence import ENGINE, FLIGHTS, OTHER_SCHEMES, Evidence
 from reports.exhibits import Exhibit, draw_all
 from reports.findings import Finding
+from reports.lead import lead_words
 from reports.page import render
 from reports.solvers import find
 from reports.studies.differences import PARTING_BAND
 from reports.tables import trajectory_csv
+from slicemodel import Trajectory
 from slicemodel.observables import plateau
 
 SUMMARY_VERSION = 1
@@ -52,6 +54,7 @@ def build(evidence: Evidence, provenance: Mapping[str, str]) -> Report:
         "differences": [_difference_mapping(difference) for difference in evidence.differences],
         "solvers": solvers,
         "runs": [_run_mapping(evidence, tag) for tag in evidence.made],
+        "lead": lead_words(evidence.differences, evidence.trajectory(ENGINE)),
         "figures": [{"name": s.name, "title": s.title, "alt": s.alt} for s in exhibits],
         "provenance": dict(provenance),
     }
@@ -99,11 +102,16 @@ def _solver_row(evidence: Evidence, tag: str) -> dict[str, Any]:
     return row | {
         "status": trajectory.status,
         "message": trajectory.message,
-        "final": float(trajectory.omega[-1] / trajectory.scenario.omega0),
+        "final": float(trajectory.omega[-1] / trajectory.scenario.omega0) if _landed(trajectory) else None,
         "plateau": plateau(trajectory.t, trajectory.omega, trajectory.scenario.omega0) if trajectory.ok else None,
         "impacts": None if trajectory.impacts is None else len(trajectory.impacts),
         "diagnostics": _plain(trajectory.diagnostics),
     }
+
+
+def _landed(trajectory: Trajectory) -> bool:
+    """Return whether the run reached the end of the flight."""
+    return bool(trajectory.t[-1] >= trajectory.scenario.duration * (1 - 1e-12))
 
 
 def _run_mapping(evidence: Evidence, tag: str) -> dict[str, Any]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import os
 import shlex
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -56,15 +58,35 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("flipproof: interrupted; nothing was overwritten", file=sys.stderr)
         return INTERRUPTED
-    except (ValueError, OSError, MemoryError) as error:
-        print(f"flipproof: error: {' '.join(str(error).split()) or type(error).__name__}", file=sys.stderr)
-        return 2
+    except (ValueError, OSError) as error:
+        return _complain(str(error) or type(error).__name__)
+    except Exception as error:
+        # Nobody is helped by a traceback at the command line; whoever wants to mend the cause asks for it.
+        if os.environ.get("FLIPPROOF_TRACEBACK"):
+            raise
+        return _complain(f"{type(error).__name__}: {error} (set FLIPPROOF_TRACEBACK=1 to see where)")
+
+
+def entry() -> NoReturn:
+    """Run the command line as a program."""
+    status = main()
+    if status == INTERRUPTED and threading.active_count() > 1:
+        # A process pool that could not end in time would hold an orderly exit up for ever. Nothing is left to clean up.
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+    sys.exit(status)
 
 
 def _interrupt(*_: object) -> NoReturn:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)  # a second one must not break the cleaning up
     raise KeyboardInterrupt
+
+
+def _complain(words: str) -> int:
+    print(f"flipproof: error: {' '.join(words.split())}", file=sys.stderr)
+    return 2
 
 
 def parser() -> argparse.ArgumentParser:
@@ -216,7 +238,10 @@ def command_compare(options: argparse.Namespace) -> int:
         path = Path(name)
         if path.suffix or path.is_file():
             return read_curve(path)
-        return Curve.of(solve(find(name).name, scenario))
+        run = solve(find(name).name, scenario)
+        if len(run.t) < 2:
+            raise ValueError(f"{name} has nothing to compare on this throw: {run.status}: {run.message}")
+        return Curve.of(run)
 
     print(table(compare(load(options.first), load(options.second))))
     return 0
@@ -241,4 +266,4 @@ def command_models(options: argparse.Namespace) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    entry()

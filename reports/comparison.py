@@ -43,6 +43,8 @@ def compare(first: Curve, second: Curve) -> Comparison:
     if omega0 == 0.0:
         raise ValueError(f"{first.label}: omega is 0 at the first time; differences are taken relative to it")
     t = first.t[(first.t >= second.t[0]) & (first.t <= second.t[-1])]
+    if len(t) < 2:
+        raise ValueError(f"{first.label} has {len(t)} times within those of {second.label}; at least 2 are needed")
 
     def both(name: str) -> tuple[FloatArray, FloatArray]:
         return np.interp(t, first.t, getattr(first, name)), np.interp(t, second.t, getattr(second, name))

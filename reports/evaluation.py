@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from reports import claims
-from reports.evidence import ENGINE, LIMITS, MODELS, Evidence
+from reports.evidence import CHECK, ENGINE, LIMITS, MODELS, Evidence
 from reports.findings import Finding
 from reports.vectors import load_all
 
@@ -49,40 +49,47 @@ def _ice_findings(evidence: Evidence) -> Iterator[Finding]:
 
 def _order_findings(evidence: Evidence) -> Iterator[Finding]:
     for scheme, model in LIMITS.items():
-        for studies, where, admissible in (
-            (evidence.starts_by_step, "before the first impact", claims.ORDER_BEFORE_IMPACT),
-            (evidence.flights_by_step, "across impacts", claims.ORDER_ACROSS_IMPACTS),
+        for studies, where in (
+            (evidence.check_starts, "before the first impact"),
+            (evidence.check_flights, "across impacts"),
         ):
             if scheme in studies:
-                yield claims.claim_order(studies[scheme], where, admissible)
+                yield claims.claim_order(studies[scheme], where)
             else:
                 title = f"{scheme} converges to {model}, {where}"
-                yield _missing(evidence, f"order-{scheme}-{where.replace(' ', '-')}", title, scheme, model)
+                tags = (f"{CHECK}, {model}", scheme)
+                yield _missing(evidence, f"order-{scheme}-{where.replace(' ', '-')}", title, *tags)
+        for studies, where in (
+            (evidence.starts_by_step, "before the first impact of this throw"),
+            (evidence.flights_by_step, "across the impacts of this throw"),
+        ):
+            if scheme in studies:
+                yield claims.claim_order(studies[scheme], where, kind="observation")
 
 
 def _reference_findings(evidence: Evidence) -> Iterator[Finding]:
     for model in MODELS:
-        usual, tight = evidence.trajectory(model), evidence.trajectory(f"{model}, tighter")
+        tag = f"{CHECK}, {model}"
+        usual, tight = evidence.trajectory(tag), evidence.trajectory(f"{tag}, tighter")
         if usual is None or tight is None:
-            yield _missing(evidence, f"reference-{model}", f"{model} is converged", model, f"{model}, tighter")
+            yield _missing(evidence, f"reference-{model}", f"{model} is converged", tag, f"{tag}, tighter")
         else:
             yield claims.claim_reference_converged(usual, tight)
         if evidence.size.second_method is None:
             continue
-        tag = f"{model}, {evidence.size.second_method}"
-        other = evidence.trajectory(tag)
+        other_tag = f"{tag}, {evidence.size.second_method}"
+        other = evidence.trajectory(other_tag)
         if usual is None or other is None:
-            yield _missing(evidence, f"second-method-{model}", f"{model} by a second method", model, tag)
+            yield _missing(evidence, f"second-method-{model}", f"{model} by a second method", tag, other_tag)
         else:
             yield claims.claim_second_method(usual, other)
 
 
 def _engine_findings(evidence: Evidence) -> Iterator[Finding]:
-    usual, without = evidence.trajectory(ENGINE), evidence.trajectory(f"{ENGINE}, no gravity")
+    tags = (f"{CHECK}, {ENGINE}", f"{CHECK}, {ENGINE}, no gravity")
+    usual, without = (evidence.trajectory(tag) for tag in tags)
     if usual is None or without is None:
-        yield _missing(
-            evidence, "engine-gravity", "free flight is the same with g = 0", ENGINE, f"{ENGINE}, no gravity"
-        )
+        yield _missing(evidence, "engine-gravity", f"{ENGINE}: free flight is the same with g = 0", *tags)
     else:
         yield claims.claim_gravity_cancels(usual, without)
     explosion = evidence.trajectory(f"{ENGINE}, 10 iterations")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -28,6 +29,15 @@ ENGINE = "pymunk"
 FLIGHTS = ("published-python", "published-limit", "exact-step", "eq8", ENGINE)
 OTHER_SCHEMES = ("published-matlab", "paper-typeset", "signs-corrected", "roots-corrected")
 MODELS = ("published-limit", "eq8")
+
+REFERENCE = Scenario().with_slices(50)
+"""The throw of the regression claims: the paper's own. What is observed on the user's throw cannot fail them."""
+
+CHECK = "check"
+"""Leads the tags of runs on REFERENCE."""
+
+PATIENCE = 2.0
+"""Seconds that an interrupted report waits for its workers to end."""
 
 COMMON = 37
 """Intervals that all grids of a step-size study share; a divisor of the 999 intervals of the default output times."""
@@ -86,6 +96,8 @@ class Evidence:
     differences: tuple[Difference, ...]
     flights_by_step: Mapping[str, StepSize]
     starts_by_step: Mapping[str, StepSize]
+    check_flights: Mapping[str, StepSize]
+    check_starts: Mapping[str, StepSize]
     ice: tuple[IceDrift, ...]
     welded: tuple[IceDrift, ...]
     slices: Mapping[str, SliceCount]
@@ -98,17 +110,19 @@ class Evidence:
 
 def plan(throw: Scenario, size: Size) -> list[Run]:
     """Return the runs of the report but for the step sizes, the slowest first."""
-    tight = {"rtol": 1e-11, "atol": 1e-14, "rest_speed": 1e-6}
     runs = [
         Run(f"{ENGINE}, finer", ENGINE, throw, _finer_engine(throw)),
-        Run(f"{ENGINE}, no gravity", ENGINE, without_gravity(throw)),
+        Run(f"{CHECK}, {ENGINE}, no gravity", ENGINE, without_gravity(REFERENCE)),
+        Run(f"{CHECK}, {ENGINE}", ENGINE, REFERENCE),
         Run(ENGINE, ENGINE, throw),
     ]
-    if size.second_method:
-        runs += [Run(f"{m}, {size.second_method}", m, throw, {"method": size.second_method}) for m in MODELS]
-    runs += [Run(f"{model}, tighter", model, throw, tight) for model in MODELS]
-    runs += [Run(model, model, throw) for model in MODELS]
-    runs += plan_welded(throw, ENGINE)
+    for prefix, scenario in ((f"{CHECK}, ", REFERENCE), ("", throw)):
+        if size.second_method:
+            other = {"method": size.second_method}
+            runs += [Run(f"{prefix}{m}, {size.second_method}", m, scenario, other) for m in MODELS]
+        runs += [Run(f"{prefix}{model}, tighter", model, scenario, _tighter(scenario)) for model in MODELS]
+        runs += [Run(f"{prefix}{model}", model, scenario) for model in MODELS]
+    runs += plan_welded(REFERENCE, ENGINE)
     runs.append(Run(f"{ENGINE}, 10 iterations", ENGINE, throw, {"iterations": 10}))
     runs += plan_ice(throw, tuple(LIMITS), MODELS, ENGINE)
     for scheme in (*LIMITS, *OTHER_SCHEMES):
@@ -120,6 +134,11 @@ def plan(throw: Scenario, size: Size) -> list[Run]:
         for vector in vectors.load_all()
     ]
     return runs
+
+
+def _tighter(scenario: Scenario) -> dict[str, Any]:
+    """Tolerances and rest speed a tenth, longest step a half of what the reference does unless told otherwise."""
+    return {"rtol": 1e-11, "atol": 1e-14, "rest_speed": 1e-6, "max_step": 0.005 / abs(scenario.omega0)}
 
 
 def _finer_engine(throw: Scenario) -> dict[str, Any]:
@@ -145,11 +164,12 @@ def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None 
     throw = scenario.with_slices(size.slices)
     runs = plan(throw, size)
     steps = {s: plan_step_size(throw, s, COMMON, 27, size.levels) for s in LIMITS}
-    flat = runs + [run for levels in steps.values() for level in levels for run in level]
+    checks = {s: plan_step_size(REFERENCE, s, COMMON, 108, 4, tag=CHECK) for s in LIMITS}
+    flat = runs + [run for plans in (steps, checks) for levels in plans.values() for level in levels for run in level]
     with workers(jobs) as pool:
         made = make_all(pool, flat, progress)
-        pending = {s: pool.submit(_study_start, throw, s, made[model].trajectory, size) for s, model in LIMITS.items()}
-        starts = {scheme: study for scheme, future in pending.items() if (study := future.result()) is not None}
+        starts = _study_starts(pool, throw, "", made, size.levels)
+        check_starts = _study_starts(pool, REFERENCE, f"{CHECK}, ", made, 4)
 
     return Evidence(
         scenario=scenario,
@@ -157,14 +177,12 @@ def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None 
         size=size,
         made=made,
         differences=tuple(_differences(made)),
-        flights_by_step={
-            scheme: study
-            for scheme, levels in steps.items()
-            if (study := _study_levels(made[LIMITS[scheme]].trajectory, levels, made)) is not None
-        },
+        flights_by_step=_study_plans(steps, "", made),
         starts_by_step=starts,
+        check_flights=_study_plans(checks, f"{CHECK}, ", made),
+        check_starts=check_starts,
         ice=tuple(_ice(made, [run.tag for run in runs if run.tag.startswith("ice,") and "welded" not in run.tag])),
-        welded=tuple(_ice(made, [run.tag for run in plan_welded(throw, ENGINE)])),
+        welded=tuple(_ice(made, [run.tag for run in plan_welded(REFERENCE, ENGINE)])),
         slices={
             scheme: counted
             for scheme in LIMITS
@@ -184,12 +202,19 @@ def make_all(pool: Executor, runs: Iterable[Run], progress: Progress) -> dict[st
     This process only waits, so that it can be interrupted at any time; the slice model compiles in one worker only.
     """
     runs = list(runs)
-    quick = [run for run in runs if find(run.solver).package == "slicemodel"]
-    jobs = [[run] for run in runs if find(run.solver).package != "slicemodel"]
+    # Runs that differ in their tag only are made once.
+    same: dict[tuple[Any, ...], list[Run]] = {}
+    for run in runs:
+        same.setdefault((run.solver, run.scenario, repr(sorted(run.settings.items()))), []).append(run)
+    different = [group[0] for group in same.values()]
+    others = {group[0].tag: group for group in same.values()}
+    quick = [run for run in different if find(run.solver).package == "slicemodel"]
+    jobs = [[run] for run in different if find(run.solver).package != "slicemodel"]
     made: dict[str, Made] = {}
     for future in as_completed([pool.submit(make_each, job) for job in ([quick] if quick else []) + jobs]):
         for result in future.result():
-            made[result.run.tag] = result
+            for run in others[result.run.tag]:
+                made[run.tag] = replace(result, run=run)
             progress(len(made), len(runs), result.run.tag)
     return made
 
@@ -213,9 +238,15 @@ def workers(jobs: int | None) -> Iterator[Executor]:
     )
     try:
         yield pool
-    except BaseException:
+    except KeyboardInterrupt:
         for child in multiprocessing.active_children():
             child.kill()
+        # A worker killed while it sends a result leaves the pool waiting for the rest of it, so the wait is bounded.
+        ending = threading.Thread(target=pool.shutdown, kwargs={"cancel_futures": True}, daemon=True)
+        ending.start()
+        ending.join(PATIENCE)
+        raise
+    except BaseException:
         pool.shutdown(cancel_futures=True)
         raise
     pool.shutdown()
@@ -249,6 +280,21 @@ def _differences(made: Mapping[str, Made]) -> Iterator[Difference]:
         yield study_difference(name, one, other, impacts_of=made[LIMITS.get(first, first)].trajectory, band=band)
 
 
+def _study_plans(plans: Mapping[str, list[list[Run]]], prefix: str, made: Mapping[str, Made]) -> dict[str, StepSize]:
+    studies = {s: _study_levels(made[f"{prefix}{LIMITS[s]}"].trajectory, levels, made) for s, levels in plans.items()}
+    return {scheme: study for scheme, study in studies.items() if study is not None}
+
+
+def _study_starts(
+    pool: Executor, throw: Scenario, prefix: str, made: Mapping[str, Made], levels: int
+) -> dict[str, StepSize]:
+    pending = {
+        scheme: pool.submit(_study_start, throw, scheme, made[f"{prefix}{model}"].trajectory, levels)
+        for scheme, model in LIMITS.items()
+    }
+    return {scheme: study for scheme, future in pending.items() if (study := future.result()) is not None}
+
+
 def _study_levels(reference: Trajectory | None, levels: list[list[Run]], made: Mapping[str, Made]) -> StepSize | None:
     runs = [[made[run.tag].trajectory for run in level] for level in levels]
     complete = [[run for run in level if run is not None] for level in runs]
@@ -257,12 +303,12 @@ def _study_levels(reference: Trajectory | None, levels: list[list[Run]], made: M
     return study_step_size(reference, complete)
 
 
-def _study_start(throw: Scenario, scheme: str, reference: Trajectory | None, size: Size) -> StepSize | None:
+def _study_start(throw: Scenario, scheme: str, reference: Trajectory | None, count: int) -> StepSize | None:
     """Study the step size on the part of the flight before any impact."""
     start = before_first_impact(throw, reference) if reference is not None and reference.impacts is not None else None
     if reference is None or start is None:
         return None
-    levels = plan_step_size(start, scheme, COMMON_START, 8, size.levels)
+    levels = plan_step_size(start, scheme, COMMON_START, 14, count)
     made = {run.tag: make(run) for level in levels for run in level}
     times = np.linspace(0.0, start.duration, COMMON_START + 1)
     short = make(Run("start", reference.method, start, {"times": times})).trajectory

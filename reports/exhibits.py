@@ -66,8 +66,8 @@ def _draw_flights(flights: list[Trajectory]) -> Iterator[Exhibit]:
         name="theta",
         section="flights",
         title="Angle",
-        caption="The angle is the integral of the curve above: what differs in ω for half a second decides how far the "
-        "bottle has turned on landing (360° is upright after one flip).",
+        caption="The angle is the integral of the curve above: a difference in ω that lasts decides how far the bottle "
+        "has turned on landing. Multiples of 360° stand upright.",
         alt=f"Line plot of the angle theta in degrees against time. Values at the end: {turns}.",
         drawing=draw(flight_figures.figure_theta(flights)),
     )
@@ -76,8 +76,8 @@ def _draw_flights(flights: list[Trajectory]) -> Iterator[Exhibit]:
         name="centre-of-mass",
         section="flights",
         title="Centre of mass",
-        caption="The centre of mass leaves the base as slices are thrown to the cap; where it settles decides how "
-        "easily the landing bottle topples.",
+        caption="Distance from the cap. The nearer to the cap the centre of mass is on landing, the easier the bottle "
+        "topples; in ice it stays where it is.",
         alt=f"Line plot of the centre of mass from the cap, as a fraction of the length. At the end: {centres}.",
         drawing=draw(flight_figures.figure_centre_of_mass(flights)),
     )
@@ -85,9 +85,11 @@ def _draw_flights(flights: list[Trajectory]) -> Iterator[Exhibit]:
         name="slices",
         section="flights",
         title="Chosen slices",
-        caption="The first slice starts on the base and rests there until something pulls it off; the last one starts "
-        "nearest the centre of mass, where the push is weakest, so it shows differences between the equations first.",
-        alt="Three line plots of position against time, cap at the top: first, middle and last slice, every solver.",
+        caption="Cap at the top, base at the bottom. The first slice starts on the base, the last one on top of the "
+        "water; the one in between starts nearest the centre of mass, where the push outwards is weakest.",
+        alt="Line plots of position against time, cap at the top, every solver. Slices: "
+        + ", ".join(f"number {i}, {words}" for i, words in flight_figures.chosen_slices(flights[0]))
+        + ".",
         drawing=draw(flight_figures.figure_slices([run for run in flights if len(run.r)])),
     )
 
@@ -99,7 +101,7 @@ def _draw_differences(evidence: Evidence) -> Exhibit:
         section="differences",
         title="Where the solvers part",
         caption="Each curve is one assumption. A marker on the dotted line is the moment at which that assumption has "
-        "cost 1 % of ω₀. Curves that stay below the line are assumptions that can be trusted for this bottle.",
+        "first cost 1 % of ω₀. An assumption whose curve stays below the line costs this throw less than that.",
         alt=f"Logarithmic line plot of the differences in omega. {words}.".replace("ω₀", "omega_0"),
         drawing=draw(flight_figures.figure_differences(evidence.differences)),
     )
@@ -113,9 +115,9 @@ def _draw_step_size(evidence: Evidence) -> Exhibit:
         name="step-size",
         section="steps",
         title="Error against step size",
-        caption="Points on the dotted slope mean that halving the step halves the error. The shaded range is that of "
-        f"{PHASES} grids per step size, each with other impact phases, because a rebound waits for the grid. A scheme "
-        "that converges does so to its own equation, not to free flight.",
+        caption="Points parallel to the dotted slope mean that halving the step halves the error. The shaded range is "
+        f"that of the {PHASES} grids averaged in each point: other steps, other impact phases, because a rebound waits "
+        "for the grid. A scheme that converges does so to its own equation, not to free flight.",
         alt=f"Two log-log plots of error against step. Over the whole flight: {words}.",
         drawing=draw(numeric_figures.figure_step_size(studies, starts)),
     )

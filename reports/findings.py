@@ -79,13 +79,15 @@ class Finding:
     @property
     def band_text(self) -> str:
         """The numerical band, or a dash."""
-        return "–" if self.band is None else f"± {self.band:.1g}"
+        return "–" if self.band is None or math.isnan(self.band) else f"± {self.band:.1g}"
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the finding as JSON-ready data; infinite bounds become null."""
         mapping = asdict(self)
         mapping["admissible"] = [None if math.isinf(bound) else bound for bound in self.admissible]
-        if self.value is not None and not math.isfinite(self.value):
-            mapping["value"] = str(self.value)
+        for name in ("value", "band"):
+            number = mapping[name]
+            if number is not None and not math.isfinite(number):
+                mapping[name] = str(number)
         mapping["verdict"] = self.verdict
         return mapping

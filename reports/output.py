@@ -26,6 +26,8 @@ def check_replaceable(target: Path) -> None:
     """
     if not target.exists():
         return
+    if target.resolve() == Path.cwd():
+        raise OutputError(f"'{target}' is the current folder; name another")
     if not target.is_dir():
         raise OutputError(f"{target} is a file; --out names a folder")
     if any(target.iterdir()) and not (target / MARKER).is_file():
@@ -39,7 +41,7 @@ def replaced_folder(target: Path) -> Iterator[Path]:
     If the block raises or is interrupted, the new folder is removed and ``target`` is as it was. The exchange itself
     is two renames; a run that dies between them is repaired by the next one.
     """
-    target = target.absolute()
+    target = target.resolve()
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         _repair(target)
@@ -82,7 +84,28 @@ def _umask() -> int:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write one file so that a reader sees the old or the new content, never half of it."""
+    """Write one file so that a reader sees the old or the new content, never half of it.
+
+    Links are followed; a device or a pipe is written to as it is.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    path = path.resolve()
+    try:
+        if path.exists() and not path.is_file() and not path.is_dir():
+            path.write_text(text, encoding="utf-8")
+        else:
+            _replace(path, text)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written ({error.strerror or error})") from None
+
+
+def _replace(path: Path, text: str) -> None:
+    if path.is_dir():
+        raise OutputError(f"{path} is a folder; name a file")
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     try:
         with os.fdopen(handle, "w", encoding="utf-8") as file:

@@ -8,9 +8,11 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from reports.evidence import TOTAL, Evidence
+from reports.evidence import ENGINE, Evidence
 from reports.exhibits import Exhibit
 from reports.findings import Finding
+from reports.lead import lead_words
+from reports.studies.differences import Difference
 
 SYMBOLS = {
     "omega_0": "ω₀", "omega0": "ω₀", "omega": "ω", "theta": "θ", "gamma": "γ", "alpha": "α", "epsilon": "ε",
@@ -22,6 +24,15 @@ def typeset(text: str) -> str:
     """Return plain-text mathematics with Greek letters and signs; the command line prints it as it is."""
     pattern = "|".join(re.escape(word) for word in sorted(SYMBOLS, key=len, reverse=True))
     return re.sub(pattern, lambda match: SYMBOLS[match.group()], text)
+
+
+def amount(difference: Difference) -> str:
+    """Return the size of a difference as a percentage of omega_0 with its band, as in "0.47 %, band < 1e-5 %"."""
+    size = f"{100 * difference.largest:.2g} %"
+    if difference.band is None:
+        return size
+    band = 100 * difference.band
+    return f"{size} ± {band:.1g} %" if band >= 1e-3 else f"{size} ± < 0.001 %"
 
 
 def render(
@@ -41,14 +52,14 @@ def render(
     )
     differences = sorted(evidence.differences, key=lambda difference: -difference.largest)
     environment.filters["typeset"] = typeset
+    environment.filters["amount"] = amount
     regressions = [finding for finding in findings if finding.kind == "regression"]
     return environment.get_template("report.html.j2").render(
         scenario=evidence.scenario,
         throw=evidence.throw,
         size=evidence.size,
         differences=differences,
-        parts=[difference for difference in differences if difference.name != TOTAL],
-        total=[difference for difference in differences if difference.name == TOTAL],
+        lead=lead_words(evidence.differences, evidence.trajectory(ENGINE)),
         regressions=regressions,
         observations=[finding for finding in findings if finding.kind == "observation"],
         failed=[finding for finding in regressions if finding.failed],

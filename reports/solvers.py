@@ -35,7 +35,7 @@ def catalogue() -> dict[str, Solver]:
 
 
 def find(name: str) -> Solver:
-    """Return the solver of that name.
+    """Return the solver of that name; "switches:110000" and its like are combinations of the ladder's rungs.
 
     Raises
     ------
@@ -43,6 +43,12 @@ def find(name: str) -> Solver:
         If there is none; the message names the nearest.
     """
     solvers = catalogue()
+    if name.startswith("switches:"):
+        from ode_reference.combinations import model_of
+        from ode_reference.switches import Switches
+
+        model = model_of(Switches.from_name(name))
+        return Solver(name, "ode_reference", "model", model.equation, model.reason)
     if name not in solvers:
         raise ValueError(unknown_name("solver", name, solvers))
     return solvers[name]

@@ -44,7 +44,7 @@ def moment_of_inertia(scenario: Scenario, r: ArrayLike) -> FloatArray:
     r_cm = centre_of_mass(scenario, positions)
     water = scenario.slice_mass * ((positions - r_cm[..., np.newaxis]) ** 2).sum(axis=-1)
     bottle = scenario.bottle
-    about_own_centre = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
+    about_own_centre = bottle.mass * (bottle.radius * bottle.radius / 2 + bottle.length * bottle.length / 12)
     return np.asarray(water + about_own_centre + bottle.mass * (bottle.length / 2 - r_cm) ** 2)
 
 
@@ -73,3 +73,29 @@ def plateau(t: ArrayLike, omega: ArrayLike, omega0: float) -> float:
     grid = np.concatenate(([middle], times[late]))
     curve = np.concatenate(([np.interp(middle, times, values)], values[late]))
     return float(np.trapezoid(curve, grid) / (grid[-1] - grid[0]) / omega0)
+
+
+def centre_of_mass_velocity(scenario: Scenario, v: ArrayLike) -> FloatArray:
+    """Velocity of the centre of mass along the axis, in the bottle [m/s] (derivative of Eq. 10).
+
+    Parameters
+    ----------
+    v : array, shape (..., N) - slice velocities in the bottle [m/s], positive towards the base
+
+    Returns
+    -------
+    array, shape (...)
+    """
+    momentum = np.asarray(v, dtype=np.float64).sum(axis=-1) * scenario.slice_mass
+    return np.asarray(momentum / scenario.total_mass)
+
+
+def toppling_angle(scenario: Scenario, r_cm: ArrayLike) -> FloatArray:
+    """Angle beyond which a bottle standing on its rim topples [rad] (Eq. 13a: tan theta_c = R / (L - r_CM)).
+
+    Parameters
+    ----------
+    r_cm : array, any shape - centre of mass from the cap [m]
+    """
+    bottle = scenario.bottle
+    return np.asarray(np.arctan2(bottle.radius, bottle.length - np.asarray(r_cm, dtype=np.float64)))

@@ -47,6 +47,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+MOST_SLICES = 10_000_000
+"""Slices of a throw at the most; the paper uses 500."""
+
+
 class ScenarioError(ValueError):
     """A value no bottle can have; the message names field, value and admissible range."""
 
@@ -74,7 +78,10 @@ class _Checks:
         if isinstance(value, bool) or not isinstance(value, numbers.Real):
             self.problems.append(f"{shown} is not a number (admissible: {admissible} {unit})".replace(" )", ")"))
             return None
-        number = float(value)
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
         # Written as "not inside", because NaN passes every "outside" test.
         inside = math.isfinite(number)
         inside = inside and (above is None or number > above)
@@ -85,17 +92,26 @@ class _Checks:
             return None
         return number
 
-    def whole(self, name: str, value: object, *, least: int) -> int | None:
-        """Return ``value`` as int if it is a whole number of at least ``least``."""
-        if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < least:
-            self.problems.append(f"{self.where}{name} = {value!r} is not a whole number of at least {least}")
+    def whole(self, name: str, value: object, *, least: int, most: int) -> int | None:
+        """Return ``value`` as int if it is a whole number in [least, most]."""
+        problem = not_whole(f"{self.where}{name}", value, least, most)
+        if problem:
+            self.problems.append(problem)
             return None
-        return int(value)
+        return int(value)  # type: ignore[call-overload, no-any-return]
 
     def refuse(self) -> None:
         """Raise one ScenarioError that states all problems, if there are any."""
         if self.problems:
             raise ScenarioError("; ".join(self.problems))
+
+
+def not_whole(name: str, value: object, least: int, most: int) -> str:
+    """Return what is wrong with ``value`` as a whole number in [least, most], or an empty string."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not least <= int(value) <= most:
+        shown = repr(value)
+        return f"{name} = {shown if len(shown) < 40 else shown[:36] + '...'} is not a whole number in [{least}, {most}]"
+    return ""
 
 
 def _range_words(above: float | None, least: float | None, most: float | None) -> str:
@@ -190,7 +206,7 @@ class Scenario:
             raise ScenarioError(f"bottle = {self.bottle!r} is not a Bottle")
         checked: dict[str, object] = {
             "water_mass": self._checked_water_mass(checks),
-            "n_slices": checks.whole("n_slices", self.n_slices, least=1),
+            "n_slices": checks.whole("n_slices", self.n_slices, least=1, most=MOST_SLICES),
             "drag": checks.number("drag", self.drag, "kg/s", least=0.0),
             "restitution": checks.number("restitution", self.restitution, "", least=0.0, most=1.0),
             "omega0": checks.number("omega0", self.omega0, "rad/s"),
@@ -276,8 +292,9 @@ class Scenario:
 
     def with_slices(self, n_slices: int) -> Scenario:
         """Return the same throw cut into ``n_slices`` slices, damping rate alpha/2m unchanged."""
-        if isinstance(n_slices, bool) or not isinstance(n_slices, numbers.Integral) or n_slices < 1:
-            raise ScenarioError(f"n_slices = {n_slices!r} is not a whole number of at least 1")
+        problem = not_whole("n_slices", n_slices, 1, MOST_SLICES)
+        if problem:
+            raise ScenarioError(problem)
         return replace(self, n_slices=int(n_slices), drag=self.drag * self.n_slices / int(n_slices))
 
     # ------------------------------------------------------------------ files
@@ -297,7 +314,9 @@ class Scenario:
             document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
         except OSError as error:
             raise ScenarioError(f"{name}: cannot be read ({error.strerror or error})") from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        except RecursionError:
+            raise ScenarioError(f"{name}: is nested too deeply") from None
+        except ValueError as error:  # bad TOML, bad UTF-8, numbers of thousands of digits
             raise ScenarioError(f"{name}: is not valid TOML ({error})") from None
         return cls.from_mapping(document, source=name)
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-import numbers
 from typing import Any, Literal, get_args
 
 import numpy as np
 
-from slicemodel.scenario import Scenario, unknown_name
+from slicemodel.scenario import Scenario, not_whole, unknown_name
 from slicemodel.schemes import SCHEMES, Scheme, StepConstants, StepForm
 from slicemodel.trajectory import FloatArray, Impacts, Trajectory
+
+MOST_STEPS = 1_000_000_000
+FULL_LIMIT = 4 * 2**30
+"""Bytes of r and v together beyond which store="full" is refused."""
 
 Store = Literal["full", "summary"]
 Rebound = Literal["grid", "in-step"]
@@ -61,10 +64,17 @@ def solve(
     """
     if scheme not in SCHEMES:
         raise ValueError(unknown_name("scheme =", scheme, SCHEMES))
-    if isinstance(steps, bool) or not isinstance(steps, numbers.Integral) or steps < 2:
-        raise ValueError(f"steps = {steps!r} is not a whole number of at least 2 (points of the grid)")
+    problem = not_whole("steps", steps, 2, MOST_STEPS)
+    if problem:
+        raise ValueError(f"{problem} (points of the grid)")
     if store not in get_args(Store):
         raise ValueError(unknown_name("store =", store, get_args(Store)))
+    size = 16 * int(steps) * scenario.n_slices
+    if store == "full" and size > FULL_LIMIT:
+        raise ValueError(
+            f"steps = {steps} of n_slices = {scenario.n_slices} need {size / 2**30:.1f} GiB, more than "
+            f"{FULL_LIMIT / 2**30:.0f} GiB; use store = 'summary' or fewer of either"
+        )
     if rebound is not None and rebound not in get_args(Rebound):
         raise ValueError(unknown_name("rebound =", rebound, get_args(Rebound)))
     chosen = SCHEMES[scheme]
@@ -86,7 +96,7 @@ def _run(scenario: Scenario, scheme: Scheme, form: StepForm, steps: int, store: 
         r_max=scenario.r_max,
         slice_mass=scenario.slice_mass,
         bottle_mass=bottle.mass,
-        bottle_inertia=bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12),
+        bottle_inertia=bottle.mass * (bottle.radius * bottle.radius / 2 + bottle.length * bottle.length / 12),
         omega0=scenario.omega0,
         theta0=scenario.theta0,
         frozen=scenario.frozen,

@@ -49,22 +49,29 @@ def figure_centre_of_mass(trajectories: Iterable[Trajectory]) -> Figure:
     return _over_time(trajectories, "r_cm", "centre of mass r_CM / L [1], cap = 0")
 
 
+def chosen_slices(trajectory: Trajectory) -> list[tuple[int, str]]:
+    """Return the slices worth drawing: first, nearest the centre of mass at release, last; fewer if they coincide."""
+    nearest = int(np.abs(trajectory.r[0] - trajectory.r_cm[0]).argmin())
+    words = {0: "starts on the base", trajectory.scenario.n_slices - 1: "starts on top of the water"}
+    words.setdefault(nearest, "starts nearest the centre of mass")
+    return sorted(words.items())
+
+
 @styled
 def figure_slices(trajectories: Sequence[Trajectory]) -> Figure:
-    """Paths of the first, the middle and the last slice, one panel each."""
-    figure, panels = new_figure(3, size=(8.0, 7.2), sharex=True, sharey=True)
-    n = trajectories[0].scenario.n_slices
-    chosen = (("first slice (starts on the base)", 0), ("middle slice", n // 2), ("last slice", n - 1))
-    for axes, (words, i) in zip(panels, chosen, strict=True):
+    """Paths of a few slices, one panel each."""
+    chosen = chosen_slices(trajectories[0])
+    size = (8.0, 1.2 + 2.0 * len(chosen))
+    figure, grid = new_figure(len(chosen), size=size, sharex=True, sharey=True, squeeze=False)
+    panels = grid[:, 0]
+    for axes, (i, words) in zip(panels, chosen, strict=True):
         for k, trajectory in enumerate(trajectories):
             length = trajectory.scenario.bottle.length
             axes.plot(
-                trajectory.t,
-                trajectory.r[:, i] / length,
-                label=shown_name(trajectory),
+                trajectory.t, trajectory.r[:, i] / length, label=shown_name(trajectory),
                 **solver_style(trajectory.label, k),
-            )
-        axes.set_title(f"{words}, number {i}", fontsize=10, loc="left")
+            )  # fmt: skip
+        axes.set_title(f"slice {i}: {words}", fontsize=10, loc="left")
         axes.set_ylabel("r / L [1]")
         axes.set_ylim(1.03, -0.03)
         axes.margins(x=0.01)

@@ -12,7 +12,7 @@ from matplotlib.ticker import NullFormatter
 from reports.figures.style import ICE_FLOOR, MARKERS, STYLES, new_figure, shared_legend, solver_style, styled
 from reports.studies.ice import IceDrift
 from reports.studies.slices import SliceCount
-from reports.studies.step_size import StepSize
+from reports.studies.step_size import ROUND_OFF, StepSize
 
 
 @styled
@@ -22,10 +22,10 @@ def figure_step_size(flights: Sequence[StepSize], starts: Sequence[StepSize]) ->
     for axes, studies, title in ((panels[0], flights, "whole flight"), (panels[1], starts, "before the first impact")):
         for k, study in enumerate(studies):
             style = solver_style(study.scheme, k)
-            low, high = study.error.min(axis=1), study.error.max(axis=1)
+            low, high = np.maximum([study.error.min(axis=1), study.error.max(axis=1)], ROUND_OFF)
             axes.fill_between(study.mean_dt, low, high, color=style["color"], alpha=0.25, linewidth=0)
             axes.loglog(
-                study.mean_dt, study.mean_error, marker=MARKERS[k], color=style["color"], linewidth=1.4,
+                study.mean_dt, np.maximum(study.mean_error, ROUND_OFF), marker=MARKERS[k], color=style["color"], linewidth=1.4,
                 label=f"{study.scheme} → {study.model}",
             )  # fmt: skip
             axes.text(
@@ -34,7 +34,7 @@ def figure_step_size(flights: Sequence[StepSize], starts: Sequence[StepSize]) ->
             )  # fmt: skip
         if studies:
             dt = studies[0].mean_dt
-            top = max(study.mean_error[0] for study in studies) * 2.0
+            top = max(ROUND_OFF, *(study.mean_error[0] for study in studies)) * 2.0
             axes.loglog(dt, top * dt / dt[0], color="#444444", linestyle=":", linewidth=1.0, label="slope 1")
         axes.set_title(title, fontsize=10, loc="left")
         axes.set_xlabel("step Δt [s]")
@@ -49,15 +49,16 @@ def figure_step_size(flights: Sequence[StepSize], starts: Sequence[StepSize]) ->
 def figure_ice(drifts: Sequence[IceDrift]) -> Figure:
     """Drift of omega in the ice case over time, on a logarithmic scale with a floor."""
     figure, axes = new_figure(size=(8.0, 4.3))
-    colours = ("#D55E00", "#7A3600", "#56B4E9", "#00466E", "#009E73", "#882255", "#CC79A7", "#E69F00")
+    others = iter(("#882255", "#CC79A7", "#E69F00"))
     exact = 0
-    for k, ice in enumerate(drifts):
+    for ice in drifts:
         # Runs that do not drift at all would lie on one another: each gets its own line just above the floor.
         floor = ICE_FLOOR * 3.0**exact
         exact += ice.largest == 0.0
         words = "none" if ice.largest == 0.0 else f"{ice.largest:.1e}"
+        known = STYLES.get(ice.label.removesuffix(" rigid"))
         axes.semilogy(
-            ice.t, np.maximum(ice.drift, floor), color=colours[k % len(colours)], linewidth=1.5,
+            ice.t, np.maximum(ice.drift, floor), color=known["color"] if known else next(others), linewidth=1.5,
             label=f"{ice.label}: {words}",
         )  # fmt: skip
     axes.set_ylim(ICE_FLOOR / 3, 1e-2)

@@ -79,7 +79,7 @@ def draw(figure: Figure) -> Drawing:
 
 
 def solver_style(label: str, k: int = 0) -> dict[str, Any]:
-    """Return line colour, style and width of a solver; one the report has no colour for takes the ``k``-th of the others."""
+    """Return colour, style and width of a solver's line; an unknown solver takes the ``k``-th of the other colours."""
     return STYLES.get(label, {"color": OTHERS[k % len(OTHERS)], "linestyle": "-.", "linewidth": 1.4})
 
 

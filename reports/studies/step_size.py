@@ -21,6 +21,9 @@ from slicemodel.trajectory import FloatArray
 PHASES = 8
 """Members of the ensemble at each step size."""
 
+ROUND_OFF = 1e-13
+"""Errors below this fraction of omega_0 are not the step's."""
+
 LEAST_COMMON = 8
 """Common times, less one, that a run and its reference must share at the least."""
 
@@ -43,6 +46,11 @@ class StepSize:
     refined: bool
 
     @property
+    def exact(self) -> bool:
+        """True if every error is at round-off: nothing depends on the step (ice, or a tube that nothing moves)."""
+        return bool(np.all(self.error < ROUND_OFF))
+
+    @property
     def mean_dt(self) -> FloatArray:
         """Geometric mean step of every level [s]."""
         return np.asarray(np.exp(np.log(self.dt).mean(axis=1)))
@@ -58,11 +66,13 @@ def levels(base: int, multiple: int, count: int) -> list[list[int]]:
     return [[base * (multiple + phase) * 2**level for phase in range(PHASES)] for level in range(count)]
 
 
-def plan_step_size(scenario: Scenario, scheme: str, base: int, multiple: int, count: int) -> list[list[Run]]:
-    """Return the runs of every level; all their grids share ``base + 1`` times."""
+def plan_step_size(
+    scenario: Scenario, scheme: str, base: int, multiple: int, count: int, *, tag: str = "throw"
+) -> list[list[Run]]:
+    """Return the runs of every level; all their grids share ``base + 1`` times. ``tag`` leads the runs' tags."""
     return [
         [
-            Run(f"{scheme}, {steps} steps", scheme, scenario, {"steps": steps + 1, "store": "summary"})
+            Run(f"{tag}, {scheme}, {steps} steps", scheme, scenario, {"steps": steps + 1, "store": "summary"})
             for steps in members
         ]
         for members in levels(base, multiple, count)
@@ -117,9 +127,9 @@ def _error(reference: Trajectory, run: Trajectory, omega0: float) -> float:
 def observed_order(dt: FloatArray, error: FloatArray) -> tuple[float, float]:
     """Fit log(rms error) = p log(dt) + c over the levels; return p and its standard error.
 
-    NaN for both if an error is not finite, or if errors reach round-off (below 1e-13), where an order means nothing.
+    NaN for both if an error is not finite, or if errors reach ROUND_OFF, where an order means nothing.
     """
-    if not np.all(np.isfinite(error)) or error.min() < 1e-13 or len(dt) < 3:
+    if not np.all(np.isfinite(error)) or error.min() < ROUND_OFF or len(dt) < 3:
         return float("nan"), float("nan")
     x = np.log(dt).mean(axis=1)
     y = 0.5 * np.log((error**2).mean(axis=1))

@@ -74,6 +74,6 @@ PAPER_TYPESET = Scheme(
         keeps_position=True,
         strict=False,
     ),
-    limit="nothing moves: v changes sign every step",
+    limit="nothing moves as dt -> 0: v changes sign every step",
     reason="Eq. 9c, Eq. 9d and [C.S.] exactly as typeset; Eq. 9d ends in minus v cosh.",
 )

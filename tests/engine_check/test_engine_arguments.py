@@ -28,9 +28,20 @@ def test_an_engine_unlike_any_lists_all():
         solve(THROW, engine="xyz")
 
 
-@pytest.mark.parametrize("dt", [0.0, -1e-4, math.nan, math.inf, 0.011])
+def test_dt_is_an_upper_bound_and_may_exceed_the_flight():
+    short = solve(replace(THROW, duration=5e-5), times=[0.0, 5e-5])
+    assert short.status == "ok"
+    assert short.settings["step"] == pytest.approx(5e-5)
+
+
+def test_more_slices_than_an_engine_can_hold_are_refused():
+    with pytest.raises(ValueError, match=r"n_slices = 5001 is outside \[1, 5000\] for an engine"):
+        solve(replace(THROW, n_slices=5001))
+
+
+@pytest.mark.parametrize("dt", [0.0, -1e-4, math.nan, math.inf])
 def test_dt_out_of_range_is_named_with_the_range(dt):
-    with pytest.raises(ValueError, match=r"dt = .* s is outside \(0, 0.01\] s"):
+    with pytest.raises(ValueError, match=r"dt = .* s is outside \(0, inf\) s"):
         solve(THROW, dt=dt)
 
 

@@ -74,7 +74,7 @@ def test_models_lists_everything_with_reasons(capsys):
         (["report", "--out", "{full}"], ["not a flipproof report"]),
         (["simulate", "--solver", "eq9"], ["solver 'eq9' is unknown", "did you mean 'eq8'?"]),
         (["simulate", "--solver", "eq8", "--steps", "5"], ["eq8 is not a scheme"]),
-        (["simulate", "--steps", "1"], ["steps = 1", "at least 2"]),
+        (["simulate", "--steps", "1"], ["steps = 1", "[2, 1000000000]"]),
         (["simulate", "--out", "nowhere/a.csv"], ["the folder nowhere does not exist"]),
         (["compare", "eq8", "missing.csv"], ["missing.csv: cannot be read"]),
         (["compare", "eq8", "zzz"], ["solver 'zzz' is unknown", "known: "]),

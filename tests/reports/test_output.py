@@ -72,6 +72,35 @@ def test_a_parent_that_cannot_be_made_is_named(tmp_path):
         pass
 
 
+def test_links_are_followed_and_folders_refused(tmp_path):
+    (tmp_path / "real.csv").write_text("old")
+    (tmp_path / "link.csv").symlink_to(tmp_path / "real.csv")
+    write_text(tmp_path / "link.csv", "new")
+    assert (tmp_path / "link.csv").is_symlink()
+    assert (tmp_path / "real.csv").read_text() == "new"
+    with pytest.raises(OutputError, match="is a folder"):
+        write_text(tmp_path, "x")
+    with pytest.raises(OutputError, match="cannot be written"):
+        write_text(tmp_path / "real.csv" / "x.csv", "x")
+
+
+def test_a_pipe_is_written_to_and_not_replaced(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    write_text(pipe, "through")
+    assert os.read(reader, 100) == b"through"
+    os.close(reader)
+    assert pipe.is_fifo()
+
+
+def test_the_current_folder_is_not_a_report(tmp_path, monkeypatch):
+    (tmp_path / "summary.json").write_text("{}")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(OutputError, match="current folder"):
+        check_replaceable(Path())
+
+
 def test_text_files_are_written_whole(tmp_path):
     file = tmp_path / "table.csv"
     write_text(file, "one")

@@ -1,12 +1,17 @@
 """Studies on made-up curves whose answers are known."""
 
+import dataclasses
+import json
 import math
 
 import numpy as np
 import pytest
 
 from reports import claims
+from reports.evidence import TOTAL, run_bands
 from reports.findings import Finding
+from reports.lead import lead_words
+from reports.solvers import Made, Run
 from reports.studies.differences import first_crossing, study_difference
 from reports.studies.ice import study_ice
 from reports.studies.slices import study_slices
@@ -116,7 +121,25 @@ def step_runs(error_of_dt):
 def test_claim_order_accepts_first_order_and_nothing_else(error_of_dt, verdict):
     reference = curve(np.full(9, 20.0), method="limit")
     study = study_step_size(reference, step_runs(error_of_dt))
-    assert claims.claim_order(study, "here", (0.9, 1.1)).verdict == verdict
+    assert claims.claim_order(study, "here").verdict == verdict
+
+
+def test_a_good_slope_with_one_level_that_is_worse_fails():
+    """The fit alone would pass: refinement must help at every level."""
+    errors = {0.1: 0.1, 0.05: 0.034, 0.025: 0.035, 0.0125: 0.0105}
+    reference = curve(np.full(9, 20.0), method="limit")
+    study = study_step_size(reference, step_runs(lambda dt: errors[min(errors, key=lambda h: abs(h - dt))]))
+    assert 0.9 <= study.order <= 1.1
+    assert not study.refined
+    assert claims.claim_order(study, "here").failed
+
+
+def test_no_step_error_is_no_failure():
+    study = study_step_size(curve(np.full(9, 20.0), method="limit"), step_runs(lambda dt: 0.0))
+    finding = claims.claim_order(study, "here")
+    assert finding.kind == "observation"
+    assert not finding.failed
+    assert "round-off" in finding.note
 
 
 def test_runs_that_share_too_few_times_are_refused():
@@ -131,7 +154,7 @@ def test_a_run_that_ends_early_has_no_order():
     runs[1][0] = curve([20, 20], t=[0.0, 0.1], method="scheme", status="overflow", dt=0.05)
     study = study_step_size(reference, runs)
     assert math.isnan(study.order)
-    assert claims.claim_order(study, "here", (0.9, 1.1)).failed
+    assert claims.claim_order(study, "here").failed
 
 
 def test_ice_and_slices():
@@ -150,10 +173,13 @@ def test_verdicts(value, verdict, failed):
 
 
 def test_an_observation_cannot_fail_and_json_holds_no_infinity():
-    finding = Finding(id="x", title="x", value=math.inf, unit="", kind="observation")
+    finding = Finding(id="x", title="x", value=math.inf, unit="", kind="observation", band=math.nan)
     assert not finding.failed
     assert finding.to_mapping()["admissible"] == [None, None]
     assert finding.to_mapping()["value"] == "inf"
+    assert finding.to_mapping()["band"] == "nan"
+    assert finding.band_text == "–"
+    json.dumps(finding.to_mapping(), allow_nan=False)
 
 
 def test_largest_change_of_incomparable_runs_is_nan():
@@ -161,3 +187,80 @@ def test_largest_change_of_incomparable_runs_is_nan():
     assert claims.largest_change(whole, curve([20, 20, 20.2])) == pytest.approx(0.01)
     assert math.isnan(claims.largest_change(whole, curve([20, 20])))
     assert math.isnan(claims.largest_change(whole, curve([20, 20, 20], status="diverged")))
+
+
+def reference_run(omega, **settings):
+    usual = {"rtol": 1e-10, "rest_speed": 1e-5, "max_step": 5e-4, "method": "DOP853"}
+    return dataclasses.replace(curve(omega, method="eq8", solver="ode_reference"), settings=usual | settings)
+
+
+def test_a_run_compared_with_itself_proves_nothing():
+    run = reference_run([20, 20, 20])
+    tight = reference_run([20, 20, 20], rtol=1e-11, rest_speed=1e-6, max_step=2.5e-4)
+    assert claims.claim_reference_converged(run, tight).verdict == "pass"
+    assert claims.claim_reference_converged(run, run).failed
+    assert claims.claim_reference_converged(run, reference_run([20, 20, 20], rtol=1e-11, rest_speed=1e-6)).failed
+    assert claims.claim_second_method(run, reference_run([20, 20, 20], method="Radau")).verdict == "pass"
+    assert claims.claim_second_method(run, tight).failed
+    floating = dataclasses.replace(run, scenario=dataclasses.replace(SCENARIO, gravity=0.0))
+    assert claims.claim_gravity_cancels(run, floating).verdict == "pass"
+    assert claims.claim_gravity_cancels(run, run).failed
+
+
+def test_a_run_that_is_not_whole_is_not_evaluated_and_says_why():
+    run = reference_run([20, 20, 20])
+    floating = dataclasses.replace(run, scenario=dataclasses.replace(SCENARIO, gravity=0.0), status="diverged")
+    finding = claims.claim_gravity_cancels(run, dataclasses.replace(floating, message="omega mismatch at t = 0.1 s"))
+    assert finding.failed
+    assert finding.verdict == "not evaluated"
+    assert "omega mismatch at t = 0.1 s" in finding.note
+
+
+def test_bands_of_runs():
+    def made(omega, tag):
+        return Made(Run(tag, tag, SCENARIO), curve(omega, method=tag), 0.0)
+
+    runs = {
+        "published-limit": made([20, 20], "published-limit"),
+        "published-limit, tighter": made([20, 20], "published-limit"),
+        "eq8": made([20, 20], "eq8"),
+        "eq8, tighter": made([20, 20 + 2e-6], "eq8"),
+        "eq8, Radau": made([20, 20 + 4e-6], "eq8"),
+        "pymunk": made([20, 20], "pymunk"),
+        "pymunk, finer": made([20, 20.02], "pymunk"),
+    }
+    bands = run_bands(runs)
+    assert bands["published-limit"] == 1e-9  # never finer than independent methods share
+    assert bands["eq8"] == pytest.approx(2e-7)
+    assert bands["pymunk"] == pytest.approx(2e-3)  # of first order: twice the change
+    assert bands["published-python"] == 0.0
+
+
+def named(name, first, second, size, **changes):
+    difference = study_difference(name, curve([20, 20], method=first), curve([20, 20 - 20 * size], method=second))
+    return dataclasses.replace(difference, **changes)
+
+
+def test_the_lead_says_what_the_numbers_say():
+    engine = curve([20, 20], method="pymunk")
+    total = named(TOTAL, "published-python", "pymunk", 0.13)
+    step = named("step size", "published-python", "published-limit", 0.005)
+    form = named("model form", "eq8", "pymunk", 0.55)
+    words = lead_words([total, step, form], engine)
+    assert "differ by up to 13 % of ω₀" in words
+    assert "largest single part is model form: 55 %" in words
+    assert "partly cancel" in words
+    assert "costs 0.5 % at this number of steps and stays within 1%" in words
+    assert "partly cancel" not in lead_words([named(TOTAL, "a", "b", 0.6), form], engine)
+    assert "exceeds 1%" in lead_words([total, named("s", "published-python", "published-limit", 0.02), form], engine)
+
+
+def test_the_lead_knows_ice_divergence_and_nothing_at_all():
+    engine = curve([20, 20], method="pymunk")
+    none = [named(TOTAL, "a", "b", 0.0), named("x", "c", "d", 1e-9)]
+    assert "all solvers agree" in lead_words(none, engine)
+    burst = dataclasses.replace(engine, status="diverged")
+    words = lead_words([named(TOTAL, "a", "b", 0.02), named("x", "c", "d", 0.1)], burst)
+    assert "up to t = 500 ms, where pymunk diverged" in words
+    assert "could not be computed by pymunk" in lead_words([named("x", "c", "d", 0.1)], None)
+    assert "No two solvers could be compared" in lead_words([], None)

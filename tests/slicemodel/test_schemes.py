@@ -188,7 +188,8 @@ def test_the_other_spin_is_the_mirror_image():
     [
         ({"scheme": "exact-stepp"}, ["scheme = 'exact-stepp'", "did you mean 'exact-step'?"]),
         ({"scheme": "zzz"}, ["scheme = 'zzz'", "known: published-python"]),
-        ({"steps": 1}, ["steps = 1", "at least 2"]),
+        ({"steps": 1}, ["steps = 1", "[2, 1000000000]"]),
+        ({"steps": 100_000_000}, ["29.8 GiB", "store = 'summary'"]),
         ({"steps": 10.0}, ["steps = 10.0", "whole number"]),
         ({"store": "none"}, ["store = 'none'", "full, summary"]),
     ],
