@@ -22,7 +22,8 @@ def figure_step_size(flights: Sequence[StepSize], starts: Sequence[StepSize]) ->
     for axes, studies, title in ((panels[0], flights, "whole flight"), (panels[1], starts, "before the first impact")):
         for k, study in enumerate(studies):
             style = solver_style(study.scheme, k)
-            low, high = np.maximum([study.error.min(axis=1), study.error.max(axis=1)], ROUND_OFF)
+            spread = study.error.min(axis=1), study.error.max(axis=1)
+            low, high = np.maximum(spread, ROUND_OFF)
             axes.fill_between(study.mean_dt, low, high, color=style["color"], alpha=0.25, linewidth=0)
             axes.loglog(
                 study.mean_dt, np.maximum(study.mean_error, ROUND_OFF), marker=MARKERS[k], color=style["color"], linewidth=1.4,
