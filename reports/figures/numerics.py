@@ -26,8 +26,8 @@ def figure_step_size(flights: Sequence[StepSize], starts: Sequence[StepSize]) ->
             low, high = np.maximum(spread, ROUND_OFF)
             axes.fill_between(study.mean_dt, low, high, color=style["color"], alpha=0.25, linewidth=0)
             axes.loglog(
-                study.mean_dt, np.maximum(study.mean_error, ROUND_OFF), marker=MARKERS[k], color=style["color"], linewidth=1.4,
-                label=f"{study.scheme} → {study.model}",
+                study.mean_dt, np.maximum(study.mean_error, ROUND_OFF), marker=MARKERS[k], color=style["color"],
+                linewidth=1.4, label=f"{study.scheme} → {study.model}",
             )  # fmt: skip
             axes.text(
                 0.03, 0.96 - 0.07 * k, f"{study.scheme}: order {study.order:.2f}", transform=axes.transAxes,
