@@ -1,0 +1,55 @@
+"""Docs that point somewhere point somewhere that exists, and README's numbers are the report's."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from slicemodel import Scenario
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = [
+    "README.md",
+    *(str(p.relative_to(ROOT)) for p in sorted((ROOT / "docs").glob("*.md"))),
+    "tests/vectors/README.md",
+]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_link_leads_somewhere(page):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    for target in re.findall(r"\]\(([^)#]+)\)", text):
+        assert not target.startswith("http")
+        assert ((ROOT / page).parent / target).exists(), f"{page}: {target}"
+
+
+def test_the_test_command_of_the_readme_is_the_one_ci_runs():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    block = text.split("<!-- test command -->")[1].split("<!-- end -->")[0]
+    assert block.count("```sh") == 1
+    assert "pytest" in block
+    assert "<!-- test command -->" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+
+
+def test_the_code_of_the_readme_runs(capsys):
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    assert blocks
+    for block in blocks:
+        exec(compile(block, "README.md", "exec"), {})
+    assert capsys.readouterr().out.strip().endswith("ok")
+
+
+def test_the_example_is_the_default_throw():
+    assert Scenario.from_toml(ROOT / "examples" / "half_full.toml") == Scenario()
+
+
+def test_the_readme_states_the_numbers_of_the_snapshot():
+    summary = json.loads((ROOT / "reports" / "snapshot" / "summary.json").read_text(encoding="utf-8"))
+    largest = {(d["first"], d["second"]): 100 * d["largest"] for d in summary["differences"]}
+    text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    assert f"costs {largest['published-python', 'published-limit']:.1f} % of omega_0" in text
+    assert f"({largest['published-limit', 'eq8']:.0f} % away from the paper's own Eq. 8)" in text
+    assert f"({largest['eq8', 'pymunk']:.0f} % away from a free bottle" in text
+    assert f"within {largest['published-python', 'pymunk']:.0f} % of free flight" in text
