@@ -9,14 +9,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ode_reference.models import MODELS
-    from ode_reference.solver import METHODS, solve
+    from ode_reference.combinations import model_of
+    from ode_reference.impacts import LAWS
+    from ode_reference.models import LADDER, MODELS
+    from ode_reference.solver import solve
+    from ode_reference.steppers import METHODS
+    from ode_reference.switches import Switches
 
-__all__ = ["METHODS", "MODELS", "solve"]
+__all__ = ["LADDER", "LAWS", "METHODS", "MODELS", "Switches", "model_of", "solve"]
 
 _HOMES = {
-    "METHODS": "ode_reference.solver",
+    "LADDER": "ode_reference.models",
+    "LAWS": "ode_reference.impacts",
+    "METHODS": "ode_reference.steppers",
     "MODELS": "ode_reference.models",
+    "Switches": "ode_reference.switches",
+    "model_of": "ode_reference.combinations",
     "solve": "ode_reference.solver",
 }
 

@@ -207,10 +207,11 @@ def case_symmetric_pair(model: str = "eq8") -> ExactCase:
 
     r_CM stays at L/2, so that with x the distance of the flying pair from it and J = J_b + 2 m X^2 + 2 m x^2
 
-        m x'^2 + (J_0 omega_0)^2 / 2J + gamma'^2 J / 2 = constant,   gamma' = gamma for published-limit, 0 for eq8
+        m x'^2 + (J_0 omega_0)^2 / 2J + gamma'^2 J / 2 = constant,   gamma' = gamma for published-limit, else 0
 
     (derivative: 2 m x'' = 2 m (omega^2 - gamma'^2) x). The time follows by quadrature, t = integral of dx / x'.
-    Eq. 8 is taken without drag; the published limit keeps gamma, since it damps nothing.
+    The published limit keeps gamma, since it damps nothing; every other model is taken without drag. The symmetry
+    leaves the tube at rest, so that origin and recoil make no difference.
     """
     gamma = 5.0 if model == "published-limit" else 0.0
     scenario = Scenario(water_mass=1.0, n_slices=4, drag=2 * gamma * 0.25, gravity=0.0, restitution=0.5)
@@ -271,7 +272,7 @@ CASES: Final[tuple[Callable[[str], ExactCase], ...]] = (
     case_zeno,
     case_symmetric_pair,
 )
-"""Every exact case; each takes "eq8" or "published-limit"."""
+"""Every exact case; each takes the name of any rung of the ladder."""
 
 
 def first_integral(model: str, scenario: Scenario, r: FloatArray, v: FloatArray) -> FloatArray:

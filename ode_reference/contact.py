@@ -8,22 +8,28 @@
 A slice is free (side 0) or rests on one side. With ``side`` as sign, side * v > 0 approaches and side * a > 0
 presses, at either end. ``a`` is the acceleration of the model, so the model alone decides who rests.
 
-    rebound  v -> -e v, the position set exactly on the end
+    rebound  by the impact law, the position set exactly on the end
     rest     after a rebound slower than the rest speed if the slice is pressed (side * a >= 0): v = 0, held.
              Restitution below 1 under a steady push makes infinitely many rebounds in finite time; the
              rest speed ends that sequence a time of about 2 (rest speed) / a before its limit.
-    release  as soon as side * a < 0
+    release  as soon as side * a < 0, or at once where an impact throws the end out from under the slice
+
+All slices at rest on one end have the same acceleration, so that only two groups decide: who stays is found
+by trying the four choices. A choice is right if every group that stays is pressed and every group that leaves is not,
+with the mass of the resting body that the choice itself makes.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ode_reference.models import BoolArray, Instant, Motion
+from ode_reference.impacts import Law
+from ode_reference.motion import BoolArray, Instant, Motion
 from slicemodel.trajectory import BASE, CAP, FloatArray
 
 SideArray = NDArray[np.int64]
@@ -70,10 +76,12 @@ class Walls:
 class Outcome:
     """The state after an event: ``y``, the end each slice rests on (``resting``), and how many came to rest or left.
 
-    ``speed_after`` has one entry per struck slice, in the order of the slices [m/s].
+    ``rebounded`` is the state after the impacts, before anything came to rest; ``speed_after`` has one entry per
+    struck slice, in the order of the slices [m/s].
     """
 
     y: FloatArray
+    rebounded: FloatArray
     resting: SideArray
     speed_after: FloatArray
     rests: int
@@ -88,12 +96,15 @@ def resolve(
     walls: Walls,
     restitution: float,
     rest_speed: float,
+    law: Law,
 ) -> Outcome:
     """Return the state after all contacts of one instant, resolved together.
 
-    Every struck slice rebounds; then, with the drag that the new velocities make (an impact changes r'_CM
-    discontinuously), slow pressed ones come to rest and unpressed resting ones are released. The rebound is
-    that of a tube too massive to recoil, which is what the paper assumes at any mass.
+    The impact law acts on all touching slices, struck or at rest. Then, with the drag that the new velocities make
+    (an impact changes r'_CM discontinuously), slow pressed slices come to rest and unpressed resting ones leave.
+
+    With recoil, coming to rest is a perfectly inelastic impact of its own: all that stick share one impulse with the
+    tube, which every other slice feels as a jump. Momentum is conserved; below the rest speed the impulse may pull.
 
     Parameters
     ----------
@@ -104,24 +115,78 @@ def resolve(
     walls : Walls
     restitution : float - e
     rest_speed : float [m/s]
+    law : callable - of ``ode_reference.impacts``
     """
     n = len(struck)
+    ratio = motion.throw.slice_mass / motion.throw.bottle_mass
     y = now.y.copy()
     r, v = y[1 : n + 1], y[n + 1 :]
-    hits = np.flatnonzero(struck)
-    side = struck[hits]
-    r[hits] = np.where(side == BASE, walls.high, walls.low)
-    v[hits] *= -restitution
-    resting = resting.copy()
+    contact = struck + resting
+    touching = np.flatnonzero(contact)
+    side = contact[touching]
+    r[touching] = np.where(side == BASE, walls.high, walls.low)
+    if struck.any():
+        after, gained = law(side * v[touching], side, restitution, ratio, rest_speed)
+        v -= gained
+        v[touching] = side * after
+    mass_ratio = ratio if motion.model.switches.recoil else 0.0
+    stays = np.zeros(n, dtype=np.int64)
+    slow = np.abs(v[touching]) < rest_speed
+    rebounded = y
+    if slow.any():
+        stays = _staying(motion, y, np.where(slow, side, FREE), touching, mass_ratio)
+        y = y.copy()
+        y[n + 1 :] = _stuck(v, stays, mass_ratio)
+    speed_after = np.abs(y[n + 1 :][struck != FREE])
+    rests = int(np.count_nonzero((stays != FREE) & (resting == FREE)))
+    releases = int(np.count_nonzero((stays == FREE) & (resting != FREE)))
+    return Outcome(y, rebounded, stays, speed_after, rests, releases)
 
-    _, a = motion.acceleration(y, resting != FREE)
-    slow = (np.abs(v[hits]) < rest_speed) & (side * a[hits] >= 0)
-    stopped = hits[slow]
-    v[stopped] = 0.0
-    resting[stopped] = side[slow]
 
-    if stopped.size:
-        _, a = motion.acceleration(y, resting != FREE)
-    leaving = resting * a < 0
-    resting[leaving] = FREE
-    return Outcome(y, resting, np.abs(v[hits]), int(stopped.size), int(np.count_nonzero(leaving)))
+def _stuck(v: FloatArray, stays: SideArray, mass_ratio: float) -> FloatArray:
+    """Return the velocities after the slices that stay have stopped relative to the tube, shape (N,) [m/s].
+
+    Momentum of tube and sticking slices: the tube gains (m/M_b) sum v / (1 + n m/M_b), the sum over the n that stick.
+    """
+    sticking = stays != FREE
+    loose = v[sticking]
+    v = v.copy()
+    if loose.any():
+        v -= mass_ratio * float(loose.sum()) / (1.0 + mass_ratio * len(loose))
+    v[sticking] = 0.0
+    return v
+
+
+def _staying(
+    motion: Motion, y: FloatArray, slow: SideArray, touching: NDArray[np.int64], mass_ratio: float
+) -> SideArray:
+    """Return the end on which each of the slow touching slices stays, 0 where none; shape (N,).
+
+    Parameters
+    ----------
+    y : array, shape (2N + 1,) - the state after the impact
+    slow : array, shape (K,) - for each touching slice its side if it is slow, else 0
+    touching : array, shape (K,)
+    mass_ratio : float - m / M_b, 0 without recoil
+    """
+    n = (len(y) - 1) // 2
+    groups = [(side, touching[slow == side]) for side in (BASE, CAP)]
+    groups = [(side, members) for side, members in groups if members.size]
+    pressed_only: SideArray | None = None
+    for choice in product((True, False), repeat=len(groups)):
+        stays: SideArray = np.zeros(n, dtype=np.int64)
+        for (side, members), stay in zip(groups, choice, strict=True):
+            if stay:
+                stays[members] = side
+        if not any(choice):
+            break
+        trial = y.copy()
+        trial[n + 1 :] = _stuck(y[n + 1 :], stays, mass_ratio)
+        _, a = motion.acceleration(trial, np.where(stays == FREE, 1.0, 0.0))
+        push = [side * float(a[members[0]]) for side, members in groups]
+        if all(force >= 0 for force, stay in zip(push, choice, strict=True) if stay):
+            if all(force < 0 for force, stay in zip(push, choice, strict=True) if not stay):
+                return stays
+            pressed_only = stays if pressed_only is None else pressed_only
+    # Rounding at a group that is neither pressed nor pulled can spoil every strict choice.
+    return np.zeros(n, dtype=np.int64) if pressed_only is None else pressed_only

@@ -13,17 +13,29 @@ start of the step is never found again. Limit: velocities that change sign more 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 from scipy.optimize import brentq
 
 from ode_reference.contact import SideArray, Walls
-from ode_reference.models import BoolArray, Instant
+from ode_reference.motion import BoolArray, Instant
 from slicemodel.trajectory import BASE, CAP
 
-Path = Callable[[float], Instant]
+MOST_NEWTON: Final = 50
+"""Steps of Newton's method before a search for a crossing goes on by halving alone."""
+
+
+class Path(Protocol):
+    """The state at any time of one step."""
+
+    def __call__(self, t: float) -> Instant:
+        """Return the instant at ``t``."""
+
+    def of_slice(self, t: float, i: int) -> tuple[float, float]:
+        """Return position [m] and velocity [m/s] of one slice at ``t``: what a search for a wall needs, and cheap."""
 
 
 class Node(NamedTuple):
@@ -41,7 +53,7 @@ def event_wall(start: Instant, end: Instant, path: Path, free: BoolArray, walls:
     Parameters
     ----------
     start, end : Instant - both ends of the step
-    path : callable - the state at any time of the step, from the integrator's dense output
+    path : Path - from the integrator's dense output
     free : array, shape (N,) of bool
     walls : Walls
 
@@ -73,7 +85,7 @@ def event_release(start: Instant, end: Instant, path: Path, resting: SideArray) 
     Parameters
     ----------
     start, end : Instant
-    path : callable
+    path : Path
     resting : array, shape (N,) - end that each slice rests on, else 0
     """
     found: Instant | None = None
@@ -102,18 +114,21 @@ def _letting_go(side: int, i: int, start: Instant, end: Instant, path: Path) -> 
 
 def _suspects(start: Instant, end: Instant, free: BoolArray, walls: Walls) -> list[int]:
     """Return the free slices that may meet an end in the step, the one expected first in front."""
-    length = end.t - start.t
     heading = np.where(start.v == 0, start.a, start.v)
-    reach = length * np.maximum(np.abs(start.v), np.abs(end.v))
-    reach += length**2 * np.maximum(np.abs(start.a), np.abs(end.a))
+    turning = heading * end.v
+    turns_once = turning < 0
+    turns_twice = (turning > 0) & (heading * start.a < 0) & (end.v * end.a > 0)
     over = np.maximum(end.r - walls.high, walls.low - end.r)
-    near_base = np.maximum(start.r, end.r) + reach > walls.high
-    near_cap = np.minimum(start.r, end.r) - reach < walls.low
-    turns_once = heading * end.v < 0
-    turns_twice = (heading * end.v > 0) & (heading * start.a < 0) & (end.v * end.a > 0)
-    ahead = np.where(heading > 0, near_base, near_cap)
-    inside = (turns_once & ahead) | (turns_twice & (near_base | near_cap))
-    suspects = np.flatnonzero(free & ((over > walls.tolerance) | inside))
+    found = over > walls.tolerance
+    if (turns_once | turns_twice).any():
+        length = end.t - start.t
+        reach = length * np.maximum(np.abs(start.v), np.abs(end.v))
+        reach += length**2 * np.maximum(np.abs(start.a), np.abs(end.a))
+        near_base = np.maximum(start.r, end.r) + reach > walls.high
+        near_cap = np.minimum(start.r, end.r) - reach < walls.low
+        found |= turns_once & np.where(heading > 0, near_base, near_cap)
+        found |= turns_twice & (near_base | near_cap)
+    suspects = np.flatnonzero(free & found)
     if suspects.size < 2:
         return [int(i) for i in suspects]
     expected = end.t - np.maximum(over[suspects], 0.0) / np.maximum(np.abs(end.v[suspects]), np.finfo(np.float64).tiny)
@@ -126,66 +141,83 @@ def _node(now: Instant, i: int) -> Node:
 
 def _first_contact(i: int, a: Node, b: Node, path: Path, walls: Walls) -> float | None:
     """Return the first time in [a.t, b.t] at which slice ``i`` meets an end it moves toward, or None."""
-
-    def at(t: float) -> Node:
-        return _node(path(t), i)
-
     heading = a.v if a.v != 0 else a.a
     if heading * b.v > 0 and heading * a.a < 0 and b.v * b.a > 0:
-        middle = at(a.t + (b.t - a.t) * a.a / (a.a - b.a))
+        middle = _node(path(a.t + (b.t - a.t) * a.a / (a.a - b.a)), i)
         if heading * middle.v < 0 and a.t < middle.t < b.t:
             first = _first_contact(i, a, middle, path, walls)
             return first if first is not None else _first_contact(i, middle, b, path, walls)
     if heading == 0:
         heading = b.v
     ahead, behind = (BASE, CAP) if heading > 0 else (CAP, BASE)
+
+    def at(t: float) -> tuple[float, float]:
+        return path.of_slice(t, i)
+
     if walls.gap(ahead, b.r) < -walls.tolerance:
-        return _crossing(at, ahead, a, b, walls)
+        return _crossing(at, ahead, (a.t, a.r), (b.t, b.r), walls)
     if heading * b.v >= 0:
         return None
     if walls.gap(behind, b.r) < -walls.tolerance:
-        inside = _clear_of(at, behind, a, b, walls)
-        return _crossing(at, behind, inside, b, walls)
-    turn = at(_root(lambda t: at(t).v, a.t, b.t)) if a.v != 0 else a
-    return _crossing(at, ahead, a, turn, walls) if walls.gap(ahead, turn.r) < -walls.tolerance else None
+        return _crossing(at, behind, _clear_of(at, behind, a, b, walls), (b.t, b.r), walls)
+    if a.v == 0:
+        return None
+    turn = _root(lambda t: at(t)[1], a.t, b.t)
+    place = at(turn)[0]
+    return (
+        _crossing(at, ahead, (a.t, a.r), (turn, place), walls) if walls.gap(ahead, place) < -walls.tolerance else None
+    )
 
 
-def _clear_of(at: Callable[[float], Node], side: int, a: Node, b: Node, walls: Walls) -> Node:
-    """Return a node at which a slice that moves away from ``side`` at ``a`` and beyond it at ``b`` is still inside.
+OfTime = Callable[[float], tuple[float, float]]
+
+
+def _clear_of(at: OfTime, side: int, a: Node, b: Node, walls: Walls) -> tuple[float, float]:
+    """Return a time and place at which a slice that leaves ``side`` at ``a`` and is beyond it at ``b`` is inside.
 
     The gap rises and then falls, so whatever time has a positive gap lies before the crossing sought.
     """
     if walls.gap(side, a.r) > walls.tolerance:
-        return a
-    node = at(a.t + (b.t - a.t) * a.v / (a.v - b.v))
-    while walls.gap(side, node.r) <= 0 and node.t - a.t > 2 * np.spacing(b.t):
-        node = at(a.t + (node.t - a.t) / 2)
-    return node
+        return a.t, a.r
+    # Where the velocity turns; after a release at v = 0 that may be anywhere, and the acceleration turns before.
+    share = a.v / (a.v - b.v) if a.v != 0 else (a.a / (a.a - b.a) if a.a * b.a < 0 else 0.5)
+    t = a.t + (b.t - a.t) * share
+    while walls.gap(side, at(t)[0]) <= 0 and t - a.t > 2 * np.spacing(b.t):
+        t = a.t + (t - a.t) / 2
+    return t, at(t)[0]
 
 
-def _crossing(at: Callable[[float], Node], side: int, a: Node, b: Node, walls: Walls) -> float:
+def _crossing(at: OfTime, side: int, a: tuple[float, float], b: tuple[float, float], walls: Walls) -> float:
     """Return the time at which the gap to ``side``, positive at ``a`` and negative at ``b``, is zero.
 
     Newton's method, kept inside a bracket that shrinks with every evaluation: where Newton leaves the
     bracket (near a turning point) the bracket is halved. A slice that touches at ``a`` meets the end at ``a``.
+
+    Parameters
+    ----------
+    at : callable - position and velocity of the slice at a time
+    a, b : tuple - time [s] and position [m] of the slice
     """
-    gap_a, gap_b = walls.gap(side, a.r), walls.gap(side, b.r)
+    (low, r_low), (high, r_high) = a, b
+    gap_a, gap_b = walls.gap(side, r_low), walls.gap(side, r_high)
     if gap_a <= 0:
-        return a.t
-    low, high = a.t, b.t
+        return low
     t = low + (high - low) * gap_a / (gap_a - gap_b)
-    while high - low > 2 * np.spacing(high):
-        node = at(t)
-        gap = walls.gap(side, node.r)
+    tries = 0
+    while high - low > 2 * math.ulp(high):
+        r, v = at(t)
+        tries += 1
+        gap = walls.gap(side, r)
         if gap > 0:
             low = t
         else:
             high = t
-        closing = side * node.v
-        new = t + gap / closing if closing > 0 else -np.inf
-        if abs(new - t) <= np.spacing(t):
+        closing = side * v
+        new = t + gap / closing if closing > 0 else -math.inf
+        if abs(new - t) <= math.ulp(t):
             return t
-        t = new if low < new < high else low + (high - low) / 2
+        # Where round-off in r spoils Newton's steps, the bracket would shrink by units in the last place.
+        t = new if low < new < high and tries < MOST_NEWTON else low + (high - low) / 2
     return high
 
 

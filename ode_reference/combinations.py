@@ -1,0 +1,80 @@
+r"""The equation that any set of ``Switches`` makes: one expression, of which every rung of the ladder is a case.
+
+    r_i'' = k^2 s_i + w - d (r_i' - u) - a_c
+
+    k^2 = omega^2 (roots), else omega^2 - gamma^2                             [1/s^2]
+    w   = 0 (weightless), else k^2 g cos(theta) / omega^2                     [m/s^2]
+    d   = 2 gamma (signs), else 0                                             [1/s]
+    u   = r'_CM (drag_on_centre and not origin), else 0                       [m/s]
+    a_c = 0 (not origin), else the acceleration of tube and resting slices    [m/s^2]
+
+With ``origin`` the tube gets its own equation of motion, from the same forces that its slices feel. With M_c the mass
+of tube and resting slices, n_h of them resting, and -m sum_free s_j = M_c s_c,
+
+    M_c a_c = k^2 M_c s_c + d m sum_free r_j' + n_h m w:
+
+the spring k^2 on the body, the reaction of the drag, the weight of what rests in it. The tube itself has no weight
+here, as it has none in Eq. 8, which is an equation of slices only: a weight on everything would cancel and
+leave nothing for ``weightless`` to mend. These are forces that a body can feel, so that contact keeps its meaning: the
+push on a resting slice changes sign if and only if its acceleration once released would (see ``models.free_flight``).
+Where ``weightless`` is on, -a_c is r''_CM, the second derivative of Eq. 10; with weight it is not, because then the
+forces do not add up to zero and C_M accelerates in its own frame, which is what is wrong with that weight.
+
+``recoil`` without ``origin`` is an impact law on relative velocities and nothing else: at an impact every r_i' jumps by
+the velocity that the tube gains, between impacts nobody knows of the tube.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+
+from ode_reference.motion import Acceleration, Model, Throw
+from ode_reference.switches import Switches
+from slicemodel.trajectory import FloatArray
+
+
+def model_of(switches: Switches) -> Model:
+    """Return the model that ``switches`` make, under the name ``switches.name``."""
+    on = [field.name for field in fields(switches) if getattr(switches, field.name)]
+    return Model(
+        name=switches.name,
+        equation="r_i'' = k^2 (r_i - r_CM) + w - d (r_i' - u) - a_c",
+        reason="Published program with " + (", ".join(on) if on else "nothing") + " mended.",
+        acceleration=acceleration_of(switches),
+        switches=switches,
+    )
+
+
+def acceleration_of(switches: Switches) -> Acceleration:
+    """Return the right-hand side that ``switches`` make; its parameters stand in ``Model``."""
+
+    def acceleration(
+        throw: Throw, theta: float, omega: float, s: FloatArray, v: FloatArray, free: FloatArray
+    ) -> FloatArray:
+        gamma = throw.drag_rate / 2
+        slowness = np.float64(0.0 if switches.roots else gamma) / omega
+        spring = omega * omega - (0.0 if switches.roots else gamma * gamma)
+        weight = 0.0 if switches.weightless else (1 - slowness * slowness) * throw.gravity * np.cos(theta)
+        damping = throw.drag_rate if switches.signs else 0.0
+        common = weight
+        if switches.drag_on_centre and not switches.origin:
+            common += damping * throw.centre_of_mass_velocity(v)
+        if switches.origin:
+            common -= _origin(throw, spring, damping, weight, s, v, free)
+        found: FloatArray = s * spring
+        found -= damping * v
+        found += common
+        return found
+
+    return acceleration
+
+
+def _origin(
+    throw: Throw, spring: float, damping: float, weight: float, s: FloatArray, v: FloatArray, free: FloatArray
+) -> float:
+    """Return a_c, the acceleration of tube and resting slices in the frame of C_M [m/s^2]."""
+    m, free_count = throw.slice_mass, float(free.dot(free))
+    force = m * (-spring * float(s.dot(free)) + damping * float(v.dot(free)) + (len(s) - free_count) * weight)
+    return force / (throw.total_mass - m * free_count)

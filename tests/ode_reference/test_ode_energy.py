@@ -1,0 +1,80 @@
+"""The energy ledger closes for every rung, and its entries mean what they say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ode_reference import LADDER, LAWS, solve
+from ode_reference.energy import WORKS
+from slicemodel.scenario import Scenario
+
+ALLOWED = {"drag", "impacts", "rests"}
+"""What may change the energy of a bottle in free flight."""
+
+
+def by_definition(scenario, r, v, omega):
+    """Slice by slice and with the tube as a body of its own, from positions and velocities against C_M."""
+    m, bottle = scenario.slice_mass, scenario.bottle
+    total = scenario.total_mass
+    r_cm = (m * r.sum() + bottle.mass * bottle.length / 2) / total
+    v_cm = m * v.sum() / total
+    axial = sum(m / 2 * (u - v_cm) ** 2 for u in v) + bottle.mass / 2 * v_cm**2
+    about = sum(m * (x - r_cm) ** 2 for x in r)
+    about += bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12 + (bottle.length / 2 - r_cm) ** 2)
+    return axial + about * omega**2 / 2
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("model", LADDER)
+def test_ledger_closes_and_agrees_with_the_energy_by_definition(model, law):
+    scenario = Scenario().with_slices(20)
+    found = solve(scenario, model, impact_law=law, energy=True)
+    ledger = found.diagnostics["energy"]
+    assert set(ledger) == {"initial", "final", "residual", *WORKS}
+    assert abs(ledger["residual"]) < 1e-9 * ledger["initial"]
+    for key, k in (("initial", 0), ("final", -1)):
+        assert ledger[key] == pytest.approx(by_definition(scenario, found.r[k], found.v[k], found.omega[k]), rel=1e-12)
+    assert ledger["impacts"] < 0.0
+    if model == "free-flight":
+        assert all(ledger[work] == 0.0 for work in set(WORKS) - ALLOWED)
+        assert ledger["rests"] <= 0.0
+        assert ledger["drag"] < 0.0
+
+
+def test_what_the_ladder_mends_is_what_the_ledger_no_longer_books():
+    scenario = Scenario(duration=0.3).with_slices(20)
+    wrong = {"weight", "negative_spring", "missing_origin", "missing_recoil"}
+    booked = [
+        {work for work in wrong if solve(scenario, model, energy=True).diagnostics["energy"][work] != 0.0}
+        for model in LADDER
+    ]
+    assert booked[0] == booked[1] == wrong
+    assert booked[2] == booked[3] == wrong - {"negative_spring"}
+    assert booked[4] == {"missing_origin", "missing_recoil"}
+    assert booked[5] == {"missing_recoil"}
+    assert booked[6] == set()
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_free_flight_without_loss_keeps_its_energy(law):
+    scenario = Scenario(n_slices=12, drag=0.0, restitution=1.0)
+    found = solve(scenario, "free-flight", impact_law=law, rest_speed=1e-8, energy=True)
+    ledger = found.diagnostics["energy"]
+    assert found.ok
+    assert len(found.impacts) > 30
+    assert ledger["final"] == pytest.approx(ledger["initial"], rel=1e-9)
+    assert abs(ledger["impacts"]) < 1e-9 * ledger["initial"]
+
+
+def test_drag_takes_alpha_times_the_square_of_every_speed_along_the_wall():
+    scenario = Scenario(duration=0.02).with_slices(20)
+    found = solve(scenario, "free-flight", energy=True, times=np.linspace(0, 0.02, 4001))
+    power = scenario.drag * (found.v**2).sum(axis=1)
+    assert found.diagnostics["energy"]["drag"] == pytest.approx(-np.trapezoid(power, found.t), rel=1e-5)
+
+
+def test_without_being_asked_no_ledger_is_kept():
+    found = solve(Scenario(duration=0.05, n_slices=5))
+    assert "energy" not in found.diagnostics
+    assert found.settings["energy"] is False

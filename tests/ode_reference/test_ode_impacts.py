@@ -1,0 +1,207 @@
+"""The two impact laws: against every possible active set, momentum, energy; and the contacts they end in."""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from ode_reference.contact import Walls, resolve
+from ode_reference.impacts import LAWS, sequential, simultaneous
+from ode_reference.models import MODELS
+from ode_reference.motion import Motion, Throw
+from slicemodel.scenario import Bottle, Scenario
+
+
+def by_enumeration(x, side, e, ratio):
+    """All solutions of the complementarity problem, as impulses per slice mass, one linear system per active set."""
+    k = len(x)
+    matrix = np.eye(k) + ratio * np.outer(side, side)
+    found = []
+    for active in product((False, True), repeat=k):
+        on = np.array(active)
+        p = np.zeros(k)
+        if on.any():
+            p[on] = np.linalg.solve(matrix[np.ix_(on, on)], (1 + e) * x[on])
+        w = matrix @ p - (1 + e) * x
+        scale = 1e-12 * (1 + np.abs(x).max())
+        if np.all(p >= -scale) and np.all(w >= -scale):
+            found.append(p)
+    return found
+
+
+def kinetic(x, side, tube, ratio):
+    """Energy per slice mass, from velocities relative to the tube and that of the tube."""
+    return 0.5 * ((side * x + tube) ** 2).sum() + 0.5 * tube**2 / ratio
+
+
+def assert_law_of_newton_and_moreau(x, side, e, ratio):
+    after, gained = simultaneous(x, side, e, ratio, 1e-3)
+    solutions = by_enumeration(x, side, e, ratio)
+    assert solutions
+    for p in solutions:
+        assert gained == pytest.approx(ratio * (side * p).sum(), rel=1e-9, abs=1e-12)
+        np.testing.assert_allclose(after, x - p - side * gained, rtol=1e-9, atol=1e-11)
+    pushed = solutions[0] > 1e-9 * (1 + x.max())
+    np.testing.assert_array_equal(after[pushed], -e * x[pushed])
+    loss = kinetic(x, side, 0.0, ratio) - kinetic(after, side, gained, ratio)
+    p = solutions[0]
+    expected = (1 - e) / (1 + e) * 0.5 * ((p**2).sum() + ratio * (side * p).sum() ** 2)
+    assert loss == pytest.approx(expected, rel=1e-9, abs=1e-11 * (1 + (x**2).sum()))
+
+
+FIXED = [
+    ([2.0], [1]),
+    ([2.0, 0.0], [1, -1]),  # one strikes the base while another rests on the cap
+    ([2.0, 0.0], [1, 1]),  # ... while another rests on the base: it is left behind
+    ([1.0, 1.0], [1, -1]),  # symmetric: the tube stays
+    ([3.0, 0.1, 0.0, 0.0], [1, 1, 1, -1]),  # the slow one's end runs away faster than it leaves
+    ([0.5, 0.5, 0.5, 0.0, 0.0, 2.0], [1, 1, 1, -1, -1, -1]),
+    ([0.0, 0.0], [1, -1]),
+]
+
+
+@pytest.mark.parametrize(("x", "side"), FIXED)
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("ratio", [1e-15, 0.3, 20.0])
+def test_simultaneous_law_solves_the_complementarity_problem(x, side, e, ratio):
+    assert_law_of_newton_and_moreau(np.array(x), np.array(side), e, ratio)
+
+
+contacts = st.lists(
+    st.tuples(st.one_of(st.just(0.0), st.floats(1e-6, 10.0)), st.sampled_from([1, -1])), min_size=1, max_size=6
+)
+
+
+@settings(max_examples=300, derandomize=True, deadline=None)
+@given(contacts=contacts, e=st.floats(0, 1), ratio=st.floats(1e-3, 30.0))
+def test_simultaneous_law_solves_every_complementarity_problem(contacts, e, ratio):
+    x, side = map(np.array, zip(*contacts, strict=True))
+    assert_law_of_newton_and_moreau(x, side, e, ratio)
+
+
+@settings(max_examples=200, derandomize=True, deadline=None)
+@given(contacts=contacts, e=st.one_of(st.sampled_from([0.0, 1.0]), st.floats(0, 1)), ratio=st.floats(1e-3, 30.0))
+def test_sequential_law_ends_with_nothing_approaching_and_gains_no_energy(contacts, e, ratio):
+    x, side = map(np.array, zip(*contacts, strict=True))
+    after, gained = sequential(x, side, e, ratio, 1e-3)
+    assert np.all(after <= 0.0)
+    before = kinetic(x, side, 0.0, ratio)
+    assert kinetic(after, side, gained, ratio) <= before * (1 + 1e-9)
+    # Newton's third law, slice by slice: each impulse pushes, and together they move the tube.
+    impulse = side * (side * x - side * after - gained)
+    assert np.all(impulse >= -1e-9 * (1 + x.max()))
+    assert ratio * (side * impulse).sum() == pytest.approx(gained, rel=1e-8, abs=1e-9)
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_one_slice_alone_is_the_textbook_impact_by_either_law(law):
+    after, gained = law(np.array([2.0]), np.array([-1]), 0.5, 0.4, 1e-3)
+    assert after[0] == -1.0
+    assert gained == pytest.approx(-2.0 * 1.5 / (1 + 1 / 0.4), rel=1e-15)
+
+
+def test_the_laws_differ_when_one_slice_rests_on_the_base_and_another_strikes_the_cap():
+    x, side = np.array([0.0, 1.0]), np.array([1, -1])
+    together, _ = simultaneous(x, side, 0.5, 2.0, 1e-6)
+    in_turn, _ = sequential(x, side, 0.5, 2.0, 1e-6)
+    np.testing.assert_allclose(together, [0.0, -0.5], atol=1e-15)
+    # 1: the cap is struck, V = -1.5 * 2/3 = -1, the base comes at the resting slice with 1. 2: that one leaves at -0.5,
+    # V = +1, and the cap comes at the first one again, at 0.5. 3: that leaves at -0.25, V = -0.5: the base at 0. Done.
+    np.testing.assert_allclose(in_turn, [0.0, -0.25], atol=1e-15)
+
+
+def test_the_sequential_law_takes_the_fastest_approach_first():
+    # The cap at 2: V = -1, the base now comes at 2, and so on; the base first would end at (-0.375, -0.875).
+    after, gained = sequential(np.array([1.0, 2.0]), np.array([1, -1]), 0.5, 0.5, 1e-6)
+    np.testing.assert_allclose(after, [-1.0, 0.0], atol=1e-15)
+    assert gained == pytest.approx(0.0, abs=1e-15)
+
+
+def test_elastic_exchange_conserves_energy_by_either_law():
+    x, side = np.array([1.3, 0.0, 0.2]), np.array([1, -1, -1])
+    for law in LAWS.values():
+        after, gained = law(x, side, 1.0, 1.7, 1e-12)
+        assert kinetic(after, side, gained, 1.7) == pytest.approx(kinetic(x, side, 0.0, 1.7), rel=1e-12)
+
+
+# ---------------------------------------------------------------------- the contacts of one instant
+
+SCENARIO = Scenario(bottle=Bottle(length=1.0, mass=0.05), n_slices=5, water_mass=0.4, drag=0.3, gravity=0.0)
+WALLS = Walls.between(SCENARIO.r_min, SCENARIO.r_max, 1.0)
+
+
+@settings(max_examples=200, derandomize=True, deadline=None)
+@given(
+    places=st.lists(st.sampled_from(["base", "cap", "inside", "on base", "on cap"]), min_size=5, max_size=5),
+    speeds=st.lists(st.floats(1e-4, 3.0), min_size=5, max_size=5),
+    e=st.sampled_from([0.0, 0.5, 1.0]),
+    law=st.sampled_from(sorted(LAWS)),
+    seed=st.integers(0, 5),
+)
+def test_every_slice_that_touches_nothing_keeps_its_velocity_against_the_centre_of_mass(places, speeds, e, law, seed):
+    """Momentum: what no end pushes goes on through the lab as before, though its r' jumps with the tube."""
+    assume("inside" in places and {"base", "cap"} & set(places))
+    motion = Motion(Throw.of(SCENARIO), MODELS["free-flight"], np.array(["on" in place for place in places]))
+    inside = np.random.default_rng(seed).uniform(0.3, 0.7, 5)
+    r = np.array(
+        [
+            {"base": WALLS.high, "cap": WALLS.low}.get(p[-4:].strip().split()[-1], x)
+            for p, x in zip(places, inside, strict=True)
+        ]
+    )
+    side = np.array([1 if p.endswith("base") else -1 if p.endswith("cap") else 0 for p in places])
+    resting = np.where([p.startswith("on") for p in places], side, 0)
+    v = np.where(resting != 0, 0.0, np.where(side != 0, side, 1) * np.array(speeds))
+    now = motion.at(0.1, np.concatenate([[0.0], r, v]))
+    out = resolve(motion, now, np.where(resting == 0, side, 0), resting, WALLS, e, 1e-2, LAWS[law])
+
+    def in_frame_of_centre(v):
+        drift = motion.throw.centre_of_mass_velocity(v)
+        return v - drift, -drift
+
+    before, tube_before = in_frame_of_centre(v)
+    after, tube_after = in_frame_of_centre(out.y[6:])
+    loose = side == 0
+    np.testing.assert_allclose(after[loose], before[loose], rtol=0, atol=1e-12)
+    m, empty = motion.throw.slice_mass, motion.throw.bottle_mass
+    assert m * after.sum() + empty * tube_after == pytest.approx(0.0, abs=1e-13)
+    assert m * (after**2).sum() + empty * tube_after**2 <= (m * (before**2).sum() + empty * tube_before**2) * (
+        1 + 1e-12
+    )
+    assert np.all(out.y[6:][out.resting != 0] == 0.0)
+    assert np.all((side * out.y[6:])[side != 0] <= 1e-2)
+    _, a = motion.acceleration(out.y, np.where(out.resting == 0, 1.0, 0.0))
+    assert np.all((out.resting * a)[out.resting != 0] >= 0.0)
+
+
+def test_slices_resting_on_both_ends_leave_or_stay_by_their_common_body():
+    """Of two groups that one end's push holds only together, the choice that is right with its own M_c is found."""
+    motion = Motion(Throw.of(SCENARIO), MODELS["free-flight"], np.ones(5, dtype=bool))
+    r = np.array([WALLS.high, WALLS.high, WALLS.high, WALLS.low, 0.72])
+    v = np.array([0.0, 0.0, 0.0, 0.0, 0.0])
+    now = motion.at(0.0, np.concatenate([[0.0], r, v]))
+    out = resolve(
+        motion, now, np.zeros(5, dtype=int), np.array([1, 1, 1, -1, 0]), WALLS, 0.5, 1e-3, LAWS["simultaneous"]
+    )
+    np.testing.assert_array_equal(out.resting, [1, 1, 1, -1, 0])
+    fast = now.y.copy()
+    fast[10] = -40.0  # its drag drags the tube toward the cap, away from nobody on the base
+    out = resolve(
+        motion,
+        motion.at(0.0, fast),
+        np.zeros(5, dtype=int),
+        np.array([1, 1, 1, -1, 0]),
+        WALLS,
+        0.5,
+        1e-3,
+        LAWS["simultaneous"],
+    )
+    _, a = motion.acceleration(out.y, np.where(out.resting == 0, 1.0, 0.0))
+    side = np.array([1, 1, 1, -1])
+    assert np.all(np.where(out.resting[:4] != 0, side * a[:4] >= 0, side * a[:4] < 0))
+    assert math.isclose(out.y[10], -40.0)
