@@ -1,0 +1,228 @@
+"""The difference from the published program to free flight, split over the assumptions that make it.
+
+    program --step size--> its limit --signs--> --roots--> --drag reference--> --gravity--> --origin--> --recoil--> free
+
+Mending the assumptions in this order gives one split (forward), in the reverse order another (backward); where the two
+differ, assumptions interact. The average over all orders (the Shapley value) is the only split that treats
+them alike. Each of the three sums to the whole difference, which is asserted. The step size comes first in every order:
+only the program has one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from itertools import combinations
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from ode_reference.switches import Switches
+from reports.solvers import Run
+from slicemodel import Scenario, Trajectory, observables
+
+PROGRAM: Final = "published-python"
+
+NAMES: Final = MappingProxyType(
+    {
+        "signs": "signs of Eq. 9d: no damping",
+        "roots": "roots of Eq. 9a: γ ≪ ω",
+        "drag_on_centre": "drag against C_M",
+        "weightless": "gravity in Eq. 8",
+        "origin": "origin at rest, drag on the tube",
+        "recoil": "no recoil in impacts",
+    }
+)
+"""Switch -> the assumption it mends, in the order of the ladder."""
+
+STEP: Final = "step size of the program"
+
+USUAL: Final = MappingProxyType({"rtol": 1e-10, "rest_speed": 1e-5})
+LOOSE: Final = MappingProxyType({"rtol": 1e-9, "rest_speed": 1e-4})
+"""Tolerances ten times coarser: what they change is the band of a value."""
+
+
+@dataclass(frozen=True, slots=True)
+class Observable:
+    """One number read off a trajectory."""
+
+    name: str
+    words: str
+    unit: str
+    of: Callable[[Trajectory], float]
+
+
+OBSERVABLES: Final = (
+    Observable(
+        "plateau",
+        "mean of ω/ω₀ over the second half",
+        "1",
+        lambda run: observables.plateau(run.t, run.omega, run.scenario.omega0),
+    ),
+    Observable("omega", "ω on landing / ω₀", "1", lambda run: float(run.omega[-1] / run.scenario.omega0)),
+    Observable("theta", "θ on landing", "rad", lambda run: float(run.theta[-1])),
+    Observable(
+        "toppling",
+        "toppling angle on landing",
+        "rad",
+        lambda run: float(observables.toppling_angle(run.scenario, run.r_cm[-1])),
+    ),
+    Observable(
+        "v_cm",
+        "velocity of C_M in the bottle on landing",
+        "m/s",
+        lambda run: float(observables.centre_of_mass_velocity(run.scenario, run.v[-1])),
+    ),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bar:
+    """What mending one assumption changes, in the units of the observable; ``band`` is numerical uncertainty."""
+
+    name: str
+    forward: float
+    backward: float
+    average: float
+    forward_band: float
+    average_band: float
+
+    @property
+    def interaction(self) -> float:
+        """Largest difference between the three splits."""
+        return max(self.forward, self.backward, self.average) - min(self.forward, self.backward, self.average)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Waterfall:
+    """The split of one observable. ``residual`` is the largest |total - sum of bars| of the three splits."""
+
+    observable: Observable
+    start: float
+    end: float
+    end_band: float
+    bars: tuple[Bar, ...]
+    residual: float
+
+    @property
+    def total(self) -> float:
+        """Free flight minus published program."""
+        return self.end - self.start
+
+    @property
+    def largest(self) -> Bar:
+        """The bar whose average over orders is largest in size."""
+        return max(self.bars, key=lambda bar: abs(bar.average))
+
+
+def canonical(switches: Switches) -> Switches:
+    """Return the one set that stands for all that make its equation: ``drag_on_centre`` off where it has no effect."""
+    idle = switches.origin or not switches.signs
+    return replace(switches, drag_on_centre=False) if idle else switches
+
+
+def plan_waterfall(throw: Scenario, steps: int) -> list[Run]:
+    """Return the program's run, and every equation at usual and at coarser tolerances (81 runs)."""
+    runs = [Run("waterfall, program", PROGRAM, throw, {"steps": steps})]
+    # Recoil costs most: those runs first keep the workers evenly busy.
+    sets = sorted({canonical(s) for s in Switches.every()}, key=lambda s: (not s.recoil, s.name))
+    for label, tolerances in (("usual", USUAL), ("loose", LOOSE)):
+        runs += [Run(_tag(label, switches), switches.name, throw, dict(tolerances)) for switches in sets]
+    return runs
+
+
+def _tag(label: str, switches: Switches) -> str:
+    return f"waterfall, {label}, {canonical(switches).name}"
+
+
+def study_waterfall(runs: Mapping[str, Trajectory]) -> tuple[Waterfall, ...]:
+    """Split every observable.
+
+    Parameters
+    ----------
+    runs : mapping from tag to trajectory
+        All runs of ``plan_waterfall``.
+
+    Raises
+    ------
+    ArithmeticError
+        If a run is not whole, or a split does not sum to the whole difference within round-off.
+    """
+    for tag, run in runs.items():
+        if not run.ok:
+            raise ArithmeticError(f"{tag}: {run.status}: {run.message}")
+    return tuple(_split(observable, runs) for observable in OBSERVABLES)
+
+
+def _split(observable: Observable, runs: Mapping[str, Trajectory]) -> Waterfall:
+    values: dict[Switches, float] = {}
+    bands: dict[Switches, float] = {}
+    for switches in Switches.every():
+        values[switches] = observable.of(runs[_tag("usual", switches)])
+        bands[switches] = abs(values[switches] - observable.of(runs[_tag("loose", switches)]))
+    start = observable.of(runs["waterfall, program"])
+    none, everything = Switches(), Switches(*[True] * len(NAMES))
+    step = values[none] - start
+    bars = [
+        Bar(
+            name=STEP,
+            forward=step,
+            backward=step,
+            average=step,
+            forward_band=bands[none],
+            average_band=bands[none],
+        )
+    ]
+    order = [field.name for field in fields(Switches)]
+    for name in order:
+        before = order[: order.index(name)]
+        after = order[order.index(name) + 1 :]
+        average, average_band = _average(name, values, bands)
+        bars.append(
+            Bar(
+                name=NAMES[name],
+                forward=_change(name, before, values),
+                backward=_change(name, after, values),
+                average=average,
+                forward_band=bands[_with(before)] + bands[_with([*before, name])],
+                average_band=average_band,
+            )
+        )
+    total = values[everything] - start
+    residual = max(
+        abs(total - sum(getattr(bar, split) for bar in bars)) for split in ("forward", "backward", "average")
+    )
+    if not residual <= 1e-12 * (1.0 + abs(start) + sum(abs(bar.average) for bar in bars)):
+        raise ArithmeticError(f"{observable.name}: the bars miss the total by {residual:.3g} {observable.unit}")
+    return Waterfall(
+        observable=observable,
+        start=start,
+        end=values[everything],
+        end_band=bands[everything],
+        bars=tuple(bars),
+        residual=residual,
+    )
+
+
+def _with(names: list[str] | tuple[str, ...]) -> Switches:
+    return Switches(**dict.fromkeys(names, True))
+
+
+def _change(name: str, others: list[str] | tuple[str, ...], values: Mapping[Switches, float]) -> float:
+    """Return what switching ``name`` on changes when ``others`` are on."""
+    return values[_with([*others, name])] - values[_with(others)]
+
+
+def _average(name: str, values: Mapping[Switches, float], bands: Mapping[Switches, float]) -> tuple[float, float]:
+    """Return the mean of ``_change`` over all orders, and its band."""
+    others = [other for other in NAMES if other != name]
+    n = len(NAMES)
+    changes, uncertain = [], []
+    for size in range(n):
+        weight = math.factorial(size) * math.factorial(n - size - 1) / math.factorial(n)
+        for chosen in combinations(others, size):
+            changes.append(weight * _change(name, chosen, values))
+            uncertain.append(weight * (bands[_with(chosen)] + bands[_with([*chosen, name])]))
+    return float(np.sum(changes)), float(np.sum(uncertain))

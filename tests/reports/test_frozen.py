@@ -1,0 +1,105 @@
+"""What frozen coefficients cost: on a flight where nothing changes, on real ones, and under refinement."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reports.figures.frozen import figure_frozen
+from reports.figures.style import draw
+from reports.solvers import make
+from reports.studies.frozen import LIMITS, QUANTITIES, plan_frozen, study_frozen
+from slicemodel import Bottle, Scenario
+
+THROW = Scenario().with_slices(20)
+
+
+def studied(scheme="exact-step", steps=1000, throw=THROW):
+    run, reference = (make(run) for run in plan_frozen(throw, scheme, steps))
+    return study_frozen(run.trajectory, reference.trajectory)
+
+
+@pytest.fixture(scope="module")
+def study():
+    return studied()
+
+
+def test_plans_a_full_run_and_its_own_equation_at_the_same_times():
+    for scheme, model in LIMITS.items():
+        run, reference = plan_frozen(THROW, scheme, 101)
+        assert (run.solver, run.settings["store"], reference.solver) == (scheme, "full", model)
+        assert len(reference.settings["times"]) == run.settings["steps"]
+        assert run.tag != reference.tag
+
+
+def test_defects_added_up_are_the_error_before_the_first_impact(study):
+    assert study.first_impact is not None
+    assert study.explained == pytest.approx(1.0, abs=0.1)
+
+
+def test_defects_of_a_step_fall_with_its_square(study):
+    finer = studied(steps=3997)  # a quarter of the step
+    for quantity in ("omega", "theta", "r_cm"):
+        assert study.peak[quantity][1] / finer.peak[quantity][1] == pytest.approx(16.0, rel=0.2)
+    early = study.t < 0.01
+    assert np.nanmax(study.cumulative[early]) / np.nanmax(finer.cumulative[finer.t < 0.01]) == pytest.approx(
+        4.0, rel=0.2
+    )
+
+
+def test_nothing_changes_in_a_heavy_tube_without_weight_and_drag():
+    """Slices that weigh nothing beside the tube change neither omega nor r_CM: no defect is left."""
+    heavy = replace(THROW, bottle=Bottle(mass=1e9), gravity=0.0, drag=0.0)
+    study = studied(throw=heavy)
+    assert all(study.peak[quantity][1] < 1e-9 for quantity in QUANTITIES)
+    assert np.nanmax(study.change_omega) < 1e-9
+
+
+def test_gravity_alone_is_the_theta_defect():
+    """Theta turns at omega_0: the defect is g dt^2 omega_0 |sin theta| / 2, with theta at a quarter of the step."""
+    heavy = replace(THROW, bottle=Bottle(mass=1e9), drag=0.0)
+    study = studied(throw=heavy)
+    middle = heavy.theta0 + heavy.omega0 * (study.t + study.dt / 4)
+    expected = 0.5 * heavy.gravity * study.dt**2 * heavy.omega0 * np.abs(np.sin(middle))
+    seen = np.isfinite(study.defect["theta"])
+    assert np.abs(study.defect["theta"] - expected)[seen].max() < 1e-3 * expected.max()
+    assert study.share["theta"] > 0.99
+
+
+def test_a_scheme_without_drag_on_the_centre_has_no_defect_there():
+    assert studied("published-python").peak["v_cm"][1] == 0.0
+
+
+def test_the_lag_of_the_published_program_is_part_of_its_defect():
+    """A value one step old misses three times as much of the change as one from the start of the step."""
+    lagged = studied("published-python")
+    clean = studied("signs-corrected")
+    k = int(np.searchsorted(lagged.t, 0.01))
+    assert lagged.defect["omega"][k] / clean.defect["omega"][k] == pytest.approx(3.0, rel=0.15)
+
+
+def test_shares_add_up_and_peaks_lie_on_their_curves(study):
+    assert sum(study.share.values()) == pytest.approx(1.0)
+    for quantity, (time, peak) in study.peak.items():
+        assert np.nanmax(study.defect[quantity]) == peak
+        assert 0.0 <= time < THROW.duration
+    assert study.damping[0] == pytest.approx(0.25)
+
+
+def test_what_cannot_be_studied_is_refused():
+    run, reference = (make(run).trajectory for run in plan_frozen(THROW, "exact-step", 101))
+    with pytest.raises(ValueError, match="does not freeze"):
+        study_frozen(reference, reference)
+    with pytest.raises(ValueError, match="store = 'full'"):
+        study_frozen(replace(run, r=np.zeros((0, 20)), v=np.zeros((0, 20))), reference)
+    other = make(plan_frozen(THROW, "exact-step", 51)[1]).trajectory
+    with pytest.raises(ValueError, match="at the times"):
+        study_frozen(run, other)
+
+
+def test_the_figure_says_which_quantity_leads(study):
+    figure = figure_frozen(study)
+    labels = [text.get_text() for axes in figure.axes for text in axes.get_legend().get_texts()]
+    assert any("leads" in label for label in labels)
+    assert figure.axes[-1].get_xlabel() == "time t [s]"
+    assert draw(figure).svg.startswith("<?xml")

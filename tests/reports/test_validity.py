@@ -1,0 +1,165 @@
+"""Maps of validity on made-up plateaus, and a small real one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reports.figures.style import draw
+from reports.figures.validity import figure_map
+from reports.solvers import Made, Run, make
+from reports.studies.validity import COARSE, EXTRA, LADDER, RUNGS, SCHEMES, cells, plan_map, study_map, vary
+from slicemodel import Scenario, Trajectory
+
+THROW = Scenario().with_slices(6)
+FILLS = (0.3, 0.6)
+
+
+def flat(run: Run, level: float, status: str = "ok") -> Made:
+    """A run whose omega jumps from omega_0 to a level at once."""
+    points = run.settings.get("steps", 201)
+    omega = np.full(points, level * run.scenario.omega0)
+    trajectory = Trajectory(
+        scenario=run.scenario,
+        solver="made-up",
+        method=run.solver,
+        t=np.linspace(0.0, run.scenario.duration, points),
+        theta=np.zeros(points),
+        omega=omega,
+        r=np.zeros((0, 6)),
+        v=np.zeros((0, 6)),
+        r_cm=np.zeros(points),
+        inertia=np.ones(points),
+        status=status,
+    )
+    return Made(run, trajectory, 0.0)
+
+
+def made_up(axis, values, level_of, spoil=None):
+    """Make every planned run up; ``spoil`` maps tags to what became of them instead."""
+    runs = plan_map(THROW, axis, FILLS, values)
+    made = {run.tag: flat(run, level_of(run)) for run in runs} | (spoil or {})
+    return study_map(THROW, axis, FILLS, values, made)
+
+
+def by_rung(rung: int):
+    """Levels that jump by 0.2 at one rung and by 0.01 at the others."""
+    steps = np.full(len(RUNGS), 0.01)
+    steps[rung] = 0.2
+    levels = dict(zip(LADDER, 0.2 + np.concatenate(([0.0], np.cumsum(steps))), strict=True))
+    return lambda run: levels.get(run.solver, 0.5)
+
+
+def test_the_ladder_and_its_rungs_fit_together():
+    from ode_reference import LADDER as MODELS
+
+    assert LADDER[1:] == MODELS
+    assert len(RUNGS) == len(LADDER) - 1
+
+
+def test_tags_are_unique_within_and_across_maps():
+    runs = [run for axis in ("gamma", "step", "restitution") for run in plan_map(THROW, axis, FILLS, (0.1, 0.2, 0.3))]
+    assert len({run.tag for run in runs}) == len(runs)
+
+
+def test_a_model_runs_once_per_fill_along_the_step_axis():
+    runs = plan_map(THROW, "step", FILLS, (0.01, 0.1, 0.5))
+    solvers = [run.solver for run in runs]
+    assert {solvers.count(name) for name in SCHEMES} == {6}
+    assert {solvers.count(name) for name in LADDER[1:]} == {2}
+    steps = [run.settings["steps"] for run in runs if run.solver == "exact-step"]
+    assert steps == [1001, 1001, 101, 101, 21, 21]  # omega_0 T = 10
+
+
+def test_cells_have_the_throw_that_their_axes_say():
+    for cell, (e, fill) in zip(
+        cells(THROW, "restitution", FILLS, (0.0, 0.9), 1000),
+        ((0.0, 0.3), (0.0, 0.6), (0.9, 0.3), (0.9, 0.6)),
+        strict=True,
+    ):
+        assert (cell.scenario.restitution, cell.scenario.fill_fraction) == pytest.approx((e, fill))
+        assert cell.scenario.damping_rate == pytest.approx(THROW.damping_rate)
+    damped = vary(THROW, fill=0.25, damping=0.4)
+    assert damped.damping_rate / damped.omega0 == pytest.approx(0.4)
+    assert damped.n_slices == THROW.n_slices
+
+
+@pytest.mark.parametrize("rung", range(len(RUNGS)))
+def test_the_largest_step_of_the_ladder_dominates(rung):
+    study = made_up("gamma", (0.1, 0.2, 0.3), by_rung(rung))
+    assert study.dominant.shape == (3, 2)
+    assert (study.dominant == rung).all()
+    assert study.differences[rung] == pytest.approx(0.2)
+    assert study.error("published-python") == pytest.approx(0.26)
+    assert study.error("free-flight") == pytest.approx(0.0)
+    assert study.error("published-python", "largest") == pytest.approx(0.26)
+    assert (study.reason == "").all()
+
+
+def test_step_errors_are_held_against_the_scheme_s_own_equation():
+    levels = {"published-python": 0.30, "published-limit": 0.33, "exact-step": 0.5, "eq8": 0.51}
+    study = made_up("step", (0.01, 0.1), lambda run: levels.get(run.solver, 0.9))
+    assert study.step_error["published-python"] == pytest.approx(0.03)
+    assert study.step_error["exact-step"] == pytest.approx(0.01)
+
+
+def test_a_cell_that_could_not_be_computed_carries_its_reason_and_no_colour():
+    values = (0.1, 0.2)
+    runs = {run.tag: run for run in plan_map(THROW, "gamma", FILLS, values)}
+    stalled, failed = "map gamma, row 0, column 1, free-flight", "map gamma, row 1, column 0, eq8"
+    spoil = {
+        stalled: flat(runs[stalled], 0.5, "stalled"),
+        failed: Made(runs[failed], None, 0.0, "MemoryError: too much"),
+    }
+    study = made_up("gamma", values, by_rung(4), spoil)
+    assert study.reason.tolist() == [["", "free-flight: stalled"], ["eq8: MemoryError", ""]]
+    assert study.dominant.tolist() == [[4, -1], [-1, 4]]
+    assert np.isnan(study.error("published-python")[0, 1])
+    assert study.error("published-python")[1, 0] == pytest.approx(0.26)  # does not need eq8
+    labels = [text.get_text() for text in figure_map(study).legends[0].get_texts()]
+    assert "not computed: eq8: MemoryError (1), free-flight: stalled (1)" in labels
+
+
+def test_a_run_that_was_never_made_is_no_pass():
+    study = study_map(THROW, "gamma", FILLS, (0.1,), {})
+    assert (study.dominant == -1).all()
+    assert "not run" in study.reason[0, 0]
+
+
+@pytest.mark.parametrize("axis", ["gamma", "step", "restitution"])
+def test_figures_name_their_axes_with_units_and_their_levels(axis):
+    study = made_up(axis, (0.1, 0.2, 0.3), lambda run: by_rung(1)(run) + 0.2 * run.scenario.fill_fraction)
+    figure = figure_map(study)
+    axes = figure.axes[0]
+    assert axes.get_xlabel() == "fill fraction M_w / M_max [1]"
+    assert axes.get_ylabel().endswith("[1]")
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert set(RUNGS) <= set(labels)
+    assert sum("10%" in label for label in labels) == (2 if axis == "step" else 1)
+    assert draw(figure).svg.startswith("<?xml")
+
+
+def test_a_real_map_agrees_with_the_reference_at_its_usual_tolerances():
+    from ode_reference import solve
+    from slicemodel.observables import plateau
+
+    values = (0.25,)
+    for tolerances, band in ((None, 1e-4), (COARSE, 1e-2)):
+        options = {} if tolerances is None else {"tolerances": tolerances}
+        made = {run.tag: make(run) for run in plan_map(THROW, "gamma", FILLS, values, **options)}
+        study = study_map(THROW, "gamma", FILLS, values, made)
+        assert (study.reason == "").all()
+        for column, fill in enumerate(FILLS):
+            for name in ("eq8", "free-flight"):
+                run = solve(vary(THROW, fill=fill), name)
+                usual = plateau(run.t, run.omega, THROW.omega0)
+                assert study.level[name][0, column] == pytest.approx(usual, abs=band)
+    assert set(study.level) == {*LADDER, *EXTRA}
+
+
+def test_without_gravity_the_weight_is_no_mistake():
+    far = replace(THROW, gravity=0.0)
+    made = {run.tag: make(run) for run in plan_map(far, "gamma", (0.5,), (0.25,), tolerances=COARSE)}
+    study = study_map(far, "gamma", (0.5,), (0.25,), made)
+    assert study.differences[RUNGS.index("gravity")] == pytest.approx(0.0, abs=1e-3)
+    assert study.dominant[0, 0] != RUNGS.index("gravity")

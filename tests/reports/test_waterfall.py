@@ -1,0 +1,114 @@
+"""The split of a difference over its assumptions, on made-up values whose split is known."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from ode_reference.switches import Switches
+from reports.studies import waterfall
+from reports.studies.waterfall import LOOSE, NAMES, OBSERVABLES, USUAL, canonical, plan_waterfall, study_waterfall
+from slicemodel import Scenario, Trajectory
+
+THROW = Scenario(n_slices=1)
+NAME_OF = {switch: words for switch, words in NAMES.items()}
+
+
+def made_up(value: float) -> Trajectory:
+    """A run whose plateau is ``value`` and whose other observables follow from it."""
+    t = np.linspace(0.0, THROW.duration, 5)
+    return Trajectory(
+        scenario=THROW,
+        solver="made-up",
+        method="made-up",
+        t=t,
+        theta=np.full(5, value),
+        omega=np.full(5, THROW.omega0 * value),
+        r=np.full((5, 1), 0.1),
+        v=np.full((5, 1), value),
+        r_cm=np.full(5, 0.1),
+        inertia=np.ones(5),
+    )
+
+
+def split(value_of, *, program=0.0, loosened=0.0):
+    runs = {}
+    for run in plan_waterfall(THROW, 1000):
+        if run.solver == waterfall.PROGRAM:
+            runs[run.tag] = made_up(program)
+            continue
+        value = value_of(Switches.from_name(run.solver))
+        runs[run.tag] = made_up(value + (loosened if run.settings == dict(LOOSE) else 0.0))
+    return study_waterfall(runs)
+
+
+def plateau_bars(result):
+    assert result[0].observable.name == "plateau"
+    return {bar.name: bar for bar in result[0].bars}
+
+
+def test_the_plan_names_every_equation_once_at_two_tolerances():
+    runs = plan_waterfall(THROW, 1000)
+    assert len({run.tag for run in runs}) == len(runs) == 81
+    assert {tuple(run.settings.items()) for run in runs[1:]} == {tuple(USUAL.items()), tuple(LOOSE.items())}
+    assert all(canonical(Switches.from_name(run.solver)).name == run.solver for run in runs[1:])
+
+
+def test_independent_assumptions_split_alike_in_every_order():
+    worth = {"signs": 0.1, "roots": -0.2, "weightless": 0.4, "origin": -0.05, "recoil": 0.02}
+    bars = plateau_bars(split(lambda s: 1.0 + sum(w for name, w in worth.items() if getattr(s, name)), program=0.7))
+    for name, words in NAME_OF.items():
+        expected = worth.get(name, 0.0)
+        bar = bars[words]
+        assert (bar.forward, bar.backward, bar.average) == pytest.approx((expected,) * 3, abs=1e-14)
+        assert bar.interaction == pytest.approx(0.0, abs=1e-14)
+    assert bars[waterfall.STEP].forward == pytest.approx(0.3)
+
+
+def test_an_interaction_is_shared_evenly_by_the_average_and_shows():
+    bars = plateau_bars(split(lambda s: 1.0 if s.signs and s.recoil else 0.0))
+    signs, recoil = bars[NAME_OF["signs"]], bars[NAME_OF["recoil"]]
+    assert (signs.forward, signs.backward, signs.average) == pytest.approx((0.0, 1.0, 0.5))
+    assert (recoil.forward, recoil.backward, recoil.average) == pytest.approx((1.0, 0.0, 0.5))
+    assert signs.interaction == pytest.approx(1.0)
+
+
+def test_every_split_of_every_observable_sums_to_the_whole():
+    rng = np.random.default_rng(5)
+    values = {s: rng.normal() for s in Switches.every()}
+    result = split(lambda s: values[canonical(s)], program=rng.normal())
+    assert [w.observable.name for w in result] == [o.name for o in OBSERVABLES]
+    for part in result:
+        for order in ("forward", "backward", "average"):
+            assert sum(getattr(bar, order) for bar in part.bars) == pytest.approx(part.total, abs=1e-12)
+        assert part.residual <= 1e-12
+        assert part.largest.name in {bar.name for bar in part.bars}
+
+
+def test_bands_come_from_the_looser_runs():
+    bars = plateau_bars(split(lambda s: 1.0 if s.signs else 0.0, loosened=1e-3))
+    for words in NAME_OF.values():
+        assert bars[words].forward_band == pytest.approx(2e-3)
+        assert bars[words].average_band == pytest.approx(2e-3)
+
+
+def test_a_run_that_is_not_whole_is_named():
+    runs = {run.tag: made_up(1.0) for run in plan_waterfall(THROW, 1000)}
+    tag = next(tag for tag in runs if "111111" in tag or "recoil" in tag or "usual" in tag)
+    runs[tag] = dataclasses.replace(runs[tag], status="stalled", message="time hardly passes")
+    with pytest.raises(ArithmeticError, match="stalled: time hardly passes") as refusal:
+        study_waterfall(runs)
+    assert tag in str(refusal.value)
+
+
+def test_canonical_sets_make_the_same_equation():
+    """What ``canonical`` calls idle has no effect: the trajectories are the same to the last bit."""
+    import ode_reference
+
+    throw = Scenario(n_slices=4, drag=1.0, duration=0.1)
+    for switches in (Switches(drag_on_centre=True, roots=True), Switches(signs=True, drag_on_centre=True, origin=True)):
+        assert canonical(switches) != switches
+        one = ode_reference.solve(throw, switches.name)
+        other = ode_reference.solve(throw, canonical(switches).name)
+        np.testing.assert_array_equal(one.omega, other.omega)
+    assert canonical(Switches(signs=True, drag_on_centre=True)) == Switches(signs=True, drag_on_centre=True)
