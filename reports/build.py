@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from reports.evaluation import evaluate
-from reports.evidence import ENGINE, FLIGHTS, OTHER_SCHEMES, Evidence
-from reports.exhibits import Exhibit, draw_all
+from reports.evidence import FLIGHTS, FREE, OTHERS, Evidence
+from reports.exhibit import Exhibit
+from reports.exhibits import draw_all
 from reports.findings import Finding
 from reports.lead import lead_words
 from reports.page import render
@@ -43,7 +44,7 @@ def build(evidence: Evidence, provenance: Mapping[str, str]) -> Report:
     """Evaluate every claim, draw every figure and write the page, all in memory."""
     findings = tuple(evaluate(evidence))
     exhibits = tuple(draw_all(evidence))
-    solvers = [_solver_row(evidence, tag) for tag in (*FLIGHTS, *OTHER_SCHEMES)]
+    solvers = [_solver_row(evidence, tag) for tag in (*FLIGHTS, *OTHERS)]
     summary = {
         "flipproof": provenance["flipproof"],
         "version": SUMMARY_VERSION,
@@ -54,7 +55,7 @@ def build(evidence: Evidence, provenance: Mapping[str, str]) -> Report:
         "differences": [_difference_mapping(difference) for difference in evidence.differences],
         "solvers": solvers,
         "runs": [_run_mapping(evidence, tag) for tag in evidence.made],
-        "lead": lead_words(evidence.differences, evidence.trajectory(ENGINE)),
+        "lead": lead_words(evidence.differences, evidence.trajectory(FREE)),
         "figures": [{"name": s.name, "title": s.title, "alt": s.alt} for s in exhibits],
         "provenance": dict(provenance),
     }
@@ -65,7 +66,7 @@ def build(evidence: Evidence, provenance: Mapping[str, str]) -> Report:
         summary=summary,
         tables={
             tag: trajectory_csv(trajectory)
-            for tag in (*FLIGHTS, *OTHER_SCHEMES)
+            for tag in (*FLIGHTS, *OTHERS)
             if (trajectory := evidence.trajectory(tag)) is not None
         },
     )

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ode_reference.models import LADDER
 from reports import claims
-from reports.evidence import CHECK, ENGINE, LIMITS, MODELS, Evidence
+from reports.evidence import CHECK, CROSS_CHECKED, ENGINE, ICED, LIMITS, Evidence
 from reports.findings import Finding
 from reports.vectors import load_all
 
@@ -19,6 +20,19 @@ def evaluate(evidence: Evidence) -> Iterator[Finding]:
     yield from _order_findings(evidence)
     yield from _reference_findings(evidence)
     yield from _engine_findings(evidence)
+    yield from _attribution_findings(evidence)
+
+
+def _attribution_findings(evidence: Evidence) -> Iterator[Finding]:
+    found = evidence.attribution
+    for waterfall in found.waterfalls:
+        yield claims.claim_waterfall(waterfall)
+    for pair, forms in found.forms.items():
+        yield claims.claim_model_form(*pair, forms["omega"])
+    for solver, study in found.predictability.items():
+        yield claims.claim_predictability(solver, study)
+    for erratum in found.errata:
+        yield claims.claim_erratum(erratum)
 
 
 def _vector_findings(evidence: Evidence) -> Iterator[Finding]:
@@ -32,7 +46,7 @@ def _vector_findings(evidence: Evidence) -> Iterator[Finding]:
 def _ice_findings(evidence: Evidence) -> Iterator[Finding]:
     for ice in evidence.ice:
         yield claims.claim_ice(ice)
-    for tag in (f"ice, {name}" for name in (*LIMITS, *MODELS, f"{ENGINE} rigid")):
+    for tag in (f"ice, {name}" for name in (*LIMITS, *ICED, f"{ENGINE} rigid")):
         if evidence.trajectory(tag) is None:
             yield _missing(evidence, tag.replace(", ", "-").replace(" ", "-"), f"{tag} keeps ω constant", tag)
     runs = [made for tag, made in evidence.made.items() if tag.startswith(f"ice, {ENGINE} welded")]
@@ -68,14 +82,21 @@ def _order_findings(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _reference_findings(evidence: Evidence) -> Iterator[Finding]:
-    for model in MODELS:
+    for model in LADDER:
         tag = f"{CHECK}, {model}"
         usual, tight = evidence.trajectory(tag), evidence.trajectory(f"{tag}, tighter")
         if usual is None or tight is None:
             yield _missing(evidence, f"reference-{model}", f"{model} is converged", tag, f"{tag}, tighter")
         else:
             yield claims.claim_reference_converged(usual, tight)
-        if evidence.size.second_method is None:
+        ledger = evidence.trajectory(f"{CHECK}, ledger, {model}")
+        if ledger is None:
+            yield _missing(
+                evidence, f"energy-{model}", f"{model}: the energy ledger closes", f"{CHECK}, ledger, {model}"
+            )
+        else:
+            yield claims.claim_energy(ledger)
+        if evidence.size.second_method is None or model not in CROSS_CHECKED:
             continue
         other_tag = f"{tag}, {evidence.size.second_method}"
         other = evidence.trajectory(other_tag)

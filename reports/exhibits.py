@@ -6,33 +6,16 @@ which is written from the data.
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from reports.evidence import FLIGHTS, Evidence
+from reports.exhibit import Exhibit
+from reports.exhibits_attribution import draw_attribution
 from reports.figures import flights as flight_figures
 from reports.figures import numerics as numeric_figures
-from reports.figures.style import Drawing, draw
+from reports.figures.style import draw
 from reports.studies.step_size import PHASES
 from slicemodel import Trajectory
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Exhibit:
-    """A figure with its words, and the section of the page it belongs to."""
-
-    name: str
-    section: str
-    title: str
-    caption: str
-    alt: str
-    drawing: Drawing
-
-    @property
-    def source(self) -> str:
-        """The figure as a data URI: an image of its own, so that ids of two figures cannot collide."""
-        return "data:image/svg+xml;base64," + base64.b64encode(self.drawing.svg.encode("utf-8")).decode("ascii")
 
 
 def draw_all(evidence: Evidence) -> Iterator[Exhibit]:
@@ -48,6 +31,7 @@ def draw_all(evidence: Evidence) -> Iterator[Exhibit]:
         yield _draw_ice(evidence)
     if evidence.slices:
         yield _draw_slices(evidence)
+    yield from draw_attribution(evidence.attribution)
 
 
 def _draw_flights(flights: list[Trajectory]) -> Iterator[Exhibit]:
@@ -57,7 +41,7 @@ def _draw_flights(flights: list[Trajectory]) -> Iterator[Exhibit]:
         section="flights",
         title="Angular velocity",
         caption="Compare each solid scheme with the dashed equation of the same hue: between them lies the step size. "
-        "What lies between the hues comes from the equations; pymunk is free flight.",
+        "What lies between the hues comes from the equations; free-flight and pymunk are free flight.",
         alt=f"Line plot of omega over omega_0 against time. Values at the end: {ends}.",
         drawing=draw(flight_figures.figure_omega(flights)),
     )

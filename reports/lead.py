@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from reports.evidence import ENGINE, TOTAL
+from reports.evidence import TOTAL
 from reports.studies.differences import PARTING_BAND, Difference
 from slicemodel import Trajectory
 
@@ -12,11 +12,11 @@ NOTHING = 1e-6
 """Fraction of omega_0 below which two solvers are said to agree."""
 
 
-def lead_words(differences: Sequence[Difference], engine: Trajectory | None) -> str:
+def lead_words(differences: Sequence[Difference], free: Trajectory | None) -> str:
     """Return the verdict in a few sentences of plain text.
 
     ``differences`` are those of the report, the total from the published program to free flight among them;
-    ``engine`` is the run of free flight, or None if there is none.
+    ``free`` is the run of free flight, or None if there is none.
     """
     total = next((d for d in differences if d.name == TOTAL), None)
     parts = sorted((d for d in differences if d.name != TOTAL), key=lambda d: -d.largest)
@@ -28,10 +28,10 @@ def lead_words(differences: Sequence[Difference], engine: Trajectory | None) -> 
             f"On this throw all solvers agree to {_share(max(worst.largest, total.largest if total else 0.0))} of ω₀."
         )
     sentences = []
-    if engine is None or total is None:
-        sentences.append(f"Free flight could not be computed by {ENGINE}; the reason stands below.")
+    if free is None or total is None:
+        sentences.append("Free flight could not be computed; the reason stands below.")
     else:
-        until = "" if engine.ok else f", up to t = {total.t[-1] * 1e3:.0f} ms, where {ENGINE} {engine.status}"
+        until = "" if free.ok else f", up to t = {total.t[-1] * 1e3:.0f} ms, where {free.method} {free.status}"
         sentences.append(
             f"The published program and a free bottle differ by up to {_share(total.largest)} of ω₀ "
             f"(at t = {total.largest_time * 1e3:.0f} ms{until})."

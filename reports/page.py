@@ -8,8 +8,8 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from reports.evidence import ENGINE, Evidence
-from reports.exhibits import Exhibit
+from reports.evidence import FREE, Evidence
+from reports.exhibit import Exhibit
 from reports.findings import Finding
 from reports.lead import lead_words
 from reports.studies.differences import Difference
@@ -59,13 +59,15 @@ def render(
         throw=evidence.throw,
         size=evidence.size,
         differences=differences,
-        lead=lead_words(evidence.differences, evidence.trajectory(ENGINE)),
+        lead=lead_words(evidence.differences, evidence.trajectory(FREE)),
         regressions=regressions,
         observations=[finding for finding in findings if finding.kind == "observation"],
         failed=[finding for finding in regressions if finding.failed],
         exhibits=exhibits,
         steps=evidence.flights_by_step,
         slices=evidence.slices,
+        found=evidence.attribution,
+        forms_omega=[(pair, forms["omega"]) for pair, forms in evidence.attribution.forms.items()],
         solvers=solvers,
         problems=[made for made in evidence.made.values() if made.trajectory is None],
         provenance=provenance,

@@ -50,6 +50,9 @@ def test_the_readme_states_the_numbers_of_the_snapshot():
     largest = {(d["first"], d["second"]): 100 * d["largest"] for d in summary["differences"]}
     text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
     assert f"costs {largest['published-python', 'published-limit']:.1f} % of omega_0" in text
-    assert f"({largest['published-limit', 'eq8']:.0f} % away from the paper's own Eq. 8)" in text
-    assert f"({largest['eq8', 'pymunk']:.0f} % away from a free bottle" in text
-    assert f"within {largest['published-python', 'pymunk']:.0f} % of free flight" in text
+    assert f"free flight cancels moves omega by {largest['eq8', 'eq8-weightless']:.0f} %" in text
+    assert f"against the centre of mass by {largest['eq8-wall', 'eq8']:.0f} %" in text
+    assert f"weak damping by {largest['signs-limit', 'eq8-wall']:.0f} %" in text
+    assert f"all damping off by {largest['published-limit', 'signs-limit']:.0f} %" in text
+    assert f"within {largest['published-python', 'free-flight']:.0f} % of free flight" in text
+    assert f"agree to {largest['free-flight', 'pymunk']:.1f} %" in text

@@ -83,7 +83,7 @@ def figure_slices(trajectories: Sequence[Trajectory]) -> Figure:
 @styled
 def figure_differences(differences: Sequence[Difference]) -> Figure:
     """Size of every difference over time on a logarithmic scale, with the parting band and moments."""
-    figure, axes = new_figure(size=(8.0, 4.6))
+    figure, axes = new_figure(size=(8.0, 5.4))
     axes.axhline(PARTING_BAND, color="#444444", linewidth=1.0, linestyle=":")
     axes.text(1.005, PARTING_BAND, f"{PARTING_BAND:.0%}", transform=axes.get_yaxis_transform(), va="center", fontsize=9)
     for k, difference in enumerate(differences):
@@ -92,7 +92,12 @@ def figure_differences(differences: Sequence[Difference]) -> Figure:
         axes.plot(difference.t, size, color=colour, linewidth=1.4, label=difference.name)
         if difference.parting_time is not None:
             axes.plot(
-                difference.parting_time, PARTING_BAND, MARKERS[k], color=colour, markeredgecolor="white", markersize=8
+                difference.parting_time,
+                PARTING_BAND,
+                MARKERS[k % len(MARKERS)],
+                color=colour,
+                markeredgecolor="white",
+                markersize=8,
             )
     axes.set_yscale("log")
     axes.set_ylim(1e-7, 2.0)

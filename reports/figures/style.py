@@ -26,9 +26,13 @@ STYLES: dict[str, dict[str, Any]] = {
     "published-limit": {"color": "#7A3600", "linestyle": (0, (5, 3)), "linewidth": 1.4},
     "exact-step": {"color": "#56B4E9", "linestyle": "-", "linewidth": 2.4},
     "eq8": {"color": "#00466E", "linestyle": (0, (5, 3)), "linewidth": 1.4},
-    "pymunk": {"color": "#009E73", "linestyle": "-", "linewidth": 1.6},
+    "pymunk": {"color": "#00B386", "linestyle": "-", "linewidth": 2.4},
+    "free-flight": {"color": "#00402F", "linestyle": (0, (5, 3)), "linewidth": 1.4},
+    "midpoint": {"color": "#CC79A7", "linestyle": "-", "linewidth": 1.6},
 }
-ASSUMPTIONS = ("#E69F00", "#6A5ACD", "#CC79A7", "#882255", "#000000")
+ASSUMPTIONS = (
+    "#E69F00", "#6A5ACD", "#CC79A7", "#882255", "#999933", "#0072B2", "#44AA99", "#D55E00", "#999999", "#000000",
+)  # fmt: skip
 ICE_FLOOR = 1e-18
 OTHERS = ("#CC79A7", "#E69F00", "#000000", "#999933", "#882255")
 MARKERS = "os^Dv<>"
@@ -74,6 +78,7 @@ def draw(figure: Figure) -> Drawing:
     """Render a figure; the same data give the same bytes (fixed ids, no date)."""
     svg, png = BytesIO(), BytesIO()
     figure.savefig(svg, format="svg", metadata={"Date": None})
+    figure.set_layout_engine("none")  # laid out by now; to do it again for the second format costs as much as drawing
     figure.savefig(png, format="png", dpi=160)
     return Drawing(svg.getvalue().decode("utf-8"), png.getvalue())
 
@@ -91,7 +96,7 @@ def new_figure(
     return figure, figure.subplots(rows, columns, **options)
 
 
-def shared_legend(figure: Figure, axes: Axes, columns: int = 5) -> None:
+def shared_legend(figure: Figure, axes: Axes, columns: int = 3) -> None:
     """Put one legend for all panels below the figure, from the entries of ``axes``."""
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=columns)

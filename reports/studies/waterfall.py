@@ -39,9 +39,16 @@ NAMES: Final = MappingProxyType(
 
 STEP: Final = "step size of the program"
 
-USUAL: Final = MappingProxyType({"rtol": 1e-10, "rest_speed": 1e-5})
-LOOSE: Final = MappingProxyType({"rtol": 1e-9, "rest_speed": 1e-4})
-"""Tolerances ten times coarser: what they change is the band of a value."""
+LOOSER: Final = 10.0
+"""Tolerance and rest speed of the second set of runs, in units of the first: what they change is a value's band."""
+
+
+def tolerances(throw: Scenario, switches: Switches, *, loose: bool) -> dict[str, float]:
+    """Return the settings of a run; a rest speed ten times smaller with recoil would multiply the impacts by ten."""
+    factor = LOOSER if loose else 1.0
+    rest_speed = 1e-3 if switches.recoil else 1e-5
+    longest = min(0.04 * (2.0 if loose else 1.0) / abs(throw.omega0), throw.duration)
+    return {"rtol": 1e-9 * factor, "rest_speed": rest_speed * factor, "max_step": longest}
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +56,7 @@ class Observable:
     """One number read off a trajectory."""
 
     name: str
+    symbol: str
     words: str
     unit: str
     of: Callable[[Trajectory], float]
@@ -57,20 +65,23 @@ class Observable:
 OBSERVABLES: Final = (
     Observable(
         "plateau",
+        "plateau",
         "mean of ω/ω₀ over the second half",
         "1",
         lambda run: observables.plateau(run.t, run.omega, run.scenario.omega0),
     ),
-    Observable("omega", "ω on landing / ω₀", "1", lambda run: float(run.omega[-1] / run.scenario.omega0)),
-    Observable("theta", "θ on landing", "rad", lambda run: float(run.theta[-1])),
+    Observable("omega", "ω(T)/ω₀", "ω on landing / ω₀", "1", lambda run: float(run.omega[-1] / run.scenario.omega0)),
+    Observable("theta", "θ(T)", "θ on landing", "rad", lambda run: float(run.theta[-1])),
     Observable(
         "toppling",
+        "θ_c(T)",
         "toppling angle on landing",
         "rad",
         lambda run: float(observables.toppling_angle(run.scenario, run.r_cm[-1])),
     ),
     Observable(
         "v_cm",
+        "v_CM(T)",
         "velocity of C_M in the bottle on landing",
         "m/s",
         lambda run: float(observables.centre_of_mass_velocity(run.scenario, run.v[-1])),
@@ -128,8 +139,10 @@ def plan_waterfall(throw: Scenario, steps: int) -> list[Run]:
     runs = [Run("waterfall, program", PROGRAM, throw, {"steps": steps})]
     # Recoil costs most: those runs first keep the workers evenly busy.
     sets = sorted({canonical(s) for s in Switches.every()}, key=lambda s: (not s.recoil, s.name))
-    for label, tolerances in (("usual", USUAL), ("loose", LOOSE)):
-        runs += [Run(_tag(label, switches), switches.name, throw, dict(tolerances)) for switches in sets]
+    for label in ("usual", "loose"):
+        for switches in sets:
+            settings = tolerances(throw, switches, loose=label == "loose")
+            runs.append(Run(_tag(label, switches), switches.name, throw, settings))
     return runs
 
 

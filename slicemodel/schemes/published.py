@@ -75,5 +75,6 @@ PAPER_TYPESET = Scheme(
         strict=False,
     ),
     limit="nothing moves as dt -> 0: v changes sign every step",
-    reason="Eq. 9c, Eq. 9d and [C.S.] exactly as typeset; Eq. 9d ends in minus v cosh.",
+    reason="Eq. 9c and Eq. 9d exactly as typeset; Eq. 9d ends in minus v cosh. Rebounds as [C.S.] means them: with the "
+    "sign it prints, beta = -0.5 would not reverse the velocity.",
 )

@@ -1,0 +1,190 @@
+"""Which assumption makes the solvers differ, when, and for which bottles: what these studies need and find."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, field
+from typing import Any, Final, TypeVar
+
+from ode_reference.models import LADDER
+from reports.solvers import Made, Run
+from reports.studies.alignment import Alignment, study_alignment
+from reports.studies.errata import Erratum
+from reports.studies.frozen import Frozen, plan_frozen, study_frozen
+from reports.studies.model_form import ModelForm, study_signals
+from reports.studies.predictability import Predictability, plan_predictability, study_predictability
+from reports.studies.step_size import plan_step_size
+from reports.studies.validity import COARSE, ValidityMap, plan_map, study_map
+from reports.studies.waterfall import Waterfall, plan_waterfall, study_waterfall
+from slicemodel import Scenario, Trajectory
+
+ALIGNED: Final = (("eq8", "midpoint"), ("eq8", "free-flight"))
+"""Pairs whose impact sequences are aligned: two ways to the same equation, and two equations."""
+
+PREDICTED: Final = ("eq8", "free-flight")
+PERTURBATIONS: Final = (1e-9, 1e-6)
+
+FORMS: Final = (
+    ("exact-step", "eq8"),
+    ("exact-step", "eq8-weightless"),
+    ("published-python", "published-limit"),
+    ("published-python", "eq8"),
+)
+"""Scheme and equation: is what is left as the step goes to zero the step's, or another equation?"""
+
+FORM_LEVELS: Final = 6
+FORM_MULTIPLE: Final = 54
+COMMON: Final = 37
+
+LEDGER_SLICES: Final = 20
+FROZEN_SCHEME: Final = "exact-step"
+GAMMAS: Final = (0.05, 0.15, 0.25, 0.35, 0.5)
+RESTITUTIONS: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
+TURNS: Final = (0.005, 0.01, 0.02, 0.05, 0.1)
+FILLS: Final = (0.1, 0.25, 0.4, 0.55, 0.75, 1.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scope:
+    """How much of it: slices of the waterfall and of the maps, columns of the maps (0: no maps)."""
+
+    waterfall_slices: int
+    map_slices: int
+    fills: tuple[float, ...]
+    rows: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Attribution:
+    """What the studies found; a study that could not be made is missing, and ``problems`` says why."""
+
+    waterfalls: tuple[Waterfall, ...] = ()
+    alignments: Mapping[tuple[str, str], Alignment] = field(default_factory=dict)
+    predictability: Mapping[str, Predictability] = field(default_factory=dict)
+    forms: Mapping[tuple[str, str], Mapping[str, ModelForm]] = field(default_factory=dict)
+    frozen: Frozen | None = None
+    maps: tuple[ValidityMap, ...] = ()
+    errata: tuple[Erratum, ...] = ()
+    ledgers: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    problems: Mapping[str, str] = field(default_factory=dict)
+
+
+def axes_of(scope: Scope) -> Iterator[tuple[Any, tuple[float, ...]]]:
+    """Yield axis and values of every map."""
+    if scope.fills:
+        for axis, values in (("gamma", GAMMAS), ("step", TURNS), ("restitution", RESTITUTIONS)):
+            yield axis, values[:: max(1, len(values) // scope.rows)][: scope.rows]
+
+
+def plan_attribution(throw: Scenario, scope: Scope, steps: int) -> list[Run]:
+    """Return every run; those of flights that the report makes anyway have the same settings and are made once."""
+    runs = plan_waterfall(throw.with_slices(scope.waterfall_slices), steps)
+    for solver in PREDICTED:
+        runs += [run for level in plan_predictability(throw, solver, sizes=PERTURBATIONS) for run in level]
+    runs += [Run(f"attribution, {solver}", solver, throw) for pair in ALIGNED for solver in pair]
+    runs += [Run(f"attribution, {model}", model, throw) for _, model in FORMS]
+    for scheme in dict.fromkeys(scheme for scheme, _ in FORMS):
+        levels = plan_step_size(throw, scheme, COMMON, FORM_MULTIPLE, FORM_LEVELS)
+        runs += [run for level in levels for run in level]
+    runs += plan_frozen(throw, FROZEN_SCHEME, steps)
+    few = throw.with_slices(LEDGER_SLICES)
+    runs += [Run(f"ledger, {model}", model, few, {"energy": True}) for model in LADDER]
+    small = throw.with_slices(scope.map_slices)
+    for axis, values in axes_of(scope):
+        runs += plan_map(small, axis, scope.fills, values, steps=steps, tolerances=COARSE)
+    return list({run.tag: run for run in runs}.values())
+
+
+Result = TypeVar("Result")
+
+
+def _submit_form(
+    pool: Executor, throw: Scenario, pair: tuple[str, str], made: Mapping[str, Made]
+) -> Future[dict[str, ModelForm]] | None:
+    """Have a worker fit one scheme's errors against one equation; None if a run is missing, which is told elsewhere."""
+    scheme, model = pair
+    reference = made[f"attribution, {model}"].trajectory
+    plan = plan_step_size(throw, scheme, COMMON, FORM_MULTIPLE, FORM_LEVELS)
+    levels = [[run for r in level if (run := made[r.tag].trajectory) is not None] for level in plan]
+    if reference is None or [len(level) for level in levels] != [len(level) for level in plan]:
+        return None
+    return pool.submit(study_signals, reference, levels)
+
+
+def study_attribution(
+    throw: Scenario,
+    scope: Scope,
+    steps: int,
+    made: Mapping[str, Made],
+    pool: Executor,
+    audit: Future[tuple[Erratum, ...]],
+) -> Attribution:
+    """Study what ``plan_attribution`` planned.
+
+    ``made`` maps its tags to what became of them; ``audit`` is the errata study, already under way in ``pool``.
+    """
+    problems: dict[str, str] = {}
+    fits = {pair: _submit_form(pool, throw, pair, made) for pair in FORMS}
+
+    def run(tag: str) -> Trajectory:
+        trajectory = made[tag].trajectory
+        if trajectory is None:
+            raise ArithmeticError(f"{tag}: {made[tag].reason}")
+        return trajectory
+
+    def attempt(name: str, study: Callable[[], Result]) -> Result | None:
+        try:
+            return study()
+        except (ArithmeticError, ValueError, LookupError) as error:
+            problems[name] = f"{type(error).__name__}: {error}"
+            return None
+
+    def predict(solver: str) -> Predictability:
+        levels = plan_predictability(throw, solver, sizes=PERTURBATIONS)
+        return study_predictability(run(f"attribution, {solver}"), [[run(r.tag) for r in level] for level in levels])
+
+    small = throw.with_slices(scope.map_slices)
+    falls = attempt(
+        "waterfall",
+        lambda: study_waterfall(
+            {r.tag: run(r.tag) for r in plan_waterfall(throw.with_slices(scope.waterfall_slices), steps)}
+        ),
+    )
+    alignments = {
+        pair: attempt(
+            f"alignment of {pair[0]} and {pair[1]}",
+            lambda pair=pair: study_alignment(*(run(f"attribution, {solver}") for solver in pair)),  # type: ignore[misc]
+        )
+        for pair in ALIGNED
+    }
+    predicted = {s: attempt(f"predictability of {s}", lambda s=s: predict(s)) for s in PREDICTED}  # type: ignore[misc]
+    forms = {
+        pair: attempt(f"{pair[0]} against {pair[1]}", fit.result) if fit is not None else None
+        for pair, fit in fits.items()
+    }
+    maps = [
+        attempt(f"map over {axis}", lambda axis=axis, values=values: study_map(  # type: ignore[misc]
+            small, axis, scope.fills, values, made, steps=steps
+        ))
+        for axis, values in axes_of(scope)
+    ]  # fmt: skip
+    frozen = attempt(
+        "frozen coefficients",
+        lambda: study_frozen(run(plan_frozen(throw, FROZEN_SCHEME, steps)[0].tag), run("attribution, eq8")),
+    )
+    return Attribution(
+        waterfalls=falls or (),
+        alignments={pair: study for pair, study in alignments.items() if study is not None},
+        predictability={solver: study for solver, study in predicted.items() if study is not None},
+        forms={pair: study for pair, study in forms.items() if study is not None},
+        frozen=frozen,
+        maps=tuple(study for study in maps if study is not None),
+        errata=attempt("errata", audit.result) or (),
+        ledgers={
+            model: ledger
+            for model in LADDER
+            if (ledger := attempt(f"ledger of {model}", lambda m=model: run(f"ledger, {m}").diagnostics["energy"]))  # type: ignore[misc]
+        },
+        problems=problems,
+    )

@@ -1,0 +1,119 @@
+"""The figures that say which assumption makes the solvers differ, with their words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from reports.attribution import Attribution
+from reports.exhibit import Exhibit
+from reports.figures.events import figure_gantt, figure_predictability
+from reports.figures.frozen import figure_frozen
+from reports.figures.style import draw
+from reports.figures.validity import figure_map
+from reports.figures.waterfall import figure_waterfall
+from reports.studies.frozen import QUANTITIES
+from reports.studies.validity import RUNGS
+
+AXES = {"gamma": "damping", "step": "step size", "restitution": "restitution"}
+
+
+def draw_attribution(found: Attribution) -> Iterator[Exhibit]:
+    """Yield the figures of every study that was made."""
+    if found.waterfalls:
+        yield _draw_waterfall(found)
+    if found.frozen is not None:
+        yield _draw_frozen(found)
+    yield from _draw_gantts(found)
+    if found.predictability:
+        yield _draw_predictability(found)
+    yield from _draw_maps(found)
+
+
+def _draw_waterfall(found: Attribution) -> Exhibit:
+    waterfall = found.waterfalls[0]
+    bars = ", ".join(f"{bar.name} {bar.average:+.3f}" for bar in waterfall.bars)
+    return Exhibit(
+        name="waterfall",
+        section="assumptions",
+        title="From the published program to free flight",
+        caption=(
+            "Left: each bar is what mending one more assumption changes; blue raises, orange lowers. Right: the "
+            "same in other orders. Where the three marks lie apart the assumptions interact, and only the mean "
+            "over all orders is a fair share. Error bars are numerical."
+        ),
+        alt=f"Waterfall of the mean of omega over omega_0 in the second half: from {waterfall.start:.3f} to "
+        f"{waterfall.end:.3f}. Means over all orders: {bars}.",
+        drawing=draw(figure_waterfall(waterfall)),
+    )
+
+
+def _draw_frozen(found: Attribution) -> Exhibit:
+    study = found.frozen
+    assert study is not None
+    shares = ", ".join(f"{name} {study.share[name]:.0%}" for name in QUANTITIES)
+    return Exhibit(
+        name="frozen",
+        section="steps",
+        title="What holding the coefficients constant costs, step by step",
+        caption=(
+            "Top: how much each frozen quantity changes within a step. Middle: what freezing it misses in that "
+            "step; the highest curve costs most at that moment. Bottom: the defects added up, beside the error "
+            "they lead to."
+        ),
+        alt=f"Curves over time for {study.scheme}. Share of the steps in which freezing costs most: {shares}.",
+        drawing=draw(figure_frozen(study)),
+    )
+
+
+def _draw_gantts(found: Attribution) -> Iterator[Exhibit]:
+    for (first, second), alignment in found.alignments.items():
+        yield Exhibit(
+            name=f"gantt-{first}-{second}",
+            section="events",
+            title=f"Contacts and impacts: {first} and {second}",
+            caption=(
+                "One row per slice. Bars are contacts, ticks are impacts; the upper lane of a row is the first "
+                "solver, the lower the second. Where the lanes look alike the two tell the same story of that slice."
+            ),
+            alt=f"Gantt-like plot of contacts. {alignment.words}".replace("ω₀", "omega_0"),
+            drawing=draw(figure_gantt(alignment)),
+        )
+
+
+def _draw_predictability(found: Attribution) -> Exhibit:
+    studies = list(found.predictability.values())
+    words = " ".join(study.words for study in studies)
+    return Exhibit(
+        name="predictability",
+        section="events",
+        title="How far ahead the curves mean anything",
+        caption=(
+            "Flights released a hair differently. Parallel curves grow with the change: the flight is smooth. "
+            "Curves that meet at one level whatever the change show jumps, where an impact just happens or just "
+            "does not."
+        ),
+        alt=f"Logarithmic plot of the spread after tiny changes. {words}".replace("ω₀", "omega_0"),
+        drawing=draw(figure_predictability(studies)),
+    )
+
+
+def _draw_maps(found: Attribution) -> Iterator[Exhibit]:
+    for study in found.maps:
+        dominant = study.dominant
+        contours = (
+            "the contours are where a scheme is 1 % and 10 % of ω₀ off its own equation."
+            if study.axis == "step"
+            else "the contours are where the published program is 1 % and 10 % of ω₀ off free flight."
+        )
+        counts = ", ".join(
+            f"{name} {int((dominant == k).sum())}" for k, name in enumerate(RUNGS) if (dominant == k).any()
+        )
+        yield Exhibit(
+            name=f"map-{study.axis}",
+            section="maps",
+            title=f"Validity over filling and {AXES[study.axis]}",
+            caption="Every cell is a throw. Its colour names the assumption that moves the plateau of ω most; "
+            f"{contours} Hatched cells could not be computed.",
+            alt=f"Map of {dominant.size} throws of {study.slices} slices. Cells by largest mistake: {counts}.",
+            drawing=draw(figure_map(study)),
+        )
