@@ -21,6 +21,7 @@ from reports.solvers import Made, Run, find, make, without_gravity
 from reports.studies.differences import Difference, study_difference
 from reports.studies.errata import study_errata
 from reports.studies.ice import IceDrift, plan_ice, plan_welded, study_ice
+from reports.studies.predictability import PartingGrowth, study_parting_growth
 from reports.studies.slices import SliceCount, plan_slices, study_slices
 from reports.studies.step_size import StepSize, before_first_impact, plan_step_size, study_step_size
 from reports.studies.waterfall import NAMES
@@ -116,6 +117,7 @@ class Evidence:
     size: Size
     made: Mapping[str, Made]
     differences: tuple[Difference, ...]
+    growths: tuple[PartingGrowth, ...]
     flights_by_step: Mapping[str, StepSize]
     starts_by_step: Mapping[str, StepSize]
     check_flights: Mapping[str, StepSize]
@@ -203,12 +205,14 @@ def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None 
         check_starts = _study_starts(pool, REFERENCE, f"{CHECK}, ", made, 4)
         attribution = study_attribution(throw, size.scope, size.steps, made, pool, audit)
 
+    differences = tuple(_differences(made))
     return Evidence(
         scenario=scenario,
         throw=throw,
         size=size,
         made=made,
-        differences=tuple(_differences(made)),
+        differences=differences,
+        growths=tuple(_growth(difference, made) for difference in differences if difference.parting_time is not None),
         flights_by_step=_study_plans(steps, "", made),
         starts_by_step=starts,
         check_flights=_study_plans(checks, f"{CHECK}, ", made),
@@ -313,8 +317,17 @@ def _differences(made: Mapping[str, Made]) -> Iterator[Difference]:
         if one is None or other is None:
             continue
         band = bands[first] + bands[second] if first in bands and second in bands else None
-        # The moments come from the equation behind the first run, whose impacts are located, not gridded.
-        yield study_difference(name, one, other, impacts_of=made[LIMITS.get(first, first)].trajectory, band=band)
+        yield study_difference(name, one, other, impacts_of=_located(first, made), band=band)
+
+
+def _located(name: str, made: Mapping[str, Made]) -> Trajectory | None:
+    """Return the equation behind a run: its impacts are located, not gridded, so moments are told by them."""
+    return made[LIMITS.get(name, name)].trajectory
+
+
+def _growth(difference: Difference, made: Mapping[str, Made]) -> PartingGrowth:
+    run = _located(difference.first, made)
+    return study_parting_growth(difference, None if run is None else run.impacts)
 
 
 def _study_plans(plans: Mapping[str, list[list[Run]]], prefix: str, made: Mapping[str, Made]) -> dict[str, StepSize]:

@@ -66,6 +66,7 @@ def render(
         exhibits=exhibits,
         steps=evidence.flights_by_step,
         slices=evidence.slices,
+        growths=evidence.growths,
         found=evidence.attribution,
         forms_omega=[(pair, forms["omega"]) for pair, forms in evidence.attribution.forms.items()],
         solvers=solvers,

@@ -14,6 +14,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ode_reference.models import LADDER as MODELS
 from reports.solvers import Made, Run
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import plateau
@@ -22,16 +23,7 @@ from slicemodel.trajectory import FloatArray
 Axis = Literal["gamma", "step", "restitution"]
 Measure = Literal["plateau", "largest"]
 
-LADDER: Final = (
-    "published-python",
-    "published-limit",
-    "signs-limit",
-    "eq8-wall",
-    "eq8",
-    "eq8-weightless",
-    "accelerating-origin",
-    "free-flight",
-)
+LADDER: Final = ("published-python", *MODELS)
 """From what was published to what is right; each differs from the next by one mistake."""
 
 RUNGS: Final = (
