@@ -7,14 +7,18 @@ from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field
 from typing import Any, Final, TypeVar
 
+import numpy as np
+
 from ode_reference.models import LADDER
 from reports.solvers import Made, Run
 from reports.studies.alignment import Alignment, study_alignment
+from reports.studies.digits import SharedDigits, study_digits
 from reports.studies.errata import Erratum
 from reports.studies.frozen import Frozen, plan_frozen, study_frozen
-from reports.studies.model_form import ModelForm, study_signals
+from reports.studies.model_form import ModelForm, Richardson, richardson, study_signals
 from reports.studies.predictability import Predictability, plan_predictability, study_predictability
 from reports.studies.step_size import plan_step_size
+from reports.studies.tube import Tube, study_tube
 from reports.studies.validity import COARSE, ValidityMap, plan_map, study_map
 from reports.studies.waterfall import Waterfall, plan_waterfall, study_waterfall
 from slicemodel import Scenario, Trajectory
@@ -32,6 +36,13 @@ FORMS: Final = (
     ("published-python", "eq8"),
 )
 """Scheme and equation: is what is left as the step goes to zero the step's, or another equation?"""
+
+EXACT: Final = ("eq8", "free-flight")
+"""Models held against exact solutions."""
+
+TUBE_TIME: Final = 2e-3
+TUBE_SHARE: Final = 0.01
+"""Half-widths of the tube in which two trajectories are compared: seconds, and share of omega_0."""
 
 FORM_LEVELS: Final = 6
 FORM_MULTIPLE: Final = 54
@@ -67,6 +78,9 @@ class Attribution:
     maps: tuple[ValidityMap, ...] = ()
     errata: tuple[Erratum, ...] = ()
     ledgers: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    digits: Mapping[str, tuple[SharedDigits, ...]] = field(default_factory=dict)
+    tubes: Mapping[tuple[str, str], Tube] = field(default_factory=dict)
+    limits: Mapping[str, Richardson] = field(default_factory=dict)
     problems: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -144,7 +158,15 @@ def study_attribution(
         levels = plan_predictability(throw, solver, sizes=PERTURBATIONS)
         return study_predictability(run(f"attribution, {solver}"), [[run(r.tag) for r in level] for level in levels])
 
+    def limit(scheme: str) -> Richardson:
+        levels = plan_step_size(throw, scheme, COMMON, FORM_MULTIPLE, FORM_LEVELS)
+        # The mean over the grids of a level: a single one carries the luck of its impact phases.
+        members = [[run(r.tag) for r in level] for level in levels]
+        steps = [float(np.mean([r.settings["dt"] for r in level])) for level in members]
+        return richardson(steps, [float(np.mean([r.omega[-1] for r in level])) / throw.omega0 for level in members])
+
     small = throw.with_slices(scope.map_slices)
+    exact = {model: pool.submit(study_digits, model) for model in EXACT}
     falls = attempt(
         "waterfall",
         lambda: study_waterfall(
@@ -181,6 +203,29 @@ def study_attribution(
         frozen=frozen,
         maps=tuple(study for study in maps if study is not None),
         errata=attempt("errata", audit.result) or (),
+        digits={
+            model: digits
+            for model, pending in exact.items()
+            if (digits := attempt(f"exact cases of {model}", pending.result)) is not None
+        },
+        tubes={
+            pair: tube
+            for pair in ALIGNED
+            if (
+                tube := attempt(
+                    f"tube of {pair[0]} and {pair[1]}",
+                    lambda pair=pair: study_tube(  # type: ignore[misc]
+                        *(run(f"attribution, {s}") for s in pair), dt=TUBE_TIME, dy=TUBE_SHARE * abs(throw.omega0)
+                    ),
+                )
+            )
+            is not None
+        },
+        limits={
+            scheme: value
+            for scheme in dict.fromkeys(scheme for scheme, _ in FORMS)
+            if (value := attempt(f"limit of {scheme}", lambda s=scheme: limit(s))) is not None  # type: ignore[misc]
+        },
         ledgers={
             model: ledger
             for model in LADDER

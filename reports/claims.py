@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from reports.findings import Finding, Kind
 from reports.studies.differences import Difference
+from reports.studies.digits import SharedDigits
 from reports.studies.errata import Erratum
 from reports.studies.ice import IceDrift
-from reports.studies.model_form import ModelForm
+from reports.studies.model_form import ModelForm, Richardson
 from reports.studies.predictability import Predictability
 from reports.studies.step_size import StepSize
+from reports.studies.tube import Tube
 from reports.studies.waterfall import Waterfall
 from slicemodel import Trajectory
 
@@ -28,6 +30,9 @@ REFERENCE_BAND = 1e-7
 
 WIDER_BANDS = {"accelerating-origin": 1e-4, "free-flight": 3e-3}
 """The same where a slice that rests pushes the tube and one that bounces below the rest speed does not."""
+
+EXACT_CASE_ERROR = 1e-9
+"""Error of the reference against exact solutions, relative to omega_0 and to the length."""
 
 ENERGY_RESIDUAL = 1e-9
 """What an energy ledger may miss, as a fraction of the initial energy."""
@@ -188,6 +193,45 @@ def claim_waterfall(waterfall: Waterfall) -> Finding:
         band=waterfall.end_band,
         note=f"largest in the mean of all orders: {largest.name}, {largest.average:+.3g} ± {largest.average_band:.1g}; "
         f"the bars miss the whole by {waterfall.residual:.1g}",
+    )
+
+
+def claim_exact_cases(model: str, cases: Sequence[SharedDigits]) -> Finding:
+    """The reference reproduces every case that has an exact solution; nothing finer is claimed of it."""
+    worst = max(cases, key=lambda case: _nan_is_largest(case.error))
+    return Finding(
+        id=f"exact-cases-{model}",
+        title=f"{model}: largest error against exact solutions",
+        value=worst.error,
+        unit="relative",
+        kind="regression",
+        admissible=(0.0, EXACT_CASE_ERROR),
+        note="digits shared: " + ", ".join(f"{case.case} {case.digits:.0f}" for case in cases),
+    )
+
+
+def claim_limit(scheme: str, limit: Richardson) -> Finding:
+    """Where omega(T) / omega_0 of a scheme goes as its step goes to zero, with its grid-convergence index."""
+    return Finding(
+        id=f"limit-{scheme}",
+        title=f"{scheme}: ω(T)/ω₀ extrapolated to Δt = 0 (Richardson)",
+        value=limit.value if limit.ok else None,
+        unit="",
+        kind="observation",
+        band=limit.gci if limit.ok else None,
+        note=f"observed order {limit.order:.2f}; band: grid-convergence index; {limit.reason}",
+    )
+
+
+def claim_tube(first: str, second: str, tube: Tube) -> Finding:
+    """The share of the time that one curve spends in the tolerance tube around another: early is no failure."""
+    return Finding(
+        id=f"tube-{first}-{second}",
+        title=f"{second} in the tube around {first}: share of the time",
+        value=tube.share,
+        unit="",
+        kind="observation",
+        note=tube.words,
     )
 
 

@@ -27,6 +27,12 @@ def _attribution_findings(evidence: Evidence) -> Iterator[Finding]:
     found = evidence.attribution
     for waterfall in found.waterfalls:
         yield claims.claim_waterfall(waterfall)
+    for model, digits in found.digits.items():
+        yield claims.claim_exact_cases(model, digits)
+    for scheme, limit in found.limits.items():
+        yield claims.claim_limit(scheme, limit)
+    for pair, tube in found.tubes.items():
+        yield claims.claim_tube(*pair, tube)
     for pair, forms in found.forms.items():
         yield claims.claim_model_form(*pair, forms["omega"])
     for solver, study in found.predictability.items():
