@@ -58,12 +58,19 @@ FILLS: Final = (0.1, 0.25, 0.4, 0.55, 0.75, 1.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scope:
-    """How much of it: slices of the waterfall and of the maps, columns of the maps (0: no maps)."""
+    """How much of it.
+
+    Slices of the waterfall and of the maps; columns and rows of the maps (none: no maps); sizes of the changed
+    releases; models held against exact solutions; pairs of scheme and equation whose error is fitted.
+    """
 
     waterfall_slices: int
     map_slices: int
     fills: tuple[float, ...]
     rows: int
+    perturbations: tuple[float, ...] = PERTURBATIONS
+    exact: tuple[str, ...] = EXACT
+    forms: tuple[tuple[str, str], ...] = FORMS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,7 +102,7 @@ def plan_attribution(throw: Scenario, scope: Scope, steps: int) -> list[Run]:
     """Return every run; those of flights that the report makes anyway have the same settings and are made once."""
     runs = plan_waterfall(throw.with_slices(scope.waterfall_slices), steps)
     for solver in PREDICTED:
-        runs += [run for level in plan_predictability(throw, solver, sizes=PERTURBATIONS) for run in level]
+        runs += [run for level in plan_predictability(throw, solver, sizes=scope.perturbations) for run in level]
     runs += [Run(f"attribution, {solver}", solver, throw) for pair in ALIGNED for solver in pair]
     runs += [Run(f"attribution, {model}", model, throw) for _, model in FORMS]
     for scheme in dict.fromkeys(scheme for scheme, _ in FORMS):
@@ -139,7 +146,7 @@ def study_attribution(
     ``made`` maps its tags to what became of them; ``audit`` is the errata study, already under way in ``pool``.
     """
     problems: dict[str, str] = {}
-    fits = {pair: _submit_form(pool, throw, pair, made) for pair in FORMS}
+    fits = {pair: _submit_form(pool, throw, pair, made) for pair in scope.forms}
 
     def run(tag: str) -> Trajectory:
         trajectory = made[tag].trajectory
@@ -155,7 +162,7 @@ def study_attribution(
             return None
 
     def predict(solver: str) -> Predictability:
-        levels = plan_predictability(throw, solver, sizes=PERTURBATIONS)
+        levels = plan_predictability(throw, solver, sizes=scope.perturbations)
         return study_predictability(run(f"attribution, {solver}"), [[run(r.tag) for r in level] for level in levels])
 
     def limit(scheme: str) -> Richardson:
@@ -166,7 +173,7 @@ def study_attribution(
         return richardson(steps, [float(np.mean([r.omega[-1] for r in level])) / throw.omega0 for level in members])
 
     small = throw.with_slices(scope.map_slices)
-    exact = {model: pool.submit(study_digits, model) for model in EXACT}
+    exact = {model: pool.submit(study_digits, model) for model in scope.exact}
     falls = attempt(
         "waterfall",
         lambda: study_waterfall(

@@ -219,7 +219,9 @@ def claim_limit(scheme: str, limit: Richardson) -> Finding:
         unit="",
         kind="observation",
         band=limit.gci if limit.ok else None,
-        note=f"observed order {limit.order:.2f}; band: grid-convergence index; {limit.reason}",
+        note=f"observed order {limit.order:.2f}; band: grid-convergence index; {limit.reason}"
+        if limit.ok
+        else limit.reason,
     )
 
 

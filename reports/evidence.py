@@ -16,7 +16,7 @@ import numpy as np
 
 from ode_reference.models import LADDER
 from reports import vectors
-from reports.attribution import FILLS, LEDGER_SLICES, Attribution, Scope, plan_attribution, study_attribution
+from reports.attribution import FILLS, FORMS, LEDGER_SLICES, Attribution, Scope, plan_attribution, study_attribution
 from reports.solvers import Made, Run, find, make, without_gravity
 from reports.studies.differences import Difference, study_difference
 from reports.studies.errata import study_errata
@@ -104,7 +104,15 @@ QUICK = Size(
     levels=6,
     counts=(5, 20, 50, 200),
     second_method=None,
-    scope=Scope(waterfall_slices=6, map_slices=10, fills=(), rows=0),
+    scope=Scope(
+        waterfall_slices=6,
+        map_slices=10,
+        fills=(),
+        rows=0,
+        perturbations=(1e-9,),
+        exact=("free-flight",),
+        forms=FORMS[:2],
+    ),
 )
 
 
