@@ -226,6 +226,8 @@ UNUSUAL = {
     "one slice": {"n_slices": 1, "drag": 5.0},
     "short": {"duration": 5e-5},
     "weightless, other spin": {"gravity": 0.0, "omega0": -20.0},
+    "elastic": {"restitution": 1.0, "drag": 0.0},
+    "full": {"water_mass": 1.0},
     "elastic and full": {"restitution": 1.0, "drag": 0.0, "water_mass": 1.0},
 }
 
