@@ -74,8 +74,9 @@ def claim_ice(ice: IceDrift) -> Finding:
     )
 
 
-def claim_welded_order(dt: list[float], drifts: list[IceDrift], printed_order: float) -> Finding:
+def claim_welded_order(drifts: Sequence[IceDrift], printed_order: float) -> Finding:
     """Ice made of masses welded on by joints drifts, and the drift falls with dt at the engine's printed order."""
+    dt = [math.nan if drift.step is None else drift.step for drift in drifts]
     sizes = np.array([drift.largest for drift in drifts])
     order = float(np.polyfit(np.log(dt), np.log(sizes), 1)[0]) if np.all(sizes > 0) else math.nan
     return Finding(

@@ -58,11 +58,7 @@ def _ice_findings(evidence: Evidence) -> Iterator[Finding]:
     runs = [made for tag, made in evidence.made.items() if tag.startswith(f"ice, {ENGINE} welded")]
     trajectories = [made.trajectory for made in runs if made.trajectory is not None]
     if len(trajectories) == len(runs):
-        yield claims.claim_welded_order(
-            [trajectory.settings["step"] for trajectory in trajectories],
-            list(evidence.welded),
-            trajectories[0].diagnostics["weld_order"],
-        )
+        yield claims.claim_welded_order(evidence.welded, trajectories[0].diagnostics["weld_order"])
     else:
         yield _missing(evidence, "ice-welded-order", "drift of welded ice", *(made.run.tag for made in runs))
 

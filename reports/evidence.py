@@ -265,7 +265,8 @@ def make_all(pool: Executor, runs: Iterable[Run], progress: Progress) -> dict[st
             for run in others[result.run.tag]:
                 made[run.tag] = replace(result, run=run)
             progress(len(made), len(runs), result.run.tag)
-    return made
+    # In the order asked, whichever worker was faster: what is read off this table must not depend on load.
+    return {run.tag: made[run.tag] for run in runs}
 
 
 def make_each(runs: Iterable[Run]) -> list[Made]:

@@ -16,10 +16,11 @@ COARSEST_WELDED = 4e-4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IceDrift:
-    """|omega / omega_0 - 1| of one frozen run over time, and its maximum."""
+    """|omega / omega_0 - 1| of one frozen run over time, its maximum, and the step that made it (None: it has none)."""
 
     label: str
     package: str
+    step: float | None
     t: FloatArray
     drift: FloatArray
     largest: float
@@ -54,4 +55,11 @@ def plan_welded(scenario: Scenario, engine: str) -> list[Run]:
 def study_ice(label: str, trajectory: Trajectory) -> IceDrift:
     """Return the drift of one frozen run."""
     drift = np.abs(trajectory.omega / trajectory.scenario.omega0 - 1.0)
-    return IceDrift(label=label, package=trajectory.solver, t=trajectory.t, drift=drift, largest=float(drift.max()))
+    return IceDrift(
+        label=label,
+        package=trajectory.solver,
+        step=trajectory.settings.get("step"),
+        t=trajectory.t,
+        drift=drift,
+        largest=float(drift.max()),
+    )

@@ -7,6 +7,9 @@ import os
 import re
 import subprocess
 import sys
+import threading
+import time
+from concurrent.futures import Executor, Future
 from pathlib import Path
 
 import pytest
@@ -215,6 +218,34 @@ def test_workers_bring_home_the_same_trajectory():
     assert seen == [(1, 1, "eq8")]
     assert (away.omega == here.omega).all()
     assert away.settings == here.settings
+
+
+class LastFirst(Executor):
+    """Finishes the jobs it is given in reverse, once it has as many as it waits for."""
+
+    def __init__(self, jobs):
+        self.jobs, self.waiting = jobs, []
+
+    def submit(self, function, *arguments):
+        future = Future()
+        self.waiting.append((future, function, arguments))
+        if len(self.waiting) == self.jobs:
+            threading.Thread(target=self._finish).start()
+        return future
+
+    def _finish(self):
+        for future, function, arguments in reversed(self.waiting):
+            future.set_result(function(*arguments))
+            time.sleep(0.02)
+
+
+def test_results_stand_in_the_order_asked_whichever_worker_is_faster(monkeypatch):
+    """A step must never be paired with the drift of another: what is read off this table is read in order."""
+    monkeypatch.setattr(evidence_module, "SMALL", 0.0)
+    runs = [Run(f"{n}", "eq8", Scenario(n_slices=n, duration=0.02)) for n in (1, 2, 3)]
+    made = make_all(LastFirst(3), runs, lambda *_: None)
+    assert list(made) == ["1", "2", "3"]
+    assert [result.run.tag for result in made.values()] == ["1", "2", "3"]
 
 
 def test_typeset():
