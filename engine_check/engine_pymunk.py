@@ -21,6 +21,7 @@ from engine_check import watch
 from engine_check.pymunk_settings import CAP_ELASTICITY, PymunkKnobs, enough_iterations
 from engine_check.pymunk_setup import verify
 from engine_check.pymunk_world import BatchReader, World, build, start_staggered
+from engine_check.solver import Order
 from engine_check.watch import State
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray, Trajectory
@@ -32,16 +33,8 @@ WELD_ORDER: Final = 2
 """Order in dt at which the drift of welded ice falls (joint errors are removed within one step: error_bias = 0)."""
 
 
-def run(
-    scenario: Scenario,
-    *,
-    dt: float,
-    iterations: int | None,
-    times: FloatArray,
-    ice: str,
-    knobs: Mapping[str, float],
-) -> Trajectory:
-    """Throw the bottle in pymunk; arguments as checked by ``engine_check.solve``.
+def run(scenario: Scenario, order: Order) -> Trajectory:
+    """Throw the bottle in pymunk; the order as checked by ``engine_check.solve``.
 
     Accuracy
     --------
@@ -58,9 +51,9 @@ def run(
     Output intervals that need unequal steps cost one order: a leapfrog whose step changes from h to h' has
     kicked its velocities for (h - h')/2 too long.
     """
-    settings = PymunkKnobs.from_overrides(knobs)
-    if iterations is None:
-        iterations = enough_iterations(scenario)
+    settings = PymunkKnobs.from_overrides(order.knobs)
+    iterations = enough_iterations(scenario) if order.iterations is None else order.iterations
+    ice, dt, times = order.ice, order.dt, order.times
     world = build(scenario, settings, iterations, ice)
     setup = verify(world, scenario, settings, iterations, ice)
     flight = _Flight(world, scenario, settings, setup["angular_momentum"])
@@ -79,6 +72,8 @@ def run(
             "dt": dt,
             "iterations": iterations,
             "ice": ice if scenario.frozen else None,
+            "frame": order.frame,
+            "slices": order.slices,
             "points": len(times),
             **settings.to_mapping(),
             "cap_elasticity": CAP_ELASTICITY,

@@ -13,17 +13,22 @@ from typing import Final
 from numpy.typing import ArrayLike
 
 from slicemodel.scenario import Scenario, unknown_name
-from slicemodel.trajectory import Trajectory, output_times
+from slicemodel.trajectory import FloatArray, Trajectory, output_times
 
 
 @dataclass(frozen=True, slots=True)
 class Engine:
-    """A physics engine: the module whose ``run`` throws the bottle in it, what it solves and why it is here."""
+    """A physics engine: the module whose ``run`` throws the bottle in it, what it solves and why it is here.
+
+    ``frames`` and ``contacts`` name the worlds it can build, of ``FRAMES`` and ``CONTACTS``.
+    """
 
     name: str
     module: str
     equation: str
     reason: str
+    frames: tuple[str, ...] = ("free",)
+    contacts: tuple[str, ...] = ("overlap",)
 
 
 ENGINES: Final[Mapping[str, Engine]] = MappingProxyType(
@@ -47,9 +52,28 @@ DEFAULT_DT: Final = 1e-4
 """Upper bound of the step unless told otherwise [s]."""
 
 ICE_MODELS: Final = ("rigid", "welded")
+FRAMES: Final = ("free", "rotating")
+"""Who moves the tube: "free", the engine, in the lab; "rotating", it is held, and Eq. 8's fictitious forces act."""
+
+CONTACTS: Final = ("overlap", "exclude")
+"""What two slices do when they meet: pass through each other as in the paper, or collide as rods of length h/N."""
+
 MOST_ITERATIONS: Final = 1_000_000
 MOST_SLICES: Final = 5_000
 """Slices at the most; an engine's sweep costs their number times its iterations, 2e6 constraints a step at 5 000."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Order:
+    """What an engine is asked to build and how to step it, checked; knobs are the engine's own to check."""
+
+    dt: float
+    iterations: int | None
+    times: FloatArray
+    ice: str = "rigid"
+    frame: str = "free"
+    slices: str = "overlap"
+    knobs: Mapping[str, float]
 
 
 class SetupError(RuntimeError):
@@ -64,6 +88,8 @@ def solve(
     times: ArrayLike | None = None,
     *,
     ice: str = "rigid",
+    frame: str = "free",
+    slices: str = "overlap",
     **knobs: float,
 ) -> Trajectory:
     """Throw the bottle in a rigid-body engine and return what the engine's own bodies did.
@@ -83,6 +109,10 @@ def solve(
     ice : str
         How ``scenario.frozen`` is built: "rigid" (one body) or "welded" (slices held by joints, whose
         drift is reported). Without effect on a scenario that is not frozen.
+    frame : str
+        "free" or "rotating" (``FRAMES``).
+    slices : str
+        "overlap" or "exclude" (``CONTACTS``).
     **knobs
         Overrides of the engine's settings (``PymunkKnobs``), for sensitivity studies.
 
@@ -95,8 +125,8 @@ def solve(
     Raises
     ------
     ValueError
-        Unknown engine, ice model or knob (with the nearest known name); ``dt``, ``iterations``, ``times``
-        or a knob out of range (with the admissible range).
+        Unknown engine, ice model, frame, contact or knob (with the nearest known name), or one that this engine
+        does not have; ``dt``, ``iterations``, ``times`` or a knob out of range (with the admissible range).
     SetupError
         If the engine did not receive what was meant.
 
@@ -107,19 +137,25 @@ def solve(
     """
     if engine not in ENGINES:
         raise ValueError(unknown_name("engine =", engine, ENGINES))
-    if ice not in ICE_MODELS:
-        raise ValueError(unknown_name("ice =", ice, ICE_MODELS))
+    for what, name, known in (("ice", ice, ICE_MODELS), ("frame", frame, FRAMES), ("slices", slices, CONTACTS)):
+        if name not in known:
+            raise ValueError(unknown_name(f"{what} =", name, known))
+    for what, name, offered in (("frame", frame, ENGINES[engine].frames), ("slices", slices, ENGINES[engine].contacts)):
+        if name not in offered:
+            raise ValueError(f"engine = {engine!r} has no {what} = {name!r} (it has: {', '.join(offered)})")
     if scenario.n_slices > MOST_SLICES:
         raise ValueError(f"n_slices = {scenario.n_slices} is outside [1, {MOST_SLICES}] for an engine; cut it coarser")
     run = import_module(ENGINES[engine].module).run
-    trajectory: Trajectory = run(
-        scenario,
+    order = Order(
         dt=_checked_dt(dt),
         iterations=_checked_iterations(iterations),
         times=output_times(scenario, times),
         ice=ice,
+        frame=frame,
+        slices=slices,
         knobs=knobs,
     )
+    trajectory: Trajectory = run(scenario, order)
     return trajectory
 
 

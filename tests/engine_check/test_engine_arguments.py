@@ -28,6 +28,14 @@ def test_an_engine_unlike_any_lists_all():
         solve(THROW, engine="xyz")
 
 
+@pytest.mark.parametrize(
+    ("argument", "value", "nearest"), [("frame", "rotated", "rotating"), ("slices", "exclud", "exclude")]
+)
+def test_an_unknown_world_is_named_with_the_nearest(argument, value, nearest):
+    with pytest.raises(ValueError, match=rf"{argument} = '{value}' is unknown; did you mean '{nearest}'\?"):
+        solve(THROW, **{argument: value})
+
+
 def test_dt_is_an_upper_bound_and_may_exceed_the_flight():
     short = solve(replace(THROW, duration=5e-5), times=[0.0, 5e-5])
     assert short.status == "ok"
