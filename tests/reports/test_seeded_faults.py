@@ -1,31 +1,136 @@
-"""Faults put into one solver on purpose: the first bar of the ladder that changes must be the one it belongs to.
-
-That each also turns a test of its own room red was tried by hand; here it is the attribution that is on trial.
-"""
+"""Faults put into one solver on purpose: each turns a named test red, and the first bar to change is its own."""
 
 import dataclasses
+import importlib.util
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from ode_reference import combinations, motion, solver
+import slicemodel
+from ode_reference import combinations, motion, run, solver
 from reports.solvers import make
 from reports.studies.waterfall import NAMES, STEP, plan_waterfall, study_waterfall
 from slicemodel import Scenario
 
+TESTS = Path(__file__).resolve().parents[1]
 THROW = dataclasses.replace(Scenario().with_slices(6), duration=0.4)
 STEPS = 40
 
 
-def bars(spoil_program=None):
+def drop_the_origin(monkeypatch):
+    """r''_CM is left out of the equations that have it."""
+    monkeypatch.setattr(combinations, "_origin", lambda *_: 0.0)
+
+
+def make_recoil_elastic(monkeypatch):
+    """The law with recoil is elastic whatever e is; impacts on an immovable tube are sound."""
+    law = solver.LAWS["simultaneous"]
+    wrong = {**solver.LAWS, "simultaneous": lambda x, side, _e, ratio, rest: law(x, side, 1.0, ratio, rest)}
+    monkeypatch.setattr(solver, "LAWS", wrong)
+
+
+def flip_the_sign_of_restitution(monkeypatch):
+    """A slice goes on into an immovable end with e times its speed, again and again, until it may rest."""
+    law = solver.immovable
+    monkeypatch.setattr(solver, "immovable", lambda x, side, e, ratio, rest: law(x, side, -e, ratio, rest))
+
+
+def forget_the_bottle_in_the_inertia(monkeypatch):
+    """J is that of the water alone, in every equation of the reference."""
+    right = motion.Throw.about_centre_of_mass
+
+    def without_bottle(self, r):
+        r_cm, s, _ = right(self, r)
+        return r_cm, s, self.slice_mass * float(s.dot(s))
+
+    monkeypatch.setattr(motion.Throw, "about_centre_of_mass", without_bottle)
+
+
+def swallow_one_impact_of_free_flight(monkeypatch):
+    """The third impact of a run with recoil is missed; as for an event that changed sign unseen, its slice is lost."""
+    find = run.event_wall
+    seen, lost = {}, {}
+
+    def forgetful(start, end, path, free, walls):
+        if not path.motion.model.switches.recoil:
+            return find(start, end, path, free, walls)
+        watched = free.copy()
+        watched[lost.get(path.motion, [])] = False
+        found = find(start, end, path, watched, walls)
+        if found is None:
+            return None
+        seen[path.motion] = seen.get(path.motion, 0) + 1
+        if seen[path.motion] != 3:
+            return found
+        lost[path.motion] = [found[1]]
+        return forgetful(start, end, path, free, walls)
+
+    monkeypatch.setattr(run, "event_wall", forgetful)
+
+
+def shift_the_program_by_half_a_step(monkeypatch):
+    """The published program's omega and theta are those of half a step before."""
+    right = slicemodel.solve
+
+    def late(scenario, scheme="exact-step", *arguments, **settings):
+        found = right(scenario, scheme, *arguments, **settings)
+        if scheme != "published-python":
+            return found
+        times = np.clip(found.t - found.settings["dt"] / 2, 0.0, None)
+        changed = {name: np.interp(times, found.t, getattr(found, name)) for name in ("omega", "theta")}
+        return dataclasses.replace(found, **changed)
+
+    monkeypatch.setattr(slicemodel, "solve", late)
+
+
+@dataclasses.dataclass(frozen=True)
+class Fault:
+    plant: Callable[[pytest.MonkeyPatch], None]
+    bar: str
+    file: str
+    test: str
+    arguments: tuple = ()
+
+
+FREE = "ode_reference/test_ode_free_flight.py"
+AGREES = "test_an_independent_program_agrees_through_impacts_rests_and_releases"
+FAULTS = (
+    Fault(
+        drop_the_origin,
+        NAMES["origin"],
+        "ode_reference/test_ode_switches.py",
+        "test_a_rung_and_its_switches_have_the_same_right_hand_side",
+        ("free-flight", 0),
+    ),
+    Fault(make_recoil_elastic, NAMES["recoil"], FREE, AGREES, ("simultaneous", 2)),
+    Fault(swallow_one_impact_of_free_flight, NAMES["recoil"], FREE, AGREES, ("simultaneous", 5)),
+    Fault(
+        flip_the_sign_of_restitution,
+        STEP,
+        "ode_reference/test_ode_exact_cases.py",
+        "test_zeno_case_accumulates_rests_and_time_passes",
+    ),
+    Fault(forget_the_bottle_in_the_inertia, STEP, FREE, AGREES, ("simultaneous", 2)),
+    Fault(
+        shift_the_program_by_half_a_step,
+        STEP,
+        "slicemodel/test_vectors.py",
+        "test_published_python_prints_the_published_numbers",
+        ("python_default",),
+    ),
+)
+each_fault = pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.plant.__name__)
+
+
+def bars():
     """Return the plateau's bars in the order of the ladder, with every run made in this process."""
     runs = {}
-    for run in plan_waterfall(THROW, STEPS):
-        trajectory = make(run).trajectory
-        assert trajectory is not None, run.tag
-        if spoil_program is not None and run.tag == "waterfall, program":
-            trajectory = spoil_program(trajectory)
-        runs[run.tag] = trajectory
+    for planned in plan_waterfall(THROW, STEPS):
+        trajectory = make(planned).trajectory
+        assert trajectory is not None, planned.tag
+        runs[planned.tag] = trajectory
     plateau = study_waterfall(runs)[0]
     assert plateau.observable.name == "plateau"
     return {bar.name: bar.forward for bar in plateau.bars}
@@ -36,42 +141,27 @@ def sound():
     return bars()
 
 
-def first_changed(sound, spoiled):
+@each_fault
+def test_the_first_bar_that_changes_is_the_fault_s_own(fault, sound, monkeypatch):
+    fault.plant(monkeypatch)
+    spoiled = bars()
     change = {name: abs(spoiled[name] - sound[name]) for name in sound}
     assert max(change.values()) > 1e-4, change
-    return next(name for name, size in change.items() if size > 1e-9)
+    assert next(name for name, size in change.items() if size > 1e-9) == fault.bar
 
 
-def test_a_dropped_origin_shows_in_the_bar_of_the_origin(sound, monkeypatch):
-    monkeypatch.setattr(combinations, "_origin", lambda *_: 0.0)
-    assert first_changed(sound, bars()) == NAMES["origin"]
+def named_test(fault):
+    """Return a test function of another file, loaded afresh."""
+    spec = importlib.util.spec_from_file_location("named", TESTS / fault.file)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return getattr(module, fault.test)
 
 
-def test_a_wrong_impact_law_shows_in_the_bar_of_the_recoil(sound, monkeypatch):
-    """The law with recoil is elastic whatever e is; impacts on an immovable tube are sound."""
-    law = solver.LAWS["simultaneous"]
-    wrong = {**solver.LAWS, "simultaneous": lambda x, side, _e, ratio, rest: law(x, side, 1.0, ratio, rest)}
-    monkeypatch.setattr(solver, "LAWS", wrong)
-    assert first_changed(sound, bars()) == NAMES["recoil"]
-
-
-def test_a_wrong_inertia_in_every_equation_shows_where_the_program_meets_them(sound, monkeypatch):
-    right = motion.Throw.about_centre_of_mass
-
-    def without_bottle(self, r):
-        r_cm, s, _ = right(self, r)
-        return r_cm, s, self.slice_mass * float(s.dot(s))
-
-    monkeypatch.setattr(motion.Throw, "about_centre_of_mass", without_bottle)
-    assert first_changed(sound, bars()) == STEP
-
-
-def test_a_program_that_is_half_a_step_late_shows_in_the_bar_of_its_step(sound):
-    def late(run):
-        times = np.clip(run.t - run.settings["dt"] / 2, 0.0, None)
-        return dataclasses.replace(run, omega=np.interp(times, run.t, run.omega))
-
-    spoiled = bars(late)
-    assert first_changed(sound, spoiled) == STEP
-    for name in NAMES.values():
-        assert spoiled[name] == sound[name]
+@each_fault
+def test_the_named_test_is_green_and_turns_red(fault, monkeypatch):
+    test = named_test(fault)
+    test(*fault.arguments)
+    fault.plant(monkeypatch)
+    with pytest.raises(AssertionError):
+        test(*fault.arguments)
