@@ -64,7 +64,7 @@ def solve(
     method : str
         A name in ``ode_reference.METHODS``.
     max_step : float, optional
-        Longest step, at least duration / 1e6 [s]. By default 0.01 / |omega0|, within duration / 1e5 and
+        Longest step, at least duration / 1e6 [s]. By default 0.02 / |omega0|, within duration / 1e5 and
         duration: a short step leaves no slice the time to reverse more than twice in it, and keeps the
         dense output as accurate as the step itself.
     energy : bool
@@ -106,7 +106,7 @@ def solve(
     rest_speed = number_within("rest_speed", rest_speed, 1e-8, 0.1, unit=" m/s")
     duration = scenario.duration
     if max_step is None:
-        max_step = min(max(0.01 / abs(scenario.omega0), 1e-5 * duration), duration)
+        max_step = min(max(0.02 / abs(scenario.omega0), 1e-5 * duration), duration)
     else:
         max_step = number_within("max_step", max_step, duration / STEP_LIMIT, unit=" s")
     moments = output_times(scenario, times)

@@ -48,7 +48,7 @@ def test_settings_repeat_the_run_bit_for_bit():
     np.testing.assert_array_equal(first.r, again.r)
     np.testing.assert_array_equal(first.omega, again.omega)
     assert dict(first.settings) == dict(again.settings)
-    assert first.settings["max_step"] == 0.01 / 20
+    assert first.settings["max_step"] == 0.02 / 20
 
 
 @pytest.mark.parametrize("times", [[0.0], [0.3], [0.1], [0.0, 0.3], [1e-9, 0.123456, 0.3]])
