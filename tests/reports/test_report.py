@@ -1,7 +1,6 @@
 """The report from end to end: the folder, the page, the summary, the exit status."""
 
 import dataclasses
-import html.parser
 import json
 import os
 import re
@@ -16,7 +15,6 @@ import pytest
 
 from reports import claims, cli
 from reports import evidence as evidence_module
-from reports.attribution import Scope
 from reports.build import build
 from reports.evaluation import evaluate
 from reports.evidence import (
@@ -25,9 +23,7 @@ from reports.evidence import (
     ENGINE,
     FLIGHTS,
     OTHER_SCHEMES,
-    QUICK,
     make_all,
-    with_slices,
     workers,
 )
 from reports.page import typeset
@@ -36,41 +32,12 @@ from reports.solvers import Made, Run, make
 from slicemodel import Scenario
 
 ROOT = Path(__file__).resolve().parents[2]
+pytestmark = pytest.mark.xdist_group("evidence")
 
 
 @pytest.fixture(scope="module")
 def report(evidence):
     return build(evidence, provenance("flipproof report"))
-
-
-class Page(html.parser.HTMLParser):
-    """Collects what the tests ask about, and refuses unbalanced tags."""
-
-    VOID = frozenset({"meta", "img", "br", "link", "hr", "input"})
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.images, self.ids, self.links, self.captions = [], [], [], [], []
-        self.feed(text)
-        assert self.open == []
-
-    def handle_starttag(self, tag, attributes):
-        values = dict(attributes)
-        if tag not in self.VOID:
-            self.open.append(tag)
-        if tag == "img":
-            self.images.append(values)
-        if "id" in values:
-            self.ids.append(values["id"])
-        if "href" in values:
-            self.links.append(values["href"])
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag, f"</{tag}> closes another tag"
-
-    def handle_data(self, data):
-        if self.open and self.open[-1] == "figcaption" and data.strip():
-            self.captions.append(data.strip())
 
 
 def test_every_claim_is_evaluated_and_holds(evidence):
@@ -90,8 +57,8 @@ def test_every_claim_is_evaluated_and_holds(evidence):
     assert evidence.attribution.problems == {}
 
 
-def test_the_page_is_whole_and_stands_alone(report):
-    page = Page(report.html)
+def test_the_page_is_whole_and_stands_alone(report, read_page):
+    page = read_page(report.html)
     assert len(page.images) == len(report.exhibits) >= 8
     assert len(page.captions) >= len(report.exhibits)
     by_alt = {image["alt"]: image for image in page.images}
@@ -155,13 +122,13 @@ def run_report(monkeypatch, evidence, folder, *arguments):
     return cli.main(["report", "--out", str(folder), *arguments])
 
 
-def test_the_folder_holds_everything(monkeypatch, capsys, tmp_path, evidence):
+def test_the_folder_holds_everything(monkeypatch, capsys, tmp_path, evidence, read_page):
     folder = tmp_path / "latest"
     assert run_report(monkeypatch, evidence, folder) == 0
     out = capsys.readouterr().out
     assert "regression claims hold." in out
     assert str(folder / "index.html") in out
-    page = Page((folder / "index.html").read_text(encoding="utf-8"))
+    page = read_page((folder / "index.html").read_text(encoding="utf-8"))
     for link in page.links:
         if not link.startswith("#"):
             assert (folder / link).is_file(), link
@@ -250,33 +217,6 @@ def test_results_stand_in_the_order_asked_whichever_worker_is_faster(monkeypatch
 
 def test_typeset():
     assert typeset("v' = (omega^2 - gamma^2) X - 2 gamma v, gamma << omega_0") == ("v' = (ω² − γ²) X − 2 γ v, γ ≪ ω₀")
-
-
-UNUSUAL = {
-    "ice": {"frozen": True},
-    "one slice": {"n_slices": 1, "drag": 5.0},
-    "short": {"duration": 5e-5},
-    "weightless, other spin": {"gravity": 0.0, "omega0": -20.0},
-    "elastic": {"restitution": 1.0, "drag": 0.0},
-    "full": {"water_mass": 1.0},
-    "elastic and full": {"restitution": 1.0, "drag": 0.0, "water_mass": 1.0},
-}
-
-
-@pytest.mark.parametrize("name", UNUSUAL)
-def test_unusual_throws_have_a_report_too(name):
-    """No failed regression, no warning, no NaN in the page: a regression claim is not the user's throw to break."""
-    values = {"n_slices": 8, "drag": 0.5} | UNUSUAL[name]
-    throw = Scenario(**values)
-    size = dataclasses.replace(
-        with_slices(QUICK, throw.n_slices),
-        scope=Scope(waterfall_slices=min(4, throw.n_slices), map_slices=4, fills=(), rows=0),
-    )
-    evidence = evidence_module.gather(throw, size, lambda *_: None)
-    report = build(evidence, provenance("flipproof report"))
-    assert [(f.id, f.value, f.note) for f in report.failed] == []
-    json.dumps(report.summary, allow_nan=False)
-    Page(report.html)
 
 
 def test_the_real_command_from_a_cold_start(tmp_path):

@@ -19,6 +19,7 @@ from reports.studies.step_size import PHASES, levels, observed_order, study_step
 from slicemodel import Impacts, Scenario, Trajectory
 
 SCENARIO = Scenario(n_slices=1)
+pytestmark = pytest.mark.xdist_group("evidence")
 
 
 def curve(omega, *, method="made-up", solver="slicemodel", impacts=None, t=None, status="ok", **settings) -> Trajectory:

@@ -1,0 +1,39 @@
+"""Throws that no regression claim was written for: their reports must be whole all the same."""
+
+import dataclasses
+import json
+
+import pytest
+
+from reports import evidence as evidence_module
+from reports.attribution import Scope
+from reports.build import build
+from reports.evidence import QUICK, with_slices
+from reports.provenance import provenance
+from slicemodel import Scenario
+
+UNUSUAL = {
+    "ice": {"frozen": True},
+    "one slice": {"n_slices": 1, "drag": 5.0},
+    "short": {"duration": 5e-5},
+    "weightless, other spin": {"gravity": 0.0, "omega0": -20.0},
+    "elastic": {"restitution": 1.0, "drag": 0.0},
+    "full": {"water_mass": 1.0},
+    "elastic and full": {"restitution": 1.0, "drag": 0.0, "water_mass": 1.0},
+}
+
+
+@pytest.mark.parametrize("name", UNUSUAL)
+def test_unusual_throws_have_a_report_too(name, read_page):
+    """No failed regression, no warning, no NaN in the page: a regression claim is not the user's throw to break."""
+    values = {"n_slices": 8, "drag": 0.5} | UNUSUAL[name]
+    throw = Scenario(**values)
+    size = dataclasses.replace(
+        with_slices(QUICK, throw.n_slices),
+        scope=Scope(waterfall_slices=min(4, throw.n_slices), map_slices=4, fills=(), rows=0),
+    )
+    evidence = evidence_module.gather(throw, size, lambda *_: None)
+    report = build(evidence, provenance("flipproof report"))
+    assert [(f.id, f.value, f.note) for f in report.failed] == []
+    json.dumps(report.summary, allow_nan=False)
+    read_page(report.html)
