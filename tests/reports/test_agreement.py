@@ -1,0 +1,83 @@
+"""The agreement matrix on made-up curves: who is named, and when nobody is."""
+
+import numpy as np
+import pytest
+
+from reports.studies.agreement import study_agreement
+from slicemodel import Scenario, Trajectory
+
+SCENARIO = Scenario(n_slices=1)
+T = np.linspace(0.0, 0.5, 101)
+
+
+def curve(shift, t=T, scenario=SCENARIO):
+    points = len(t)
+    return Trajectory(
+        scenario=scenario,
+        solver="ode_reference",
+        method="made-up",
+        t=t,
+        theta=np.zeros(points),
+        omega=20.0 + shift * np.ones(points),
+        r=np.full((points, 1), 0.1),
+        v=np.zeros((points, 1)),
+        r_cm=np.full(points, 0.1),
+        inertia=np.ones(points),
+        impacts=None,
+        status="ok",
+    )
+
+
+def matrix(*shifts, band=1e-3, **options):
+    names = "abcd"[: len(shifts)]
+    runs = {name: curve(shift) for name, shift in zip(names, shifts, strict=True)}
+    return study_agreement(runs, dict.fromkeys(names, band), **options)
+
+
+def test_those_within_their_bands_agree():
+    found = matrix(0.0, 0.02, 0.039)
+    assert found.odd is None
+    assert found.words == "all agree within their bands"
+    assert found.pair("c", "a").largest == pytest.approx(0.039 / 20)
+    assert found.pair("a", "c").bands == pytest.approx(2e-3)
+
+
+@pytest.mark.parametrize(("shifts", "odd"), [((1.0, 0.0, 0.0), "a"), ((0.0, 1.0, 0.0), "b"), ((0.0, 0.0, -1.0), "c")])
+def test_the_one_that_stands_alone_is_named(shifts, odd):
+    found = matrix(*shifts)
+    assert found.odd == odd
+    assert found.words.startswith(f"{odd} is the odd one out")
+
+
+@pytest.mark.parametrize("shifts", [(0.0, 1.0), (0.0, 1.0, 2.0), (0.0, 0.03, 0.06), (0.0, 0.0, 1.0, 2.0)])
+def test_nobody_is_named_where_no_one_explains_it(shifts):
+    found = matrix(*shifts)
+    assert found.odd is None
+    assert found.words.endswith("no single one of them explains it")
+
+
+def test_a_band_that_is_not_a_number_agrees_with_nobody():
+    runs = {name: curve(0.0) for name in "abc"}
+    found = study_agreement(runs, {"a": 1e-3, "b": 1e-3, "c": np.nan})
+    assert found.odd == "c"
+    assert found.pair("a", "c").share == 0.0
+
+
+def test_a_band_may_vary_in_time_and_one_time_in_twenty_may_lie_outside():
+    late = np.where(T > 0.4, 1.0, 0.0)
+    runs = {"a": curve(0.0), "b": curve(late)}
+    assert not study_agreement(runs, {"a": 1e-3, "b": 0.0}).pair("a", "b").agree
+    assert study_agreement(runs, {"a": 1e-3, "b": late / 20}).pair("a", "b").agree
+    assert study_agreement(runs, {"a": 1e-3, "b": 0.0}, until=0.4).pair("a", "b").agree
+    few = study_agreement(runs, {"a": 1e-3, "b": 0.0}, until=0.42)
+    assert few.pair("a", "b").agree
+    assert few.pair("a", "b").share < 1.0
+    assert few.until == pytest.approx(0.42)
+
+
+def test_runs_of_different_throws_or_times_are_refused():
+    with pytest.raises(ValueError, match="at least two"):
+        study_agreement({"a": curve(0.0)}, {"a": 0.0})
+    for other in (curve(0.0, t=T[:50]), curve(0.0, scenario=Scenario(n_slices=1, omega0=10.0))):
+        with pytest.raises(ValueError, match="b and a are not runs of one throw"):
+            study_agreement({"a": curve(0.0), "b": other}, {"a": 0.0, "b": 0.0})
