@@ -31,12 +31,13 @@ examples:
   flipproof simulate --solver eq8 --out eq8.csv
   flipproof compare published-python eq8
   flipproof compare eq8.csv measured.csv
+  flipproof sweep sweep.toml --out my-sweep     many throws and solvers; run it again to go on
 
 exit status:
   0  done; for a report: every claim was evaluated and no regression claim failed
   1  a regression claim failed (ice constancy, published vectors, convergence)
   2  bad input; one line on standard error says what and where
-  130  interrupted; an older report is as it was
+  130  interrupted; an older report is as it was, a sweep goes on where it stopped
 """
 
 SCENARIO_HELP = "scenario file (TOML with tables [scenario] and [bottle]); default: the paper's own throw"
@@ -119,6 +120,17 @@ def parser() -> argparse.ArgumentParser:
     compare.add_argument("second", metavar="B", help="the same; differences are B minus A")
     compare.add_argument("--scenario", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     compare.add_argument("--slices", type=_count, metavar="N", help="slices for both solvers (default 50)")
+
+    sweep = _command(commands, "sweep", "Run many throws by many solvers, or go on with them.", command_sweep)
+    sweep.add_argument("design", type=Path, metavar="SWEEP.toml", help="which fields vary, and which solvers")
+    sweep.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder; holds one SQLite file of rows")
+    where = sweep.add_mutually_exclusive_group()
+    where.add_argument("--jobs", type=_count, metavar="N", help="worker processes (default: one per core)")
+    where.add_argument("--dask", metavar="ADDRESS", help="scheduler whose workers do the work: tcp://127.0.0.1:8786")
+    sweep.add_argument(
+        "--export", type=Path, metavar="FILE", help="when complete, write all rows to a .csv or .parquet"
+    )
+    sweep.add_argument("--quiet", action="store_true", help="no progress")
 
     _command(commands, "models", "List every scheme, model and engine.", command_models)
     return top
@@ -244,6 +256,49 @@ def command_compare(options: argparse.Namespace) -> int:
         return Curve.of(run)
 
     print(table(compare(load(options.first), load(options.second))))
+    return 0
+
+
+def command_sweep(options: argparse.Namespace) -> int:
+    """Make the points of a design that have no row yet."""
+    from contextlib import ExitStack
+
+    from tqdm import tqdm
+
+    from reports.sweep.command import sweep
+
+    stored = [0, 0]
+
+    def begin(there: int, size: int) -> Callable[[int, int], None]:
+        if 0 < there < size and not options.quiet:
+            print(f"flipproof: {there} of {size} points are there; going on", file=sys.stderr)
+        stored[:] = there, size
+        hide = True if options.quiet else None
+        bar = bars.enter_context(
+            tqdm(total=size, initial=there, unit="point", disable=hide, leave=False, smoothing=0.05)
+        )
+        without = 0
+
+        def progress(points: int, unfinished: int) -> None:
+            nonlocal without
+            stored[0] += points
+            without += unfinished
+            if without:
+                bar.set_postfix_str(f"{without} without a whole flight", refresh=False)
+            bar.update(points)
+
+        return progress
+
+    try:
+        with ExitStack() as bars:
+            line = sweep(
+                options.design, options.out, begin, jobs=options.jobs, dask=options.dask, export_to=options.export
+            )
+    except KeyboardInterrupt:
+        there = f"{stored[0]} of {stored[1]} points are stored; " if stored[1] else ""
+        print(f"flipproof: interrupted; {there}the same command goes on from there", file=sys.stderr)
+        return INTERRUPTED
+    print(line)
     return 0
 
 

@@ -1,0 +1,77 @@
+"""A sweep from its file to its summary: what the command line does, without printing."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+from reports.sweep.design import read_design
+from reports.sweep.entries import try_entries
+from reports.sweep.export import check_export, export
+from reports.sweep.local import Workers, local_workers
+from reports.sweep.run import Progress, run_sweep
+from reports.sweep.store import FILE, Store
+from reports.sweep.work import OUTCOMES, code_identity
+
+
+def sweep(
+    file: Path,
+    out: Path,
+    begin: Callable[[int, int], Progress],
+    *,
+    jobs: int | None = None,
+    dask: str | None = None,
+    export_to: Path | None = None,
+) -> str:
+    """Make every point of the design in ``file`` that has no row in ``out``; return one line that tells what is there.
+
+    Parameters
+    ----------
+    begin : callable (points there, points of the design) -> progress
+        Called once, when the work begins.
+    jobs : int or None
+        Worker processes of this machine; None: one per core.
+    dask : str or None
+        Address of a Dask scheduler whose workers take their place.
+    export_to : path or None
+        File to write all rows to when they are complete.
+
+    Raises
+    ------
+    SweepError
+        If the file, the folder, the workers or the disk will not do; what was stored is kept.
+    """
+    began = time.perf_counter()
+    if export_to:
+        check_export(export_to, out)
+    design = read_design(file)
+    if not (out / FILE).exists():
+        # Before the folder knows the design, so that the mended file may have the same folder.
+        try_entries(design.entries)
+    with Store(out, design, code_identity()) as store:
+        there = sum(store.done())
+        progress = begin(there, design.size)
+        if there < design.size:
+            with _workers(jobs, dask) as workers:
+                run_sweep(store, workers, progress)
+        if export_to:
+            export(store, export_to)
+        return _summary(store, there, time.perf_counter() - began)
+
+
+def _workers(jobs: int | None, dask: str | None) -> AbstractContextManager[Workers]:
+    if dask is None:
+        return local_workers(jobs)
+    from reports.sweep.cluster import dask_workers
+
+    return dask_workers(dask)
+
+
+def _summary(store: Store, there: int, seconds: float) -> str:
+    counts = store.counts()
+    kinds = ", ".join(f"{counts[status]} {status}" for status in OUTCOMES if status in counts)
+    made = store.design.size - there
+    rate = f"; {made} made in {seconds:.1f} s ({made / seconds:.0f} per second)" if made else ""
+    return f"{store.design.size} points in {store.file}: {kinds}{rate}{f'; {there} were there' if there else ''}"

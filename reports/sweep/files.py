@@ -1,0 +1,33 @@
+"""Files that are whole or not there."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+TEMPORARY = ".part"
+"""Ends the names of files that are being written."""
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Give a name beside ``path`` to write to; put the file in the place of ``path`` when the block ends well.
+
+    The content is on the disk before the name is: after a power failure too, a file of that name is whole.
+    """
+    part = path.with_name(f"{path.name}.{os.getpid()}{TEMPORARY}")
+    try:
+        yield part
+        with part.open("rb+") as file:
+            os.fsync(file.fileno())
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def sweep_away_parts(folder: Path) -> None:
+    """Remove what a killed program left half-written."""
+    for part in folder.rglob(f"*{TEMPORARY}"):
+        part.unlink(missing_ok=True)

@@ -1,0 +1,257 @@
+"""A sweep's file: what it means, and one line for every mistake in it."""
+
+import json
+import tomllib
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from reports.sweep.axes import KINDS, Choices, Range
+from reports.sweep.design import MOST_POINTS, design_of, from_parameters, latin_shares, read_design
+from reports.sweep.entries import try_entries
+from reports.sweep.errors import SweepError
+from slicemodel import Bottle, Scenario, ScenarioError
+
+GRID = """
+[sweep]
+design = "grid"
+[sweep.fields]
+fill_fraction = [0.25, 0.5]
+bottle.length = {from = 0.2, to = 0.3, count = 3}
+[[solvers]]
+name = "exact-step"
+steps = 50
+[[solvers]]
+name = "eq8"
+"""
+
+LATIN = """
+[sweep]
+design = "latin-hypercube"
+samples = 50
+seed = 3
+[sweep.fields]
+restitution = {from = 0.1, to = 0.9}
+drag = {from = 1e-3, to = 1e1, scale = "log"}
+n_slices = {from = 2, to = 6}
+frozen = [false, true]
+[[solvers]]
+name = "eq8"
+"""
+
+
+def read(text):
+    return design_of(tomllib.loads(text), "sweep.toml", text)
+
+
+def test_a_grid_is_every_combination_the_last_field_fastest():
+    design = read(GRID)
+    assert (design.throws, design.size) == (6, 12)
+    points = [design.point(number) for number in range(design.size)]
+    assert [point.values for point in points[:6]] == [
+        (0.25, 0.2), (0.25, 0.25), (0.25, 0.3), (0.5, 0.2), (0.5, 0.25), (0.5, 0.3),
+    ]  # fmt: skip
+    assert [point.values for point in points[6:]] == [point.values for point in points[:6]]
+    assert [point.solver for point in points] == ["exact-step"] * 6 + ["eq8"] * 6
+    assert points[0].settings == {"steps": 50, "store": "summary"}
+    assert points[6].settings == {}
+    assert points[4].scenario() == Scenario(bottle=Bottle(length=0.25), water_mass=0.5)
+
+
+def test_every_field_of_a_throw_can_be_swept():
+    swept = set(KINDS)
+    assert {f"bottle.{field.name}" for field in fields(Bottle)} <= swept
+    plain = {field.name for field in fields(Scenario)} - {"bottle", "launch_velocity"}
+    assert plain <= swept
+    assert {"launch_velocity.x", "launch_velocity.y"} <= swept
+    # Every one of them arrives in the scenario.
+    for name in plain | {"launch_velocity.x", "launch_velocity.y", *(n for n in swept if n.startswith("bottle."))}:
+        values = {"whole": [3, 7], "truth": [False, True], "real": [0.6, 0.7]}[KINDS[name]]
+        document = {"sweep": {"design": "grid", "fields": {name: values}}, "solvers": [{"name": "eq8"}]}
+        for number, value in enumerate(values):
+            throw = design_of(document, "x").point(number).scenario()
+            outer, _, inner = name.partition(".")
+            found = getattr(throw, outer)
+            if outer == "launch_velocity":
+                found = found["xy".index(inner)]
+            elif inner:
+                found = getattr(found, inner)
+            assert found == value, name
+
+
+def test_derived_fields_set_what_they_are_made_of():
+    text = GRID.replace("bottle.length = {from = 0.2, to = 0.3, count = 3}", "damping_rate = [3.0]\nn_slices = [4, 9]")
+    for number in range(read(text).throws):
+        throw = read("[bottle]\ncapacity = 0.8\n" + text).point(number).scenario()
+        assert throw.damping_rate == pytest.approx(3.0, rel=1e-15)
+    assert throw.water_mass == 0.5 * 0.8
+    assert throw.n_slices == 9
+
+
+def test_log_ranges_have_equal_ratios_and_exact_ends():
+    text = GRID.replace("[0.25, 0.5]", '{from = 0.001, to = 1.0, count = 4, scale = "log"}')
+    (axis, _) = read(text).axes
+    assert axis.values[0] == 0.001
+    assert axis.values[-1] == 1.0
+    assert axis.values == pytest.approx((0.001, 0.01, 0.1, 1.0), rel=1e-14)
+
+
+def test_a_latin_hypercube_has_one_sample_in_every_part():
+    shares = latin_shares(1000, 3, seed=5)
+    for axis in range(3):
+        assert sorted((shares[:, axis] * 1000).astype(int)) == list(range(1000))
+    assert not np.array_equal(shares[:, 0], shares[:, 1])
+    assert abs(np.corrcoef(shares.T)[0, 1]) < 0.1
+    assert np.array_equal(shares, latin_shares(1000, 3, seed=5))
+    assert not np.array_equal(shares, latin_shares(1000, 3, seed=6))
+    # The bits of PCG64, so these numbers outlive versions of NumPy.
+    known = [[0.07207980635981687, 0.4138512969102209], [0.9743247235686219, 0.7045995681845807]]
+    assert latin_shares(2, 2, seed=1).tolist() == known
+
+
+def test_a_latin_hypercube_reaches_every_kind_of_field():
+    design = read(LATIN)
+    values = [design.point(number).values for number in range(design.size)]
+    restitution, drag, slices, frozen = zip(*values, strict=True)
+    assert all(0.1 <= e <= 0.9 for e in restitution)
+    assert sum(d < 0.1 for d in drag) == 25
+    assert set(slices) == {2, 3, 4, 5, 6}
+    assert all(type(n) is int for n in slices)
+    assert frozen.count(True) == 25
+    assert isinstance(design.axes[0], Range)
+    assert isinstance(design.axes[3], Choices)
+
+
+def test_a_point_is_made_again_from_its_parameters_alone():
+    for point in (read(LATIN).point(17), read(GRID).point(2)):
+        again = from_parameters(json.dumps(point.parameters()))
+        assert again.scenario() == point.scenario()
+        assert (again.solver, again.settings) == (point.solver, point.settings)
+        assert again.key("1") == point.key("1")
+
+
+def test_keys_tell_points_settings_and_code_apart():
+    design = read(GRID)
+    keys = {design.point(number).key("1") for number in range(design.size)}
+    assert len(keys) == design.size
+    assert design.point(0).key("2") not in keys
+    other = read(GRID.replace("0.25, 0.5", "0.25000000000000006, 0.5"))
+    assert other.point(0).key("1") not in keys
+    assert read(GRID.replace("steps = 50", "steps = 51")).point(0).key("1") not in keys
+    assert read("# a comment\n" + GRID).point(0).key("1") in keys
+
+
+def test_an_impossible_throw_is_a_point_and_says_why():
+    design = read(GRID.replace("0.5]", "1.5]"))
+    with pytest.raises(ScenarioError, match=r"water_mass = 1\.5 kg exceeds the bottle's capacity"):
+        design.point(3).scenario()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('design = "grid"', 'design = "gird"', ["[sweep] design = 'gird' is unknown", "did you mean 'grid'?"]),
+        ('design = "grid"', "", ["design = None is unknown", "grid, latin-hypercube"]),
+        ('design = "grid"', 'design = "grid"\nseeds = 3', ["[sweep] key 'seeds' is unknown", "'seed'?"]),
+        ('design = "grid"', 'design = "grid"\nsamples = 3', ["samples = 3 belongs to design = \"latin-hypercube\""]),
+        ('design = "grid"', 'design = "grid"\ntrajectories = 1', ["trajectories = 1 is neither true nor false"]),
+        ('design = "grid"', 'design = "latin-hypercube"', ["count belongs to a grid"]),
+        ("[sweep]", "[swoop]\nx = 1\n[sweep]", ["table 'swoop' is unknown", "'sweep'?"]),
+        ("[sweep]", "[scenario]\nomega = 2.0\n[sweep]", ["[scenario] key 'omega' is unknown", "'omega0'?"]),
+        ("[sweep]", "[scenario]\ndrag = -1.0\n[sweep]", ["[scenario] drag = -1.0 kg/s is outside [0, inf)"]),
+        ("fill_fraction", "fil_fraction", ["[sweep.fields] key 'fil_fraction' is unknown", "'fill_fraction'?"]),
+        ("bottle.length", "bottle.lenght", ["key 'bottle.lenght' is unknown", "'bottle.length'?"]),
+        ("[0.25, 0.5]", "[]", ["fill_fraction = [] holds no value"]),
+        ("[0.25, 0.5]", "0.5", ["fill_fraction = 0.5 is not a list of values"]),
+        ("[0.25, 0.5]", '[0.25, "half"]', ["fill_fraction = 'half' is not a finite number"]),
+        ("[0.25, 0.5]", "[0.25, nan]", ["fill_fraction = nan is not a finite number"]),
+        ("[0.25, 0.5]", "[true]", ["fill_fraction = True is not a finite number"]),
+        ("[0.25, 0.5]", "[0.5, 0.5]", ["fill_fraction takes the value 0.5 twice"]),
+        ("[0.25, 0.5]", "[0.5]\nn_slices = [2.0]", ["n_slices = 2.0 is not a whole number"]),
+        ("[0.25, 0.5]", "[0.5]\nn_slices = [1" + 30 * "0" + "]", ["is not a whole number"]),
+        ("[0.25, 0.5]", "[0.5]\nn_slices = {from = 2, to = 4, count = 9}", ["n_slices takes the value 2 twice"]),
+        ("[0.25, 0.5]", "[0.5]\nfrozen = {from = 0, to = 1}", ["frozen = {'from': 0, 'to': 1} is not a list"]),
+        ("[0.25, 0.5]", "[0.5]\nwater_mass = [0.1]", ["fill_fraction and water_mass set the same thing"]),
+        ("[0.25, 0.5]", "[0.5]\ndrag = [0.1]\ndamping_rate = [1.0]", ["damping_rate and drag set the same thing"]),
+        ("count = 3", "counts = 3", ["bottle.length key 'counts' is unknown", "'count'?"]),
+        (", count = 3", "", ["bottle.length lacks count"]),
+        ("count = 3", "count = 1", ["bottle.length count = 1 is not a whole number in [2, 1000000]"]),
+        ("count = 3", 'count = 3, scale = "lg"', ["scale = 'lg' is unknown", "'log'?"]),
+        ("from = 0.2", "from = 0.4", ["from = 0.4 is not below to = 0.3"]),
+        ("from = 0.2", 'scale = "log", from = 0', ["from = 0.0 is outside (0, inf)"]),
+        ("count = 3", "count = 900000", ["1800000 throws by 2 solvers make 3600000 points, more than 1000000"]),
+        ('name = "eq8"', 'name = "eq9"', ["[[solvers]] 2: solver 'eq9' is unknown", "'eq8'?"]),
+        ('name = "eq8"', "rtol = 1e-9", ["[[solvers]] 2 name = None is not a solver's name"]),
+        ('name = "eq8"', 'name = "eq8"\nrtoll = 1.0', ["2 (eq8) key 'rtoll' is unknown", "'rtol'?"]),
+        ('name = "eq8"', 'name = "eq8"\nsteps = 5', ["2 (eq8) key 'steps' is unknown"]),
+        ('name = "eq8"', 'name = "eq8"\nrtol = inf', ["rtol = inf is not a finite number"]),
+        ('name = "eq8"', 'name = "exact-step"\nsteps = 50', ["2 (exact-step) is there twice"]),
+    ],
+)  # fmt: skip
+def test_every_mistake_names_file_table_key_and_value(old, new, words):
+    assert old in GRID
+    with pytest.raises(SweepError) as raised:
+        read(GRID.replace(old, new, 1))
+    message = str(raised.value)
+    assert message.startswith("sweep.toml: ")
+    for word in words:
+        assert word in message
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "has no table [sweep]"),
+        ('[sweep]\ndesign = "grid"', "has no table [sweep.fields]"),
+        ('[sweep]\ndesign = "grid"\n[sweep.fields]', "[sweep.fields] is empty"),
+        (GRID.partition("[[solvers]]")[0], "has no [[solvers]]"),
+        (GRID.partition("[[solvers]]")[0] + '[solvers]\nname = "eq8"', "has no [[solvers]]"),
+        (LATIN.replace("samples = 50", ""), "samples = None is not a whole number in [1, 1000000]"),
+        (LATIN.replace("seed = 3", "seed = -3"), "seed = -3 is not a whole number"),
+        (LATIN.replace("{from = 0.1, to = 0.9}", "[0.1]").replace("drag", "#"), "its throws would repeat themselves"),
+    ],
+)
+def test_what_is_missing_is_named(text, words):
+    with pytest.raises(SweepError, match=r"^sweep\.toml: ") as raised:
+        read(text)
+    assert words in str(raised.value)
+
+
+def test_a_file_that_cannot_be_read_is_named(tmp_path):
+    with pytest.raises(SweepError, match=r"nowhere\.toml: cannot be read"):
+        read_design(tmp_path / "nowhere.toml")
+    (tmp_path / "bad.toml").write_text("[sweep")
+    with pytest.raises(SweepError, match=r"bad\.toml: is not valid TOML"):
+        read_design(tmp_path / "bad.toml")
+
+
+def test_the_water_of_the_base_does_not_stand_in_the_way_of_the_swept():
+    design = read("[bottle]\ncapacity = 0.4\n" + GRID)
+    assert design.point(0).scenario().water_mass == 0.25 * 0.4
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ('name = "eq8"\nrtol = 7.0', r"2 \(eq8\): rtol = 7.0 is outside \[1e-13, 0.01\]"),
+        ('name = "eq8"\nmethod = "DOP"', "did you mean 'DOP853'"),
+        ('name = "midpoint"\nsteps = 1', r"2 \(midpoint\): steps = 1 is not a whole number in \[2, "),
+        ('name = "pymunk"\ncolision_bias = 1.0', "did you mean 'collision_bias'"),
+    ],
+)
+def test_a_setting_out_of_range_is_refused_before_the_first_point(settings, words):
+    with pytest.raises(SweepError, match=words):
+        try_entries(read(GRID.replace('name = "eq8"', settings)).entries)
+
+
+def test_settings_in_range_are_tried_without_their_cost():
+    try_entries(read(GRID.replace("steps = 50", "steps = 1000000000") + "times = [0.0, 0.5]\nmax_step = 0.01").entries)
+
+
+def test_a_sweep_may_be_as_large_as_stated_and_costs_nothing_to_state():
+    text = GRID.replace("[0.25, 0.5]", f"{{from = 0.1, to = 1.0, count = {MOST_POINTS // 8}}}")
+    text = text.replace("count = 3", "count = 4")
+    design = read(text)
+    assert design.size == MOST_POINTS
+    assert design.point(design.size - 1).values == (1.0, 0.3)

@@ -1,0 +1,253 @@
+"""Sweeps as people run them: killed, interrupted, resumed, on this machine and through Dask, with the same rows."""
+
+import importlib.util
+import os
+import random
+import signal
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from reports import cli
+from reports.solvers import solve
+from reports.sweep.design import from_parameters, read_design
+from slicemodel.observables import plateau
+
+ROOT = Path(__file__).resolve().parents[2]
+POINTS = 160
+
+SPEC = importlib.util.spec_from_file_location("sweep_kill", ROOT / "benchmarks" / "sweep_kill.py")
+sweep_kill = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(sweep_kill)
+
+pytestmark = pytest.mark.xdist_group("sweep")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _path():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(ROOT))
+        yield
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    """Return a design's file, and the folder of a sweep that nothing disturbed."""
+    place = tmp_path_factory.mktemp("undisturbed")
+    (place / "sweep.toml").write_text(sweep_kill.DESIGN.format(samples=POINTS // 2))
+    sweep_kill.finish(sweep_kill.start(place / "sweep.toml", place / "out"))
+    return place / "sweep.toml", place / "out"
+
+
+def test_every_number_is_that_of_a_single_run(undisturbed):
+    _, out = undisturbed
+    with closing(sqlite3.connect(out / "sweep.sqlite")) as connection:
+        rows = connection.execute(
+            "SELECT parameters, plateau, omega_end, theta_end, r_cm_end, t_end, impacts, status FROM points"
+        ).fetchall()
+    assert len(rows) == POINTS
+    made = [row for row in rows if row[-1] != "impossible"]
+    assert 0 < POINTS - len(made) < POINTS / 10
+    for parameters, *numbers, status in made[::7]:
+        point = from_parameters(parameters)
+        flight = solve(point.solver, point.scenario(), **point.settings)
+        assert status == flight.status == "ok"
+        assert numbers == [
+            plateau(flight.t, flight.omega, flight.scenario.omega0),
+            flight.omega[-1], flight.theta[-1], flight.r_cm[-1], flight.t[-1], len(flight.impacts),
+        ]  # fmt: skip
+
+
+def test_a_sweep_killed_again_and_again_ends_with_the_rows_of_an_undisturbed_one(undisturbed, tmp_path):
+    design, out = undisturbed
+    told = sweep_kill.killed(design, tmp_path / "killed", "sww", 0.3, random.Random(4))
+    assert sweep_kill.rows(tmp_path / "killed") == sweep_kill.rows(out)
+    assert any(kill["killed"] for kill in told)
+    assert [kill["outlived"] for kill in told] == [0, 0, 0]
+
+
+def test_a_worker_does_not_outlive_a_killed_parent_even_in_a_long_call():
+    code = (
+        "import time; from reports.sweep.local import Processes; p = Processes(1); f = p.submit(time.time); f.result();"
+    )
+    code += "p.submit(time.sleep, 1000); print('ready', flush=True); time.sleep(1000)"
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
+    assert process.stdout.readline() == "ready\n"
+    process.kill()
+    process.communicate(timeout=60)
+    assert sweep_kill.left_over(process.pid) == []
+
+
+def interrupt(process):
+    """Interrupt a sweep as a terminal does, every process of the group; return what it says."""
+    os.killpg(process.pid, signal.SIGINT)
+    printed, err = process.communicate(timeout=60)
+    assert (process.returncode, printed) == (130, ""), err
+    assert sweep_kill.left_over(process.pid) == []
+    return err.splitlines()
+
+
+def test_a_long_sweep_outlives_its_worker_and_goes_on_after_interrupts(tmp_path):
+    design, out = tmp_path / "sweep.toml", tmp_path / "out"
+    design.write_text(sweep_kill.DESIGN.format(samples=50_000))
+    process = sweep_kill.start(design, out, "--jobs", "1")
+    count = sweep_kill.wait_for_rows(process, out, 0)
+    workers = [
+        number
+        for number in sweep_kill.alive_in_session(process.pid)
+        if b"spawn_main" in Path(f"/proc/{number}/cmdline").read_bytes()
+    ]
+    assert len(workers) == 1
+    os.kill(workers[0], signal.SIGKILL)
+    # The first may have been on its way already; the second is the new worker's.
+    for _ in range(2):
+        count = sweep_kill.wait_for_rows(process, out, count)
+    (line,) = interrupt(process)
+    kept = sweep_kill.rows(out)
+    assert line == (
+        f"flipproof: interrupted; {len(kept)} of 100000 points are stored; the same command goes on from there"
+    )
+    assert count <= len(kept) < 100_000
+    process = sweep_kill.start(design, out, "--jobs", "1")
+    sweep_kill.wait_for_rows(process, out, len(kept))
+    begun, _ = interrupt(process)
+    assert begun == f"flipproof: {len(kept)} of 100000 points are there; going on"
+    assert set(kept) < set(sweep_kill.rows(out))
+    with closing(sqlite3.connect(out / "sweep.sqlite")) as connection:
+        assert {status for (status,) in connection.execute("SELECT status FROM points")} <= {"ok", "impossible"}
+
+
+def test_the_same_sweep_through_dask_with_a_worker_killed_midway(undisturbed, tmp_path, monkeypatch):
+    # By itself Dask tries a dead worker's batches elsewhere; here it hands them back, and the sweep divides them.
+    monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", "0")
+    design, out = undisturbed
+    for attempt in range(3):
+        # On a machine too busy to look in time the sweep may be complete before the kill.
+        place = tmp_path / str(attempt)
+        midway = sweep_kill.through_dask(design, place, POINTS, 1)["midway"]
+        assert sweep_kill.rows(place) == sweep_kill.rows(out)
+        if midway:
+            break
+    assert midway
+
+
+def test_a_disk_that_takes_no_more_ends_the_sweep_in_one_line(undisturbed, tmp_path):
+    design, out = undisturbed
+    # No file may grow beyond 100 kB: SQLite meets an error in the middle of a transaction.
+    code = (
+        "import resource, sys; from reports.cli import entry; "
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, resource.RLIM_INFINITY)); entry()"
+    )
+    command = [sys.executable, "-c", code, "sweep", str(design), "--out", str(tmp_path / "out"), "--jobs", "1"]
+    process = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
+    assert process.returncode == 2, process
+    assert process.stderr.count("\n") == 1
+    assert "cannot be written (" in process.stderr
+    assert "the same command goes on from there" in process.stderr
+    kept = sweep_kill.rows(tmp_path / "out")
+    assert 0 < len(kept) < POINTS
+    assert set(kept) <= set(sweep_kill.rows(out))
+
+
+def run(capsys, *arguments):
+    try:
+        status = cli.main(["sweep", *map(str, arguments)])
+    except SystemExit as end:
+        status = end.code
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+def test_a_complete_sweep_is_not_made_again_and_is_exported(undisturbed, capsys):
+    design, out = undisturbed
+    status, line, err = run(capsys, design, "--out", out, "--export", out / "rows.csv")
+    assert (status, err) == (0, "")
+    assert line.startswith(f"{POINTS} points in {out / 'sweep.sqlite'}: ")
+    assert line.endswith(f"; {POINTS} were there\n")
+    assert len((out / "rows.csv").read_text().splitlines()) == POINTS + 1
+
+
+def test_all_three_packages_in_one_sweep_with_their_flights(capsys, tmp_path):
+    (tmp_path / "sweep.toml").write_text(
+        """
+        scenario = {duration = 0.02, n_slices = 2}
+        sweep = {design = "grid", trajectories = true, fields = {omega0 = [10.0, 20.0]}}
+        [[solvers]]
+        name = "midpoint"
+        steps = 20
+        [[solvers]]
+        name = "switches:110000"
+        max_step = 0.01
+        [[solvers]]
+        name = "pymunk"
+        dt = 1e-3
+        """
+    )
+    status, line, _ = run(capsys, tmp_path / "sweep.toml", "--out", tmp_path / "out", "--jobs", "1", "--quiet")
+    assert status == 0
+    assert ": 6 ok; 6 made in " in line
+    assert len(list((tmp_path / "out" / "trajectories").rglob("*.npz"))) == 6
+    with closing(sqlite3.connect(tmp_path / "out" / "sweep.sqlite")) as connection:
+        rows = connection.execute("SELECT parameters, omega_end, theta_end, reason FROM points").fetchall()
+    for parameters, omega_end, theta_end, reason in rows:
+        point = from_parameters(parameters)
+        flight = solve(point.solver, point.scenario(), **point.settings)
+        assert (omega_end, theta_end) == (flight.omega[-1], flight.theta[-1])
+        assert (reason != "") == (point.solver == "pymunk")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["{design}", "--out", "{design}"], "is a file; --out names a folder"),
+        (["{design}", "--out", "{out}", "--export", "rows.xls"], "the ending '.xls' is neither .csv nor .parquet"),
+        (["nowhere.toml", "--out", "{out}"], "nowhere.toml: cannot be read"),
+        (["{other}", "--out", "{out}"], "holds another design (samples is 80 there and 79 here)"),
+        (["{wrong}", "--out", "{new}"], "[[solvers]] 2 (eq8): rtol = 6.0 is outside [1e-13, 0.01]"),
+        (["{design}", "--out", "{new}", "--jobs", "1", "--dask", "tcp://127.0.0.1:1"], "not allowed with argument"),
+        (["{design}"], "the following arguments are required: --out"),
+    ],
+)
+def test_every_mistake_is_one_line_and_status_2(undisturbed, capsys, tmp_path, arguments, words):
+    design, out = undisturbed
+    text = design.read_text()
+    (tmp_path / "other.toml").write_text(text.replace("samples = 80", "samples = 79"))
+    (tmp_path / "wrong.toml").write_text(text.replace("rtol = 1e-6", "rtol = 6.0"))
+    places = {"design": design, "out": out, "new": tmp_path / "new"}
+    places |= {"other": tmp_path / "other.toml", "wrong": tmp_path / "wrong.toml"}
+    status, printed, err = run(capsys, *(argument.format(**places) for argument in arguments))
+    assert (status, printed) == (2, "")
+    assert len([line for line in err.splitlines() if "error:" in line]) == 1
+    assert words in err
+    assert not (tmp_path / "new").exists()
+
+
+def test_nobody_at_the_address_is_one_line(undisturbed, capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr("reports.sweep.cluster.CONNECT", 0.5)
+    design, _ = undisturbed
+    status, _, err = run(capsys, design, "--out", tmp_path / "out", "--dask", "tcp://127.0.0.1:1")
+    assert status == 2
+    assert "--dask tcp://127.0.0.1:1: no scheduler answers there" in err
+
+
+def test_dask_that_is_not_installed_is_one_line(undisturbed, capsys, tmp_path, monkeypatch):
+    def missing(name):
+        raise ModuleNotFoundError(name=name)
+
+    monkeypatch.setattr("reports.sweep.cluster.import_module", missing)
+    design, _ = undisturbed
+    status, _, err = run(capsys, design, "--out", tmp_path / "out", "--dask", "tcp://127.0.0.1:1")
+    assert status == 2
+    assert "--dask needs distributed: install flipproof with its extra 'dask'" in err
+
+
+def test_the_example_is_a_sweep():
+    design = read_design(ROOT / "examples" / "sweep.toml")
+    assert design.size == 60
+    assert [entry.name for entry in design.entries] == ["published-python", "exact-step", "eq8"]
