@@ -1,0 +1,38 @@
+"""Compare what an engine holds with what was meant, name by name, before its first step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Final
+
+ROUND_OFF: Final = 1e-12
+"""Largest relative difference between meant and built: sums of N terms in a different order, nothing more."""
+
+
+def differences(meant: Mapping[str, float], held: Mapping[str, float], scales: Mapping[str, float]) -> list[str]:
+    """Return a sentence for each value of ``held`` that is not the one meant; NaN and absence count.
+
+    ``scales`` gives sizes against which a value that should be near zero is judged.
+    """
+    problems = []
+    for name, value in meant.items():
+        got = held.get(name, math.nan)
+        scale = max(abs(value), scales.get(name, 0.0))
+        if got == value or abs(got - value) <= ROUND_OFF * scale:
+            continue
+        problems.append(f"{name} = {got!r}, meant {value!r}")
+    return problems
+
+
+def both(name: str, value: float) -> dict[str, float]:
+    """Return ``name.least`` and ``name.most`` of a value that is the same for all slices."""
+    return {f"{name}.least": value, f"{name}.most": value}
+
+
+def extremes(name: str, values: Iterable[float]) -> dict[str, float]:
+    """Return ``name.least`` and ``name.most``; nothing for no values, NaN if one is NaN."""
+    known = [float(value) for value in values]
+    if any(math.isnan(value) for value in known):
+        return both(name, math.nan)
+    return {f"{name}.least": min(known), f"{name}.most": max(known)} if known else {}
