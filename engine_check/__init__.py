@@ -8,16 +8,30 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from engine_check.certificate import Certificate, certify
     from engine_check.pymunk_settings import PymunkKnobs
+    from engine_check.restitution import measure_restitution
     from engine_check.solver import DEFAULT_DT, ENGINES, SetupError, solve
 
-__all__ = ["DEFAULT_DT", "ENGINES", "PymunkKnobs", "SetupError", "solve"]
+__all__ = [
+    "DEFAULT_DT",
+    "ENGINES",
+    "Certificate",
+    "PymunkKnobs",
+    "SetupError",
+    "certify",
+    "measure_restitution",
+    "solve",
+]
 
 _HOMES = {
+    "Certificate": "engine_check.certificate",
     "DEFAULT_DT": "engine_check.solver",
     "ENGINES": "engine_check.solver",
     "PymunkKnobs": "engine_check.pymunk_settings",
     "SetupError": "engine_check.solver",
+    "certify": "engine_check.certificate",
+    "measure_restitution": "engine_check.restitution",
     "solve": "engine_check.solver",
 }
 

@@ -7,24 +7,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from itertools import pairwise, product
-from typing import Final
+from collections.abc import Mapping
+from itertools import product
 
 import numpy as np
 import pymunk
 
-from engine_check.pymunk_settings import PymunkKnobs
+from engine_check import pymunk_rods as rods
+from engine_check.pymunk_settings import PymunkKnobs, restitution_between_slices
 from engine_check.pymunk_world import World
+from engine_check.readback import both, differences, extremes
 from engine_check.solver import SetupError
 from slicemodel import observables
 from slicemodel.scenario import Scenario
 
-ROUND_OFF: Final = 1e-12
-"""Largest relative difference between meant and built: sums of N terms in a different order, nothing more."""
 
-
-def intended(scenario: Scenario, knobs: PymunkKnobs, iterations: int, ice: str) -> dict[str, float]:
+def intended(
+    scenario: Scenario, knobs: PymunkKnobs, iterations: int, ice: str, slices: str = "overlap"
+) -> dict[str, float]:
     """Return what the world must hold, from the scenario alone, SI units.
 
     A pair ``name.least`` and ``name.most`` bounds a value over all slices.
@@ -57,23 +57,26 @@ def intended(scenario: Scenario, knobs: PymunkKnobs, iterations: int, ice: str) 
     }
     if one_body:
         return meant
-    meant |= _both("slice_mass", scenario.slice_mass) | _both("slice_moment", math.inf)
+    meant |= both("slice_mass", scenario.slice_mass) | both("slice_moment", math.inf)
     meant |= {"joint_error_bias.most": knobs.error_bias, "joint_force_limit.least": math.inf}
     if scenario.frozen:
         return meant | {"welds": float(scenario.n_slices)}
     drag_count = float(scenario.n_slices if scenario.drag > 0.0 else 0)
     meant |= {"grooves": float(scenario.n_slices), "dampers": drag_count}
-    meant |= {"slices_that_collide": 0.0, "caps_passed_through": 0.0}
-    meant |= _both("elasticity_product", scenario.restitution)
-    meant |= _both("friction_product", knobs.friction**2)
-    meant |= _both("groove_top", knobs.groove_reach * bottle.length)
-    meant |= _both("groove_bottom", -knobs.groove_reach * bottle.length)
-    meant |= _both("groove_off_axis", 0.0)
-    meant |= _both("contact_at_cap", scenario.r_min) | _both("contact_at_base", scenario.r_max)
-    meant |= _both("cap_thickness", knobs.cap_thickness * bottle.length)
+    between = restitution_between_slices(scenario, knobs, slices)
+    meant |= {"slices_that_collide": 0.0, "caps_passed_through": 0.0, "wall_shapes": float(scenario.n_slices)}
+    if between is not None:
+        meant |= rods.intended(scenario, between, knobs.friction)
+    meant |= both("elasticity_product", scenario.restitution)
+    meant |= both("friction_product", knobs.friction**2)
+    meant |= both("groove_top", knobs.groove_reach * bottle.length)
+    meant |= both("groove_bottom", -knobs.groove_reach * bottle.length)
+    meant |= both("groove_off_axis", 0.0)
+    meant |= both("contact_at_cap", scenario.r_min) | both("contact_at_base", scenario.r_max)
+    meant |= both("cap_thickness", knobs.cap_thickness * bottle.length)
     if drag_count:
-        meant |= _both("drag", scenario.drag) | _both("drag_stiffness", 0.0)
-        meant |= _both("drag_anchor", knobs.anchor_distance * bottle.length) | _both("drag_off_axis", 0.0)
+        meant |= both("drag", scenario.drag) | both("drag_stiffness", 0.0)
+        meant |= both("drag_anchor", knobs.anchor_distance * bottle.length) | both("drag_off_axis", 0.0)
     return meant
 
 
@@ -112,8 +115,8 @@ def read_back(world: World) -> dict[str, float]:
         ),
     }
     if world.slices:
-        held |= _extremes("slice_mass", (body.mass for body in world.slices))
-        held |= _extremes("slice_moment", (body.moment for body in world.slices))
+        held |= extremes("slice_mass", (body.mass for body in world.slices))
+        held |= extremes("slice_moment", (body.moment for body in world.slices))
         held |= _read_joints(world)
         held |= _read_shapes(world)
     return held
@@ -132,35 +135,38 @@ def _read_joints(world: World) -> dict[str, float]:
         "joint_error_bias.most": max((c.error_bias for c in joints), default=math.nan),
         "joint_force_limit.least": min((c.max_force for c in constraints), default=math.nan),
     }
-    held |= _extremes("groove_top", (c.groove_a.y for c in grooves))
-    held |= _extremes("groove_bottom", (c.groove_b.y for c in grooves))
-    held |= _extremes("groove_off_axis", (abs(c.groove_a.x) + abs(c.groove_b.x) + c.anchor_b.length for c in grooves))
-    held |= _extremes("drag", (c.damping for c in dampers))
-    held |= _extremes("drag_stiffness", (c.stiffness for c in dampers))
-    held |= _extremes("drag_anchor", (c.anchor_a.y for c in dampers))
-    return held | _extremes("drag_off_axis", (abs(c.anchor_a.x) + c.anchor_b.length for c in dampers))
+    held |= extremes("groove_top", (c.groove_a.y for c in grooves))
+    held |= extremes("groove_bottom", (c.groove_b.y for c in grooves))
+    held |= extremes("groove_off_axis", (abs(c.groove_a.x) + abs(c.groove_b.x) + c.anchor_b.length for c in grooves))
+    held |= extremes("drag", (c.damping for c in dampers))
+    held |= extremes("drag_stiffness", (c.stiffness for c in dampers))
+    held |= extremes("drag_anchor", (c.anchor_a.y for c in dampers))
+    return held | extremes("drag_off_axis", (abs(c.anchor_a.x) + c.anchor_b.length for c in dampers))
 
 
 def _read_shapes(world: World) -> dict[str, float]:
     half = world.axis_origin
     caps = [s for s in world.tube.shapes if isinstance(s, pymunk.Segment)]
-    circles = [s for body in world.slices for s in body.shapes if isinstance(s, pymunk.Circle)]
+    circles = rods.wall_circles(world.slices)
     pairs = list(product(caps, circles))
     # The inner face of a cap, as a distance from the cap end of the tube (the local axis points the other way).
     upper = [(half - (s.a.y - s.radius), s.radius) for s in caps if s.a.y > 0]
     lower = [(half - (s.a.y + s.radius), s.radius) for s in caps if s.a.y <= 0]
     held = {
-        "slices_that_collide": float(sum(not a.filter.rejects_collision(b.filter) for a, b in pairwise(circles))),
         "caps_passed_through": float(sum(a.filter.rejects_collision(b.filter) for a, b in pairs)),
+        "wall_shapes": float(len(circles)),
+        **rods.read_back(world.tube, world.slices),
     }
-    held |= _extremes("elasticity_product", (a.elasticity * b.elasticity for a, b in pairs))
-    held |= _extremes("friction_product", (a.friction * b.friction for a, b in pairs))
-    held |= _extremes("contact_at_cap", (face + s.radius for (face, _), s in product(upper, circles)))
-    held |= _extremes("contact_at_base", (face - s.radius for (face, _), s in product(lower, circles)))
-    return held | _extremes("cap_thickness", (2 * radius for _, radius in (*upper, *lower)))
+    held |= extremes("elasticity_product", (a.elasticity * b.elasticity for a, b in pairs))
+    held |= extremes("friction_product", (a.friction * b.friction for a, b in pairs))
+    held |= extremes("contact_at_cap", (face + s.radius for (face, _), s in product(upper, circles)))
+    held |= extremes("contact_at_base", (face - s.radius for (face, _), s in product(lower, circles)))
+    return held | extremes("cap_thickness", (2 * radius for _, radius in (*upper, *lower)))
 
 
-def verify(world: World, scenario: Scenario, knobs: PymunkKnobs, iterations: int, ice: str) -> dict[str, float]:
+def verify(
+    world: World, scenario: Scenario, knobs: PymunkKnobs, iterations: int, ice: str, slices: str = "overlap"
+) -> dict[str, float]:
     """Return the world as read back, or refuse it.
 
     Raises
@@ -170,25 +176,13 @@ def verify(world: World, scenario: Scenario, knobs: PymunkKnobs, iterations: int
         engine cannot do what is asked (a groove or an anchor that ends inside the tube).
     """
     held = read_back(world)
-    meant = intended(scenario, knobs, iterations, ice)
+    meant = intended(scenario, knobs, iterations, ice, slices)
     problems = differences(meant, held, _scales(scenario))
     if world.slices and not scenario.frozen:
         problems += _dead_stops(held, scenario)
     if problems:
         raise SetupError("the built world is not the one meant: " + "; ".join(problems))
     return {name: held[name] for name in meant}
-
-
-def differences(meant: Mapping[str, float], held: Mapping[str, float], scales: Mapping[str, float]) -> list[str]:
-    """Return a sentence for each value of ``held`` that is not the one meant; NaN and absence count."""
-    problems = []
-    for name, value in meant.items():
-        got = held.get(name, math.nan)
-        scale = max(abs(value), scales.get(name, 0.0))
-        if got == value or abs(got - value) <= ROUND_OFF * scale:
-            continue
-        problems.append(f"{name} = {got!r}, meant {value!r}")
-    return problems
 
 
 def _scales(scenario: Scenario) -> dict[str, float]:
@@ -207,12 +201,3 @@ def _dead_stops(held: Mapping[str, float], scenario: Scenario) -> list[str]:
         if name in held and not inward * held[name] > half:
             problems.append(f"{name} = {held[name]!r} m ends inside the tube (needed: beyond {inward * half:g} m)")
     return problems
-
-
-def _both(name: str, value: float) -> dict[str, float]:
-    return {f"{name}.least": value, f"{name}.most": value}
-
-
-def _extremes(name: str, values: Iterable[float]) -> dict[str, float]:
-    known = list(values)
-    return {f"{name}.least": min(known), f"{name}.most": max(known)} if known else {}

@@ -8,7 +8,8 @@
     +-------> x      base  +-------+  local (0, -L/2)
 
 A slice is a circle of radius h/2N, so that its centre stays in [h/2N, L - h/2N] (Eq. 3a). Slices share one
-filter group and pass through each other. The drag alpha acts between slice and tube wall.
+filter group and pass through each other; if they must not, each carries a second circle (``pymunk_rods``).
+The drag alpha acts between slice and tube wall.
 The origin at the centre of mass keeps coordinates near 1 m, so that gravity costs no digits of omega.
 """
 
@@ -22,7 +23,8 @@ import numpy as np
 import pymunk
 import pymunk.batch
 
-from engine_check.pymunk_settings import CAP_ELASTICITY, PymunkKnobs
+from engine_check import pymunk_rods as rods
+from engine_check.pymunk_settings import CAP_ELASTICITY, PymunkKnobs, insertion_order, restitution_between_slices
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray
 
@@ -42,15 +44,17 @@ class World:
     spin_moment: float
 
 
-def build(scenario: Scenario, knobs: PymunkKnobs, iterations: int, ice: str) -> World:
+def build(scenario: Scenario, knobs: PymunkKnobs, iterations: int, ice: str, slices: str = "overlap") -> World:
     """Return the world at release, t = 0: rigid rotation with omega_0 about the centre of mass.
 
-    Bodies enter the space in a fixed order, which makes a run reproducible to the last bit.
+    Bodies enter the space in a fixed order (``PymunkKnobs.shuffle``), which makes a run reproducible to the last bit.
 
     Parameters
     ----------
     ice : str
         "rigid" or "welded"; used if ``scenario.frozen``.
+    slices : str
+        "overlap" or "exclude" (``engine_check.solver.CONTACTS``); used if not.
     """
     space = pymunk.Space()
     space.iterations = iterations
@@ -82,20 +86,25 @@ def build(scenario: Scenario, knobs: PymunkKnobs, iterations: int, ice: str) -> 
     space.add(tube)
     if not scenario.frozen:
         space.add(*_caps(tube, scenario, knobs))
-    slices = []
-    for position in positions:
+    between = restitution_between_slices(scenario, knobs, slices)
+    bodies = {}
+    for index in insertion_order(scenario.n_slices, knobs.shuffle):
+        position = positions[index]
         body = pymunk.Body(scenario.slice_mass, math.inf)
         _throw(body, scenario, float(position) - centre)
         # A point slice carries no spin of its own.
         body.angle = body.angular_velocity = 0.0
         space.add(body)
-        slices.append(body)
+        bodies[index] = body
         if scenario.frozen:
             space.add(_weld(tube, body, scenario, knobs, float(position)))
         else:
             space.add(*_slide(tube, body, scenario, knobs))
-    masses = np.array([bottle.mass, *[scenario.slice_mass] * len(slices)])
-    return World(space, tube, tuple(slices), bottle.length / 2, masses, tube_moment)
+            if between is not None:
+                space.add(rods.neighbour_shape(body, index, scenario.slice_height / 2, between, knobs.friction))
+    masses = np.array([bottle.mass, *[scenario.slice_mass] * len(bodies)])
+    in_order = tuple(bodies[index] for index in range(scenario.n_slices))
+    return World(space, tube, in_order, bottle.length / 2, masses, tube_moment)
 
 
 def _throw(body: pymunk.Body, scenario: Scenario, offset: float) -> None:
@@ -117,6 +126,7 @@ def _caps(tube: pymunk.Body, scenario: Scenario, knobs: PymunkKnobs) -> list[pym
         cap = pymunk.Segment(tube, (-half_width, y), (half_width, y), radius)
         cap.elasticity = CAP_ELASTICITY
         cap.friction = knobs.friction
+        rods.meets_walls_only(cap)
         caps.append(cap)
     return caps
 
@@ -127,7 +137,7 @@ def _slide(
     circle = pymunk.Circle(body, scenario.slice_height / 2)
     circle.elasticity = scenario.restitution
     circle.friction = knobs.friction
-    circle.filter = pymunk.ShapeFilter(group=SLICE_GROUP)
+    rods.meets_walls_only(circle, SLICE_GROUP)
     reach = knobs.groove_reach * scenario.bottle.length
     groove = pymunk.GrooveJoint(tube, body, (0.0, reach), (0.0, -reach), (0.0, 0.0))
     groove.error_bias = knobs.error_bias

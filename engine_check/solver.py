@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from types import MappingProxyType
@@ -42,6 +42,15 @@ ENGINES: Final[Mapping[str, Engine]] = MappingProxyType(
                 reason="A witness with no formula of ours: constraints keep the masses on the axis, the engine's own "
                 "solver makes the rebounds, and gravity, the moving origin and the recoil of the tube come out by "
                 "themselves.",
+                frames=("free", "rotating"),
+                contacts=("overlap", "exclude"),
+            ),
+            Engine(
+                name="mujoco",
+                module="engine_check.engine_mujoco",
+                equation="free flight: a tree of joints in generalised coordinates, in the lab frame",
+                reason="A second witness that shares no method with the first: the masses cannot leave the axis, "
+                "Runge-Kutta steps between impacts, impulses from the engine's exact mass matrix at their own times.",
             ),
         )
     }
@@ -49,7 +58,10 @@ ENGINES: Final[Mapping[str, Engine]] = MappingProxyType(
 """Every engine by name. A new engine is one file and one entry here."""
 
 DEFAULT_DT: Final = 1e-4
-"""Upper bound of the step unless told otherwise [s]."""
+"""Upper bound of the step when iterations are given and the step is not [s]."""
+
+DEFAULT_TOLERANCE: Final = 2e-3
+"""Change of omega under refinement below which a run is certified, fraction of omega_0."""
 
 ICE_MODELS: Final = ("rigid", "welded")
 FRAMES: Final = ("free", "rotating")
@@ -75,6 +87,14 @@ class Order:
     slices: str = "overlap"
     knobs: Mapping[str, float]
 
+    def legs(self) -> Iterator[tuple[float, int]]:
+        """Yield each output time with the number of equal steps that lead to it."""
+        before = 0.0
+        for when in self.times.tolist():
+            # A hair less than the quotient: 0.5 s / 1e-4 s must not become 5001 steps by rounding.
+            yield when, math.ceil((when - before) / self.dt * (1.0 - 1e-12))
+            before = when
+
 
 class SetupError(RuntimeError):
     """The world that the engine holds is not the one that was meant; the message names each difference."""
@@ -83,10 +103,11 @@ class SetupError(RuntimeError):
 def solve(
     scenario: Scenario,
     engine: str = "pymunk",
-    dt: float = DEFAULT_DT,
+    dt: float | None = None,
     iterations: int | None = None,
     times: ArrayLike | None = None,
     *,
+    tolerance: float = DEFAULT_TOLERANCE,
     ice: str = "rigid",
     frame: str = "free",
     slices: str = "overlap",
@@ -99,13 +120,16 @@ def solve(
     scenario : Scenario
     engine : str
         A name in ``ENGINES``.
-    dt : float
-        Upper bound of the engine's step [s]; every output interval is divided into equal steps.
+    dt : float or None
+        Upper bound of the engine's step [s]; every output interval is divided into equal steps. None: without
+        iterations either, both are those of a certificate (``certify``), which costs several runs; else 1e-4 s.
     iterations : int or None
         Iterations of the engine's impulse solver per step. None: enough for this number of slices and
         this mass ratio (``pymunk_settings.enough_iterations``); ``settings`` states the number.
     times : array, shape (P,) or None
         Output times [s], increasing, in [0, duration]. None: 1000 uniform points.
+    tolerance : float
+        What a certificate must hold, fraction of omega_0; without effect if ``dt`` or ``iterations`` is given.
     ice : str
         How ``scenario.frozen`` is built: "rigid" (one body) or "welded" (slices held by joints, whose
         drift is reported). Without effect on a scenario that is not frozen.
@@ -119,8 +143,11 @@ def solve(
     Returns
     -------
     Trajectory
-        ``impacts`` is None: an engine resolves contacts and knows no impacts. ``settings`` holds every
-        knob and version, ``diagnostics`` the set-up as read back and the largest residuals.
+        ``impacts`` is None where the engine resolves contacts and knows no impacts (pymunk). ``settings`` holds every
+        knob and version, ``diagnostics`` the set-up as read back and the largest residuals. Without dt and
+        iterations also ``settings["certified"]``, ``diagnostics["certificate"]`` and ``diagnostics["omega_band"]``
+        (``certificate.Certificate.band``); a run that could not be certified is returned as it is, and its message
+        says why.
 
     Raises
     ------
@@ -145,9 +172,14 @@ def solve(
             raise ValueError(f"engine = {engine!r} has no {what} = {name!r} (it has: {', '.join(offered)})")
     if scenario.n_slices > MOST_SLICES:
         raise ValueError(f"n_slices = {scenario.n_slices} is outside [1, {MOST_SLICES}] for an engine; cut it coarser")
+    if dt is None and iterations is None:
+        certified = import_module("engine_check.certificate").certified
+        settings = {"times": times, "tolerance": tolerance, "ice": ice, "frame": frame, "slices": slices}
+        certified_run: Trajectory = certified(scenario, engine, **settings, **knobs)
+        return certified_run
     run = import_module(ENGINES[engine].module).run
     order = Order(
-        dt=_checked_dt(dt),
+        dt=checked_number("dt", DEFAULT_DT if dt is None else dt, 0.0, math.inf, " s"),
         iterations=_checked_iterations(iterations),
         times=output_times(scenario, times),
         ice=ice,
@@ -159,13 +191,15 @@ def solve(
     return trajectory
 
 
-def _checked_dt(dt: object) -> float:
-    if isinstance(dt, bool) or not isinstance(dt, numbers.Real):
-        raise ValueError(f"dt = {dt!r} is not a number (admissible: (0, inf) s)")
+def checked_number(name: str, value: object, above: float, below: float, unit: str = "") -> float:
+    """Return ``value`` as float if it is a number in (above, below); else raise ValueError with the range."""
+    admissible = f"({above:g}, {below:g}){unit}"
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise ValueError(f"{name} = {value!r} is not a number (admissible: {admissible})")
     # Written as "not inside", because NaN passes every "outside" test.
-    if not 0.0 < float(dt) < math.inf:
-        raise ValueError(f"dt = {float(dt)!r} s is outside (0, inf) s")
-    return float(dt)
+    if not above < float(value) < below:
+        raise ValueError(f"{name} = {float(value)!r}{unit} is outside {admissible}")
+    return float(value)
 
 
 def _checked_iterations(iterations: object) -> int | None:

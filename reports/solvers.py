@@ -100,7 +100,10 @@ def solve(name: str, scenario: Scenario, **settings: Any) -> Trajectory:
         return ode_reference.solve(scenario, **settings)
     import engine_check
 
-    return engine_check.solve(scenario, **settings)
+    # Without step and tolerance an engine would certify each run, at several times its cost; the report's own
+    # refinement (``evidence.run_bands``) says what its runs are worth.
+    given = {} if "tolerance" in settings else {"dt": engine_check.DEFAULT_DT}
+    return engine_check.solve(scenario, **{**given, **settings})
 
 
 def without_gravity(scenario: Scenario) -> Scenario:

@@ -54,7 +54,7 @@ def test_nouns_know_no_verb():
                 assert module.partition(".")[2] in NOUNS, f"{noun} imports {module} {names}"
 
 
-@pytest.mark.parametrize("heavy", ["numba", "scipy", "matplotlib", "pymunk", "jinja2", "numpy"])
+@pytest.mark.parametrize("heavy", ["numba", "scipy", "matplotlib", "pymunk", "mujoco", "jinja2", "numpy"])
 @pytest.mark.parametrize("statement", ["import slicemodel, ode_reference, engine_check, reports.cli"])
 def test_start_up_is_light(statement, heavy):
     code = f"import sys; {statement}; sys.exit({heavy!r} in sys.modules)"

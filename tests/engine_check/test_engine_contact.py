@@ -1,14 +1,19 @@
 """Rebounds are the engine's own: restitution, sticking, energy, the simultaneous law, creep of a rest."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
-from engine_check import solve
+import engine_check
+from engine_check import DEFAULT_DT
 from engine_check.pymunk_settings import PymunkKnobs
 from engine_check.pymunk_world import build
 from slicemodel.scenario import Scenario
+
+solve = partial(engine_check.solve, dt=DEFAULT_DT)
+"""At a given step: how one is found is the subject of ``test_certificate``."""
 
 ONE = replace(Scenario(), n_slices=1, water_mass=0.1, drag=0.0, duration=0.1)
 

@@ -1,12 +1,17 @@
 """Ice: no slice moves, omega is constant, the centre of mass flies a parabola."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
-from engine_check import solve
+import engine_check
+from engine_check import DEFAULT_DT
 from slicemodel.scenario import Scenario
+
+solve = partial(engine_check.solve, dt=DEFAULT_DT)
+"""At a given step: how one is found is the subject of ``test_certificate``."""
 
 ICE = replace(Scenario().with_slices(50), frozen=True)
 TIMES = np.linspace(0.0, 0.5, 101)

@@ -3,16 +3,21 @@
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from engine_check import solve
+import engine_check
+from engine_check import DEFAULT_DT
 from engine_check.pymunk_settings import PymunkKnobs
 from engine_check.pymunk_world import BatchReader, build, read_single
 from slicemodel import observables
 from slicemodel.scenario import Scenario
+
+solve = partial(engine_check.solve, dt=DEFAULT_DT)
+"""At a given step: how one is found is the subject of ``test_certificate``."""
 
 ROOT = Path(__file__).resolve().parents[2]
 FIFTY = Scenario().with_slices(50)
@@ -97,7 +102,7 @@ def test_a_run_is_reproducible_to_the_last_bit():
         assert np.array_equal(getattr(first, name), getattr(second, name))
     code = (
         "from dataclasses import replace; from engine_check import solve; from slicemodel.scenario import Scenario;"
-        "print(solve(replace(Scenario().with_slices(10), duration=0.1)).omega[-1].hex())"
+        "print(solve(replace(Scenario().with_slices(10), duration=0.1), dt=1e-4).omega[-1].hex())"
     )
     other = subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, capture_output=True, text=True)
     assert other.stdout.strip() == first.omega[-1].hex()

@@ -2,16 +2,21 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import pymunk
 import pytest
 
-from engine_check import SetupError, solve
+import engine_check
+from engine_check import DEFAULT_DT, SetupError
 from engine_check.pymunk_settings import PymunkKnobs
-from engine_check.pymunk_setup import differences, verify
+from engine_check.pymunk_setup import verify
 from engine_check.pymunk_world import build
 from slicemodel import observables
 from slicemodel.scenario import Bottle, Scenario
+
+solve = partial(engine_check.solve, dt=DEFAULT_DT)
+"""At a given step: how one is found is the subject of ``test_certificate``."""
 
 # No field zero and none equal to another, so that no slip hides.
 THROW = Scenario(
@@ -205,7 +210,3 @@ def test_a_seeded_fault_is_refused_by_name(fault):
 def test_a_knob_that_ends_inside_the_tube_is_refused(knob, value):
     with pytest.raises(SetupError, match="ends inside the tube"):
         solve(THROW, **{knob: value})
-
-
-def test_nan_and_absence_are_differences():
-    assert differences({"a": 1.0, "b": 2.0}, {"a": math.nan}, {}) == ["a = nan, meant 1.0", "b = nan, meant 2.0"]

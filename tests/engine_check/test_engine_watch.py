@@ -1,14 +1,19 @@
 """A run that explodes says so, when and why, and returns what was good."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
-from engine_check import solve, watch
+import engine_check
+from engine_check import DEFAULT_DT, watch
 from engine_check.watch import BANDS, State
 from slicemodel import observables
 from slicemodel.scenario import Scenario
+
+solve = partial(engine_check.solve, dt=DEFAULT_DT)
+"""At a given step: how one is found is the subject of ``test_certificate``."""
 
 FIFTY = Scenario().with_slices(50)
 
