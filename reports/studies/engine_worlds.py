@@ -1,0 +1,141 @@
+"""The smallest worlds that show what an engine does unasked: one or two bodies, no bottle, nothing of ``engine_check``.
+
+Lengths in metres, times in seconds; x to the right, y up. The engines are imported where a world is built.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from importlib import import_module
+
+
+def rebound_of_two(first: float, second: float) -> float:
+    """Return the speed of separation over the speed of approach of two discs with these elasticities."""
+    import pymunk
+
+    space = pymunk.Space()
+    discs = []
+    for x, speed, elasticity in ((-0.2, 1.0, first), (0.2, -1.0, second)):
+        body = pymunk.Body(1.0, math.inf)
+        body.position, body.velocity = (x, 0.0), (speed, 0.0)
+        disc = pymunk.Circle(body, 0.1)
+        disc.elasticity = elasticity
+        space.add(body, disc)
+        discs.append(body)
+    for _ in range(200):
+        space.step(1e-3)
+    return float(discs[1].velocity.x - discs[0].velocity.x) / 2.0
+
+
+def speed_after_groove_end() -> float:
+    """Return the largest speed back, over the speed before, of a mass that runs into the end of its groove."""
+    import pymunk
+
+    space = pymunk.Space()
+    body = pymunk.Body(1.0, math.inf)
+    body.position, body.velocity = (0.5, 0.0), (1.0, 0.0)
+    disc = pymunk.Circle(body, 0.01)
+    disc.elasticity = 1.0
+    space.add(body, disc, pymunk.GrooveJoint(space.static_body, body, (0.0, 0.0), (1.0, 0.0), (0.0, 0.0)))
+    back = 0.0
+    for _ in range(1000):
+        space.step(1e-3)
+        back = max(back, -float(body.velocity.x))
+    if not abs(body.position.x - 1.0) < 1e-3:
+        raise LookupError(f"the mass is at {body.position.x:.3g} m, not at the groove's end")
+    return back
+
+
+def stagger() -> float:
+    """Return by how many steps the engine's velocity is ahead of its position, in free fall.
+
+    The slope of the positions at t_n is (x_n+1 - x_n-1) / 2 dt, exact for a parabola; the engine's velocity is larger
+    by g times the time it is ahead.
+    """
+    import pymunk
+
+    dt, weight = 1e-3, -9.81
+    space = pymunk.Space()
+    space.gravity = (0.0, weight)
+    body = pymunk.Body(1.0, 1.0)
+    space.add(body)
+    height, speed = [], []
+    for _ in range(11):
+        space.step(dt)
+        height.append(float(body.position.y))
+        speed.append(float(body.velocity.y))
+    slope = (height[6] - height[4]) / (2.0 * dt)
+    return (speed[5] - slope) / (weight * dt)
+
+
+def depth_left(slop: float | None) -> tuple[float, float]:
+    """Return ``collision_slop`` and how deep a disc lies in the floor it was dropped on [m]; None: as by default."""
+    import pymunk
+
+    space = pymunk.Space()
+    space.gravity = (0.0, -9.81)
+    if slop is not None:
+        space.collision_slop = slop
+    body = pymunk.Body(1.0, math.inf)
+    body.position, body.velocity = (0.0, 0.05), (0.0, -2.0)
+    space.add(body, pymunk.Circle(body, 0.02), pymunk.Segment(space.static_body, (-1.0, -0.1), (1.0, -0.1), 0.1))
+    for _ in range(200):
+        space.step(1e-2)
+    return float(space.collision_slop), 0.02 - float(body.position.y)
+
+
+def speed_through_wall(dt: float) -> float:
+    """Return the speed along the way over the speed before, of a disc thrown at an elastic wall 1 cm thick."""
+    import pymunk
+
+    space = pymunk.Space()
+    wall = pymunk.Segment(space.static_body, (0.0, -1.0), (0.0, 1.0), 0.005)
+    wall.elasticity = 1.0
+    body = pymunk.Body(1.0, math.inf)
+    body.position, body.velocity = (-1.03, 0.0), (5.0, 0.0)
+    disc = pymunk.Circle(body, 0.005)
+    disc.elasticity = 1.0
+    space.add(wall, body, disc)
+    for _ in range(round(0.5 / dt)):
+        space.step(dt)
+    return float(body.velocity.x) / 5.0
+
+
+def rebound_of_limit() -> tuple[float, float]:
+    """Return speed back over speed before of a mass at MuJoCo's joint limit, and how far it goes beyond [m]."""
+    path = list(
+        _mujoco_path(
+            '<mujoco><option gravity="0 0 0" timestep="1e-4"/><worldbody><body>'
+            '<joint type="slide" axis="1 0 0" limited="true" range="-1 0.1"/>'
+            '<geom size="0.01" mass="1" contype="0" conaffinity="0"/></body></worldbody></mujoco>',
+            speed=1.0,
+            duration=0.5,
+        )
+    )
+    return -min(v for _, v in path), max(x for x, _ in path) - 0.1
+
+
+def depth_of_contact() -> tuple[float, float]:
+    """Return how deep a ball of 1 kg lies in MuJoCo's floor at rest, and at the deepest after landing at 1 m/s [m]."""
+    path = list(
+        _mujoco_path(
+            '<mujoco><option timestep="1e-4"/><worldbody><geom type="plane" size="1 1 0.1"/>'
+            '<body pos="0 0 0.02"><joint type="slide" axis="0 0 1"/><geom size="0.02" mass="1"/></body>'
+            "</worldbody></mujoco>",
+            speed=-1.0,
+            duration=1.0,
+        )
+    )
+    return -path[-1][0], -min(x for x, _ in path)
+
+
+def _mujoco_path(xml: str, *, speed: float, duration: float) -> Iterator[tuple[float, float]]:
+    """Yield position and velocity of a model with one joint, step by step; ``speed`` is its velocity at the start."""
+    mujoco = import_module("mujoco")
+    model = mujoco.MjModel.from_xml_string(xml)
+    data = mujoco.MjData(model)
+    data.qvel[0] = speed
+    for _ in range(round(duration / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+        yield float(data.qpos[0]), float(data.qvel[0])

@@ -1,0 +1,116 @@
+"""Facts about engines: each can fail, and the small worlds measure what they say."""
+
+import math
+import sys
+from dataclasses import replace
+
+import pytest
+
+from reports.claims_engines import claim_engine_fact
+from reports.exhibits_engines import draw_gallery
+from reports.figures.engines import figure_gallery
+from reports.solvers import Made, make
+from reports.studies import engine_worlds as worlds
+from reports.studies.engine_facts import plan_engine_facts, study_engine_facts
+from slicemodel import Scenario
+
+PYMUNK = (
+    "gravity", "smaller-step", "order", "order-forgotten", "joints", "elasticity", "groove-end", "stagger", "slop",
+    "tunnel",
+)  # fmt: skip
+MUJOCO = ("mujoco-limit", "mujoco-contact")
+
+
+@pytest.fixture(scope="module")
+def made():
+    return {run.tag: make(run) for run in plan_engine_facts(Scenario())}
+
+
+@pytest.fixture(scope="module")
+def facts(made):
+    return {fact.id: fact for fact in study_engine_facts(made)}
+
+
+def test_the_plan_has_unique_tags_and_explicit_steps():
+    runs = plan_engine_facts(Scenario(duration=0.1))
+    assert len({run.tag for run in runs}) == len(runs)
+    assert all({"dt", "iterations"} <= set(run.settings) for run in runs)
+    assert all(run.settings["times"][-1] == run.scenario.duration == 0.1 for run in runs)
+
+
+@pytest.mark.parametrize("name", PYMUNK)
+def test_every_fact_about_pymunk_holds(facts, name):
+    fact = facts[name]
+    assert fact.holds, fact
+    assert claim_engine_fact(fact).verdict == "pass"
+    assert fact.note
+
+
+@pytest.mark.parametrize("name", MUJOCO)
+def test_every_fact_about_mujoco_holds_or_says_that_it_is_not_installed(facts, name):
+    fact = facts[name]
+    assert fact.holds or (fact.absent and "not installed" in fact.note), fact
+    assert not claim_engine_fact(fact).failed
+
+
+def test_there_is_no_other_fact(facts):
+    assert set(facts) == {*PYMUNK, *MUJOCO}
+
+
+def test_an_engine_that_is_missing_is_not_evaluated_and_no_failure(made, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    missing = {fact.id: fact for fact in study_engine_facts(made)}["mujoco-limit"]
+    assert (missing.value, missing.holds, missing.absent) == (None, None, True)
+    finding = claim_engine_fact(missing)
+    assert (finding.verdict, finding.failed) == ("not evaluated", False)
+    assert "not installed" in finding.note
+
+
+def test_a_fact_whose_run_is_missing_or_stopped_fails(made):
+    broken = dict(made)
+    usual = made["engine fact, usual"]
+    broken["engine fact, usual"] = Made(usual.run, None, 0.0, "MemoryError: too much")
+    fact = study_engine_facts(broken)[0]
+    assert (fact.id, fact.value, fact.absent) == ("gravity", None, False)
+    assert "MemoryError" in fact.note
+    assert claim_engine_fact(fact).failed
+    stopped = replace(usual.trajectory, status="diverged", message="diverged: joints")
+    assert study_engine_facts(made | {"engine fact, usual": replace(usual, trajectory=stopped)})[0].value is None
+    # A run that was to explode and did not is no evidence that it explodes sooner.
+    calm = {tag: replace(usual, run=m.run) if "few" in tag else m for tag, m in made.items()}
+    assert study_engine_facts(calm)[1].value is None
+
+
+def test_a_number_outside_its_interval_and_nan_fail(facts):
+    for value in (facts["stagger"].value * -1, math.nan):
+        finding = claim_engine_fact(replace(facts["stagger"], value=value))
+        assert finding.verdict == "fail"
+
+
+@pytest.mark.parametrize(("first", "second"), [(1.0, 1.0), (0.8, 0.25), (0.0, 0.9)])
+def test_two_discs_rebound_by_the_product(first, second):
+    assert worlds.rebound_of_two(first, second) == pytest.approx(first * second, abs=1e-9)
+
+
+def test_a_thin_wall_is_passed_only_by_long_steps():
+    assert worlds.speed_through_wall(1e-2) == pytest.approx(1.0)
+    assert worlds.speed_through_wall(1e-3) == pytest.approx(-1.0)
+
+
+def test_without_slop_nothing_stays_sunk():
+    (default, left), (none, without) = worlds.depth_left(None), worlds.depth_left(0.0)
+    assert default == pytest.approx(0.1)
+    assert none == 0.0
+    assert left > 5e-3
+    assert abs(without) < 1e-6
+
+
+def test_the_gallery_has_fact_number_threshold_and_sign(facts):
+    chosen = [facts["gravity"], replace(facts["stagger"], value=-0.5), replace(facts["mujoco-limit"], value=None)]
+    findings = [claim_engine_fact(fact) for fact in chosen]
+    texts = [text.get_text() for text in figure_gallery(findings, [f.engine for f in chosen]).axes[0].texts]
+    assert {"engine", "fact", "number", "threshold", "✓", "✗", "–", "≤ 1e-09", "-0.500 steps"} <= set(texts)
+    exhibit = draw_gallery(chosen)
+    assert "1 of 3" in exhibit.caption
+    assert "-0.500 steps, threshold 0.49 to 0.51, fail" in exhibit.alt
+    assert exhibit.drawing.svg.startswith("<?xml")

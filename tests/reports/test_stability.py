@@ -1,0 +1,179 @@
+"""The stability chart on made-up runs, and a small real one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reports.claims_engines import claim_default_iterations_explode, claim_rule_of_iterations, claim_whole_and_wrong
+from reports.exhibits_engines import draw_stability
+from reports.figures.engines import COLOURS, SIGNS, figure_stability
+from reports.solvers import Made, make
+from reports.studies.stability import (
+    FULL,
+    GRADES,
+    QUICK,
+    Layout,
+    grade_of,
+    panel_throw,
+    plan_stability,
+    study_stability,
+)
+from slicemodel import Scenario, Trajectory
+
+THROW = Scenario()
+SMALL = Layout(panels=((6.0, 10),), dt=(2e-3, 2e-4), iterations=(5, 10, 60), duration=0.1, budget=2e5)
+
+
+def flight(run, error=0.0, message="", points=None) -> Made:
+    """A run whose omega is off by a fraction of omega_0 from the middle on; stopped if there is a message."""
+    t = run.settings["times"][:points]
+    zero = np.zeros(len(t))
+    trajectory = Trajectory(
+        scenario=run.scenario,
+        solver="made-up",
+        method=run.solver,
+        t=t,
+        theta=zero,
+        omega=run.scenario.omega0 * (1.0 + error * (t > SMALL.duration / 2)),
+        r=np.zeros((0, run.scenario.n_slices)),
+        v=np.zeros((0, run.scenario.n_slices)),
+        r_cm=zero,
+        inertia=zero + 1.0,
+        status="diverged" if message else "ok",
+        message=message,
+    )
+    return Made(run, trajectory, 0.0)
+
+
+def chart(spoil, layout=SMALL):
+    """Study a chart whose runs are perfect but for those that ``spoil`` makes, by words in their tags."""
+    made = {}
+    for run in plan_stability(THROW, layout):
+        found = [change for words, change in spoil.items() if words in run.tag]
+        made[run.tag] = found[0](run) if found else flight(run)
+    return study_stability(THROW, layout, made)
+
+
+def test_the_plan_has_unique_tags_explicit_settings_and_both_references():
+    runs = plan_stability(THROW, FULL)
+    assert len({run.tag for run in runs}) == len(runs)
+    engine = [run for run in runs if run.solver == "pymunk"]
+    assert all({"dt", "iterations", "times"} == set(run.settings) for run in engine)
+    assert sum(run.solver == "free-flight" for run in runs) == 2 * len(FULL.panels)
+    costs = [run.scenario.n_slices * run.settings["iterations"] / run.settings["dt"] for run in engine]
+    assert costs == sorted(costs, reverse=True)
+    assert 10 in FULL.iterations
+    assert 10 in QUICK.iterations
+
+
+@pytest.mark.parametrize("layout", [FULL, QUICK])
+def test_output_times_are_whole_steps_of_every_column(layout):
+    gaps = np.diff(layout.times)
+    for dt in layout.dt:
+        assert gaps / dt == pytest.approx(np.round(gaps / dt), abs=1e-9)
+        assert round(gaps[0] / dt) >= 1
+
+
+def test_a_panel_is_the_throw_with_other_water():
+    scenario = panel_throw(THROW, 18.0, 30, 0.25)
+    assert scenario.water_mass == pytest.approx(18.0 * THROW.bottle.mass)
+    assert scenario.damping_rate == pytest.approx(THROW.damping_rate)
+    assert (scenario.n_slices, scenario.duration) == (30, 0.25)
+
+
+def test_every_grade_is_given_for_its_reason_and_no_other():
+    spoil = {
+        "dt 0.002 s, 5 iterations": lambda run: flight(run, message="diverged: joints; raise iterations", points=3),
+        "dt 0.002 s, 10 iterations": lambda run: flight(run, message="diverged: depth; reduce dt", points=5),
+        "dt 0.002 s, 60 iterations": lambda run: flight(run, 0.011),
+        "dt 0.0002 s, 5 iterations": lambda run: flight(run, 0.009),
+        "dt 0.0002 s, 10 iterations": lambda run: flight(run, 0.0009),
+    }
+    (panel,) = chart(spoil)
+    assert panel.grade.tolist() == [["explodes", "good"], ["sinks in", "excellent"], ["wrong", "not run"]]
+    assert panel.held_until[0, 0] == pytest.approx(0.004)
+    assert panel.held_until[1, 0] == pytest.approx(0.008)
+    assert panel.error[2, 0] == pytest.approx(0.011)
+    assert panel.plateau_error[2, 0] == pytest.approx(0.011, rel=0.05)
+    assert panel.reason[0, 0] == "diverged: joints; raise iterations"
+    assert "more than 2.0e+05" in panel.reason[2, 1]
+    assert panel.band == 0.0
+    assert panel.enough == 50
+    assert sum(panel.counts.values()) == panel.grade.size
+    assert panel.at_default.tolist() == ["sinks in", "excellent"]
+
+
+def test_an_error_that_is_no_number_is_wrong():
+    assert [grade_of(error) for error in (1e-3, 1e-2, 0.0101, np.nan)] == ["excellent", "good", "wrong", "wrong"]
+
+
+def test_a_cell_without_a_run_or_a_reference_is_never_good():
+    (panel,) = chart({"dt 0.002 s, 60": lambda run: Made(run, None, 0.0, "MemoryError: too much")})
+    assert (panel.grade[2, 0], panel.reason[2, 0]) == ("not run", "MemoryError: too much")
+    (panel,) = chart({"free-flight": lambda run: Made(run, None, 0.0, "stalled")})
+    assert (panel.grade == "not run").all()
+    assert np.isnan(panel.band)
+    assert "free-flight has no result" in panel.reason[0, 0]
+    (panel,) = study_stability(THROW, SMALL, {})
+    assert panel.reason[0, 0] == "not made"
+    assert claim_rule_of_iterations([panel]).failed
+
+
+def test_the_band_is_what_the_reference_moves():
+    (panel,) = chart({"free-flight, tighter": lambda run: flight(run, 0.0004)})
+    assert panel.band == pytest.approx(0.0004)
+    assert panel.error[0, 0] == pytest.approx(0.0004)
+
+
+def test_the_claims_count_what_the_chart_shows():
+    wide = replace(SMALL, budget=1e9)
+    explode = {"s, 10 iterations": lambda run: flight(run, message="x; raise iterations", points=2)}
+    panels = chart(explode | {"dt 0.0002 s, 60": lambda run: flight(run, 0.004)}, wide)
+    rule, default = claim_rule_of_iterations(panels), claim_default_iterations_explode(panels)
+    assert (rule.value, rule.verdict) == (pytest.approx(0.004), "pass")
+    assert (default.value, default.verdict) == (0.0, "pass")
+    stopped = chart({"dt 0.0002 s, 60": lambda run: flight(run, message="x; reduce dt", points=2)}, wide)
+    assert claim_rule_of_iterations(stopped).verdict == "fail"
+    assert claim_default_iterations_explode(stopped).failed
+    nan = [replace(panels[0], error=panels[0].error * np.nan)]
+    assert claim_rule_of_iterations(nan).verdict == "fail"
+    wrong = chart({"60 iterations": lambda run: flight(run, 0.02)}, wide)
+    assert claim_rule_of_iterations(wrong).failed
+    assert claim_whole_and_wrong(wrong).value == 2.0
+    assert "2 %" in claim_whole_and_wrong(wrong).note
+    assert "none" in claim_whole_and_wrong(panels).note
+    assert claim_rule_of_iterations([]).failed
+
+
+def test_the_figure_signs_every_cell_and_draws_rule_and_default():
+    (panel,) = chart({"5 iterations": lambda run: flight(run, message="x; raise iterations", points=3)})
+    figure = figure_stability([panel, panel, panel])
+    assert len([axes for axes in figure.axes if axes.get_visible()]) == 3
+    axes = figure.axes[0]
+    cells = [text.get_text() for text in axes.texts]
+    assert len(cells) == panel.grade.size
+    assert cells[0] == "×\n4 ms"
+    assert cells[2] == "++\n0 %"
+    assert [line.get_ydata()[0] for line in axes.lines] == [1.5]
+    assert "Δt [ms]" in figure.axes[2].get_xlabel()
+    assert "[1]" in axes.get_ylabel()
+    assert len(set(COLOURS.values())) == len(set(SIGNS.values())) == len(GRADES)
+    exhibit = draw_stability([panel])
+    assert "2 explode" not in exhibit.caption
+    assert "1 not run" in exhibit.alt
+    assert "Not run (1)" in exhibit.caption
+    assert exhibit.drawing.png.startswith(b"\x89PNG")
+
+
+def test_pymunk_explodes_at_its_default_and_follows_free_flight_by_the_rule():
+    layout = replace(SMALL, budget=1e6)
+    panels = study_stability(THROW, layout, {run.tag: make(run) for run in plan_stability(THROW, layout)})
+    (panel,) = panels
+    assert panel.grade[:2].tolist() == [["explodes"] * 2] * 2
+    # A finer step explodes sooner.
+    assert (panel.held_until[:2, 1] < panel.held_until[:2, 0]).all()
+    assert panel.error[2, 1] < panel.error[2, 0] < 0.02
+    assert panel.band < 1e-5
+    assert claim_rule_of_iterations(panels).verdict == "pass"
+    assert claim_default_iterations_explode(panels).verdict == "pass"
