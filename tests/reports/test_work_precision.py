@@ -1,0 +1,492 @@
+"""The work-precision study: nobody is left out, slopes and prices are what made-up curves say, failures stay seen."""
+
+import json
+import math
+from concurrent.futures import Executor, Future
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import slicemodel
+from engine_check.solver import ENGINES
+from ode_reference.models import MODELS
+from ode_reference.steppers import METHODS
+from reports.claims_work_precision import claim_work_precision
+from reports.exhibits_work_precision import (
+    draw_work_precision,
+    summarise_work_precision,
+    tabulate_work_precision,
+)
+from reports.figures.work_precision import figure_work_precision
+from reports.solvers import Made, Run, make
+from reports.studies.contenders import (
+    AT_REST,
+    CASES,
+    COMMON,
+    COMPLETE,
+    EQUATION_OF_SCHEME,
+    FULL,
+    OWN_LIMIT,
+    QUICK,
+    Asked,
+    Case,
+    Contender,
+    contenders,
+    left_out,
+)
+from reports.studies.work_precision import (
+    Price,
+    gather_work_precision,
+    plan_work_precision,
+    price,
+    study_work_precision,
+    work_of,
+)
+from reports.timing import at_times, make_all_timed, make_timed, sampled
+from slicemodel import Scenario, Trajectory
+from slicemodel.schemes import SCHEMES
+
+SMOOTH = replace(
+    FULL,
+    name="test",
+    cases=("smooth",),
+    scheme_levels=4,
+    scheme_members=(4, 5),
+    engine_levels=3,
+    engine_members=(4,),
+    methods={"DOP853": Asked(rtol=(1e-3, 1e-9)), "LSODA": Asked(rtol=(1e-3, 1e-5, 1e-7), equations=("eq8",))},
+)
+
+
+class Here(Executor):
+    """A pool that works in this process."""
+
+    def submit(self, function, /, *arguments, **options):
+        done = Future()
+        done.set_result(function(*arguments, **options))
+        return done
+
+
+def run(case, effort):
+    return make_all_timed(Here(), [(planned, case.times) for planned in plan_work_precision(case, effort)])
+
+
+@pytest.fixture(scope="module")
+def smooth():
+    case = CASES["smooth"]
+    made = run(case, SMOOTH)
+    return made, study_work_precision(case, SMOOTH, made)
+
+
+@pytest.fixture(scope="module")
+def quick():
+    return gather_work_precision(Here(), QUICK)
+
+
+# ---------------------------------------------------------------------- who competes
+
+
+@pytest.mark.parametrize("effort", [COMPLETE, FULL, QUICK], ids=lambda effort: effort.name)
+@pytest.mark.parametrize("case", CASES.values(), ids=lambda case: case.name)
+def test_everyone_of_every_registry_competes_or_is_absent_for_a_reason(case, effort):
+    rivals = contenders(case, effort)
+    absent = left_out(effort)
+    assert len({rival.key for rival in rivals}) == len(rivals)
+    assert {rival.solver for rival in rivals if rival.family == "scheme"} == set(SCHEMES)
+    worlds = {(rival.solver, rival.fixed["frame"]) for rival in rivals if rival.family == "engine"}
+    for engine in ENGINES.values():
+        for frame in engine.frames:
+            assert (engine.name, frame) in worlds or f"{engine.name}, frame {frame}" in absent
+        for contact in engine.contacts:
+            assert (contact == "overlap") != (f"{engine.name}, slices = {contact}" in absent)
+    asked = {(rival.name, rival.equation) for rival in rivals if rival.family == "method"}
+    for method in METHODS:
+        for model in MODELS:
+            told = f"{model}, all methods" in absent or any(what.split(",")[0] == method for what in absent)
+            assert (method, model) in asked or told, (method, model)
+    assert all(len(reason) > 20 for reason in absent.values())
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=lambda case: case.name)
+def test_each_is_held_against_its_own_equation(case):
+    for rival in contenders(case, FULL):
+        if rival.family == "engine":
+            assert rival.equation == {"free": "free-flight", "rotating": "eq8"}[rival.fixed["frame"]]
+        elif rival.family == "method":
+            assert rival.equation == rival.solver
+        else:
+            expected = {
+                "published-python": "published-limit", "published-matlab": f"{OWN_LIMIT}published-matlab",
+                "paper-typeset": AT_REST, "signs-corrected": "signs-limit", "roots-corrected": "eq8-wall",
+                "exact-step": "eq8", "midpoint": "eq8",
+            }  # fmt: skip
+            assert rival.equation == expected[rival.solver]
+
+
+@pytest.mark.parametrize("effort", [FULL, QUICK], ids=lambda effort: effort.name)
+def test_runs_are_unique_and_say_how_they_are_refined(effort):
+    runs = [planned for name in effort.cases for planned in plan_work_precision(CASES[name], effort)]
+    assert len({planned.tag for planned in runs}) == len(runs)
+    for planned in runs:
+        if planned.solver in SCHEMES:
+            assert (planned.settings["steps"] - 1) % COMMON == 0
+        elif planned.solver in ENGINES:
+            steps = planned.scenario.duration / planned.settings["dt"]
+            assert steps == pytest.approx(round(steps), abs=1e-9)
+            assert round(steps) % COMMON == 0
+            assert ("iterations" in planned.settings) == (planned.solver == "pymunk")
+        else:
+            assert {"rtol", "atol", "max_step", "rest_speed", "method"} <= set(planned.settings)
+
+
+def test_a_scheme_that_no_equation_knows_competes_against_its_own_limit(monkeypatch):
+    monkeypatch.delitem(EQUATION_OF_SCHEME, "midpoint")
+    found = {rival.name: rival.equation for rival in contenders(CASES["smooth"], FULL)}
+    assert found["midpoint"] == f"{OWN_LIMIT}midpoint"
+
+
+def test_nothing_strikes_in_the_smooth_throw():
+    case = CASES["smooth"]
+    for model in MODELS:
+        made = make(Run(model, model, case.scenario, {"times": case.times}))
+        assert made.trajectory is not None
+        assert len(made.trajectory.impacts) == 0, model
+        longer = replace(case.scenario, duration=1.4 * case.scenario.duration)
+        assert len(make(Run(model, model, longer)).trajectory.impacts) > 0, model
+
+
+# ---------------------------------------------------------------------- what made-up curves say
+
+
+def curve(case: Case, error: float, *, status="ok", **settings) -> Trajectory:
+    """Return a made-up run of one-slice schemes that ends ``error`` omega_0 too fast."""
+    n = case.scenario.n_slices
+    points = len(case.times)
+    return Trajectory(
+        scenario=case.scenario,
+        solver="slicemodel",
+        method="exact-step",
+        t=case.times,
+        theta=np.zeros(points),
+        omega=case.scenario.omega0 * (1.0 + error * np.linspace(0.0, 1.0, points)),
+        r=np.empty((0, n)),
+        v=np.empty((0, n)),
+        r_cm=np.full(points, 0.1),
+        inertia=np.ones(points),
+        status=status,
+        message="it burst at t = 0.1 s" if status != "ok" else "",
+        settings=settings,
+    )
+
+
+CASE = Case(name="made-up", title="made up", scenario=Scenario(n_slices=2))
+
+
+def studied(monkeypatch, errors, floor=1e-9, spoiled=None):
+    """Return the curve that the study makes of a scheme with these errors at 40, 80, 160 ... steps."""
+    from reports.studies import work_precision
+
+    rival = Contender(
+        name="exact-step",
+        family="scheme",
+        solver="exact-step",
+        equation="eq8",
+        levels=tuple(({"steps": COMMON * 2**k + 1},) for k in range(len(errors))),
+    )
+    monkeypatch.setattr(work_precision, "contenders", lambda *_: (rival,))
+    made = {}
+    for planned in plan_work_precision(CASE, QUICK):
+        if planned.solver == "eq8":
+            error = 0.0 if "reference" in planned.tag else floor
+            made[planned.tag] = Made(planned, curve(CASE, error), 1.0)
+        else:
+            k = round(math.log2((planned.settings["steps"] - 1) / COMMON))
+            made[planned.tag] = Made(planned, curve(CASE, errors[k], **planned.settings), 0.1 * 2**k)
+    for tag, outcome in (spoiled or {}).items():
+        at = next(name for name in made if name.endswith(tag))
+        made[at] = replace(made[at], **outcome)
+    study = study_work_precision(CASE, QUICK, made)
+    return study, study.curves[rival.key]
+
+
+@pytest.mark.parametrize("order", [0.5, 1.0, 2.0, 4.0])
+def test_the_slope_is_the_order_in_cost(monkeypatch, order):
+    _, found = studied(monkeypatch, [1e-2 * 2.0 ** (-order * k) for k in range(5)])
+    assert found.slope == pytest.approx(order, abs=1e-6)
+    assert found.slope_error < 1e-6
+    assert [point.work for point in found.points] == pytest.approx([2 * COMMON * 2**k for k in range(5)])
+    assert [point.steps for point in found.points] == pytest.approx([COMMON * 2**k for k in range(5)])
+
+
+def test_errors_near_the_floor_and_saturated_ones_bend_no_slope(monkeypatch):
+    errors = [0.9, 0.1, 0.05, 0.025, 2e-3, 0.9e-3, 0.9e-3]
+    study, found = studied(monkeypatch, errors, floor=1e-3)
+    assert study.references["eq8"].floor == pytest.approx(1e-3)
+    assert found.slope == pytest.approx(1.0, abs=1e-6)
+    assert [point.at_floor for point in found.points] == [False, False, False, False, False, True, True]
+
+
+def test_too_few_levels_have_no_slope_and_say_so(monkeypatch):
+    _, found = studied(monkeypatch, [1e-2, 1e-3])
+    assert math.isnan(found.slope)
+    assert "2 levels" in found.slope_reason
+
+
+def test_a_reference_that_agrees_to_the_last_digit_claims_no_more_than_round_off(monkeypatch):
+    study, found = studied(monkeypatch, [1e-2, 1e-6, 1e-14], floor=0.0)
+    assert study.references["eq8"].floor == 1e-13
+    assert [point.at_floor for point in found.points] == [False, False, True]
+
+
+@pytest.mark.parametrize(
+    ("outcome", "words"),
+    [
+        ({"trajectory": None, "reason": "RuntimeError: needs MuJoCo"}, "needs MuJoCo"),
+        ({"trajectory": curve(CASE, 0.0, status="diverged", steps=41)}, "diverged: it burst at t = 0.1 s"),
+        ({"trajectory": curve(CASE, 0.0, status="escaped", steps=41)}, "escaped"),
+    ],
+)
+def test_a_failed_run_stays_with_its_reason(monkeypatch, outcome, words):
+    study, found = studied(monkeypatch, [1e-2, 5e-3, 2.5e-3, 1e-3], spoiled={"exact-step on eq8, 1, 0": outcome})
+    failed = found.points[1]
+    assert math.isnan(failed.error)
+    assert words in failed.reason
+    assert found.failed == (failed,)
+    assert not failed.at_floor
+    results = next(tabulate_work_precision([study]))
+    assert any(words in cell for row in results.rows for cell in row)
+    assert f"{words[:20]}" in json.dumps(summarise_work_precision([study]), allow_nan=False)
+    assert price(found, 8e-3, study.references["eq8"]) == Price(found.points[2].work, bound=True)
+    crosses = [line for line in figure_work_precision(study).axes[0].lines if line.get_marker() == "x"]
+    assert len(crosses) == (outcome["trajectory"] is not None)  # a run that never began has no cost to stand at
+
+
+def test_without_a_reference_nobody_has_an_error(monkeypatch):
+    study, found = studied(
+        monkeypatch, [1e-2, 1e-3], spoiled={"witness 1, eq8": {"trajectory": None, "reason": "ValueError: no"}}
+    )
+    assert math.isnan(study.references["eq8"].floor)
+    assert all("no reference: ValueError: no" in point.reason for point in found.points)
+    assert price(found, 1e-2, study.references["eq8"]) is None
+    figure_work_precision(study)
+
+
+def test_a_run_off_the_common_times_is_refused(monkeypatch):
+    short = replace(CASE.scenario, duration=0.4)
+    other = curve(Case(name="x", title="x", scenario=short), 0.0, steps=41)
+    with pytest.raises(ValueError, match="holds no point at t = "):
+        studied(monkeypatch, [1e-2], spoiled={"exact-step on eq8, 0, 0": {"trajectory": other}})
+
+
+@pytest.mark.parametrize(
+    ("error", "expected"),
+    [
+        (2e-2, Price(80.0, bound=True)),  # the first level keeps it already
+        (1e-3, Price(160.0, bound=False)),
+        (math.sqrt(5e-4 * 1e-5), Price(math.sqrt(640.0 * 1280.0), bound=False)),  # past the lucky level at 320
+        (1e-6, None),  # never reached
+        (math.nan, None),
+    ],
+)
+def test_the_price_of_an_error(monkeypatch, error, expected):
+    study, found = studied(monkeypatch, [1e-2, 1e-3, 1e-8, 5e-4, 1e-5], floor=1e-9)
+    level = price(found, error, study.references["eq8"])
+    assert (level is None) == (expected is None)
+    if expected is not None:
+        assert (level.value, level.bound) == (pytest.approx(expected.value), expected.bound)
+
+
+def test_nobody_is_priced_at_the_floor(monkeypatch):
+    study, found = studied(monkeypatch, [1e-2, 1e-5, 1e-10], floor=1e-9)
+    floor = study.references["eq8"].floor
+    assert found.points[-1].at_floor
+    assert price(found, floor, study.references["eq8"]) is None
+    assert price(found, 1.01 * floor, study.references["eq8"]).value <= found.points[-1].work
+
+
+def test_a_price_in_seconds_steps_and_work(monkeypatch):
+    study, found = studied(monkeypatch, [1e-2, 1e-4])
+    reference = study.references["eq8"]
+    middle = [price(found, 1e-3, reference, cost).value for cost in ("work", "steps", "seconds")]
+    assert middle == pytest.approx([80 * math.sqrt(2), 40 * math.sqrt(2), 0.1 * math.sqrt(2)])
+
+
+# ---------------------------------------------------------------------- what solvers do
+
+
+@pytest.mark.parametrize(
+    ("name", "order"),
+    [*((scheme, 2.0 if scheme == "midpoint" else 1.0) for scheme in SCHEMES if scheme != "published-matlab"),
+     ("pymunk", 1.0), ("pymunk rotating", 1.0)],
+)  # fmt: skip
+def test_orders_before_the_first_impact(smooth, name, order):
+    found = next(c for c in smooth[1].curves.values() if c.contender.name == name)
+    assert found.failed == ()
+    assert found.slope == pytest.approx(order, abs=0.1)
+
+
+def test_the_floors_of_the_smooth_throw(smooth):
+    for name, reference in smooth[1].references.items():
+        limit = 1e-4 if name.startswith(OWN_LIMIT) else 1e-12
+        assert reference.reason == ""
+        assert 1e-13 <= reference.floor < limit, name
+
+
+def test_methods_and_mujoco_reach_a_billionth(smooth):
+    for name in ("DOP853 on eq8", "DOP853 on free-flight", "mujoco on free-flight"):
+        assert smooth[1].curves[name].points[-1].error < 1e-9, name
+
+
+def test_against_another_equation_no_scheme_converges(smooth):
+    """The published program goes to its own limit; held against Eq. 8 its error would stand still."""
+    made, study = smooth
+    case = CASES["smooth"]
+    swapped = {
+        tag: made[tag.replace("published-limit", "eq8")] if tag.endswith(", published-limit") else outcome
+        for tag, outcome in made.items()
+    }
+    wrong = study_work_precision(case, SMOOTH, swapped).curves["published-python on published-limit"]
+    right = study.curves["published-python on published-limit"]
+    assert right.slope == pytest.approx(1.0, abs=0.1)
+    assert not wrong.slope > 0.3
+    assert wrong.points[-1].error > 5 * right.points[-1].error
+
+
+@pytest.mark.parametrize(("drag", "lowest", "highest"), [(False, 1.7, 2.4), (True, 0.8, 1.3)])
+def test_midpoint_keeps_its_order_through_impacts_only_without_drag(drag, lowest, highest):
+    """v_CM jumps at an impact; without drag nobody feels that."""
+    scenario = CASES["impacts"].scenario
+    scenario = scenario if drag else replace(scenario, drag=0.0)
+    case = Case(name="drag", title="drag", scenario=scenario)
+    effort = replace(SMOOTH, scheme_levels=7, scheme_members=(4, 5, 6, 7))
+    runs = [r for r in plan_work_precision(case, effort) if r.tag.endswith(", eq8") or "midpoint on" in r.tag]
+    made = make_all_timed(Here(), [(planned, case.times) for planned in runs])
+    nothing = {r.tag: Made(r, None, 0.0, "not asked") for r in plan_work_precision(case, effort) if r.tag not in made}
+    found = study_work_precision(case, effort, nothing | made).curves["midpoint on eq8"]
+    assert lowest < found.slope < highest
+
+
+def test_work_is_counted_as_stated():
+    case = CASES["smooth"]
+    n = case.scenario.n_slices
+    assert work_of(slicemodel.solve(case.scenario, "exact-step", 101)) == 100 * n
+    assert work_of(slicemodel.solve(case.scenario, "midpoint", 101)) == 200 * n
+    for solver, settings, per_step in (
+        ("pymunk", {"iterations": 7}, 7),
+        ("pymunk", {"iterations": 3, "frame": "rotating"}, 3),
+        ("mujoco", {}, 4),
+    ):
+        dt = case.scenario.duration / 80
+        flight = make(Run("x", solver, case.scenario, {"dt": dt, "times": case.times, **settings})).trajectory
+        assert work_of(flight) == flight.diagnostics["steps"] * n * per_step
+        assert flight.diagnostics["steps"] == 80 or flight.status == "diverged"
+    flight = make(Run("x", "eq8", case.scenario, {"times": case.times})).trajectory
+    assert work_of(flight) == flight.diagnostics["evaluations"] * n
+
+
+# ---------------------------------------------------------------------- timing
+
+
+def test_times_that_a_run_does_not_hold_are_refused():
+    t = np.linspace(0.0, 1.0, 11)
+    assert list(at_times(t, np.array([0.0, 0.3, 1.0 - 1e-12]))) == [0, 3, 10]
+    with pytest.raises(ValueError, match=r"t = 0\.35 s"):
+        at_times(t, np.array([0.0, 0.35]))
+
+
+def test_a_timed_run_is_thinned_and_costs_something():
+    case = CASES["smooth"]
+    planned = Run("x", "exact-step", case.scenario, {"steps": 4 * COMMON + 1})
+    (made,) = make_timed([(planned, case.times)])
+    assert made.run == planned
+    assert 0.0 < made.seconds < math.inf
+    whole = slicemodel.solve(case.scenario, "exact-step", 4 * COMMON + 1)
+    assert np.array_equal(made.trajectory.omega, whole.omega[::4])
+    assert made.trajectory.r.shape == (0, case.scenario.n_slices)
+    assert made.trajectory.settings == whole.settings
+
+
+def test_a_run_that_ends_early_is_thinned_up_to_there():
+    whole = slicemodel.solve(CASES["smooth"].scenario, "exact-step", COMMON + 1)
+    times = CASES["smooth"].times
+    short = sampled(whole, times)
+    assert len(sampled(replace(short, t=short.t[:5], theta=short.theta[:5], omega=short.omega[:5],
+                               r_cm=short.r_cm[:5], inertia=short.inertia[:5]), times).t) == 5  # fmt: skip
+
+
+def test_runs_come_back_in_order_and_failures_keep_their_reason():
+    case = CASES["smooth"]
+    runs = [
+        (Run("b", "eq8", case.scenario, {"times": case.times, "method": "LSODA"}), case.times),
+        (Run("a", "eq8", case.scenario, {"times": case.times, "method": "nobody"}), case.times),
+        (Run("c", "midpoint", case.scenario, {"steps": COMMON + 1}), case.times),
+        (Run("d", "eq8", case.scenario, {"times": case.times, "method": "LSODA", "rtol": 1e-6}), case.times),
+    ]
+    made = make_all_timed(Here(), runs)
+    assert list(made) == ["b", "a", "c", "d"]
+    assert made["a"].trajectory is None
+    assert "nobody" in made["a"].reason
+    assert made["b"].trajectory is not None
+
+
+# ---------------------------------------------------------------------- as a report shows it
+
+
+def test_figures_name_every_contender_and_carry_units(quick):
+    (study,) = quick
+    for cost, unit in (("work", "[1]"), ("seconds", "[s]")):
+        figure = figure_work_precision(study, cost)
+        words = " ".join(text.get_text() for axes in figure.axes for text in (*axes.texts, axes.title))
+        titles = [axes.get_title(loc="left") for axes in figure.axes]
+        for found in study.curves.values():
+            assert found.contender.name in words
+        for equation in study.references:
+            assert any(equation in title for title in titles)
+        labels = [axes.get_xlabel() for axes in figure.axes if axes.get_xlabel()]
+        assert labels
+        assert all(label.endswith(unit) for label in labels)
+        assert all(axes.get_xscale() == axes.get_yscale() == "log" for axes in figure.axes[: len(study.references)])
+
+
+def test_exhibits_and_tables_of_the_quick_report(quick):
+    exhibits = list(draw_work_precision(quick))
+    assert [exhibit.name for exhibit in exhibits] == ["work-precision-impacts"]
+    for exhibit in exhibits:
+        assert exhibit.drawing.svg.startswith("<?xml")
+        assert "nan" not in exhibit.alt
+        assert len(exhibit.caption) > 60
+    tables = {table.name: table for table in tabulate_work_precision(quick)}
+    for table in tables.values():
+        assert all(len(row) == len(table.columns) for row in table.rows)
+        assert "nan" not in " ".join(" ".join(row) for row in table.rows)
+        assert table.as_text().startswith(table.title)
+    held = {row[0]: row[4] for row in tables["work-settings-impacts"].rows}
+    assert "iterations" in held["pymunk"]
+    assert "rest_flight" in held["mujoco"]
+    assert "max_step" in held["DOP853"]
+    assert {row[0] for row in tables["work-results-impacts"].rows} >= {*SCHEMES, *ENGINES, "DOP853", "LSODA"}
+    assert "Radau" in " ".join(row[0] for row in tables["work-absent"].rows)
+
+
+def test_findings_are_observations_with_numbers(quick):
+    findings = {finding.id: finding for finding in claim_work_precision(quick)}
+    assert all(finding.kind == "observation" for finding in findings.values())
+    steps = findings["work-exact-step-midpoint"]
+    assert steps.value > 5.0
+    assert "steps of exact-step" in steps.note
+    assert findings["work-floor"].value < 1e-3
+    assert "published-matlab" in findings["work-failed"].note
+    assert findings["work-failed"].value == QUICK.scheme_levels
+    json.dumps([finding.to_mapping() for finding in findings.values()], allow_nan=False)
+
+
+def test_claims_of_nothing_are_none():
+    assert list(claim_work_precision([])) == []
+    assert list(draw_work_precision([])) == []
+
+
+def test_what_impacts_cost_needs_both_throws(quick, smooth):
+    ids = {finding.id for finding in claim_work_precision([smooth[1], *quick])}
+    assert "work-impacts-eq8" in ids
+    assert "work-impacts-eq8" not in {finding.id for finding in claim_work_precision(quick)}
