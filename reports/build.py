@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from reports.evaluation import evaluate
 from reports.evidence import FLIGHTS, FREE, OTHERS, Evidence
 from reports.exhibit import Exhibit
 from reports.exhibits import draw_all
+from reports.exhibits_work_precision import summarise_work_precision
 from reports.findings import Finding
 from reports.lead import lead_words
 from reports.page import render
@@ -54,6 +56,7 @@ def build(evidence: Evidence, provenance: Mapping[str, str]) -> Report:
         "findings": [finding.to_mapping() for finding in findings],
         "differences": [_difference_mapping(difference) for difference in evidence.differences],
         "solvers": solvers,
+        "work_precision": summarise_work_precision(evidence.precision),
         "runs": [_run_mapping(evidence, tag) for tag in evidence.made],
         "lead": lead_words(evidence.differences, evidence.trajectory(FREE)),
         "figures": [{"name": s.name, "title": s.title, "alt": s.alt} for s in exhibits],
@@ -138,17 +141,18 @@ def _difference_mapping(difference: Any) -> dict[str, Any]:
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return settings or diagnostics as JSON-ready values; what JSON cannot say becomes text."""
-    plain: dict[str, Any] = {}
-    for name, value in values.items():
-        if hasattr(value, "item") and getattr(value, "shape", None) == ():
-            value = value.item()
-        if isinstance(value, Mapping):
-            plain[name] = _plain(value)
-        elif isinstance(value, float) and value - value != 0.0:
-            plain[name] = str(value)
-        elif value is None or isinstance(value, (bool, int, float, str)):
-            plain[name] = value
-        else:
-            plain[name] = str(value)
-    return plain
+    """Return settings or diagnostics as JSON-ready values, without the arrays."""
+    return {name: _plain_value(value) for name, value in values.items() if not getattr(value, "shape", None)}
+
+
+def _plain_value(value: Any) -> Any:
+    """Return one value as JSON holds it; what it cannot say becomes text."""
+    if hasattr(value, "item"):
+        value = value.item()
+    if isinstance(value, Mapping):
+        return _plain(value)
+    if isinstance(value, (list, tuple)):
+        return [_plain_value(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value if value is None or isinstance(value, (bool, int, float, str)) else str(value)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ode_reference.models import LADDER
-from reports import claims
+from reports import claims, claims_engines
+from reports.claims_work_precision import claim_work_precision
 from reports.evidence import CHECK, CROSS_CHECKED, ENGINE, ICED, LIMITS, Evidence
 from reports.findings import Finding
 from reports.vectors import load_all
@@ -20,7 +21,31 @@ def evaluate(evidence: Evidence) -> Iterator[Finding]:
     yield from _order_findings(evidence)
     yield from _reference_findings(evidence)
     yield from _engine_findings(evidence)
+    yield from _instrument_findings(evidence)
     yield from _attribution_findings(evidence)
+    yield from claim_work_precision(evidence.precision)
+
+
+def _instrument_findings(evidence: Evidence) -> Iterator[Finding]:
+    found = evidence.instruments
+    for tag, certificate in found.certificates.items():
+        yield claims_engines.claim_certificate(tag, certificate)
+    if found.agreement is not None:
+        yield claims_engines.claim_agreement(found.agreement)
+    yield claims_engines.claim_rule_of_iterations(found.panels)
+    yield claims_engines.claim_default_iterations_explode(found.panels)
+    yield claims_engines.claim_whole_and_wrong(found.panels)
+    for fact in found.facts:
+        yield claims_engines.claim_engine_fact(fact)
+    for horizon in found.horizons:
+        yield claims_engines.claim_horizon(horizon)
+        yield claims_engines.claim_angle(horizon)
+        order = claims_engines.claim_order_of_bodies(horizon)
+        if order is not None:
+            yield order
+    yield claims_engines.claim_full_bottle(found.full_bottle)
+    if found.overlap is not None:
+        yield claims_engines.claim_overlap(found.overlap)
 
 
 def _attribution_findings(evidence: Evidence) -> Iterator[Finding]:

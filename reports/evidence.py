@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
-import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ode_reference.models import LADDER
-from reports import vectors
+from reports import instruments, vectors
 from reports.attribution import FILLS, FORMS, LEDGER_SLICES, Attribution, Scope, plan_attribution, study_attribution
-from reports.solvers import Made, Run, find, make, without_gravity
+from reports.instruments import Bench, Instruments, plan_instruments, plan_witnesses, study_instruments
+from reports.pool import Progress, make_all, workers
+from reports.solvers import Made, Run, make, without_gravity
+from reports.studies import contenders
+from reports.studies.contenders import Effort
 from reports.studies.differences import Difference, study_difference
 from reports.studies.errata import study_errata
 from reports.studies.ice import IceDrift, plan_ice, plan_welded, study_ice
@@ -25,16 +24,19 @@ from reports.studies.predictability import PartingGrowth, study_parting_growth
 from reports.studies.slices import SliceCount, plan_slices, study_slices
 from reports.studies.step_size import StepSize, before_first_impact, plan_step_size, study_step_size
 from reports.studies.waterfall import NAMES
+from reports.studies.work_precision import WorkPrecision, gather_work_precision
 from slicemodel import Scenario, Trajectory
-
-Progress = Callable[[int, int, str], None]
-"""Called with runs made, runs planned and the last run's tag."""
+from slicemodel.trajectory import FloatArray
 
 ENGINE = "pymunk"
 FREE = LADDER[-1]
 FLIGHTS = ("published-python", "published-limit", "exact-step", "eq8", ENGINE, FREE)
 OTHER_SCHEMES = ("midpoint", "published-matlab", "paper-typeset", "signs-corrected", "roots-corrected")
-OTHERS = (*OTHER_SCHEMES, *(model for model in LADDER if model not in FLIGHTS))
+OTHERS = (
+    *OTHER_SCHEMES,
+    *(model for model in LADDER if model not in FLIGHTS),
+    *(tag for tag in instruments.WITNESSES if tag not in FLIGHTS),
+)
 ICED = ("published-limit", "eq8", FREE)
 CROSS_CHECKED = ("published-limit", "eq8")
 """Models that a second integration method is held against."""
@@ -45,14 +47,11 @@ REFERENCE = Scenario().with_slices(50)
 CHECK = "check"
 """Leads the tags of runs on REFERENCE."""
 
-SMALL = 8.0
-"""Slices times seconds of flight below which runs are made in groups."""
+CHECK_DT = 2e-4
+"""Step of the engine where two of its runs are compared with one another [s]."""
 
-GROUP = 8
-"""Runs of a group."""
-
-PATIENCE = 2.0
-"""Seconds that an interrupted report waits for its workers to end."""
+WELDED_SLICES = 20
+"""Slices of the ice that joints hold; its drift hardly depends on them."""
 
 COMMON = 37
 """Intervals that all grids of a step-size study share; a divisor of the 999 intervals of the default output times."""
@@ -70,6 +69,7 @@ DIFFERENCES = (
     ("step size of the exact step", "exact-step", "eq8"),
     *((NAMES[switch], first, second) for switch, first, second in zip(NAMES, LADDER, LADDER[1:], strict=False)),
     ("the engine's own error", FREE, ENGINE),
+    ("the engine's own error in Eq. 8's world", "eq8", "pymunk rotating"),
     (TOTAL, "published-python", FREE),
 )
 """Name, first, second: down the ladder one assumption at a time, then the engine, then the whole."""
@@ -90,6 +90,8 @@ class Size:
     counts: tuple[int, ...]
     second_method: str | None
     scope: Scope
+    bench: Bench
+    precision: Effort
 
 
 FULL = Size(
@@ -98,6 +100,8 @@ FULL = Size(
     counts=(5, 10, 20, 50, 100, 200, 500),
     second_method="Radau",
     scope=Scope(waterfall_slices=20, map_slices=12, fills=FILLS, rows=5),
+    bench=instruments.FULL,
+    precision=contenders.FULL,
 )
 QUICK = Size(
     name="quick",
@@ -113,6 +117,8 @@ QUICK = Size(
         exact=("free-flight",),
         forms=FORMS[:2],
     ),
+    bench=instruments.QUICK,
+    precision=contenders.QUICK,
 )
 
 
@@ -135,6 +141,8 @@ class Evidence:
     slices: Mapping[str, SliceCount]
     vectors: Mapping[str, Mapping[str, float]]
     attribution: Attribution
+    instruments: Instruments
+    precision: tuple[WorkPrecision, ...]
 
     def trajectory(self, tag: str) -> Trajectory | None:
         """Return the trajectory of a run, or None if it failed."""
@@ -144,10 +152,9 @@ class Evidence:
 def plan(throw: Scenario, size: Size) -> list[Run]:
     """Return the runs of the report but for the step sizes, the slowest first."""
     runs = [
-        Run(f"{ENGINE}, finer", ENGINE, throw, _finer_engine(throw)),
-        Run(f"{CHECK}, {ENGINE}, no gravity", ENGINE, without_gravity(REFERENCE)),
-        Run(f"{CHECK}, {ENGINE}", ENGINE, REFERENCE),
-        Run(ENGINE, ENGINE, throw),
+        *plan_witnesses(throw, size.bench),
+        Run(f"{CHECK}, {ENGINE}, no gravity", ENGINE, without_gravity(REFERENCE), {"dt": CHECK_DT}),
+        Run(f"{CHECK}, {ENGINE}", ENGINE, REFERENCE, {"dt": CHECK_DT}),
     ]
     for prefix, scenario in ((f"{CHECK}, ", REFERENCE), ("", throw)):
         if size.second_method:
@@ -157,7 +164,7 @@ def plan(throw: Scenario, size: Size) -> list[Run]:
             runs.append(Run(f"{prefix}{model}, tighter", model, scenario, _tighter(scenario, model)))
             runs.append(Run(f"{prefix}{model}", model, scenario))
     runs += [Run(f"{CHECK}, ledger, {m}", m, REFERENCE.with_slices(LEDGER_SLICES), {"energy": True}) for m in LADDER]
-    runs += plan_welded(REFERENCE, ENGINE)
+    runs += plan_welded(REFERENCE.with_slices(WELDED_SLICES), ENGINE)
     runs.append(Run(f"{ENGINE}, 10 iterations", ENGINE, throw, {"iterations": 10}))
     runs += plan_ice(throw, tuple(LIMITS), ICED, ENGINE)
     for scheme in (*LIMITS, *OTHER_SCHEMES):
@@ -174,15 +181,7 @@ def plan(throw: Scenario, size: Size) -> list[Run]:
 def _tighter(scenario: Scenario, model: str) -> dict[str, Any]:
     """Tolerances and rest speed a tenth, longest step a half of what the reference does unless told otherwise."""
     rest_speed = 1e-4 if model == FREE else 1e-6
-    return {"rtol": 1e-11, "atol": 1e-14, "rest_speed": rest_speed, "max_step": 0.005 / abs(scenario.omega0)}
-
-
-def _finer_engine(throw: Scenario) -> dict[str, Any]:
-    """Half the engine's default step and twice its default iterations, refined together."""
-    from engine_check.pymunk_settings import enough_iterations
-    from engine_check.solver import DEFAULT_DT
-
-    return {"dt": DEFAULT_DT / 2, "iterations": 2 * enough_iterations(throw)}
+    return {"rtol": 1e-11, "atol": 1e-14, "rest_speed": rest_speed, "max_step": 0.01 / abs(scenario.omega0)}
 
 
 def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None = None) -> Evidence:
@@ -204,11 +203,14 @@ def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None 
     flat = (
         runs
         + plan_attribution(throw, size.scope, size.steps)
+        + plan_instruments(REFERENCE, throw, size.bench)
         + [run for plans in (steps, checks) for levels in plans.values() for level in levels for run in level]
     )
     with workers(jobs) as pool:
         audit = pool.submit(study_errata, throw)
         made = make_all(pool, flat, progress)
+        # After the other runs, so that the compiled loop is there and its compiling is not counted.
+        precision = gather_work_precision(pool, size.precision)
         starts = _study_starts(pool, throw, "", made, size.levels)
         check_starts = _study_starts(pool, REFERENCE, f"{CHECK}, ", made, 4)
         attribution = study_attribution(throw, size.scope, size.steps, made, pool, audit)
@@ -226,7 +228,7 @@ def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None 
         check_flights=_study_plans(checks, f"{CHECK}, ", made),
         check_starts=check_starts,
         ice=tuple(_ice(made, [run.tag for run in runs if run.tag.startswith("ice,") and "welded" not in run.tag])),
-        welded=tuple(_ice(made, [run.tag for run in plan_welded(REFERENCE, ENGINE)])),
+        welded=tuple(_ice(made, [run.tag for run in plan_welded(REFERENCE.with_slices(WELDED_SLICES), ENGINE)])),
         slices={
             scheme: counted
             for scheme in LIMITS
@@ -238,68 +240,9 @@ def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None 
             if (run := made[f"vector {vector.name}"].trajectory) is not None
         },
         attribution=attribution,
+        instruments=study_instruments(REFERENCE, throw, size.bench, made, _band_over_time(made)),
+        precision=precision,
     )
-
-
-def make_all(pool: Executor, runs: Iterable[Run], progress: Progress) -> dict[str, Made]:
-    """Make runs in worker processes: one job for each slow run, one for all of the slice model's.
-
-    This process only waits, so that it can be interrupted at any time; the slice model compiles in one worker only.
-    """
-    runs = list(runs)
-    # Runs that differ in their tag only are made once.
-    same: dict[tuple[Any, ...], list[Run]] = {}
-    for run in runs:
-        same.setdefault((run.solver, run.scenario, repr(sorted(run.settings.items()))), []).append(run)
-    different = [group[0] for group in same.values()]
-    others = {group[0].tag: group for group in same.values()}
-    quick = [run for run in different if find(run.solver).package == "slicemodel"]
-    slow = [run for run in different if find(run.solver).package != "slicemodel"]
-    # Small runs go in groups: sending each away alone would cost as much as making it.
-    small = [run for run in slow if run.scenario.n_slices * run.scenario.duration < SMALL]
-    jobs = [[run] for run in slow if run.scenario.n_slices * run.scenario.duration >= SMALL]
-    jobs += [small[k : k + GROUP] for k in range(0, len(small), GROUP)]
-    made: dict[str, Made] = {}
-    for future in as_completed([pool.submit(make_each, job) for job in ([quick] if quick else []) + jobs]):
-        for result in future.result():
-            for run in others[result.run.tag]:
-                made[run.tag] = replace(result, run=run)
-            progress(len(made), len(runs), result.run.tag)
-    # In the order asked, whichever worker was faster: what is read off this table must not depend on load.
-    return {run.tag: made[run.tag] for run in runs}
-
-
-def make_each(runs: Iterable[Run]) -> list[Made]:
-    """Make runs one after the other."""
-    return [make(run) for run in runs]
-
-
-@contextmanager
-def workers(jobs: int | None) -> Iterator[Executor]:
-    """Give a pool of worker processes; when interrupted, end them at once instead of waiting for their runs."""
-    # One linear-algebra thread per worker: two workers with two each wait for one another.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    pool = ProcessPoolExecutor(
-        max_workers=jobs or cores,
-        mp_context=multiprocessing.get_context("spawn"),
-        initializer=signal.signal,
-        initargs=(signal.SIGINT, signal.SIG_IGN),
-    )
-    try:
-        yield pool
-    except KeyboardInterrupt:
-        for child in multiprocessing.active_children():
-            child.kill()
-        # A worker killed while it sends a result leaves the pool waiting for the rest of it, so the wait is bounded.
-        ending = threading.Thread(target=pool.shutdown, kwargs={"cancel_futures": True}, daemon=True)
-        ending.start()
-        ending.join(PATIENCE)
-        raise
-    except BaseException:
-        pool.shutdown(cancel_futures=True)
-        raise
-    pool.shutdown()
 
 
 def run_bands(made: Mapping[str, Made]) -> dict[str, float]:
@@ -307,16 +250,28 @@ def run_bands(made: Mapping[str, Made]) -> dict[str, float]:
 
     A scheme at its number of steps is a definite program: its step error is a difference with a bar of its own, so its
     band is zero. For a model it is the change under tenfold tighter tolerances or another method, and never less than
-    MODEL_FLOOR; for the engine, of first order, twice the change when step and iterations are refined together.
+    MODEL_FLOOR; for an engine that of its certificate.
     """
     bands = dict.fromkeys(LIMITS, 0.0)
-    checks = [(model, other, 1.0) for model in LADDER for other in made if other.startswith(f"{model}, ")]
-    for tag, other, factor in [*checks, (ENGINE, f"{ENGINE}, finer", 2.0)]:
+    for tag, other in [(model, other) for model in LADDER for other in made if other.startswith(f"{model}, ")]:
         usual, better = made[tag].trajectory, made[other].trajectory
         if usual is not None and better is not None and usual.ok and better.ok:
-            change = factor * study_difference(tag, usual, better).largest
-            bands[tag] = max(bands.get(tag, MODEL_FLOOR), change)
+            bands[tag] = max(bands.get(tag, MODEL_FLOOR), study_difference(tag, usual, better).largest)
+    for tag in instruments.WITNESSES:
+        run = made[tag].trajectory if tag in made else None
+        certificate = {} if run is None else run.diagnostics.get("certificate", {})
+        if certificate.get("band") is not None:
+            bands[tag] = certificate["band"]
     return bands
+
+
+def _band_over_time(made: Mapping[str, Made]) -> FloatArray | None:
+    """Return up to when free flight has moved by how much under tenfold tighter tolerances, fraction of omega_0."""
+    usual, tight = made[FREE].trajectory, made[f"{FREE}, tighter"].trajectory
+    if usual is None or tight is None or len(usual.t) != len(tight.t):
+        return None
+    moved = np.abs(tight.omega - usual.omega) / abs(usual.scenario.omega0)
+    return np.asarray(np.maximum.accumulate(np.maximum(moved, MODEL_FLOOR)))
 
 
 def _differences(made: Mapping[str, Made]) -> Iterator[Difference]:

@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from reports.evidence import FLIGHTS, Evidence
 from reports.exhibit import Exhibit
 from reports.exhibits_attribution import draw_attribution
+from reports.exhibits_engines import draw_instruments
+from reports.exhibits_work_precision import draw_work_precision
 from reports.figures import flights as flight_figures
 from reports.figures import numerics as numeric_figures
 from reports.figures.style import draw
@@ -31,6 +33,8 @@ def draw_all(evidence: Evidence) -> Iterator[Exhibit]:
         yield _draw_ice(evidence)
     if evidence.slices:
         yield _draw_slices(evidence)
+    yield from draw_instruments(evidence.instruments)
+    yield from draw_work_precision(evidence.precision)
     yield from draw_attribution(evidence.attribution)
 
 

@@ -10,6 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from reports.evidence import FREE, Evidence
 from reports.exhibit import Exhibit
+from reports.exhibits_work_precision import tabulate_work_precision
 from reports.findings import Finding
 from reports.lead import lead_words
 from reports.studies.differences import Difference
@@ -35,6 +36,19 @@ def amount(difference: Difference) -> str:
     return f"{size} ± {band:.1g} %" if band >= 1e-3 else f"{size} ± < 0.001 %"
 
 
+def short(value: float | None) -> str:
+    """Return a number with two digits, a dash if there is none."""
+    if value is None:
+        return "–"
+    return str(value) if isinstance(value, int) else f"{value:.2g}"
+
+
+def restitution_error(certificate: Mapping[str, Any]) -> float | None:
+    """Return the largest |measured - asked| restitution of a certificate; None if none was measured."""
+    errors = [abs(r["measured"] - r["asked"]) for r in certificate["restitution"] if r["measured"] is not None]
+    return max(errors, default=None)
+
+
 def render(
     evidence: Evidence,
     findings: Sequence[Finding],
@@ -53,6 +67,8 @@ def render(
     differences = sorted(evidence.differences, key=lambda difference: -difference.largest)
     environment.filters["typeset"] = typeset
     environment.filters["amount"] = amount
+    environment.filters["short"] = short
+    environment.filters["restitution_error"] = restitution_error
     regressions = [finding for finding in findings if finding.kind == "regression"]
     return environment.get_template("report.html.j2").render(
         scenario=evidence.scenario,
@@ -68,6 +84,8 @@ def render(
         slices=evidence.slices,
         growths=evidence.growths,
         found=evidence.attribution,
+        instruments=evidence.instruments,
+        tables=list(tabulate_work_precision(evidence.precision)),
         forms_omega=[(pair, forms["omega"]) for pair, forms in evidence.attribution.forms.items()],
         solvers=solvers,
         problems=[made for made in evidence.made.values() if made.trajectory is None],

@@ -7,7 +7,7 @@ import platform
 from datetime import UTC, datetime
 from importlib import metadata
 
-PACKAGES = ("flipproof", "numpy", "scipy", "numba", "pymunk", "matplotlib", "jinja2")
+PACKAGES = ("flipproof", "numpy", "scipy", "numba", "pymunk", "mujoco-core", "matplotlib", "jinja2")
 
 
 def provenance(command: str) -> dict[str, str]:
@@ -21,7 +21,7 @@ def provenance(command: str) -> dict[str, str]:
         try:
             facts[package] = metadata.version(package)
         except metadata.PackageNotFoundError:
-            facts[package] = "checkout"
+            facts[package] = "checkout" if package == "flipproof" else "not installed"
     facts["system"] = f"{platform.system()} {platform.machine()}"
     facts["processor"] = _processor()
     facts["cores"] = str(_cores())

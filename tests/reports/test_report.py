@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from reports import claims, cli
+from reports import claims, cli, pool
 from reports import evidence as evidence_module
 from reports.build import build
 from reports.evaluation import evaluate
@@ -23,10 +23,9 @@ from reports.evidence import (
     ENGINE,
     FLIGHTS,
     OTHER_SCHEMES,
-    make_all,
-    workers,
 )
 from reports.page import typeset
+from reports.pool import make_all, workers
 from reports.provenance import provenance
 from reports.solvers import Made, Run, make
 from slicemodel import Scenario
@@ -179,8 +178,8 @@ def test_a_run_that_raises_becomes_its_reason():
 def test_workers_bring_home_the_same_trajectory():
     run = Run("eq8", "eq8", Scenario(n_slices=2, duration=0.05))
     seen = []
-    with workers(1) as pool:
-        away = make_all(pool, [run], lambda *call: seen.append(call))["eq8"].trajectory
+    with workers(1) as processes:
+        away = make_all(processes, [run], lambda *call: seen.append(call))["eq8"].trajectory
     here = make(run).trajectory
     assert seen == [(1, 1, "eq8")]
     assert (away.omega == here.omega).all()
@@ -208,7 +207,7 @@ class LastFirst(Executor):
 
 def test_results_stand_in_the_order_asked_whichever_worker_is_faster(monkeypatch):
     """A step must never be paired with the drift of another: what is read off this table is read in order."""
-    monkeypatch.setattr(evidence_module, "SMALL", 0.0)
+    monkeypatch.setattr(pool, "SMALL", 0.0)
     runs = [Run(f"{n}", "eq8", Scenario(n_slices=n, duration=0.02)) for n in (1, 2, 3)]
     made = make_all(LastFirst(3), runs, lambda *_: None)
     assert list(made) == ["1", "2", "3"]

@@ -228,12 +228,16 @@ def test_bands_of_runs():
         "eq8, tighter": made([20, 20 + 2e-6], "eq8"),
         "eq8, Radau": made([20, 20 + 4e-6], "eq8"),
         "pymunk": made([20, 20], "pymunk"),
-        "pymunk, finer": made([20, 20.02], "pymunk"),
+        "mujoco": made([20, 20], "mujoco"),
     }
+    witness = runs["pymunk"].trajectory
+    certified = dataclasses.replace(witness, diagnostics={"certificate": {"band": 2e-3}})
+    runs["pymunk"] = dataclasses.replace(runs["pymunk"], trajectory=certified)
     bands = run_bands(runs)
     assert bands["published-limit"] == 1e-9  # never finer than independent methods share
     assert bands["eq8"] == pytest.approx(2e-7)
-    assert bands["pymunk"] == pytest.approx(2e-3)  # of first order: twice the change
+    assert bands["pymunk"] == 2e-3
+    assert "mujoco" not in bands  # without a certificate there is none
     assert bands["published-python"] == 0.0
 
 

@@ -1,0 +1,154 @@
+"""The engines as instruments: what each says of itself, who agrees with whom, where they fail, what they add."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final, TypeVar
+
+import numpy as np
+
+from reports.solvers import Made, Run
+from reports.studies import horizon, overlap, stability
+from reports.studies.agreement import Agreement, study_agreement
+from reports.studies.engine_facts import EngineFact, plan_engine_facts, study_engine_facts
+from reports.studies.horizon import Horizon, Reach, plan_horizon, study_horizon
+from reports.studies.overlap import Overlap, plan_overlap, study_overlap
+from reports.studies.stability import Layout, StabilityPanel, plan_stability, study_stability
+from reports.studies.validity import vary
+from slicemodel import Scenario, Trajectory
+from slicemodel.trajectory import FloatArray
+
+TOLERANCE: Final = 1e-3
+"""What the certificates of a report must hold, fraction of omega_0."""
+
+WITNESSES: Final[Mapping[str, tuple[str, Mapping[str, Any]]]] = {
+    "pymunk": ("pymunk", {}),
+    "mujoco": ("mujoco", {}),
+    "pymunk rotating": ("pymunk", {"frame": "rotating"}),
+}
+"""Tag -> engine and settings of every engine run that the report certifies."""
+
+SAME_EQUATION: Final = ("free-flight", "pymunk", "mujoco")
+"""What solves the same equation on the same throw, in three different ways."""
+
+REFERENCE: Final = SAME_EQUATION[0]
+
+FULL_SLICES: Final = 5
+FULL_DT: Final = 1e-5
+FULL_TAG: Final = "full bottle, slices exclude each other"
+"""A full bottle in which nothing can move: resting contacts creep at first order, hence the fine step."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bench:
+    """How much of it: the stability chart, the ensembles, the fill fractions and slices of the overlap."""
+
+    layout: Layout = stability.FULL
+    reach: Reach = horizon.FULL
+    fills: tuple[float, ...] = overlap.FILLS
+    slices: int = overlap.SLICES
+    dt: float = overlap.DT
+    tolerance: float = TOLERANCE
+
+
+FULL: Final = Bench()
+QUICK: Final = Bench(
+    layout=stability.QUICK, reach=horizon.QUICK, fills=overlap.FEW_FILLS, slices=6, dt=2e-4, tolerance=5 * TOLERANCE
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Instruments:
+    """What was found about the engines; a study that could not be made is missing, and ``problems`` says why.
+
+    Parameters
+    ----------
+    certificates : mapping tag -> mapping
+        As ``engine_check.Certificate.to_mapping`` gives it, of each run in ``WITNESSES`` that was made.
+    agreement : Agreement or None
+        Of the three solvers of free flight, on the report's throw.
+    full_bottle : Trajectory or None
+        The full bottle whose slices exclude each other.
+    """
+
+    certificates: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    agreement: Agreement | None = None
+    panels: tuple[StabilityPanel, ...] = ()
+    facts: tuple[EngineFact, ...] = ()
+    horizons: tuple[Horizon, ...] = ()
+    overlap: Overlap | None = None
+    full_bottle: Trajectory | None = None
+    problems: Mapping[str, str] = field(default_factory=dict)
+
+
+def plan_witnesses(throw: Scenario, bench: Bench) -> list[Run]:
+    """Return the certified engine runs of the report's throw."""
+    return [
+        Run(tag, engine, throw, {**settings, "tolerance": bench.tolerance})
+        for tag, (engine, settings) in WITNESSES.items()
+    ]
+
+
+def plan_instruments(reference: Scenario, throw: Scenario, bench: Bench) -> list[Run]:
+    """Return the runs of the studies; only the overlap is of the ``throw``, all else is of ``reference``."""
+    full = vary(reference.with_slices(FULL_SLICES), fill=1.0)
+    times = np.linspace(0.0, full.duration, 101)
+    return [
+        *plan_stability(reference, bench.layout),
+        *plan_engine_facts(reference),
+        *plan_horizon(reference, bench.reach),
+        *plan_overlap(throw, bench.fills, slices=bench.slices, dt=bench.dt),
+        Run(FULL_TAG, "pymunk", full, {"slices": "exclude", "dt": FULL_DT, "times": times}),
+    ]
+
+
+Result = TypeVar("Result")
+
+
+def study_instruments(
+    reference: Scenario, throw: Scenario, bench: Bench, made: Mapping[str, Made], band: FloatArray | None
+) -> Instruments:
+    """Study what was planned.
+
+    Parameters
+    ----------
+    made : mapping tag -> Made
+    band : array, shape (P,), or None
+        How far the reference's free flight may be off, fraction of omega_0; None if it was not made.
+    """
+    problems: dict[str, str] = {}
+
+    def attempt(name: str, study: Callable[[], Result]) -> Result | None:
+        try:
+            return study()
+        except (ArithmeticError, ValueError, LookupError) as error:
+            problems[name] = f"{type(error).__name__}: {error}"
+            return None
+
+    runs = {tag: run for tag in (REFERENCE, *WITNESSES) if tag in made and (run := made[tag].trajectory) is not None}
+    full = made[FULL_TAG].trajectory
+    return Instruments(
+        certificates={
+            tag: runs[tag].diagnostics["certificate"]
+            for tag in WITNESSES
+            if tag in runs and "certificate" in runs[tag].diagnostics
+        },
+        agreement=attempt("agreement", lambda: _agreement(runs, band)),
+        panels=attempt("stability chart", lambda: study_stability(reference, bench.layout, made)) or (),
+        facts=attempt("engine facts", lambda: study_engine_facts(made)) or (),
+        horizons=attempt("horizon", lambda: study_horizon(reference, bench.reach, made)) or (),
+        overlap=attempt("overlap", lambda: study_overlap(throw, made, bench.fills, slices=bench.slices)),
+        full_bottle=full if full is not None and full.ok else None,
+        problems=problems,
+    )
+
+
+def _agreement(runs: Mapping[str, Trajectory], band: FloatArray | None) -> Agreement:
+    """Compare the solvers of free flight that reached the end, each within its own band."""
+    if band is None:
+        raise ArithmeticError("free flight was not made twice: its band is not known")
+    whole = {tag: runs[tag] for tag in SAME_EQUATION if tag in runs and runs[tag].ok}
+    bands = {tag: band if tag == REFERENCE else run.diagnostics["omega_band"] for tag, run in whole.items()}
+    horizons = [run.diagnostics["certificate"]["horizon"] for tag, run in whole.items() if tag != REFERENCE]
+    return study_agreement(whole, bands, until=min((h for h in horizons if h is not None), default=np.inf))
