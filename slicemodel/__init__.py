@@ -10,15 +10,29 @@ from typing import TYPE_CHECKING, Any
 from slicemodel.scenario import Bottle, Scenario, ScenarioError
 
 if TYPE_CHECKING:
+    from slicemodel.batch import Batch, solve_batch
     from slicemodel.solver import solve
     from slicemodel.step_advice import required_steps
     from slicemodel.trajectory import Impact, Impacts, Trajectory
 
-__all__ = ["Bottle", "Impact", "Impacts", "Scenario", "ScenarioError", "Trajectory", "required_steps", "solve"]
+__all__ = [
+    "Batch",
+    "Bottle",
+    "Impact",
+    "Impacts",
+    "Scenario",
+    "ScenarioError",
+    "Trajectory",
+    "required_steps",
+    "solve",
+    "solve_batch",
+]
 
 _HOMES = {
     "required_steps": "slicemodel.step_advice",
     "solve": "slicemodel.solver",
+    "solve_batch": "slicemodel.batch",
+    "Batch": "slicemodel.batch",
     "Impact": "slicemodel.trajectory",
     "Impacts": "slicemodel.trajectory",
     "Trajectory": "slicemodel.trajectory",
@@ -30,5 +44,6 @@ def __getattr__(name: str) -> Any:
     if name in _HOMES:
         from importlib import import_module
 
-        return getattr(import_module(_HOMES[name]), name)
+        globals()[name] = getattr(import_module(_HOMES[name]), name)
+        return globals()[name]
     raise AttributeError(f"module 'slicemodel' has no attribute {name!r}")

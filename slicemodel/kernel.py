@@ -1,35 +1,72 @@
 """The compiled loop: one pass over the time grid that every scheme feeds with its switches.
 
+A step is one map with coefficients that all slices share (``schemes.form``), so the slices move in lanes, eight at a
+time: they are loaded, moved, summed and stored without leaving the processor's registers.
+
+    r  |01234567|89......|........|....pppp|     p: padding, kept at the middle of the bottle, adds 0 to every sum
+            |
+            +-> r', v' --> a slice at an end? --no---------------------> add to the sums, store
+                                  |                                        ^
+                                  +--yes--> rebound it, list the rebound --+
+
+The instructions are written out, because no compiler may put eight sums in the place of one: the order of additions
+decides the last digit. Here the order is part of the program, and so is where a product and a sum are rounded once
+(fma): the same on every machine, however wide its registers are.
+
 All compiled functions live in this one file: numba's cache does not notice a change in a helper elsewhere.
 """
 
 from __future__ import annotations
 
+import inspect
 import logging
 import math
+import operator
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numba
 import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
 from slicemodel.trajectory import FloatArray
-
-
-def compiled(function: Callable[..., Any]) -> Any:
-    """Compile for speed with reproducible sums (no fastmath); without a writable cache, compile in memory."""
-    try:
-        return numba.njit(function, cache=True, error_model="numpy", nogil=True)
-    except RuntimeError as error:
-        logging.getLogger(__name__).warning("compiling %s in memory: %s", function.__name__, error)
-        return numba.njit(function, error_model="numpy", nogil=True)
-
 
 REST_SPEED = 1e-6
 """In-step rebounds: a slice slower than this that its end pushes back stays there [m/s]; it would hop 1e-14 m."""
 
 MOST_HITS = 1000
 """In-step rebounds of one slice in one step after which it is left at the end it hit."""
+
+ROUNDING = 4e-16
+"""Of a sum of two numbers, in units of the larger."""
+
+SERIES = 0.5
+"""Arguments below which sinh is summed up from its series; the first term left out is 2e-17 of the sum."""
+
+
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
+"""Every operation is rounded as written: no fastmath."""
+
+
+def compiled(function: Callable[..., Any]) -> Any:
+    """Compile a function that is called."""
+    return numba.njit(function, forceinline=False, **OPTIONS)
+
+
+def merged(function: Callable[..., Any]) -> Any:
+    """Compile a function that becomes part of its callers: what it is given stays in registers."""
+    return numba.njit(function, forceinline=True, **OPTIONS)
+
+
+def kept_on_disk(function: Callable[..., Any]) -> Any:
+    """Compile a function and keep the result on disk; without a writable place, in memory only."""
+    try:
+        return numba.njit(function, cache=True, **OPTIONS)
+    except RuntimeError as error:
+        logging.getLogger(__name__).warning("compiling in memory, once per process: %s", error)
+        return numba.njit(function, **OPTIONS)
 
 
 class Frame(NamedTuple):
@@ -46,46 +83,297 @@ class Frame(NamedTuple):
     frozen: bool
 
 
-class Run(NamedTuple):
-    """What the loop returns: arrays over the grid, rebounds, where it stopped, where a slice escaped (or -1)."""
+class Record(NamedTuple):
+    """Where the loop writes: theta, omega, r_cm, inertia of shape (P,); r, v of shape (P, N), or (0, N) for none."""
 
     theta: FloatArray
     omega: FloatArray
     r_cm: FloatArray
     inertia: FloatArray
-    rebounds: FloatArray
+    r: FloatArray
+    v: FloatArray
+
+
+class Run(NamedTuple):
+    """What the loop returns: finite points, rebounds, and where a slice first escaped (or -1)."""
+
     points: int
+    rebounds: int
     escape_step: int
     escape_slice: int
+
+
+# ---------------------------------------------------------------------- lanes: eight numbers that move together
+
+LANES = 8
+"""Numbers in a lane group: one AVX-512 register, two of AVX2; also the number of partial sums, on every machine."""
+
+LOOKED_AT = 3 * LANES
+"""Where in the working memory, after three partial sums, r and v of a single lane group stand."""
+
+HALF_PAGE = 256
+"""Numbers in 2048 bytes."""
+
+WORK = LOOKED_AT + 2 * LANES
+
+VECTOR = ir.VectorType(ir.DoubleType(), LANES)
+WORD = ir.IntType(64)
+
+
+class Lanes(types.Type):
+    """Type of a lane group in compiled code."""
+
+
+lanes, number, whole = Lanes("Lanes"), types.float64, types.int64
+
+
+@register_model(Lanes)
+class LanesModel(models.PrimitiveModel):
+    """A lane group is a vector of LLVM."""
+
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, VECTOR)
+
+
+def instructions(result: Any, *kinds: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Make a function of compiled code out of one that writes its instructions."""
+
+    def made(write: Callable[..., Any]) -> Callable[..., Any]:
+        def definition(context, *arguments):  # noqa: ARG001 - numba's protocol
+            def code(context, builder, signature, values):  # noqa: ARG001
+                written = write(builder, *values)
+                return context.get_dummy_value() if written is None else written
+
+            return result(*kinds), code
+
+        definition.__name__, definition.__doc__ = write.__name__, write.__doc__
+        # numba folds arguments by name: here the context, then those of ``write`` after its builder.
+        definition.__signature__ = inspect.signature(write)  # type: ignore[attr-defined]
+        function: Callable[..., Any] = intrinsic(definition)
+        return function
+
+    return made
+
+
+def lane_by_lane(operation: Callable[..., Any], instruction: str) -> None:
+    """Let an operator between two lane groups be one instruction."""
+
+    @type_callable(operation)
+    def kind(context):  # noqa: ARG001
+        return lambda x, y: lanes if x == y == lanes else None
+
+    @lower_builtin(operation, Lanes, Lanes)
+    def lower(context, builder, signature, values):  # noqa: ARG001
+        return getattr(builder, instruction)(*values)
+
+
+lane_by_lane(operator.add, "fadd")
+lane_by_lane(operator.sub, "fsub")
+lane_by_lane(operator.mul, "fmul")
+
+
+def llvm(builder: Any, name: str, *values: Any) -> Any:
+    """Write LLVM's own function ``name`` of lane groups."""
+    full, known = f"llvm.{name}.v{LANES}f64", builder.module.globals
+    kind = ir.FunctionType(VECTOR, [VECTOR] * len(values))
+    return builder.call(known[full] if full in known else ir.Function(builder.module, kind, full), values)
+
+
+def shuffled(builder: Any, x: Any, order: list[int]) -> Any:
+    """Write the lanes of x in another order."""
+    mask = ir.Constant(ir.VectorType(ir.IntType(32), len(order)), order)
+    return builder.shuffle_vector(x, ir.Constant(x.type, ir.Undefined), mask)
+
+
+def bits(builder: Any, relation: str, x: Any, y: Any) -> Any:
+    """Write an integer whose bit j tells whether the relation holds in lane j; it never does for NaN."""
+    return builder.zext(builder.bitcast(builder.fcmp_ordered(relation, x, y), ir.IntType(LANES)), WORD)
+
+
+@instructions(lanes, number)
+def everywhere(builder: Any, value: Any) -> Any:
+    """Return a lane group that holds ``value`` in every lane."""
+    first = builder.insert_element(ir.Constant(VECTOR, ir.Undefined), value, ir.Constant(ir.IntType(32), 0))
+    return shuffled(builder, first, [0] * LANES)
+
+
+@instructions(lanes, lanes, lanes, lanes)
+def fma(builder: Any, x: Any, y: Any, z: Any) -> Any:
+    """Return x y + z, rounded once."""
+    return llvm(builder, "fma", x, y, z)
+
+
+@instructions(number, number, number, number)
+def fused(builder: Any, x: Any, y: Any, z: Any) -> Any:
+    """Return x y + z, rounded once, of single numbers."""
+    return builder.fma(x, y, z)
+
+
+@instructions(lanes, lanes)
+def size_of(builder: Any, x: Any) -> Any:
+    """Return |x|."""
+    return llvm(builder, "fabs", x)
+
+
+@instructions(whole, lanes, lanes)
+def above(builder: Any, x: Any, y: Any) -> Any:
+    """Return the lanes in which x > y, as bits."""
+    return bits(builder, ">", x, y)
+
+
+@instructions(whole, lanes, lanes)
+def at_least(builder: Any, x: Any, y: Any) -> Any:
+    """Return the lanes in which x >= y, as bits."""
+    return bits(builder, ">=", x, y)
+
+
+@instructions(whole, whole)
+def lowest(builder: Any, which: Any) -> Any:
+    """Return the number of the first lane whose bit is set."""
+    return builder.cttz(which, ir.Constant(ir.IntType(1), 1))
+
+
+@instructions(lanes, whole, lanes, lanes)
+def where(builder: Any, which: Any, x: Any, y: Any) -> Any:
+    """Return x in the lanes whose bit is set, y in the others."""
+    truths = builder.bitcast(builder.trunc(which, ir.IntType(LANES)), ir.VectorType(ir.IntType(1), LANES))
+    return builder.select(truths, x, y)
+
+
+@instructions(number, lanes)
+def total(builder: Any, x: Any) -> Any:
+    """Return the sum of the lanes: one half onto the other, three times."""
+    width = LANES
+    while width > 1:
+        width //= 2
+        low, high = list(range(width)), list(range(width, 2 * width))
+        x = builder.fadd(shuffled(builder, x, low), shuffled(builder, x, high))
+    return builder.extract_element(x, ir.Constant(ir.IntType(32), 0))
+
+
+row: Any = types.CPointer(number)
+"""Type of the address of a first number: unlike an array it is a single value, and nobody counts references to it."""
+
+
+def address(context, array):  # noqa: ARG001
+    """Return the address of the array's first number; the caller keeps the array alive."""
+
+    def code(context, builder, signature, values):
+        return context.make_array(signature.args[0])(context, builder, values[0]).data
+
+    return row(array), code
+
+
+row_of: Callable[..., Any] = intrinsic(address)
+
+
+def place(builder: Any, numbers: Any, i: Any, kind: Any) -> Any:
+    """Write the address of what stands in a row from number i on."""
+    return builder.bitcast(builder.gep(numbers, [i]), kind.as_pointer())
+
+
+@instructions(number, row, types.intp)
+def get(builder: Any, numbers: Any, i: Any) -> Any:
+    """Return number i of a row."""
+    return builder.load(place(builder, numbers, i, ir.DoubleType()))
+
+
+@instructions(types.void, row, types.intp, number)
+def put(builder: Any, numbers: Any, i: Any, x: Any) -> None:
+    """Write number i of a row."""
+    builder.store(x, place(builder, numbers, i, ir.DoubleType()))
+
+
+@instructions(lanes, row, types.intp)
+def load(builder: Any, numbers: Any, i: Any) -> Any:
+    """Return the lane group that starts at number i of a row."""
+    return builder.load(place(builder, numbers, i, VECTOR), align=8)
+
+
+@instructions(types.void, row, types.intp, lanes)
+def store(builder: Any, numbers: Any, i: Any, x: Any) -> None:
+    """Write the lane group that starts at number i of a row."""
+    builder.store(x, place(builder, numbers, i, VECTOR), align=8)
+
+
+def apart(context):  # noqa: ARG001
+    """Keep the function that calls this out of its callers, so that all registers are its own."""
+
+    def code(context, builder, signature, values):  # noqa: ARG001
+        builder.function.attributes.add("noinline")
+        return context.get_dummy_value()
+
+    return types.void(), code
+
+
+stands_alone: Callable[..., Any] = intrinsic(apart)
 
 
 # ---------------------------------------------------------------------- the closed form of one slice
 
 
-@compiled
-def step_coefficients(  # type: ignore[no-untyped-def]
-    form, constants, omega: float, dt: float
-):
+@merged
+def sinh(x: float) -> float:
+    """Return sinh x, for small x by its series: a third of the library's time, and the same on every machine."""
+    if abs(x) < SERIES:
+        y = x * x
+        tail = fused(y, 1.0 / 6227020800.0, 1.0 / 39916800.0)
+        tail = fused(y, fused(y, tail, 1.0 / 362880.0), 1.0 / 5040.0)
+        tail = fused(y, fused(y, tail, 1.0 / 120.0), 1.0 / 6.0)
+        return float(fused(x * y, tail, x))
+    return math.sinh(x)
+
+
+@merged
+def decay(x: float):
+    """Return exp(-x) - 1 and exp(-x) for x >= 0; for small x from h = sinh(x / 2): exp(-x / 2) = sqrt(1 + h^2) - h."""
+    if x < SERIES:
+        h = sinh(0.5 * x)
+        root = math.sqrt(fused(h, h, 1.0)) - h
+        return -2.0 * h * root, root * root
+    return math.expm1(-x), math.exp(-x)
+
+
+@merged
+def growth_rate(form, constants, omega: float) -> float:
+    """Return k (module docstring of ``schemes.form``)."""
+    k: float = math.sqrt(omega * omega + constants.gamma * constants.gamma) if form.exact_roots else omega
+    return k
+
+
+@merged
+def coefficients(form, constants, k: float, fade_minus_1: float, fade: float, dt: float):
     """Return a - 1, b, c, d of the closed-form step (module docstring of ``schemes.form``; Eq. 9c, 9d).
 
-    a is close to 1 for a short step: a - 1 is formed without the subtraction, which would lose the digits that move
-    the slice (E C - 1 = expm1(-gamma dt) C + 2 sinh(k dt / 2)^2).
+    What is the same for all steps of a flight, ``decay(gamma dt)``, or for all times in a step, k, is given. a is close
+    to 1 for a short step: a - 1 is formed without the subtraction, which would lose the digits that move the slice
+    (E C - 1 = expm1(-gamma dt) C + 2 sinh(k dt / 2)^2).
     """
     gamma = constants.gamma
-    k = math.sqrt(omega * omega + gamma * gamma) if form.exact_roots else omega
-    decay = math.exp(-gamma * dt)
-    cosh = math.cosh(k * dt)
-    sinh = decay * math.sinh(k * dt)
-    half = math.sinh(0.5 * k * dt)
-    a_minus_1 = math.expm1(-gamma * dt) * cosh + 2.0 * half * half + constants.gamma_position / k * sinh
-    b = sinh / k
-    c = (k * k - gamma * gamma) / k * sinh
-    d = form.cosh_sign * decay * cosh + form.sinh_sign * gamma / k * sinh
+    half = sinh(0.5 * k * dt)
+    cosh_minus_1 = 2.0 * half * half
+    b = 2.0 * fade * half * math.sqrt(fused(half, half, 1.0)) / k
+    a_minus_1 = fade_minus_1 * (1.0 + cosh_minus_1) + cosh_minus_1 + constants.gamma_position * b
+    c = (k * k - gamma * gamma) * b
+    d = form.cosh_sign * fade * (1.0 + cosh_minus_1) + form.sinh_sign * gamma * b
     return a_minus_1, b, c, d
 
 
+@merged
+def coefficients_at(form, constants, k: float, t: float):
+    """Return the coefficients of a step of any length t."""
+    fade_minus_1, fade = decay(constants.gamma * t)
+    return coefficients(form, constants, k, fade_minus_1, fade, t)
+
+
 @compiled
-def path(form, constants, omega: float, x: float, v: float, t: float):  # type: ignore[no-untyped-def]
+def step_coefficients(form, constants, omega: float, dt: float):
+    """Return a - 1, b, c, d of the closed-form step of any omega and dt."""
+    return coefficients_at(form, constants, growth_rate(form, constants, omega), dt)
+
+
+@compiled
+def path(form, constants, omega: float, x: float, v: float, t: float):
     """Return distance from the centre and velocity after time t, from distance x and velocity v."""
     a_minus_1, b, c, d = step_coefficients(form, constants, omega, t)
     return x + (a_minus_1 * x + b * v), c * x + d * v
@@ -99,160 +387,322 @@ def turning_time(gamma: float, omega: float, x: float, v: float) -> float:
     return math.atanh(ratio) / k if 0.0 < ratio < 1.0 else math.inf
 
 
-@compiled
-def hit_time(  # type: ignore[no-untyped-def]
-    form, constants, omega: float, x: float, v: float, wall: float, low: float, high: float
-):
-    """Return when the path crosses ``wall`` between ``low`` and ``high``, which lie on its two sides.
+@merged
+def first_guess(gamma: float, omega: float, x: float, v: float, way: float, end: int) -> float:
+    """Return about when a slice moving towards ``end``, at last, has made ``way``: of constant force, then mended once.
 
-    Newton's method on the closed form, kept inside the bracket; the path is monotone there.
+    The series of the path to fourth order is off by (k t)^4 / 120 of the way, which one step of Newton squares.
     """
-    side = path(form, constants, omega, x, v, high)[0] - wall
-    t = high
+    force = omega * omega * x - 2.0 * gamma * v
+    jerk = omega * omega * v - 2.0 * gamma * force
+    snap = omega * omega * force - 2.0 * gamma * jerk
+    root = end * math.sqrt(max(v * v + 2.0 * force * way, 0.0))
+    t = 2.0 * way / (v + root) if end * v > 0.0 else (root - v) / force
+    made = t * (v + t * (force / 2.0 + t * (jerk / 6.0 + t * (snap / 24.0))))
+    speed = v + t * (force + t * (jerk / 2.0 + t * (snap / 6.0)))
+    return t - (made - way) / speed
+
+
+@merged
+def hit(form, constants, omega: float, k: float, x: float, v: float, way: float, end: int, high: float):
+    """Return when the path has made ``way`` and goes on towards ``end``, before ``high``, and the velocity then.
+
+    Newton's method on the closed form, kept inside the bracket. The way, not the place, is compared: it keeps its
+    digits however short a hop is.
+    """
+    low = 0.0
+    t = first_guess(constants.gamma, omega, x, v, way, end)
+    if not low < t < high:
+        t = high
     for _ in range(100):
-        at, speed = path(form, constants, omega, x, v, t)
-        gap = at - wall
-        if gap * side > 0.0:
+        a_minus_1, b, c, d = coefficients_at(form, constants, k, t)
+        pushed, flown = a_minus_1 * x, b * v
+        gap = (pushed + flown) - way
+        speed = c * x + d * v
+        if gap * end > 0.0:
             high = t
         else:
             low = t
-        better = t - gap / speed
-        if not low < better < high:
-            better = 0.5 * (low + high)
-        if abs(better - t) <= 1e-16 + 4e-16 * t:
-            return better
+        shift = -gap / speed
+        better = t + shift
+        if not low <= better <= high:
+            t = 0.5 * (low + high)
+            continue
+        force = omega * omega * (x + pushed + flown) - 2.0 * constants.gamma * speed
+        # What Newton leaves is shift^2 force / (2 speed); what the gap cannot tell is the rounding of its terms.
+        if shift * shift * abs(force) <= ROUNDING * abs(speed) * better or abs(gap) <= ROUNDING * (
+            abs(pushed) + abs(flown)
+        ):
+            return better, speed + force * shift
         t = better
-    return t
+    return t, speed
+
+
+# ---------------------------------------------------------------------- rebounds
+
+
+class Log(NamedTuple):
+    """Where rebounds are listed: the address of four numbers each, and for how many there is room."""
+
+    row: Any
+    room: int
+
+
+@merged
+def listed(log, count: int, time: float, i: int, end: int, v: float) -> int:
+    """Write rebound number ``count`` (time, slice, end, velocity before) if there is room; return count + 1."""
+    if count < log.room:
+        put(log.row, 4 * count, time)
+        put(log.row, 4 * count + 1, float(i))
+        put(log.row, 4 * count + 2, float(end))
+        put(log.row, 4 * count + 3, v)
+    return count + 1
+
+
+@merged
+def falls_back(gamma: float, omega: float, x: float, away: float, left: float, room: float) -> bool:
+    """Return whether a slice that leaves its end with velocity ``away`` > 0 surely is back within ``left``.
+
+    x > 0 is how far the end is from the centre, which drives the slice back. On its hop it is never farther from the
+    end than ``away * left``, nor faster than ``away``: that bounds the force from below, and the time is at most
+    2 ``away`` / force.
+    """
+    force = omega * omega * (x - away * left) - 2.0 * gamma * away
+    return away > 0.0 and away * left < room and 2.0 * away < force * left
+
+
+@compiled
+def rebound_in_step(
+    form, constants, frame, omega: float, centre: float, start: float, dt: float, i: int, r: float, v: float,
+    r_end: float, v_end: float, log, count: int
+):  # fmt: skip
+    """Follow one slice through a step with its hits located by the closed form; return r, v and the count of rebounds.
+
+    ``r_end``, ``v_end`` is where the step would take it if the bottle had no ends.
+
+    Coefficients stay frozen over the whole step. A path turns at most once, so the stretch before the turning point and
+    the one after it are each searched for the end the slice then moves to. A slice that turns has slowed down until
+    then: it cannot have got farther than its velocity would have carried it.
+    """
+    elapsed = 0.0
+    k = growth_rate(form, constants, omega)
+    for bounces in range(MOST_HITS):
+        x = r - centre
+        left = dt - elapsed
+        if abs(v) <= REST_SPEED and ((r == frame.r_max and x > 0.0) or (r == frame.r_min and x < 0.0)):
+            return r, 0.0, count
+        wall = frame.r_max if x > 0.0 else frame.r_min
+        side = 1 if x > 0.0 else -1
+        if r == wall and falls_back(constants.gamma, omega, side * x, -side * v, left, frame.r_max - frame.r_min):
+            tau, v_hit = hit(form, constants, omega, k, x, v, 0.0, side, left)
+            count = listed(log, count, start + elapsed + tau, i, side, v_hit)
+            elapsed += tau
+            v = -constants.restitution * v_hit
+            continue
+        if bounces > 0:
+            a_minus_1, b, c, d = coefficients_at(form, constants, k, left)
+            r_end, v_end = r + (a_minus_1 * x + b * v), c * x + d * v
+        end = 0
+        high = left
+        if v * v_end < 0.0 and not frame.r_min <= r + v * left <= frame.r_max:
+            turn = turning_time(constants.gamma, omega, x, v)
+            farthest = centre + path(form, constants, omega, x, v, turn)[0]
+            if (v > 0.0 and farthest > frame.r_max) or (v < 0.0 and farthest < frame.r_min):
+                end, high = (1 if v > 0.0 else -1), turn
+        if end == 0:
+            end = int(r_end > frame.r_max) - int(r_end < frame.r_min)
+        if end == 0:
+            return r_end, v_end, count
+        wall = frame.r_max if end > 0 else frame.r_min
+        tau, v_hit = hit(form, constants, omega, k, x, v, wall - r, end, high)
+        count = listed(log, count, start + elapsed + tau, i, end, v_hit)
+        elapsed += tau
+        r, v = wall, -constants.restitution * v_hit
+    return r, 0.0, count
 
 
 # ---------------------------------------------------------------------- one step of all slices
 
 
-@compiled
-def logged(log, count: int, time: float, i: int, end: int, v: float):  # type: ignore[no-untyped-def]
-    """Append a rebound (time, slice, end, velocity before); the log doubles when full, so that none is lost."""
-    if count == len(log):
-        longer = np.empty((2 * count, 4))
-        longer[:count] = log
-        log = longer
-    log[count, 0] = time
-    log[count, 1] = i
-    log[count, 2] = end
-    log[count, 3] = v
-    return log, count + 1
+class Shared(NamedTuple):
+    """What all slices of a step have in common; the first seven in every lane, ``near`` just less than L/2 - h/2N."""
+
+    a_minus_1: Any
+    b: Any
+    c: Any
+    d: Any
+    centre: Any
+    middle: Any
+    near: Any
+    r_min: float
+    r_max: float
+    minus_e: float
+    dt: float
+    end: float
+    in_step: bool
+    strict: bool
+    keeps_position: bool
+    kept: bool
 
 
-@compiled
-def move(  # type: ignore[no-untyped-def]
-    r: FloatArray, v: FloatArray, r_new: FloatArray, v_new: FloatArray, coefficients, centre: float, frame
-) -> bool:
-    """Write the step of every slice to ``r_new``, ``v_new``; return whether any reached an end."""
-    a_minus_1, b, c, d = coefficients
-    r_min, r_max = frame.r_min, frame.r_max
-    reached = 0
-    for i in range(len(r)):
-        x = r[i] - centre
-        moved = r[i] + (a_minus_1 * x + b * v[i])
-        v_new[i] = c * x + d * v[i]
-        r_new[i] = moved
-        reached += int(moved <= r_min) | int(moved >= r_max)
-    return reached > 0
+@merged
+def shared(form, constants, frame, fading, omega: float, centre: float, dt: float, end: float, kept: bool):
+    """Return what all slices have in common in the step that ends at time ``end``; if not ``kept`` it is a trial."""
+    k = growth_rate(form, constants, omega)
+    a_minus_1, b, c, d = coefficients(form, constants, k, fading[0], fading[1], dt)
+    middle = frame.length / 2
+    # Nearer than the ends, because r - L/2 is rounded; the slices found are then compared with the ends themselves.
+    near = (1.0 - 1e-14) * min(frame.r_max - middle, middle - frame.r_min)
+    return Shared(
+        everywhere(a_minus_1), everywhere(b), everywhere(c), everywhere(d), everywhere(centre), everywhere(middle),
+        everywhere(near), frame.r_min, frame.r_max, -constants.restitution, dt, end, form.in_step, form.strict,
+        form.keeps_position, kept,
+    )  # fmt: skip
 
 
-@compiled
-def rebound_on_grid(  # type: ignore[no-untyped-def]
-    time: float, r: FloatArray, r_new: FloatArray, v_new: FloatArray, form, restitution: float, frame, log, count: int
-):
-    """Apply [C.S.] to the slices past an end; return the log of rebounds and its length."""
-    for i in range(len(r)):
-        x = r_new[i]
-        if form.strict:
-            end = int(x > frame.r_max) - int(x < frame.r_min)
-        else:
-            end = int(x >= frame.r_max) - int(x <= frame.r_min)
-        if end == 0:
-            continue
-        log, count = logged(log, count, time, i, end, v_new[i])
-        v_new[i] *= -restitution
-        if form.keeps_position:
-            r_new[i] = r[i]
-    return log, count
+@merged
+def moved(group, there: int, r, v):
+    """Return r and v of one lane group a step later, as if the bottle had no ends; ``there`` of it are slices."""
+    x = r - group.centre
+    r_new, v_new = fma(group.b, v, fma(group.a_minus_1, x, r)), fma(group.c, x, group.d * v)
+    if there < LANES:
+        slices = (1 << there) - 1
+        r_new, v_new = where(slices, r_new, group.middle), where(slices, v_new, everywhere(0.0))
+    return r_new, v_new
 
 
-@compiled
-def rebound_in_step(  # type: ignore[no-untyped-def]
-    form, constants, frame, omega: float, centre: float, start: float, dt: float, i: int, r: float, v: float, log, count
-):
-    """Follow one slice through a step with its hits located by the closed form; return r, v, log and its length.
+@merged
+def near_an_end(group, v_old, v, y):
+    """Return which slices an end may concern, as bits: those at one, and those whose velocity is reversed.
 
-    Coefficients stay frozen over the whole step. A path turns at most once, so the stretch before the turning point and
-    the one after it are each searched for the end the slice then moves to.
+    A dip through an end and back within the step leaves no other trace.
     """
-    elapsed = 0.0
-    gamma = constants.gamma
-    for _ in range(MOST_HITS):
-        x = r - centre
-        left = dt - elapsed
-        if abs(v) <= REST_SPEED and ((r == frame.r_max and x > 0.0) or (r == frame.r_min and x < 0.0)):
-            return r, 0.0, log, count
-        at_end, v_end = path(form, constants, omega, x, v, left)
-        turn = turning_time(gamma, omega, x, v)
-        end = 0
-        low, high = 0.0, left
-        if turn < left:
-            farthest = centre + path(form, constants, omega, x, v, turn)[0]
-            if (v > 0.0 and farthest > frame.r_max) or (v < 0.0 and farthest < frame.r_min):
-                end, high = (1 if v > 0.0 else -1), turn
+    found = at_least(size_of(y), group.near)
+    if group.in_step:
+        found |= above(everywhere(0.0), v_old * v)
+    return found
+
+
+@merged
+def rebound_on_grid(group, i: int, r_old, r, v, work, log, count: int):
+    """Apply [C.S.] to the slices of a lane group past an end; return r, v and the count of rebounds."""
+    r_min, r_max = everywhere(group.r_min), everywhere(group.r_max)
+    if group.strict:
+        base, cap = above(r, r_max), above(r_min, r)
+    else:
+        base, cap = at_least(r, r_max), at_least(r_min, r)
+    past = base | cap
+    store(work, LOOKED_AT, v)
+    left = past
+    while left:
+        j = lowest(left)
+        left &= left - 1
+        count = listed(log, count, group.end, i + j, 1 if base >> j & 1 else -1, get(work, LOOKED_AT + j))
+    v = where(past, everywhere(group.minus_e) * v, v)
+    return (where(past, r_old, r) if group.keeps_position else r), v, count
+
+
+@merged
+def struck_or_resting(group, r_old, v_old, v, y):
+    """Return which slices of a lane group may hit an end in the step, and which rest at one, as bits.
+
+    A slice that turned had slowed down until then: it cannot have got farther than its velocity would have carried it.
+    """
+    zero, r_min, r_max = everywhere(0.0), everywhere(group.r_min), everywhere(group.r_max)
+    x = r_old - group.centre
+    at_base = at_least(r_old, r_max) & at_least(r_max, r_old) & above(x, zero)
+    at_cap = at_least(r_old, r_min) & at_least(r_min, r_old) & above(zero, x)
+    resting = at_least(everywhere(REST_SPEED), size_of(v_old)) & (at_base | at_cap)
+    farthest = fma(v_old, everywhere(group.dt), r_old - group.middle)
+    turned = above(zero, v_old * v) & at_least(size_of(farthest), group.near)
+    return (turned | at_least(size_of(y), group.near)) & ~resting, resting
+
+
+@compiled
+def glide(group, n: int, i: int, r, v, work, log, count: int):
+    """Move the lane groups from ``i`` on until a slice hits an end in the step; return where, and the rebounds."""
+    stands_alone()
+    zero = everywhere(0.0)
+    first, second, speed = load(work, 0), load(work, LANES), load(work, 2 * LANES)
+    while i < n:
+        r_old, v_old = load(r, i), load(v, i)
+        r_new, v_new = moved(group, n - i, r_old, v_old)
+        y = r_new - group.middle
+        if near_an_end(group, v_old, v_new, y):
+            if group.in_step:
+                struck, resting = struck_or_resting(group, r_old, v_old, v_new, y)
+                if struck:
+                    break
+                r_new, v_new = where(resting, r_old, r_new), where(resting, zero, v_new)
             else:
-                low = turn
-        if end == 0:
-            end = int(centre + at_end > frame.r_max) - int(centre + at_end < frame.r_min)
-        if end == 0:
-            return centre + at_end, v_end, log, count
-        wall = frame.r_max if end > 0 else frame.r_min
-        tau = hit_time(form, constants, omega, x, v, wall - centre, low, high)
-        v_hit = path(form, constants, omega, x, v, tau)[1]
-        log, count = logged(log, count, start + elapsed + tau, i, end, v_hit)
-        elapsed += tau
-        r, v = wall, -constants.restitution * v_hit
-    return r, 0.0, log, count
+                r_new, v_new, count = rebound_on_grid(group, i, r_old, r_new, v_new, work, log, count)
+            y = r_new - group.middle
+        if group.kept:
+            store(r, i, r_new)
+            store(v, i, v_new)
+        first, second, speed = first + y, fma(y, y, second), speed + v_new
+        i += LANES
+    store(work, 0, first)
+    store(work, LANES, second)
+    store(work, 2 * LANES, speed)
+    return i, count
+
+
+@merged
+def sums_of(work):
+    """Return the sums over slices of (r - L/2), (r - L/2)^2 and v, whose partial sums ``work`` begins with."""
+    return total(load(work, 0)), total(load(work, LANES)), total(load(work, 2 * LANES))
+
+
+@merged
+def add(work, y, v) -> None:
+    """Add one lane group to the partial sums."""
+    store(work, 0, load(work, 0) + y)
+    store(work, LANES, fma(y, y, load(work, LANES)))
+    store(work, 2 * LANES, load(work, 2 * LANES) + v)
 
 
 @compiled
-def advance(  # type: ignore[no-untyped-def]
-    form,
-    constants,
-    frame,
-    r,
-    v,
-    r_new,
-    v_new,
-    omega: float,
-    centre: float,
-    start: float,
-    end: float,
-    dt: float,
-    log,
-    count,
-):
-    """Write one step of all slices with their rebounds to ``r_new``, ``v_new``; return the log and its length."""
-    reached = move(r, v, r_new, v_new, step_coefficients(form, constants, omega, dt), centre, frame)
-    if form.in_step:
-        for i in range(len(r)):
-            # A dip through an end and back leaves no trace at the end of the step but a reversed velocity.
-            if r_new[i] <= frame.r_min or r_new[i] >= frame.r_max or v[i] * v_new[i] < 0.0:
-                r_new[i], v_new[i], log, count = rebound_in_step(
-                    form, constants, frame, omega, centre, start, dt, i, r[i], v[i], log, count
-                )
-    elif reached:
-        log, count = rebound_on_grid(end, r, r_new, v_new, form, constants.restitution, frame, log, count)
-    return log, count
+def follow(form, constants, frame, group, omega: float, centre: float, i: int, n: int, r, v, work, log, count: int):
+    """Move one lane group of which slices hit an end in the step; return r, v and the count of rebounds."""
+    r_old, v_old = load(r, i), load(v, i)
+    r_new, v_new = moved(group, n - i, r_old, v_old)
+    y = r_new - group.middle
+    struck, resting = struck_or_resting(group, r_old, v_old, v_new, y)
+    store(work, LOOKED_AT, where(resting, r_old, r_new))
+    store(work, LOOKED_AT + LANES, where(resting, everywhere(0.0), v_new))
+    while struck:
+        j = lowest(struck)
+        struck &= struck - 1
+        r_j, v_j, count = rebound_in_step(
+            form, constants, frame, omega, centre, group.end - group.dt, group.dt, i + j, get(r, i + j), get(v, i + j),
+            get(work, LOOKED_AT + j), get(work, LOOKED_AT + LANES + j), log, count,
+        )  # fmt: skip
+        put(work, LOOKED_AT + j, r_j)
+        put(work, LOOKED_AT + LANES + j, v_j)
+    return load(work, LOOKED_AT), load(work, LOOKED_AT + LANES), count
 
 
-@compiled
-def centre_of_repulsion(  # type: ignore[no-untyped-def]
-    form, constants, r_cm: float, v_cm: float, theta: float, omega: float
-):
+@merged
+def step(form, constants, frame, group, omega: float, centre: float, n: int, r, v, work, log, count: int):
+    """Move all slices by one step, unless it is a trial; return the count of rebounds, and the sums in ``work``."""
+    for j in range(0, LOOKED_AT, LANES):
+        store(work, j, everywhere(0.0))
+    i = 0
+    while True:
+        i, count = glide(group, n, i, r, v, work, log, count)
+        if i >= n:
+            return count
+        r_new, v_new, count = follow(form, constants, frame, group, omega, centre, i, n, r, v, work, log, count)
+        if group.kept:
+            store(r, i, r_new)
+            store(v, i, v_new)
+        add(work, r_new - group.middle, v_new)
+        i += LANES
+
+
+@merged
+def centre_of_repulsion(form, constants, r_cm: float, v_cm: float, theta: float, omega: float):
     """Return r* (module docstring of ``schemes.form``)."""
     pull = constants.gravity * math.cos(theta)
     if form.follows_cm:
@@ -264,95 +714,101 @@ def centre_of_repulsion(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def first_outside(r: FloatArray, length: float) -> int:
+def copy(numbers, array) -> None:
+    """Fill an array from a row."""
+    to, n = row_of(array), len(array)
+    for i in range(0, n - LANES + 1, LANES):
+        store(to, i, load(numbers, i))
+    for i in range(n - n % LANES, n):
+        put(to, i, get(numbers, i))
+
+
+@compiled
+def first_outside(r, n: int, length: float) -> int:
     """Return the first slice outside [0, length], or -1."""
-    for i in range(len(r)):
-        if r[i] < 0.0 or r[i] > length:
+    for i in range(n):
+        if get(r, i) < 0.0 or get(r, i) > length:
             return i
     return -1
 
 
 @compiled
-def moments(r: FloatArray, v: FloatArray, about: float):  # type: ignore[no-untyped-def]
-    """Return sums over slices of (r - about), (r - about)^2 and v.
+def shares_of(memory: FloatArray, n: int):
+    """Return the parts of ``memory_for(n)``: whole lane groups of r and of v on 64-byte boundaries, and the rest.
 
-    Four explicit partial sums each: they run side by side and always add up in the same order.
+    Rows are half a page apart, plus pages: a processor that compares the last 12 bits of addresses only would take what
+    it reads of v for what it has just written of r.
     """
-    n = len(r)
-    a0 = a1 = a2 = a3 = 0.0
-    b0 = b1 = b2 = b3 = 0.0
-    c0 = c1 = c2 = c3 = 0.0
-    for i in range(0, n - 3, 4):
-        x0, x1, x2, x3 = r[i] - about, r[i + 1] - about, r[i + 2] - about, r[i + 3] - about
-        a0, a1, a2, a3 = a0 + x0, a1 + x1, a2 + x2, a3 + x3
-        b0, b1, b2, b3 = b0 + x0 * x0, b1 + x1 * x1, b2 + x2 * x2, b3 + x3 * x3
-        c0, c1, c2, c3 = c0 + v[i], c1 + v[i + 1], c2 + v[i + 2], c3 + v[i + 3]
-    for i in range(n - n % 4, n):
-        x = r[i] - about
-        a0, b0, c0 = a0 + x, b0 + x * x, c0 + v[i]
-    return (a0 + a1) + (a2 + a3), (b0 + b1) + (b2 + b3), (c0 + c1) + (c2 + c3)
+    size = (n + LANES - 1) // LANES * LANES
+    begin = (-(memory.ctypes.data // 8)) % LANES
+    second = begin + size + (HALF_PAGE - size) % (2 * HALF_PAGE)
+    end = second + size
+    return memory[begin : begin + size], memory[second:end], memory[end : end + WORK]
 
 
-@compiled
-def inertia_about(frame, n: int, first: float, second: float, offset: float):  # type: ignore[no-untyped-def]
+@merged
+def inertia_about(frame, n: int, first: float, second: float, offset: float):
     """Return J (Eq. 11b to 11d) about a point ``offset`` from the middle, from sums taken about the middle."""
     water = frame.slice_mass * (second - offset * (2.0 * first - n * offset))
     return water + frame.bottle_inertia + frame.bottle_mass * offset * offset
 
 
-@compiled
-def fly(form, constants, frame, r, v, t, dt: float) -> Run:  # type: ignore[no-untyped-def]
-    """Advance the slices over the uniform grid ``t`` of step ``dt``.
+@kept_on_disk
+def fly(form, constants, frame, r0, t, dt: float, record, rebounds, memory) -> Run:
+    """Advance the slices, at rest at ``r0``, over the uniform grid ``t`` of step ``dt``; write to ``record``.
 
-    ``r`` and ``v`` have shape (rows, N) with the start in row 0. Step k is written to row k modulo rows:
-    ``rows = len(t)`` keeps everything, ``rows = 2`` only what the next step needs.
+    Rebounds are counted; the first K of them are listed in ``rebounds``, shape (K, 4).
     """
-    rows, n = r.shape
-    steps = len(t)
-    theta, omega, r_cm, inertia = np.empty(steps), np.empty(steps), np.empty(steps), np.empty(steps)
-    log, count = np.empty((1024, 4)), 0
-    unread = np.empty((1024, 4))
-    r_end, v_end = np.empty(n), np.empty(n)
-    escape_step = escape_slice = -1
+    theta, omega, r_cm, inertia = record.theta, record.omega, record.r_cm, record.inertia
+    n = len(r0)
     middle = frame.length / 2
     water_share = (1.0 - constants.bottle_share) / n
+    fading = decay(constants.gamma * dt)
+    hits = 0
+    escape_step = escape_slice = -1
+    positions, velocities, rest = shares_of(memory, n)
+    positions[:], velocities[:], rest[:] = middle, 0.0, 0.0
+    positions[:n] = r0
+    r, v, work = row_of(positions), row_of(velocities), row_of(rest)
+    log = Log(row_of(rebounds), len(rebounds))
+    full = len(record.r) > 0
+    if full:
+        record.r[0], record.v[0] = r0, 0.0
 
-    first, second, speed = moments(r[0], v[0], middle)
+    for i in range(0, n, LANES):
+        add(work, load(r, i) - everywhere(middle), everywhere(0.0))
+    first, second, speed = sums_of(work)
     theta[0], omega[0] = frame.theta0, frame.omega0
     r_cm[0] = middle + water_share * first
     inertia[0] = inertia_about(frame, n, first, second, water_share * first)
     momentum = inertia[0] * frame.omega0
     points = 1
 
-    for k in range(1, steps):
-        now, new = (k - 1) % rows, k % rows
+    for k in range(1, len(t)):
         w = omega[k - 1]
-        if frame.frozen:
-            r[new] = r[now]
-            v[new] = 0.0
-        else:
+        # A lagged program weighs the slices of the step before, about the centre of mass it knew then.
+        lagged_first, lagged_second = first, second
+        if not frame.frozen:
             centre = centre_of_repulsion(form, constants, r_cm[k - 1], water_share * speed, theta[k - 1], w)
             if form.midpoint:
                 # A step as the exact step would make it predicts the end. Means over the step are then known up to
                 # second order, that of v_CM from the way of C_M, because v_CM itself jumps at an impact.
-                unread, _ = advance(
-                    form, constants, frame, r[now], v[now], r_end, v_end, w, centre, 0.0, 0.0, dt, unread, 0
-                )
-                end_first, end_second, _ = moments(r_end, v_end, middle)
+                group = shared(form, constants, frame, fading, w, centre, dt, t[k], False)
+                step(form, constants, frame, group, w, centre, n, r, v, work, log, log.room)
+                end_first, end_second, _ = sums_of(work)
                 way = water_share * (end_first - first)
                 mid_theta = theta[k - 1] + 0.5 * dt * w
                 w = 0.5 * (w + momentum / inertia_about(frame, n, end_first, end_second, water_share * end_first))
                 centre = centre_of_repulsion(form, constants, r_cm[k - 1] + 0.5 * way, way / dt, mid_theta, w)
-            log, count = advance(
-                form, constants, frame, r[now], v[now], r[new], v[new], w, centre, t[k - 1], t[k], dt, log, count
-            )
+            group = shared(form, constants, frame, fading, w, centre, dt, t[k], True)
+            hits = step(form, constants, frame, group, w, centre, n, r, v, work, log, hits)
+            first, second, speed = sums_of(work)
             if not form.keeps_position and escape_step < 0:
-                escape_slice = first_outside(r[new], frame.length)
+                escape_slice = first_outside(r, n, frame.length)
                 escape_step = k if escape_slice >= 0 else -1
-
-        # A lagged program weighs the slices of the step before, about the centre of mass it knew then.
-        lagged_first, lagged_second = first, second
-        first, second, speed = moments(r[new], v[new], middle)
+        if full:
+            copy(r, record.r[k])
+            copy(v, record.v[k])
         if form.lagged:
             r_cm[k] = middle + water_share * lagged_first
             inertia[k] = inertia_about(frame, n, lagged_first, lagged_second, r_cm[k - 1] - middle)
@@ -365,22 +821,9 @@ def fly(form, constants, frame, r, v, t, dt: float) -> Run:  # type: ignore[no-u
             break
         points = k + 1
 
-    return Run(
-        theta[:points],
-        omega[:points],
-        r_cm[:points],
-        inertia[:points],
-        log[:count],
-        points,
-        escape_step,
-        escape_slice,
-    )
+    return Run(points, hits, escape_step, escape_slice)
 
 
-def start(r0: FloatArray, rows: int) -> tuple[FloatArray, FloatArray]:
-    """Return fresh r and v of shape (rows, N) with the slices at ``r0`` at rest in row 0."""
-    r = np.empty((rows, len(r0)))
-    v = np.empty((rows, len(r0)))
-    r[0] = r0
-    v[0] = 0.0
-    return r, v
+def memory_for(n: int) -> FloatArray:
+    """Return the memory that ``fly`` works in, for n slices: two rows of lane groups and what keeps them apart."""
+    return np.empty(2 * (n + HALF_PAGE) + 3 * LANES + WORK)

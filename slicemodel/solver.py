@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
@@ -10,9 +10,17 @@ from slicemodel.scenario import Scenario, not_whole, unknown_name
 from slicemodel.schemes import SCHEMES, Scheme, StepConstants, StepForm
 from slicemodel.trajectory import FloatArray, Impacts, Trajectory
 
+if TYPE_CHECKING:
+    from slicemodel.kernel import Record, Run
+
 MOST_STEPS = 1_000_000_000
 FULL_LIMIT = 4 * 2**30
 """Bytes of r and v together beyond which store="full" is refused."""
+
+SURELY_LISTED = 1024
+MOST_LISTED = 1 << 22
+"""Rebounds there is room for at first: one for every fourth slice and step, as memory that is not touched costs
+nothing; a run with more of them is repeated with room for all."""
 
 Store = Literal["full", "summary"]
 Rebound = Literal["grid", "in-step"]
@@ -60,21 +68,41 @@ def solve(
     --------
     Order 1 in dt against the equation named by the scheme's ``limit``: before the first impact because the coefficients
     are frozen at the start of the step, across impacts because a rebound waits for the grid. ``midpoint`` is of order 2
-    before the first impact and, with rebounds in the step, close to it across impacts.
+    before the first impact and, with rebounds in the step and no drag, across impacts too. With drag it is of order 1
+    there, with a far smaller constant: an impact makes r'_CM jump, and the drag of a step knows one mean of it.
     """
-    if scheme not in SCHEMES:
-        raise ValueError(unknown_name("scheme =", scheme, SCHEMES))
-    problem = not_whole("steps", steps, 2, MOST_STEPS)
-    if problem:
-        raise ValueError(f"{problem} (points of the grid)")
+    chosen, form, steps = checked(scheme, steps, rebound)
     if store not in get_args(Store):
         raise ValueError(unknown_name("store =", store, get_args(Store)))
-    size = 16 * int(steps) * scenario.n_slices
+    size = 16 * steps * scenario.n_slices
     if store == "full" and size > FULL_LIMIT:
         raise ValueError(
             f"steps = {steps} of n_slices = {scenario.n_slices} need {size / 2**30:.1f} GiB, more than "
             f"{FULL_LIMIT / 2**30:.0f} GiB; use store = 'summary' or fewer of either"
         )
+    from slicemodel import kernel
+
+    rows = (steps if store == "full" else 0, scenario.n_slices)
+    theta, omega, r_cm, inertia = (np.empty(steps) for _ in range(4))
+    record = kernel.Record(theta, omega, r_cm, inertia, np.empty(rows), np.empty(rows))
+    rebounds = np.empty((min(steps * scenario.n_slices // 4 + SURELY_LISTED, MOST_LISTED), 4))
+    t = np.linspace(0.0, scenario.duration, steps)
+    constants = chosen.constants(scenario)
+    run = advance(scenario, form, constants, t, record, rebounds)
+    if run.rebounds > len(rebounds):
+        rebounds = np.empty((run.rebounds, 4))
+        run = advance(scenario, form, constants, t, record, rebounds)
+    impacts = _impacts(rebounds[: run.rebounds], form, constants.restitution)
+    return trajectory(scenario, chosen.name, form, constants, t, record, run, impacts)
+
+
+def checked(scheme: str, steps: int, rebound: Rebound | None) -> tuple[Scheme, StepForm, int]:
+    """Return the scheme, its form with ``rebound`` and the points of the grid, or raise ValueError (see ``solve``)."""
+    if scheme not in SCHEMES:
+        raise ValueError(unknown_name("scheme =", scheme, SCHEMES))
+    problem = not_whole("steps", steps, 2, MOST_STEPS)
+    if problem:
+        raise ValueError(f"{problem} (points of the grid)")
     if rebound is not None and rebound not in get_args(Rebound):
         raise ValueError(unknown_name("rebound =", rebound, get_args(Rebound)))
     chosen = SCHEMES[scheme]
@@ -82,14 +110,16 @@ def solve(
         able = ", ".join(name for name, other in SCHEMES.items() if other.form.exact_roots)
         raise ValueError(f"rebound = 'in-step' needs a scheme with exact roots ({able}), not {scheme!r}")
     form = chosen.form if rebound is None else chosen.form._replace(in_step=rebound == "in-step")
-    return _run(scenario, chosen, form, int(steps), store)
+    return chosen, form, int(steps)
 
 
-def _run(scenario: Scenario, scheme: Scheme, form: StepForm, steps: int, store: Store) -> Trajectory:
+def advance(
+    scenario: Scenario, form: StepForm, constants: StepConstants, t: FloatArray, record: Record, rebounds: FloatArray
+) -> Run:
+    """Run the compiled loop on one scenario; it writes to ``record`` and as many ``rebounds`` as there are rows."""
     from slicemodel import kernel
 
     bottle = scenario.bottle
-    constants = scheme.constants(scenario)
     frame = kernel.Frame(
         length=bottle.length,
         r_min=scenario.r_min,
@@ -101,38 +131,52 @@ def _run(scenario: Scenario, scheme: Scheme, form: StepForm, steps: int, store: 
         theta0=scenario.theta0,
         frozen=scenario.frozen,
     )
-    t, dt = np.linspace(0.0, scenario.duration, steps, retstep=True)
-    r, v = kernel.start(scenario.initial_positions(), steps if store == "full" else 2)
-    run = kernel.fly(form, constants, frame, r, v, t, float(dt))
-    kept = run.points if store == "full" else 0
+    dt = scenario.duration / (len(t) - 1)
+    memory = kernel.memory_for(scenario.n_slices)
+    run: Run = kernel.fly(form, constants, frame, scenario.initial_positions(), t, dt, record, rebounds, memory)
+    return run
+
+
+def trajectory(
+    scenario: Scenario,
+    method: str,
+    form: StepForm,
+    constants: StepConstants,
+    t: FloatArray,
+    record: Record,
+    run: Run,
+    impacts: Impacts | None,
+) -> Trajectory:
+    """Return what the loop has written as a trajectory up to its last finite point."""
     status, message = _verdict(run, t)
+    points = run.points
     return Trajectory(
         scenario=scenario,
         solver="slicemodel",
-        method=scheme.name,
-        t=t[: run.points],
-        theta=run.theta,
-        omega=run.omega,
-        r=r[:kept],
-        v=v[:kept],
-        r_cm=run.r_cm,
-        inertia=run.inertia,
-        impacts=_impacts(run, constants),
+        method=method,
+        t=t[:points],
+        theta=record.theta[:points],
+        omega=record.omega[:points],
+        r=record.r[:points],
+        v=record.v[:points],
+        r_cm=record.r_cm[:points],
+        inertia=record.inertia[:points],
+        impacts=impacts,
         status=status,
         message=message,
         settings={
-            "scheme": scheme.name,
-            "steps": steps,
-            "dt": float(dt),
-            "store": store,
+            "scheme": method,
+            "steps": len(t),
+            "dt": scenario.duration / (len(t) - 1),
+            "store": "full" if len(record.r) else "summary",
             "rebound": "in-step" if form.in_step else "grid",
             **constants._asdict(),
         },
-        diagnostics={"rebounds": len(run.rebounds)},
+        diagnostics={"rebounds": run.rebounds},
     )
 
 
-def _verdict(run: Any, t: FloatArray) -> tuple[str, str]:
+def _verdict(run: Run, t: FloatArray) -> tuple[str, str]:
     """Return status and message of a finished run."""
     escape = ""
     if run.escape_step >= 0:
@@ -144,14 +188,10 @@ def _verdict(run: Any, t: FloatArray) -> tuple[str, str]:
     return ("escaped", escape) if escape else ("ok", "")
 
 
-def _impacts(run: Any, constants: StepConstants) -> Impacts:
-    rebounds = run.rebounds[np.argsort(run.rebounds[:, 0], kind="stable")]
+def _impacts(rebounds: FloatArray, form: StepForm, restitution: float) -> Impacts:
+    if form.in_step:
+        # They are listed step by step and slice by slice.
+        rebounds = rebounds[np.argsort(rebounds[:, 0], kind="stable")]
     time, slice_index, end, velocity = rebounds.T
     speed = np.abs(velocity)
-    return Impacts(
-        time=time,
-        slice=slice_index,
-        end=end,
-        speed_before=speed,
-        speed_after=constants.restitution * speed,
-    )
+    return Impacts(time=time, slice=slice_index, end=end, speed_before=speed, speed_after=restitution * speed)

@@ -147,10 +147,10 @@ class Trajectory:
         for name in ("r", "v"):
             if getattr(self, name).shape not in ((points, n), (0, n)):
                 raise ValueError(f"{name} has shape {getattr(self, name).shape}, not {(points, n)}")
-        if not np.all(np.diff(self.t) > 0):
+        if not (self.t[1:] > self.t[:-1]).all():
             raise ValueError("t does not increase")
         for name in ("t", "theta", "omega", "r", "v", "r_cm", "inertia"):
-            if not np.all(np.isfinite(getattr(self, name))):
+            if not np.isfinite(getattr(self, name)).all():
                 raise ValueError(f"{name} holds values that are not finite; return the run up to its last finite point")
 
     def __reduce__(self) -> tuple[Any, ...]:

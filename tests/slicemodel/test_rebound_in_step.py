@@ -2,6 +2,7 @@
 
 import math
 
+import numba
 import numpy as np
 import pytest
 
@@ -74,11 +75,19 @@ def test_a_dip_through_the_end_and_back_within_one_step_is_found():
     v = math.sqrt(omega**2 * (x**2 - (0.272 - centre) ** 2))
     turn = kernel.turning_time(constants.gamma, omega, x, v)
     assert centre + kernel.path(form, constants, omega, x, v, turn)[0] > 0.27
-    assert centre + kernel.path(form, constants, omega, x, v, 2 * turn)[0] < 0.27
+    distance, v_end = kernel.path(form, constants, omega, x, v, 2 * turn)
+    r_end = centre + distance
+    assert r_end < 0.27
     log = np.empty((4, 4))
-    new, speed, log, count = kernel.rebound_in_step(
-        form, constants, frame, omega, centre, 1.0, 2 * turn, 5, r, v, log, 0
-    )
+
+    @numba.njit
+    def follow(form, constants, frame, log):
+        room = kernel.Log(kernel.row_of(log), len(log))
+        return kernel.rebound_in_step(
+            form, constants, frame, omega, centre, 1.0, 2 * turn, 5, r, v, r_end, v_end, room, 0
+        )
+
+    new, speed, count = follow(form, constants, frame, log)
     assert count == 1
     assert tuple(log[0, 1:3]) == (5.0, 1.0)
     assert 1.0 < log[0, 0] < 1.0 + turn
