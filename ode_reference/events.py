@@ -90,7 +90,7 @@ def event_release(start: Instant, end: Instant, path: Path, resting: SideArray) 
     """
     found: Instant | None = None
     for side in (BASE, CAP):
-        on_side = np.flatnonzero(resting == side)
+        on_side = (resting == side).nonzero()[0]
         if on_side.size and side * end.a[on_side[0]] < 0:
             end = found = _letting_go(side, int(on_side[0]), start, end, path)
     return found
@@ -120,7 +120,7 @@ def _suspects(start: Instant, end: Instant, free: BoolArray, walls: Walls) -> li
     turns_twice = (turning > 0) & (heading * start.a < 0) & (end.v * end.a > 0)
     over = np.maximum(end.r - walls.high, walls.low - end.r)
     found = over > walls.tolerance
-    if (turns_once | turns_twice).any():
+    if np.count_nonzero(turns_once | turns_twice):
         length = end.t - start.t
         reach = length * np.maximum(np.abs(start.v), np.abs(end.v))
         reach += length**2 * np.maximum(np.abs(start.a), np.abs(end.a))
@@ -128,7 +128,7 @@ def _suspects(start: Instant, end: Instant, free: BoolArray, walls: Walls) -> li
         near_cap = np.minimum(start.r, end.r) - reach < walls.low
         found |= turns_once & np.where(heading > 0, near_base, near_cap)
         found |= turns_twice & (near_base | near_cap)
-    suspects = np.flatnonzero(free & found)
+    suspects = (free & found).nonzero()[0]
     if suspects.size < 2:
         return [int(i) for i in suspects]
     expected = end.t - np.maximum(over[suspects], 0.0) / np.maximum(np.abs(end.v[suspects]), np.finfo(np.float64).tiny)

@@ -148,7 +148,7 @@ class Motion:
         a stepper assumes that its right-hand side is smooth.
     """
 
-    __slots__ = ("any_held", "evaluations", "free", "held", "model", "n", "throw")
+    __slots__ = ("any_held", "evaluations", "free", "held", "held_speeds", "model", "n", "throw")
 
     def __init__(self, throw: Throw, model: Model, held: BoolArray) -> None:
         self.throw = throw
@@ -160,7 +160,8 @@ class Motion:
     def hold(self, held: BoolArray) -> None:
         """Let these slices be held from now on, and no others."""
         self.held = held
-        self.any_held = bool(held.any())
+        self.held_speeds = held.nonzero()[0] + self.n + 1
+        self.any_held = self.held_speeds.size > 0
         self.free = np.where(held, 0.0, 1.0)
 
     def acceleration(self, y: FloatArray, free: FloatArray) -> tuple[float, FloatArray]:
@@ -174,15 +175,17 @@ class Motion:
     def __call__(self, t: float, y: FloatArray) -> FloatArray:
         """Return dy/dt, shape (2N + 1,); the equations do not depend on ``t`` itself."""
         del t
-        n = self.n
-        omega, acceleration = self.acceleration(y, self.free)
-        derivative = np.empty(2 * n + 1)
-        derivative[0] = omega
-        derivative[1 : n + 1] = y[n + 1 :]
-        derivative[n + 1 :] = acceleration
-        if self.any_held:
-            derivative[n + 1 :][self.held] = 0.0
+        derivative = np.empty(2 * self.n + 1)
+        self.derive(y, derivative)
         return derivative
+
+    def derive(self, y: FloatArray, derivative: FloatArray) -> None:
+        """Write dy/dt at ``y`` into ``derivative``, both of shape (2N + 1,)."""
+        n = self.n
+        derivative[0], derivative[n + 1 :] = self.acceleration(y, self.free)
+        derivative[1 : n + 1] = y[n + 1 :]
+        if self.any_held:
+            derivative[self.held_speeds] = 0.0
 
     def at(self, t: float, y: FloatArray) -> Instant:
         """Return the state ``y`` at time ``t`` with the acceleration the model gives it."""
@@ -194,5 +197,5 @@ class Motion:
         """Return dy/dt at ``now``, shape (2N + 1,), from the acceleration it carries."""
         derivative = np.concatenate(((now.omega,), now.v, now.a))
         if self.any_held:
-            derivative[self.n + 1 :][self.held] = 0.0
+            derivative[self.held_speeds] = 0.0
         return derivative

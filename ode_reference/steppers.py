@@ -67,6 +67,8 @@ class DormandPrince:
         self.motion = motion
         self.stop, self.rtol, self.atol, self.max_step = stop, rtol, atol, max_step
         self.slopes = np.empty((_STAGES + 4, 2 * motion.n + 1))
+        self.slopes_before = [self.slopes[:k] for k in range(_STAGES + 4)]
+        self.trial = np.empty(2 * motion.n + 1)
         self.length = max_step
 
     def start(self, now: Instant) -> None:
@@ -86,7 +88,7 @@ class DormandPrince:
             if not length >= 10 * np.spacing(now.t):
                 return "Required step size is less than spacing between numbers."
             for k in range(1, _STAGES):
-                slopes[k] = self.motion(0.0, y + length * (_A[k] @ slopes[:k]))
+                self._slope(k, y, length, _A[k])
             new = y + length * (_B @ slopes[:_STAGES])
             end_time = self.stop if length >= self.stop - now.t else now.t + length
             end = self.motion.at(end_time, new)
@@ -102,6 +104,14 @@ class DormandPrince:
         self.before, self.now, self.taken = now, end, end_time - now.t
         return end
 
+    def _slope(self, k: int, y: FloatArray, length: float, row: FloatArray) -> None:
+        """Evaluate stage ``k``: the slope at y + length (row . slopes before it)."""
+        trial = self.trial
+        row.dot(self.slopes_before[k], trial)
+        trial *= length
+        trial += y
+        self.motion.derive(trial, self.slopes[k])
+
     def _error(self, length: float, scale: FloatArray) -> float:
         fifth, third = (_ERRORS @ self.slopes[: _STAGES + 1]) / scale
         fifth_squared, third_squared = float(fifth @ fifth), float(third @ third)
@@ -112,8 +122,8 @@ class DormandPrince:
     def dense_output(self) -> Polynomial:
         """Return the path of the last step."""
         slopes, h, old, new = self.slopes, self.taken, self.before.y, self.now.y
-        for k, row in enumerate(_A_EXTRA):
-            slopes[_STAGES + 1 + k] = self.motion(0.0, old + h * (row @ slopes[: _STAGES + 1 + k]))
+        for k, row in enumerate(_A_EXTRA, start=_STAGES + 1):
+            self._slope(k, old, h, row)
         parts = np.empty((7, len(old)))
         parts[0] = new - old
         parts[1] = h * slopes[0] - parts[0]
@@ -150,8 +160,8 @@ class Polynomial:
     def of_slice(self, t: float, i: int) -> tuple[float, float]:
         """Return position [m] and velocity [m/s] of one slice at one time."""
         weights, parts, n = np.array(self._weights(t)), self.parts, self.n
-        r = self.old[1 + i] + weights @ parts[:, 1 + i]
-        return float(r), float(self.old[n + 1 + i] + weights @ parts[:, n + 1 + i])
+        r = self.old[1 + i] + weights.dot(parts[:, 1 + i])
+        return float(r), float(self.old[n + 1 + i] + weights.dot(parts[:, n + 1 + i]))
 
 
 class FromSciPy:
