@@ -9,12 +9,14 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+from reports.arguments import INTERRUPTED, SCENARIO_HELP, add_command, count, read_scenario
+from reports.cli_sweeps import add_sweeps
+
 DEFAULT_OUT = Path("reports/latest")
-INTERRUPTED = 130
 
 MANUAL = """\
 flipproof throws one bottle with many solvers and names every difference between them.
@@ -32,6 +34,8 @@ examples:
   flipproof compare published-python eq8
   flipproof compare eq8.csv measured.csv
   flipproof sweep sweep.toml --out my-sweep     many throws and solvers; run it again to go on
+  flipproof map --axis gamma --out my-map       where which mistake matters; run it again to go on
+  flipproof waterfall --out my-waterfall        from the published program to free flight, one bar per mistake
 
 exit status:
   0  done; for a report: every claim was evaluated and no regression claim failed
@@ -39,8 +43,6 @@ exit status:
   2  bad input; one line on standard error says what and where
   130  interrupted; an older report is as it was, a sweep goes on where it stopped
 """
-
-SCENARIO_HELP = "scenario file (TOML with tables [scenario] and [bottle]); default: the paper's own throw"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -98,56 +100,32 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument("--version", action="version", version=f"flipproof {_version()}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
-    report = _command(commands, "report", "Run everything and write a validation report.", command_report)
+    report = add_command(commands, "report", "Run everything and write a validation report.", command_report)
     report.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     report.add_argument("--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="folder (default %(default)s)")
     report.add_argument("--quick", action="store_true", help="fewer refinements, no second method, no validity maps")
     report.add_argument(
-        "--slices", type=_count, metavar="N", help="slices at which solvers are compared (default 50, or the file's "
+        "--slices", type=count, metavar="N", help="slices at which solvers are compared (default 50, or the file's "
         "number if smaller)",
     )  # fmt: skip
-    report.add_argument("--jobs", type=_count, metavar="N", help="worker processes (default: one per core)")
+    report.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
 
-    simulate = _command(commands, "simulate", "Run one solver and write its trajectory as CSV.", command_simulate)
+    simulate = add_command(commands, "simulate", "Run one solver and write its trajectory as CSV.", command_simulate)
     simulate.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     simulate.add_argument("--solver", default="exact-step", metavar="NAME", help="see 'flipproof models' (%(default)s)")
-    simulate.add_argument("--steps", type=_count, metavar="P", help="points of a scheme's grid (default 1000)")
-    simulate.add_argument("--slices", type=_count, metavar="N", help="cut the throw into N slices, alpha/2m unchanged")
+    simulate.add_argument("--steps", type=count, metavar="P", help="points of a scheme's grid (default 1000)")
+    simulate.add_argument("--slices", type=count, metavar="N", help="cut the throw into N slices, alpha/2m unchanged")
     simulate.add_argument("--out", type=Path, metavar="FILE.csv", help="file to write (default: standard output)")
 
-    compare = _command(commands, "compare", "Compare two solvers, or two CSV files, in numbers.", command_compare)
+    compare = add_command(commands, "compare", "Compare two solvers, or two CSV files, in numbers.", command_compare)
     compare.add_argument("first", metavar="A", help="a solver's name, or a CSV file with columns t, theta, omega, r_cm")
     compare.add_argument("second", metavar="B", help="the same; differences are B minus A")
     compare.add_argument("--scenario", metavar="SCENARIO.toml", help=SCENARIO_HELP)
-    compare.add_argument("--slices", type=_count, metavar="N", help="slices for both solvers (default 50)")
+    compare.add_argument("--slices", type=count, metavar="N", help="slices for both solvers (default 50)")
 
-    sweep = _command(commands, "sweep", "Run many throws by many solvers, or go on with them.", command_sweep)
-    sweep.add_argument("design", type=Path, metavar="SWEEP.toml", help="which fields vary, and which solvers")
-    sweep.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder; holds one SQLite file of rows")
-    where = sweep.add_mutually_exclusive_group()
-    where.add_argument("--jobs", type=_count, metavar="N", help="worker processes (default: one per core)")
-    where.add_argument("--dask", metavar="ADDRESS", help="scheduler whose workers do the work: tcp://127.0.0.1:8786")
-    sweep.add_argument(
-        "--export", type=Path, metavar="FILE", help="when complete, write all rows to a .csv or .parquet"
-    )
-    sweep.add_argument("--quiet", action="store_true", help="no progress")
-
-    _command(commands, "models", "List every scheme, model and engine.", command_models)
+    add_sweeps(commands)
+    add_command(commands, "models", "List every scheme, model and engine.", command_models)
     return top
-
-
-def _command(
-    commands: Any, name: str, description: str, action: Callable[[argparse.Namespace], int]
-) -> argparse.ArgumentParser:
-    command: argparse.ArgumentParser = commands.add_parser(name, description=description, help=description)
-    command.set_defaults(action=action)
-    return command
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
-    return int(text)
 
 
 def _version() -> str:
@@ -159,16 +137,9 @@ def _version() -> str:
         return "checkout"
 
 
-def _scenario(path: str | None, slices: int | None = None) -> Any:
-    from slicemodel import Scenario
-
-    scenario = Scenario.from_toml(path) if path else Scenario()
-    return scenario.with_slices(slices) if slices else scenario
-
-
 def command_report(options: argparse.Namespace) -> int:
     """Write a report; return 1 if a regression claim failed."""
-    scenario = _scenario(options.scenario)
+    scenario = read_scenario(options.scenario)
     from reports.output import check_replaceable, replaced_folder
 
     check_replaceable(options.out)
@@ -216,7 +187,7 @@ def command_simulate(options: argparse.Namespace) -> int:
     from reports.solvers import find, solve
     from reports.tables import trajectory_csv
 
-    scenario = _scenario(options.scenario, options.slices)
+    scenario = read_scenario(options.scenario, options.slices)
     solver = find(options.solver)
     settings: dict[str, Any] = {}
     if options.steps is not None:
@@ -242,7 +213,7 @@ def command_compare(options: argparse.Namespace) -> int:
     from reports.solvers import find, solve
     from reports.tables import Curve, read_curve
 
-    scenario = _scenario(options.scenario, options.slices)
+    scenario = read_scenario(options.scenario, options.slices)
     if options.slices is None:
         scenario = scenario.with_slices(min(50, scenario.n_slices))
 
@@ -256,49 +227,6 @@ def command_compare(options: argparse.Namespace) -> int:
         return Curve.of(run)
 
     print(table(compare(load(options.first), load(options.second))))
-    return 0
-
-
-def command_sweep(options: argparse.Namespace) -> int:
-    """Make the points of a design that have no row yet."""
-    from contextlib import ExitStack
-
-    from tqdm import tqdm
-
-    from reports.sweep.command import sweep
-
-    stored = [0, 0]
-
-    def begin(there: int, size: int) -> Callable[[int, int], None]:
-        if 0 < there < size and not options.quiet:
-            print(f"flipproof: {there} of {size} points are there; going on", file=sys.stderr)
-        stored[:] = there, size
-        hide = True if options.quiet else None
-        bar = bars.enter_context(
-            tqdm(total=size, initial=there, unit="point", disable=hide, leave=False, smoothing=0.05)
-        )
-        without = 0
-
-        def progress(points: int, unfinished: int) -> None:
-            nonlocal without
-            stored[0] += points
-            without += unfinished
-            if without:
-                bar.set_postfix_str(f"{without} without a whole flight", refresh=False)
-            bar.update(points)
-
-        return progress
-
-    try:
-        with ExitStack() as bars:
-            line = sweep(
-                options.design, options.out, begin, jobs=options.jobs, dask=options.dask, export_to=options.export
-            )
-    except KeyboardInterrupt:
-        there = f"{stored[0]} of {stored[1]} points are stored; " if stored[1] else ""
-        print(f"flipproof: interrupted; {there}the same command goes on from there", file=sys.stderr)
-        return INTERRUPTED
-    print(line)
     return 0
 
 

@@ -43,7 +43,7 @@ def figure_map(study: ValidityMap, approximation: str = "published-python", meas
         size = (x[column + 1] - x[column], y[row + 1] - y[row])
         axes.add_patch(Rectangle(corner, *size, facecolor="none", edgecolor="#555555", hatch=HATCH, linewidth=0))
     handles: list[Artist] = [Patch(facecolor=colour, label=name) for colour, name in zip(COLOURS, RUNGS, strict=True)]
-    for (words, error), colour in zip(_errors(study, approximation, measure), LINES, strict=False):
+    for (words, error), colour in zip(errors(study, approximation, measure), LINES, strict=False):
         handles += _contours(axes, study, error, words, colour)
     if logarithmic:
         axes.set_yscale("log")
@@ -60,7 +60,9 @@ def figure_map(study: ValidityMap, approximation: str = "published-python", meas
     return figure
 
 
-def _errors(study: ValidityMap, approximation: str, measure: Measure) -> Sequence[tuple[str, FloatArray]]:
+def errors(
+    study: ValidityMap, approximation: str = "published-python", measure: Measure = "plateau"
+) -> Sequence[tuple[str, FloatArray]]:
     """Return what the contours show, with its name."""
     if study.axis == "step":
         return [(f"step error of {scheme}", study.step_error[scheme]) for scheme in SCHEMES]
@@ -73,14 +75,29 @@ def _contours(axes: Axes, study: ValidityMap, error: FloatArray, words: str, col
     for level, style in CONTOURS:
         finite = error[np.isfinite(error)]
         label = f"{words}: {level:.0%}"
-        if finite.size and finite.min() < level < finite.max() and min(error.shape) > 1:
-            axes.contour(
+        if _crosses(error, level):
+            lines = axes.contour(
                 study.fills, study.values, error, levels=[level], colors=colour, linestyles=style, linewidths=1.6
             )
+            axes.clabel(lines, fmt={level: f"{level:.0%}"}, fontsize=8)
         elif finite.size:
             label += " (all above)" if finite.min() >= level else " (all below)"
         handles.append(Line2D([], [], color=colour, linestyle=style, linewidth=1.6, label=label))
     return handles
+
+
+def _crosses(error: FloatArray, level: float) -> bool:
+    """Return whether a map has a contour at ``level``."""
+    finite = error[np.isfinite(error)]
+    return bool(finite.size and finite.min() < level < finite.max() and min(error.shape) > 1)
+
+
+def contour_lines(study: ValidityMap, error: FloatArray, level: float) -> list[FloatArray]:
+    """Return the contour of ``error`` as lines of (fill fraction, value), each of shape (K, 2)."""
+    if not _crosses(error, level):
+        return []
+    found = Figure().subplots().contour(study.fills, study.values, error, levels=[level])
+    return [np.asarray(line) for line in found.allsegs[0] if len(line)]
 
 
 def _edges(centres: FloatArray, *, logarithmic: bool) -> FloatArray:

@@ -166,16 +166,27 @@ def study_waterfall(runs: Mapping[str, Trajectory]) -> tuple[Waterfall, ...]:
     for tag, run in runs.items():
         if not run.ok:
             raise ArithmeticError(f"{tag}: {run.status}: {run.message}")
-    return tuple(_split(observable, runs) for observable in OBSERVABLES)
+    return split_all({tag: {o.name: o.of(run) for o in OBSERVABLES} for tag, run in runs.items()})
 
 
-def _split(observable: Observable, runs: Mapping[str, Trajectory]) -> Waterfall:
+def split_all(observed: Mapping[str, Mapping[str, float]]) -> tuple[Waterfall, ...]:
+    """Split every observable; ``observed`` maps the tags of ``plan_waterfall`` to their values by name.
+
+    Raises
+    ------
+    ArithmeticError
+        If a split does not sum to the whole difference within round-off.
+    """
+    return tuple(_split(o, {tag: values[o.name] for tag, values in observed.items()}) for o in OBSERVABLES)
+
+
+def _split(observable: Observable, observed: Mapping[str, float]) -> Waterfall:
     values: dict[Switches, float] = {}
     bands: dict[Switches, float] = {}
     for switches in Switches.every():
-        values[switches] = observable.of(runs[_tag("usual", switches)])
-        bands[switches] = abs(values[switches] - observable.of(runs[_tag("loose", switches)]))
-    start = observable.of(runs["waterfall, program"])
+        values[switches] = observed[_tag("usual", switches)]
+        bands[switches] = abs(values[switches] - observed[_tag("loose", switches)])
+    start = observed["waterfall, program"]
     none, everything = Switches(), Switches(*[True] * len(NAMES))
     step = values[none] - start
     bars = [

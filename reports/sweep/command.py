@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
-from reports.sweep.design import read_design
+from reports.sweep.design import Design, read_design
 from reports.sweep.entries import try_entries
 from reports.sweep.export import check_export, export
 from reports.sweep.local import Workers, local_workers
@@ -15,11 +15,14 @@ from reports.sweep.run import Progress, run_sweep
 from reports.sweep.store import FILE, Store
 from reports.sweep.work import OUTCOMES, code_identity
 
+Begin = Callable[[int, int], Progress]
+"""Called once with points there and points of the design, when the work begins; returns what follows it."""
+
 
 def sweep(
     file: Path,
     out: Path,
-    begin: Callable[[int, int], Progress],
+    begin: Begin,
     *,
     jobs: int | None = None,
     dask: str | None = None,
@@ -30,7 +33,6 @@ def sweep(
     Parameters
     ----------
     begin : callable (points there, points of the design) -> progress
-        Called once, when the work begins.
     jobs : int or None
         Worker processes of this machine; None: one per core.
     dask : str or None
@@ -43,13 +45,31 @@ def sweep(
     SweepError
         If the file, the folder, the workers or the disk will not do; what was stored is kept.
     """
-    began = time.perf_counter()
-    if export_to:
-        check_export(export_to, out)
     design = read_design(file)
     if not (out / FILE).exists():
         # Before the folder knows the design, so that the mended file may have the same folder.
         try_entries(design.entries)
+    with completed(design, out, begin, jobs=jobs, dask=dask, export_to=export_to) as (_, summary):
+        return summary
+
+
+@contextmanager
+def completed(
+    design: Design,
+    out: Path,
+    begin: Begin,
+    *,
+    jobs: int | None = None,
+    dask: str | None = None,
+    export_to: Path | None = None,
+) -> Iterator[tuple[Store, str]]:
+    """Give the store in ``out`` when every point of ``design`` has a row, and a line that tells what is there.
+
+    Parameters, and what is raised, as for ``sweep``.
+    """
+    began = time.perf_counter()
+    if export_to:
+        check_export(export_to, out)
     with Store(out, design, code_identity()) as store:
         there = sum(store.done())
         progress = begin(there, design.size)
@@ -58,7 +78,7 @@ def sweep(
                 run_sweep(store, workers, progress)
         if export_to:
             export(store, export_to)
-        return _summary(store, there, time.perf_counter() - began)
+        yield store, _summary(store, there, time.perf_counter() - began)
 
 
 def _workers(jobs: int | None, dask: str | None) -> AbstractContextManager[Workers]:

@@ -9,6 +9,7 @@
     samples = 200               points of a Latin hypercube for each solver
     seed = 1                    its seed (default 0)
     trajectories = false        true: keep every flight as NPZ
+    curves = 101                keep omega, theta, r_CM and v_CM at so many equal times in the row (default 0: none)
 
     [sweep.fields]
     fill_fraction = [0.25, 0.5, 0.75]
@@ -47,7 +48,9 @@ MOST_POINTS: Final = 1_000_000
 
 GRID: Final = "grid"
 LATIN: Final = "latin-hypercube"
-KEYS: Final = ("design", "samples", "seed", "trajectories", "fields")
+KEYS: Final = ("design", "samples", "seed", "trajectories", "curves", "fields")
+MOST_CURVE: Final = 10_000
+"""Points of a row's curves at the most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +119,7 @@ class Design:
     text : str - the file it was read from
     base : {"bottle": {...}, "scenario": {...}} - the throw that the swept fields change
     shares : (samples, axes) or None - places in a Latin hypercube, in [0, 1); None for a grid
+    curves : int - points of the curves that every row keeps; 0: none
     """
 
     text: str
@@ -125,6 +129,7 @@ class Design:
     shares: FloatArray | None
     seed: int | None
     trajectories: bool
+    curves: int
 
     @property
     def throws(self) -> int:
@@ -182,6 +187,7 @@ class Design:
             "samples": None if self.shares is None else len(self.shares),
             "seed": self.seed,
             "trajectories": self.trajectories,
+            **({"curves": self.curves} if self.curves else {}),
             "fields": {axis.name: axis.facts() for axis in self.axes},
             "order of fields": [axis.name for axis in self.axes],
             "solvers": [{"name": entry.name, **entry.settings} for entry in self.entries],
@@ -226,6 +232,10 @@ def design_of(document: Mapping[str, Any], source: str, text: str = "") -> Desig
     trajectories = table.get("trajectories", False)
     if not isinstance(trajectories, bool):
         raise SweepError(f"{where} trajectories = {trajectories!r} is neither true nor false")
+    curves = table.get("curves", 0)
+    problem = not_whole(f"{where} curves", curves, 2, MOST_CURVE) if curves != 0 or isinstance(curves, bool) else ""
+    if problem:
+        raise SweepError(f"{problem}, or 0 for none")
     fields = table.get("fields")
     if not isinstance(fields, Mapping):
         raise SweepError(f"{source}: has no table [sweep.fields]; it names the fields to vary")
@@ -246,6 +256,7 @@ def design_of(document: Mapping[str, Any], source: str, text: str = "") -> Desig
         shares=None if samples is None else latin_shares(samples, len(axes), seed or 0),
         seed=seed,
         trajectories=trajectories,
+        curves=int(curves),
     )
 
 

@@ -1,7 +1,7 @@
 """The rows of a sweep as one CSV or Parquet file, in the order of the design.
 
 A missing number is an empty cell (CSV) or a null (Parquet), and the column ``reason`` says why. CSV writes floats so
-that they read back to the last bit. The full parameters of a row stay in the store, under its key.
+that they read back to the last bit. The full parameters of a row and its curves stay in the store, under its key.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from reports.sweep.files import whole_file
 from reports.sweep.store import Store, columns
 
 FORMS: Final = (".csv", ".parquet")
-LEFT_OUT: Final = ("parameters", "versions")
+LEFT_OUT: Final = ("parameters", "versions", "curves")
 CHUNK: Final = 10_000
 """Rows in memory at a time."""
 

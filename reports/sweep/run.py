@@ -167,8 +167,9 @@ def _next(lines: list[Line], again: deque[Batch], capacity: int) -> Batch | None
 
 
 def _submit(workers: Workers, store: Store, batch: Batch) -> Future[Returned]:
+    design = store.design
     try:
-        return workers.executor.submit(make_batch, store.code, batch.points, store.design.trajectories)
+        return workers.executor.submit(make_batch, store.code, batch.points, design.trajectories, design.curves)
     except Exception as error:
         raise _no_workers(store.code, error) from None
 

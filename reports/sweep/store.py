@@ -33,7 +33,8 @@ from reports.sweep.design import Design
 from reports.sweep.entries import settings_text
 from reports.sweep.errors import SweepError
 from reports.sweep.files import sweep_away_parts, whole_file
-from reports.sweep.work import OUTCOMES, Outcome, Returned
+from reports.sweep.work import CURVES, OUTCOMES, Outcome, Returned
+from slicemodel.trajectory import FloatArray
 
 SCHEMA: Final = 1
 FILE: Final = "sweep.sqlite"
@@ -66,6 +67,7 @@ def points_table(design: Design) -> str:
     numbers = "".join(f"    {name} REAL CHECK (typeof({name}) IN ('real', 'null')),\n" for name in NUMBERS)
     known = " AND ".join(f"{name} IS NOT NULL" for name in (*NUMBERS, "impacts"))
     statuses = ", ".join(f"'{status}'" for status in OUTCOMES)
+    curves = f"    curves BLOB,  -- float64, little-endian: {', '.join(CURVES)}\n" if design.curves else ""
     return f"""
 CREATE TABLE points (
     number INTEGER PRIMARY KEY,  -- place in the design, from 0
@@ -78,7 +80,7 @@ CREATE TABLE points (
     reason TEXT NOT NULL,        -- why a number is NULL
     seconds REAL NOT NULL,
     trajectory TEXT,             -- file of the flight, if it was kept
-    versions INTEGER NOT NULL REFERENCES versions (id),
+{curves}    versions INTEGER NOT NULL REFERENCES versions (id),
     parameters TEXT NOT NULL,    -- JSON: enough to make this row again alone
     CHECK (reason <> '' OR ({known}))
 );
@@ -227,6 +229,7 @@ class Store:
             outcome.reason,
             outcome.seconds,
             flight,
+            *([_bytes(outcome.curves)] if self.design.curves else []),
             versions,
             json.dumps(point.parameters()),
         )
@@ -246,8 +249,18 @@ class Store:
 def columns(design: Design) -> tuple[str, ...]:
     """Return the columns of the table of points, in order."""
     swept = (column(axis.name) for axis in design.axes)
-    told = ("status", "message", "reason", "seconds", "trajectory", "versions", "parameters")
+    kept = ("trajectory", "curves") if design.curves else ("trajectory",)
+    told = ("status", "message", "reason", "seconds", *kept, "versions", "parameters")
     return ("number", "key", *swept, "solver", "settings", *NUMBERS, "impacts", *told)
+
+
+def read_curves(blob: bytes) -> dict[str, FloatArray]:
+    """Return the curves of a row by name, each of shape (P,)."""
+    return dict(zip(CURVES, np.frombuffer(blob, dtype="<f8").reshape(len(CURVES), -1), strict=True))
+
+
+def _bytes(curves: FloatArray | None) -> bytes | None:
+    return None if curves is None else curves.astype("<f8").tobytes()
 
 
 def _tables(connection: sqlite3.Connection) -> set[str]:

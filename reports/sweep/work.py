@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from reports.provenance import provenance
 from reports.solvers import Run, make
 from reports.sweep.design import Point
-from slicemodel.observables import plateau
+from slicemodel.observables import centre_of_mass_velocity, plateau
 from slicemodel.scenario import ScenarioError
-from slicemodel.trajectory import STATUSES, Trajectory
+from slicemodel.trajectory import STATUSES, FloatArray, Trajectory
 
 WHOLE: Final = ("ok", "escaped")
 """Statuses of a trajectory that reached the end of the flight."""
@@ -40,6 +40,9 @@ OUTCOMES: Final = {
 
 SOURCES: Final = ("slicemodel", "ode_reference", "engine_check", "reports.solvers", "reports.sweep.work")
 """What a point's numbers depend on."""
+
+CURVES: Final = ("omega", "theta", "r_cm", "v_cm")
+"""What a row's curves show, in their order [rad/s, rad, m, m/s]."""
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -60,6 +63,7 @@ class Outcome:
     reason : why a number is missing; empty if none is
     seconds : what the point took
     arrays : the flight, if it was asked for and there is one
+    curves : (4, P) - ``curves_of`` the flight, if they were asked for and it was whole
     """
 
     number: int
@@ -74,6 +78,7 @@ class Outcome:
     reason: str = ""
     seconds: float = 0.0
     arrays: Arrays | None = None
+    curves: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,21 +120,22 @@ def versions() -> Mapping[str, str]:
     return {name: fact for name, fact in provenance("").items() if name not in ("command", "made", "flipproof")}
 
 
-def make_batch(code: str, points: Sequence[Point], keep: bool) -> Returned:
+def make_batch(code: str, points: Sequence[Point], keep: bool, curves: int = 0) -> Returned:
     """Make points one after the other; if the caller's ``code`` is not the code here, make none.
 
     Parameters
     ----------
     code : str - ``code_identity()`` where the sweep is written
     keep : bool - return the flights too
+    curves : int - points of the curves to return; 0: none
     """
     began = time.perf_counter()
     here = code_identity()
-    outcomes = [make_point(point, keep) for point in points] if here == code else []
+    outcomes = [make_point(point, keep, curves) for point in points] if here == code else []
     return Returned(here, versions(), outcomes, time.perf_counter() - began)
 
 
-def make_point(point: Point, keep: bool = False) -> Outcome:
+def make_point(point: Point, keep: bool = False, curves: int = 0) -> Outcome:
     """Make one point; whatever goes wrong becomes its status and reason."""
     try:
         scenario = point.scenario()
@@ -144,10 +150,21 @@ def make_point(point: Point, keep: bool = False) -> Outcome:
         return Outcome(number=point.number, status="failed", reason=f"{type(error).__name__}: {error}", seconds=seconds)
     if made.trajectory is None:
         return Outcome(number=point.number, status="failed", reason=made.reason, seconds=made.seconds)
-    return _read(point.number, made.trajectory, made.seconds, keep)
+    return _read(point.number, made.trajectory, made.seconds, keep, curves)
 
 
-def _read(number: int, flight: Trajectory, seconds: float, keep: bool) -> Outcome:
+def curves_of(flight: Trajectory, points: int) -> FloatArray:
+    """Return the ``CURVES`` of a whole flight at equal times from release to landing, shape (4, points).
+
+    Linear between output times. v_CM is NaN where the run kept no slices (a scheme's store "summary").
+    """
+    times = np.linspace(0.0, flight.scenario.duration, points)
+    kept = len(flight.v) == len(flight.t)
+    v_cm = centre_of_mass_velocity(flight.scenario, flight.v) if kept else np.full(len(flight.t), np.nan)
+    return np.array([np.interp(times, flight.t, curve) for curve in (flight.omega, flight.theta, flight.r_cm, v_cm)])
+
+
+def _read(number: int, flight: Trajectory, seconds: float, keep: bool, curves: int) -> Outcome:
     values: dict[str, float | None] = dict.fromkeys(("plateau", "omega_end", "theta_end", "r_cm_end"))
     reasons = []
     if flight.status in WHOLE:
@@ -175,6 +192,7 @@ def _read(number: int, flight: Trajectory, seconds: float, keep: bool) -> Outcom
         reason="; ".join(reasons),
         seconds=seconds,
         arrays=_arrays(flight) if keep else None,
+        curves=curves_of(flight, curves) if curves and flight.status in WHOLE else None,
     )
 
 

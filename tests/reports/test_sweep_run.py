@@ -31,9 +31,9 @@ def design(throws, solvers=2, trajectories=False):
     return design_of(document, "sweep.toml")
 
 
-def quick(code, points, keep):
+def quick(code, points, keep, curves):
     """Stand in for ``make_batch``: every point succeeds in a millisecond."""
-    del keep
+    del keep, curves
     numbers = dict.fromkeys(("plateau", "omega_end", "theta_end", "r_cm_end", "t_end"), 0.5)
     outcomes = [Outcome(**numbers, number=point.number, impacts=1, status="ok") for point in points]
     return Returned(code, {}, outcomes, 0.001 * len(points))
@@ -45,14 +45,14 @@ class Inline(Executor):
     def __init__(self, fault=lambda points: None):  # noqa: ARG005
         self.fault, self.batches = fault, []
 
-    def submit(self, fn, /, code, points, keep):
+    def submit(self, fn, /, code, points, *kept):
         self.batches.append([point.number for point in points])
         future = Future()
         error = self.fault(points)
         if error:
             future.set_exception(error)
         else:
-            future.set_result(fn(code, points, keep))
+            future.set_result(fn(code, points, *kept))
         return future
 
 
@@ -186,7 +186,7 @@ def test_waiting_for_workers_has_an_end(tmp_path, monkeypatch):
 
 
 def test_a_worker_of_other_code_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(run, "make_batch", lambda _, __, ___: Returned("0.9.0+other", {}, [], 0.1))
+    monkeypatch.setattr(run, "make_batch", lambda *_: Returned("0.9.0+other", {}, [], 0.1))
     with pytest.raises(SweepError, match=r"a worker runs flipproof 0\.9\.0\+other, this is 0\.1\.0\+test"):
         sweep(tmp_path, Inline())
 

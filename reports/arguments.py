@@ -1,0 +1,36 @@
+"""What the commands of ``flipproof`` share: how one is added, and the arguments that several take."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import Any, Final
+
+INTERRUPTED: Final = 130
+"""Exit status of an interrupted command."""
+
+SCENARIO_HELP: Final = "scenario file (TOML with tables [scenario] and [bottle]); default: the paper's own throw"
+
+
+def add_command(
+    commands: Any, name: str, description: str, action: Callable[[argparse.Namespace], int]
+) -> argparse.ArgumentParser:
+    """Add a command that ``action`` runs and return its parser."""
+    command: argparse.ArgumentParser = commands.add_parser(name, description=description, help=description)
+    command.set_defaults(action=action)
+    return command
+
+
+def count(text: str) -> int:
+    """Return a whole number of at least 1."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
+    return int(text)
+
+
+def read_scenario(path: str | None, slices: int | None = None) -> Any:
+    """Return the throw of a file, or the paper's own, cut into ``slices`` if given."""
+    from slicemodel import Scenario
+
+    scenario = Scenario.from_toml(path) if path else Scenario()
+    return scenario.with_slices(slices) if slices else scenario
