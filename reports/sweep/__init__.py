@@ -3,4 +3,7 @@
 A file (``design``) states which fields vary and which solvers throw each bottle; its points are numbered. ``run`` hands
 them in batches to workers, processes of this machine (``local``) or of a Dask cluster (``cluster``), which do nothing
 but ``work``. What comes back is written by this program alone (``store``) and can be exported (``export``).
+
+A study that plans its runs can have them made so (``planned``): the map of validity (``validity_map``) and the
+waterfall (``split``) do.
 """

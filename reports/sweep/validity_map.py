@@ -80,9 +80,7 @@ class Plan:
 
     def runs(self) -> list[Run]:
         """Return every run; the output times are the solvers' own, so that a row repeats a run of the command line."""
-        return plan_map(
-            self.throw, self.axis, self.fills, self.values, steps=STEPS, tolerances=MEDIUM, points=None
-        )  # fmt: skip
+        return plan_map(self.throw, self.axis, self.fills, self.values, steps=STEPS, tolerances=MEDIUM, points=None)
 
     def varied(self) -> dict[str, Sequence[Value]]:
         """Return the fields of a scenario that the cells vary."""
