@@ -10,8 +10,9 @@ from engine_check import PymunkKnobs
 from engine_check.pymunk_settings import insertion_order
 from engine_check.pymunk_world import build
 from reports.claims_engines import claim_angle, claim_horizon, claim_order_of_bodies
-from reports.exhibits_engines import draw_engines, draw_horizon
+from reports.exhibits_engines import draw_horizon, draw_instruments
 from reports.figures.engines import figure_horizon
+from reports.instruments import Instruments
 from reports.solvers import Made, make, solve
 from reports.studies.horizon import FULL, QUICK, Reach, plan_horizon, study_ensemble, study_horizon
 from slicemodel import Scenario, Trajectory
@@ -152,7 +153,7 @@ def test_a_solver_that_did_not_run_stays_with_its_reason():
     engine, _ = made_up(lambda _: 0.0, {member: Made(run, None, 0.0, "MemoryError: too much")})
     assert [(e.kind, e.size) for e in engine.ensembles if e.kind == "angle"] == [("angle", 1e-9)]
     assert "MemoryError" in engine.problems[0]
-    assert list(draw_engines((), (), (replace(engine, ensembles=()),))) == []
+    assert list(draw_instruments(Instruments(horizons=(replace(engine, ensembles=()),)))) == []
 
 
 def test_the_figure_labels_band_sizes_and_horizons():
