@@ -47,7 +47,7 @@ REFERENCE = Scenario().with_slices(50)
 CHECK = "check"
 """Leads the tags of runs on REFERENCE."""
 
-CHECK_DT = 2e-4
+CHECK_DT = 4e-4
 """Step of the engine where two of its runs are compared with one another [s]."""
 
 WELDED_SLICES = 20
@@ -91,7 +91,7 @@ class Size:
     second_method: str | None
     scope: Scope
     bench: Bench
-    precision: Effort
+    precision: Effort | None
 
 
 FULL = Size(
@@ -109,7 +109,7 @@ QUICK = Size(
     counts=(5, 20, 50, 200),
     second_method=None,
     scope=Scope(
-        waterfall_slices=6,
+        waterfall_slices=4,
         map_slices=10,
         fills=(),
         rows=0,
@@ -118,7 +118,7 @@ QUICK = Size(
         forms=FORMS[:2],
     ),
     bench=instruments.QUICK,
-    precision=contenders.QUICK,
+    precision=None,
 )
 
 
@@ -210,7 +210,7 @@ def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None 
         audit = pool.submit(study_errata, throw)
         made = make_all(pool, flat, progress)
         # After the other runs, so that the compiled loop is there and its compiling is not counted.
-        precision = gather_work_precision(pool, size.precision)
+        precision = gather_work_precision(pool, size.precision) if size.precision is not None else ()
         starts = _study_starts(pool, throw, "", made, size.levels)
         check_starts = _study_starts(pool, REFERENCE, f"{CHECK}, ", made, 4)
         attribution = study_attribution(throw, size.scope, size.steps, made, pool, audit)

@@ -95,6 +95,8 @@ def tabulate_work_precision(studies: Sequence[WorkPrecision]) -> Iterator[Table]
         yield _results(study)
         yield _settings(study)
         yield _references(study)
+    if not studies:
+        return
     absent = {name: reason for study in studies for name, reason in study.absent.items()}
     yield Table(
         name="work-absent",

@@ -12,6 +12,7 @@ from reports.evidence import FREE, Evidence
 from reports.exhibit import Exhibit
 from reports.exhibits_work_precision import tabulate_work_precision
 from reports.findings import Finding
+from reports.instruments import WITNESSES
 from reports.lead import lead_words
 from reports.studies.differences import Difference
 
@@ -85,6 +86,7 @@ def render(
         growths=evidence.growths,
         found=evidence.attribution,
         instruments=evidence.instruments,
+        uncertified=[tag for tag in WITNESSES if tag not in evidence.size.bench.certified],
         tables=list(tabulate_work_precision(evidence.precision)),
         forms_omega=[(pair, forms["omega"]) for pair, forms in evidence.attribution.forms.items()],
         solvers=solvers,

@@ -26,6 +26,15 @@ def without(evidence, tag, reason="RuntimeError: not installed"):
 def test_a_report_certifies_to_what_solve_asks_by_itself():
     assert instruments.TOLERANCE == DEFAULT_TOLERANCE
     assert [run.tag for run in plan_witnesses(REFERENCE, instruments.FULL)] == list(WITNESSES)
+    assert all(run.settings["tolerance"] == DEFAULT_TOLERANCE for run in plan_witnesses(REFERENCE, instruments.FULL))
+
+
+def test_a_quick_report_says_what_it_does_not_certify(evidence):
+    size = dataclasses.replace(evidence.size, bench=instruments.QUICK)
+    planned = {run.tag: run.settings for run in plan_witnesses(REFERENCE, instruments.QUICK)}
+    assert planned["pymunk"] == {"dt": instruments.UNCERTIFIED_DT}
+    quick = dataclasses.replace(evidence, size=size)
+    assert "pymunk and mujoco: not certified in a quick report" in build(quick, provenance("flipproof report")).html
 
 
 def test_every_witness_has_its_certificate(evidence, read_page):

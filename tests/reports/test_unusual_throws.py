@@ -9,9 +9,8 @@ from reports import evidence as evidence_module
 from reports.attribution import Scope
 from reports.build import build
 from reports.evidence import QUICK, with_slices
-from reports.instruments import QUICK_TOLERANCE, Bench
+from reports.instruments import Bench
 from reports.provenance import provenance
-from reports.studies import contenders
 from reports.studies.horizon import Reach
 from reports.studies.stability import Layout
 from slicemodel import Scenario
@@ -22,7 +21,7 @@ SMALL_BENCH = Bench(
     fills=(0.5, 1.0),
     slices=3,
     dt=4e-4,
-    tolerance=QUICK_TOLERANCE,
+    certified=(),
 )
 """What does not depend on the throw is tried elsewhere; here it is only as large as its claims need."""
 
@@ -47,7 +46,6 @@ def test_unusual_throws_have_a_report_too(name, read_page, monkeypatch):
         with_slices(QUICK, throw.n_slices),
         scope=Scope(waterfall_slices=min(4, throw.n_slices), map_slices=4, fills=(), rows=0),
         bench=SMALL_BENCH,
-        precision=dataclasses.replace(contenders.QUICK, cases=()),
     )
     evidence = evidence_module.gather(throw, size, lambda *_: None)
     report = build(evidence, provenance("flipproof report"))
