@@ -81,7 +81,7 @@ def draw(figure: Figure) -> Drawing:
     svg, png = BytesIO(), BytesIO()
     figure.savefig(svg, format="svg", metadata={"Date": None})
     figure.set_layout_engine("none")  # laid out by now; to do it again for the second format costs as much as drawing
-    figure.savefig(png, format="png", dpi=130)
+    figure.savefig(png, format="png", dpi=100)
     return Drawing(svg.getvalue().decode("utf-8"), png.getvalue())
 
 
