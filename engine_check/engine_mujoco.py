@@ -265,14 +265,11 @@ class _Flight:
             self._status, self._cause = "diverged", "the engine's numbers are no longer finite; reduce dt"
             return
         residuals = watch.measure(state, scenario, self._setup["angular_momentum"])
-        for name, band in BANDS.items():
-            self._worst[name] = max(self._worst[name], residuals[name])
-            # Written as "not inside", because NaN passes every "outside" test.
-            if not residuals[name] <= band.limit:
-                self._status = "diverged"
-                self._cause = f"{name.replace('_', ' ')} {residuals[name]:.3g} exceeds {band.limit:g} ({band.what})"
-                self._cause += f"; {band.remedy}"
-                return
+        self._worst = {name: max(worst, residuals[name]) for name, worst in self._worst.items()}
+        self._cause = watch.first_left(residuals, BANDS)[1]
+        if self._cause:
+            self._status = "diverged"
+            return
         r, v = scenario.initial_positions(), np.zeros(scenario.n_slices)
         if world.movable:
             r, v = world.r.copy(), np.where(self._contacts.side == FREE, world.v, 0.0)

@@ -14,8 +14,7 @@ import mujoco
 import numpy as np
 
 from engine_check.mujoco_world import TUBE, TUBE_DOFS, World, disable_flags
-from engine_check.readback import both, differences, extremes
-from engine_check.solver import SetupError
+from engine_check.readback import both, differences, extremes, matched
 from slicemodel import observables
 from slicemodel.scenario import Scenario
 
@@ -146,10 +145,7 @@ def verify(world: World, scenario: Scenario, dt: float) -> dict[str, float]:
     """
     held = read_back(world)
     meant = intended(scenario, dt, world.movable)
-    problems = differences(meant, held, _scales(scenario))
-    if problems:
-        raise SetupError("the built world is not the one meant: " + "; ".join(problems))
-    return {name: held[name] for name in meant}
+    return matched(held, meant, differences(meant, held, _scales(scenario)))
 
 
 def _scales(scenario: Scenario) -> dict[str, float]:

@@ -209,12 +209,7 @@ class _Flight:
             "prediction_gap": float(np.abs(x - predicted).max()) / length,
         }
         self._worst = {name: max(self._worst[name], value) for name, value in residuals.items()}
-        for name, band in BANDS.items():
-            # Written as "not inside", because NaN passes every "outside" test.
-            if not residuals[name] <= band.limit:
-                found = f"{name.replace('_', ' ')} {residuals[name]:.3g}"
-                return f"{found} exceeds {band.limit:g} ({band.what}); {band.remedy}"
-        return ""
+        return watch.first_left(residuals, BANDS)[1]
 
     def trajectory(self, *, settings: Mapping[str, Any], setup: Mapping[str, float]) -> Trajectory:
         """Return what was recorded up to the last good point."""

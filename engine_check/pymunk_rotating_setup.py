@@ -15,8 +15,7 @@ import pymunk
 
 from engine_check.pymunk_rotating_world import ForceLaw, HeldWorld, forces_held
 from engine_check.pymunk_settings import CAP_ELASTICITY, PymunkKnobs
-from engine_check.readback import both, differences, extremes
-from engine_check.solver import SetupError
+from engine_check.readback import both, differences, extremes, matched
 from slicemodel import observables
 from slicemodel.scenario import Scenario
 
@@ -146,10 +145,7 @@ def verify_held(
     """
     held = read_back(world, law, scenario.bottle.length / 2)
     meant = intended(scenario, knobs, iterations, ice)
-    problems = differences(meant, held, _scales(scenario))
-    if problems:
-        raise SetupError("the built world is not the one meant: " + "; ".join(problems))
-    return {name: held[name] for name in meant}
+    return matched(held, meant, differences(meant, held, _scales(scenario)))
 
 
 def _scales(scenario: Scenario) -> dict[str, float]:

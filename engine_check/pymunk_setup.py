@@ -16,8 +16,7 @@ import pymunk
 from engine_check import pymunk_rods as rods
 from engine_check.pymunk_settings import PymunkKnobs, restitution_between_slices
 from engine_check.pymunk_world import World
-from engine_check.readback import both, differences, extremes
-from engine_check.solver import SetupError
+from engine_check.readback import both, differences, extremes, matched
 from slicemodel import observables
 from slicemodel.scenario import Scenario
 
@@ -180,9 +179,7 @@ def verify(
     problems = differences(meant, held, _scales(scenario))
     if world.slices and not scenario.frozen:
         problems += _dead_stops(held, scenario)
-    if problems:
-        raise SetupError("the built world is not the one meant: " + "; ".join(problems))
-    return {name: held[name] for name in meant}
+    return matched(held, meant, problems)
 
 
 def _scales(scenario: Scenario) -> dict[str, float]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
+
+from engine_check.solver import SetupError
 
 ROUND_OFF: Final = 1e-12
 """Largest relative difference between meant and built: sums of N terms in a different order, nothing more."""
@@ -23,6 +25,13 @@ def differences(meant: Mapping[str, float], held: Mapping[str, float], scales: M
             continue
         problems.append(f"{name} = {got!r}, meant {value!r}")
     return problems
+
+
+def matched(held: Mapping[str, float], meant: Mapping[str, float], problems: Sequence[str]) -> dict[str, float]:
+    """Return what is held of what was meant, or raise SetupError with every problem."""
+    if problems:
+        raise SetupError("the built world is not the one meant: " + "; ".join(problems))
+    return {name: held[name] for name in meant}
 
 
 def both(name: str, value: float) -> dict[str, float]:

@@ -150,10 +150,17 @@ def broken(residuals: Mapping[str, float], cap_thickness: float) -> str:
 
     ``cap_thickness`` is in bottle lengths: past the middle of a cap the engine pushes a slice outward.
     """
-    for name, band in BANDS.items():
+    name, words = first_left(residuals, BANDS)
+    if name == "penetration" and residuals[name] > cap_thickness / 2:
+        return f"a slice has tunnelled through an end cap ({residuals[name]:.3g} L deep); reduce dt"
+    return words
+
+
+def first_left(residuals: Mapping[str, float], bands: Mapping[str, Band]) -> tuple[str, str]:
+    """Return the first residual that has left its band, and how in words; two empty strings if none has."""
+    for name, band in bands.items():
         # Written as "not inside", because NaN passes every "outside" test.
         if not residuals[name] <= band.limit:
-            if name == "penetration" and residuals[name] > cap_thickness / 2:
-                return f"a slice has tunnelled through an end cap ({residuals[name]:.3g} L deep); reduce dt"
-            return f"{name.replace('_', ' ')} {residuals[name]:.3g} exceeds {band.limit:g} ({band.what}); {band.remedy}"
-    return ""
+            value = f"{name.replace('_', ' ')} {residuals[name]:.3g}"
+            return name, f"{value} exceeds {band.limit:g} ({band.what}); {band.remedy}"
+    return "", ""
