@@ -8,6 +8,7 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
+from engine_check.solver import DEFAULT_TOLERANCE
 from reports.solvers import Made, Run
 from reports.studies import horizon, overlap, stability
 from reports.studies.agreement import Agreement, study_agreement
@@ -19,7 +20,7 @@ from reports.studies.validity import vary
 from slicemodel import Scenario, Trajectory
 from slicemodel.trajectory import FloatArray
 
-TOLERANCE: Final = 2e-3
+TOLERANCE: Final = DEFAULT_TOLERANCE
 """What the certificates of a report must hold, fraction of omega_0: as ``engine_check.solve`` asks by itself."""
 
 UNCERTIFIED_DT: Final = 1.25e-4

@@ -168,7 +168,16 @@ def test_more_iterations_change_nothing_and_half_the_step_little():
 def test_the_default_iterations_suffice(n, water_mass):
     scenario = replace(Scenario(), water_mass=water_mass).with_slices(n)
     times = np.linspace(0.0, 0.5, 101)
-    run = solve(scenario, times=times, dt=2e-4)
-    more = solve(scenario, times=times, dt=2e-4, iterations=2 * run.settings["iterations"])
+    run = solve(scenario, times=times)
+    more = solve(scenario, times=times, iterations=2 * run.settings["iterations"])
     assert run.ok
     assert abs(more.omega[-1] - run.omega[-1]) < 1e-4 * scenario.omega0
+
+
+@pytest.mark.slow
+def test_the_default_step_is_trustworthy_against_a_finer_one():
+    times = np.linspace(0.0, 0.5, 501)
+    runs = [solve(FIFTY, dt=dt, times=times) for dt in (1e-4, 5e-5, 2.5e-5)]
+    assert all(run.ok for run in runs)
+    for run in runs[:-1]:
+        assert np.max(np.abs(run.omega - runs[-1].omega)) < 5e-3 * FIFTY.omega0
