@@ -3,11 +3,14 @@
 A step is one map with coefficients that all slices share (``schemes.form``), so the slices move in lanes, eight at a
 time: they are loaded, moved, summed and stored without leaving the processor's registers.
 
-    r  |01234567|89......|........|....pppp|     p: padding, kept at the middle of the bottle, adds 0 to every sum
+    y  |01234567|89......|........|....pppp|     p: padding, kept at the middle of the bottle, adds 0 to every sum
             |
-            +-> r', v' --> a slice at an end? --no---------------------> add to the sums, store
+            +-> y', v' --> a slice at an end? --no---------------------> add to the sums, store
                                   |                                        ^
                                   +--yes--> rebound it, list the rebound --+
+
+Positions are counted from the middle of the bottle, y = r - L/2: the two ends are one number, and sums of squares lose
+no digits.
 
 The instructions are written out, because no compiler may put eight sums in the place of one: the order of additions
 decides the last digit. Here the order is part of the program, and so is where a product and a sum are rounded once
@@ -43,7 +46,7 @@ ROUNDING = 4e-16
 """Of a sum of two numbers, in units of the larger."""
 
 SERIES = 0.5
-"""Arguments below which sinh is summed up from its series; the first term left out is 2e-17 of the sum."""
+"""Arguments below which sinh and cosh are summed up from their series; the first term left out is 2e-17 of the sum."""
 
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
@@ -335,41 +338,56 @@ def decay(x: float):
 
 
 @merged
-def growth_rate(form, constants, omega: float) -> float:
-    """Return k (module docstring of ``schemes.form``)."""
-    k: float = math.sqrt(omega * omega + constants.gamma * constants.gamma) if form.exact_roots else omega
-    return k
+def growth_rate_squared(form, constants, omega: float) -> float:
+    """Return k^2 (module docstring of ``schemes.form``)."""
+    squared: float = omega * omega + constants.gamma * constants.gamma if form.exact_roots else omega * omega
+    return squared
 
 
 @merged
-def coefficients(form, constants, k: float, fade_minus_1: float, fade: float, dt: float):
+def hyperbolic(y: float):
+    """Return sinh(x) / x and (cosh(x) - 1) / x^2 of y = x^2, for small x by their series: no root and no quotient."""
+    if y < SERIES * SERIES:
+        odd = fused(y, fused(y, 1.0 / 6227020800.0, 1.0 / 39916800.0), 1.0 / 362880.0)
+        odd = fused(y, fused(y, fused(y, odd, 1.0 / 5040.0), 1.0 / 120.0), 1.0 / 6.0)
+        even = fused(y, fused(y, 1.0 / 87178291200.0, 1.0 / 479001600.0), 1.0 / 3628800.0)
+        even = fused(y, fused(y, fused(y, even, 1.0 / 40320.0), 1.0 / 720.0), 1.0 / 24.0)
+        return fused(y, odd, 1.0), fused(y, even, 0.5)
+    x = math.sqrt(y)
+    half = math.sinh(0.5 * x) / x
+    return math.sinh(x) / x, 2.0 * half * half
+
+
+@merged
+def coefficients(form, constants, k_squared: float, fade_minus_1: float, fade: float, dt: float):
     """Return a - 1, b, c, d of the closed-form step (module docstring of ``schemes.form``; Eq. 9c, 9d).
 
-    What is the same for all steps of a flight, ``decay(gamma dt)``, or for all times in a step, k, is given. a is close
-    to 1 for a short step: a - 1 is formed without the subtraction, which would lose the digits that move the slice
-    (E C - 1 = expm1(-gamma dt) C + 2 sinh(k dt / 2)^2).
+    What is the same for all steps of a flight, ``decay(gamma dt)``, or for all times in a step, k^2, is given. a is
+    close to 1 for a short step: a - 1 is formed without the subtraction, which would lose the digits that move the
+    slice (E C - 1 = expm1(-gamma dt) C + C - 1).
     """
     gamma = constants.gamma
-    half = sinh(0.5 * k * dt)
-    cosh_minus_1 = 2.0 * half * half
-    b = 2.0 * fade * half * math.sqrt(fused(half, half, 1.0)) / k
+    y = k_squared * dt * dt
+    odd, even = hyperbolic(y)
+    cosh_minus_1 = y * even
+    b = fade * dt * odd
     a_minus_1 = fade_minus_1 * (1.0 + cosh_minus_1) + cosh_minus_1 + constants.gamma_position * b
-    c = (k * k - gamma * gamma) * b
+    c = (k_squared - gamma * gamma) * b
     d = form.cosh_sign * fade * (1.0 + cosh_minus_1) + form.sinh_sign * gamma * b
     return a_minus_1, b, c, d
 
 
 @merged
-def coefficients_at(form, constants, k: float, t: float):
+def coefficients_at(form, constants, k_squared: float, t: float):
     """Return the coefficients of a step of any length t."""
     fade_minus_1, fade = decay(constants.gamma * t)
-    return coefficients(form, constants, k, fade_minus_1, fade, t)
+    return coefficients(form, constants, k_squared, fade_minus_1, fade, t)
 
 
 @compiled
 def step_coefficients(form, constants, omega: float, dt: float):
     """Return a - 1, b, c, d of the closed-form step of any omega and dt."""
-    return coefficients_at(form, constants, growth_rate(form, constants, omega), dt)
+    return coefficients_at(form, constants, growth_rate_squared(form, constants, omega), dt)
 
 
 @compiled
@@ -404,7 +422,7 @@ def first_guess(gamma: float, omega: float, x: float, v: float, way: float, end:
 
 
 @merged
-def hit(form, constants, omega: float, k: float, x: float, v: float, way: float, end: int, high: float):
+def hit(form, constants, omega: float, k_squared: float, x: float, v: float, way: float, end: int, high: float):
     """Return when the path has made ``way`` and goes on towards ``end``, before ``high``, and the velocity then.
 
     Newton's method on the closed form, kept inside the bracket. The way, not the place, is compared: it keeps its
@@ -415,7 +433,7 @@ def hit(form, constants, omega: float, k: float, x: float, v: float, way: float,
     if not low < t < high:
         t = high
     for _ in range(100):
-        a_minus_1, b, c, d = coefficients_at(form, constants, k, t)
+        a_minus_1, b, c, d = coefficients_at(form, constants, k_squared, t)
         pushed, flown = a_minus_1 * x, b * v
         gap = (pushed + flown) - way
         speed = c * x + d * v
@@ -473,125 +491,126 @@ def falls_back(gamma: float, omega: float, x: float, away: float, left: float, r
 
 @compiled
 def rebound_in_step(
-    form, constants, frame, omega: float, centre: float, start: float, dt: float, i: int, r: float, v: float,
-    r_end: float, v_end: float, log, count: int
+    form, constants, reach: float, omega: float, centre: float, start: float, dt: float, i: int, y: float, v: float,
+    y_end: float, v_end: float, log, count: int
 ):  # fmt: skip
-    """Follow one slice through a step with its hits located by the closed form; return r, v and the count of rebounds.
+    """Follow one slice through a step with its hits located by the closed form; return y, v and the count of rebounds.
 
-    ``r_end``, ``v_end`` is where the step would take it if the bottle had no ends.
+    The ends are at y = ``-reach`` and ``reach``. ``y_end``, ``v_end`` is where the step would take the slice if the
+    bottle had no ends.
 
     Coefficients stay frozen over the whole step. A path turns at most once, so the stretch before the turning point and
     the one after it are each searched for the end the slice then moves to. A slice that turns has slowed down until
     then: it cannot have got farther than its velocity would have carried it.
     """
     elapsed = 0.0
-    k = growth_rate(form, constants, omega)
+    k_squared = growth_rate_squared(form, constants, omega)
     for bounces in range(MOST_HITS):
-        x = r - centre
+        x = y - centre
         left = dt - elapsed
-        if abs(v) <= REST_SPEED and ((r == frame.r_max and x > 0.0) or (r == frame.r_min and x < 0.0)):
-            return r, 0.0, count
-        wall = frame.r_max if x > 0.0 else frame.r_min
         side = 1 if x > 0.0 else -1
-        if r == wall and falls_back(constants.gamma, omega, side * x, -side * v, left, frame.r_max - frame.r_min):
-            tau, v_hit = hit(form, constants, omega, k, x, v, 0.0, side, left)
+        at_rest_end = y == side * reach and x != 0.0
+        if abs(v) <= REST_SPEED and at_rest_end:
+            return y, 0.0, count
+        if at_rest_end and falls_back(constants.gamma, omega, side * x, -side * v, left, 2.0 * reach):
+            tau, v_hit = hit(form, constants, omega, k_squared, x, v, 0.0, side, left)
             count = listed(log, count, start + elapsed + tau, i, side, v_hit)
             elapsed += tau
             v = -constants.restitution * v_hit
             continue
         if bounces > 0:
-            a_minus_1, b, c, d = coefficients_at(form, constants, k, left)
-            r_end, v_end = r + (a_minus_1 * x + b * v), c * x + d * v
+            a_minus_1, b, c, d = coefficients_at(form, constants, k_squared, left)
+            y_end, v_end = y + (a_minus_1 * x + b * v), c * x + d * v
         end = 0
         high = left
-        if v * v_end < 0.0 and not frame.r_min <= r + v * left <= frame.r_max:
+        if v * v_end < 0.0 and abs(y + v * left) > reach:
             turn = turning_time(constants.gamma, omega, x, v)
             farthest = centre + path(form, constants, omega, x, v, turn)[0]
-            if (v > 0.0 and farthest > frame.r_max) or (v < 0.0 and farthest < frame.r_min):
+            if (v > 0.0 and farthest > reach) or (v < 0.0 and farthest < -reach):
                 end, high = (1 if v > 0.0 else -1), turn
         if end == 0:
-            end = int(r_end > frame.r_max) - int(r_end < frame.r_min)
+            end = int(y_end > reach) - int(y_end < -reach)
         if end == 0:
-            return r_end, v_end, count
-        wall = frame.r_max if end > 0 else frame.r_min
-        tau, v_hit = hit(form, constants, omega, k, x, v, wall - r, end, high)
+            return y_end, v_end, count
+        tau, v_hit = hit(form, constants, omega, k_squared, x, v, end * reach - y, end, high)
         count = listed(log, count, start + elapsed + tau, i, end, v_hit)
         elapsed += tau
-        r, v = wall, -constants.restitution * v_hit
-    return r, 0.0, count
+        y, v = end * reach, -constants.restitution * v_hit
+    return y, 0.0, count
 
 
 # ---------------------------------------------------------------------- one step of all slices
 
 
 class Shared(NamedTuple):
-    """What all slices of a step have in common; the first seven in every lane, ``near`` just less than L/2 - h/2N."""
+    """What all slices of a step have in common; the first seven in every lane.
+
+    The closed form is summed up from the smallest number to the largest, two products with their sums at a time:
+    y' = y + (b v + ((a - 1) y + push)), v' = c y + (d v + pull), with what the centre of repulsion y* contributes in
+    push = (1 - a) y* and pull = -c y*.
+    """
 
     a_minus_1: Any
     b: Any
     c: Any
     d: Any
-    centre: Any
-    middle: Any
-    near: Any
-    r_min: float
-    r_max: float
+    push: Any
+    pull: Any
+    reach: Any
+    centre: float
     minus_e: float
     dt: float
     end: float
     in_step: bool
     strict: bool
     keeps_position: bool
+    weighs_velocities: bool
     kept: bool
 
 
 @merged
-def shared(form, constants, frame, fading, omega: float, centre: float, dt: float, end: float, kept: bool):
+def shared(
+    form, constants, reach: float, fading, omega: float, centre: float, dt: float, end: float, weighs: bool, kept: bool
+):
     """Return what all slices have in common in the step that ends at time ``end``; if not ``kept`` it is a trial."""
-    k = growth_rate(form, constants, omega)
-    a_minus_1, b, c, d = coefficients(form, constants, k, fading[0], fading[1], dt)
-    middle = frame.length / 2
-    # Nearer than the ends, because r - L/2 is rounded; the slices found are then compared with the ends themselves.
-    near = (1.0 - 1e-14) * min(frame.r_max - middle, middle - frame.r_min)
+    k_squared = growth_rate_squared(form, constants, omega)
+    a_minus_1, b, c, d = coefficients(form, constants, k_squared, fading[0], fading[1], dt)
     return Shared(
-        everywhere(a_minus_1), everywhere(b), everywhere(c), everywhere(d), everywhere(centre), everywhere(middle),
-        everywhere(near), frame.r_min, frame.r_max, -constants.restitution, dt, end, form.in_step, form.strict,
-        form.keeps_position, kept,
+        everywhere(a_minus_1), everywhere(b), everywhere(c), everywhere(d), everywhere(-a_minus_1 * centre),
+        everywhere(-c * centre), everywhere(reach), centre, -constants.restitution, dt, end, form.in_step, form.strict,
+        form.keeps_position, weighs, kept,
     )  # fmt: skip
 
 
 @merged
-def moved(group, there: int, r, v):
-    """Return r and v of one lane group a step later, as if the bottle had no ends; ``there`` of it are slices."""
-    x = r - group.centre
-    r_new, v_new = fma(group.b, v, fma(group.a_minus_1, x, r)), fma(group.c, x, group.d * v)
+def moved(group, there: int, y, v):
+    """Return y and v of one lane group a step later, as if the bottle had no ends; ``there`` of it are slices."""
+    y_new = y + fma(group.b, v, fma(group.a_minus_1, y, group.push))
+    v_new = fma(group.c, y, fma(group.d, v, group.pull))
     if there < LANES:
         slices = (1 << there) - 1
-        r_new, v_new = where(slices, r_new, group.middle), where(slices, v_new, everywhere(0.0))
-    return r_new, v_new
+        y_new, v_new = where(slices, y_new, everywhere(0.0)), where(slices, v_new, everywhere(0.0))
+    return y_new, v_new
 
 
 @merged
-def near_an_end(group, v_old, v, y):
+def at_an_end(group, v_old, v, y):
     """Return which slices an end may concern, as bits: those at one, and those whose velocity is reversed.
 
     A dip through an end and back within the step leaves no other trace.
     """
-    found = at_least(size_of(y), group.near)
+    found = at_least(size_of(y), group.reach)
     if group.in_step:
         found |= above(everywhere(0.0), v_old * v)
     return found
 
 
 @merged
-def rebound_on_grid(group, i: int, r_old, r, v, work, log, count: int):
-    """Apply [C.S.] to the slices of a lane group past an end; return r, v and the count of rebounds."""
-    r_min, r_max = everywhere(group.r_min), everywhere(group.r_max)
-    if group.strict:
-        base, cap = above(r, r_max), above(r_min, r)
-    else:
-        base, cap = at_least(r, r_max), at_least(r_min, r)
-    past = base | cap
+def rebound_on_grid(group, i: int, y_old, y, v, work, log, count: int):
+    """Apply [C.S.] to the slices of a lane group past an end; return y, v and the count of rebounds."""
+    zero = everywhere(0.0)
+    past = above(size_of(y), group.reach) if group.strict else at_least(size_of(y), group.reach)
+    base = past & above(y, zero)
     store(work, LOOKED_AT, v)
     left = past
     while left:
@@ -599,48 +618,47 @@ def rebound_on_grid(group, i: int, r_old, r, v, work, log, count: int):
         left &= left - 1
         count = listed(log, count, group.end, i + j, 1 if base >> j & 1 else -1, get(work, LOOKED_AT + j))
     v = where(past, everywhere(group.minus_e) * v, v)
-    return (where(past, r_old, r) if group.keeps_position else r), v, count
+    return (where(past, y_old, y) if group.keeps_position else y), v, count
 
 
 @merged
-def struck_or_resting(group, r_old, v_old, v, y):
+def struck_or_resting(group, y_old, v_old, v, y):
     """Return which slices of a lane group may hit an end in the step, and which rest at one, as bits.
 
     A slice that turned had slowed down until then: it cannot have got farther than its velocity would have carried it.
     """
-    zero, r_min, r_max = everywhere(0.0), everywhere(group.r_min), everywhere(group.r_max)
-    x = r_old - group.centre
-    at_base = at_least(r_old, r_max) & at_least(r_max, r_old) & above(x, zero)
-    at_cap = at_least(r_old, r_min) & at_least(r_min, r_old) & above(zero, x)
+    zero, centre = everywhere(0.0), everywhere(group.centre)
+    at_base = at_least(y_old, group.reach) & at_least(group.reach, y_old) & above(y_old, centre)
+    at_cap = at_least(zero - y_old, group.reach) & at_least(group.reach, zero - y_old) & above(centre, y_old)
     resting = at_least(everywhere(REST_SPEED), size_of(v_old)) & (at_base | at_cap)
-    farthest = fma(v_old, everywhere(group.dt), r_old - group.middle)
-    turned = above(zero, v_old * v) & at_least(size_of(farthest), group.near)
-    return (turned | at_least(size_of(y), group.near)) & ~resting, resting
+    farthest = fma(v_old, everywhere(group.dt), y_old)
+    turned = above(zero, v_old * v) & above(size_of(farthest), group.reach)
+    return (turned | above(size_of(y), group.reach)) & ~resting, resting
 
 
 @compiled
-def glide(group, n: int, i: int, r, v, work, log, count: int):
+def glide(group, n: int, i: int, y, v, work, log, count: int):
     """Move the lane groups from ``i`` on until a slice hits an end in the step; return where, and the rebounds."""
     stands_alone()
     zero = everywhere(0.0)
     first, second, speed = load(work, 0), load(work, LANES), load(work, 2 * LANES)
     while i < n:
-        r_old, v_old = load(r, i), load(v, i)
-        r_new, v_new = moved(group, n - i, r_old, v_old)
-        y = r_new - group.middle
-        if near_an_end(group, v_old, v_new, y):
+        y_old, v_old = load(y, i), load(v, i)
+        y_new, v_new = moved(group, n - i, y_old, v_old)
+        if at_an_end(group, v_old, v_new, y_new):
             if group.in_step:
-                struck, resting = struck_or_resting(group, r_old, v_old, v_new, y)
+                struck, resting = struck_or_resting(group, y_old, v_old, v_new, y_new)
                 if struck:
                     break
-                r_new, v_new = where(resting, r_old, r_new), where(resting, zero, v_new)
+                y_new, v_new = where(resting, y_old, y_new), where(resting, zero, v_new)
             else:
-                r_new, v_new, count = rebound_on_grid(group, i, r_old, r_new, v_new, work, log, count)
-            y = r_new - group.middle
+                y_new, v_new, count = rebound_on_grid(group, i, y_old, y_new, v_new, work, log, count)
         if group.kept:
-            store(r, i, r_new)
+            store(y, i, y_new)
             store(v, i, v_new)
-        first, second, speed = first + y, fma(y, y, second), speed + v_new
+        first, second = first + y_new, fma(y_new, y_new, second)
+        if group.weighs_velocities:
+            speed = speed + v_new
         i += LANES
     store(work, 0, first)
     store(work, LANES, second)
@@ -650,7 +668,7 @@ def glide(group, n: int, i: int, r, v, work, log, count: int):
 
 @merged
 def sums_of(work):
-    """Return the sums over slices of (r - L/2), (r - L/2)^2 and v, whose partial sums ``work`` begins with."""
+    """Return the sums over slices of y, y^2 and v, whose partial sums ``work`` begins with."""
     return total(load(work, 0)), total(load(work, LANES)), total(load(work, 2 * LANES))
 
 
@@ -663,54 +681,67 @@ def add(work, y, v) -> None:
 
 
 @compiled
-def follow(form, constants, frame, group, omega: float, centre: float, i: int, n: int, r, v, work, log, count: int):
-    """Move one lane group of which slices hit an end in the step; return r, v and the count of rebounds."""
-    r_old, v_old = load(r, i), load(v, i)
-    r_new, v_new = moved(group, n - i, r_old, v_old)
-    y = r_new - group.middle
-    struck, resting = struck_or_resting(group, r_old, v_old, v_new, y)
-    store(work, LOOKED_AT, where(resting, r_old, r_new))
+def follow(form, constants, reach: float, group, omega: float, i: int, n: int, y, v, work, log, count: int):
+    """Move one lane group of which slices hit an end in the step; return y, v and the count of rebounds."""
+    y_old, v_old = load(y, i), load(v, i)
+    y_new, v_new = moved(group, n - i, y_old, v_old)
+    struck, resting = struck_or_resting(group, y_old, v_old, v_new, y_new)
+    store(work, LOOKED_AT, where(resting, y_old, y_new))
     store(work, LOOKED_AT + LANES, where(resting, everywhere(0.0), v_new))
     while struck:
         j = lowest(struck)
         struck &= struck - 1
-        r_j, v_j, count = rebound_in_step(
-            form, constants, frame, omega, centre, group.end - group.dt, group.dt, i + j, get(r, i + j), get(v, i + j),
-            get(work, LOOKED_AT + j), get(work, LOOKED_AT + LANES + j), log, count,
+        y_j, v_j, count = rebound_in_step(
+            form, constants, reach, omega, group.centre, group.end - group.dt, group.dt, i + j, get(y, i + j),
+            get(v, i + j), get(work, LOOKED_AT + j), get(work, LOOKED_AT + LANES + j), log, count,
         )  # fmt: skip
-        put(work, LOOKED_AT + j, r_j)
+        put(work, LOOKED_AT + j, y_j)
         put(work, LOOKED_AT + LANES + j, v_j)
     return load(work, LOOKED_AT), load(work, LOOKED_AT + LANES), count
 
 
 @merged
-def step(form, constants, frame, group, omega: float, centre: float, n: int, r, v, work, log, count: int):
+def step(form, constants, reach: float, group, omega: float, n: int, y, v, work, log, count: int):
     """Move all slices by one step, unless it is a trial; return the count of rebounds, and the sums in ``work``."""
     for j in range(0, LOOKED_AT, LANES):
         store(work, j, everywhere(0.0))
     i = 0
     while True:
-        i, count = glide(group, n, i, r, v, work, log, count)
+        i, count = glide(group, n, i, y, v, work, log, count)
         if i >= n:
             return count
-        r_new, v_new, count = follow(form, constants, frame, group, omega, centre, i, n, r, v, work, log, count)
+        y_new, v_new, count = follow(form, constants, reach, group, omega, i, n, y, v, work, log, count)
         if group.kept:
-            store(r, i, r_new)
+            store(y, i, y_new)
             store(v, i, v_new)
-        add(work, r_new - group.middle, v_new)
+        add(work, y_new, v_new)
         i += LANES
 
 
 @merged
-def centre_of_repulsion(form, constants, r_cm: float, v_cm: float, theta: float, omega: float):
-    """Return r* (module docstring of ``schemes.form``)."""
-    pull = constants.gravity * math.cos(theta)
+def centre_of_repulsion(form, constants, offset: float, v_cm: float, weight: float, omega: float):
+    """Return y* (module docstring of ``schemes.form``); ``weight`` is g cos(theta), ``offset`` is r_CM - L/2."""
+    pull = weight
     if form.follows_cm:
         pull += 2.0 * constants.gamma * v_cm
-    return r_cm - pull / (omega * omega)
+    return offset - pull / (omega * omega)
 
 
 # ---------------------------------------------------------------------- the whole flight
+
+
+@compiled
+def copy_positions(y, frame, array) -> None:
+    """Fill an array with r; a slice at the cap is at r_min, which L/2 - (r_max - L/2) need not be to the last digit."""
+    to, n, middle = row_of(array), len(array), frame.length / 2
+    cap = middle - frame.r_max
+    for i in range(0, n - LANES + 1, LANES):
+        here = load(y, i)
+        resting = at_least(here, everywhere(cap)) & at_least(everywhere(cap), here)
+        store(to, i, where(resting, everywhere(frame.r_min), here + everywhere(middle)))
+    for i in range(n - n % LANES, n):
+        here_alone = get(y, i)
+        put(to, i, frame.r_min if here_alone == cap else here_alone + middle)
 
 
 @compiled
@@ -724,20 +755,20 @@ def copy(numbers, array) -> None:
 
 
 @compiled
-def first_outside(r, n: int, length: float) -> int:
-    """Return the first slice outside [0, length], or -1."""
+def first_outside(y, n: int, half_length: float) -> int:
+    """Return the first slice outside the bottle, or -1."""
     for i in range(n):
-        if get(r, i) < 0.0 or get(r, i) > length:
+        if abs(get(y, i)) > half_length:
             return i
     return -1
 
 
 @compiled
 def shares_of(memory: FloatArray, n: int):
-    """Return the parts of ``memory_for(n)``: whole lane groups of r and of v on 64-byte boundaries, and the rest.
+    """Return the parts of ``memory_for(n)``: whole lane groups of y and of v on 64-byte boundaries, and the rest.
 
     Rows are half a page apart, plus pages: a processor that compares the last 12 bits of addresses only would take what
-    it reads of v for what it has just written of r.
+    it reads of v for what it has just written of y.
     """
     size = (n + LANES - 1) // LANES * LANES
     begin = (-(memory.ctypes.data // 8)) % LANES
@@ -762,59 +793,68 @@ def fly(form, constants, frame, r0, t, dt: float, record, rebounds, memory) -> R
     theta, omega, r_cm, inertia = record.theta, record.omega, record.r_cm, record.inertia
     n = len(r0)
     middle = frame.length / 2
+    reach = frame.r_max - middle
     water_share = (1.0 - constants.bottle_share) / n
     fading = decay(constants.gamma * dt)
     hits = 0
     escape_step = escape_slice = -1
     positions, velocities, rest = shares_of(memory, n)
-    positions[:], velocities[:], rest[:] = middle, 0.0, 0.0
-    positions[:n] = r0
-    r, v, work = row_of(positions), row_of(velocities), row_of(rest)
+    positions[:], velocities[:], rest[:] = 0.0, 0.0, 0.0
+    for i in range(n):
+        positions[i] = r0[i] - middle
+    y, v, work = row_of(positions), row_of(velocities), row_of(rest)
     log = Log(row_of(rebounds), len(rebounds))
     full = len(record.r) > 0
     if full:
         record.r[0], record.v[0] = r0, 0.0
+    # Velocities are added up for who asks for their mean, and where a number that overflows must be seen at once.
+    weighs = form.follows_cm or full or not form.keeps_position
 
     for i in range(0, n, LANES):
-        add(work, load(r, i) - everywhere(middle), everywhere(0.0))
+        add(work, load(y, i), everywhere(0.0))
     first, second, speed = sums_of(work)
+    offset = water_share * first
+    weight = constants.gravity * math.cos(frame.theta0)
     theta[0], omega[0] = frame.theta0, frame.omega0
-    r_cm[0] = middle + water_share * first
-    inertia[0] = inertia_about(frame, n, first, second, water_share * first)
+    r_cm[0] = middle + offset
+    inertia[0] = inertia_about(frame, n, first, second, offset)
     momentum = inertia[0] * frame.omega0
     points = 1
 
     for k in range(1, len(t)):
         w = omega[k - 1]
         # A lagged program weighs the slices of the step before, about the centre of mass it knew then.
-        lagged_first, lagged_second = first, second
+        lagged_first, lagged_second, lagged_offset = first, second, offset
         if not frame.frozen:
-            centre = centre_of_repulsion(form, constants, r_cm[k - 1], water_share * speed, theta[k - 1], w)
+            centre = centre_of_repulsion(form, constants, offset, water_share * speed, weight, w)
             if form.midpoint:
                 # A step as the exact step would make it predicts the end. Means over the step are then known up to
                 # second order, that of v_CM from the way of C_M, because v_CM itself jumps at an impact.
-                group = shared(form, constants, frame, fading, w, centre, dt, t[k], False)
-                step(form, constants, frame, group, w, centre, n, r, v, work, log, log.room)
+                weight = constants.gravity * math.cos(theta[k - 1] + 0.5 * dt * w)
+                group = shared(form, constants, reach, fading, w, centre, dt, t[k], weighs, False)
+                step(form, constants, reach, group, w, n, y, v, work, log, log.room)
                 end_first, end_second, _ = sums_of(work)
                 way = water_share * (end_first - first)
-                mid_theta = theta[k - 1] + 0.5 * dt * w
                 w = 0.5 * (w + momentum / inertia_about(frame, n, end_first, end_second, water_share * end_first))
-                centre = centre_of_repulsion(form, constants, r_cm[k - 1] + 0.5 * way, way / dt, mid_theta, w)
-            group = shared(form, constants, frame, fading, w, centre, dt, t[k], True)
-            hits = step(form, constants, frame, group, w, centre, n, r, v, work, log, hits)
+                centre = centre_of_repulsion(form, constants, offset + 0.5 * way, way / dt, weight, w)
+            # Before the slices move: the processor then works on the cosine and on the first of them side by side.
+            weight = constants.gravity * math.cos(theta[k - 1] + w * dt)
+            group = shared(form, constants, reach, fading, w, centre, dt, t[k], weighs, True)
+            hits = step(form, constants, reach, group, w, n, y, v, work, log, hits)
             first, second, speed = sums_of(work)
             if not form.keeps_position and escape_step < 0:
-                escape_slice = first_outside(r, n, frame.length)
+                escape_slice = first_outside(y, n, middle)
                 escape_step = k if escape_slice >= 0 else -1
         if full:
-            copy(r, record.r[k])
+            copy_positions(y, frame, record.r[k])
             copy(v, record.v[k])
         if form.lagged:
-            r_cm[k] = middle + water_share * lagged_first
-            inertia[k] = inertia_about(frame, n, lagged_first, lagged_second, r_cm[k - 1] - middle)
+            offset = water_share * lagged_first
+            inertia[k] = inertia_about(frame, n, lagged_first, lagged_second, lagged_offset)
         else:
-            r_cm[k] = middle + water_share * first
-            inertia[k] = inertia_about(frame, n, first, second, water_share * first)
+            offset = water_share * first
+            inertia[k] = inertia_about(frame, n, first, second, offset)
+        r_cm[k] = middle + offset
         omega[k] = momentum / inertia[k]
         theta[k] = theta[k - 1] + w * dt
         if not (math.isfinite(omega[k]) and math.isfinite(theta[k]) and math.isfinite(second + speed)):

@@ -136,22 +136,19 @@ class Trajectory:
     def __post_init__(self) -> None:
         if self.status not in STATUSES:
             raise ValueError(f"status = {self.status!r} is unknown; known: {', '.join(STATUSES)}")
-        for name in ("t", "theta", "omega", "r", "v", "r_cm", "inertia"):
-            object.__setattr__(self, name, _read_only(getattr(self, name)))
         object.__setattr__(self, "settings", MappingProxyType(dict(self.settings)))
         object.__setattr__(self, "diagnostics", MappingProxyType(dict(self.diagnostics)))
         points, n = len(self.t), self.scenario.n_slices
-        for name in ("theta", "omega", "r_cm", "inertia"):
-            if getattr(self, name).shape != (points,):
-                raise ValueError(f"{name} has shape {getattr(self, name).shape}, not {(points,)}")
-        for name in ("r", "v"):
-            if getattr(self, name).shape not in ((points, n), (0, n)):
-                raise ValueError(f"{name} has shape {getattr(self, name).shape}, not {(points, n)}")
+        per_point, per_slice = ((points,),), ((points, n), (0, n))
+        for name in ("t", "theta", "omega", "r", "v", "r_cm", "inertia"):
+            values = _read_only(getattr(self, name))
+            object.__setattr__(self, name, values)
+            if values.shape not in (per_slice if name in ("r", "v") else per_point):
+                raise ValueError(f"{name} has shape {values.shape}, not {(points, n) if name in 'rv' else (points,)}")
+            if values.size and not np.isfinite(values).all():
+                raise ValueError(f"{name} holds values that are not finite; return the run up to its last finite point")
         if not (self.t[1:] > self.t[:-1]).all():
             raise ValueError("t does not increase")
-        for name in ("t", "theta", "omega", "r", "v", "r_cm", "inertia"):
-            if not np.isfinite(getattr(self, name)).all():
-                raise ValueError(f"{name} holds values that are not finite; return the run up to its last finite point")
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Read-only views of mappings do not pickle; worker processes send trajectories home.

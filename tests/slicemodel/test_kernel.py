@@ -110,6 +110,9 @@ def test_short_steps_use_the_series_of_the_long_ones(x):
     assert kernel.sinh(x) == pytest.approx(np.sinh(x), rel=4e-16)
     assert kernel.sinh(-x) == -kernel.sinh(x)
     assert kernel.decay(x) == pytest.approx((np.expm1(-x), np.exp(-x)), rel=1e-15)
+    # cosh(x) - 1 = 2 sinh(x / 2)^2, so that the comparison loses no digits either.
+    shape = (np.sinh(x) / x, 2 * (np.sinh(x / 2) / x) ** 2) if x else (1.0, 0.5)
+    assert kernel.hyperbolic(x * x) == pytest.approx(shape, rel=1e-15)
 
 
 def test_every_rebound_is_listed_however_many(monkeypatch):

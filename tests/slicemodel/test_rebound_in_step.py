@@ -65,35 +65,31 @@ def test_a_dip_through_the_end_and_back_within_one_step_is_found():
     form = SCHEMES["exact-step"].form._replace(in_step=True)
     scenario = heavy(duration=0.05, drag=0.0)
     constants = SCHEMES["exact-step"].constants(scenario)
-    frame = kernel.Frame(
-        length=0.28, r_min=0.01, r_max=0.27, slice_mass=0.05, bottle_mass=1.0, bottle_inertia=1.0,
-        omega0=10.0, theta0=0.0, frozen=False,
-    )  # fmt: skip
     # The centre lies beyond the base, so that the slice is thrown back: it would turn 2 mm behind the wall.
-    centre, r, omega = 0.5, 0.25, 10.0
-    x = r - centre
-    v = math.sqrt(omega**2 * (x**2 - (0.272 - centre) ** 2))
+    reach, centre, y, omega = 0.13, 0.36, 0.11, 10.0
+    x = y - centre
+    v = math.sqrt(omega**2 * (x**2 - (reach + 0.002 - centre) ** 2))
     turn = kernel.turning_time(constants.gamma, omega, x, v)
-    assert centre + kernel.path(form, constants, omega, x, v, turn)[0] > 0.27
+    assert centre + kernel.path(form, constants, omega, x, v, turn)[0] > reach
     distance, v_end = kernel.path(form, constants, omega, x, v, 2 * turn)
-    r_end = centre + distance
-    assert r_end < 0.27
+    y_end = centre + distance
+    assert y_end < reach
     log = np.empty((4, 4))
 
     @numba.njit
-    def follow(form, constants, frame, log):
+    def follow(form, constants, log):
         room = kernel.Log(kernel.row_of(log), len(log))
         return kernel.rebound_in_step(
-            form, constants, frame, omega, centre, 1.0, 2 * turn, 5, r, v, r_end, v_end, room, 0
+            form, constants, reach, omega, centre, 1.0, 2 * turn, 5, y, v, y_end, v_end, room, 0
         )
 
-    new, speed, count = follow(form, constants, frame, log)
+    new, speed, count = follow(form, constants, log)
     assert count == 1
     assert tuple(log[0, 1:3]) == (5.0, 1.0)
     assert 1.0 < log[0, 0] < 1.0 + turn
     # Energy of the closed form without drag: v^2 - omega^2 x^2 is constant, so the speed at the wall is known.
-    assert log[0, 3] ** 2 == pytest.approx(v**2 - omega**2 * x**2 + omega**2 * (0.27 - centre) ** 2, rel=1e-9)
-    assert new < 0.27
+    assert log[0, 3] ** 2 == pytest.approx(v**2 - omega**2 * x**2 + omega**2 * (reach - centre) ** 2, rel=1e-9)
+    assert new < reach
     assert speed < 0.0
 
 
