@@ -622,6 +622,15 @@ def rebound_on_grid(group, i: int, y_old, y, v, work, log, count: int):
 
 
 @merged
+def mirrored(group, y, v):
+    """Return y and v with the way past an end thrown back e-fold: a rebound inside the step to second order."""
+    zero, past = everywhere(0.0), at_least(size_of(y), group.reach)
+    excess = everywhere(1.0 - group.minus_e) * (size_of(y) - group.reach)
+    y = where(past, where(above(y, zero), y - excess, y + excess), y)
+    return y, where(past, everywhere(group.minus_e) * v, v)
+
+
+@merged
 def struck_or_resting(group, y_old, v_old, v, y):
     """Return which slices of a lane group may hit an end in the step, and which rest at one, as bits.
 
@@ -638,7 +647,10 @@ def struck_or_resting(group, y_old, v_old, v, y):
 
 @compiled
 def glide(group, n: int, i: int, y, v, work, log, count: int):
-    """Move the lane groups from ``i`` on until a slice hits an end in the step; return where, and the rebounds."""
+    """Move the lane groups from ``i`` on until a slice hits an end in the step; return where, and the rebounds.
+
+    A trial, which only predicts sums, does not stop for hits: it need not know them better than to second order.
+    """
     stands_alone()
     zero = everywhere(0.0)
     first, second, speed = load(work, 0), load(work, LANES), load(work, 2 * LANES)
@@ -649,7 +661,9 @@ def glide(group, n: int, i: int, y, v, work, log, count: int):
             if group.in_step:
                 struck, resting = struck_or_resting(group, y_old, v_old, v_new, y_new)
                 if struck:
-                    break
+                    if group.kept:
+                        break
+                    y_new, v_new = mirrored(group, y_new, v_new)
                 y_new, v_new = where(resting, y_old, y_new), where(resting, zero, v_new)
             else:
                 y_new, v_new, count = rebound_on_grid(group, i, y_old, y_new, v_new, work, log, count)
