@@ -36,8 +36,8 @@ def measure(name: str, scenario: Scenario, **settings: Any) -> dict[str, Any]:
     return {"case": name, "impacts": impacts, "seconds": round(seconds, 4), "per_second": round(impacts / seconds)}
 
 
-def main() -> int:
-    """Measure, print, write, draw."""
+def measure_all() -> dict[str, Any]:
+    """Return the runs and the exponent with which their cost grows with the number of impacts."""
     free = {"model": "free-flight", "impact_law": "sequential", "rest_speed": 1e-3}
     measure("warm up", replace(FULL, duration=0.05), **free)
     growth = [
@@ -49,14 +49,24 @@ def main() -> int:
         measure("eq8, half full", HALF, model="eq8"),
         measure("free-flight, half full", HALF, model="free-flight"),
     ]
-    for row in growth + others:
-        print(f"{row['case']:32} {row['impacts']:7d} impacts {row['seconds']:8.3f} s {row['per_second']:7d} /s")
     impacts, seconds = (np.array([row[key] for row in growth], dtype=float) for key in ("impacts", "seconds"))
-    slope = float(np.polyfit(np.log(impacts), np.log(seconds), 1)[0])
-    print(f"cost grows as impacts^{slope:.2f}")
+    return {
+        "exponent": float(np.polyfit(np.log(impacts), np.log(seconds), 1)[0]),
+        "growth": growth,
+        "runs": growth + others,
+    }
+
+
+def main() -> int:
+    """Measure, print, write, draw."""
+    facts = measure_all()
+    for row in facts["runs"]:
+        print(f"{row['case']:32} {row['impacts']:7d} impacts {row['seconds']:8.3f} s {row['per_second']:7d} /s")
+    print(f"cost grows as impacts^{facts['exponent']:.2f}")
     RESULTS.mkdir(exist_ok=True)
-    facts = {"python": sys.version.split()[0], "cores": os.cpu_count(), "exponent": slope, "runs": growth + others}
+    facts |= {"python": sys.version.split()[0], "cores": os.cpu_count()}
     (RESULTS / "impacts.json").write_text(json.dumps(facts, indent=1))
+    impacts, seconds = (np.array([row[key] for row in facts["growth"]], dtype=float) for key in ("impacts", "seconds"))
     figure = Figure(figsize=(6.0, 4.0), layout="constrained")
     axes = figure.subplots()
     axes.loglog(impacts, seconds, "o-", label="free-flight, full bottle, sequential law")

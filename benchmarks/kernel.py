@@ -277,19 +277,14 @@ def cold_start() -> dict[str, float]:
 # ---------------------------------------------------------------------- together
 
 
-def main() -> int:
-    """Measure, print, write, draw."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=ROOT / "benchmarks" / "results", help="folder for JSON and plot")
-    parser.add_argument("--throws", type=int, default=10_000, help="throws of the batch")
-    arguments = parser.parse_args()
-
+def measure(throws: int) -> dict[str, Any]:
+    """Return everything this file measures, with what is asked of it under ``measured`` and ``limits``."""
     # First, while memory is handed out afresh.
     full = in_turns(
         {"full": solving(1000, 1000, store="full"), "write": lambda: write_two((1000, 1000))}, 2 * REPETITIONS
     )
     facts: dict[str, Any] = {"published_program_off_by": verify_published(), "speed_up": speed_up(), **scaling()}
-    facts["batch"] = batches(arguments.throws)
+    facts["batch"] = batches(throws)
     in_step = in_turns(
         {
             "grid": solving(500, 1000, "exact-step"),
@@ -299,25 +294,34 @@ def main() -> int:
     )
     slices, points = facts["slices"]["published-python"], facts["points"]["published-python"]
     ratio = {n: times["published program"] / times["published-python"] for n, times in facts["speed_up"].items()}
-    measured = {
-        "published / kernel, N = 1000": ratio["1000"],
-        "published / kernel, N = 100": ratio["100"],
-        "full / writing two arrays": full["full"] / full["write"],
-        "N = 100000 / N = 500, per slice-step": slices["100000"] / slices["500"],
-        "P = 100000 / P = 1000, per slice-step": points["100000"] / points["1000"],
-        "in-step / grid, exact-step, N = 500": in_step["in-step"] / in_step["grid"],
-        "midpoint / exact-step on the grid, N = 500": in_step["midpoint"] / in_step["grid"],
-        "batch on all cores [s]": min(facts["batch"]["seconds"].values()),
-        "peak memory [MiB]": facts["batch"]["peak_MiB"],
-    }
     limit = facts["slices"]["arithmetic"]
-    facts |= {
+    return facts | {
         "full_store_seconds": full,
         "in_step_seconds": in_step,
         "fraction_of_arithmetic_limit": {n: limit[n] / facts["slices"]["no rebounds"][n] for n in limit},
         "cold_start_seconds": cold_start(),
-        "measured": measured,
+        "measured": {
+            "published / kernel, N = 1000": ratio["1000"],
+            "published / kernel, N = 100": ratio["100"],
+            "full / writing two arrays": full["full"] / full["write"],
+            "N = 100000 / N = 500, per slice-step": slices["100000"] / slices["500"],
+            "P = 100000 / P = 1000, per slice-step": points["100000"] / points["1000"],
+            "in-step / grid, exact-step, N = 500": in_step["in-step"] / in_step["grid"],
+            "midpoint / exact-step on the grid, N = 500": in_step["midpoint"] / in_step["grid"],
+            "batch on all cores [s]": min(facts["batch"]["seconds"].values()),
+            "peak memory [MiB]": facts["batch"]["peak_MiB"],
+        },
         "limits": {name: f"{word} {value:g}" for name, (word, value) in LIMITS.items()},
+    }
+
+
+def main() -> int:
+    """Measure, print, write, draw."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, default=ROOT / "benchmarks" / "results", help="folder for JSON and plot")
+    parser.add_argument("--throws", type=int, default=10_000, help="throws of the batch")
+    arguments = parser.parse_args()
+    facts = measure(arguments.throws) | {
         "python": sys.version.split()[0],
         "numpy": np.__version__,
         "numba": numba.__version__,

@@ -15,6 +15,7 @@ from reports.attribution import FILLS, FORMS, LEDGER_SLICES, Attribution, Scope,
 from reports.instruments import Bench, Instruments, plan_instruments, plan_witnesses, study_instruments
 from reports.pool import Progress, make_all, workers
 from reports.solvers import Made, Run, make, without_gravity
+from reports.stages import Stages
 from reports.studies import contenders
 from reports.studies.contenders import Effort
 from reports.studies.differences import Difference, study_difference
@@ -143,6 +144,7 @@ class Evidence:
     attribution: Attribution
     instruments: Instruments
     precision: tuple[WorkPrecision, ...]
+    stages: Stages
 
     def trajectory(self, tag: str) -> Trajectory | None:
         """Return the trajectory of a run, or None if it failed."""
@@ -206,14 +208,18 @@ def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None 
         + plan_instruments(REFERENCE, throw, size.bench)
         + [run for plans in (steps, checks) for levels in plans.values() for level in levels for run in level]
     )
+    stages = Stages()
     with workers(jobs) as pool:
         audit = pool.submit(study_errata, throw)
-        made = make_all(pool, flat, progress)
-        # After the other runs, so that the compiled loop is there and its compiling is not counted.
-        precision = gather_work_precision(pool, size.precision) if size.precision is not None else ()
-        starts = _study_starts(pool, throw, "", made, size.levels)
-        check_starts = _study_starts(pool, REFERENCE, f"{CHECK}, ", made, 4)
-        attribution = study_attribution(throw, size.scope, size.steps, made, pool, audit)
+        with stages.lap("runs"):
+            made = make_all(pool, flat, progress)
+        with stages.lap("work and precision"):
+            # After the other runs, so that the compiled loop is there and its compiling is not counted.
+            precision = gather_work_precision(pool, size.precision) if size.precision is not None else ()
+        with stages.lap("studies"):
+            starts = _study_starts(pool, throw, "", made, size.levels)
+            check_starts = _study_starts(pool, REFERENCE, f"{CHECK}, ", made, 4)
+            attribution = study_attribution(throw, size.scope, size.steps, made, pool, audit)
 
     differences = tuple(_differences(made))
     return Evidence(
@@ -242,6 +248,7 @@ def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None 
         attribution=attribution,
         instruments=study_instruments(REFERENCE, throw, size.bench, made, _band_over_time(made)),
         precision=precision,
+        stages=stages,
     )
 
 
