@@ -2,10 +2,13 @@
 
 import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+import slicemodel
 from slicemodel import Scenario
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -32,13 +35,21 @@ def test_the_test_command_of_the_readme_is_the_one_ci_runs():
     assert "<!-- test command -->" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
 
 
-def test_the_code_of_the_readme_runs(capsys):
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize("page", ["README.md", "docs/theory.md", "docs/howto.md"])
+def test_the_code_of_the_page_runs(page):
+    text = (ROOT / page).read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     assert blocks
     for block in blocks:
-        exec(compile(block, "README.md", "exec"), {})
-    assert capsys.readouterr().out.strip().endswith("ok")
+        exec(compile(block, page, "exec"), {})
+
+
+def test_the_reference_is_built_without_a_warning(tmp_path):
+    command = [sys.executable, str(ROOT / "docs" / "reference.py"), "--out", str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    page = (tmp_path / "slicemodel.html").read_text(encoding="utf-8")
+    assert all(f'id="{name}"' in page for name in slicemodel.__all__)
 
 
 def test_the_example_is_the_default_throw():
