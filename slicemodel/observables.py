@@ -6,11 +6,21 @@ inertia inside its own equations computes them itself; the tests compare the two
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+from typing import Final
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from slicemodel.scenario import Scenario
+from slicemodel.scenario import Scenario, ScenarioError, not_whole
 from slicemodel.trajectory import FloatArray
+
+PLATEAU_POINTS: Final = 21
+"""Points of the paper's average: its "at least 20" around the minimum, the same number on either side of it."""
+
+PLATEAU_SHARE: Final = 0.02
+"""The same window as a share of the flight: 20 of the paper's 1000 steps, 10 ms of its 0.5 s."""
 
 
 def centre_of_mass(scenario: Scenario, r: ArrayLike) -> FloatArray:
@@ -75,6 +85,117 @@ def plateau(t: ArrayLike, omega: ArrayLike, omega0: float) -> float:
     return float(np.trapezoid(curve, grid) / (grid[-1] - grid[0]) / omega0)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plateau:
+    """omega_f / omega_0 as read off one window: ``level`` [1], and the window's ``begin`` and ``end`` [s]."""
+
+    level: float
+    begin: float
+    end: float
+
+
+def plateau_of_points(t: ArrayLike, omega: ArrayLike, omega0: float, points: int = PLATEAU_POINTS) -> Plateau:
+    """Mean of omega / omega_0 over the grid points around its minimum: the paper's omega_f (section 5, Fig. 7b).
+
+    The window holds as many points on either side of the minimum; at an end of the flight it is shifted inwards.
+    Its width in time depends on the grid: twice the points halve it.
+
+    Parameters
+    ----------
+    t : array, shape (P,) [s]
+    omega : array, shape (P,) [rad/s]
+    omega0 : float [rad/s]
+    points : int
+        Points of the mean, in [1, P].
+
+    Raises
+    ------
+    ValueError
+        If the grid has fewer points.
+    """
+    times, values = np.asarray(t, dtype=np.float64), np.asarray(omega, dtype=np.float64) / omega0
+    problem = not_whole("points", points, 1, len(times))
+    if problem:
+        raise ValueError(problem)
+    first = int(np.clip(int(values.argmin()) - points // 2, 0, len(times) - points))
+    window = slice(first, first + points)
+    return Plateau(level=float(values[window].mean()), begin=float(times[window][0]), end=float(times[window][-1]))
+
+
+def plateau_of_width(t: ArrayLike, omega: ArrayLike, omega0: float, width: float) -> Plateau:
+    """Lowest mean of omega / omega_0 over any window of ``width`` seconds of the flight.
+
+    What ``plateau_of_points`` becomes without its grid: the mean is taken over time, and the window lies where the
+    mean, not one point, is lowest. So the level moves by no more than the curve does, even where two minima compete.
+
+    Parameters
+    ----------
+    t : array, shape (P,) [s]
+    omega : array, shape (P,) [rad/s]
+    omega0 : float [rad/s]
+    width : float
+        In (0, t[-1] - t[0]] [s].
+
+    Raises
+    ------
+    ValueError
+        If the width is not positive or exceeds the flight.
+
+    Accuracy
+    --------
+    Exact for the polygon through the points, hence second order in the spacing of the grid.
+    """
+    times, values = np.asarray(t, dtype=np.float64), np.asarray(omega, dtype=np.float64) / omega0
+    span = float(times[-1] - times[0])
+    if not 0.0 < width <= span:
+        raise ValueError(f"width = {width!r} s is outside (0, {span:g}] s (the flight)")
+    last_start = times[-1] - width
+    # Between two of these starts neither edge of the window passes a point of the polygon.
+    starts = np.unique(np.clip(np.concatenate((times, times - width)), times[0], last_start))
+    slope = np.interp(starts + width, times, values) - np.interp(starts, times, values)
+    # There the mean is a parabola of the start, lowest where its slope passes from falling to rising.
+    turns = np.flatnonzero((slope[:-1] < 0.0) & (slope[1:] > 0.0))
+    share = slope[turns] / (slope[turns] - slope[turns + 1])
+    starts = np.concatenate((starts, starts[turns] + share * np.diff(starts)[turns]))
+    means = (_integral(times, values, starts + width) - _integral(times, values, starts)) / width
+    best = int(means.argmin())
+    return Plateau(level=float(means[best]), begin=float(starts[best]), end=float(starts[best] + width))
+
+
+def _integral(times: FloatArray, values: FloatArray, until: FloatArray) -> FloatArray:
+    """Return the integral of the polygon through the points from times[0] to each of ``until``."""
+    areas = np.concatenate(([0.0], np.cumsum(np.diff(times) * (values[1:] + values[:-1]) / 2)))
+    before = np.clip(np.searchsorted(times, until, side="right") - 1, 0, len(times) - 1)
+    rest = until - times[before]
+    return np.asarray(areas[before] + rest * (values[before] + np.interp(until, times, values)) / 2)
+
+
+def centre_of_mass_at_rest(scenario: Scenario) -> float:
+    """Distance of the centre of mass from the cap while all water rests on the base [m] (Eq. 3e with Eq. 4a)."""
+    length = scenario.bottle.length
+    epsilon = scenario.bottle.mass / scenario.total_mass
+    return (1 - epsilon / 2) * length - (1 - epsilon) * scenario.fill_fraction * length / 2
+
+
+def release_angular_velocity(scenario: Scenario, speed: float | None = None) -> float:
+    """Angular velocity of a bottle swung about its cap at release [rad/s] (section 5: omega_0 = v_0 / r_CM(0)).
+
+    Parameters
+    ----------
+    speed : float, optional
+        Of the centre of mass [m/s], finite and >= 0; that of ``scenario.launch_velocity`` by default.
+
+    Raises
+    ------
+    ScenarioError
+        If the speed is negative or not finite.
+    """
+    speed = math.hypot(*scenario.launch_velocity) if speed is None else speed
+    if not 0.0 <= speed < math.inf:
+        raise ScenarioError(f"speed = {speed!r} m/s is outside [0, inf)")
+    return speed / centre_of_mass_at_rest(scenario)
+
+
 def centre_of_mass_velocity(scenario: Scenario, v: ArrayLike) -> FloatArray:
     """Velocity of the centre of mass along the axis, in the bottle [m/s] (derivative of Eq. 10).
 
@@ -99,3 +220,8 @@ def toppling_angle(scenario: Scenario, r_cm: ArrayLike) -> FloatArray:
     """
     bottle = scenario.bottle
     return np.asarray(np.arctan2(bottle.radius, bottle.length - np.asarray(r_cm, dtype=np.float64)))
+
+
+def static_toppling_angle(scenario: Scenario) -> float:
+    """Angle beyond which the bottle topples while all water rests on its base [rad] (Eq. 13b with Eq. 4a)."""
+    return float(toppling_angle(scenario, centre_of_mass_at_rest(scenario)))
