@@ -1,0 +1,180 @@
+"""Tables that Tracker reads, and tables written the way Tracker writes them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from slicemodel import Scenario, Trajectory
+from slicemodel.landing import LabMotion, lab_motion, landing
+from slicemodel.trajectory import FloatArray
+
+FRAME_RATE: Final = 240.0
+"""Of the paper's camera [1/s]."""
+
+DATA_COLUMNS: Final = ("t", "xcap", "ycap", "xbase", "ybase", "xcm", "ycm")
+"""Pairs that Tracker's data track asks for, one point mass each."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Style:
+    """How one kind of export is written.
+
+    Parameters
+    ----------
+    name : of the file that shows it, without its ending
+    delimiter, decimal, newline : signs
+    multi : the first line of an export of several tracks, "" for none
+    closing : True if the rows of names end with a delimiter
+    encoding : a codec of Python
+    subscripts : True for the older ``v_{x}``, else ``vx``
+    underscores : True if names hold underscores for spaces, as a copied table does
+    comment : lines that begin with // above the table
+    digits : of a number; 0 prints every digit, as "unformatted" does
+    """
+
+    name: str
+    delimiter: str = "\t"
+    decimal: str = "."
+    newline: str = "\n"
+    multi: str = "#multi:"
+    closing: bool = True
+    encoding: str = "utf-8"
+    subscripts: bool = False
+    underscores: bool = False
+    comment: str = ""
+    digits: int = 0
+
+
+STYLES: Final = MappingProxyType({
+    style.name: style
+    for style in (
+        Style(name="tab", digits=4),
+        Style(name="tab_unformatted"),
+        Style(name="semicolon_decimal_comma", delimiter=";", decimal=",", digits=4),
+        Style(name="comma", delimiter=",", digits=4, comment="synthetic"),
+        Style(name="space", delimiter=" ", underscores=True, digits=5),
+        Style(name="byte_order_mark", encoding="utf-8-sig", newline="\r\n", decimal=",", digits=4),
+        Style(name="utf16", encoding="utf-16", digits=4),
+        Style(name="older_headings", multi="multi:", subscripts=True, digits=4),
+        Style(name="single", multi="", digits=4),
+        Style(name="copied_table", multi="", closing=False, underscores=True, digits=4, comment="synthetic"),
+    )
+})  # fmt: skip
+"""Every style in which examples and tests write."""
+
+
+def tracker_number(value: float, digits: int, decimal: str) -> str:
+    """Return a number as Tracker prints it: fixed from 0.1 to 1000, else with E, and 0.0; NaN is an empty cell.
+
+    ``digits`` significant digits, 0 for the shortest form that reads back exactly.
+    """
+    if np.isnan(value):
+        return ""
+    if value == 0:
+        return f"0{decimal}0"
+    if 0.1 <= abs(value) < 1000:
+        text = repr(float(value)) if not digits else f"{value:#.{digits}g}"
+    else:
+        mantissa, _, exponent = (np.format_float_scientific(value, trim="0") if not digits
+                                 else f"{value:.{digits - 1}E}".replace("E", "e")).partition("e")  # fmt: skip
+        text = f"{mantissa}E{int(exponent)}"
+    return text.replace(".", decimal)
+
+
+def tracker_text(t: FloatArray, tracks: Mapping[str, Mapping[str, FloatArray]], style: Style) -> str:
+    """Return an export of several tracks.
+
+    Parameters
+    ----------
+    t : (P,)
+    tracks : columns by name, each (P,), NaN where missing, by track
+    """
+    end = style.delimiter if style.closing else ""
+    names, titles = style.delimiter, ["t"]
+    for k, (name, columns) in enumerate(tracks.items()):
+        shown = name.replace(" ", "_") if style.underscores else name
+        cells = len(columns) - (1 if k == len(tracks) - 1 and not style.closing else 0)
+        names += shown + style.delimiter * cells
+        titles += [f"{title[0]}_{{{title[1:]}}}" if style.subscripts and len(title) > 1 else title for title in columns]
+    lines = [f"// {style.comment}"] if style.comment else []
+    lines += [style.multi] if style.multi else []
+    lines += [names, style.delimiter.join(titles) + end]
+    values = np.column_stack((t, *(column for columns in tracks.values() for column in columns.values())))
+    lines += [style.delimiter.join(tracker_number(v, style.digits, style.decimal) for v in row) for row in values]
+    return style.newline.join(lines) + style.newline
+
+
+def frame_times(scenario: Scenario, frame_rate: float) -> FloatArray:
+    """Return the times of a camera's frames from release to landing [s].
+
+    Raises
+    ------
+    ValueError
+        If the rate is not in [1, 1e5] per second.
+    """
+    if not 1 <= frame_rate <= 1e5:
+        raise ValueError(f"frame_rate = {frame_rate!r} 1/s is outside [1, 100000]")
+    times = np.arange(int(scenario.duration * frame_rate * (1 + 1e-12)) + 1) / frame_rate
+    return np.minimum(times, scenario.duration)
+
+
+def at_times(run: Trajectory, times: FloatArray) -> Trajectory:
+    """Return a run at other times within it, between its own linearly, without its slices."""
+    empty = np.empty((0, run.scenario.n_slices))
+    return replace(
+        run, t=times, r=empty, v=empty, impacts=None,
+        **{name: np.interp(times, run.t, getattr(run, name)) for name in ("theta", "omega", "r_cm", "inertia")},
+    )  # fmt: skip
+
+
+def until_landing(run: Trajectory, frames: Trajectory, height: float) -> tuple[Trajectory, str]:
+    """Return the frames before the bottle comes down on a table, and how it does, in words.
+
+    Raises
+    ------
+    ValueError
+        If it does not come down during the run.
+    """
+    found = landing(run, height)
+    if found is None:
+        raise ValueError(
+            f"height = {height:g} m: the bottle does not come down on such a table within {run.t[-1]:g} s; choose a "
+            "longer duration in the scenario, or another height"
+        )
+    words = f"the {found.end} lands at t = {found.moment.time:.4f} s"
+    return at_times(frames, frames.t[frames.t <= found.moment.time]), words
+
+
+def data_track_text(
+    run: Trajectory,
+    *,
+    start: float = 0.0,
+    origin: tuple[float, float] = (0.0, 0.0),
+    metres: float = 1.0,
+    delimiter: str = "\t",
+) -> str:
+    """Return cap, base and C_M of a run in the lab (Eq. 2) as the table of a data track.
+
+    Parameters
+    ----------
+    start : time of the release in the video [s]
+    origin : place of the cap at release on the video's axes [m]
+    metres : length of the video's unit [m]
+    """
+    motion: LabMotion = lab_motion(run)
+    columns = [run.t + start]
+    for points in (motion.cap, motion.base, motion.centre):
+        columns += list(((points + origin) / metres).T)
+    return table_text(DATA_COLUMNS, columns, delimiter)
+
+
+def table_text(names: Sequence[str], columns: Sequence[FloatArray], delimiter: str) -> str:
+    """Return a table with one line of names and nine decimals."""
+    rows = [delimiter.join(names)]
+    rows += [delimiter.join(f"{value:.9f}" for value in row) for row in np.round(np.column_stack(columns), 9) + 0.0]
+    return "\n".join(rows) + "\n"

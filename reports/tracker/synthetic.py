@@ -1,0 +1,96 @@
+"""A video that never was: a simulated throw with a hand before it, a table after it and a camera's noise on it.
+
+For tests and examples, where the truth must be known; always labelled synthetic.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from slicemodel import Trajectory
+from slicemodel.observables import centre_of_mass_at_rest
+from slicemodel.trajectory import FloatArray
+
+HAND_ACCELERATION = (-6.0, 24.0)
+"""Acceleration of the centre of mass in the hand [m/s^2], far from free fall."""
+
+HAND_SPIN_UP = 90.0
+"""Angular acceleration in the hand [rad/s^2]."""
+
+ROCKING = 0.03
+"""Time in which the bottle rocks upright after landing [s]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SyntheticVideo:
+    """True motion of a throw in the lab; arrays of shape (P,), points (P, 2) [m].
+
+    ``t`` counts from the first frame; ``release`` and ``landing`` are times on it [s].
+    """
+
+    t: FloatArray
+    theta: FloatArray
+    omega: FloatArray
+    cap: FloatArray
+    base: FloatArray
+    centre: FloatArray
+    release: float
+    landing: float
+
+
+def synthetic_video(
+    run: Trajectory, *, frame_rate: float = 240.0, before: float = 0.1, after: float = 0.12, start: float = 0.0
+) -> SyntheticVideo:
+    """Return what a camera with no noise would see of a throw: ``before`` seconds of hand, the flight, the table.
+
+    In the hand the centre of mass and the angle accelerate evenly and meet the release in place and velocity. On the
+    table the base stays where it is and the bottle rocks to the nearest upright position.
+    """
+    scenario = run.scenario
+    length, gravity = scenario.bottle.length, scenario.gravity
+    velocity = np.array(scenario.launch_velocity)
+    r_cm0 = centre_of_mass_at_rest(scenario)
+    flight = float(run.t[-1])
+    tau = np.arange(-np.floor(before * frame_rate), np.floor((flight + after) * frame_rate) + 1) / frame_rate
+    inside = np.clip(tau, 0.0, flight)
+    theta = np.interp(inside, run.t, run.theta)
+    r_cm = np.interp(inside, run.t, run.r_cm)
+    omega = np.interp(inside, run.t, run.omega)
+    held, down = tau < 0, tau > flight
+    spin_up = np.sign(scenario.omega0) * HAND_SPIN_UP
+    theta[held] += scenario.omega0 * tau[held] + 0.5 * spin_up * tau[held] ** 2
+    omega[held] += spin_up * tau[held]
+    upright = 2 * np.pi * np.rint(theta[down][:1] / (2 * np.pi)) if down.any() else np.zeros(1)
+    fade = np.exp(-(tau[down] - flight) / ROCKING)
+    lean = theta[down] - upright
+    theta[down], omega[down] = upright + lean * fade, -lean * fade / ROCKING
+    origin = r_cm0 * np.array([np.sin(scenario.theta0), -np.cos(scenario.theta0)])
+    acceleration = np.where(held[:, None], HAND_ACCELERATION, (0.0, -gravity))
+    clock = np.where(held, tau, inside)[:, None]
+    centre = origin + velocity * clock + 0.5 * acceleration * clock**2
+    axis = np.column_stack((np.sin(theta), -np.cos(theta)))
+    cap = centre - r_cm[:, None] * axis
+    base = cap + length * axis
+    if down.any():
+        first = int(np.flatnonzero(down)[0])
+        touch = int(max(first - 1, 0))
+        base[down] = base[touch]
+        cap[down] = base[down] - length * axis[down]
+        centre[down] = cap[down] + r_cm[down, None] * axis[down]
+    return SyntheticVideo(
+        t=tau - tau[0] + start,
+        theta=theta,
+        omega=omega,
+        cap=cap,
+        base=base,
+        centre=centre,
+        release=float(-tau[0] + start),
+        landing=float(flight - tau[0] + start),
+    )
+
+
+def with_noise(points: FloatArray, deviation: float, seed: int) -> FloatArray:
+    """Return points with independent Gaussian noise of a standard deviation in x and y."""
+    return points + np.random.default_rng(seed).normal(0.0, deviation, points.shape)
