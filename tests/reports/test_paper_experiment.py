@@ -1,0 +1,136 @@
+"""The text about the experiment: what each equation misses, which comes closest, and what is not known."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reports.paper import experiment
+from reports.paper.cases import ICE, family
+from reports.paper.claim_runs import ClaimRuns
+from reports.paper.experiment import OBSERVATIONS, Comparison, Observation, agreement, closest_overall, compare
+from reports.paper.observe import Flights
+from reports.paper.parameters import paper_throw
+from reports.paper.runs import PUBLISHED, REPORT, SOLVERS, PaperRuns
+from reports.paper.statements import Reading
+from reports.solvers import Made, Run
+from slicemodel import Trajectory
+
+BY_ID = {observation.id: observation for observation in OBSERVATIONS}
+
+
+def flight(scenario, level, climb=0.0):
+    """Return a flight whose omega / omega_0 is ``level`` all along, but for a climb at the end."""
+    scenario = scenario.with_slices(1)
+    t = np.linspace(0.0, scenario.duration, 101)
+    omega = scenario.omega0 * (level + climb * np.clip(t / scenario.duration - 0.9, 0.0, None) * 10)
+    none = np.empty((0, 1))
+    return Trajectory(
+        scenario=scenario, solver="made up", method="made up", t=t, theta=t, omega=omega, r=none, v=none,
+        r_cm=np.full_like(t, 0.2), inertia=np.ones_like(t),
+    )  # fmt: skip
+
+
+def flights(level_of, *, ice=1.0, climb=0.0):
+    runs = {case.key: flight(case.scenario, level_of(case.value), climb) for case in family("filling")}
+    runs[ICE] = flight(paper_throw(), ice)
+    return Flights(solver=PUBLISHED, runs=runs, reasons={})
+
+
+def experimental(filling):
+    """What the text says: like ice at a tenth, a fifth between 0.25 and 0.5, clearly less than ice at 0.75."""
+    return np.interp(filling, [0.1, 0.33, 0.75, 1.0], [1.0, 0.2, 0.5, 1.0])
+
+
+def test_the_experiment_agrees_with_itself():
+    assert {id_: compare(each, flights(experimental)).verdict for id_, each in BY_ID.items()} == dict.fromkeys(
+        BY_ID, "holds"
+    )
+
+
+@pytest.mark.parametrize(
+    ("id_", "wrong"),
+    [
+        ("ice", {"level_of": experimental, "ice": 0.9}),
+        ("two-phases", {"level_of": experimental, "climb": 0.3}),
+        ("tenth-like-ice", {"level_of": lambda _: 0.6}),
+        ("minimum", {"level_of": lambda filling: abs(filling - 0.75) + 0.1}),
+        ("three-quarters", {"level_of": lambda _: 0.95}),
+        ("five-times", {"level_of": lambda _: 0.5}),
+        ("five-times", {"level_of": lambda _: 0.1}),
+    ],
+)
+def test_each_statement_can_be_missed(id_, wrong):
+    assert compare(BY_ID[id_], flights(**wrong)).verdict == "fails"
+
+
+def test_numbers_by_hand():
+    read = flights(experimental)
+    assert experiment.slowest_filling(read) == 0.33
+    assert experiment.lowest_level(read) == pytest.approx(0.2)
+    assert experiment.level_of(0.1)(read) == pytest.approx(1.0)
+    assert experiment.ice_drift(flights(experimental, ice=1.02)) == pytest.approx(0.02)
+    assert experiment.climb_at_a_third(flights(experimental, climb=0.25)) == pytest.approx(0.25)
+
+
+def reading(value, band=0.0):
+    return Reading(name="x", value=value, unit="", admissible=(0.0, 1.0), band=band)
+
+
+def comparison(*readings, measured=(1.0, 1.0)):
+    observation = Observation(
+        id="x", place="", says="", means="", read=lambda _: 0.0, unit="", measured=measured, slack=0.1
+    )
+    return Comparison(observation=observation, readings=dict(zip(SOLVERS, readings, strict=True)))
+
+
+def test_the_closest_is_the_one_that_misses_least():
+    assert comparison(reading(0.6), reading(0.7), reading(0.9)).closest == ("free-flight",)
+    assert comparison(reading(1.1), reading(0.7), reading(0.8)).closest == (PUBLISHED,)
+    # Where bands overlap nobody is closest alone; inside an interval all are alike; what did not fly is not compared.
+    assert comparison(reading(0.88, 0.03), reading(0.7), reading(0.9)).closest == (PUBLISHED, "free-flight")
+    assert comparison(reading(0.3), reading(0.4), reading(0.6), measured=(0.25, 0.5)).closest == (PUBLISHED, "eq8")
+    assert comparison(reading(math.nan), reading(0.7), reading(0.8)).closest == ("free-flight",)
+    assert comparison(*[reading(math.nan)] * 3).closest == ()
+
+
+def test_the_equation_that_agrees_most_often_is_the_closest_overall():
+    first = comparison(reading(2.0), reading(0.5), reading(0.5))
+    second = comparison(reading(2.0), reading(2.0), reading(0.5))
+    assert agreement((first, second)) == {PUBLISHED: 0, "eq8": 1, "free-flight": 2}
+    assert closest_overall((first, second)) == ("free-flight",)
+    assert closest_overall((first,)) == ("eq8", "free-flight")
+    # Two that agree equally often are told apart by which of them comes closer.
+    third = comparison(reading(2.0), reading(0.95), reading(1.0))
+    assert agreement((first, third))["eq8"] == agreement((first, third))["free-flight"]
+    assert closest_overall((first, third)) == ("free-flight",)
+
+
+def test_a_missing_flight_is_no_number_and_says_why():
+    found = compare(BY_ID["five-times"], Flights(solver="eq8", runs={}, reasons={"filling 0.05": "no bottle"}))
+    assert found.verdict == "cannot be decided"
+    assert found.note == "no bottle"
+    mapping = comparison(found, reading(0.7), reading(0.8)).to_mapping()
+    assert mapping["equations"][PUBLISHED]["value"] is None
+    assert mapping["closest"] == ["free-flight"]
+
+
+def test_half_the_slices_are_a_band_here_too():
+    coarse = flights(lambda filling: experimental(filling) + 0.08)
+    found = compare(BY_ID["five-times"], replace(flights(experimental), halved=coarse))
+    assert found.band == pytest.approx(0.08)
+    assert found.verdict == "cannot be decided"
+
+
+def test_all_statements_are_compared_for_all_equations():
+    made = {}
+    for solver in SOLVERS:
+        for key, run in flights(experimental).runs.items():
+            made[solver, key] = Made(Run(key, solver, run.scenario), run, 0.0)
+    runs = ClaimRuns(paper=PaperRuns(size=REPORT, made=made, costs=()), further={}, halved={})
+    compared = experiment.compare_all(runs)
+    assert [each.observation.id for each in compared] == list(BY_ID)
+    assert all(set(each.readings) == set(SOLVERS) for each in compared)
+    assert agreement(compared) == dict.fromkeys(SOLVERS, len(BY_ID))
+    assert "not its data" in experiment.CAVEAT
