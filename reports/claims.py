@@ -290,7 +290,7 @@ def claim_explosion_is_reported(trajectory: Trajectory) -> Finding:
 def claim_difference(difference: Difference) -> Finding:
     """How far two solvers part: an observation with a band and a moment."""
     return Finding(
-        id=f"difference-{difference.first}-{difference.second}",
+        id=f"difference-{difference.first}-{difference.second}".replace(" ", "-"),
         title=f"{difference.name}: {difference.first} against {difference.second}",
         value=difference.largest,
         unit="of ω₀",

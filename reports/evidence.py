@@ -13,6 +13,8 @@ from ode_reference.models import LADDER
 from reports import instruments, vectors
 from reports.attribution import FILLS, FORMS, LEDGER_SLICES, Attribution, Scope, plan_attribution, study_attribution
 from reports.instruments import Bench, Instruments, plan_instruments, plan_witnesses, study_instruments
+from reports.paper.runs import REPORT, PaperRuns, PaperSize, gather_paper
+from reports.paper.verdicts import PaperVerdicts, gather_verdicts
 from reports.pool import Progress, make_all, workers
 from reports.solvers import Made, Run, make, without_gravity
 from reports.stages import Stages
@@ -93,6 +95,7 @@ class Size:
     scope: Scope
     bench: Bench
     precision: Effort | None
+    paper: PaperSize | None
 
 
 FULL = Size(
@@ -103,6 +106,7 @@ FULL = Size(
     scope=Scope(waterfall_slices=20, map_slices=12, fills=FILLS, rows=5),
     bench=instruments.FULL,
     precision=contenders.FULL,
+    paper=REPORT,
 )
 QUICK = Size(
     name="quick",
@@ -120,7 +124,16 @@ QUICK = Size(
     ),
     bench=instruments.QUICK,
     precision=None,
+    paper=None,
 )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Paper:
+    """The paper's own throws, and what becomes of its statements; they do not depend on the throw of the report."""
+
+    runs: PaperRuns
+    verdicts: PaperVerdicts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,6 +157,7 @@ class Evidence:
     attribution: Attribution
     instruments: Instruments
     precision: tuple[WorkPrecision, ...]
+    paper: Paper | None
     stages: Stages
 
     def trajectory(self, tag: str) -> Trajectory | None:
@@ -220,6 +234,8 @@ def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None 
             starts = _study_starts(pool, throw, "", made, size.levels)
             check_starts = _study_starts(pool, REFERENCE, f"{CHECK}, ", made, 4)
             attribution = study_attribution(throw, size.scope, size.steps, made, pool, audit)
+        with stages.lap("the paper"):
+            paper = _gather_paper(pool, size.paper, progress) if size.paper is not None else None
 
     differences = tuple(_differences(made))
     return Evidence(
@@ -248,8 +264,14 @@ def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None 
         attribution=attribution,
         instruments=study_instruments(REFERENCE, throw, size.bench, made, _band_over_time(made)),
         precision=precision,
+        paper=paper,
         stages=stages,
     )
+
+
+def _gather_paper(pool: Executor, size: PaperSize, progress: Progress) -> Paper:
+    runs = gather_paper(pool, size, progress, costs=False)
+    return Paper(runs=runs, verdicts=gather_verdicts(pool, runs, progress))
 
 
 def run_bands(made: Mapping[str, Made]) -> dict[str, float]:

@@ -6,22 +6,28 @@ which is written from the data.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 
-from reports.evidence import FLIGHTS, Evidence
+import numpy as np
+
+from reports import exhibit_tables as tables
+from reports.evidence import FLIGHTS, LIMITS, Evidence
 from reports.exhibit import Exhibit
 from reports.exhibits_attribution import draw_attribution
 from reports.exhibits_engines import draw_instruments
 from reports.exhibits_work_precision import draw_work_precision
 from reports.figures import flights as flight_figures
 from reports.figures import numerics as numeric_figures
-from reports.figures.style import draw
-from reports.studies.step_size import PHASES
+from reports.studies.step_size import PHASES, StepSize
 from slicemodel import Trajectory
 
 
 def draw_all(evidence: Evidence) -> Iterator[Exhibit]:
-    """Yield every figure with its title, a caption that says what to see, and an alternative text with its numbers."""
+    """Yield every figure with its title, a caption that says what to see, and an alternative text with its numbers.
+
+    Nothing is drawn yet: ``reports.exhibit.drawn`` does that, on all cores.
+    """
     flights = [run for tag in FLIGHTS if (run := evidence.trajectory(tag)) is not None]
     if flights:
         yield from _draw_flights(flights)
@@ -39,47 +45,84 @@ def draw_all(evidence: Evidence) -> Iterator[Exhibit]:
 
 
 def _draw_flights(flights: list[Trajectory]) -> Iterator[Exhibit]:
-    ends = ", ".join(f"{run.label} {run.omega[-1] / run.scenario.omega0:.3f}" for run in flights)
+    ends = {run.label: float(run.omega[-1] / run.scenario.omega0) for run in flights}
     yield Exhibit(
         name="omega",
         section="flights",
         title="Angular velocity",
         caption="Compare each solid scheme with the dashed equation of the same hue: between them lies the step size. "
         "What lies between the hues comes from the equations; free-flight and pymunk are free flight.",
-        alt=f"Line plot of omega over omega_0 against time. Values at the end: {ends}.",
-        drawing=draw(flight_figures.figure_omega(flights)),
+        alt=f"Line plot of omega over omega_0 against time, 1 at release. Values at the end: {_listed(ends, '.3f')}. "
+        f"{_apart(ends, ' of omega_0', '.2g')}",
+        maker=flight_figures.figure_omega,
+        data=(flights,),
+        table=tables.table_omega(flights),
     )
-    turns = ", ".join(f"{run.label} {run.theta[-1]:.2f} rad" for run in flights)
+    turns = {run.label: float(np.degrees(run.theta[-1])) for run in flights}
     yield Exhibit(
         name="theta",
         section="flights",
         title="Angle",
         caption="The angle is the integral of the curve above: a difference in ω that lasts decides how far the bottle "
         "has turned on landing. Multiples of 360° stand upright.",
-        alt=f"Line plot of the angle theta in degrees against time. Values at the end: {turns}.",
-        drawing=draw(flight_figures.figure_theta(flights)),
+        alt=f"Line plot of the angle theta in degrees against time. Values at the end: {_listed(turns, '.0f')} degrees."
+        f" {_apart(turns, ' degrees', '.1f')}",
+        maker=flight_figures.figure_theta,
+        data=(flights,),
+        table=tables.table_theta(flights),
     )
-    centres = ", ".join(f"{run.label} {run.r_cm[-1] / run.scenario.bottle.length:.3f}" for run in flights)
+    centres = {run.label: float(run.r_cm[-1] / run.scenario.bottle.length) for run in flights}
     yield Exhibit(
         name="centre-of-mass",
         section="flights",
         title="Centre of mass",
         caption="Distance from the cap. The nearer to the cap the centre of mass is on landing, the easier the bottle "
         "topples; in ice it stays where it is.",
-        alt=f"Line plot of the centre of mass from the cap, as a fraction of the length. At the end: {centres}.",
-        drawing=draw(flight_figures.figure_centre_of_mass(flights)),
+        alt="Line plot of the centre of mass from the cap, as a fraction of the length, "
+        f"{flights[0].r_cm[0] / flights[0].scenario.bottle.length:.3f} at release. At the end: "
+        f"{_listed(centres, '.3f')}. {_apart(centres, ' of the length', '.2g')}",
+        maker=flight_figures.figure_centre_of_mass,
+        data=(flights,),
+        table=tables.table_centre_of_mass(flights),
     )
+    chosen = flight_figures.chosen_slices(flights[0])
+    whole = [run for run in flights if len(run.r)]
     yield Exhibit(
         name="slices",
         section="flights",
         title="Chosen slices",
         caption="Cap at the top, base at the bottom. The first slice starts on the base, the last one on top of the "
         "water; the one in between starts nearest the centre of mass, where the push outwards is weakest.",
-        alt="Line plots of position against time, cap at the top, every solver. Slices: "
-        + ", ".join(f"number {i}, {words}" for i, words in flight_figures.chosen_slices(flights[0]))
-        + ".",
-        drawing=draw(flight_figures.figure_slices([run for run in flights if len(run.r)])),
+        alt="Line plots of position against time, cap (0) at the top and base (1) at the bottom, every solver. "
+        + " ".join(f"Slice {i}, which {words}, is at the end at {_places(whole, i)}." for i, words in chosen),
+        maker=flight_figures.figure_slices,
+        data=(whole,),
+        table=tables.table_slices(whole, [i for i, _ in chosen]),
     )
+
+
+def _listed(values: dict[str, float], digits: str) -> str:
+    return ", ".join(f"{name} {value:{digits}}" for name, value in values.items())
+
+
+def _apart(ends: dict[str, float], unit: str, digits: str) -> str:
+    """Return how far the solvers end apart, and how far each scheme from its own equation."""
+    finite = {name: value for name, value in ends.items() if math.isfinite(value)}
+    if len(finite) < 2:
+        return ""
+    low, high = min(finite, key=lambda name: finite[name]), max(finite, key=lambda name: finite[name])
+    words = f"They end up to {finite[high] - finite[low]:{digits}}{unit} apart ({low} to {high})"
+    pairs = [(s, m) for s, m in LIMITS.items() if s in finite and m in finite]
+    if pairs:
+        words += ", a scheme and its own equation up to " + (
+            f"{max(abs(finite[s] - finite[m]) for s, m in pairs):{digits}}{unit}"
+        )
+    return words + "."
+
+
+def _places(flights: Sequence[Trajectory], i: int) -> str:
+    places = {run.label: float(run.r[-1, i] / run.scenario.bottle.length) for run in flights}
+    return f"{_listed(places, '.2f')} of the length"
 
 
 def _draw_differences(evidence: Evidence) -> Exhibit:
@@ -91,14 +134,18 @@ def _draw_differences(evidence: Evidence) -> Exhibit:
         caption="Each curve is one assumption. A marker on the dotted line is the moment at which that assumption has "
         "first cost 1 % of ω₀. An assumption whose curve stays below the line costs this throw less than that.",
         alt=f"Logarithmic line plot of the differences in omega. {words}.".replace("ω₀", "omega_0"),
-        drawing=draw(flight_figures.figure_differences(evidence.differences)),
+        maker=flight_figures.figure_differences,
+        data=(evidence.differences,),
+        table=tables.table_differences(evidence.differences),
     )
 
 
 def _draw_step_size(evidence: Evidence) -> Exhibit:
     studies = list(evidence.flights_by_step.values())
     starts = list(evidence.starts_by_step.values())
-    words = "; ".join(f"{s.scheme} to {s.model} order {s.order:.2f}" for s in studies)
+    words = f"Over the whole flight: {'; '.join(map(_converges, studies))}."
+    if starts:
+        words += f" Before the first impact: {'; '.join(map(_converges, starts))}."
     return Exhibit(
         name="step-size",
         section="steps",
@@ -106,8 +153,20 @@ def _draw_step_size(evidence: Evidence) -> Exhibit:
         caption="Points parallel to the dotted slope mean that halving the step halves the error. The shaded range is "
         f"that of the {PHASES} grids averaged in each point: other steps, other impact phases, because a rebound waits "
         "for the grid. A scheme that converges does so to its own equation, not to free flight.",
-        alt=f"Two log-log plots of error against step. Over the whole flight: {words}.",
-        drawing=draw(numeric_figures.figure_step_size(studies, starts)),
+        alt=f"Two log-log plots of error against step. {words}",
+        maker=numeric_figures.figure_step_size,
+        data=(studies, starts),
+        table=tables.table_step_size(studies, starts),
+    )
+
+
+def _converges(study: StepSize) -> str:
+    if study.exact:
+        return f"{study.scheme} equals {study.model} to round-off at every step"
+    order = f"order {study.order:.2f}" if math.isfinite(study.order) else "no order"
+    return (
+        f"{study.scheme} to {study.model} {order}, error {study.mean_error[0]:.1e} of omega_0 at a step of "
+        f"{study.mean_dt[0]:.1e} s down to {study.mean_error[-1]:.1e} at {study.mean_dt[-1]:.1e} s"
     )
 
 
@@ -120,8 +179,10 @@ def _draw_ice(evidence: Evidence) -> Exhibit:
         title="Ice keeps its angular velocity",
         caption="Nothing moves inside a bottle of ice, so every drift is the solver's own: its largest value stands in "
         "the legend. Masses welded on by joints give in a little at the start, a quarter as much at half the step.",
-        alt=f"Logarithmic plot of the drift of omega. Largest drift: {words}.",
-        drawing=draw(numeric_figures.figure_ice(drifts)),
+        alt=f"Logarithmic plot of the drift of omega over omega_0 in a bottle of ice. Largest drift: {words}.",
+        maker=numeric_figures.figure_ice,
+        data=(drifts,),
+        table=tables.table_ice(drifts),
     )
 
 
@@ -136,6 +197,9 @@ def _draw_slices(evidence: Evidence) -> Exhibit:
         title="What more slices would change",
         caption="The same water cut finer and finer at the same damping rate: read off from which number of slices on "
         "the curve no longer moves by more than the differences above.",
-        alt=f"Line plots of omega for several numbers of slices. Distance from the finest cut: {words}.",
-        drawing=draw(numeric_figures.figure_slice_count(evidence.slices)),
+        alt="Line plots of omega over omega_0 for several numbers of slices. Largest distance from the finest cut, of "
+        f"omega_0: {words}.",
+        maker=numeric_figures.figure_slice_count,
+        data=(dict(evidence.slices),),
+        table=tables.table_slice_count(evidence.slices),
     )

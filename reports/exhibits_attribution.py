@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
+import numpy as np
+
+from reports import exhibit_tables as tables
 from reports.attribution import Attribution
 from reports.exhibit import Exhibit
 from reports.figures.events import figure_gantt, figure_predictability
 from reports.figures.frozen import figure_frozen
-from reports.figures.style import draw
-from reports.figures.validity import figure_map
+from reports.figures.validity import CONTOURS, errors, figure_map
 from reports.figures.waterfall import figure_waterfall
 from reports.studies.frozen import QUANTITIES
-from reports.studies.validity import RUNGS
+from reports.studies.validity import RUNGS, ValidityMap
+from reports.studies.waterfall import Waterfall
+from slicemodel import Trajectory
 
+WORDS = {"omega": "omega", "theta": "theta", "r_cm": "r_CM", "v_cm": "v_CM"}
 AXES = {"gamma": "damping", "step": "step size", "restitution": "restitution"}
 
 
@@ -32,6 +38,7 @@ def draw_attribution(found: Attribution) -> Iterator[Exhibit]:
 def _draw_waterfall(found: Attribution) -> Exhibit:
     waterfall = found.waterfalls[0]
     bars = ", ".join(f"{bar.name} {bar.average:+.3f}" for bar in waterfall.bars)
+    largest = waterfall.largest
     return Exhibit(
         name="waterfall",
         section="assumptions",
@@ -42,15 +49,31 @@ def _draw_waterfall(found: Attribution) -> Exhibit:
             "over all orders is a fair share. Error bars are numerical."
         ),
         alt=f"Waterfall of the mean of omega over omega_0 in the second half: from {waterfall.start:.3f} to "
-        f"{waterfall.end:.3f}. Means over all orders: {bars}.",
-        drawing=draw(figure_waterfall(waterfall)),
+        f"{waterfall.end:.3f}. Means over all orders: {bars}. The largest is {largest.name}.",
+        maker=figure_waterfall,
+        data=(_without_reader(waterfall),),
+        table=tables.table_waterfall(waterfall),
     )
+
+
+def _without_reader(waterfall: Waterfall) -> Waterfall:
+    """Return the same numbers for a worker process: what reads them off a run is a lambda and cannot be sent there."""
+    return replace(waterfall, observable=replace(waterfall.observable, of=_already_read))
+
+
+def _already_read(run: Trajectory) -> float:
+    raise TypeError(f"the numbers of {run.label} were read before they were sent to be drawn")
 
 
 def _draw_frozen(found: Attribution) -> Exhibit:
     study = found.frozen
     assert study is not None
-    shares = ", ".join(f"{name} {study.share[name]:.0%}" for name in QUANTITIES)
+    shares = ", ".join(f"{WORDS[name]} {study.share[name]:.0%}" for name in QUANTITIES)
+    peaks = ", ".join(
+        f"{WORDS[name]} {study.peak[name][1]:.1e} m/s at {study.peak[name][0] * 1e3:.0f} ms"
+        for name in QUANTITIES
+        if study.defect[name].any()
+    )
     return Exhibit(
         name="frozen",
         section="steps",
@@ -60,8 +83,12 @@ def _draw_frozen(found: Attribution) -> Exhibit:
             "step; the highest curve costs most at that moment. Bottom: the defects added up, beside the error "
             "they lead to."
         ),
-        alt=f"Curves over time for {study.scheme}. Share of the steps in which freezing costs most: {shares}.",
-        drawing=draw(figure_frozen(study)),
+        alt=f"Curves over time for {study.scheme} at a step of {study.dt * 1e3:.2g} ms. Share of the steps in which "
+        f"freezing costs most: {shares}. Largest velocity missed in one step: {peaks or 'none'}. Largest error of "
+        f"omega over omega_0 against {study.model}: {study.omega_error.max():.2g}.",
+        maker=figure_frozen,
+        data=(study,),
+        table=tables.table_frozen(study),
     )
 
 
@@ -75,14 +102,17 @@ def _draw_gantts(found: Attribution) -> Iterator[Exhibit]:
                 "One row per slice. Bars are contacts, ticks are impacts; the upper lane of a row is the first "
                 "solver, the lower the second. Where the lanes look alike the two tell the same story of that slice."
             ),
-            alt=f"Gantt-like plot of contacts. {alignment.words}".replace("ω₀", "omega_0"),
-            drawing=draw(figure_gantt(alignment)),
+            alt=f"Contacts and impacts of {first} above those of {second}, one row per slice. "
+            f"{alignment.words}.".replace("ω₀", "omega_0"),
+            maker=figure_gantt,
+            data=(alignment,),
+            table=tables.table_gantt(alignment),
         )
 
 
 def _draw_predictability(found: Attribution) -> Exhibit:
     studies = list(found.predictability.values())
-    words = " ".join(study.words for study in studies)
+    words = " ".join(f"{study.words}." for study in studies)
     return Exhibit(
         name="predictability",
         section="events",
@@ -93,7 +123,9 @@ def _draw_predictability(found: Attribution) -> Exhibit:
             "does not."
         ),
         alt=f"Logarithmic plot of the spread after tiny changes. {words}".replace("ω₀", "omega_0"),
-        drawing=draw(figure_predictability(studies)),
+        maker=figure_predictability,
+        data=(studies,),
+        table=tables.table_predictability(studies),
     )
 
 
@@ -114,6 +146,22 @@ def _draw_maps(found: Attribution) -> Iterator[Exhibit]:
             title=f"Validity over filling and {AXES[study.axis]}",
             caption="Every cell is a throw. Its colour names the assumption that moves the plateau of ω most; "
             f"{contours} Hatched cells could not be computed.",
-            alt=f"Map of {dominant.size} throws of {study.slices} slices. Cells by largest mistake: {counts}.",
-            drawing=draw(figure_map(study)),
+            alt=f"Map of {dominant.size} throws of {study.slices} slices, fill fraction {study.fills[0]:g} to "
+            f"{study.fills[-1]:g} by {AXES[study.axis]} {study.values[0]:g} to {study.values[-1]:g}. Cells by largest "
+            f"mistake: {counts or 'none could be computed'}. {_within(study)}",
+            maker=figure_map,
+            data=(study,),
+            table=tables.table_map(study),
         )
+
+
+def _within(study: ValidityMap) -> str:
+    """Return how many cells lie within each contour."""
+    parts = []
+    for words, error in errors(study):
+        finite = error[np.isfinite(error)]
+        cells = ", ".join(f"below {level:.0%} in {int((finite < level).sum())}" for level, _ in CONTOURS)
+        parts.append(
+            f"The {words} is {cells} of {finite.size} cells" + (f", at most {finite.max():.2g}" if finite.size else "")
+        )
+    return "; ".join(parts) + "."

@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from reports import exhibit_tables as tables
 from reports.claims_engines import claim_engine_fact
 from reports.exhibit import Exhibit
 from reports.figures.engines import figure_gallery, figure_horizon, figure_stability
 from reports.figures.overlap import figure_overlap
-from reports.figures.style import draw
 from reports.instruments import Instruments
 from reports.studies.engine_facts import EngineFact
 from reports.studies.horizon import Horizon
@@ -43,8 +43,10 @@ def draw_overlap(study: Overlap) -> Exhibit:
         caption="In the paper slices pass through each other, and a full bottle, which ought to behave like ice, slows "
         "down. The same engine with rods that exclude each other keeps a full bottle turning; what lies between the "
         "two curves is the price of overlap. Bars: what halving the step changes, twice.",
-        alt=f"Line plot of the plateau of omega over omega_0 against the fill fraction. {rows}.",
-        drawing=draw(figure_overlap(study)),
+        alt=f"Line plot of the plateau of omega over omega_0 against the fill fraction; ice is 1. {rows}.",
+        maker=figure_overlap,
+        data=(study,),
+        table=tables.table_overlap(study),
     )
 
 
@@ -70,13 +72,16 @@ def draw_stability(panels: Sequence[StabilityPanel]) -> Exhibit:
         title="Where pymunk is stable, and where it is right",
         caption=caption,
         alt="Charts of step against solver iterations. " + ". ".join(panel.words for panel in panels) + ".",
-        drawing=draw(figure_stability(panels)),
+        maker=figure_stability,
+        data=(panels,),
+        table=tables.table_stability(panels),
     )
 
 
 def draw_gallery(facts: Sequence[EngineFact]) -> Exhibit:
     """Return the table of engine facts."""
     findings = [claim_engine_fact(fact) for fact in facts]
+    engines = [fact.engine for fact in facts]
     words = " ".join(
         f"{finding.title}: {finding.value_text}, threshold {finding.threshold_text}, {finding.verdict}."
         for finding in findings
@@ -90,7 +95,9 @@ def draw_gallery(facts: Sequence[EngineFact]) -> Exhibit:
         f"threshold: {held} of {len(facts)} do. The knobs of the engine check are chosen so that none of them can bite "
         "unseen; how each was measured stands with the findings.",
         alt=f"Table of facts about the engines. {words}".replace("ω₀", "omega_0"),
-        drawing=draw(figure_gallery(findings, [fact.engine for fact in facts])),
+        maker=figure_gallery,
+        data=(findings, engines),
+        table=tables.table_gallery(findings, engines),
     )
 
 
@@ -115,5 +122,7 @@ def draw_horizon(horizons: Sequence[Horizon]) -> Exhibit:
         "or just do not, and below that level two curves cannot be told apart. "
         f"Widest ensemble: {'; '.join(numbers)}.",
         alt=f"Logarithmic plots of the width of ensembles over time. {words}",
-        drawing=draw(figure_horizon(horizons)),
+        maker=figure_horizon,
+        data=(horizons,),
+        table=tables.table_horizon(horizons),
     )

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 from reports.exhibit import Exhibit
-from reports.figures.style import draw
+from reports.exhibit_tables import table_work_precision
 from reports.figures.work_precision import figure_work_precision
 from reports.studies.contenders import COMMON
 from reports.studies.work_precision import Cost, Curve, WorkPrecision, price, words_of
@@ -57,11 +57,7 @@ def _whole_levels(study: WorkPrecision) -> tuple[bool, int, str]:
 
 
 def _exhibit(study: WorkPrecision, cost: Cost) -> Exhibit:
-    reached = "; ".join(
-        f"{curve.contender.key}: " + (f"{curve.whole[0].error:.1e} to {curve.whole[-1].error:.1e}" if curve.whole else
-        curve.failed[0].reason.partition(":")[0])
-        for curve in study.curves.values()
-    )  # fmt: skip
+    reached = "; ".join(_reached(curve, cost) for curve in study.curves.values())
     floors = ", ".join(
         f"{name} {reference.floor:.1e}"
         for name, reference in study.references.items()
@@ -80,9 +76,23 @@ def _exhibit(study: WorkPrecision, cost: Cost) -> Exhibit:
             if cost == "work"
             else "Schemes and engines run in compiled code, methods in Python: this is the price of a program."
         ),
-        alt=f"Log-log plots of error against {UNITS[cost]}. Errors from the first level to the last: {reached}. "
+        alt=f"Log-log plots of error, of omega_0, against {UNITS[cost]}. From the first level to the last: {reached}. "
         f"Floors: {floors}.",
-        drawing=draw(figure_work_precision(study, cost)),
+        maker=figure_work_precision,
+        data=(study, cost),
+        table=table_work_precision(study),
+    )
+
+
+def _reached(curve: Curve, cost: Cost) -> str:
+    """Return error and cost of a contender's first and last level, or why there is none."""
+    if not curve.whole:
+        return f"{curve.contender.key}: {curve.failed[0].reason.partition(':')[0]}"
+    first, last = curve.whole[0], curve.whole[-1]
+    unit = " s" if cost == "seconds" else ""
+    return (
+        f"{curve.contender.key}: {first.error:.1e} for {first.cost(cost):.1e}{unit} to {last.error:.1e} for "
+        f"{last.cost(cost):.1e}{unit}"
     )
 
 

@@ -17,7 +17,7 @@ class Finding:
     Parameters
     ----------
     id : str
-        Stable name, an anchor of the page.
+        Stable name without blanks, unique in a report; an anchor of the page, and the key to compare reports by.
     title : str
         The claim in words.
     value : float or None
@@ -82,12 +82,13 @@ class Finding:
         return "–" if self.band is None or math.isnan(self.band) else f"± {self.band:.1g}"
 
     def to_mapping(self) -> dict[str, Any]:
-        """Return the finding as JSON-ready data; infinite bounds become null."""
+        """Return the finding as JSON-ready data: infinite bounds become null, other infinities and NaN become words."""
         mapping = asdict(self)
         mapping["admissible"] = [None if math.isinf(bound) else bound for bound in self.admissible]
         for name in ("value", "band"):
             number = mapping[name]
             if number is not None and not math.isfinite(number):
                 mapping[name] = str(number)
+        mapping["threshold"] = self.threshold_text
         mapping["verdict"] = self.verdict
         return mapping

@@ -12,8 +12,10 @@ from io import BytesIO
 from typing import Any, TypeVar, cast
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatterMathtext
 
 from slicemodel import Trajectory
 
@@ -53,6 +55,21 @@ STYLE: dict[Any, Any] = {
 }
 
 
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+class PlainPowers(LogFormatterMathtext):
+    """Powers of ten with superscript characters: typeset, the labels of an axis would take longer than its data."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """Return the label of ``x``; what is no power of ten is typeset as usual."""
+        typeset = super().__call__(x, pos)
+        exponent = round(np.log10(x)) if typeset and x > 0.0 else 0
+        if not typeset or not np.isclose(x, 10.0**exponent, rtol=1e-9, atol=0.0):
+            return typeset
+        return f"10{str(exponent).translate(SUPERSCRIPTS)}"
+
+
 @dataclass(frozen=True, slots=True)
 class Drawing:
     """One finished figure as SVG text and PNG bytes."""
@@ -78,6 +95,10 @@ def styled(function: Maker) -> Maker:
 @styled
 def draw(figure: Figure) -> Drawing:
     """Render a figure; the same data give the same bytes (fixed ids, no date)."""
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            if isinstance(axis.get_major_formatter(), LogFormatterMathtext):
+                axis.set_major_formatter(PlainPowers())
     svg, png = BytesIO(), BytesIO()
     figure.savefig(svg, format="svg", metadata={"Date": None})
     figure.set_layout_engine("none")  # laid out by now; to do it again for the second format costs as much as drawing

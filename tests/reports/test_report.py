@@ -1,21 +1,26 @@
 """The report from end to end: the folder, the page, the summary, the exit status."""
 
+import csv
 import dataclasses
+import io
 import json
 import os
+import pickle
 import re
 import subprocess
 import sys
 import threading
 import time
+import xml.etree.ElementTree as ElementTree
 from concurrent.futures import Executor, Future
 from pathlib import Path
 
 import pytest
+from jsonschema import validate
 
+from reports import build as build_module
 from reports import claims, cli, pool
 from reports import evidence as evidence_module
-from reports.build import build
 from reports.evaluation import evaluate
 from reports.evidence import (
     CHECK,
@@ -24,19 +29,16 @@ from reports.evidence import (
     FLIGHTS,
     OTHER_SCHEMES,
 )
+from reports.exhibit import FEW, drawn
+from reports.exhibits import draw_all
+from reports.figures.style import Drawing
 from reports.page import typeset
 from reports.pool import make_all, workers
-from reports.provenance import provenance
 from reports.solvers import Made, Run, make
 from slicemodel import Scenario
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.xdist_group("evidence")
-
-
-@pytest.fixture(scope="module")
-def report(evidence):
-    return build(evidence, provenance("flipproof report"))
 
 
 def test_every_claim_is_evaluated_and_holds(evidence):
@@ -62,8 +64,8 @@ def test_the_page_is_whole_and_stands_alone(report, read_page):
     assert len(page.captions) >= len(report.exhibits)
     by_alt = {image["alt"]: image for image in page.images}
     for exhibit in report.exhibits:
-        assert by_alt[exhibit.alt]["src"].startswith("data:image/svg+xml;base64,")
-        assert re.search(r"\d", exhibit.alt) or exhibit.name == "slices"
+        assert by_alt[exhibit.alt]["src"].startswith("data:image/svg+xml,")
+        assert len(re.findall(r"\d+", exhibit.alt)) >= 4, exhibit.name
         assert len(exhibit.caption) > 60
     assert len(page.ids) == len(set(page.ids))
     for link in page.links:
@@ -71,7 +73,7 @@ def test_the_page_is_whole_and_stands_alone(report, read_page):
         if link.startswith("#"):
             assert link[1:] in page.ids
     words = re.sub(r'src="data:[^"]*"', "", report.html)
-    assert "http" not in words
+    assert "://" not in words.replace("http://www.w3.org/2000/svg", "")  # the name of a vocabulary, not an address
     assert not re.search(r"\b(nan|None)\b", words)
 
 
@@ -80,6 +82,65 @@ def test_every_figure_is_there_as_svg_and_png(report):
     for exhibit in report.exhibits:
         assert exhibit.drawing.svg.startswith("<?xml")
         assert exhibit.drawing.png.startswith(b"\x89PNG")
+
+
+def test_every_figure_has_its_numbers_as_csv_with_units(report):
+    for exhibit in report.exhibits:
+        header, *rows = csv.reader(io.StringIO(exhibit.table))
+        assert rows, exhibit.name
+        assert len(set(header)) == len(header), exhibit.name
+        columns = list(zip(*rows, strict=True))
+        assert len(columns) == len(header), exhibit.name
+        filled = 0
+        for name, cells in zip(header, columns, strict=True):
+            numbers = [cell for cell in cells if cell]
+            assert numbers or exhibit.name in ("overlap", "work-precision-impacts", "stability"), (exhibit.name, name)
+            if numbers and all(is_number(cell) for cell in numbers):
+                assert re.search(r"\[[^]]+\]$", name), (exhibit.name, name)
+                filled += 1
+        assert filled >= 2, exhibit.name
+
+
+def is_number(cell):
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def test_the_csv_of_a_figure_is_what_is_drawn(evidence, report):
+    """Read back from the tables: the last omega of each flight, and the largest of each difference."""
+    tables = {exhibit.name: list(csv.DictReader(io.StringIO(exhibit.table))) for exhibit in report.exhibits}
+    for tag in FLIGHTS:
+        run = evidence.trajectory(tag)
+        column = [float(row[f"omega/omega_0 {run.label} [1]"]) for row in tables["omega"]]
+        assert column == pytest.approx(run.omega / run.scenario.omega0, rel=1e-8)
+    for difference in evidence.differences:
+        column = [float(row[f"difference in omega/omega_0: {difference.name} [1]"]) for row in tables["differences"]]
+        assert max(map(abs, column)) == pytest.approx(difference.largest, rel=1e-8)
+    waterfall = evidence.attribution.waterfalls[0]
+    bars = [float(row["mean of all orders [1]"]) for row in tables["waterfall"]]
+    assert sum(bars[:-1]) == pytest.approx(bars[-1], abs=1e-7)
+    assert bars[-1] == pytest.approx(waterfall.end, rel=1e-8)
+
+
+def test_workers_draw_the_same_bytes_in_the_same_order(evidence, report):
+    """Only the figures that are quickest to draw: what is asked of is the way there and back."""
+    quick = ("omega", "theta", "slice-count", "waterfall")
+    exhibits = [exhibit for exhibit in draw_all(evidence) if exhibit.name in quick]
+    assert len(exhibits) == len(quick) > FEW
+    here = {exhibit.name: exhibit.drawing for exhibit in report.exhibits}
+    away = drawn(exhibits, 2)
+    assert [exhibit.name for exhibit in away] == [exhibit.name for exhibit in exhibits]
+    for exhibit in away:
+        assert exhibit.drawn == here[exhibit.name]
+
+
+def test_every_figure_can_be_sent_to_a_worker(evidence):
+    for exhibit in draw_all(evidence):
+        maker, _ = pickle.loads(pickle.dumps((exhibit.maker, exhibit.data)))
+        assert maker is exhibit.maker
 
 
 def test_axes_carry_units(evidence):
@@ -116,8 +177,15 @@ def test_the_same_data_draw_the_same_bytes(evidence):
     assert first.svg == second.svg
 
 
+def with_a_stand_in(exhibits, jobs=None):
+    del jobs
+    return tuple(dataclasses.replace(exhibit, drawn=Drawing("<?xml?><svg/>", b"\x89PNG")) for exhibit in exhibits)
+
+
 def run_report(monkeypatch, evidence, folder, *arguments):
     monkeypatch.setattr(evidence_module, "gather", lambda *_: evidence)
+    # Drawn before: what these tests ask about is what is made of the figures.
+    monkeypatch.setattr(build_module, "drawn", with_a_stand_in)
     return cli.main(["report", "--out", str(folder), *arguments])
 
 
@@ -135,12 +203,16 @@ def test_the_folder_holds_everything(monkeypatch, capsys, tmp_path, evidence, re
         header = (folder / "trajectories" / tag / "data.csv").read_text().splitlines()[0]
         assert header.startswith("t,theta,omega,r_cm,inertia,r_0")
     names = {path.stem for path in (folder / "figures").iterdir()}
-    assert {path.suffix for path in (folder / "figures").iterdir()} == {".svg", ".png"}
+    assert {path.suffix for path in (folder / "figures").iterdir()} == {".svg", ".png", ".csv"}
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert {figure["name"] for figure in summary["figures"]} == names
+    for figure in summary["figures"]:
+        assert all((folder / figure[kind]).is_file() for kind in ("svg", "png", "table"))
+    assert (folder / summary["$schema"]).is_file()
+    assert (folder / "junit.xml").is_file()
     assert Scenario.from_mapping(summary["scenario"]) == evidence.scenario
     for finding in summary["findings"]:
-        assert {"id", "title", "value", "unit", "band", "admissible", "kind", "verdict", "note"} <= set(finding)
+        assert {"id", "value", "unit", "band", "threshold", "admissible", "kind", "verdict", "note"} <= set(finding)
     assert {run["tag"] for run in summary["runs"]} == set(evidence.made)
     assert summary["provenance"]["command"].startswith("flipproof")
 
@@ -155,16 +227,53 @@ def test_a_failed_regression_sets_status_1_and_says_which(monkeypatch, capsys, t
 
 
 def test_a_solver_that_fails_is_shown_in_place(monkeypatch, capsys, tmp_path, evidence):
+    """The page, the summary and the verdicts for CI systems give the reason; the rest of the report is whole."""
+    reason = "SetupError: the world is not the one that was meant"
     made = dict(evidence.made)
     for tag in (ENGINE, f"{CHECK}, {ENGINE}"):
-        made[tag] = Made(made[tag].run, None, 0.1, "SetupError: the world is not the one that was meant")
+        made[tag] = Made(made[tag].run, None, 0.1, reason)
     broken = dataclasses.replace(evidence, made=made, differences=evidence.differences[:3])
     folder = tmp_path / "latest"
     assert run_report(monkeypatch, broken, folder) == 1
     page = (folder / "index.html").read_text(encoding="utf-8")
     assert "Runs and studies that failed" in page
-    assert "the world is not the one that was meant" in page
+    assert reason in page
     assert "FAIL  pymunk: free flight is the same with g = 0" in capsys.readouterr().out
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    (finding,) = (finding for finding in summary["findings"] if finding["id"] == "engine-gravity")
+    assert (finding["verdict"], finding["value"]) == ("not evaluated", None)
+    assert reason in finding["note"]
+    for row in ("solvers", "runs"):
+        (solver,) = (each for each in summary[row] if each.get("name", each.get("tag")) == ENGINE)
+        assert (solver["status"], solver["message"]) == ("failed", reason)
+    validate(summary, json.loads((folder / summary["$schema"]).read_text(encoding="utf-8")))
+    suite = ElementTree.parse(folder / "junit.xml").getroot()[0]
+    (case,) = (case for case in suite.iter("testcase") if case.get("name") == "engine-gravity")
+    assert reason in case.find("error").get("message")
+    assert suite.get("errors") == "1"
+
+
+def test_a_report_that_cannot_be_written_whole_leaves_the_one_before(monkeypatch, capsys, tmp_path, evidence):
+    folder = tmp_path / "latest"
+    folder.mkdir()
+    (folder / "summary.json").write_text("the old one")
+
+    def break_off(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(build_module, "junit_text", break_off)
+    assert run_report(monkeypatch, evidence, folder) == 2
+    assert "No space left" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["latest"]
+    assert [path.read_text() for path in folder.iterdir()] == ["the old one"]
+
+
+def test_the_snapshot_has_every_claim_that_the_code_makes(evidence):
+    """A full report makes all claims of a quick one."""
+    summary = json.loads((ROOT / "reports" / "snapshot" / "summary.json").read_text(encoding="utf-8"))
+    held = {finding["id"] for finding in summary["findings"] if finding["kind"] == "regression"}
+    made = {finding.id for finding in evaluate(evidence) if finding.kind == "regression"}
+    assert sorted(made - held) == []
 
 
 def test_a_run_that_raises_becomes_its_reason():

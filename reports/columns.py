@@ -1,0 +1,77 @@
+"""Columns of numbers as CSV: the table beside a figure. Every header carries its unit in brackets."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import zip_longest
+from typing import Any, Final
+
+import numpy as np
+
+from slicemodel.trajectory import FloatArray
+
+DIGITS: Final = 9
+"""Significant digits of a number."""
+
+TIME: Final = "t [s]"
+
+Curves = Mapping[str, tuple[FloatArray, FloatArray]]
+"""Header -> times [s] and values, of equal length."""
+
+
+def rows_csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """Return rows as CSV; what is None or not a number is an empty cell.
+
+    Parameters
+    ----------
+    header : sequence of str
+        One per cell; a column of numbers ends in its unit, as in "dt [s]".
+    rows : iterable of sequences
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows([_cell(value) for value in row] for row in rows)
+    return text.getvalue()
+
+
+def columns_csv(columns: Mapping[str, Iterable[Any]]) -> str:
+    """Return columns as CSV; one that is shorter than others ends in empty cells."""
+    return rows_csv(list(columns), zip_longest(*columns.values()))
+
+
+def curves_csv(curves: Curves) -> str:
+    """Return curves over time: those on the same times share a column of them, every other brings its own.
+
+    A curve that ends early on the times of a longer one shares that one's column.
+    """
+    grids: list[FloatArray] = []
+    members: list[list[str]] = []
+    for name, (t, _) in sorted(curves.items(), key=lambda item: -len(item[1][0])):
+        k = next((k for k, grid in enumerate(grids) if np.array_equal(grid[: len(t)], t)), None)
+        if k is None:
+            grids.append(t)
+            members.append([name])
+        else:
+            members[k].append(name)
+    order = list(curves)
+    columns: dict[str, FloatArray] = {}
+    for k, (grid, names) in enumerate(zip(grids, members, strict=True)):
+        together = sorted(names, key=order.index)
+        columns[TIME if k == 0 else f"t of {together[0].partition(' [')[0]} [s]"] = grid
+        columns |= {name: curves[name][1] for name in together}
+    return columns_csv(columns)
+
+
+def _cell(value: Any) -> str:
+    """Return a number with ``DIGITS`` significant digits; whole numbers and words as they are."""
+    if value is None:
+        return ""
+    if isinstance(value, (bool, np.bool_)):
+        return "yes" if value else "no"
+    if isinstance(value, (float, np.floating)):
+        return f"{value:.{DIGITS}g}" if not math.isnan(value) else ""
+    return str(value)

@@ -1,0 +1,272 @@
+"""Two reports compared: which findings moved beyond their bands, changed their verdict, came or went.
+
+    |new - old| <= band_new + band_old + ROUND_OFF max(|new|, |old|) + LEAST
+
+A finding without a band must stay the same to ``ROUND_OFF``; ``LEAST`` lets the residuals that are themselves round-off
+(ice, energy ledgers, vectors) be another round-off on another machine. Notes and run times are not compared: they hold
+the clock of the machine. Titles are, for a certificate or an erratum states its verdict there.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal
+
+ROUND_OFF: Final = 1e-9
+"""Relative change of a number that nobody claims to be a change."""
+
+LEAST: Final = 1e-12
+"""Absolute change, in the unit of the finding, that nobody claims to be a change."""
+
+READABLE: Final = (1, 2)
+"""Versions of the summary's format that can be compared."""
+
+NEEDED: Final = ("id", "title", "value", "unit", "kind", "band", "verdict", "admissible")
+
+Kind = Literal["verdict", "moved", "words", "gone", "new"]
+
+HEADINGS: Final[Mapping[Kind, str]] = {
+    "verdict": "changed their verdict",
+    "moved": "moved beyond their bands",
+    "words": "say something else",
+    "gone": "are gone",
+    "new": "are new",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """One finding that differs; ``words`` say from what to what."""
+
+    kind: Kind
+    id: str
+    words: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """Two reports.
+
+    Parameters
+    ----------
+    premises : tuple of str
+        In what the two were made differently and cannot be expected to agree: throw, slices, size of the report.
+    circumstances : tuple of str
+        In what else they differ: versions and machine.
+    changes : tuple of Change
+    compared : int
+        Findings that both have.
+    """
+
+    premises: tuple[str, ...]
+    circumstances: tuple[str, ...]
+    changes: tuple[Change, ...]
+    compared: int
+
+    @property
+    def same(self) -> bool:
+        """True if throw, slices and size are the same and no finding differs."""
+        return not self.premises and not self.changes
+
+    @property
+    def text(self) -> str:
+        """The comparison for a terminal: premises first."""
+        lines = [f"DIFFERENT {words}" for words in self.premises]
+        lines += [f"note: {words}" for words in self.circumstances]
+        for kind, heading in HEADINGS.items():
+            chosen = [change for change in self.changes if change.kind == kind]
+            if chosen:
+                lines.append(f"{heading} ({len(chosen)}):")
+                lines += [f"  {change.id}: {change.words}" for change in chosen]
+        lines.append(
+            f"{self.compared} findings compared: "
+            + ("no difference" if not self.changes else f"{len(self.changes)} differ")
+        )
+        return "\n".join(lines)
+
+
+# ---------------------------------------------------------------------- reading
+
+
+def read_summary(path: Path) -> dict[str, Any]:
+    """Return the summary of a report: of a folder, or of its ``summary.json`` itself.
+
+    Raises
+    ------
+    ValueError
+        Naming the file and what is wrong with it.
+    """
+    file = path / "summary.json" if path.is_dir() else path
+    try:
+        summary = json.loads(file.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise ValueError(f"{file}: cannot be read ({error.strerror or error}); name a report's folder") from None
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{file}: is not JSON ({error})") from None
+    problem = _problem(summary)
+    if problem:
+        raise ValueError(f"{file}: {problem}")
+    return dict(summary)
+
+
+def _problem(summary: Any) -> str:
+    """Return what keeps a summary from being compared, or nothing."""
+    if not isinstance(summary, dict) or "findings" not in summary:
+        return "is not the summary of a report: it has no findings"
+    if summary.get("version") not in READABLE:
+        return f"version = {summary.get('version')!r} of the format, must be one of {', '.join(map(str, READABLE))}"
+    if not isinstance(summary.get("scenario"), dict):
+        return "has no scenario"
+    findings = summary["findings"]
+    if not isinstance(findings, list) or not all(isinstance(finding, dict) for finding in findings):
+        return "its findings are not a list of objects"
+    for k, finding in enumerate(findings):
+        missing = [name for name in NEEDED if name not in finding]
+        if missing:
+            return f"finding {finding.get('id', k)!r} has no {', '.join(missing)}"
+        if not isinstance(finding["id"], str):
+            return f"finding {k} has the id {finding['id']!r}, which is no text"
+        for name in ("value", "band"):
+            if not _readable(finding[name]):
+                return f"finding {finding['id']!r}: {name} = {finding[name]!r} is neither a number nor null"
+        bounds = finding["admissible"]
+        if not (isinstance(bounds, list) and len(bounds) == 2 and all(map(_readable, bounds))):
+            return f"finding {finding['id']!r}: admissible = {bounds!r} is not two numbers or nulls"
+    ids = [finding["id"] for finding in findings]
+    twice = sorted({name for name in ids if ids.count(name) > 1})
+    return f"findings share the id {twice[0]!r}" if twice else ""
+
+
+def _readable(value: Any) -> bool:
+    if isinstance(value, str):
+        return value in ("nan", "inf", "-inf")
+    return value is None or (isinstance(value, (int, float)) and not isinstance(value, bool))
+
+
+def number(value: Any) -> float | None:
+    """Return a number of a summary, which may be one of the words "nan", "inf", "-inf"; None stays None."""
+    return None if value is None else float(value)
+
+
+# ---------------------------------------------------------------------- comparing
+
+
+def compare_summaries(old: Mapping[str, Any], new: Mapping[str, Any]) -> Comparison:
+    """Compare two summaries as ``read_summary`` gives them."""
+    before = {finding["id"]: finding for finding in old["findings"]}
+    after = {finding["id"]: finding for finding in new["findings"]}
+    both = [name for name in before if name in after]
+    changes = [change for name in both if (change := change_of(before[name], after[name])) is not None]
+    changes += [Change(kind="gone", id=n, words=_said(f)) for n, f in before.items() if n not in after]
+    changes += [Change(kind="new", id=n, words=_said(f)) for n, f in after.items() if n not in before]
+    return Comparison(
+        premises=tuple(_premises(old, new)),
+        circumstances=tuple(_circumstances(old, new)),
+        changes=tuple(changes),
+        compared=len(both),
+    )
+
+
+def change_of(old: Mapping[str, Any], new: Mapping[str, Any]) -> Change | None:
+    """Return in what a finding differs; None if it is the same within the bands."""
+    name = old["id"]
+    if old["verdict"] != new["verdict"]:
+        reason = f" ({new['note']})" if new["verdict"] == "not evaluated" and new.get("note") else ""
+        words = f"{old['verdict']} → {new['verdict']}, {_value(old)} → {_value(new)}{reason}"
+        return Change(kind="verdict", id=name, words=words)
+    if old["unit"] != new["unit"]:
+        return Change(kind="moved", id=name, words=f"{_value(old)} → {_value(new)}")
+    first, second = number(old["value"]), number(new["value"])
+    if first is not None and second is not None and not within(first, second, bands(old, new)):
+        return Change(kind="moved", id=name, words=_moved(old, new, first, second))
+    if old["title"] != new["title"]:
+        return Change(kind="words", id=name, words=f"“{old['title']}” → “{new['title']}”")
+    return None
+
+
+def bands(*findings: Mapping[str, Any]) -> float:
+    """Return the sum of the bands; one that is missing or not finite adds nothing."""
+    known = [number(finding["band"]) for finding in findings]
+    return sum(abs(band) for band in known if band is not None and math.isfinite(band))
+
+
+def within(old: float, new: float, allowed: float) -> bool:
+    """Return whether two numbers are the same within ``allowed`` and round-off; NaN is the same as NaN."""
+    if not (math.isfinite(old) and math.isfinite(new)):
+        return old == new or (math.isnan(old) and math.isnan(new))
+    return abs(new - old) <= allowed + ROUND_OFF * max(abs(old), abs(new)) + LEAST
+
+
+def _moved(old: Mapping[str, Any], new: Mapping[str, Any], first: float, second: float) -> str:
+    allowed = bands(old, new)
+    words = f"{_value(old)} → {_value(new)}, moved by {second - first:+.2g}"
+    return words + (f", bands allow {allowed:.1g}" if allowed else ", no band")
+
+
+def _value(finding: Mapping[str, Any]) -> str:
+    value = number(finding["value"])
+    return "–" if value is None else f"{value:.6g} {finding['unit']}".strip()
+
+
+def _said(finding: Mapping[str, Any]) -> str:
+    return f"{finding['title']} ({_value(finding)}, {finding['verdict']})"
+
+
+def _premises(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
+    yield from (f"throw: {words}" for words in scenario_changes(old["scenario"], new["scenario"]))
+    for name, words in (("slices", "slices"), ("size", "size of the report")):
+        if old.get(name) != new.get(name):
+            yield f"{words}: {old.get(name)} → {new.get(name)}"
+
+
+def scenario_changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
+    """Return which fields of a throw differ, as "water_mass = 0.5 → 0.3"."""
+    flat = [_flat(scenario) for scenario in (old, new)]
+    return [
+        f"{name} = {flat[0].get(name, 'absent')} → {flat[1].get(name, 'absent')}"
+        for name in dict.fromkeys((*flat[0], *flat[1]))
+        if flat[0].get(name) != flat[1].get(name)
+    ]
+
+
+def _flat(scenario: Mapping[str, Any]) -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for table, entries in scenario.items():
+        if isinstance(entries, Mapping):
+            flat |= {name if table == "scenario" else f"{table}.{name}": value for name, value in entries.items()}
+        else:
+            flat[table] = entries
+    return flat
+
+
+APART: Final = ("command", "made")
+"""Of the provenance, what differs between any two reports."""
+
+
+def _circumstances(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
+    if old["version"] != new["version"]:
+        yield f"version of the format: {old['version']} → {new['version']}"
+    before, after = ({"flipproof": s.get("flipproof"), **_mapping(s.get("provenance"))} for s in (old, new))
+    for name in dict.fromkeys((*before, *after)):
+        one, other = before.get(name), after.get(name)
+        if name not in APART and one is not None and other is not None and one != other:
+            yield f"{name}: {one} → {other}"
+
+
+def _mapping(value: Any) -> Mapping[str, Any]:
+    return value if isinstance(value, Mapping) else {}
+
+
+def compare_reports(old: Path, new: Path) -> Comparison:
+    """Compare two report folders, or their ``summary.json``.
+
+    Raises
+    ------
+    ValueError
+        If one of them cannot be read.
+    """
+    return compare_summaries(read_summary(old), read_summary(new))

@@ -1,0 +1,187 @@
+"""A throw held to a baseline: what passes, what fails, and what is said of the rest."""
+
+import argparse
+import json
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
+
+import pytest
+
+from reports import check as check_module
+from reports.check import CHECKS, check, line
+from reports.cli_check import GROUPS, add_checks
+from reports.findings import Finding
+from reports.solvers import Made
+from reports.solvers import make as really_make
+from reports.summary import summary_text
+from slicemodel import Scenario
+
+pytestmark = pytest.mark.xdist_group("check")
+THROW = Scenario(n_slices=6, drag=0.8, duration=0.2)
+
+
+def flipproof(*arguments):
+    """Run the command as the command line does."""
+    top = argparse.ArgumentParser()
+    add_checks(top.add_subparsers())
+    options = top.parse_args([str(argument) for argument in arguments])
+    return options.action(options)
+
+
+@pytest.fixture(scope="module")
+def thresholds():
+    """What the group finds on the throw, computed once."""
+    return tuple(CHECKS["thresholds"](THROW))
+
+
+@pytest.fixture
+def computed(monkeypatch, thresholds):
+    monkeypatch.setitem(check_module.__dict__, "CHECKS", {**CHECKS, "thresholds": lambda _: iter(thresholds)})
+
+
+@pytest.fixture
+def place(tmp_path, thresholds):
+    """A folder with the throw and a baseline that it meets, and a function that spoils the baseline."""
+    (tmp_path / "throw.toml").write_text(THROW.to_toml())
+    findings = [finding.to_mapping() for finding in thresholds]
+    findings.append(Finding(id="engine-x", title="x", value=1.0, unit="", kind="observation").to_mapping())
+    summary = {"version": 2, "scenario": THROW.to_mapping(), "slices": 6, "size": "quick", "findings": findings}
+
+    def spoiled(id_="", **changes):
+        changed = [{**f, **changes} if f["id"] == id_ else f for f in findings]
+        (tmp_path / "summary.json").write_text(summary_text({**summary, "findings": changed}))
+        return tmp_path
+
+    return spoiled
+
+
+STEP = "difference-exact-step-eq8"
+
+
+@pytest.mark.usefixtures("computed")
+def test_a_baseline_of_the_same_throw_is_met_and_the_rest_is_named(place, capsys):
+    folder = place()
+    status = flipproof("check", folder / "throw.toml", "--baseline", folder, "--only", "thresholds")
+    lines = capsys.readouterr().out.splitlines()
+    assert status == 0
+    assert all(words.startswith("PASS  ") for words in lines[:-2])
+    assert {f"PASS  {STEP}", "PASS  difference-published-python-free-flight"} <= {w.partition(":")[0] for w in lines}
+    assert lines[-2] == f"{len(lines) - 2} of {len(lines) - 2} checks hold."
+    assert lines[-1] == "not recomputed: 1 findings of the baseline (engine 1)"
+
+
+@pytest.mark.usefixtures("computed")
+@pytest.mark.parametrize(
+    ("changes", "arguments", "failed"),
+    [
+        ({"value": 0.5}, (), True),
+        ({"value": 0.5, "band": 0.25}, (), False),
+        ({"value": 0.5}, ("--tolerance", "0.5"), False),
+        ({}, ("--tolerance", "0"), False),
+        ({"value": 0.5}, ("--tolerance", "1e-3"), True),
+        ({"admissible": [None, 1e-9]}, (), True),
+        ({"admissible": [None, 1e-9]}, ("--tolerance", "1"), True),
+        ({"admissible": [0.0, 0.5]}, (), False),
+        ({"admissible": [0.5, None]}, (), True),
+        ({"value": None}, (), False),
+        ({"unit": "rad"}, (), True),
+    ],
+    ids=str,
+)
+def test_a_finding_must_stay_where_the_baseline_has_it_and_in_the_interval_chosen_there(
+    place, capsys, changes, arguments, failed
+):
+    folder = place(STEP, **changes)
+    chosen = ("--baseline", folder / "summary.json", "--only", "thresholds", "--junit", folder / "junit.xml")
+    assert flipproof("check", folder / "throw.toml", *chosen, *arguments) == failed
+    failures = [words for words in capsys.readouterr().out.splitlines() if words.startswith("FAIL")]
+    assert [words.partition(":")[0] for words in failures] == ([f"FAIL  {STEP}"] if failed else [])
+    (suite,) = ElementTree.parse(folder / "junit.xml").getroot()
+    assert [case.get("name") for case in suite if case.find("failure") is not None] == ([STEP] if failed else [])
+
+
+def test_without_a_baseline_ice_vectors_and_convergence_are_checked(place, capsys):
+    folder = place()
+    assert flipproof("check", folder / "throw.toml") == 0
+    lines = capsys.readouterr().out.splitlines()
+    names = {words.split()[1].partition("-")[0] for words in lines[:-1]}
+    assert names == {"ice", "vectors", "order"}
+    assert lines[-1] == "17 of 17 checks hold."
+
+
+def test_a_threshold_of_the_baseline_holds_for_the_other_groups_too(tmp_path):
+    ice = Finding(id="ice-exact-step", title="x", value=7.0, unit="of ω₀", kind="regression", admissible=(-2.0, -1.0))
+    summary = {"version": 2, "scenario": THROW.to_mapping(), "slices": 6, "findings": [ice.to_mapping()]}
+    (tmp_path / "summary.json").write_text(summary_text(summary))
+    said = []
+    found = check(THROW, ("ice",), baseline=tmp_path, say=said.append)
+    assert [finding.id for finding in found.failed] == ["ice-exact-step"]
+    assert said[1] == "FAIL  ice-exact-step: 0 of ω₀; threshold -2 to -1"
+    assert found.left_out == ()
+
+
+def test_a_solver_that_fails_is_a_failed_check_with_its_reason(monkeypatch):
+    def broken(run):
+        if run.solver == "eq8":
+            return Made(run, None, 0.0, "RuntimeError: no\nluck")
+        return really_make(run)
+
+    monkeypatch.setattr(check_module, "make", broken)
+    said = []
+    found = check(THROW, ("ice", "convergence"), say=said.append)
+    assert [finding.id for finding in found.failed] == [
+        "ice-eq8", "order-exact-step-before-the-first-impact", "order-exact-step-across-impacts",
+    ]  # fmt: skip
+    assert "FAIL  ice-eq8: not evaluated: RuntimeError: no luck" in said
+    assert all("\n" not in words for words in said)
+
+
+def test_a_difference_without_one_of_its_runs_is_not_evaluated(monkeypatch, place):
+    def broken(run):
+        return Made(run, None, 0.0, "RuntimeError: no luck")
+
+    monkeypatch.setattr(check_module, "make", broken)
+    monkeypatch.setattr(check_module, "study_errata", lambda _: ())
+    found = check(THROW, ("thresholds",), baseline=place())
+    assert len(found.failed) == len(found.findings) > 5
+    assert all("no luck" in finding.note for finding in found.failed)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"scenario": Scenario(omega0=3.0).to_mapping()}, "is of another throw: .*omega0 = 3.0 → 20.0"),
+        ({"slices": 0}, "slices = 0"),
+        ({"slices": "many"}, "slices = 'many'"),
+        ({"version": 3}, "version = 3"),
+    ],
+    ids=["throw", "zero slices", "slices", "version"],
+)
+def test_a_baseline_that_cannot_serve_is_refused_in_one_line(place, change, words):
+    folder = place()
+    summary = json.loads((folder / "summary.json").read_text())
+    (folder / "summary.json").write_text(json.dumps(summary | change))
+    with pytest.raises(ValueError, match=words) as caught:
+        flipproof("check", folder / "throw.toml", "--baseline", folder)
+    assert "\n" not in str(caught.value)
+
+
+def test_bad_arguments_are_refused(place, capsys):
+    folder = place()
+    throw = folder / "throw.toml"
+    with pytest.raises(ValueError, match="needs --baseline"):
+        flipproof("check", throw, "--only", "thresholds")
+    with pytest.raises(ValueError, match="does not exist"):
+        flipproof("check", throw, "--junit", folder / "none" / "junit.xml")
+    for arguments in (("--only", "luck"), ("--only", ","), ("--tolerance", "-1"), ("--tolerance", "nan")):
+        with pytest.raises(SystemExit) as caught:
+            flipproof("check", throw, *arguments)
+        assert caught.value.code == 2
+    assert "'luck'" not in capsys.readouterr().out
+    assert set(GROUPS) == set(CHECKS)
+
+
+def test_a_value_that_is_not_a_number_fails():
+    finding = Finding(id="x", title="x", value=float("nan"), unit="m", kind="regression", admissible=(0.0, 1.0))
+    assert line(finding, "threshold ≤ 1") == "FAIL  x: nan m; threshold ≤ 1"
+    assert line(replace(finding, value=0.5), "threshold ≤ 1") == "PASS  x: 0.5 m; threshold ≤ 1"

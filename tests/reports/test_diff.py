@@ -1,0 +1,279 @@
+"""Two reports compared: nothing between two runs of the same program, and a seeded fault by the findings it moves."""
+
+import argparse
+import copy
+import dataclasses
+import json
+from concurrent.futures import Executor, Future
+from contextlib import contextmanager
+from types import MappingProxyType
+
+import pytest
+
+from reports import evidence as evidence_module
+from reports import instruments, pool, solvers
+from reports.attribution import Scope
+from reports.cli_check import add_checks
+from reports.diff import Change, change_of, compare_summaries, read_summary, scenario_changes, within
+from reports.evaluation import evaluate
+from reports.evidence import QUICK, with_slices
+from reports.findings import Finding
+from reports.instruments import Bench
+from reports.provenance import provenance
+from reports.studies.horizon import Reach
+from reports.studies.stability import Layout
+from reports.summary import solver_rows, summarise, summary_text
+from slicemodel import Scenario, schemes
+from slicemodel import solver as slice_solver
+
+THROW = Scenario(water_mass=0.5, n_slices=6, drag=0.8, duration=0.3)
+SIZE = dataclasses.replace(
+    with_slices(QUICK, THROW.n_slices),
+    levels=4,
+    counts=(3, 6),
+    scope=Scope(waterfall_slices=2, map_slices=4, fills=(), rows=0, perturbations=(1e-9,), exact=(), forms=()),
+    bench=Bench(
+        layout=Layout(panels=((18.0, 10),), dt=(2e-3, 2e-4), iterations=(10, 90), duration=0.1, budget=2e6),
+        reach=Reach(solvers=("pymunk",), sizes=(1e-9,), seeds=(1,), slices=3),
+        fills=(1.0,),
+        slices=3,
+        dt=4e-4,
+        certified=(),
+    ),
+)
+"""As small as a report can be that makes all kinds of claims."""
+
+
+class Here(Executor):
+    """Does at once, in this process, what it is asked to do: a fault that is seeded here is seeded for all."""
+
+    def submit(self, function, *arguments):
+        future = Future()
+        future.set_result(function(*arguments))
+        return future
+
+
+@contextmanager
+def here(_):
+    yield Here()
+
+
+def summary_of_a_run(make=solvers.make):
+    """Return the summary of a small report; ``make`` makes its runs."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(evidence_module, "workers", here)
+        patch.setattr(evidence_module, "REFERENCE", dataclasses.replace(Scenario().with_slices(5), duration=0.3))
+        patch.setattr(instruments, "FULL_DT", 1e-4)
+        patch.setattr(pool, "make", make)
+        found = evidence_module.gather(THROW, SIZE, lambda *_: None)
+    made = summarise(found, tuple(evaluate(found)), (), solver_rows(found), provenance("flipproof report"))
+    return json.loads(summary_text(made))
+
+
+def key_of(run):
+    return run.solver, run.scenario, repr(sorted(run.settings.items()))
+
+
+@pytest.fixture(scope="module")
+def made():
+    """Every run of the sound report."""
+    return {}
+
+
+@pytest.fixture(scope="module")
+def sound(made):
+    def make(run):
+        made[key_of(run)] = solvers.make(run)
+        return made[key_of(run)]
+
+    return summary_of_a_run(make)
+
+
+def flipproof(*arguments):
+    """Run the commands as the command line does."""
+    top = argparse.ArgumentParser()
+    add_checks(top.add_subparsers())
+    options = top.parse_args([str(argument) for argument in arguments])
+    return options.action(options)
+
+
+def written(folder, summary):
+    folder.mkdir()
+    (folder / "summary.json").write_text(summary_text(summary), encoding="utf-8")
+    return folder
+
+
+# ---------------------------------------------------------------------- real runs
+
+
+def test_two_runs_of_one_throw_do_not_differ(sound, tmp_path, capsys):
+    again = summary_of_a_run()
+    assert len(sound["findings"]) > 70
+    old, new = written(tmp_path / "old", sound), written(tmp_path / "new", again)
+    assert flipproof("diff", old, new) == 0
+    assert capsys.readouterr().out.endswith("findings compared: no difference\n")
+
+
+def test_the_sign_fault_of_eq_9d_is_named_by_the_findings_it_moves(sound, made, tmp_path, capsys, monkeypatch):
+    """The sinh term of the exact step gets back the plus sign with which the paper prints Eq. 9d."""
+    exact = schemes.SCHEMES["exact-step"]
+    assert exact.form.sinh_sign == -1.0
+    wrong = dataclasses.replace(exact, form=exact.form._replace(sinh_sign=+1.0))
+    monkeypatch.setattr(slice_solver, "SCHEMES", MappingProxyType({**schemes.SCHEMES, "exact-step": wrong}))
+
+    def make(run):
+        """Only the slice model has the fault: what other packages run is what it was."""
+        known = made.get(key_of(run))
+        if known is None or solvers.find(run.solver).package == "slicemodel":
+            return solvers.make(run)
+        return dataclasses.replace(known, run=run)
+
+    faulty = summary_of_a_run(make)
+    assert flipproof("diff", written(tmp_path / "old", sound), written(tmp_path / "new", faulty)) == 1
+    out = capsys.readouterr().out
+    changes = {change.id: change for change in compare_summaries(sound, faulty).changes}
+    assert all(f"  {name}: " in out for name in changes)
+    assert changes["difference-exact-step-eq8"].kind == "moved"
+    assert changes["order-exact-step-before-the-first-impact"].words.startswith("pass → fail")
+    assert "order-exact-step-across-impacts" in changes
+    # The audit measures the paper's drag by a flight of the exact step.
+    assert [name for name in changes if "exact-step" not in name] == ["erratum-eq8-drag"]
+
+
+# ---------------------------------------------------------------------- what counts as a difference
+
+
+def finding(**changes):
+    usual = {"id": "x", "title": "x", "value": 1.0, "unit": "m", "kind": "observation", "band": 0.1}
+    return Finding(**{**usual, **changes}).to_mapping()
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind"),
+    [
+        ({}, None),
+        ({"value": 1.19}, None),
+        ({"value": 1.21}, "moved"),
+        ({"value": 0.79}, "moved"),
+        ({"value": 1.3, "band": 0.25}, None),
+        ({"value": 1.3, "band": None}, "moved"),
+        ({"value": float("nan")}, "moved"),
+        ({"value": float("inf")}, "moved"),
+        ({"band": float("nan"), "value": 1.09}, None),
+        ({"value": None}, "verdict"),
+        ({"unit": "km"}, "moved"),
+        ({"title": "says something else"}, "words"),
+        ({"note": "took 3 s"}, None),
+        ({"kind": "regression", "admissible": (0.0, 2.0)}, "verdict"),
+    ],
+    ids=str,
+)
+def test_a_finding_differs_beyond_the_sum_of_both_bands(changes, kind):
+    change = change_of(finding(), finding(**changes))
+    assert (None if change is None else change.kind) == kind
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "same"),
+    [
+        (1.0, 1.0 + 5e-10, True),
+        (1.0, 1.0 + 5e-9, False),
+        (1e6, 1e6 + 1e-4, True),
+        (1e6, 1e6 + 1e-2, False),
+        (2e-16, 9e-15, True),
+        (0.0, 2e-12, False),
+        (float("nan"), float("nan"), True),
+        (float("inf"), float("inf"), True),
+        (float("inf"), float("-inf"), False),
+        (1.0, float("nan"), False),
+    ],
+)
+def test_without_a_band_only_round_off_is_no_change(old, new, same):
+    assert within(old, new, 0.0) is same
+    assert within(new, old, 0.0) is same
+
+
+def test_what_was_made_differently_is_said_first(sound, tmp_path, capsys):
+    other = copy.deepcopy(sound)
+    other["scenario"]["scenario"]["water_mass"] = 0.3
+    other["slices"], other["size"] = 50, "full"
+    other["provenance"]["numpy"] = "9.9"
+    other["findings"] = other["findings"][1:]
+    other["findings"][3]["id"] = "brand-new"
+    old, new = written(tmp_path / "old", sound), written(tmp_path / "new", other)
+    assert flipproof("diff", old, new / "summary.json") == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:3] == [
+        "DIFFERENT throw: water_mass = 0.5 → 0.3",
+        "DIFFERENT slices: 6 → 50",
+        "DIFFERENT size of the report: quick → full",
+    ]
+    assert lines[3].startswith("note: numpy: ")
+    assert "are gone (2):" in lines
+    assert "are new (1):" in lines
+    assert compare_summaries(sound, other).changes[-1].id == "brand-new"
+
+
+def test_another_version_alone_is_no_difference(sound):
+    other = {**sound, "version": 1, "flipproof": "9.9"}
+    found = compare_summaries(sound, other)
+    assert found.same
+    assert found.circumstances[:1] == ("version of the format: 2 → 1",)
+
+
+def test_scenarios_are_compared_field_by_field():
+    old, new = Scenario().to_mapping(), Scenario(omega0=21.0).to_mapping()
+    new["bottle"] = {**new["bottle"], "mass": 0.03}
+    assert scenario_changes(old, new) == ["bottle.mass = 0.028 → 0.03", "omega0 = 20.0 → 21.0"]
+    assert scenario_changes(old, old) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "is not JSON"),
+        ("[1]", "has no findings"),
+        ("{}", "has no findings"),
+        ('{"findings": [], "version": 99, "scenario": {}}', "version = 99"),
+        ('{"findings": [], "version": 2}', "has no scenario"),
+        ('{"findings": [1], "version": 2, "scenario": {}}', "not a list of objects"),
+        ('{"findings": [{"id": "x"}], "version": 2, "scenario": {}}', "'x' has no title"),
+    ],
+)
+def test_what_is_no_summary_is_refused_in_one_line(tmp_path, text, words):
+    file = tmp_path / "summary.json"
+    file.write_text(text)
+    with pytest.raises(ValueError, match=words) as caught:
+        read_summary(tmp_path)
+    assert str(file) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"value": "much"}, "value = 'much'"),
+        ({"value": True}, "value = True"),
+        ({"band": [1]}, "band = "),
+        ({"admissible": [0]}, "admissible = "),
+        ({"id": 7}, "which is no text"),
+    ],
+)
+def test_a_finding_that_cannot_be_read_is_named(tmp_path, sound, change, words):
+    broken = {**sound, "findings": [*sound["findings"], {**finding(), **change}]}
+    with pytest.raises(ValueError, match=words):
+        read_summary(written(tmp_path / "report", broken))
+
+
+def test_a_missing_folder_and_a_repeated_id_are_refused(tmp_path, sound):
+    with pytest.raises(ValueError, match="cannot be read"):
+        read_summary(tmp_path / "nowhere")
+    twice = {**sound, "findings": [finding(), finding()]}
+    with pytest.raises(ValueError, match="share the id 'x'"):
+        read_summary(written(tmp_path / "report", twice))
+
+
+def test_a_change_is_worded_with_its_size_and_its_band():
+    assert change_of(finding(), finding(value=1.5)) == Change(
+        kind="moved", id="x", words="1 m → 1.5 m, moved by +0.5, bands allow 0.2"
+    )
