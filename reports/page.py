@@ -3,18 +3,61 @@
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from importlib.resources import files
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
-from reports.evidence import FREE, Evidence
+from reports.evidence import FLIGHTS, FREE, Evidence
 from reports.exhibit import Exhibit
 from reports.exhibits_work_precision import tabulate_work_precision
 from reports.findings import Finding
+from reports.inline import data_uri, shape
 from reports.instruments import WITNESSES
 from reports.lead import lead_words
 from reports.studies.differences import Difference
+from reports.verdict import answer, strips, tiles
+
+CONTENTS = {
+    "verdict": "Verdict",
+    "assumptions": "What each assumption costs",
+    "flights": "The flights",
+    "differences": "Where they part",
+    "steps": "Step size",
+    "slices": "How many slices",
+    "events": "Events",
+    "energy": "Energy",
+    "ice": "Ice",
+    "engines": "Engines",
+    "work-precision": "What a digit costs",
+    "maps": "For which bottles",
+    "throws": "Explore other throws",
+    "paper": "The paper's figures and claims",
+    "errata": "Errata",
+    "findings": "All findings",
+    "solvers": "Every solver",
+    "provenance": "Settings and provenance",
+}
+"""Section -> its name in the contents, in the order of the page."""
+
+PLACES = {
+    "waterfall": "assumptions",
+    "frozen": "steps",
+    "limit of": "steps",
+    "map over": "maps",
+    "ledger of": "energy",
+    "exact cases": "energy",
+    "errata": "errata",
+    "agreement": "engines",
+    "stability chart": "engines",
+    "engine facts": "engines",
+    "horizon": "engines",
+    "overlap": "engines",
+}
+"""How the name of a study begins -> the section that tells of its failure; every other stands with the events."""
 
 SYMBOLS = {
     "omega_0": "ω₀", "omega0": "ω₀", "omega": "ω", "theta": "θ", "gamma": "γ", "alpha": "α", "epsilon": "ε",
@@ -26,6 +69,11 @@ def typeset(text: str) -> str:
     """Return plain-text mathematics with Greek letters and signs; the command line prints it as it is."""
     pattern = "|".join(re.escape(word) for word in sorted(SYMBOLS, key=len, reverse=True))
     return re.sub(pattern, lambda match: SYMBOLS[match.group()], text)
+
+
+def unbroken(text: str) -> str:
+    """Return text in which no line ends between a sign of equality or a number and what belongs to it."""
+    return re.sub(r"(?<==) (?=[\d−])|(?<=\d) (?=(?:%|ms|s|rad)\b|%)| (?== )", "\N{NO-BREAK SPACE}", text)
 
 
 def amount(difference: Difference) -> str:
@@ -50,14 +98,40 @@ def restitution_error(certificate: Mapping[str, Any]) -> float | None:
     return max(errors, default=None)
 
 
+def read_assets() -> dict[str, Markup]:
+    """Return the style sheets and scripts of the page, file name -> text."""
+    folder = files("reports") / "assets"
+    return {
+        item.name: Markup(item.read_text(encoding="utf-8"))
+        for item in folder.iterdir()
+        if item.name.endswith((".css", ".js"))
+    }
+
+
+def sort_problems(problems: Mapping[str, str]) -> Mapping[str, Sequence[tuple[str, str]]]:
+    """Return section -> studies that failed there, each with its reason."""
+    sorted_problems: dict[str, list[tuple[str, str]]] = defaultdict(list)
+    for name, reason in problems.items():
+        place = next((section for begin, section in PLACES.items() if name.startswith(begin)), "events")
+        sorted_problems[place].append((name, reason))
+    return sorted_problems
+
+
 def render(
     evidence: Evidence,
     findings: Sequence[Finding],
     exhibits: Sequence[Exhibit],
     solvers: Sequence[Mapping[str, Any]],
     provenance: Mapping[str, str],
+    *,
+    motion: Any = None,
+    explore: Any = None,
+    paper: Any = None,
 ) -> str:
-    """Return the whole page."""
+    """Return the whole page.
+
+    ``motion``, ``explore`` and ``paper`` are what their templates draw from; a part that is None is left out.
+    """
     environment = Environment(
         loader=PackageLoader("reports"),
         autoescape=True,
@@ -65,17 +139,36 @@ def render(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    differences = sorted(evidence.differences, key=lambda difference: -difference.largest)
     environment.filters["typeset"] = typeset
+    environment.filters["unbroken"] = unbroken
     environment.filters["amount"] = amount
+    environment.filters["data_uri"] = data_uri
+    environment.filters["shape"] = shape
     environment.filters["short"] = short
     environment.filters["restitution_error"] = restitution_error
+    found = evidence.attribution
+    reasons = sort_problems({**found.problems, **evidence.instruments.problems})
+    tables = list(tabulate_work_precision(evidence.precision))
+    absent = {
+        name
+        for name, there in (
+            ("work-precision", tables),
+            ("maps", found.maps or reasons["maps"]),
+            ("throws", explore),
+            ("paper", paper),
+        )
+        if not there
+    }
     regressions = [finding for finding in findings if finding.kind == "regression"]
     return environment.get_template("report.html.j2").render(
         scenario=evidence.scenario,
         throw=evidence.throw,
         size=evidence.size,
-        differences=differences,
+        contents=[(section, words) for section, words in CONTENTS.items() if section not in absent],
+        answer=answer(evidence.differences),
+        tiles=tiles(evidence.differences),
+        strips=strips(found.waterfalls[0]) if found.waterfalls else (),
+        differences=sorted(evidence.differences, key=lambda difference: -difference.largest),
         lead=lead_words(evidence.differences, evidence.trajectory(FREE)),
         regressions=regressions,
         observations=[finding for finding in findings if finding.kind == "observation"],
@@ -84,13 +177,19 @@ def render(
         steps=evidence.flights_by_step,
         slices=evidence.slices,
         growths=evidence.growths,
-        found=evidence.attribution,
+        found=found,
         instruments=evidence.instruments,
         uncertified=[tag for tag in WITNESSES if tag not in evidence.size.bench.certified],
-        tables=list(tabulate_work_precision(evidence.precision)),
-        forms_omega=[(pair, forms["omega"]) for pair, forms in evidence.attribution.forms.items()],
+        tables=tables,
+        forms_omega=[(pair, forms["omega"]) for pair, forms in found.forms.items()],
         solvers=solvers,
+        flown=[row for row in solvers if row["name"] in FLIGHTS],
         problems=[made for made in evidence.made.values() if made.trajectory is None],
+        reasons=reasons,
+        motion=motion,
+        explore=explore,
+        paper=paper,
+        assets=read_assets(),
         provenance=provenance,
         settings=evidence.scenario.to_toml(),
     )

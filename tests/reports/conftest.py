@@ -1,22 +1,8 @@
-"""One small body of evidence, gathered once for all tests of what is made from it; a reader of pages."""
+"""A reader of pages."""
 
 import html.parser
-from dataclasses import replace
 
 import pytest
-
-from reports.evidence import QUICK, Evidence, gather, with_slices
-from reports.instruments import WITNESSES
-from reports.studies import contenders
-from slicemodel import Scenario
-
-
-@pytest.fixture(scope="session")
-def evidence() -> Evidence:
-    """Gathered once per process: tests that use it belong to the xdist group "evidence"."""
-    size = replace(with_slices(QUICK, 20), bench=replace(QUICK.bench, certified=tuple(WITNESSES)))
-    size = replace(size, precision=contenders.QUICK)
-    return gather(Scenario(), size, lambda *_: None)
 
 
 class Page(html.parser.HTMLParser):

@@ -1,0 +1,83 @@
+"""How fast a report opens and its bottles move, in a headless Chromium.
+
+    python benchmarks/page_load.py [REPORT_FOLDER]      (default reports/latest)
+
+Printed are the time to the load event and the frames a second while the flights play, each with the worst of its runs.
+Asked for: load within 1 s, 50 frames/s.
+"""
+
+import argparse
+import itertools
+import statistics
+from pathlib import Path
+
+from playwright.sync_api import Page, sync_playwright
+
+from reports.pdf import require_browser
+
+VISITS = 7
+SECONDS = 3.0
+
+COUNT_FRAMES = """seconds => new Promise(done => {
+  const times = [];
+  const tick = (now) => {
+    times.push(now);
+    if (now - times[0] < 1000 * seconds) requestAnimationFrame(tick);
+    else done(times);
+  };
+  requestAnimationFrame(tick);
+})"""
+
+
+def load_time(page: Page, url: str) -> float:
+    """Return the time from the start of the navigation to the end of the load event [ms]."""
+    page.goto(url, wait_until="load")
+    page.wait_for_function("performance.getEntriesByType('navigation')[0].loadEventEnd > 0")
+    return float(page.evaluate("performance.getEntriesByType('navigation')[0].loadEventEnd"))
+
+
+def frame_rate(page: Page, view: str) -> tuple[float, float, int]:
+    """Return frames a second while playing, the longest frame [ms], and how often the stage was drawn a second."""
+    page.get_by_test_id("motion").scroll_into_view_if_needed()
+    page.get_by_test_id("motion-view").select_option(view)
+    page.get_by_test_id("motion-scrub").fill("0")
+    before = page.evaluate("flipproofMotion.drawn()")
+    page.get_by_test_id("motion-play").click()
+    times = page.evaluate(COUNT_FRAMES, SECONDS)
+    drawn = page.evaluate("flipproofMotion.drawn()") - before
+    page.get_by_test_id("motion-play").click()
+    seconds = (times[-1] - times[0]) / 1000
+    longest = max(after - first for first, after in itertools.pairwise(times))
+    return (len(times) - 1) / seconds, longest, round(drawn / seconds)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("reports/latest"))
+    page_file = parser.parse_args().folder / "index.html"
+    print(f"{page_file}: {page_file.stat().st_size / 1e6:.2f} MB")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=require_browser(), args=["--no-sandbox", "--disable-quic"])
+        loads = []
+        for _ in range(VISITS):
+            context = browser.new_context(viewport={"width": 1440, "height": 900})
+            loads.append(load_time(context.new_page(), page_file.resolve().as_uri()))
+            context.close()
+        print(
+            f"load event: median {statistics.median(loads):.0f} ms, worst of {VISITS} {max(loads):.0f} ms (1000 asked)"
+        )
+        page = browser.new_page(viewport={"width": 1440, "height": 900})
+        load_time(page, page_file.resolve().as_uri())
+        if page.get_by_test_id("motion").count():
+            for view in ("lab", "bottle"):
+                rate, longest, drawn = frame_rate(page, view)
+                print(
+                    f"playing, view {view}: {rate:.1f} frames/s, drawn {drawn} times a second, "
+                    f"longest frame {longest:.0f} ms (50 frames/s asked)"
+                )
+        browser.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,52 @@
+"""A figure inside the page: the SVG as a data URI, as short as it can be without changing what is seen.
+
+Percent-encoding writes digits and letters as they are, where base64 makes four characters of three; coordinates keep
+two digits after the point, a hundredth of a point, which no screen and no printer shows.
+"""
+
+from __future__ import annotations
+
+import re
+
+from markupsafe import Markup
+
+DIGITS = 2
+"""Digits kept after the point of a coordinate, in points of 1/72 inch."""
+
+COORDINATES = re.compile(r'(?<= )(?:d|x|y|points)="[^"]*"')
+NUMBER = re.compile(rf"-?\d+\.\d{{{DIGITS + 1},}}(?:e[-+]?\d+)?")
+SPACES = re.compile(r"\s*\n\s*")
+COMMENTS = re.compile(r"<!--.*?-->", re.S)
+GROUP_NAMES = re.compile(r'<g id="([^"]*)"')
+SIZE = re.compile(r'<svg[^>]*? width="([\d.]+)pt" height="([\d.]+)pt"')
+REFERENCES = re.compile(r"#([\w.-]+)")
+ESCAPES = str.maketrans({"%": "%25", "#": "%23", "<": "%3C", ">": "%3E", "&": "%26"})
+
+
+def compact_svg(svg: str) -> str:
+    """Return the same picture in fewer characters: no comments, no names nobody refers to, shorter coordinates."""
+    svg = COORDINATES.sub(lambda found: NUMBER.sub(_rounded, found.group()), COMMENTS.sub("", svg))
+    used = set(REFERENCES.findall(svg))
+    svg = GROUP_NAMES.sub(lambda found: found.group() if found.group(1) in used else "<g", svg)
+    return SPACES.sub(" ", svg).strip()
+
+
+def data_uri(svg: str) -> Markup:
+    """Return an SVG as the value of ``src`` between double quotes: an image of its own, whose ids meet no others."""
+    text = compact_svg(svg).translate(ESCAPES)
+    return Markup("data:image/svg+xml,") + Markup(text.replace('"', "'" if "'" not in text else "%22"))
+
+
+def shape(svg: str) -> Markup:
+    """Return width and height of an SVG as attributes of its image, so that its place is kept before it is drawn."""
+    found = SIZE.search(svg)
+    return (
+        Markup(' width="{}" height="{}"').format(*(round(float(side)) for side in found.groups()))
+        if found
+        else Markup("")
+    )
+
+
+def _rounded(found: re.Match[str]) -> str:
+    text = f"{float(found.group()):.{DIGITS}f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text

@@ -1,0 +1,108 @@
+"""The report in a real, headless Chromium.
+
+Chromium comes from the system, axe-core from ``npm ci`` in this folder. Where either is missing the tests that need it
+are skipped with the reason, unless FLIPPROOF_BROWSER=require: then they fail.
+"""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from reports.build import write
+from reports.pdf import VARIABLE, find_browser
+
+HERE = Path(__file__).parent
+AXE = Path(os.environ.get("FLIPPROOF_AXE", HERE / "node_modules" / "axe-core" / "axe.min.js"))
+WIDE = (1440, 900)
+PHONE = (390, 844)
+
+
+def pytest_collection_modifyitems(items):
+    # With the other tests of the same evidence, so that it is gathered once.
+    for item in items:
+        if HERE in Path(item.path).parents:
+            item.add_marker(pytest.mark.xdist_group("evidence"))
+
+
+def unavailable(reason: str) -> None:
+    """Skip, or fail where a browser is required."""
+    if os.environ.get("FLIPPROOF_BROWSER") == "require":
+        pytest.fail(reason)
+    pytest.skip(reason)
+
+
+@pytest.fixture(scope="session")
+def chromium() -> str:
+    path = find_browser()
+    if path is None:
+        unavailable(f"no Chromium: install the package chromium, or set {VARIABLE}")
+    return path
+
+
+@pytest.fixture(scope="session")
+def axe() -> str:
+    if not AXE.is_file():
+        unavailable("no axe-core: run npm ci in tests/browser, or set FLIPPROOF_AXE to axe.min.js")
+    return AXE.read_text(encoding="utf-8")
+
+
+# Of the package, not of the session: Playwright keeps an event loop running, which other tests must not meet.
+@pytest.fixture(scope="package")
+def browser(chromium):
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        unavailable("no Playwright: install flipproof[test]")
+    with sync_playwright() as playwright:
+        flags = ["--no-sandbox", "--disable-quic", "--disable-dev-shm-usage"]
+        launched = playwright.chromium.launch(executable_path=chromium, args=flags)
+        yield launched
+        launched.close()
+
+
+@pytest.fixture(scope="session")
+def folder(request, tmp_path_factory) -> Path:
+    request.getfixturevalue("chromium")  # before the report, which takes long and would be of no use without it
+    report = request.getfixturevalue("report")
+    made = tmp_path_factory.mktemp("report")
+    write(report, made)
+    return made
+
+
+@dataclass
+class Visit:
+    """An open page, with everything it said and asked for."""
+
+    page: object
+    console: list[str] = field(default_factory=list)
+    requests: list[str] = field(default_factory=list)
+
+    def probe(self, call: str):
+        return self.page.evaluate(f"probes.{call}()")
+
+
+@pytest.fixture(scope="package")
+def visit(browser, folder) -> Callable[..., Iterator[Visit]]:
+    """Open the report: ``with visit(size, scheme) as visited``."""
+
+    @contextmanager
+    def opened(size=WIDE, scheme="light", fragment="", **options) -> Iterator[Visit]:
+        context = browser.new_context(
+            viewport={"width": size[0], "height": size[1]}, color_scheme=scheme, reduced_motion="reduce", **options
+        )
+        page = context.new_page()
+        visited = Visit(page)
+        page.on("console", lambda message: visited.console.append(f"{message.type}: {message.text}"))
+        page.on("pageerror", lambda error: visited.console.append(f"uncaught: {error}"))
+        page.on("request", lambda request: visited.requests.append(request.url[:200]))
+        page.goto((folder / "index.html").as_uri() + fragment, wait_until="load")
+        page.wait_for_function("() => [...document.images].every(image => image.src && image.complete)")
+        page.evaluate((HERE / "probes.js").read_text(encoding="utf-8"))
+        yield visited
+        context.close()
+
+    return opened

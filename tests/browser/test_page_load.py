@@ -1,0 +1,141 @@
+"""The page opens by itself: nothing fetched, nothing complained of, everything in its place."""
+
+import itertools
+
+import pytest
+
+from reports.page import CONTENTS
+
+LARGEST = 5e6
+"""Bytes of the whole page, the validity maps of a full report included."""
+
+
+@pytest.fixture(scope="module")
+def opened(visit):
+    with visit() as visited:
+        visited.page.wait_for_timeout(200)
+        yield visited
+
+
+def test_nothing_is_fetched_and_nothing_goes_wrong(opened):
+    assert opened.console == []
+    assert [url for url in opened.requests if not url.startswith(("file:", "data:", "blob:"))] == []
+    assert [url for url in opened.requests if url.startswith("file:")] == [opened.page.url]
+
+
+def test_the_page_may_not_fetch_anything(visit):
+    """The browser itself is told to refuse: whatever a script may come to ask for, nothing leaves the machine."""
+    with visit() as visited:
+        answer = visited.page.evaluate(
+            "Promise.all([fetch('data:,x').then(() => 'fetched', () => 'refused'), new Promise(done => {"
+            " const image = new Image(); image.onload = () => done('loaded'); image.onerror = () => done('refused');"
+            " image.src = 'summary.json'; })])"
+        )
+        assert answer == ["refused", "refused"]
+
+
+def test_the_page_stays_small(folder):
+    assert (folder / "index.html").stat().st_size < LARGEST
+
+
+def test_sections_stand_in_the_order_of_the_contents(opened):
+    ids = opened.page.evaluate("[...document.querySelectorAll('main > section')].map(section => section.id)")
+    assert ids == [section for section in CONTENTS if section in ids]
+    assert {"verdict", "flights", "steps", "events", "ice", "engines", "errata", "findings", "provenance"} <= set(ids)
+    links = opened.page.evaluate("[...document.querySelectorAll('nav a')].map(link => link.hash.slice(1))")
+    assert links == ids
+
+
+def test_every_link_inside_the_page_leads_somewhere(opened):
+    broken = opened.page.evaluate(
+        "[...document.querySelectorAll('a[href^=\"#\"]')].map(link => decodeURIComponent(link.hash.slice(1)))"
+        ".filter(id => !document.getElementById(id))"
+    )
+    assert broken == []
+    twice = opened.page.evaluate(
+        "[...document.querySelectorAll('[id]')].map(element => element.id)"
+        ".filter((id, k, all) => all.indexOf(id) !== k)"
+    )
+    assert twice == []
+
+
+def test_every_finding_and_every_figure_has_a_link_of_its_own(opened, report):
+    links = set(opened.page.evaluate("[...document.querySelectorAll('.anchor')].map(link => link.hash.slice(1))"))
+    assert {finding.id for finding in report.findings} <= links
+    assert {f"figure-{exhibit.name}" for exhibit in report.exhibits} <= links
+
+
+def test_beside_every_figure_stand_its_numbers(opened, folder):
+    files = opened.page.evaluate(
+        "[...document.querySelectorAll('figure')].map(figure => [figure.id, "
+        "[...figure.querySelectorAll('.files a')].map(link => link.getAttribute('href'))])"
+    )
+    assert files
+    for figure, links in files:
+        assert {link.rsplit(".", 1)[1] for link in links} == {"csv", "svg", "png"}, figure
+        assert all((folder / link).is_file() for link in links), figure
+
+
+def test_every_figure_is_drawn_in_the_place_kept_for_it(opened, report):
+    drawn = opened.page.evaluate(
+        "[...document.querySelectorAll('figure img')].map(image => [image.naturalWidth / image.naturalHeight,"
+        " image.getAttribute('width') / image.getAttribute('height')])"
+    )
+    assert len(drawn) == len(report.exhibits)
+    for natural, kept in drawn:
+        assert natural == pytest.approx(kept, rel=0.01)
+
+
+def test_headings_descend_one_level_at_a_time(opened):
+    levels = opened.page.evaluate(
+        "[...document.querySelectorAll('h1, h2, h3, h4, h5, h6')].map(heading => Number(heading.tagName[1]))"
+    )
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert all(after - before <= 1 for before, after in itertools.pairwise(levels))
+
+
+def test_language_title_and_landmarks(opened):
+    found = opened.page.evaluate(
+        "({language: document.documentElement.lang, title: document.title,"
+        " main: document.querySelectorAll('main').length,"
+        " navigation: document.querySelector('nav').getAttribute('aria-label'),"
+        " images: [...document.images].filter(image => !image.alt).length})"
+    )
+    assert found == {
+        "language": "en",
+        "title": "flipproof: can the slice model be trusted?",
+        "main": 1,
+        "navigation": "Contents",
+        "images": 0,
+    }
+
+
+def test_verdict_and_waterfall_fill_the_first_screen(opened):
+    """Who opens the report sees the answer, its numbers and the waterfall without scrolling."""
+    for part in (".answer", ".tiles", ".strips"):
+        box = opened.page.locator(part).bounding_box()
+        assert box["y"] >= 0
+        assert box["y"] + box["height"] <= 900, part
+    strips, words = (opened.page.locator(part).bounding_box() for part in (".fall", ".beside .words"))
+    assert strips["x"] >= words["x"] + words["width"]
+
+
+def test_the_contents_mark_the_section_in_view(visit):
+    with visit(fragment="#errata") as visited:
+        visited.page.wait_for_selector('nav a[aria-current="location"]')
+        marked = visited.page.evaluate("[...document.querySelectorAll('nav a[aria-current]')].map(a => a.hash)")
+        assert marked == ["#errata"]
+        visited.page.evaluate("document.getElementById('ice').scrollIntoView()")
+        visited.page.wait_for_selector('nav a[aria-current="location"][href="#ice"]')
+
+
+def test_the_page_is_whole_without_scripts(browser, folder):
+    context = browser.new_context(java_script_enabled=False, viewport={"width": 390, "height": 844})
+    page = context.new_page()
+    page.goto((folder / "index.html").as_uri())
+    assert page.locator("nav li").first.is_visible()
+    assert page.locator(".filter").is_hidden()
+    assert page.locator("#verdict .answer").is_visible()
+    assert page.locator("figure img").first.bounding_box()["height"] > 100
+    context.close()

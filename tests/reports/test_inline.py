@@ -1,0 +1,84 @@
+"""Figures inside the page: shorter, and the same picture."""
+
+import re
+from urllib.parse import unquote
+from xml.etree import ElementTree
+
+import pytest
+from matplotlib.figure import Figure
+
+from reports.figures.style import draw
+from reports.inline import DIGITS, compact_svg, data_uri, shape
+
+
+@pytest.fixture(scope="module")
+def svg():
+    figure = Figure(figsize=(4.0, 3.0))
+    axes = figure.subplots()
+    axes.plot([0.0, 0.1, 0.7, 1.0], [1e-7, 0.33333, -0.5, 2.0], "o-", label="ω & <θ> 100 %")
+    axes.scatter([0.2, 0.4], [0.1, 0.2])
+    axes.legend()
+    return draw(figure).svg
+
+
+def structure(text):
+    """Return tags and attributes in order, numbers of coordinates apart."""
+    tree = ElementTree.fromstring(text)
+    words, numbers = [], []
+    for element in tree.iter():
+        words.append(element.tag)
+        for name, value in element.attrib.items():
+            if name == "id" and element.tag.endswith("}g"):
+                continue
+            if name in ("d", "x", "y", "points"):
+                numbers += [float(number) for number in re.findall(r"-?[\d.]+(?:e[-+]?\d+)?", value)]
+                value = re.sub(r"[-\d.\s]+(?:e[-+]?\d+)?", " ", value).strip()
+            words.append((name, " ".join(value.split())))
+    return words, numbers
+
+
+def test_only_digits_nobody_sees_are_gone(svg):
+    words, numbers = structure(svg)
+    compact_words, compact_numbers = structure(compact_svg(svg))
+    assert compact_words == words
+    assert len(numbers) > 100
+    assert compact_numbers == pytest.approx(numbers, abs=0.5001 * 10**-DIGITS)
+    assert len(compact_svg(svg)) < 0.95 * len(svg)
+
+
+def test_every_name_that_is_used_is_still_there(svg):
+    compact = compact_svg(svg)
+    used = set(re.findall(r'(?:href="#|url\(#)([^")]+)', svg))
+    assert used
+    assert used <= set(re.findall(r'id="([^"]+)"', compact))
+    assert (
+        compact_svg('<svg><g id="a"/><g id="b"/><use href="#b"/></svg>') == '<svg><g/><g id="b"/><use href="#b"/></svg>'
+    )
+
+
+def test_transforms_keep_all_their_digits():
+    drawn = '<use transform="translate(286.28125 0) scale(0.015625)" x="286.28125"/>'
+    assert compact_svg(drawn) == '<use transform="translate(286.28125 0) scale(0.015625)" x="286.28"/>'
+
+
+def test_the_address_holds_the_picture_and_nothing_that_ends_it(svg):
+    address = data_uri(svg)
+    head, picture = address.split(",", 1)
+    assert head == "data:image/svg+xml"
+    assert not set('"<>#&\n') & set(picture)
+    assert structure(unquote(picture)) == structure(compact_svg(svg))
+    quoted = data_uri('<svg><text x="1">it\'s</text></svg>').split(",", 1)[1]
+    assert unquote(quoted) == '<svg><text x="1">it\'s</text></svg>'
+    assert '"' not in quoted
+
+
+@pytest.mark.parametrize(
+    ("number", "short"), [("1.23456", "1.23"), ("-0.00012", "0"), ("12.999", "13"), ("5.0001", "5"), ("1.25", "1.25")]
+)
+def test_numbers_are_rounded_not_cut(number, short):
+    assert compact_svg(f'<path d="M {number} 7"/>') == f'<path d="M {short} 7"/>'
+
+
+def test_the_place_of_a_figure_is_known_before_it_is_drawn(svg):
+    assert shape(svg) == ' width="288" height="216"'
+    assert shape("<svg></svg>") == ""

@@ -1,0 +1,157 @@
+"""The page's words: the answer, its numbers, the bars of the waterfall, and failures where they belong."""
+
+import dataclasses
+import re
+from types import SimpleNamespace
+
+import pytest
+
+from reports.evidence import FLIGHTS, TOTAL
+from reports.page import CONTENTS, PLACES, read_assets, render, sort_problems, unbroken
+from reports.pdf import VARIABLE, PrintError, find_browser, print_page, require_browser
+from reports.provenance import provenance
+from reports.solvers import Made
+from reports.studies.waterfall import NAMES
+from reports.summary import solver_rows
+from reports.verdict import ENGINE, STEP, answer, strips, tiles
+
+pytestmark = pytest.mark.xdist_group("evidence")
+
+
+def difference(name, largest):
+    return SimpleNamespace(name=name, largest=largest, largest_time=0.3, moment="part at t = 50.3 ms")
+
+
+GRAVITY = NAMES["weightless"]
+
+
+@pytest.mark.parametrize(
+    ("step", "part", "words"),
+    [
+        (0.005, 0.55, "The step can be trusted. The equation in it cannot."),
+        (0.01, 0.01, "On this throw both the step and the equation in it can be trusted."),
+        (0.02, 0.001, "On this throw the equation can be trusted. The step is too long."),
+        (0.02, 0.55, "Neither the step nor the equation in it can be trusted on this throw."),
+    ],
+)
+def test_the_answer_follows_from_step_and_equation(step, part, words):
+    assert answer([difference(STEP, step), difference(GRAVITY, part), difference(TOTAL, 0.9)]) == words
+
+
+def test_there_is_no_answer_without_its_numbers():
+    assert answer([]).startswith("No verdict")
+    assert answer([difference(STEP, 0.5)]).startswith("No verdict")
+    assert answer([difference(GRAVITY, 0.5)]).startswith("No verdict")
+    nothing = float("nan")
+    assert answer([difference(STEP, nothing), difference(GRAVITY, nothing)]).startswith("Neither")
+
+
+def test_tiles_name_the_largest_part_the_whole_the_step_and_the_engine():
+    all_tiles = tiles(
+        [
+            difference(STEP, 0.0047),
+            difference(GRAVITY, 0.55),
+            difference(NAMES["recoil"], 0.06),
+            difference(TOTAL, 0.13),
+            difference(ENGINE, 0.0011),
+        ]
+    )
+    assert [(tile.value, tile.state) for tile in all_tiles] == [
+        ("55 %", "fail"), ("13 %", "fail"), ("0.47 %", "pass"), ("0.11 %", "pass"),
+    ]  # fmt: skip
+    assert GRAVITY in all_tiles[0].label
+    assert "partly cancel" in all_tiles[1].words
+    assert tiles([]) == ()
+
+
+def waterfall(start, end, *forward):
+    bars = tuple(SimpleNamespace(name=f"part {k}", forward=value) for k, value in enumerate(forward))
+    return SimpleNamespace(start=start, end=end, bars=bars)
+
+
+def test_bars_of_the_waterfall_join_and_fill_the_drawing():
+    made = strips(waterfall(0.3, 0.2, -0.1, +0.3, -0.3))
+    edges = [(round(strip.left, 6), round(strip.left + strip.width, 6)) for strip in made]
+    assert edges == [(0, 60), (40, 60), (40, 100), (40, 100), (0, 40)]
+    assert [strip.kind for strip in made] == ["whole", "down", "up", "down", "whole"]
+    assert [strip.text for strip in made] == ["0.300", "−0.100", "+0.300", "−0.300", "0.200"]
+
+
+def test_bars_below_zero_stay_inside_and_values_that_are_not_finite_draw_nothing():
+    made = strips(waterfall(-0.1, 0.3, 0.4))
+    assert all(strip.left >= 0 and strip.left + strip.width <= 100 + 1e-9 for strip in made)
+    assert strips(waterfall(float("nan"), 0.2, 0.1)) == ()
+    assert all(strip.width == 0 for strip in strips(waterfall(0.0, 0.0, 0.0)))
+
+
+def test_every_failed_study_has_a_section():
+    sorted_problems = sort_problems({"waterfall": "a", "map over gamma": "b", "something else": "c", "horizon": "d"})
+    assert dict(sorted_problems) == {
+        "assumptions": [("waterfall", "a")],
+        "maps": [("map over gamma", "b")],
+        "events": [("something else", "c")],
+        "engines": [("horizon", "d")],
+    }
+    assert set(PLACES.values()) <= set(CONTENTS)
+
+
+def section_of(page, name):
+    return re.search(rf'<section id="{name}">.*?</section>', page, re.S).group()
+
+
+def test_a_failed_solver_and_a_failed_study_stand_where_their_results_would(evidence, report):
+    made = dict(evidence.made)
+    made["pymunk"] = Made(made["pymunk"].run, None, 0.1, "SetupError: the world is <not> the one that was meant")
+    found = dataclasses.replace(evidence.attribution, waterfalls=(), problems={"waterfall": "ArithmeticError: no run"})
+    broken = dataclasses.replace(evidence, made=made, attribution=found)
+    exhibits = [exhibit for exhibit in report.exhibits if exhibit.name != "waterfall"]
+    page = render(broken, report.findings, exhibits, solver_rows(broken), provenance("flipproof report"))
+    flights = section_of(page, "flights")
+    row = re.search(r"<tr><th[^>]*>pymunk</th>.*?</tr>", flights, re.S).group()
+    assert "✗ failed" in row
+    assert "SetupError: the world is &lt;not&gt; the one that was meant" in row
+    assert "trajectories/pymunk/" not in page
+    assert "solvers failed on this throw" in section_of(page, "verdict")
+    assert "ArithmeticError: no run" in section_of(page, "assumptions")
+    assert 'class="strips"' not in page
+
+
+def test_the_flights_of_a_sound_report_are_all_marked_ok(report):
+    flights = section_of(report.html, "flights")
+    assert [name for name in FLIGHTS if f">{name}</th>" not in flights] == []
+    assert "✗ failed" not in flights
+
+
+def test_numbers_stay_with_what_belongs_to_them():
+    assert unbroken("at t = 50.3 ms, 13 % of it") == "at t~=~50.3~ms, 13~% of it".replace("~", "\N{NO-BREAK SPACE}")
+
+
+def test_scripts_and_styles_cannot_end_early():
+    assets = read_assets()
+    assert {"report.css", "report.js"} <= set(assets)
+    for name, text in assets.items():
+        assert "</script" not in text.lower(), name
+        assert "</style" not in text.lower(), name
+
+
+def test_without_a_browser_printing_says_what_to_install(monkeypatch, tmp_path):
+    monkeypatch.setenv(VARIABLE, "/nowhere/chromium")
+    assert find_browser() is None
+    with pytest.raises(PrintError, match="/nowhere/chromium is not a program"):
+        require_browser()
+    monkeypatch.delenv(VARIABLE)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr("reports.pdf.BROWSERS", ("chromium",))
+    with pytest.raises(PrintError, match="--pdf needs Chromium, Chrome or Edge"):
+        require_browser()
+
+
+def test_a_browser_that_prints_nothing_is_an_error_of_one_line(monkeypatch, tmp_path):
+    program = tmp_path / "browser"
+    program.write_text("#!/bin/sh\necho first >&2\necho broken beyond repair >&2\nexit 3\n")
+    program.chmod(0o755)
+    monkeypatch.setenv(VARIABLE, str(program))
+    with pytest.raises(PrintError, match=r"printed nothing \(exit status 3: broken beyond repair\)") as caught:
+        print_page(tmp_path / "page.html", tmp_path / "page.pdf")
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "page.pdf").exists()
