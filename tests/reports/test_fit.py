@@ -1,0 +1,358 @@
+"""The parts of a fit, each against what is known: noise, coordinates, the search, the intervals, reading, words."""
+
+import argparse
+import json
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+import ode_reference
+from reports.cli_fit import add_fit
+from reports.fit.compare import compare, told, verdict
+from reports.fit.estimate import THOROUGH, estimate, scan
+from reports.fit.landscape import HUBER, Landscape, loss
+from reports.fit.problem import ALWAYS, FAR, Measurement, Problem, first_frames, noise_of, pose, predict
+from reports.fit.reading import Averaged, read_flight
+from reports.fit.sampling import Points, cool, roughness
+from reports.fit.temperature import autocovariance, temperature
+from reports.fit.twins import film
+from reports.fit.uncertainty import correlation, intervals
+from reports.tracker.kinematics import angle
+from slicemodel import Scenario
+
+CUT = Scenario().with_slices(20)
+LIGHT = replace(THOROUGH, drags=6, restitutions=4, starts=2, points=60, moves=1, keep=6)
+SIGMA = 1e-3 * math.sqrt(2) / CUT.bottle.length
+
+
+def filmed(throw, seed=0, solver="midpoint"):
+    t, cap, base = film(throw, solver, seed)
+    return Measurement(label="film", t=t, values=np.unwrap(angle(cap, base)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plane(Problem):
+    """A problem whose prediction is linear in its coordinates, so that every answer is known in closed form."""
+
+    slopes: np.ndarray
+    folds: float = 0.0
+
+    def bounds(self):
+        return np.array([-40.0, -40.0]), np.array([60.0, 60.0])
+
+    def coarse_steps(self):
+        return np.array([0.3, 0.3])
+
+    def start(self):
+        return np.zeros(2)
+
+    def value(self, _, coordinate):
+        return float(coordinate)
+
+    def residuals(self, points):
+        moved = points + self.folds * np.sign(np.sin(7.0 * points))
+        return (self.measured.values - moved @ self.slopes.T) / self.noise
+
+
+def plane(folds=0.0, seed=3):
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0.0, 1.0, 100)
+    slopes = np.column_stack((np.ones(100), t))
+    values = slopes @ [2.0, -1.0] + rng.normal(size=100)
+    measured = Measurement(label="plane", t=t, values=values)
+    return Plane(measured=measured, throw=CUT, solver="midpoint", free=ALWAYS, noise=1.0, slopes=slopes, folds=folds)
+
+
+# ---------------------------------------------------------------------- noise and coordinates
+
+
+def test_noise_is_estimated_from_neighbours_whatever_the_flight_and_a_few_slips():
+    t = np.linspace(0.0, 0.5, 121)
+    rng = np.random.default_rng(1)
+    found = []
+    for _ in range(40):
+        values = 1.5 + 20 * t - 30 * t**2 + 0.3 * np.sin(12 * t) + rng.normal(0.0, SIGMA, len(t))
+        values[rng.integers(len(t), size=3)] += 0.3
+        found.append(noise_of(values))
+    assert np.mean(found) == pytest.approx(SIGMA, rel=0.06)
+    assert np.std(found) < 0.2 * SIGMA
+
+
+@pytest.mark.parametrize("drag", [0.0, 1e-4, 0.25, 3.0])
+def test_drag_survives_the_way_to_its_coordinate_and_back(drag):
+    problem = pose(filmed(CUT), CUT, "midpoint", slices=20)
+    assert problem.value("drag", problem.coordinate("drag", drag)) == pytest.approx(drag, rel=1e-12, abs=1e-15)
+
+
+def test_prediction_by_a_scheme_is_the_event_driven_one():
+    t = np.arange(100) / 240
+    throw = replace(CUT, duration=float(t[-1]))
+    reference = ode_reference.solve(throw, model="eq8", times=t)
+    measured = Measurement(label="", t=t, values=np.zeros(100))
+    assert predict([throw], "midpoint", measured)[0] == pytest.approx(reference.theta, abs=1e-4)
+    omega = predict([throw], "midpoint", replace(measured, quantity="omega"))[0]
+    assert omega == pytest.approx(reference.omega, abs=0.02)
+    made = replace(measured, quantity="omega", operator=Averaged(points=5))
+    assert predict([throw], "midpoint", made)[0] == pytest.approx(Averaged(points=5)(t, reference.theta), abs=0.01)
+
+
+def test_a_flight_that_the_solver_cannot_finish_is_far_off():
+    t = np.arange(120) / 240
+    measured = Measurement(label="", t=t, values=20.0 * t, noise=SIGMA)
+    problem = pose(measured, Scenario(), "published-matlab", slices=500)
+    rows = problem.residuals(problem.start()[np.newaxis])
+    assert np.isfinite(rows).all()
+    assert rows.max() == FAR
+    assert abs(rows[0, 0]) < FAR
+
+
+def test_the_papers_omega_of_an_even_spin_is_exact_to_the_last_frame():
+    t = np.array([0.0, 0.1, 0.2, 0.3, 0.5, 0.6, 0.7, 0.8])
+    assert Averaged(points=5)(t, 3.0 + 20.0 * t) == pytest.approx(np.full(8, 20.0))
+    kink = Averaged(points=3)(np.arange(7.0), np.array([0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0]))
+    assert kink == pytest.approx([0.0, 0.0, 0.5 / 3, 0.5, 2.5 / 3, 1.0, 1.0])
+
+
+# ---------------------------------------------------------------------- search and intervals, linear
+
+
+def test_loss_is_squares_within_three_deviations_and_straight_beyond():
+    assert loss(np.array([1.0, -2.0, 5.0])) == pytest.approx(1 + 4 + 2 * HUBER * 5 - HUBER**2)
+
+
+def test_difference_quotients_are_exact_on_a_plane_and_at_its_bounds():
+    problem = plane()
+    land = Landscape(problem)
+    for x in (np.array([0.0, 1.0]), problem.bounds()[0], problem.bounds()[1]):
+        found = land.jacobian(x, problem.coarse_steps(), np.array([0, 1]))
+        assert found == pytest.approx(-problem.slopes, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_on_a_plane_estimate_and_intervals_are_those_of_the_textbook(seed):
+    problem = plane(seed=seed)
+    exact = np.linalg.lstsq(problem.slopes, problem.measured.values, rcond=None)[0]
+    covariance = np.linalg.inv(problem.slopes.T @ problem.slopes)
+    found = estimate(problem, replace(THOROUGH, points=200))
+    # A few residuals lie beyond Huber's three deviations.
+    assert found.x == pytest.approx(exact, abs=0.15 * np.sqrt(covariance.diagonal()).min())
+    assert found.roughness == pytest.approx(1.0, abs=0.05)
+    for k, interval in enumerate(intervals(found)):
+        half = 2.241 * math.sqrt(covariance[k, k] * found.temperature)
+        assert interval.high - interval.value == pytest.approx(half, rel=0.15)
+        assert interval.value - interval.low == pytest.approx(half, rel=0.15)
+        assert interval.verdict == "told"
+    pairs = correlation(found)
+    assert pairs[0, 1] == pytest.approx(covariance[0, 1] / math.sqrt(covariance[0, 0] * covariance[1, 1]), abs=0.1)
+
+
+def test_a_population_has_the_spread_of_its_temperature():
+    problem = plane()
+    land = Landscape(problem)
+    seeds = Points.flown(land, scan(land, THOROUGH))
+    spread = np.sqrt(np.linalg.inv(problem.slopes.T @ problem.slopes).diagonal())
+    for temperature_ in (1.0, 9.0):
+        cloud = cool(land, seeds, temperature_, replace(THOROUGH, points=200, keep=12), seed=1)
+        assert cloud.likely.x.std(axis=0) == pytest.approx(math.sqrt(temperature_) * spread, rel=0.15)
+        assert 0.1 < cloud.accepted < 0.7
+
+
+def test_folds_in_a_landscape_are_noticed():
+    clouds = []
+    for folds in (0.0, 0.25):
+        land = Landscape(plane(folds))
+        clouds.append(cool(land, Points.flown(land, scan(land, THOROUGH)), 1.0, THOROUGH, seed=1))
+    assert roughness(clouds[0], 1.0, seed=0) < 1.02
+    assert roughness(clouds[1], 1.0, seed=0) > 1.05
+
+
+def test_shared_noise_widens_and_independent_noise_does_not():
+    rng = np.random.default_rng(0)
+    white = rng.normal(size=4000)
+    assert autocovariance(white)[0, 1:6] == pytest.approx(np.zeros(5), abs=0.06)
+    problem = plane()
+    steps = problem.coarse_steps()
+    widened = []
+    for kernel in (np.ones(1), np.ones(5) / math.sqrt(5)):
+        noise = np.convolve(rng.normal(size=104), kernel, mode="valid")[:100]
+        measured = replace(problem.measured, values=problem.slopes @ [2.0, -1.0] + noise, quantity="omega")
+        widened.append(temperature(Landscape(replace(problem, measured=measured)), np.array([2.0, -1.0]), steps))
+    assert widened[0] < 2.0
+    assert 2.5 < widened[1] < 8.0
+
+
+# ---------------------------------------------------------------------- real flights
+
+
+def test_a_slipped_marker_moves_nothing():
+    throw = replace(CUT, omega0=18.0)
+    measured = filmed(throw, seed=5)
+    slipped = measured.values.copy()
+    slipped[[20, 60, 61, 90]] += (0.4, -0.5, -0.5, 0.3)
+    clean = estimate(pose(measured, throw, "midpoint", slices=20), LIGHT)
+    dirty = estimate(pose(replace(measured, values=slipped), throw, "midpoint", slices=20), LIGHT)
+    for one, other in zip(intervals(clean), intervals(dirty), strict=True):
+        assert one.low <= other.value <= one.high
+
+
+def test_ice_tells_neither_drag_nor_restitution():
+    throw = replace(CUT, frozen=True)
+    found = intervals(estimate(pose(filmed(throw, solver="midpoint"), throw, "midpoint", slices=20), LIGHT))
+    assert [interval.verdict for interval in found] == ["not told", "not told"]
+    assert all("cannot tell" in told(interval) for interval in found)
+    assert (found[1].low, found[1].high) == (0.0, 1.0)
+
+
+def test_restitution_is_not_told_where_nothing_rebounds():
+    # A tenth of the water and strong drag: the slices creep, and none reaches the cap in the time.
+    throw = replace(Scenario(water_mass=0.3, duration=0.16).with_slices(20), drag=1.2)
+    drag, restitution = intervals(estimate(pose(filmed(throw), throw, "midpoint", slices=20), LIGHT))
+    assert drag.verdict == "told"
+    assert drag.low < throw.drag < drag.high
+    assert restitution.verdict == "not told"
+
+
+def test_release_is_read_off_the_first_frames():
+    throw = replace(CUT, omega0=17.0, theta0=1.4)
+    found = first_frames(filmed(throw))
+    assert found["omega0"] == pytest.approx(17.0, rel=0.06)
+    assert found["theta0"] == pytest.approx(1.4, abs=0.02)
+
+
+def test_the_equation_that_made_the_data_explains_them_and_another_does_not():
+    throw = replace(CUT, theta0=1.3)
+    measured = filmed(throw, seed=2)
+    found = compare(
+        [estimate(pose(measured, throw, name, slices=20), LIGHT) for name in ("published-python", "midpoint")]
+    )
+    assert [one.solver for one in found] == ["midpoint", "published-python"]
+    assert found[0].fits
+    assert not found[1].fits
+    assert found[0].aic == 0.0
+    assert found[1].aic > 100
+    assert found[0].misfit == pytest.approx(1.0, abs=0.2)
+    words = verdict(found)
+    assert "it explains the flight" in words
+    assert "published-python leaves" in words
+    assert "does not explain" in verdict(found[1:])
+
+
+def test_fits_of_different_data_are_not_compared():
+    one, other = (estimate(plane(seed=seed), LIGHT) for seed in (1, 2))
+    with pytest.raises(ValueError, match="one measurement"):
+        compare([one, other])
+
+
+# ---------------------------------------------------------------------- reading and the command
+
+
+def rows(*lines):
+    return "\n".join(lines) + "\n"
+
+
+def spin(names="t,theta", count=40, start=0.0):
+    return [names, *(f"{start + k / 240:.6f},{1.5 + k / 12:.5f}" for k in range(count))]
+
+
+@pytest.mark.parametrize(
+    ("text", "asked", "words"),
+    [
+        ("", {}, "is empty"),
+        (rows("# a remark"), {}, "is empty"),
+        (rows(*spin("time,theta")), {}, "no column t"),
+        (rows(*spin("t,angle")), {}, "neither theta nor omega"),
+        (rows(*spin("t,t")), {}, "'t' twice"),
+        (rows(*spin()), {"quantity": "omega"}, "no column omega"),
+        (rows(*spin(), "0.5"), {}, "line 42 has 1 cells"),
+        (rows(*spin(), "0.5,abc"), {}, "line 42, column theta: 'abc' is not a number"),
+        (rows(*spin(), "0.5,inf"), {}, "not finite"),
+        (rows(*spin(), "0.01,3"), {}, "does not increase"),
+        (rows(*spin(count=5)), {}, "5 frames between release and landing; 12 are needed"),
+        (rows(*spin()), {"release": 0.2, "landing": 0.1}, "does not follow"),
+        (rows(*spin()), {"release": 0.15}, "12 are needed"),
+        (rows(*spin()), {"noise": math.nan}, "outside"),
+        (rows(*spin("t,omega")), {"averaged": 4}, "odd number"),
+        (rows(*spin()), {"averaged": 5}, "the fitted column is theta"),
+    ],
+)
+def test_a_table_that_cannot_be_fitted_is_refused_in_one_line(tmp_path, text, asked, words):
+    path = tmp_path / "flight.csv"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=words) as error:
+        read_flight(path, **asked)
+    assert "\n" not in str(error.value)
+
+
+def test_a_table_is_cut_from_release_to_landing_and_empty_cells_are_left_out(tmp_path):
+    path = tmp_path / "flight.csv"
+    lines = spin(start=1.0)
+    lines[10] = lines[10].partition(",")[0] + ","
+    path.write_text(rows("# synthetic", *lines))
+    found = read_flight(path, release=1.008333, landing=1.125)
+    assert len(found.t) == 28
+    assert found.t[0] == pytest.approx(0.0, abs=1e-6)
+    assert found.t[-1] == pytest.approx(28 / 240, abs=2e-6)
+    assert found.quantity == "theta"
+
+
+def run(*arguments):
+    parser = argparse.ArgumentParser()
+    add_fit(parser.add_subparsers(required=True))
+    options = parser.parse_args(["fit", *map(str, arguments)])
+    return options.action(options)
+
+
+def test_the_command_prints_and_writes_the_same_numbers(tmp_path, capsys):
+    path, out = tmp_path / "film.csv", tmp_path / "out"
+    measured = filmed(CUT, seed=4)
+    path.write_text(rows("t,theta", *(f"{t:.6f},{v:.5f}" for t, v in zip(measured.t, measured.values, strict=True))))
+    assert run(path, "--slices", 20, "--starts", 2, "--out", out) == 0
+    printed = capsys.readouterr().out
+    assert "it explains the flight" in printed
+    assert (out / "fit.txt").read_text() in printed
+    summary = json.loads((out / "summary.json").read_text())
+    drag, restitution = summary["fits"][0]["parameters"]
+    assert drag["low"] < CUT.drag < drag["high"]
+    assert restitution["low"] < CUT.restitution < restitution["high"]
+    table = (out / "residuals.csv").read_text().splitlines()
+    assert table[0] == "t,theta,fitted midpoint,residual midpoint"
+    assert len(table) == 1 + len(measured.t)
+    for name in ("residuals", "allowed"):
+        assert (out / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--model", "eq9"], "eq9"),
+        (["--model", "pymunk"], "physics engine"),
+        (["--model", "midpoint", "midpoint"], "twice"),
+        (["--cap", "A"], "both or neither"),
+        (["--cap", "A", "--base", "B", "--averaged", "5"], "for tables"),
+        (["--scenario", "nowhere.toml"], "nowhere.toml"),
+        (["--slices", "0"], None),
+        (["--noise", "-1"], None),
+        (["--release", "soon"], None),
+    ],
+)
+def test_a_bad_command_is_refused_in_one_line(tmp_path, arguments, words):
+    path = tmp_path / "flight.csv"
+    path.write_text(rows(*spin()))
+    if words is None:
+        with pytest.raises(SystemExit):
+            run(path, *arguments)
+        return
+    with pytest.raises(ValueError, match=words) as error:
+        run(path, *arguments)
+    assert "\n" not in str(error.value)
+
+
+def test_a_release_that_the_first_frames_contradict_is_remarked(tmp_path, capsys):
+    path = tmp_path / "flight.csv"
+    path.write_text(rows("t,theta", *(f"{k / 240:.6f},{1.57 + 12.0 * k / 240:.5f}" for k in range(40))))
+    frozen = tmp_path / "ice.toml"
+    frozen.write_text("[scenario]\nfrozen = true\nn_slices = 5\ndrag = 0.1\n")
+    assert run(path, "--scenario", frozen, "--starts", 1) == 0
+    assert "the first frames say omega0 = 12, the scenario 20" in capsys.readouterr().out

@@ -1,0 +1,60 @@
+"""The tutorial's blocks, run in order in an empty folder as a class would."""
+
+import json
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from reports.cli import main
+
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "tutorial.md"
+
+
+@pytest.fixture(scope="module")
+def lesson(tmp_path_factory):
+    """Return the folder that the lesson leaves."""
+    folder = tmp_path_factory.mktemp("lesson")
+    names: dict[str, object] = {}
+    blocks = re.findall(r"^```(\w+)\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        for kind, text in blocks:
+            if kind == "toml":
+                Path(text.splitlines()[0].removeprefix("# ")).write_text(text, encoding="utf-8")
+            elif kind == "python":
+                exec(compile(text, str(PAGE), "exec"), names)
+            else:
+                assert kind == "sh", kind
+                for line in text.splitlines():
+                    program, *arguments = shlex.split(line)
+                    assert program == "flipproof"
+                    assert main(arguments) == 0, line
+    return folder
+
+
+@pytest.mark.xdist_group("tutorial")
+def test_every_step_leaves_what_the_page_says(lesson):
+    for name in (
+        "eq8.csv",
+        "omega.png",
+        "flip.txt",
+        "my-track/index.html",
+        "my-fit/residuals.png",
+        "my-fit/allowed.png",
+    ):
+        assert (lesson / name).stat().st_size > 1000, name
+
+
+@pytest.mark.xdist_group("tutorial")
+def test_the_fit_finds_the_throw_and_the_equation(lesson):
+    summary = json.loads((lesson / "my-fit" / "summary.json").read_text(encoding="utf-8"))
+    best, other = summary["fits"]
+    assert best["model"] == "midpoint"
+    assert best["misfit"] < 1.3
+    assert other["misfit"] > 2.0
+    found = {parameter["name"]: parameter for parameter in best["parameters"]}
+    assert found["drag"]["value"] == pytest.approx(0.165, rel=0.25)
+    assert found["restitution"]["value"] == pytest.approx(0.5, abs=0.1)
+    assert found["omega0"]["value"] == pytest.approx(20.0, rel=0.05)
