@@ -14,7 +14,12 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from reports.arguments import INTERRUPTED, SCENARIO_HELP, add_command, count, read_scenario
+from reports.cli_animate import add_animate
+from reports.cli_check import add_checks
+from reports.cli_fit import add_fit
+from reports.cli_paper import add_paper
 from reports.cli_sweeps import add_sweeps
+from reports.cli_tracker import add_tracker
 
 DEFAULT_OUT = Path("reports/latest")
 
@@ -33,9 +38,15 @@ examples:
   flipproof simulate --solver eq8 --out eq8.csv
   flipproof compare published-python eq8
   flipproof compare eq8.csv measured.csv
+  flipproof paper --figure 7b                   one of the paper's figures; without --figure all of them
+  flipproof check throw.toml --baseline summary.json
+  flipproof diff old-report new-report          what changed beyond its band
   flipproof sweep sweep.toml --out my-sweep     many throws and solvers; run it again to go on
   flipproof map --axis gamma --out my-map       where which mistake matters; run it again to go on
   flipproof waterfall --out my-waterfall        from the published program to free flight, one bar per mistake
+  flipproof track video.txt --cap cap --base base
+  flipproof fit flight.csv --model midpoint free-flight
+  flipproof animate --out flips.gif             the flights side by side, 9.6 times slower
 
 exit status:
   0  done; for a report: every claim was evaluated and no regression claim failed
@@ -109,6 +120,9 @@ def parser() -> argparse.ArgumentParser:
         "number if smaller)",
     )  # fmt: skip
     report.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
+    report.add_argument(
+        "--pdf", action="store_true", help="also print the page to report.pdf (needs Chromium, Chrome or Edge)"
+    )
 
     simulate = add_command(commands, "simulate", "Run one solver and write its trajectory as CSV.", command_simulate)
     simulate.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
@@ -123,7 +137,12 @@ def parser() -> argparse.ArgumentParser:
     compare.add_argument("--scenario", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     compare.add_argument("--slices", type=count, metavar="N", help="slices for both solvers (default 50)")
 
+    add_paper(commands)
+    add_checks(commands)
     add_sweeps(commands)
+    add_tracker(commands)
+    add_fit(commands)
+    add_animate(commands)
     add_command(commands, "models", "List every scheme, model and engine.", command_models)
     return top
 
@@ -141,8 +160,11 @@ def command_report(options: argparse.Namespace) -> int:
     """Write a report; return 1 if a regression claim failed."""
     scenario = read_scenario(options.scenario)
     from reports.output import check_replaceable, replaced_folder
+    from reports.pdf import print_page, require_browser
 
     check_replaceable(options.out)
+    if options.pdf:
+        require_browser()
 
     from tqdm import tqdm
 
@@ -163,8 +185,10 @@ def command_report(options: argparse.Namespace) -> int:
                 bar.update(made - bar.n)
 
             evidence = gather(scenario, size, progress, options.jobs)
-        report = build(evidence, provenance(command))
+        report = build(evidence, provenance(command), options.jobs)
         write(report, folder)
+        if options.pdf:
+            print_page(folder / "index.html", folder / "report.pdf")
     _print_report(report, options.out, time.perf_counter() - began)
     return 1 if report.failed else 0
 
