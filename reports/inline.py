@@ -20,14 +20,20 @@ COMMENTS = re.compile(r"<!--.*?-->", re.S)
 GROUP_NAMES = re.compile(r'<g id="([^"]*)"')
 SIZE = re.compile(r'<svg[^>]*? width="([\d.]+)pt" height="([\d.]+)pt"')
 REFERENCES = re.compile(r"#([\w.-]+)")
+IDS = re.compile(r'(?<= id=")[^"]*')
+TARGETS = re.compile(r'(?<=href="#)[^"]*|(?<=url\(#)[^)]*')
 ESCAPES = str.maketrans({"%": "%25", "#": "%23", "<": "%3C", ">": "%3E", "&": "%26"})
 
 
 def compact_svg(svg: str) -> str:
-    """Return the same picture in fewer characters: no comments, no names nobody refers to, shorter coordinates."""
+    """Return the same picture in fewer characters: no comments, no long names, shorter coordinates."""
     svg = COORDINATES.sub(lambda found: NUMBER.sub(_rounded, found.group()), COMMENTS.sub("", svg))
     used = set(REFERENCES.findall(svg))
     svg = GROUP_NAMES.sub(lambda found: found.group() if found.group(1) in used else "<g", svg)
+    svg = svg.replace("xlink:href", "href")
+    names = {name: f"i{k:x}" for k, name in enumerate(dict.fromkeys(IDS.findall(svg)))}
+    svg = IDS.sub(lambda found: names[found.group()], svg)
+    svg = TARGETS.sub(lambda found: names.get(found.group(), found.group()), svg)
     return SPACES.sub(" ", svg).strip()
 
 
