@@ -139,6 +139,7 @@ def render(
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.tests["about_the_paper"] = lambda id_: id_.startswith("paper-")
     environment.filters["typeset"] = typeset
     environment.filters["unbroken"] = unbroken
     environment.filters["amount"] = amount

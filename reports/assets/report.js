@@ -77,6 +77,7 @@
   const box = document.querySelector(".filter");
   const field = box.querySelector("input");
   const rows = [...document.querySelectorAll(".findings tbody tr")];
+  const folds = [...document.querySelectorAll("#findings details")];
   const words = rows.map((row) => `${row.id} ${row.textContent}`.toLowerCase());
   const filter = () => {
     const wanted = field.value.toLowerCase().split(/\s+/).filter(Boolean);
@@ -85,6 +86,7 @@
       row.hidden = !wanted.every((word) => words[k].includes(word));
       shown += row.hidden ? 0 : 1;
     });
+    folds.forEach((fold) => { fold.open = fold.open || wanted.length > 0; });
     box.querySelector("[role=status]").textContent = `${shown} of ${rows.length} findings`;
   };
   field.addEventListener("input", filter);
