@@ -167,6 +167,7 @@ def certify(
     ice: str = "rigid",
     frame: str = "free",
     slices: str = "overlap",
+    hits: str | None = None,
     levels: int = DEFAULT_LEVELS,
     **knobs: float,
 ) -> Certificate:
@@ -175,7 +176,7 @@ def certify(
     Parameters
     ----------
     scenario : Scenario
-    engine, times, ice, frame, slices, **knobs
+    engine, times, ice, frame, slices, hits, **knobs
         As in ``solve``.
     tolerance : float
         Largest change of omega at any output time to the certified settings from twice the step, from them to twice
@@ -191,31 +192,35 @@ def certify(
 
     Accuracy
     --------
-    At order 1 a certified run is off by the change from twice the step, thus by less than the tolerance. The band is
-    ``SAFETY`` times the largest up to then of the change from 2h, half of that from 4h to 2h, and what another bottle
-    leaves; and twice the change by iterations. Of a run that is not certified no order may be assumed: its band is
-    ``SAFETY`` times the spread of all runs about it.
+    At order 1 a certified run is off by the change from twice the step, thus by less than the tolerance. The band
+    is ``SAFETY`` times the largest up to then of the change from 2h, half of that from 4h to 2h (all of it if no
+    order is observed), and what another bottle leaves; and twice the change by iterations. Of a run that is not
+    certified no order may be assumed: its band is ``SAFETY`` times the spread of all runs about it.
 
-    Known failure: impacts closer than a step that change places in none of these runs stay unseen. Of 72 throws in
-    pymunk (N 2 to 50, e 0 to 0.5, with and without drag, three bottles) 66 are certified; 64 of these are within
-    3e-3 omega_0 of event-driven free flight. The other two have 20 and 50 slices and no drag, and are off by 1.0e-2
-    and 6.6e-3 at 7.8e-6 s; in the first, two slices reach the base 6.4e-6 s apart.
+    Known failure: impacts closer than a step, where hits are left to the grid, that change place in none of these runs
+    stay unseen; without drag that was 2 of 36 throws in pymunk, off by 1.0e-2 and 6.6e-3 at 7.8e-6 s (20 and 50 slices;
+    in the first, two reach the base 6.4e-6 s apart). With located hits, the default there, and on the grid with drag,
+    each of 72 throws (N 2 to 50, e 0 to 0.5, with and without drag, three bottles) is certified and within
+    3e-3 omega_0 of event-driven free flight (``benchmarks/engine_matrix.py``).
     """
     tolerance = checked_number("tolerance", tolerance, 0.0, 1.0)
     problem = not_whole("levels", levels, 1, MOST_LEVELS)
     if problem:
         raise ValueError(problem)
     moments = output_times(scenario, times)
-    runs = Runs(scenario, engine, {"times": moments, "ice": ice, "frame": frame, "slices": slices, **knobs})
+    world: dict[str, Any] = {"frame": frame, "slices": slices, "hits": hits}
+    runs = Runs(scenario, engine, {"times": moments, "ice": ice, **world, **knobs})
     verdict = search(runs, tolerance, levels)
-    rebounds = () if scenario.frozen else measure_restitution(engine, frame=frame, knobs=knobs)
+    run = runs.make("on trial", verdict.dt, verdict.iterations)
+    # What is measured is the world that is certified: the throw that measures has no drag, and would choose anew.
+    world["hits"] = run.settings["hits"]
+    rebounds = () if scenario.frozen else measure_restitution(engine, **world, knobs=knobs)
     wrong = [rebound for rebound in rebounds if not rebound.holds]
     status, reason = verdict.status, verdict.reason
     if wrong:
         status, reason = "wrong-restitution", "; ".join(str(rebound) for rebound in wrong)
     order, order_reason = _observed_order(runs, verdict)
     extrapolated_at = 2 if abs(order - 2.0) <= 0.25 else 1
-    run = runs.make("on trial", verdict.dt, verdict.iterations)
     return Certificate(
         engine=engine,
         tolerance=tolerance,
@@ -226,7 +231,7 @@ def certify(
         order_reason=order_reason,
         extrapolated_at=extrapolated_at,
         richardson=_extrapolated(runs, verdict, run, extrapolated_at),
-        band=_band(runs, verdict, run),
+        band=_band(runs, verdict, run, order),
         horizon=verdict.horizon,
         rebounds=rebounds,
         trajectory=run,
@@ -275,7 +280,7 @@ def _extrapolated(runs: Runs, at: Verdict, run: Trajectory, order: int) -> Float
     return np.asarray(run.omega + (run.omega - coarse.omega) / (2**order - 1))
 
 
-def _band(runs: Runs, at: Verdict, run: Trajectory) -> FloatArray:
+def _band(runs: Runs, at: Verdict, run: Trajectory, order: float) -> FloatArray:
     coarsest, coarse = (runs.known(at.dt * factor, at.iterations) for factor in (4.0, 2.0))
     bent = runs.bent(2 * at.dt, at.iterations)
     if coarse is None or not run.ok:
@@ -283,7 +288,8 @@ def _band(runs: Runs, at: Verdict, run: Trajectory) -> FloatArray:
     if at.status == "certified" and bent is not None:
         errors = [runs.apart(coarse, run), bent]
         if coarsest is not None:
-            errors.append(runs.apart(coarsest, coarse) / 2)
+            # Half a step is half the error only if an order is observed.
+            errors.append(runs.apart(coarsest, coarse) / (2 if math.isfinite(order) else 1))
         band = SAFETY * np.max(errors, axis=0)
     else:
         band = SAFETY * runs.spread(run, at.iterations)

@@ -109,6 +109,7 @@ def run(scenario: Scenario, order: Order) -> Trajectory:
             "ice": order.ice if scenario.frozen else None,
             "frame": order.frame,
             "slices": order.slices,
+            "hits": None if scenario.frozen else "located",
             "points": len(order.times),
             "integrator": "RK4",
             "impact_law": "simultaneous",

@@ -16,6 +16,7 @@ from typing import Any, Final
 import numpy as np
 import pymunk
 
+from engine_check import pymunk_impacts as impacts
 from engine_check import pymunk_rods as rods
 from engine_check import watch
 from engine_check.pymunk_rotating import run_rotating
@@ -44,7 +45,9 @@ def run(scenario: Scenario, order: Order) -> Trajectory:
 
     Accuracy
     --------
-    omega, theta, r: order 2 in dt without drag before the first impact if e = 1, else order 1, because
+    omega, theta, r: order 2 in dt without drag if hits are located (``pymunk_impacts``), with impacts in their true
+    order as soon as the step tells them apart. Left to the grid, order 2 before the first impact without drag if e = 1,
+    else order 1, because
 
     - the damper acts on the velocity at the end of the step (error about gamma dt),
     - an impact is seen at the next grid point and sinks in by up to v dt; at an output time that is an
@@ -65,9 +68,11 @@ def run(scenario: Scenario, order: Order) -> Trajectory:
     settings = PymunkKnobs.from_overrides(order.knobs)
     iterations = enough_iterations(scenario) if order.iterations is None else order.iterations
     ice, dt, times = order.ice, order.dt, order.times
+    hits = impacts.hits_of(scenario, order)
     world = build(scenario, settings, iterations, ice, order.slices)
     setup = verify(world, scenario, settings, iterations, ice, order.slices)
-    flight = _Flight(world, scenario, settings, setup["angular_momentum"], order.slices == "exclude")
+    located = _located(world, scenario, settings, iterations, order) if hits == "located" else None
+    flight = _Flight(world, scenario, settings, setup["angular_momentum"], order.slices == "exclude", located)
 
     for when, count in order.legs():
         if count == 0:
@@ -85,6 +90,7 @@ def run(scenario: Scenario, order: Order) -> Trajectory:
             "ice": ice if scenario.frozen else None,
             "frame": order.frame,
             "slices": order.slices,
+            "hits": hits,
             "points": len(times),
             **settings.to_mapping(),
             "slice_restitution": restitution_between_slices(scenario, settings, order.slices),
@@ -94,13 +100,34 @@ def run(scenario: Scenario, order: Order) -> Trajectory:
     )
 
 
+def _located(
+    world: World, scenario: Scenario, knobs: PymunkKnobs, iterations: int, order: Order
+) -> impacts.LocatedHits:
+    meant = (
+        impacts.impact_scenario(scenario),
+        impacts.impact_knobs(knobs),
+        impacts.impact_iterations(iterations),
+        order.ice,
+        order.slices,
+    )
+    impact = build(*meant)
+    verify(impact, *meant)
+    return impacts.LocatedHits(world, impact, scenario)
+
+
 class _Flight:
     """The bookkeeping of one run: where it is, what was recorded, the largest residuals, and the verdict."""
 
     def __init__(
-        self, world: World, scenario: Scenario, knobs: PymunkKnobs, angular_momentum: float, exclude: bool
+        self,
+        world: World,
+        scenario: Scenario,
+        knobs: PymunkKnobs,
+        angular_momentum: float,
+        exclude: bool,
+        located: impacts.LocatedHits | None,
     ) -> None:
-        self._world, self._scenario, self._exclude = world, scenario, exclude
+        self._world, self._scenario, self._exclude, self._located = world, scenario, exclude, located
         self._cap_thickness = knobs.cap_thickness
         self._angular_momentum = angular_momentum
         self._reader = BatchReader(world)
@@ -127,10 +154,7 @@ class _Flight:
         taken = 0
         while taken < count:
             chunk = min(WATCH_STEPS, count - taken)
-            for _ in range(chunk - 1):
-                self._world.space.step(step)
-            before = self._reader.read()
-            self._world.space.step(step)
+            before = self._step(step, chunk)
             taken += chunk
             self._steps += chunk
             now = when if taken == count else start + taken * step
@@ -140,6 +164,20 @@ class _Flight:
                 return False
         self.record()
         return True
+
+    def _step(self, step: float, count: int) -> FloatArray:
+        """Take ``count`` steps, and return the state before the last."""
+        if self._located is not None:
+            # As in ``_centred``.
+            with np.errstate(over="ignore", invalid="ignore"):
+                for _ in range(count):
+                    before = self._located.step(step, self._sizes[0] / 2)
+            return before
+        for _ in range(count - 1):
+            self._world.space.step(step)
+        before = self._reader.read()
+        self._world.space.step(step)
+        return before
 
     def _centred(self, now: float, gravity_time: float, before: FloatArray, after: FloatArray) -> State:
         # An exploding run may overflow here; the watch reports it as not finite.
@@ -168,6 +206,8 @@ class _Flight:
             for name, value in residuals.items():
                 self._worst[name] = max(self._worst[name], value)
             cause = watch.broken(residuals, self._cap_thickness)
+            if self._located is not None:
+                cause = cause or watch.first_left(residuals, impacts.BANDS)[1]
             return cause or (rods.broken(residuals, self._scenario) if self._exclude else "")
 
     def trajectory(self, *, method: str, settings: Mapping[str, Any], setup: Mapping[str, float]) -> Trajectory:
@@ -184,6 +224,8 @@ class _Flight:
             v = np.zeros_like(r)
         omega = np.array([state.omega for state in good])
         diagnostics: dict[str, Any] = {"steps": self._steps, **self._worst, "setup": dict(setup)}
+        if self._located is not None:
+            diagnostics["located_hits"] = self._located.hits
         if scenario.frozen:
             diagnostics |= _ice_drift(scenario, omega, r)
         message = f"diverged at t = {self._state.t:.6g} s: {self._cause}" if self._cause else ""

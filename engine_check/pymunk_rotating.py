@@ -72,7 +72,7 @@ def run_rotating(scenario: Scenario, order: Order) -> Trajectory:
     Raises
     ------
     ValueError
-        If the slices are to exclude each other, or a knob is set that nothing here obeys.
+        If the slices are to exclude each other, hits are to be located, or a knob is set that nothing here obeys.
     SetupError
         If the engine did not receive what was meant.
 
@@ -94,6 +94,8 @@ def run_rotating(scenario: Scenario, order: Order) -> Trajectory:
             f"slices = {order.slices!r} is not offered in frame = 'rotating': the slices of Eq. 8 pass through each "
             "other; take slices = 'overlap' or frame = 'free'"
         )
+    if order.hits == "located":
+        raise ValueError("hits = 'located' is not offered in frame = 'rotating'; take hits = 'grid' or frame = 'free'")
     knobs = PymunkKnobs.from_overrides(order.knobs)
     for name, value in order.knobs.items():
         if name not in OBEYED_KNOBS:
@@ -119,6 +121,7 @@ def run_rotating(scenario: Scenario, order: Order) -> Trajectory:
             "ice": order.ice if scenario.frozen else None,
             "frame": order.frame,
             "slices": order.slices,
+            "hits": None if scenario.frozen else "grid",
             "points": len(order.times),
             **used,
             "cap_elasticity": CAP_ELASTICITY,

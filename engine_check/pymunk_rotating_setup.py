@@ -114,8 +114,10 @@ def read_back(world: HeldWorld, law: ForceLaw, half_length: float) -> dict[str, 
 
 
 def _read_shapes(world: HeldWorld, half_length: float) -> dict[str, float]:
-    caps = [s for s in world.tube.shapes if isinstance(s, pymunk.Segment)]
-    carried = [(body.position.y, s) for body in world.slices for s in body.shapes if isinstance(s, pymunk.Circle)]
+    # The space's own list: a body keeps shapes that no space holds, and those meet nothing.
+    caps = [s for s in world.space.shapes if isinstance(s, pymunk.Segment) and s.body is world.tube]
+    bodies = set(world.slices)
+    carried = [(s.body.position.y, s) for s in world.space.shapes if isinstance(s, pymunk.Circle) and s.body in bodies]
     circles = [circle for _, circle in carried]
     pairs = list(product(caps, circles))
     held = {

@@ -63,7 +63,12 @@ def intended(
     drag_count = float(scenario.n_slices if scenario.drag > 0.0 else 0)
     meant |= {"grooves": float(scenario.n_slices), "dampers": drag_count}
     between = restitution_between_slices(scenario, knobs, slices)
-    meant |= {"slices_that_collide": 0.0, "caps_passed_through": 0.0, "wall_shapes": float(scenario.n_slices)}
+    meant |= {
+        "slices_that_collide": 0.0,
+        "caps_passed_through": 0.0,
+        "caps": 2.0,
+        "wall_shapes": float(scenario.n_slices),
+    }
     if between is not None:
         meant |= rods.intended(scenario, between, knobs.friction)
     meant |= both("elasticity_product", scenario.restitution)
@@ -145,7 +150,8 @@ def _read_joints(world: World) -> dict[str, float]:
 
 def _read_shapes(world: World) -> dict[str, float]:
     half = world.axis_origin
-    caps = [s for s in world.tube.shapes if isinstance(s, pymunk.Segment)]
+    # The space's own list: a body keeps shapes that no space holds, and those meet nothing.
+    caps = [s for s in world.space.shapes if isinstance(s, pymunk.Segment) and s.body is world.tube]
     circles = rods.wall_circles(world.slices)
     pairs = list(product(caps, circles))
     # The inner face of a cap, as a distance from the cap end of the tube (the local axis points the other way).
@@ -153,6 +159,7 @@ def _read_shapes(world: World) -> dict[str, float]:
     lower = [(half - (s.a.y + s.radius), s.radius) for s in caps if s.a.y <= 0]
     held = {
         "caps_passed_through": float(sum(a.filter.rejects_collision(b.filter) for a, b in pairs)),
+        "caps": float(len(caps)),
         "wall_shapes": float(len(circles)),
         **rods.read_back(world.tube, world.slices),
     }

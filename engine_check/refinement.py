@@ -3,19 +3,20 @@ r"""The search for settings that an engine run can be believed at: step and iter
     dt            4h -------- 2h -------- h       h: the step on trial. From 2h, to 2n, and from 2h bent by the
     iterations                |           |       bottle's mass, omega(t) must change by less than the tolerance
                               |          2n       (``LIMITS``), a fraction of omega_0. 4h only shows the order.
-    bottle       M_b (1 - d), M_b (1 + d),    d = 2h |omega_0| and twice that
+    bottle       M_b (1 - d), M_b (1 + d),    d = 2h |omega_0|, its square if hits are located, and twice that
 
 Nothing here knows an engine: runs go through ``engine_check.solve``, and iterations are refined only if the run
 states some.
 
-Halving the step and doubling the iterations show the error of the scheme. They do not show whether two impacts come
-in their true order: an engine without a swept test answers all that fall into one step together, which is another law
-than one after the other, and goes on doing so at half the step if they lie close enough. So the throw itself is changed
-by as little as the steps of a contact can tell, as a fraction of the time 1/omega_0 in which anything moves: one step,
-and two, because a slice that has sunk in needs more than the step of its hit to come out. What is smooth answers in
-proportion and cancels in omega(d) + omega(-d) - 2 omega(0); what an exchange of two impacts does, stays. It is asked at
-twice the step, where runs cost half and impacts change places sooner. And what moved omega at the trial before by more
-than an order can make up for has not been resolved since, but hidden.
+Halving the step and doubling the iterations show the error of the scheme. They do not show whether two impacts come in
+their true order: an engine without a swept test answers all that fall into one step together, which is another law than
+one after the other, and goes on doing so at half the step if they lie close enough. So the throw itself is changed by
+as little as the steps of a contact can tell, as a fraction of the time 1/omega_0 in which anything moves: one step, and
+two, because a slice that has sunk in needs more than the step of its hit to come out. Hits that are located are in
+order as soon as their times, which are of order 2, tell them apart: there the fraction is squared. What is smooth
+answers in proportion and cancels in omega(d) + omega(-d) - 2 omega(0); what an exchange of two impacts does, stays. It
+is asked at twice the step, where runs cost half and impacts change places sooner. And what moved omega at the trial
+before by more than an order can make up for has not been resolved since, but hidden.
 """
 
 from __future__ import annotations
@@ -120,9 +121,13 @@ class Runs:
         if (dt, iterations) in self._bent:
             return self._bent[dt, iterations]
         bends = []
+        middle = self._made[dt, iterations]
+        tells = abs(self.scenario.omega0) * dt
+        if middle.settings["hits"] == "located":
+            tells *= tells
         for steps in BEND_STEPS:
-            share = min(steps * abs(self.scenario.omega0) * dt, LARGEST_BEND)
-            bend = -2.0 * self._made[dt, iterations].omega
+            share = min(steps * tells, LARGEST_BEND)
+            bend = -2.0 * middle.omega
             for factor in (1.0 + share, 1.0 - share):
                 member = self._with_bottle(factor, dt, iterations)
                 if not member.ok:

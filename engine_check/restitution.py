@@ -92,6 +92,8 @@ def measure_restitution(
     ends: Sequence[str] = ENDS,
     dt: float = STEP,
     frame: str = "free",
+    slices: str = "overlap",
+    hits: str | None = None,
     knobs: Mapping[str, float] | None = None,
 ) -> tuple[Rebound, ...]:
     """Throw one slice against each end for each restitution and return what came back.
@@ -106,7 +108,7 @@ def measure_restitution(
         Of "base", "cap".
     dt : float
         Upper bound of the step [s].
-    frame : str
+    frame, slices, hits : str
         As in ``solve``.
     knobs : mapping, optional
         Overrides of the engine's settings, by name.
@@ -122,17 +124,15 @@ def measure_restitution(
     e_out within 1e-3 of e_in in pymunk at 1e-4 s: an impact that is answered at the next grid point keeps the
     speeds on both sides of it.
     """
-    return tuple(
-        _rebound(engine, end, float(e), dt=dt, frame=frame, knobs=knobs or {}) for end in ends for e in coefficients
-    )
+    settings = {"frame": frame, "slices": slices, "hits": hits, **(knobs or {})}
+    return tuple(_rebound(engine, end, float(e), dt, settings) for end in ends for e in coefficients)
 
 
-def _rebound(engine: str, end: str, e: float, *, dt: float, frame: str, knobs: Mapping[str, float]) -> Rebound:
+def _rebound(engine: str, end: str, e: float, dt: float, settings: Mapping[str, Any]) -> Rebound:
     side = 1.0 if end == "base" else -1.0
     throw = _throw(e, side)
     times = np.linspace(0.0, DURATION, round(DURATION / STEP) + 1)
-    settings: dict[str, Any] = {"times": times, "frame": frame, **knobs}
-    run = solve(throw, engine, dt, **settings)
+    run = solve(throw, engine, dt, times=times, **settings)
     nothing = Rebound(end=end, asked=e, measured=math.nan, speed_in=math.nan, speed_out=math.nan)
     if not run.ok:
         return replace(nothing, reason=run.message)

@@ -20,7 +20,8 @@ from slicemodel.trajectory import FloatArray, Trajectory, output_times
 class Engine:
     """A physics engine: the module whose ``run`` throws the bottle in it, what it solves and why it is here.
 
-    ``frames`` and ``contacts`` name the worlds it can build, of ``FRAMES`` and ``CONTACTS``.
+    ``frames``, ``contacts`` and ``hits`` name the worlds it can build and how it answers hits, of ``FRAMES``,
+    ``CONTACTS`` and ``HITS``.
     """
 
     name: str
@@ -29,6 +30,7 @@ class Engine:
     reason: str
     frames: tuple[str, ...] = ("free",)
     contacts: tuple[str, ...] = ("overlap",)
+    hits: tuple[str, ...] = ("located",)
 
 
 ENGINES: Final[Mapping[str, Engine]] = MappingProxyType(
@@ -44,6 +46,7 @@ ENGINES: Final[Mapping[str, Engine]] = MappingProxyType(
                 "themselves.",
                 frames=("free", "rotating"),
                 contacts=("overlap", "exclude"),
+                hits=("grid", "located"),
             ),
             Engine(
                 name="mujoco",
@@ -70,6 +73,9 @@ FRAMES: Final = ("free", "rotating")
 CONTACTS: Final = ("overlap", "exclude")
 """What two slices do when they meet: pass through each other as in the paper, or collide as rods of length h/N."""
 
+HITS: Final = ("grid", "located")
+"""When a slice's hit on an end is answered: at the next step of the grid, as engines do, or at its own time."""
+
 MOST_ITERATIONS: Final = 1_000_000
 MOST_SLICES: Final = 5_000
 """Slices at the most; an engine's sweep costs their number times its iterations, 2e6 constraints a step at 5 000."""
@@ -85,6 +91,7 @@ class Order:
     ice: str = "rigid"
     frame: str = "free"
     slices: str = "overlap"
+    hits: str | None = None
     knobs: Mapping[str, float]
 
     def legs(self) -> Iterator[tuple[float, int]]:
@@ -111,6 +118,7 @@ def solve(
     ice: str = "rigid",
     frame: str = "free",
     slices: str = "overlap",
+    hits: str | None = None,
     **knobs: float,
 ) -> Trajectory:
     """Throw the bottle in a rigid-body engine and return what the engine's own bodies did.
@@ -137,6 +145,9 @@ def solve(
         "free" or "rotating" (``FRAMES``).
     slices : str
         "overlap" or "exclude" (``CONTACTS``).
+    hits : str or None
+        "grid" or "located" (``HITS``). None: what the engine does best; pymunk locates hits where the frame is free,
+        slices overlap and there is no drag (``pymunk_impacts``). ``settings`` states which.
     **knobs
         Overrides of the engine's settings (``PymunkKnobs``), for sensitivity studies.
 
@@ -152,32 +163,39 @@ def solve(
     Raises
     ------
     ValueError
-        Unknown engine, ice model, frame, contact or knob (with the nearest known name), or one that this engine
-        does not have; ``dt``, ``iterations``, ``times`` or a knob out of range (with the admissible range).
+        Unknown engine, ice model, frame, contact, kind of hits or knob (with the nearest known name), or one that
+        this engine does not have, or not for this throw; ``dt``, ``iterations``, ``times`` or a knob out of range
+        (with the admissible range).
     SetupError
         If the engine did not receive what was meant.
 
     Accuracy
     --------
-    See ``engine_pymunk``: order 2 in ``dt`` in free flight without drag, order 1 with drag or contact.
+    See ``engine_pymunk``: order 2 in ``dt`` in free flight without drag, order 1 with drag or contacts on the grid.
     Status "diverged" if an invariant leaves its band (``watch``).
     """
     if engine not in ENGINES:
         raise ValueError(unknown_name("engine =", engine, ENGINES))
-    for what, name, known in (("ice", ice, ICE_MODELS), ("frame", frame, FRAMES), ("slices", slices, CONTACTS)):
+    has = ENGINES[engine]
+    asked = (
+        ("ice", ice, ICE_MODELS, ICE_MODELS),
+        ("frame", frame, FRAMES, has.frames),
+        ("slices", slices, CONTACTS, has.contacts),
+        *([] if hits is None else [("hits", hits, HITS, has.hits)]),
+    )
+    for what, name, known, offered in asked:
         if name not in known:
             raise ValueError(unknown_name(f"{what} =", name, known))
-    for what, name, offered in (("frame", frame, ENGINES[engine].frames), ("slices", slices, ENGINES[engine].contacts)):
         if name not in offered:
             raise ValueError(f"engine = {engine!r} has no {what} = {name!r} (it has: {', '.join(offered)})")
     if scenario.n_slices > MOST_SLICES:
         raise ValueError(f"n_slices = {scenario.n_slices} is outside [1, {MOST_SLICES}] for an engine; cut it coarser")
     if dt is None and iterations is None:
         certified = import_module("engine_check.certificate").certified
-        settings = {"times": times, "tolerance": tolerance, "ice": ice, "frame": frame, "slices": slices}
+        settings = {"times": times, "tolerance": tolerance, "ice": ice, "frame": frame, "slices": slices, "hits": hits}
         certified_run: Trajectory = certified(scenario, engine, **settings, **knobs)
         return certified_run
-    run = import_module(ENGINES[engine].module).run
+    run = import_module(has.module).run
     order = Order(
         dt=checked_number("dt", DEFAULT_DT if dt is None else dt, 0.0, math.inf, " s"),
         iterations=_checked_iterations(iterations),
@@ -185,6 +203,7 @@ def solve(
         ice=ice,
         frame=frame,
         slices=slices,
+        hits=hits,
         knobs=knobs,
     )
     trajectory: Trajectory = run(scenario, order)

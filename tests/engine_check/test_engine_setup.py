@@ -148,6 +148,15 @@ def caps_in_the_slices_group(world):
         cap.filter = pymunk.ShapeFilter(group=1)
 
 
+def caps_not_in_the_space(world):
+    """They stay on the body, which is no place to look for what a slice can meet."""
+    world.space.remove(*world.tube.shapes)
+
+
+def one_cap_not_in_the_space(world):
+    world.space.remove(next(iter(world.tube.shapes)))
+
+
 def one_slice_heavier(world):
     world.slices[2].mass *= 1.001
 
@@ -189,6 +198,8 @@ FAULTS = {
     drag_with_stiffness: "drag_stiffness.most",
     slices_that_collide: "slices_that_collide",
     caps_in_the_slices_group: "caps_passed_through",
+    caps_not_in_the_space: "caps = 0.0, meant 2.0",
+    one_cap_not_in_the_space: "caps = 1.0, meant 2.0",
     one_slice_heavier: "slice_mass.most",
     tube_without_walls: "tube_moment",
     spinning_the_other_way: "angular_velocity",
