@@ -165,31 +165,48 @@ def measure(name: str, engine: str, throw: Scenario, settings: dict[str, Any], r
     }
 
 
-def main() -> int:
-    """Measure, print, write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--out", type=Path, default=RESULTS, help="folder for the results")
-    arguments = parser.parse_args()
-    cases = (
+def measure_all(repeats: int = 5) -> list[dict[str, Any]]:
+    """Return the shares of every engine's loop; the first is the one that something is asked of."""
+    cases: tuple[tuple[str, str, Scenario, dict[str, Any]], ...] = (
         ("pymunk, free, hits on the grid", "pymunk", FIFTY, {"hits": "grid"}),
         ("pymunk, free, hits located", "pymunk", DRY, {"hits": "located"}),
         ("pymunk, free, rods that exclude", "pymunk", FIFTY, {"slices": "exclude"}),
         ("pymunk, rotating", "pymunk", FIFTY, {"frame": "rotating"}),
         ("MuJoCo", "mujoco", FIFTY, {}),
     )
-    rows = [measure(*case, arguments.repeats) for case in cases]
+    return [measure(*case, repeats) for case in cases]
+
+
+def rows(loops: list[dict[str, Any]]) -> list[tuple[str, str, str]]:
+    """Return what is measured, how much it is, and what is asked, for a table."""
+    return [
+        (
+            f"{loop['case']}, N = 50: share of the loop in the engine's own compiled code",
+            f"{loop['inside']:.1%} of {loop['microseconds_per_step']:.0f} µs a step",
+            f"at least {TARGET:.0%}" if k == 0 else "",
+        )
+        for k, loop in enumerate(loops)
+    ]
+
+
+def main() -> int:
+    """Measure, print, write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--out", type=Path, default=RESULTS, help="folder for the results")
+    arguments = parser.parse_args()
+    loops = measure_all(arguments.repeats)
     print(f"{'loop':34} {'us/step':>8} {'inside':>8} {'rest':>8}  measured")
-    for row in rows:
+    for row in loops:
         parts = ", ".join(f"{label} {share:.1%}" for label, share in row["shares"].items())
         print(f"{row['case']:34} {row['microseconds_per_step']:8.1f} {row['inside']:8.1%} {row['rest']:8.1%}  {parts}")
-    met = rows[0]["inside"] >= TARGET
+    met = loops[0]["inside"] >= TARGET
     print(
-        f"pymunk in the free frame: {rows[0]['inside']:.1%} inside, {TARGET:.0%} wanted: {'met' if met else 'missed'}"
+        f"pymunk in the free frame: {loops[0]['inside']:.1%} inside, {TARGET:.0%} wanted: {'met' if met else 'missed'}"
     )
     facts = {"python": sys.version.split()[0], "cores": os.cpu_count(), "slices": 50, "dt": DT, "target": TARGET}
     arguments.out.mkdir(parents=True, exist_ok=True)
-    text = json.dumps({**facts, "met": met, "loops": rows}, indent=1, allow_nan=False)
+    text = json.dumps({**facts, "met": met, "loops": loops}, indent=1, allow_nan=False)
     (arguments.out / "engine_share.json").write_text(text, encoding="utf-8")
     return int(not met)
 
