@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from reports.arguments import SCENARIO_HELP, add_command, count, read_scenario
+from reports.arguments import SCENARIO_HELP, add_command, count, number, read_scenario
 
 MODELS = ("midpoint",)
 
@@ -45,8 +45,8 @@ def add_fit(commands: Any) -> None:
         "--noise", type=_positive, metavar="S", help="standard deviation of one value [rad or rad/s] (default: "
         "estimated from neighbouring values)",
     )  # fmt: skip
-    fit.add_argument("--release", type=_time, metavar="S", help="time of release by the file's clock [s]")
-    fit.add_argument("--landing", type=_time, metavar="S", help="time of landing by the file's clock [s]")
+    fit.add_argument("--release", type=number, metavar="S", help="time of release by the file's clock [s]")
+    fit.add_argument("--landing", type=number, metavar="S", help="time of landing by the file's clock [s]")
     fit.add_argument("--cap", metavar="NAME", help="track of the cap in a Tracker export")
     fit.add_argument("--base", metavar="NAME", help="track of the base in a Tracker export")
     fit.add_argument("--length-unit", default="", metavar="UNIT", help="of a Tracker export: m, cm, mm")
@@ -208,17 +208,7 @@ def _fit_lines(one: Any) -> list[str]:
 
 
 def _positive(text: str) -> float:
-    value = _time(text)
+    value = number(text)
     if not value > 0:
         raise argparse.ArgumentTypeError(f"{text!r} is outside (0, 1e6)")
-    return value
-
-
-def _time(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not abs(value) < 1e6:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number in (-1e6, 1e6)")
     return value

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from reports.arguments import SCENARIO_HELP, add_command, count, read_scenario
+from reports.arguments import SCENARIO_HELP, add_command, count, number, read_scenario
 
 DELIMITERS = {"tab": "\t", "comma": ",", "semicolon": ";", "space": " "}
 
@@ -27,18 +27,18 @@ def add_tracker(commands: Any) -> None:
     centre.add_argument("--ice-top", metavar="NAME", help="track of the top of the ice: C_M half-way to the base")
     centre.add_argument("--centre", metavar="NAME", help="track of the centre of mass")
     centre.add_argument(
-        "--r-cm", type=_number, metavar="M", help="centre of mass fixed at this distance from the cap [m]"
+        "--r-cm", type=number, metavar="M", help="centre of mass fixed at this distance from the cap [m]"
     )
     track.add_argument("--length-unit", default="", metavar="UNIT", help="of x and y: m, cm, mm (needed unless stated)")
     track.add_argument("--angle-unit", default="", metavar="UNIT", help="of exported angles: deg, rad")
     track.add_argument("--time-unit", default="s", metavar="UNIT", help="of t: s, ms (%(default)s)")
-    track.add_argument("--frame-rate", type=_number, metavar="HZ", help="of the recording, if t is that of slow motion")
-    track.add_argument("--length", type=_number, metavar="M", help="cap to base, measured by hand [m]")
+    track.add_argument("--frame-rate", type=number, metavar="HZ", help="of the recording, if t is that of slow motion")
+    track.add_argument("--length", type=number, metavar="M", help="cap to base, measured by hand [m]")
     track.add_argument(
-        "--table-height", type=_number, metavar="M", help="y of the table [m]: landing when the base is there"
+        "--table-height", type=number, metavar="M", help="y of the table [m]: landing when the base is there"
     )
-    track.add_argument("--release", type=_number, metavar="S", help="time of release [s] instead of finding it")
-    track.add_argument("--landing", type=_number, metavar="S", help="time of landing [s] instead of finding it")
+    track.add_argument("--release", type=number, metavar="S", help="time of release [s] instead of finding it")
+    track.add_argument("--landing", type=number, metavar="S", help="time of landing [s] instead of finding it")
     track.add_argument(
         "--window", type=count, default=11, metavar="N", help="frames of the derivative, odd (%(default)s)"
     )
@@ -56,13 +56,11 @@ def add_tracker(commands: Any) -> None:
     export.add_argument("--format", choices=("tracker",), default="tracker", help="data track (%(default)s)")
     export.add_argument("--out", type=Path, metavar="FILE", help="file to write (default: standard output)")
     export.add_argument("--slices", type=count, metavar="N", help="cut the throw into N slices, alpha/2m unchanged")
-    export.add_argument("--speed", type=_number, metavar="V", help="of C_M at release [m/s] (default: the scenario's)")
-    export.add_argument("--launch-angle", type=_number, metavar="DEG", help="of that velocity above the horizontal")
-    export.add_argument(
-        "--height", type=_number, metavar="M", help="table over the cap at release [m]: stop on landing"
-    )
-    export.add_argument("--frame-rate", type=_number, default=240.0, metavar="HZ", help="of the video (%(default)g)")
-    export.add_argument("--start", type=_number, default=0.0, metavar="S", help="time of release in the video (0)")
+    export.add_argument("--speed", type=number, metavar="V", help="of C_M at release [m/s] (default: the scenario's)")
+    export.add_argument("--launch-angle", type=number, metavar="DEG", help="of that velocity above the horizontal")
+    export.add_argument("--height", type=number, metavar="M", help="table over the cap at release [m]: stop on landing")
+    export.add_argument("--frame-rate", type=number, default=240.0, metavar="HZ", help="of the video (%(default)g)")
+    export.add_argument("--start", type=number, default=0.0, metavar="S", help="time of release in the video (0)")
     export.add_argument("--origin", type=_pair, default=(0.0, 0.0), metavar="X,Y", help="cap at release [m] (0,0)")
     export.add_argument("--length-unit", default="m", metavar="UNIT", help="of the video: m, cm, mm (%(default)s)")
     export.add_argument("--delimiter", choices=tuple(DELIMITERS), default="tab", help="between cells (%(default)s)")
@@ -141,16 +139,6 @@ def _velocity(given: tuple[float, float], options: argparse.Namespace) -> tuple[
     return speed * math.cos(angle), speed * math.sin(angle)
 
 
-def _number(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not abs(value) < 1e6:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number in (-1e6, 1e6)")
-    return value
-
-
 def _frames(text: str) -> int:
     if not text.isdecimal() or int(text) > 1000:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number in [0, 1000]")
@@ -161,4 +149,4 @@ def _pair(text: str) -> tuple[float, float]:
     x, comma, y = text.partition(",")
     if not comma:
         raise argparse.ArgumentTypeError(f"{text!r} is not X,Y in m, such as 0.1,1.2")
-    return _number(x), _number(y)
+    return number(x), number(y)

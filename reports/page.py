@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from reports.evidence import FLIGHTS, FREE, Evidence
@@ -19,6 +18,7 @@ from reports.inline import data_uri, shape
 from reports.instruments import WITNESSES
 from reports.lead import lead_words
 from reports.studies.differences import Difference
+from reports.templating import environment
 from reports.verdict import answer, strips, tiles
 
 CONTENTS = {
@@ -132,21 +132,15 @@ def render(
 
     ``motion``, ``explore`` and ``paper`` are what their templates draw from; a part that is None is left out.
     """
-    environment = Environment(
-        loader=PackageLoader("reports"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.tests["about_the_paper"] = lambda id_: id_.startswith("paper-")
-    environment.filters["typeset"] = typeset
-    environment.filters["unbroken"] = unbroken
-    environment.filters["amount"] = amount
-    environment.filters["data_uri"] = data_uri
-    environment.filters["shape"] = shape
-    environment.filters["short"] = short
-    environment.filters["restitution_error"] = restitution_error
+    templates = environment()
+    templates.tests["about_the_paper"] = lambda id_: id_.startswith("paper-")
+    templates.filters["typeset"] = typeset
+    templates.filters["unbroken"] = unbroken
+    templates.filters["amount"] = amount
+    templates.filters["data_uri"] = data_uri
+    templates.filters["shape"] = shape
+    templates.filters["short"] = short
+    templates.filters["restitution_error"] = restitution_error
     found = evidence.attribution
     reasons = sort_problems({**found.problems, **evidence.instruments.problems})
     tables = list(tabulate_work_precision(evidence.precision))
@@ -161,7 +155,7 @@ def render(
         if not there
     }
     regressions = [finding for finding in findings if finding.kind == "regression"]
-    return environment.get_template("report.html.j2").render(
+    return templates.get_template("report.html.j2").render(
         scenario=evidence.scenario,
         throw=evidence.throw,
         size=evidence.size,

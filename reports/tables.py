@@ -73,7 +73,7 @@ def read_curve(path: Path) -> Curve:
             continue
         if len(cells) != len(names):
             raise ValueError(f"{path}: line {number} has {len(cells)} cells, the header has {len(names)}")
-        rows.append([_number(path, number, name, cells[place]) for name, place in zip(wanted, places, strict=True)])
+        rows.append([number_of(path, number, name, cells[place]) for name, place in zip(wanted, places, strict=True)])
     if len(rows) < 2:
         raise ValueError(f"{path}: has {len(rows)} rows of numbers; at least 2 are needed")
     table = np.array(rows)
@@ -82,7 +82,14 @@ def read_curve(path: Path) -> Curve:
     return Curve(path.name, *table.T)
 
 
-def _number(path: Path, line: int, column: str, cell: str) -> float:
+def number_of(path: Path, line: int, column: str, cell: str) -> float:
+    """Return a cell's number.
+
+    Raises
+    ------
+    ValueError
+        If it is none, or not finite; the message names file, line and column.
+    """
     try:
         value = float(cell)
     except ValueError:

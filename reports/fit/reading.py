@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from reports.fit.problem import Measurement, Quantity
+from reports.tables import number_of
 from slicemodel.trajectory import FloatArray
 
 QUANTITIES: Final[tuple[Quantity, ...]] = ("theta", "omega")
@@ -66,7 +67,7 @@ def read_flight(
     chosen = quantity or there[0]
     places = names.index("t"), names.index(chosen)
     table = np.array(
-        [[_number(path, line, names[place], cells[place]) for place in places] for line, cells in rows
+        [[number_of(path, line, names[place], cells[place]) for place in places] for line, cells in rows
          if all(cells[place].strip() for place in places)]
     ).reshape(-1, 2)  # fmt: skip
     t, values = table.T
@@ -168,13 +169,3 @@ def _cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
         if len(cells) != len(names):
             raise ValueError(f"{path}: line {n} has {len(cells)} cells, the header has {len(names)}")
     return names, rows
-
-
-def _number(path: Path, line: int, column: str, cell: str) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        raise ValueError(f"{path}: line {line}, column {column}: {cell.strip()!r} is not a number") from None
-    if not np.isfinite(value):
-        raise ValueError(f"{path}: line {line}, column {column}: {cell.strip()} is not finite")
-    return value

@@ -7,14 +7,13 @@ import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
 from reports.exhibit import Exhibit, drawn
 from reports.output import MARKER, check_replaceable, replaced_folder
 from reports.paper.figures import ORDER, TIMED, check_figures, exhibits_paper, keys_of
 from reports.paper.runs import FULL, PaperRuns, PaperSize, gather_paper
 from reports.paper.tables import HEADER, parameter_rows, parameters_csv
 from reports.pool import Progress, workers
+from reports.templating import environment
 
 PAGE = "index.html"
 
@@ -75,11 +74,8 @@ def write_gallery(exhibits: Sequence[Exhibit], runs: PaperRuns, folder: Path, pr
 
 def render_gallery(exhibits: Sequence[Exhibit], runs: PaperRuns, provenance: Mapping[str, str]) -> str:
     """Return the page."""
-    environment = Environment(
-        loader=PackageLoader("reports"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
-    )  # fmt: skip
-    return environment.get_template("paper_figures.html.j2").render(
+    templates = environment()
+    return templates.get_template("paper_figures.html.j2").render(
         exhibits=exhibits,
         problems=runs.failures(),
         header=HEADER,

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from reports.templating import environment
 from reports.tracker.bench import Measurement
 from reports.tracker.parabola import Parabola
 
@@ -110,8 +111,6 @@ def lines(measured: Measurement) -> list[str]:
 
 def write(measured: Measurement, folder: Path, provenance: Mapping[str, str]) -> None:
     """Write track.csv, every figure as SVG and PNG, summary.json and index.html into a folder that exists."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
     from reports.figures.style import draw
     from reports.tracker.figures import FIGURES
 
@@ -126,14 +125,8 @@ def write(measured: Measurement, folder: Path, provenance: Mapping[str, str]) ->
     (folder / "summary.json").write_text(
         json.dumps(_finite(numbers), indent=2, ensure_ascii=False) + "\n", encoding="utf-8"
     )
-    environment = Environment(
-        loader=PackageLoader("reports"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    page = environment.get_template("track.html.j2").render(
+    templates = environment()
+    page = templates.get_template("track.html.j2").render(
         measured=measured, fit=measured.track or measured.axis, summary=numbers, figures=drawn, provenance=provenance
     )
     (folder / "index.html").write_text(page, encoding="utf-8")

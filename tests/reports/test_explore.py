@@ -7,7 +7,6 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from reports import explore
 from reports.explore import (
@@ -27,6 +26,7 @@ from reports.explore import (
 from reports.solvers import make
 from reports.studies.validity import LADDER, RUNGS
 from reports.sweep.planned import Row
+from reports.templating import environment
 from slicemodel import Scenario
 from slicemodel.observables import plateau
 
@@ -200,22 +200,16 @@ def test_the_command_makes_the_file_and_goes_on_with_a_store(tmp_path, monkeypat
 
 
 def test_the_template_is_whole_and_holds_what_the_script_looks_for(read_page):
-    environment = Environment(
-        loader=PackageLoader("reports"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    templates = environment()
     assets = {file.name: file.read_text(encoding="utf-8") for file in ASSETS.iterdir()}
-    text = environment.get_template("explore.html.j2").render(explore=explore.page_data(), assets=assets)
+    text = templates.get_template("explore.html.j2").render(explore=explore.page_data(), assets=assets)
     read_page(text)
     block = re.search(r'<script type="application/json" id="explore-data">(.*?)</script>', text, re.DOTALL)
     assert json.loads(block.group(1)) == json.loads(json.dumps(explore.page_data()))
     wanted = set(re.findall(r'find\("([a-z-]+)"\)', assets["explore.js"])) | {"fill", "gamma", "restitution"}
     there = set(re.findall(r'data-testid="explore-([a-z-]+)"', text))
     assert wanted - there == set()
-    assert environment.get_template("explore.html.j2").render(explore=None, assets=assets).strip() == ""
+    assert templates.get_template("explore.html.j2").render(explore=None, assets=assets).strip() == ""
 
 
 def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):

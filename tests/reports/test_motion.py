@@ -8,7 +8,6 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from reports.motion import (
     FRAMES,
@@ -21,6 +20,7 @@ from reports.motion import (
     motion_data,
 )
 from reports.solvers import Made, Run
+from reports.templating import environment
 from slicemodel import Bottle, Scenario, Trajectory
 from slicemodel.trajectory import Impacts
 
@@ -59,15 +59,9 @@ def unpacked(text, kind):
 
 
 def rendered(data):
-    environment = Environment(
-        loader=PackageLoader("reports"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    templates = environment()
     assets = {file.name: file.read_text(encoding="utf-8") for file in ASSETS.iterdir()}
-    return environment.get_template("motion.html.j2").render(motion=data, assets=assets)
+    return templates.get_template("motion.html.j2").render(motion=data, assets=assets)
 
 
 def test_the_centre_of_mass_of_every_drawn_bottle_is_on_the_parabola_and_the_cap_starts_at_the_origin():

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from reports.paper import claim_runs, claims, claims_landing, observe
 from reports.paper.cases import FAMILIES, all_cases, family
@@ -21,6 +20,7 @@ from reports.paper.runs import BANDS, FULL, PUBLISHED, REPORT, SOLVERS, PaperRun
 from reports.paper.statements import OMEGA, Judgement, Reading, Statement
 from reports.paper.verdicts import judge_paper
 from reports.solvers import Run, make
+from reports.templating import environment
 from slicemodel import Trajectory
 
 THROW = paper_throw().with_slices(2)
@@ -595,23 +595,18 @@ def test_free_flight_does_not_know_where_down_is():
 
 
 def test_the_page_shows_every_verdict_with_word_sign_and_number(runs, read_page):
-    environment = Environment(
-        loader=PackageLoader("reports"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    templates = environment()
     verdicts = judge_paper(runs)
     macros = (
         "{% macro anchor(id, words) %}<a href='#{{ id }}'>{{ words }}</a>{% endmacro %}"
         "{% macro scroll(words) %}<div>{{ caller() }}</div>{% endmacro %}"
     )
-    text = environment.from_string(macros + '{% include "paper.html.j2" %}').render(paper=verdicts)
+    text = templates.from_string(macros + '{% include "paper.html.j2" %}').render(paper=verdicts)
     page = read_page(text)
     assert len(set(page.ids)) == len(page.ids)
     assert {f"paper-{claim.id}" for claim in CLAIMS} <= set(page.ids)
-    assert text.count("✗ fails") == sum(verdicts.count(s, "fails") for s in (*SOLVERS, "geometry"))
+    # Once in the table, once in the list of all numbers.
+    assert text.count("✗ fails") == 2 * sum(verdicts.count(s, "fails") for s in (*SOLVERS, "geometry"))
     assert "not its data" in text
     assert "published program: 17 hold, 10 fail, 0 cannot be decided." in text.lower().replace("\n", " ")
     assert len(verdicts.findings()) == len(STEADY) + sum(len(s.judgements) for s in verdicts.statements)
