@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
@@ -64,8 +65,8 @@ class Impacts:
             array = np.array(getattr(self, name), dtype=kind)
             array.flags.writeable = False
             object.__setattr__(self, name, array)
-        if len({getattr(self, name).shape for name in self.__slots__}) != 1 or self.time.ndim != 1:
-            raise ValueError("impact arrays must be one-dimensional and of one length")
+            if array.shape != (len(self.time),):
+                raise ValueError("impact arrays must be one-dimensional and of one length")
 
     def __len__(self) -> int:
         return len(self.time)
@@ -145,7 +146,7 @@ class Trajectory:
             object.__setattr__(self, name, values)
             if values.shape not in (per_slice if name in ("r", "v") else per_point):
                 raise ValueError(f"{name} has shape {values.shape}, not {(points, n) if name in 'rv' else (points,)}")
-            if values.size and not np.isfinite(values).all():
+            if not _finite(values):
                 raise ValueError(f"{name} holds values that are not finite; return the run up to its last finite point")
         if not (self.t[1:] > self.t[:-1]).all():
             raise ValueError("t does not increase")
@@ -168,6 +169,11 @@ class Trajectory:
 
 def _rebuild(state: dict[str, Any]) -> Trajectory:
     return Trajectory(**state)
+
+
+def _finite(values: FloatArray) -> bool:
+    """Return whether all values are finite; the sum of squares, unless huge, tells so in a third of the time."""
+    return math.isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())
 
 
 def _read_only(values: ArrayLike) -> FloatArray:

@@ -1,6 +1,7 @@
 """The compiled loop against the same step written out in NumPy, at every number of slices that fills lanes or not."""
 
 import logging
+from dataclasses import replace
 
 import numba
 import numba.core.caching
@@ -132,6 +133,20 @@ def test_a_predicted_step_lists_nothing_and_moves_nothing():
     run = slicemodel.solve(scenario, "midpoint", steps=2)
     pairs = list(zip(run.impacts.slice, run.impacts.time, strict=True))
     assert len(pairs) == len(set(pairs)) == run.diagnostics["rebounds"] > 0
+
+
+@pytest.mark.parametrize(("duration", "steps"), [(0.5, 1000), (1 / 3, 7), (0.123456789, 12345), (2.0, 2)])
+def test_the_grid_is_that_of_linspace_to_the_last_digit(duration, steps):
+    run = slicemodel.solve(Scenario(n_slices=1, duration=duration), steps=steps, store="summary")
+    np.testing.assert_array_equal(run.t, np.linspace(0.0, duration, steps))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_a_value_that_is_not_finite_is_refused_and_a_huge_one_is_not(value):
+    run = slicemodel.solve(Scenario(n_slices=1), steps=5, store="summary")
+    assert replace(run, omega=np.full(5, 1e300)).omega[0] == 1e300
+    with pytest.raises(ValueError, match="omega holds values that are not finite"):
+        replace(run, omega=np.array([1.0, 2.0, value, 3.0, 4.0]))
 
 
 def test_without_a_writable_cache_it_compiles_in_memory_and_says_so_once(caplog, monkeypatch):
