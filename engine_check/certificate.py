@@ -76,7 +76,8 @@ class Certificate:
     order : float
         Observed order in dt, from the mean changes of three levels; NaN if there is none, for ``order_reason``.
     extrapolated_at : int
-        Order at which omega is extrapolated: 2 if observed so within 0.25, else 1, which theory gives after impacts.
+        Order at which omega is extrapolated: 2 if observed so within 0.25, else 1, which theory gives after impacts on
+        the grid.
     richardson : (P,) [rad/s]
         omega(t) extrapolated to dt -> 0; NaN if the run at twice the step is not complete.
     band : (P,)

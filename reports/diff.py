@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -144,7 +145,9 @@ def _problem(summary: Any) -> str:
 def _readable(value: Any) -> bool:
     if isinstance(value, str):
         return value in ("nan", "inf", "-inf")
-    return value is None or (isinstance(value, (int, float)) and not isinstance(value, bool))
+    if value is None or isinstance(value, float):
+        return True
+    return isinstance(value, int) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
 def number(value: Any) -> float | None:

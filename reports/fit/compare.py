@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from reports.fit.estimate import Estimate
+from reports.fit.problem import is_scheme
 from reports.fit.temperature import fits
 from reports.fit.uncertainty import Interval, intervals
 
@@ -99,6 +100,19 @@ def verdict(contenders: Sequence[Contender]) -> str:
 
 def _listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def promise(solver: str, *, fits: bool) -> str:
+    """Return what the intervals of a fit are worth.
+
+    How often they hold the truth was counted for schemes, on flights that the fitted scheme had made; equations
+    integrated event by event are searched with far fewer flights.
+    """
+    if not fits:
+        return "intervals widened by the misfit; no coverage is claimed for an equation that does not fit"
+    if not is_scheme(solver):
+        return "intervals meant to hold drag and restitution together in 95 %, which was not measured for this equation"
+    return "intervals that hold drag and restitution together in 95 %"
 
 
 def told(interval: Interval) -> str:

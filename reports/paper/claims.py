@@ -127,8 +127,14 @@ CLAIMS: Final = (
         id="cost-steps",
         place="section 5, Supp. Fig. 1c",
         says="Of N and P, P is what limits computing time.",
-        means="The exponent of P in the counted work exceeds that of N by 0.1 at least.",
+        means="The exponent of P in the counted work of the Python program exceeds that of N by 0.1 at least.",
         read=claims_cost.claim_cost_of_steps,
+        otherwise=(
+            (
+                "in the MATLAB program, whose steps copy all steps before",
+                partial(claims_cost.claim_cost_of_steps, copies_history=True),
+            ),
+        ),
     ),
     Claim(
         id="steps-enough",
@@ -303,7 +309,8 @@ def judge(claim: Claim, flights: Flights) -> Judgement:
         try:
             other = Judgement(solver=flights.solver, readings=banded(read, flights))
         except MissingFlightError as reason:
-            asides.append(f"{words}: {reason}")
+            if str(reason) not in asides:
+                asides.append(f"{words}: {reason}")
             continue
         number = f", {other.deciding.name} {other.deciding.value_text}" if other.deciding else ""
         asides.append(f"{words}: {other.verdict}{number}")

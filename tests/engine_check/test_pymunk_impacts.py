@@ -99,7 +99,7 @@ def test_a_run_that_explodes_is_reported():
 
 
 def test_angular_momentum_lost_in_carrying_is_seen(monkeypatch):
-    """Seeded: what carries the bodies turns them by 0.1 % too little."""
+    """Seeded: every hit leaves the tube a tenth of its angular velocity short."""
     answered = LocatedHits._answered
 
     def spoiled(self, *arguments):

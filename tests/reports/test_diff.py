@@ -254,6 +254,7 @@ def test_what_is_no_summary_is_refused_in_one_line(tmp_path, text, words):
     [
         ({"value": "much"}, "value = 'much'"),
         ({"value": True}, "value = True"),
+        ({"value": 10**400}, "value = 1000"),
         ({"band": [1]}, "band = "),
         ({"admissible": [0]}, "admissible = "),
         ({"id": 7}, "which is no text"),

@@ -412,7 +412,9 @@ def test_work_of_the_program_is_linear_in_both():
     flights = Flights(solver=PUBLISHED, runs={}, reasons={})
     of_slices_ = judge(BY_ID["cost-slices"], flights)
     assert (of_slices_.verdict, round(of_slices_.value, 1)) == ("fails", 1.0)
-    assert judge(BY_ID["cost-steps"], flights).verdict == "fails"
+    of_steps = judge(BY_ID["cost-steps"], flights)
+    assert of_steps.verdict == "fails"
+    assert "MATLAB program, whose steps copy all steps before: holds" in of_steps.aside
     counted = Flights(
         solver="eq8",
         reasons={},

@@ -106,6 +106,17 @@ def test_slices_stay_inside_and_resting_ones_rest(scheme):
     assert np.all(np.diff(run.impacts.time) >= 0)
 
 
+@pytest.mark.parametrize("scheme", IN_STEP)
+@pytest.mark.parametrize("slices", [5, 6, 8, 10, 50])
+def test_a_slice_that_is_put_on_the_cap_does_not_strike_it(scheme, slices):
+    """The last slice of a full bottle lies on the cap; the sum that says where may round to either side of it."""
+    scenario = Scenario(water_mass=1.0, n_slices=slices)
+    run = slicemodel.solve(scenario, scheme, 1000, rebound="in-step")
+    assert run.impacts.time[0] > 1e-3
+    assert run.impacts.speed_before[0] > 1e-3
+    assert (run.r[1:, -1] == scenario.r_min).sum() > 10
+
+
 def test_only_exact_roots_know_their_path_inside_a_step():
     with pytest.raises(ValueError, match=r"exact roots \(roots-corrected, exact-step, midpoint\)") as e:
         slicemodel.solve(Scenario(n_slices=2), "published-python", rebound="in-step")
