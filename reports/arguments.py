@@ -5,12 +5,20 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, Final, NoReturn
 
 INTERRUPTED: Final = 130
 """Exit status of an interrupted command."""
 
 SCENARIO_HELP: Final = "scenario file (TOML with tables [scenario] and [bottle]); default: the paper's own throw"
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """A parser whose complaints are one line, like those of the commands; ``--help`` tells the rest."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong and end with status 2."""
+        self.exit(2, f"flipproof: error: {' '.join(message.split())}\n")
 
 
 def add_command(
@@ -44,5 +52,5 @@ def read_scenario(path: str | None, slices: int | None = None) -> Any:
     """Return the throw of a file, or the paper's own, cut into ``slices`` if given."""
     from slicemodel import Scenario
 
-    scenario = Scenario.from_toml(path) if path else Scenario()
+    scenario = Scenario() if path is None else Scenario.from_toml(path)
     return scenario.with_slices(slices) if slices else scenario

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from reports.arguments import INTERRUPTED, SCENARIO_HELP, add_command, count, read_scenario
+from reports.arguments import INTERRUPTED, SCENARIO_HELP, OneLineParser, add_command, count, read_scenario
 from reports.cli_animate import add_animate
 from reports.cli_check import add_checks
 from reports.cli_fit import add_fit
@@ -28,7 +28,7 @@ flipproof throws one bottle with many solvers and names every difference between
 
 The slice model of a flipping water bottle (closed-form steps, omega held constant over each)
 is compared with an event-driven integration of the paper's Eq. 8 and with a rigid tube full
-of sliding masses in the pymunk physics engine.
+of sliding masses in the physics engines pymunk and MuJoCo.
 """
 
 EXAMPLES = """\
@@ -44,13 +44,13 @@ examples:
   flipproof sweep sweep.toml --out my-sweep     many throws and solvers; run it again to go on
   flipproof map --axis gamma --out my-map       where which mistake matters; run it again to go on
   flipproof waterfall --out my-waterfall        from the published program to free flight, one bar per mistake
-  flipproof track video.txt --cap cap --base base
+  flipproof track video.txt --cap cap --base base --length-unit m
   flipproof fit flight.csv --model midpoint free-flight
   flipproof animate --out flips.gif             the flights side by side, 9.6 times slower
 
 exit status:
   0  done; for a report: every claim was evaluated and no regression claim failed
-  1  a regression claim failed (ice constancy, published vectors, convergence)
+  1  a regression claim failed (ice constancy, published vectors, convergence); for diff: something moved
   2  bad input; one line on standard error says what and where
   130  interrupted; an older report is as it was, a sweep goes on where it stopped
 """
@@ -105,7 +105,7 @@ def _complain(words: str) -> int:
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the whole command line."""
-    top = argparse.ArgumentParser(
+    top = OneLineParser(
         prog="flipproof", description=MANUAL, epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     top.add_argument("--version", action="version", version=f"flipproof {_version()}")
@@ -218,6 +218,8 @@ def command_simulate(options: argparse.Namespace) -> int:
         if solver.package != "slicemodel":
             raise ValueError(f"--steps {options.steps}: {solver.name} is not a scheme and chooses its own steps")
         settings["steps"] = options.steps
+    if options.out and options.out.is_dir():
+        raise ValueError(f"--out {options.out} is a folder; name a file")
     if options.out and not options.out.parent.is_dir():
         raise ValueError(f"--out {options.out}: the folder {options.out.parent} does not exist")
     trajectory = solve(solver.name, scenario, **settings)

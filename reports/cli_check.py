@@ -54,6 +54,8 @@ def command_check(options: argparse.Namespace) -> int:
         raise ValueError("--only thresholds: needs --baseline, the summary.json of a report of this throw")
     if options.junit and not options.junit.parent.is_dir():
         raise ValueError(f"--junit {options.junit}: the folder {options.junit.parent} does not exist")
+    if options.junit and options.junit.is_dir():
+        raise ValueError(f"--junit {options.junit} is a folder; name a file")
     from reports.check import TOLERANCE, check
 
     tolerance = TOLERANCE if options.tolerance is None else options.tolerance

@@ -26,7 +26,7 @@ def add_fit(commands: Any) -> None:
     fit.add_argument("--scenario", metavar="THROW.toml", help=f"what is known: bottle, water, release; {SCENARIO_HELP}")
     fit.add_argument(
         "--model", nargs="+", default=list(MODELS), metavar="NAME", help="equations to fit and compare, see 'flipproof "
-        "models'; midpoint solves eq8, several hundred times faster (%(default)s)",
+        "models'; midpoint solves eq8, several hundred times faster (default midpoint)",
     )  # fmt: skip
     fit.add_argument(
         "--also", nargs="+", default=[], choices=("omega0", "theta0"), help="fit these too, instead of trusting the "
@@ -62,6 +62,8 @@ def command_fit(options: argparse.Namespace) -> int:
         check_replaceable(options.out)
     if (options.cap is None) != (options.base is None):
         raise ValueError("--cap and --base name the two tracks of a Tracker export; give both or neither")
+    if options.length_unit and options.cap is None:
+        raise ValueError(f"--length-unit {options.length_unit} is that of a Tracker export; give --cap and --base, too")
     if len(set(options.model)) < len(options.model):
         raise ValueError(f"--model names {next(n for n in options.model if options.model.count(n) > 1)} twice")
     throw = read_scenario(options.scenario)
@@ -174,13 +176,13 @@ def _report(contenders: Sequence[Any], remarks: Sequence[str]) -> str:
 
 
 def _fit_lines(one: Any) -> list[str]:
-    from reports.fit.compare import digits, told
+    from reports.fit.compare import digits, promise, told
     from reports.fit.problem import UNITS
     from reports.fit.uncertainty import correlation
 
     estimate = one.estimate
     throw = estimate.problem.throw
-    lines = [f"{one.solver}, {throw.n_slices} slices; intervals that hold drag and restitution together in 95 %"]
+    lines = [f"{one.solver}, {throw.n_slices} slices; {promise(one.solver, fits=one.fits)}"]
     for found in one.intervals:
         places = digits(found)
         numbers = f"{found.value:.{places}f} [{found.low:.{places}f}, {found.high:.{places}f}]"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -69,11 +70,21 @@ def _add_store(command: argparse.ArgumentParser) -> None:
     command.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder; holds one SQLite file of rows")
     where = command.add_mutually_exclusive_group()
     where.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
-    where.add_argument("--dask", metavar="ADDRESS", help="scheduler whose workers do the work: tcp://127.0.0.1:8786")
+    where.add_argument(
+        "--dask", type=_address, metavar="ADDRESS", help="scheduler whose workers do the work: tcp://127.0.0.1:8786"
+    )
     command.add_argument(
         "--export", type=Path, metavar="FILE", help="when complete, write all rows to a .csv or .parquet"
     )
     command.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def _address(text: str) -> str:
+    """Return the address of a scheduler; Dask itself takes twenty seconds and a traceback to refuse a misspelt one."""
+    match = re.fullmatch(r"(?:(?:tcp|tls|ws|wss)://)?[^\s/]+:([0-9]{1,5})", text)
+    if not match or not 1 <= int(match[1]) <= 65535:
+        raise argparse.ArgumentTypeError(f"{text!r} is not tcp://HOST:PORT with a port in [1, 65535]")
+    return text
 
 
 def _size(text: str) -> tuple[int, int]:

@@ -61,7 +61,10 @@ def add_tracker(commands: Any) -> None:
     export.add_argument("--height", type=number, metavar="M", help="table over the cap at release [m]: stop on landing")
     export.add_argument("--frame-rate", type=number, default=240.0, metavar="HZ", help="of the video (%(default)g)")
     export.add_argument("--start", type=number, default=0.0, metavar="S", help="time of release in the video (0)")
-    export.add_argument("--origin", type=_pair, default=(0.0, 0.0), metavar="X,Y", help="cap at release [m] (0,0)")
+    export.add_argument(
+        "--origin", type=_pair, default=(0.0, 0.0), metavar="X,Y", help="cap at release [m] (0,0); below 0 as "
+        "--origin=-0.1,0.2",
+    )  # fmt: skip
     export.add_argument("--length-unit", default="m", metavar="UNIT", help="of the video: m, cm, mm (%(default)s)")
     export.add_argument("--delimiter", choices=tuple(DELIMITERS), default="tab", help="between cells (%(default)s)")
 
@@ -108,6 +111,8 @@ def command_export(options: argparse.Namespace) -> int:
         raise ValueError(f"length_unit = {options.length_unit!r} is unknown; known: {', '.join(METRES)}")
     if options.out and not options.out.parent.is_dir():
         raise ValueError(f"--out {options.out}: the folder {options.out.parent} does not exist")
+    if options.out and options.out.is_dir():
+        raise ValueError(f"--out {options.out} is a folder; name a file")
     scenario = read_scenario(options.scenario, options.slices)
     scenario = replace(scenario, launch_velocity=_velocity(scenario.launch_velocity, options))
     times = frame_times(scenario, options.frame_rate)

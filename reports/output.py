@@ -24,6 +24,9 @@ def check_replaceable(target: Path) -> None:
     ------
     OutputError
     """
+    standing = next((place for place in target.absolute().parents if place.exists()), None)
+    if standing is not None and not standing.is_dir():
+        raise OutputError(f"{target} cannot be written: {standing} is a file")
     if not target.exists():
         return
     if target.resolve() == Path.cwd():

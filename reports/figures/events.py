@@ -184,7 +184,7 @@ def _unit(signal: str) -> str:
 def figure_predictability(studies: Sequence[Predictability]) -> Figure:
     """Spread of ω after tiny changes of the release, one panel per solver and one line style per size."""
     figure, panels = new_figure(
-        1, len(studies), size=(max(5.0, 2.9 * len(studies)), 4.4), sharex=True, sharey=True, squeeze=False
+        1, len(studies), size=(max(8.0, 2.9 * len(studies)), 4.4), sharex=True, sharey=True, squeeze=False
     )
     for k, (axes, study) in enumerate(zip(panels[0], studies, strict=True)):
         colour = solver_style(study.solver, k)["color"]

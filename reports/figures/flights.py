@@ -89,7 +89,8 @@ def figure_differences(differences: Sequence[Difference]) -> Figure:
     for k, difference in enumerate(differences):
         colour = ASSUMPTIONS[k % len(ASSUMPTIONS)]
         size = np.maximum(np.abs(difference.omega), 1e-12)
-        axes.plot(difference.t, size, color=colour, linewidth=1.4, label=difference.name)
+        line = "-" if k < len(ASSUMPTIONS) else "--"  # the colours begin anew
+        axes.plot(difference.t, size, color=colour, linestyle=line, linewidth=1.4, label=difference.name)
         if difference.parting_time is not None:
             axes.plot(
                 difference.parting_time,

@@ -52,7 +52,7 @@ def figure_frozen(study: Frozen) -> Figure:
         errors.axvline(study.first_impact, color=ASSUMPTIONS[4], linewidth=1.0, linestyle=":", label="first impact")
     words = "" if study.explained is None else f"; before the first impact error / defects = {study.explained:.2f}"
     errors.set_title(f"what becomes of them, slices that have not hit an end{words}", fontsize=10, loc="left")
-    errors.set_ylabel("accumulated")
+    errors.set_ylabel("added up [m/s], [1]")
     errors.set_xlabel("time t [s]")
     for axes in panels:
         axes.margins(x=0.01)

@@ -9,6 +9,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -33,6 +34,9 @@ FLOOR_COLOUR: Final = "#c8c8c8"
 LOWEST: Final = 1e-14
 ROOM: Final = 0.54
 """Share of a panel's width that is left for the labels."""
+
+DARKER: Final = 0.55
+"""Share of a curve's colour in its label, so that small letters stand out from white and from the floor."""
 
 LINE_HEIGHT: Final = 0.075
 """Least distance of two labels, as a share of the panel's height."""
@@ -191,9 +195,15 @@ def _write(
         beside = math.exp(math.log(low) + height * span)
         note = axes.annotate(
             words, (x, y), xytext=(_beside(limits[0]), beside), textcoords="data", ha="left", va="center", fontsize=8.0,
-            color=colour, arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.5, "alpha": 0.6, "shrinkB": 4},
+            color=_dark(colour),
+            arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.5, "alpha": 0.6, "shrinkB": 4},
         )  # fmt: skip
         note.set_in_layout(False)
+
+
+def _dark(colour: str) -> tuple[float, ...]:
+    """Return the colour with less light."""
+    return tuple(DARKER * part for part in to_rgb(colour))
 
 
 def _explain(axes: Axes) -> None:

@@ -107,13 +107,13 @@ def _exhibit(runs: PaperRuns, name: str, title: str, caption: str, alt: str, gri
     )
 
 
-def _of(symbol: str, digits: str = "g") -> Label:
-    return lambda case: f"{symbol} = {case.value:{digits}}"
+def _of(symbol: str, unit: str = "") -> Label:
+    return lambda case: f"{symbol} = {case.value:g}{unit}".replace("-", "−")
 
 
 BETA: Final = _of("β")
 SLICES: Final = _of("N")
-ALPHA: Final = _of("α")
+ALPHA: Final = _of("α", " kg/s")
 FILLING: Final = _of("M̃")
 READINGS: Final = (("beta", "α = 1 (caption), α/2m = 10 /s"), ("beta at 5 /s", "α = 0.5, α/2m = 5 /s"))
 

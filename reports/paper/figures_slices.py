@@ -32,7 +32,9 @@ def exhibits_5a(runs: PaperRuns) -> Iterator[Exhibit]:
         ("-5-per-second", "beta at 5 /s", "α = 0.5, the damping rate α/2m = 5 /s of all later figures"),
     ):
         rows = tuple(
-            tuple(_panel(runs, solver, case, _all_slices, f"β = {case.value:g}") for solver in SOLVERS)
+            tuple(
+                _panel(runs, solver, case, _all_slices, f"β = {case.value:g}".replace("-", "−")) for solver in SOLVERS
+            )
             for case in family(name)
         )
         yield _exhibit(
@@ -51,7 +53,8 @@ def exhibits_6a(runs: PaperRuns) -> Iterator[Exhibit]:
     """Yield the paths of the first, the middle and the last slice for several drags."""
     cases = [case for case in family("drag") if case.value in SHOWN_DRAGS]
     rows = tuple(
-        tuple(_panel(runs, solver, case, _three_slices, f"α = {case.value:g}") for solver in SOLVERS) for case in cases
+        tuple(_panel(runs, solver, case, _three_slices, f"α = {case.value:g} kg/s") for solver in SOLVERS)
+        for case in cases
     )
     yield _exhibit(
         runs,

@@ -225,7 +225,8 @@ class Predictability:
     @property
     def words(self) -> str:
         """Amplification of every size, horizon, growth and smoothness in words."""
-        each = ", ".join(f"{f:.3g} ({s:.0e})" for s, f in zip(self.sizes, self.largest_amplification, strict=True))
+        factors = zip(self.sizes, self.largest_amplification, strict=True)
+        each = ", ".join(f"{factor:.3g} (a change of {size:.0e})" for size, factor in factors)
         words = f"{self.solver}: a change of the release is amplified at most by a factor of {each}"
         if self.horizon is None:
             words += f"; none leaves {self.band:g} of ω₀: predictable to the end"

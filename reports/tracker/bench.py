@@ -106,7 +106,7 @@ class Measurement:
     axis : parabola of C_M from the bottle's axis alone
     track : the same from a tracked C_M (Eq. 2a, 2b), None if there is none
     track_points : (P, 2) - that C_M; None if there is none
-    omega0 : angular velocity at the release, and its deviation
+    omega0 : angular velocity at the release, and its deviation: of the noise, and of water that moves early
     mean, mean_deviation : of omega / omega_0 over the second half of the flight
     r_cm : (P,) - place of C_M on the axis from the cap, where the flight's parabola crosses it; NaN outside the flight
     warnings : what looks wrong
@@ -169,6 +169,7 @@ def measure(request: Request) -> Measurement:
     cap, base = spin.cap * metres, spin.base * metres
     axis = fit_axis(spin.t, cap, base, inside, flight.release)
     calibration = check(spin, flight, metres, request.length)
+    _check_r_cm(request, calibration.length * metres)
     points = _centre(request, table, spin, metres)
     track = None if points is None else fit_track(spin.t[flight.inside], points[flight.inside], flight.release)
     omega0, deviation = _first_omega(spin, flight)
@@ -229,6 +230,11 @@ def _flight(request: Request, spin: MeasuredSpin, metres: float) -> Flight:
     return flight
 
 
+def _check_r_cm(request: Request, length: float) -> None:
+    if request.r_cm is not None and request.r_cm > length:
+        raise ValueError(f"r_cm = {request.r_cm:g} m is outside (0, {length:.4g}], the distance from cap to base")
+
+
 def _length_unit(request: Request, table: TrackTable) -> str:
     names: Sequence[str] = [
         name for name in (request.cap, request.base, request.ice_top, request.centre) if name is not None
@@ -283,10 +289,24 @@ def _first_omega(spin: MeasuredSpin, flight: Flight) -> tuple[float, float]:
 
     One fit to theta on both sides of the release: a parabola in the hand and a cubic in flight that share angle and
     angular velocity, for a hand that lets go gives no blow.
+
+    The deviation holds the noise and what half the time in flight tells otherwise beyond its noise: where the water
+    moves early, a cubic is no longer the flight, and the noise of a good film says nothing of that.
     """
+    omega0, noise = _fitted_omega(spin, flight, FLIGHT_TIME)
+    if omega0 == 0.0:
+        raise ValueError("the bottle does not turn at the release; name another release")
+    shorter, noise_of_shorter = _fitted_omega(spin, flight, FLIGHT_TIME / 2)
+    # Of two least-squares fits, one to a part of the other's frames, the difference has the difference of variances.
+    by_shape = max((shorter - omega0) ** 2 - (noise_of_shorter**2 - noise**2), 0.0)
+    return omega0, float(np.sqrt(noise**2 + by_shape))
+
+
+def _fitted_omega(spin: MeasuredSpin, flight: Flight, flight_time: float) -> tuple[float, float]:
+    """Return omega at the release by the frames up to ``flight_time`` [s] after it, and its deviation by noise."""
     first = int(np.flatnonzero(flight.inside)[0])
     hand = int(HAND_TIME / spin.frame_time)
-    ahead = max(int(FLIGHT_TIME / spin.frame_time), LEAST_FRAMES)
+    ahead = max(int(flight_time / spin.frame_time), LEAST_FRAMES)
     near = np.arange(max(first - hand, 0), min(first + ahead + 1, len(spin.t)))
     near = near[spin.measured[near] & ((near < first) | flight.inside[near])]
     tau = spin.t[near] - spin.t[first]
@@ -296,10 +316,7 @@ def _first_omega(spin: MeasuredSpin, flight: Flight) -> tuple[float, float]:
     if len(near) < matrix.shape[1] + 2:
         raise ValueError("too few frames around the release were tracked to tell omega there; name another release")
     solution, _, _ = least_squares(matrix, spin.theta[near])
-    omega0 = float(solution[1])
-    if omega0 == 0.0:
-        raise ValueError("the bottle does not turn at the release; name another release")
-    return omega0, float(spin.theta_noise * np.sqrt(np.linalg.inv(matrix.T @ matrix)[1, 1]))
+    return float(solution[1]), float(spin.theta_noise * np.sqrt(np.linalg.inv(matrix.T @ matrix)[1, 1]))
 
 
 def _late_mean(spin: MeasuredSpin, flight: Flight, omega0: float) -> float:

@@ -16,6 +16,9 @@ from slicemodel.trajectory import FloatArray
 FRAME_RATE: Final = 240.0
 """Of the paper's camera [1/s]."""
 
+MOST_FRAMES: Final = 1_000_000
+"""Of an exported table."""
+
 DATA_COLUMNS: Final = ("t", "xcap", "ycap", "xbase", "ybase", "xcm", "ycm")
 """Pairs that Tracker's data track asks for, one point mass each."""
 
@@ -115,10 +118,15 @@ def frame_times(scenario: Scenario, frame_rate: float) -> FloatArray:
     Raises
     ------
     ValueError
-        If the rate is not in [1, 1e5] per second.
+        If the rate is not in [1, 1e5] per second, or if there are more frames than a table should have.
     """
     if not 1 <= frame_rate <= 1e5:
         raise ValueError(f"frame_rate = {frame_rate!r} 1/s is outside [1, 100000]")
+    if scenario.duration * frame_rate > MOST_FRAMES:
+        raise ValueError(
+            f"duration = {scenario.duration:g} s at {frame_rate:g} frames/s makes more than {MOST_FRAMES} frames "
+            f"(admissible: durations up to {MOST_FRAMES / frame_rate:g} s)"
+        )
     times = np.arange(int(scenario.duration * frame_rate * (1 + 1e-12)) + 1) / frame_rate
     return np.minimum(times, scenario.duration)
 

@@ -173,6 +173,9 @@ def test_bad_arguments_are_refused(place, capsys):
         flipproof("check", throw, "--only", "thresholds")
     with pytest.raises(ValueError, match="does not exist"):
         flipproof("check", throw, "--junit", folder / "none" / "junit.xml")
+    with pytest.raises(ValueError, match="is a folder"):
+        flipproof("check", throw, "--only", "ice", "--junit", folder)
+    assert capsys.readouterr().out == ""
     for arguments in (("--only", "luck"), ("--only", ","), ("--tolerance", "-1"), ("--tolerance", "nan")):
         with pytest.raises(SystemExit) as caught:
             flipproof("check", throw, *arguments)

@@ -98,3 +98,13 @@ def test_every_mistake_is_one_line_and_status_2(capsys, tmp_path, arguments, wor
     assert len([line for line in err.splitlines() if "error:" in line]) == 1
     for word in words:
         assert word in err
+
+
+@pytest.mark.parametrize("arguments", [["nonsense"], [], ["simulate", "--solver"], ["simulate", "--steps", "-3"]])
+def test_a_wrong_argument_is_told_in_one_line(arguments, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    out, err = capsys.readouterr()
+    assert (ended.value.code, out) == (2, "")
+    assert err.startswith("flipproof: error: ")
+    assert err.count("\n") == 1

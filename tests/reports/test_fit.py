@@ -10,7 +10,7 @@ import pytest
 
 import ode_reference
 from reports.cli_fit import add_fit
-from reports.fit.compare import compare, told, verdict
+from reports.fit.compare import compare, promise, told, verdict
 from reports.fit.estimate import THOROUGH, estimate, scan
 from reports.fit.landscape import HUBER, Landscape, loss
 from reports.fit.problem import ALWAYS, FAR, Measurement, Problem, first_frames, noise_of, pose, predict
@@ -205,6 +205,13 @@ def test_ice_tells_neither_drag_nor_restitution():
     assert (found[1].low, found[1].high) == (0.0, 1.0)
 
 
+def test_what_intervals_are_worth_is_promised_only_where_it_was_measured():
+    assert promise("midpoint", fits=True) == "intervals that hold drag and restitution together in 95 %"
+    assert "not measured" in promise("free-flight", fits=True)
+    for solver in ("midpoint", "free-flight"):
+        assert "95" not in promise(solver, fits=False)
+
+
 def test_restitution_is_not_told_where_nothing_rebounds():
     # A tenth of the water and strong drag: the slices creep, and none reaches the cap in the time.
     throw = replace(Scenario(water_mass=0.3, duration=0.16).with_slices(20), drag=1.2)
@@ -330,6 +337,7 @@ def test_the_command_prints_and_writes_the_same_numbers(tmp_path, capsys):
         (["--model", "pymunk"], "physics engine"),
         (["--model", "midpoint", "midpoint"], "twice"),
         (["--cap", "A"], "both or neither"),
+        (["--length-unit", "m"], "give --cap and --base"),
         (["--cap", "A", "--base", "B", "--averaged", "5"], "for tables"),
         (["--scenario", "nowhere.toml"], "nowhere.toml"),
         (["--slices", "0"], None),

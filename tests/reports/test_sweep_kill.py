@@ -211,6 +211,9 @@ def test_all_three_packages_in_one_sweep_with_their_flights(capsys, tmp_path):
         (["{other}", "--out", "{out}"], "holds another design (samples is 80 there and 79 here)"),
         (["{wrong}", "--out", "{new}"], "[[solvers]] 2 (eq8): rtol = 6.0 is outside [1e-13, 0.01]"),
         (["{design}", "--out", "{new}", "--jobs", "1", "--dask", "tcp://127.0.0.1:1"], "not allowed with argument"),
+        (["{design}", "--out", "{new}", "--dask", "nonsense"], "is not tcp://HOST:PORT"),
+        (["{design}", "--out", "{new}", "--dask", "ftp://127.0.0.1:8786"], "is not tcp://HOST:PORT"),
+        (["{design}", "--out", "{new}", "--dask", "tcp://127.0.0.1:99999"], "is not tcp://HOST:PORT"),
         (["{design}"], "the following arguments are required: --out"),
     ],
 )

@@ -147,6 +147,7 @@ def test_two_files_of_one_clip(capsys):
 
 
 REFUSED = {
+    "centre of mass outside": ((*BOTH, "--r-cm", "50"), r"r_cm = 50 m is outside \(0, 0.28\], the distance"),
     "no unit": (("--cap", "cap", "--base", "base"), "does not state the unit of x and y; .* --length-unit m, cm, mm"),
     "unknown unit": ((*BOTH[:5], "inch"), "length_unit = 'inch' is unknown; known: m, cm, mm"),
     "unknown track": (("--cap", "cop", *BOTH[2:]), "track 'cop' is unknown; did you mean 'cap'"),
@@ -311,11 +312,28 @@ def test_export_to_standard_output(capsys):
         (("--speed", "-2"), r"speed = -2 m/s is outside \[0, inf\)"),
         (("--length-unit", "inch"), "length_unit = 'inch' is unknown"),
         (("--out", "/none/where.txt"), "the folder /none does not exist"),
+        (("--out", str(EXAMPLES)), "is a folder; name a file"),
     ],
 )
-def test_refusals_of_export(arguments, words):
+def test_refusals_of_export(arguments, words, monkeypatch):
+    monkeypatch.setattr("reports.solvers.solve", lambda *_: pytest.fail("solved before the refusal"))
     with pytest.raises(ValueError, match=words):
         run("export", "--solver", "exact-step", "--slices", 5, *arguments)
+
+
+def test_a_duration_of_too_many_frames_is_named(tmp_path):
+    (tmp_path / "long.toml").write_text("[scenario]\nduration = 1e300\n")
+    with pytest.raises(ValueError, match=r"duration = 1e\+300 s at 240 frames/s .* up to 4166.67 s"):
+        run("export", tmp_path / "long.toml", "--solver", "exact-step")
+
+
+@pytest.mark.parametrize("solver", ["eq8", "midpoint"])
+def test_omega_of_an_export_is_the_scenarios_within_its_deviation(tmp_path, solver):
+    """No noise: what is left is the water, which moves before the frames that tell omega end."""
+    run("export", "--solver", solver, "--slices", 50, "--out", tmp_path / "overlay.txt")
+    found = measure(Request(files=(tmp_path / "overlay.txt",), cap="cap", base="base", length_unit="m"))
+    assert abs(found.omega0 - Scenario().omega0) < 2 * found.omega0_deviation
+    assert found.omega0_deviation < 0.02 * found.omega0
 
 
 @pytest.mark.parametrize(
