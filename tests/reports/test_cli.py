@@ -103,7 +103,7 @@ def test_every_mistake_is_one_line_and_status_2(capsys, tmp_path, arguments, wor
 @pytest.mark.parametrize("arguments", [["nonsense"], [], ["simulate", "--solver"], ["simulate", "--steps", "-3"]])
 def test_a_wrong_argument_is_told_in_one_line(arguments, capsys):
     with pytest.raises(SystemExit) as ended:
-        main(arguments)
+        cli.main(arguments)
     out, err = capsys.readouterr()
     assert (ended.value.code, out) == (2, "")
     assert err.startswith("flipproof: error: ")
