@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from reports.columns import TIME, columns_csv, curves_csv, rows_csv
-from reports.findings import Finding
+from reports.findings import Finding, finite_or_none
 from reports.studies.alignment import Alignment, Keyed, Rests, end_name
 from reports.studies.differences import Difference
 from reports.studies.frozen import QUANTITIES, Frozen
@@ -217,14 +216,10 @@ def table_gallery(findings: Sequence[Finding], engines: Sequence[str]) -> str:
         ("engine", "fact", "number [unit of the row]", "unit", "at least [unit of the row]",
          "at most [unit of the row]", "verdict"),
         (
-            (engine, f.title, f.value, f.unit or "1", *map(_finite, f.admissible), f.verdict)
+            (engine, f.title, f.value, f.unit or "1", *map(finite_or_none, f.admissible), f.verdict)
             for f, engine in zip(findings, engines, strict=True)
         ),
     )  # fmt: skip
-
-
-def _finite(bound: float) -> float | None:
-    return bound if math.isfinite(bound) else None
 
 
 def table_horizon(studies: Sequence[Horizon]) -> str:

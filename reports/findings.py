@@ -10,6 +10,11 @@ Kind = Literal["regression", "observation"]
 Verdict = Literal["pass", "fail", "not evaluated", "observed"]
 
 
+def finite_or_none(number: float) -> float | None:
+    """Return a number, or None for one that JSON cannot hold and a table has no place for."""
+    return number if math.isfinite(number) else None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
     """One evaluated claim or observation.

@@ -12,7 +12,7 @@ import numpy as np
 
 from slicemodel.scenario import Scenario, not_whole
 from slicemodel.schemes import Scheme, StepForm
-from slicemodel.solver import FULL_LIMIT, Rebound, advance, checked, trajectory
+from slicemodel.solver import FULL_LIMIT, Rebound, advance, checked, grid, trajectory
 from slicemodel.trajectory import FloatArray, Trajectory
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ class Batch:
     def __getitem__(self, i: int) -> Trajectory:
         """Return throw i as ``solve(..., store="summary")`` does, with its impacts counted but not listed."""
         scenario, constants = self.scenarios[i], self.scheme.constants(self.scenarios[i])
-        t = np.linspace(0.0, scenario.duration, self.theta.shape[1])
+        t = grid(scenario.duration, self.theta.shape[1])
         record = _record(scenario, self.theta[i], self.omega[i], self.r_cm[i], self.inertia[i])
         return trajectory(scenario, self.scheme.name, self.form, constants, t, record, self.runs[i], None)
 
@@ -125,7 +125,7 @@ def solve_batch(
     unlisted = np.empty((0, 4))
 
     def run(i: int) -> Run:
-        t = np.linspace(0.0, throws[i].duration, steps)
+        t = grid(throws[i].duration, steps)
         record = _record(throws[i], theta[i], omega[i], r_cm[i], inertia[i])
         done = advance(throws[i], form, chosen.constants(throws[i]), t, record, unlisted)
         for column in (theta, omega, r_cm, inertia):

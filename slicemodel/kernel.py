@@ -727,10 +727,10 @@ def step(form, constants, reach: float, group, omega: float, n: int, y, v, work,
         i, count = glide(group, n, i, y, v, work, log, count)
         if i >= n:
             return count
+        # Only a step that is kept gets here: a trial stops for nothing.
         y_new, v_new, count = follow(form, constants, reach, group, omega, i, n, y, v, work, log, count)
-        if group.kept:
-            store(y, i, y_new)
-            store(v, i, v_new)
+        store(y, i, y_new)
+        store(v, i, v_new)
         add(work, y_new, v_new)
         i += LANES
 

@@ -86,7 +86,7 @@ def solve(
     theta, omega, r_cm, inertia = (np.empty(steps) for _ in range(4))
     record = kernel.Record(theta, omega, r_cm, inertia, np.empty(rows), np.empty(rows))
     rebounds = np.empty((min(steps * scenario.n_slices // 4 + SURELY_LISTED, MOST_LISTED), 4))
-    t = _grid(scenario.duration, steps)
+    t = grid(scenario.duration, steps)
     constants = chosen.constants(scenario)
     run = advance(scenario, form, constants, t, record, rebounds)
     if run.rebounds > len(rebounds):
@@ -96,7 +96,7 @@ def solve(
     return trajectory(scenario, chosen.name, form, constants, t, record, run, impacts)
 
 
-def _grid(duration: float, steps: int) -> FloatArray:
+def grid(duration: float, steps: int) -> FloatArray:
     """Return ``numpy.linspace(0, duration, steps)``, without the time it takes to find out what it was given."""
     t: FloatArray = np.arange(steps, dtype=np.float64) * (duration / (steps - 1))
     t[-1] = duration

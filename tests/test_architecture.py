@@ -48,7 +48,8 @@ def test_the_slice_model_imports_no_other_room():
 
 
 def test_nouns_know_no_verb():
-    for noun in NOUNS:
+    """Nor does the landing, which is read off a trajectory too, but which no solver needs."""
+    for noun in (*NOUNS, "landing"):
         for module, names in imports_of(ROOT / "slicemodel" / f"{noun}.py"):
             if module.startswith("slicemodel"):
                 assert module.partition(".")[2] in NOUNS, f"{noun} imports {module} {names}"

@@ -36,12 +36,14 @@ def test_the_test_command_of_the_readme_is_the_one_ci_runs():
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/theory.md", "docs/howto.md"])
-def test_the_code_of_the_page_runs(page):
+def test_the_code_of_the_page_runs(page, capsys):
     text = (ROOT / page).read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     assert blocks
     for block in blocks:
         exec(compile(block, page, "exec"), {})
+    if page == "README.md":
+        assert capsys.readouterr().out.strip().endswith("ok")
 
 
 def test_the_reference_is_built_without_a_warning(tmp_path):

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from reports.findings import finite_or_none
 from reports.paper.cases import ICE
 from reports.paper.claim_runs import ClaimRuns
 from reports.paper.claims import banded
@@ -103,8 +104,8 @@ class Comparison:
             "closest": list(self.closest),
             "equations": {
                 solver: {
-                    "value": reading.value if math.isfinite(reading.value) else None,
-                    "band": reading.band if math.isfinite(reading.band) else None,
+                    "value": finite_or_none(reading.value),
+                    "band": finite_or_none(reading.band),
                     "unit": reading.unit,
                     "verdict": reading.verdict,
                     "note": reading.note,

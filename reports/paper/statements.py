@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-from reports.findings import Finding
+from reports.findings import Finding, finite_or_none
 
 Verdict = Literal["holds", "fails", "cannot be decided"]
 
@@ -171,20 +171,16 @@ class Judgement:
             "readings": [
                 {
                     "name": reading.name,
-                    "value": _finite(reading.value),
+                    "value": finite_or_none(reading.value),
                     "unit": reading.unit,
-                    "band": _finite(reading.band),
-                    "admissible": [_finite(bound) for bound in reading.admissible],
+                    "band": finite_or_none(reading.band),
+                    "admissible": [finite_or_none(bound) for bound in reading.admissible],
                     "verdict": reading.verdict,
                     "note": reading.note,
                 }
                 for reading in self.readings
             ],
         }
-
-
-def _finite(number: float) -> float | None:
-    return number if math.isfinite(number) else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -212,7 +212,8 @@ def test_the_folder_holds_everything(monkeypatch, capsys, tmp_path, evidence, re
     assert (folder / "junit.xml").is_file()
     assert Scenario.from_mapping(summary["scenario"]) == evidence.scenario
     for finding in summary["findings"]:
-        assert {"id", "value", "unit", "band", "threshold", "admissible", "kind", "verdict", "note"} <= set(finding)
+        assert {"id", "title", "value", "unit", "band", "admissible", "kind", "verdict", "note"} <= set(finding)
+        assert "threshold" in finding
     assert {run["tag"] for run in summary["runs"]} == set(evidence.made)
     assert summary["provenance"]["command"].startswith("flipproof")
 
