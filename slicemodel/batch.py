@@ -35,9 +35,8 @@ class Batch:
     scheme : Scheme
     form : StepForm
         The scheme's form with the rebounds asked for.
-    theta, omega, r_cm, inertia : (S, P), read-only
-        Angle [rad], angular velocity [rad/s], centre of mass from the cap [m], moment of inertia about it [kg m^2] at
-        the points of each throw's own grid, ``linspace(0, duration, P)``; NaN after the last finite point.
+    rows : (S, 4, P), read-only
+        ``theta``, ``omega``, ``r_cm`` and ``inertia`` of every throw, which have names of their own: (S, P) each.
     runs : tuple of Run
         Finite points, rebounds and escape of every throw.
     """
@@ -45,15 +44,28 @@ class Batch:
     scenarios: tuple[Scenario, ...]
     scheme: Scheme
     form: StepForm
-    theta: FloatArray
-    omega: FloatArray
-    r_cm: FloatArray
-    inertia: FloatArray
+    rows: FloatArray
     runs: tuple[Run, ...]
 
-    def __post_init__(self) -> None:
-        for name in ("theta", "omega", "r_cm", "inertia"):
-            getattr(self, name).flags.writeable = False
+    @property
+    def theta(self) -> FloatArray:
+        """Angle [rad] at the points of each throw's grid, ``linspace(0, duration, P)``; NaN after its end."""
+        return self.rows[:, 0]
+
+    @property
+    def omega(self) -> FloatArray:
+        """Angular velocity, as ``theta`` [rad/s]."""
+        return self.rows[:, 1]
+
+    @property
+    def r_cm(self) -> FloatArray:
+        """Centre of mass from the cap, as ``theta`` [m]."""
+        return self.rows[:, 2]
+
+    @property
+    def inertia(self) -> FloatArray:
+        """Moment of inertia about the centre of mass, as ``theta`` [kg m^2]."""
+        return self.rows[:, 3]
 
     def __len__(self) -> int:
         return len(self.scenarios)
@@ -61,15 +73,15 @@ class Batch:
     def __getitem__(self, i: int) -> Trajectory:
         """Return throw i as ``solve(..., store="summary")`` does, with its impacts counted but not listed."""
         scenario, constants = self.scenarios[i], self.scheme.constants(self.scenarios[i])
-        t = grid(scenario.duration, self.theta.shape[1])
-        record = _record(scenario, self.theta[i], self.omega[i], self.r_cm[i], self.inertia[i])
+        t = grid(scenario.duration, self.rows.shape[2])
+        record = _record(scenario, self.rows[i])
         return trajectory(scenario, self.scheme.name, self.form, constants, t, record, self.runs[i], None)
 
     def __iter__(self) -> Iterator[Trajectory]:
         return (self[i] for i in range(len(self)))
 
     def __repr__(self) -> str:
-        return f"Batch of {len(self)} throws: {self.scheme.name}, {self.theta.shape[1]} points"
+        return f"Batch of {len(self)} throws: {self.scheme.name}, {self.rows.shape[2]} points"
 
 
 def solve_batch(
@@ -119,17 +131,15 @@ def solve_batch(
             f"{len(throws)} scenarios of steps = {steps} need {size / 2**30:.1f} GiB, more than "
             f"{FULL_LIMIT / 2**30:.0f} GiB; solve fewer at a time"
         )
-    theta, omega, r_cm, inertia = (np.empty((len(throws), steps)) for _ in range(4))
+    rows = np.empty((len(throws), 4, steps))
     workers = min(jobs or cores, len(throws))
     part = -(-len(throws) // (PARTS_PER_JOB * workers))
     unlisted = np.empty((0, 4))
 
     def run(i: int) -> Run:
         t = grid(throws[i].duration, steps)
-        record = _record(throws[i], theta[i], omega[i], r_cm[i], inertia[i])
-        done = advance(throws[i], form, chosen.constants(throws[i]), t, record, unlisted)
-        for column in (theta, omega, r_cm, inertia):
-            column[i, done.points :] = np.nan
+        done = advance(throws[i], form, chosen.constants(throws[i]), t, _record(throws[i], rows[i]), unlisted)
+        rows[i, :, done.points :] = np.nan
         return done
 
     def run_part(first: int) -> list[Run]:
@@ -137,9 +147,8 @@ def solve_batch(
 
     with ThreadPoolExecutor(workers) as pool:
         runs = tuple(done for some in pool.map(run_part, range(0, len(throws), part)) for done in some)
-    return Batch(
-        scenarios=throws, scheme=chosen, form=form, theta=theta, omega=omega, r_cm=r_cm, inertia=inertia, runs=runs
-    )  # fmt: skip
+    rows.setflags(write=False)
+    return Batch(scenarios=throws, scheme=chosen, form=form, rows=rows, runs=runs)
 
 
 def _throws(scenarios: Sequence[Scenario]) -> tuple[Scenario, ...]:
@@ -154,8 +163,8 @@ def _throws(scenarios: Sequence[Scenario]) -> tuple[Scenario, ...]:
     return throws
 
 
-def _record(scenario: Scenario, theta: FloatArray, omega: FloatArray, r_cm: FloatArray, inertia: FloatArray) -> Record:
+def _record(scenario: Scenario, rows: FloatArray) -> Record:
     from slicemodel import kernel
 
     nothing = np.empty((0, scenario.n_slices))
-    return kernel.Record(theta, omega, r_cm, inertia, nothing, nothing)
+    return kernel.Record(rows, nothing, nothing)

@@ -9,6 +9,10 @@ time: they are loaded, moved, summed and stored without leaving the processor's 
                                   |                                        ^
                                   +--yes--> rebound it, list the rebound --+
 
+Most slices meet no end for many steps. Linear maps that all slices share make one such map, and sums of y, v, y^2, y v
+and v^2 go over into the sums a step later: those slices, the flock, are not looked at until somebody asks where they
+are or one of them may have come near an end. Then they are moved to where they are, and a new flock is gathered.
+
 Positions are counted from the middle of the bottle, y = r - L/2: the two ends are one number, and sums of squares lose
 no digits.
 
@@ -42,6 +46,21 @@ REST_SPEED = 1e-6
 MOST_HITS = 1000
 """In-step rebounds of one slice in one step after which it is left at the end it hit."""
 
+AT_MOST_TOGETHER = 32
+"""Steps after which a flock is gathered anew."""
+
+AT_LEAST_TOGETHER = 4
+"""Steps a flock has to last to be worth gathering."""
+
+PUSHED = 0.03
+"""How far forces move a slice while it is in a flock, at most, in units of L/2."""
+
+SPARE = 0.005
+"""Room that a flock leaves for what omega, theta and the centre of mass do meanwhile, in units of L/2."""
+
+CLEAR = 1e-9
+"""Distance a flock keeps from the ends, in units of L/2: far more than its places are rounded by."""
+
 ROUNDING = 4e-16
 """Of a sum of two numbers, in units of the larger."""
 
@@ -51,6 +70,11 @@ ON_AN_END = 1e-15
 SERIES = 0.5
 """Arguments below which sinh and cosh are summed up from their series; the first term left out is 5e-17 of the sum."""
 
+SHORT_SERIES = 0.03
+"""Arguments below which four terms do; the fifth is 2e-18 of the sum."""
+
+REST_OF_PI = 1.2246467991473532e-16
+"""pi less the number nearest to it."""
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 """Every operation is rounded as written: no fastmath."""
@@ -90,12 +114,9 @@ class Frame(NamedTuple):
 
 
 class Record(NamedTuple):
-    """Where the loop writes: theta, omega, r_cm, inertia of shape (P,); r, v of shape (P, N), or (0, N) for none."""
+    """Where the loop writes: theta, omega, r_cm, inertia in rows of P; r, v of shape (P, N), or (0, N) for none."""
 
-    theta: FloatArray
-    omega: FloatArray
-    r_cm: FloatArray
-    inertia: FloatArray
+    rows: FloatArray
     r: FloatArray
     v: FloatArray
 
@@ -121,6 +142,8 @@ HALF_PAGE = 256
 """Numbers in 2048 bytes."""
 
 WORK = LOOKED_AT + 2 * LANES
+
+ALL_LANES = (1 << LANES) - 1
 
 VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 WORD = ir.IntType(64)
@@ -213,6 +236,12 @@ def fma(builder: Any, x: Any, y: Any, z: Any) -> Any:
 def fused(builder: Any, x: Any, y: Any, z: Any) -> Any:
     """Return x y + z, rounded once, of single numbers."""
     return builder.fma(x, y, z)
+
+
+@instructions(number, number)
+def now(builder: Any, x: Any) -> Any:
+    """Return x, worked out before what follows: compilers put off what is not needed yet."""
+    return builder.asm(ir.FunctionType(ir.DoubleType(), [ir.DoubleType()]), "", "=x,0", [x], side_effect=True)
 
 
 @instructions(lanes, lanes)
@@ -331,6 +360,27 @@ def sinh(x: float) -> float:
 
 
 @merged
+def cosine(x: float) -> float:
+    """Return cos x to 3e-16, of any x: as (-1)^n cos(x - n pi) with the nearest n, by its series.
+
+    The library's own would take a fifth of a step, and its last digit may be another one on another machine.
+    """
+    n = np.floor(fused(x, 1.0 / math.pi, 0.5))
+    x = fused(-n, REST_OF_PI, fused(-n, math.pi, x))
+    y = x * x
+    z = y * y
+    high = fused(
+        z,
+        fused(y, -1.0 / 1124000727777607680000.0, 1.0 / 2432902008176640000.0),
+        fused(y, -1.0 / 6402373705728000.0, 1.0 / 20922789888000.0),
+    )
+    middle = fused(z, fused(y, -1.0 / 87178291200.0, 1.0 / 479001600.0), fused(y, -1.0 / 3628800.0, 1.0 / 40320.0))
+    low = fused(y, fused(y, fused(y, -1.0 / 720.0, 1.0 / 24.0), -0.5), 1.0)
+    value: float = fused(z * z, fused(z * z, high, middle), low)
+    return value if n == 2.0 * np.floor(0.5 * n) else -value
+
+
+@merged
 def decay(x: float):
     """Return exp(-x) - 1 and exp(-x) for x >= 0; for small x from h = sinh(x / 2): exp(-x / 2) = sqrt(1 + h^2) - h."""
     if x < SERIES:
@@ -349,12 +399,19 @@ def growth_rate_squared(form, constants, omega: float) -> float:
 
 @merged
 def hyperbolic(y: float):
-    """Return sinh(x) / x and (cosh(x) - 1) / x^2 of y = x^2, for small x by their series: no root and no quotient."""
+    """Return sinh(x) / x and (cosh(x) - 1) / x^2 of y = x^2, for small x by their series: no root and no quotient.
+
+    The next step waits for them: no more terms than needed, and in pairs, so that few products wait for each other.
+    """
+    if y < SHORT_SERIES * SHORT_SERIES:
+        odd, even = fused(y, 1.0 / 5040.0, 1.0 / 120.0), fused(y, 1.0 / 40320.0, 1.0 / 720.0)
+        return fused(y, fused(y, odd, 1.0 / 6.0), 1.0), fused(y, fused(y, even, 1.0 / 24.0), 0.5)
     if y < SERIES * SERIES:
-        odd = fused(y, fused(y, 1.0 / 6227020800.0, 1.0 / 39916800.0), 1.0 / 362880.0)
-        odd = fused(y, fused(y, fused(y, odd, 1.0 / 5040.0), 1.0 / 120.0), 1.0 / 6.0)
-        even = fused(y, fused(y, 1.0 / 87178291200.0, 1.0 / 479001600.0), 1.0 / 3628800.0)
-        even = fused(y, fused(y, fused(y, even, 1.0 / 40320.0), 1.0 / 720.0), 1.0 / 24.0)
+        z = y * y
+        odd = fused(z, fused(y, 1.0 / 6227020800.0, 1.0 / 39916800.0), fused(y, 1.0 / 362880.0, 1.0 / 5040.0))
+        odd = fused(z, odd, fused(y, 1.0 / 120.0, 1.0 / 6.0))
+        even = fused(z, fused(y, 1.0 / 87178291200.0, 1.0 / 479001600.0), fused(y, 1.0 / 3628800.0, 1.0 / 40320.0))
+        even = fused(z, even, fused(y, 1.0 / 720.0, 1.0 / 24.0))
         return fused(y, odd, 1.0), fused(y, even, 0.5)
     x = math.sqrt(y)
     half = math.sinh(0.5 * x) / x
@@ -367,16 +424,17 @@ def coefficients(form, constants, k_squared: float, fade_minus_1: float, fade: f
 
     What is the same for all steps of a flight, ``decay(gamma dt)``, or for all times in a step, k^2, is given. a is
     close to 1 for a short step: a - 1 is formed without the subtraction, which would lose the digits that move the
-    slice (E C - 1 = expm1(-gamma dt) C + C - 1).
+    slice (E C - 1 = expm1(-gamma dt) + E (C - 1)).
     """
     gamma = constants.gamma
-    y = k_squared * dt * dt
+    y = k_squared * (dt * dt)
     odd, even = hyperbolic(y)
     cosh_minus_1 = y * even
     b = fade * dt * odd
-    a_minus_1 = fade_minus_1 * (1.0 + cosh_minus_1) + cosh_minus_1 + constants.gamma_position * b
+    a_minus_1 = fused(fade, cosh_minus_1, fused(constants.gamma_position, b, fade_minus_1))
     c = (k_squared - gamma * gamma) * b
-    d = form.cosh_sign * fade * (1.0 + cosh_minus_1) + form.sinh_sign * gamma * b
+    signed = form.cosh_sign * fade
+    d = fused(signed, cosh_minus_1, fused(form.sinh_sign * gamma, b, signed))
     return a_minus_1, b, c, d
 
 
@@ -545,12 +603,11 @@ def rebound_in_step(
 # ---------------------------------------------------------------------- one step of all slices
 
 
-class Shared(NamedTuple):
-    """What all slices of a step have in common; the first seven in every lane.
+class Map(NamedTuple):
+    """Where one step or several take a slice that meets no end; numbers, or the same numbers in every lane.
 
-    The closed form is summed up from the smallest number to the largest, two products with their sums at a time:
-    y' = y + (b v + ((a - 1) y + push)), v' = c y + (d v + pull), with what the centre of repulsion y* contributes in
-    push = (1 - a) y* and pull = -c y*.
+    y' = y + (b v + ((a - 1) y + push)), v' = c y + (d v + pull): summed up from the smallest number to the largest, two
+    products with their sums at a time. The centre of repulsion y* contributes push = (1 - a) y* and pull = -c y*.
     """
 
     a_minus_1: Any
@@ -559,6 +616,51 @@ class Shared(NamedTuple):
     d: Any
     push: Any
     pull: Any
+
+
+@merged
+def standstill():
+    """Return the map of no step at all."""
+    return Map(0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+
+
+@merged
+def followed(first, then):
+    """Return the map that does ``first`` and ``then``."""
+    return Map(
+        first.a_minus_1 + fused(then.a_minus_1, first.a_minus_1, fused(then.b, first.c, then.a_minus_1)),
+        first.b + fused(then.a_minus_1, first.b, then.b * first.d),
+        then.c + fused(then.c, first.a_minus_1, then.d * first.c),
+        fused(then.c, first.b, then.d * first.d),
+        first.push + fused(then.a_minus_1, first.push, fused(then.b, first.pull, then.push)),
+        fused(then.c, first.push, fused(then.d, first.pull, then.pull)),
+    )
+
+
+@merged
+def in_lanes(one):
+    """Return the map with each of its numbers in every lane."""
+    return Map(
+        everywhere(one.a_minus_1), everywhere(one.b), everywhere(one.c), everywhere(one.d), everywhere(one.push),
+        everywhere(one.pull),
+    )  # fmt: skip
+
+
+@merged
+def moved(way, there: int, y, v):
+    """Return y and v of one lane group after ``way``; ``there`` of it are slices."""
+    y_new = y + fma(way.b, v, fma(way.a_minus_1, y, way.push))
+    v_new = fma(way.c, y, fma(way.d, v, way.pull))
+    if there < LANES:
+        slices = (1 << there) - 1
+        y_new, v_new = where(slices, y_new, everywhere(0.0)), where(slices, v_new, everywhere(0.0))
+    return y_new, v_new
+
+
+class Shared(NamedTuple):
+    """What all slices of a step have in common: numbers, or ``way`` and ``reach`` in every lane."""
+
+    way: Any
     reach: Any
     centre: float
     minus_e: float
@@ -572,28 +674,32 @@ class Shared(NamedTuple):
 
 
 @merged
-def shared(
-    form, constants, reach: float, fading, omega: float, centre: float, dt: float, end: float, weighs: bool, kept: bool
-):
-    """Return what all slices have in common in the step that ends at time ``end``; if not ``kept`` it is a trial."""
+def step_map(form, constants, fading, omega: float, centre: float, dt: float):
+    """Return the map of one step."""
     k_squared = growth_rate_squared(form, constants, omega)
     a_minus_1, b, c, d = coefficients(form, constants, k_squared, fading[0], fading[1], dt)
+    return Map(a_minus_1, b, c, d, -a_minus_1 * centre, -c * centre)
+
+
+@merged
+def shared(form, constants, reach: float, way, centre: float, dt: float, end: float, weighs: bool, kept: bool):
+    """Return what all slices have in common in the step that ends at time ``end``; if not ``kept`` it is a trial."""
     return Shared(
-        everywhere(a_minus_1), everywhere(b), everywhere(c), everywhere(d), everywhere(-a_minus_1 * centre),
-        everywhere(-c * centre), everywhere(reach), centre, -constants.restitution, dt, end, form.in_step, form.strict,
-        form.keeps_position, weighs, kept,
+        way, reach, centre, -constants.restitution, dt, end, form.in_step, form.strict, form.keeps_position, weighs,
+        kept,
     )  # fmt: skip
 
 
 @merged
-def moved(group, there: int, y, v):
-    """Return y and v of one lane group a step later, as if the bottle had no ends; ``there`` of it are slices."""
-    y_new = y + fma(group.b, v, fma(group.a_minus_1, y, group.push))
-    v_new = fma(group.c, y, fma(group.d, v, group.pull))
-    if there < LANES:
-        slices = (1 << there) - 1
-        y_new, v_new = where(slices, y_new, everywhere(0.0)), where(slices, v_new, everywhere(0.0))
-    return y_new, v_new
+def spread(one):
+    """Return what slices have in common with ``way`` and ``reach`` in every lane.
+
+    Where it is used: single numbers are handed over in registers, lane groups are not.
+    """
+    return Shared(
+        in_lanes(one.way), everywhere(one.reach), one.centre, one.minus_e, one.dt, one.end, one.in_step, one.strict,
+        one.keeps_position, one.weighs_velocities, one.kept,
+    )  # fmt: skip
 
 
 @merged
@@ -649,17 +755,20 @@ def struck_or_resting(group, y_old, v_old, v, y):
 
 
 @compiled
-def glide(group, n: int, i: int, y, v, work, log, count: int):
-    """Move the lane groups from ``i`` on until a slice hits an end in the step; return where, and the rebounds.
+def glide(common, n: int, watched, j: int, many: int, y, v, work, log, count: int):
+    """Move the watched lane groups from the j-th on until a slice hits an end in the step; return where, and rebounds.
 
     A trial, which only predicts sums, does not stop for hits: it need not know them better than to second order.
     """
     stands_alone()
-    zero = everywhere(0.0)
-    first, second, speed = load(work, 0), load(work, LANES), load(work, 2 * LANES)
-    while i < n:
+    group, zero = spread(common), everywhere(0.0)
+    first = second = speed = zero
+    if j > 0:
+        first, second, speed = load(work, 0), load(work, LANES), load(work, 2 * LANES)
+    while j < many:
+        i = int(get(watched, j))
         y_old, v_old = load(y, i), load(v, i)
-        y_new, v_new = moved(group, n - i, y_old, v_old)
+        y_new, v_new = moved(group.way, n - i, y_old, v_old)
         if at_an_end(group, v_old, v_new, y_new):
             if group.in_step:
                 struck, resting = struck_or_resting(group, y_old, v_old, v_new, y_new)
@@ -676,17 +785,11 @@ def glide(group, n: int, i: int, y, v, work, log, count: int):
         first, second = first + y_new, fma(y_new, y_new, second)
         if group.weighs_velocities:
             speed = speed + v_new
-        i += LANES
+        j += 1
     store(work, 0, first)
     store(work, LANES, second)
     store(work, 2 * LANES, speed)
-    return i, count
-
-
-@merged
-def sums_of(work):
-    """Return the sums over slices of y, y^2 and v, whose partial sums ``work`` begins with."""
-    return total(load(work, 0)), total(load(work, LANES)), total(load(work, 2 * LANES))
+    return j, count
 
 
 @merged
@@ -698,10 +801,11 @@ def add(work, y, v) -> None:
 
 
 @compiled
-def follow(form, constants, reach: float, group, omega: float, i: int, n: int, y, v, work, log, count: int):
+def follow(form, constants, reach: float, common, omega: float, i: int, n: int, y, v, work, log, count: int):
     """Move one lane group of which slices hit an end in the step; return y, v and the count of rebounds."""
+    group = spread(common)
     y_old, v_old = load(y, i), load(v, i)
-    y_new, v_new = moved(group, n - i, y_old, v_old)
+    y_new, v_new = moved(group.way, n - i, y_old, v_old)
     struck, resting = struck_or_resting(group, y_old, v_old, v_new, y_new)
     store(work, LOOKED_AT, where(resting, y_old, y_new))
     store(work, LOOKED_AT + LANES, where(resting, everywhere(0.0), v_new))
@@ -718,21 +822,20 @@ def follow(form, constants, reach: float, group, omega: float, i: int, n: int, y
 
 
 @merged
-def step(form, constants, reach: float, group, omega: float, n: int, y, v, work, log, count: int):
-    """Move all slices by one step, unless it is a trial; return the count of rebounds, and the sums in ``work``."""
-    for j in range(0, LOOKED_AT, LANES):
-        store(work, j, everywhere(0.0))
-    i = 0
-    while True:
-        i, count = glide(group, n, i, y, v, work, log, count)
-        if i >= n:
-            return count
-        # Only a step that is kept gets here: a trial stops for nothing.
-        y_new, v_new, count = follow(form, constants, reach, group, omega, i, n, y, v, work, log, count)
-        store(y, i, y_new)
-        store(v, i, v_new)
-        add(work, y_new, v_new)
-        i += LANES
+def step(form, constants, reach: float, group, omega: float, n: int, watched, many: int, y, v, work, log, count: int):
+    """Move the watched slices by one step, unless it is a trial; return the count of rebounds, and sums in ``work``."""
+    j = 0
+    while j < many:
+        j, count = glide(group, n, watched, j, many, y, v, work, log, count)
+        if j < many:
+            # Only a step that is kept gets here: a trial stops for nothing.
+            i = int(get(watched, j))
+            y_new, v_new, count = follow(form, constants, reach, group, omega, i, n, y, v, work, log, count)
+            store(y, i, y_new)
+            store(v, i, v_new)
+            add(work, y_new, v_new)
+            j += 1
+    return count
 
 
 @merged
@@ -744,36 +847,201 @@ def centre_of_repulsion(form, constants, offset: float, v_cm: float, weight: flo
     return offset - pull / (omega * omega)
 
 
+# ---------------------------------------------------------------------- slices that meet no end
+
+
+class Flock(NamedTuple):
+    """Slices that meet no end for a while: how many, and their moments when they were gathered.
+
+    Then y and y + ``horizon`` v of each lay between ``low`` and ``high``. One map, kept beside it, moves them since.
+    """
+
+    n: float
+    y: float
+    v: float
+    y_y: float
+    y_v: float
+    v_v: float
+    low: float
+    high: float
+    horizon: float
+
+
+@merged
+def nobody():
+    """Return a flock without slices."""
+    return Flock(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@merged
+def sums_of(flock, way):
+    """Return the sums of y, y^2 and v over the flock after ``way``, from its moments before; u = y' - y."""
+    u = fused(flock.n, way.push, fused(way.a_minus_1, flock.y, way.b * flock.v))
+    u_y = fused(flock.y, way.push, fused(way.a_minus_1, flock.y_y, way.b * flock.y_v))
+    u_v = fused(flock.v, way.push, fused(way.a_minus_1, flock.y_v, way.b * flock.v_v))
+    u_u = fused(way.push, u, fused(way.a_minus_1, u_y, way.b * u_v))
+    speed = fused(flock.n, way.pull, fused(way.c, flock.y, way.d * flock.v))
+    return flock.y + u, flock.y_y + (2.0 * u_y + u_u), speed
+
+
+@merged
+def sums_over(flock, since, many: int, work):
+    """Return the sums of y, y^2 and v over all slices; ``work`` begins with partial sums of those that are watched."""
+    first = second = speed = 0.0
+    if flock.n > 0.0:
+        first, second, speed = sums_of(flock, since)
+    if many > 0:
+        first += total(load(work, 0))
+        second += total(load(work, LANES))
+        speed += total(load(work, 2 * LANES))
+    return first, second, speed
+
+
+@merged
+def clear_of_ends(flock, way, reach: float, margin: float) -> bool:
+    """Return whether surely no slice of the flock is nearer than ``margin`` to an end; never true of NaN.
+
+    The map puts a slice at a y0 + b v0 + push = (a - b / horizon) y0 + (b / horizon) (y0 + horizon v0) + push. As long
+    as both weights are positive that is at most a high + push, and at least a low + push.
+    """
+    room = (1.0 - CLEAR) * reach - margin
+    foreseeable = 0.0 <= way.b <= (1.0 + way.a_minus_1) * flock.horizon
+    highest = flock.high + fused(way.a_minus_1, flock.high, way.push)
+    deepest = flock.low + fused(way.a_minus_1, flock.low, way.push)
+    return bool(foreseeable and highest < room and deepest > -room)
+
+
+@merged
+def dip(one, reach: float, centre: float, dt: float) -> float:
+    """Return how far a slice that turns inside a step may go beyond where it was before, at most v dt.
+
+    It turns if v and v' = c (y - y*) + d v differ in sign: then |v| is at most c |y - y*| / d.
+    """
+    return float(dt * one.c / one.d * (reach + abs(centre)))
+
+
+@compiled
+def settle(map_since, n: int, watched, many: int, y, v) -> None:
+    """Move the slices of the flock to where they are."""
+    way, begin = in_lanes(map_since), 0
+    for j in range(many + 1):
+        end = int(get(watched, j)) if j < many else n
+        for i in range(begin, end, LANES):
+            y_new, v_new = moved(way, n - i, load(y, i), load(v, i))
+            store(y, i, y_new)
+            store(v, i, v_new)
+        begin = end + LANES
+
+
+@merged
+def all_watched(n: int, watched) -> int:
+    """List every lane group as watched; return how many there are."""
+    many = 0
+    for i in range(0, n, LANES):
+        put(watched, many, float(i))
+        many += 1
+    return many
+
+
+@compiled
+def gathered(
+    form, constants, reach: float, omega: float, centre: float, dt: float, margin: float, n: int, watched, y, v
+):  # fmt: skip
+    """Return a flock of lane groups that should stay clear of the ends, how many are watched, and for how many steps.
+
+    Where they will be is only estimated here; ``clear_of_ends`` looks after it at every step.
+    """
+    k_squared = growth_rate_squared(form, constants, omega)
+    force = k_squared * (reach + abs(centre))
+    lasting = math.sqrt(2.0 * PUSHED * reach / force)
+    steps = int(lasting / dt) if lasting < AT_MOST_TOGETHER * dt else AT_MOST_TOGETHER
+    if steps < AT_LEAST_TOGETHER or form.cosh_sign < 0.0:
+        return nobody(), all_watched(n, watched), AT_MOST_TOGETHER
+    horizon = steps * dt * (1.0 + CLEAR)
+    growth = 1.0 + 0.55 * k_squared * horizon * horizon
+    # The centre of repulsion and omega change on the way, to which some room is left.
+    room = (1.0 - SPARE) * reach - margin
+    high = min(room, centre + (room - centre) / growth)
+    low = max(-room, centre - (room + centre) / growth)
+    middle, half_width, ahead = everywhere(0.5 * (low + high)), everywhere(0.5 * (high - low)), everywhere(horizon)
+    count = many = 0
+    sum_y = sum_v = sum_y_y = sum_y_v = sum_v_v = everywhere(0.0)
+    for i in range(0, n, LANES):
+        y_i, v_i = load(y, i), load(v, i)
+        now_clear = at_least(half_width, size_of(y_i - middle))
+        then_clear = at_least(half_width, size_of(fma(v_i, ahead, y_i) - middle))
+        if now_clear & then_clear == ALL_LANES:
+            sum_y, sum_v = sum_y + y_i, sum_v + v_i
+            sum_y_y, sum_y_v, sum_v_v = fma(y_i, y_i, sum_y_y), fma(y_i, v_i, sum_y_v), fma(v_i, v_i, sum_v_v)
+            count += min(LANES, n - i)
+        else:
+            put(watched, many, float(i))
+            many += 1
+    flock = Flock(
+        float(count), total(sum_y), total(sum_v), total(sum_y_y), total(sum_y_v), total(sum_v_v), low, high, horizon
+    )  # fmt: skip
+    return flock, many, steps
+
+
+@merged
+def foreseen(form, flock, since, one, reach: float, centre: float, dt: float):
+    """Return the map of the flock after the step ``one``, and whether surely none of it meets an end in that step."""
+    if flock.n == 0.0:
+        return since, True
+    after = followed(since, one)
+    if form.in_step:
+        margin = dip(one, reach, centre, dt)
+        return after, clear_of_ends(flock, since, reach, margin) and clear_of_ends(flock, after, reach, margin)
+    return after, clear_of_ends(flock, after, reach, 0.0)
+
+
+@compiled
+def dissolved(since, n: int, watched, many: int, y, v):
+    """Move the slices of the flock to where they are and watch all; return what ``gathered`` does, for the moment."""
+    settle(since, n, watched, many, y, v)
+    return nobody(), all_watched(n, watched), 0
+
+
 # ---------------------------------------------------------------------- the whole flight
 
 
-@compiled
-def copy_positions(y, frame, array) -> None:
-    """Fill an array with r; a slice at the cap is at r_min, which L/2 - (r_max - L/2) need not be to the last digit."""
-    to, n, middle = row_of(array), len(array), frame.length / 2
-    cap = middle - frame.r_max
-    for i in range(0, n - LANES + 1, LANES):
-        here = load(y, i)
-        resting = at_least(here, everywhere(cap)) & at_least(everywhere(cap), here)
-        store(to, i, where(resting, everywhere(frame.r_min), here + everywhere(middle)))
-    for i in range(n - n % LANES, n):
-        here_alone = get(y, i)
-        put(to, i, frame.r_min if here_alone == cap else here_alone + middle)
+@merged
+def write(numbers, i: int, n: int, x, work) -> None:
+    """Write one lane group, or what of it there is room for, from number i of n on."""
+    if n - i >= LANES:
+        store(numbers, i, x)
+    else:
+        store(work, LOOKED_AT, x)
+        for j in range(n - i):
+            put(numbers, i + j, get(work, LOOKED_AT + j))
+
+
+@merged
+def write_slices(frame, i: int, n: int, y, v, to_r, to_v, work) -> None:
+    """Write r and v of one lane group; at the cap r is r_min: L/2 - (r_max - L/2) may differ in the last digit."""
+    middle = frame.length / 2
+    cap = everywhere(middle - frame.r_max)
+    resting = at_least(y, cap) & at_least(cap, y)
+    write(to_r, i, n, where(resting, everywhere(frame.r_min), y + everywhere(middle)), work)
+    write(to_v, i, n, v, work)
 
 
 @compiled
-def copy(numbers, array) -> None:
-    """Fill an array from a row."""
-    to, n = row_of(array), len(array)
-    for i in range(0, n - LANES + 1, LANES):
-        store(to, i, load(numbers, i))
-    for i in range(n - n % LANES, n):
-        put(to, i, get(numbers, i))
+def write_all(flock, since, frame, n: int, watched, many: int, y, v, to_r, to_v, work) -> None:
+    """Write r and v of all slices: first as if they all were of the flock, then those that are watched."""
+    if flock.n > 0:
+        way = in_lanes(since)
+        for i in range(0, n, LANES):
+            y_i, v_i = moved(way, n - i, load(y, i), load(v, i))
+            write_slices(frame, i, n, y_i, v_i, to_r, to_v, work)
+    for j in range(many):
+        i = int(get(watched, j))
+        write_slices(frame, i, n, load(y, i), load(v, i), to_r, to_v, work)
 
 
 @compiled
 def first_outside(y, n: int, half_length: float) -> int:
-    """Return the first slice outside the bottle, or -1."""
+    """Return the first slice outside the bottle, or -1; those of the flock are inside now as they were then."""
     for i in range(n):
         if abs(get(y, i)) > half_length:
             return i
@@ -782,7 +1050,7 @@ def first_outside(y, n: int, half_length: float) -> int:
 
 @compiled
 def shares_of(memory: FloatArray, n: int):
-    """Return the parts of ``memory_for(n)``: whole lane groups of y and of v on 64-byte boundaries, and the rest.
+    """Return the parts of ``memory_for(n)``: lane groups of y and of v on 64-byte boundaries, work, and watched groups.
 
     Rows are half a page apart, plus pages: a processor that compares the last 12 bits of addresses only would take what
     it reads of v for what it has just written of y.
@@ -791,14 +1059,14 @@ def shares_of(memory: FloatArray, n: int):
     begin = (-(memory.ctypes.data // 8)) % LANES
     second = begin + size + (HALF_PAGE - size) % (2 * HALF_PAGE)
     end = second + size
-    return memory[begin : begin + size], memory[second:end], memory[end : end + WORK]
+    return memory[begin : begin + size], memory[second:end], memory[end : end + WORK], memory[end + WORK :]
 
 
 @merged
 def inertia_about(frame, n: int, first: float, second: float, offset: float):
     """Return J (Eq. 11b to 11d) about a point ``offset`` from the middle, from sums taken about the middle."""
-    water = frame.slice_mass * (second - offset * (2.0 * first - n * offset))
-    return water + frame.bottle_inertia + frame.bottle_mass * offset * offset
+    about_offset = fused(-offset, fused(-offset, n, 2.0 * first), second)
+    return fused(frame.bottle_mass * offset, offset, fused(frame.slice_mass, about_offset, frame.bottle_inertia))
 
 
 @kept_on_disk
@@ -807,7 +1075,9 @@ def fly(form, constants, frame, r0, t, dt: float, record, rebounds, memory) -> R
 
     Rebounds are counted; the first K of them are listed in ``rebounds``, shape (K, 4).
     """
-    theta, omega, r_cm, inertia = record.theta, record.omega, record.r_cm, record.inertia
+    theta, omega, r_cm, inertia = (
+        row_of(record.rows[0]), row_of(record.rows[1]), row_of(record.rows[2]), row_of(record.rows[3])
+    )  # fmt: skip
     n = len(r0)
     middle = frame.length / 2
     reach = frame.r_max - middle
@@ -815,14 +1085,14 @@ def fly(form, constants, frame, r0, t, dt: float, record, rebounds, memory) -> R
     fading = decay(constants.gamma * dt)
     hits = 0
     escape_step = escape_slice = -1
-    positions, velocities, rest = shares_of(memory, n)
+    positions, velocities, rest, list_of_watched = shares_of(memory, n)
     positions[:], velocities[:], rest[:] = 0.0, 0.0, 0.0
     for i in range(n):
         offset = r0[i] - middle
         # The last slice of a full bottle lies on the cap, but for the rounding of where it is put.
         at_end = abs(abs(offset) - reach) <= ON_AN_END * frame.length
         positions[i] = math.copysign(reach, offset) if at_end else offset
-    y, v, work = row_of(positions), row_of(velocities), row_of(rest)
+    y, v, work, watched = row_of(positions), row_of(velocities), row_of(rest), row_of(list_of_watched)
     log = Log(row_of(rebounds), len(rebounds))
     full = len(record.r) > 0
     if full:
@@ -830,54 +1100,73 @@ def fly(form, constants, frame, r0, t, dt: float, record, rebounds, memory) -> R
     # Velocities are added up for who asks for their mean, and where a number that overflows must be seen at once.
     weighs = form.follows_cm or full or not form.keeps_position
 
+    flock, since, many, left = nobody(), standstill(), all_watched(n, watched), 0
     for i in range(0, n, LANES):
         add(work, load(y, i), everywhere(0.0))
-    first, second, speed = sums_of(work)
+    first, second, speed = sums_over(flock, since, many, work)
     offset = water_share * first
-    weight = constants.gravity * math.cos(frame.theta0)
-    theta[0], omega[0] = frame.theta0, frame.omega0
-    r_cm[0] = middle + offset
-    inertia[0] = inertia_about(frame, n, first, second, offset)
-    momentum = inertia[0] * frame.omega0
+    spin, angle = frame.omega0, frame.theta0
+    weight = constants.gravity * cosine(angle)
+    moment = inertia_about(frame, n, first, second, offset)
+    momentum = moment * spin
+    put(theta, 0, angle)
+    put(omega, 0, spin)
+    put(r_cm, 0, middle + offset)
+    put(inertia, 0, moment)
     points = 1
 
     for k in range(1, len(t)):
-        w = omega[k - 1]
+        w = spin
         # A lagged program weighs the slices of the step before, about the centre of mass it knew then.
         lagged_first, lagged_second, lagged_offset = first, second, offset
         if not frame.frozen:
             centre = centre_of_repulsion(form, constants, offset, water_share * speed, weight, w)
+            way = step_map(form, constants, fading, w, centre, dt)
+            if left == 0:
+                settle(since, n, watched, many, y, v)
+                margin = dip(way, reach, centre, dt) if form.in_step else 0.0
+                flock, many, left = gathered(form, constants, reach, w, centre, dt, margin, n, watched, y, v)
+                since = standstill()
+            left -= 1
             if form.midpoint:
                 # A step as the exact step would make it predicts the end. Means over the step are then known up to
                 # second order, that of v_CM from the way of C_M, because v_CM itself jumps at an impact.
-                weight = constants.gravity * math.cos(theta[k - 1] + 0.5 * dt * w)
-                group = shared(form, constants, reach, fading, w, centre, dt, t[k], weighs, False)
-                step(form, constants, reach, group, w, n, y, v, work, log, log.room)
-                end_first, end_second, _ = sums_of(work)
-                way = water_share * (end_first - first)
+                weight = constants.gravity * cosine(angle + 0.5 * dt * w)
+                group = shared(form, constants, reach, way, centre, dt, t[k], weighs, False)
+                after, clear = foreseen(form, flock, since, way, reach, centre, dt)
+                if not clear:
+                    flock, many, left = dissolved(since, n, watched, many, y, v)
+                step(form, constants, reach, group, w, n, watched, many, y, v, work, log, log.room)
+                end_first, end_second, _ = sums_over(flock, after, many, work)
+                shift = water_share * (end_first - first)
                 w = 0.5 * (w + momentum / inertia_about(frame, n, end_first, end_second, water_share * end_first))
-                centre = centre_of_repulsion(form, constants, offset + 0.5 * way, way / dt, weight, w)
-            # Before the slices move: the processor then works on the cosine and on the first of them side by side.
-            weight = constants.gravity * math.cos(theta[k - 1] + w * dt)
-            group = shared(form, constants, reach, fading, w, centre, dt, t[k], weighs, True)
-            hits = step(form, constants, reach, group, w, n, y, v, work, log, hits)
-            first, second, speed = sums_of(work)
+                centre = centre_of_repulsion(form, constants, offset + 0.5 * shift, shift / dt, weight, w)
+                way = step_map(form, constants, fading, w, centre, dt)
+            weight = now(constants.gravity * cosine(angle + w * dt))
+            group = shared(form, constants, reach, way, centre, dt, t[k], weighs, True)
+            after, clear = foreseen(form, flock, since, way, reach, centre, dt)
+            if not clear:
+                flock, many, left = dissolved(since, n, watched, many, y, v)
+            since = after
+            hits = step(form, constants, reach, group, w, n, watched, many, y, v, work, log, hits)
+            first, second, speed = sums_over(flock, since, many, work)
             if not form.keeps_position and escape_step < 0:
                 escape_slice = first_outside(y, n, middle)
                 escape_step = k if escape_slice >= 0 else -1
         if full:
-            copy_positions(y, frame, record.r[k])
-            copy(v, record.v[k])
+            write_all(flock, since, frame, n, watched, many, y, v, row_of(record.r[k]), row_of(record.v[k]), work)
         if form.lagged:
             offset = water_share * lagged_first
-            inertia[k] = inertia_about(frame, n, lagged_first, lagged_second, lagged_offset)
+            moment = inertia_about(frame, n, lagged_first, lagged_second, lagged_offset)
         else:
             offset = water_share * first
-            inertia[k] = inertia_about(frame, n, first, second, offset)
-        r_cm[k] = middle + offset
-        omega[k] = momentum / inertia[k]
-        theta[k] = theta[k - 1] + w * dt
-        if not (math.isfinite(omega[k]) and math.isfinite(theta[k]) and math.isfinite(second + speed)):
+            moment = inertia_about(frame, n, first, second, offset)
+        spin, angle = momentum / moment, angle + w * dt
+        put(theta, k, angle)
+        put(omega, k, spin)
+        put(r_cm, k, middle + offset)
+        put(inertia, k, moment)
+        if not (math.isfinite(spin) and math.isfinite(angle) and math.isfinite(second + speed)):
             break
         points = k + 1
 
@@ -885,5 +1174,5 @@ def fly(form, constants, frame, r0, t, dt: float, record, rebounds, memory) -> R
 
 
 def memory_for(n: int) -> FloatArray:
-    """Return the memory that ``fly`` works in, for n slices: two rows of lane groups and what keeps them apart."""
-    return np.empty(2 * (n + HALF_PAGE) + 3 * LANES + WORK)
+    """Return the memory that ``fly`` works in, for n slices: two rows of lane groups kept apart, work and a list."""
+    return np.empty(2 * (n + HALF_PAGE) + 3 * LANES + WORK + n // LANES + 1)

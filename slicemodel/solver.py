@@ -82,9 +82,8 @@ def solve(
         )
     from slicemodel import kernel
 
-    rows = (steps if store == "full" else 0, scenario.n_slices)
-    theta, omega, r_cm, inertia = (np.empty(steps) for _ in range(4))
-    record = kernel.Record(theta, omega, r_cm, inertia, np.empty(rows), np.empty(rows))
+    shape = (steps if store == "full" else 0, scenario.n_slices)
+    record = kernel.Record(np.empty((4, steps)), np.empty(shape), np.empty(shape))
     rebounds = np.empty((min(steps * scenario.n_slices // 4 + SURELY_LISTED, MOST_LISTED), 4))
     t = grid(scenario.duration, steps)
     constants = chosen.constants(scenario)
@@ -98,7 +97,8 @@ def solve(
 
 def grid(duration: float, steps: int) -> FloatArray:
     """Return ``numpy.linspace(0, duration, steps)``, without the time it takes to find out what it was given."""
-    t: FloatArray = np.arange(steps, dtype=np.float64) * (duration / (steps - 1))
+    t: FloatArray = np.arange(steps, dtype=np.float64)
+    t *= duration / (steps - 1)
     t[-1] = duration
     return t
 
@@ -157,17 +157,20 @@ def trajectory(
     """Return what the loop has written as a trajectory up to its last finite point."""
     status, message = _verdict(run, t)
     points = run.points
+    for array in (t, *record):
+        array.setflags(write=False)
+    theta, omega, r_cm, inertia = record.rows[:, :points]
     return Trajectory(
         scenario=scenario,
         solver="slicemodel",
         method=method,
         t=t[:points],
-        theta=record.theta[:points],
-        omega=record.omega[:points],
+        theta=theta,
+        omega=omega,
         r=record.r[:points],
         v=record.v[:points],
-        r_cm=record.r_cm[:points],
-        inertia=record.inertia[:points],
+        r_cm=r_cm,
+        inertia=inertia,
         impacts=impacts,
         status=status,
         message=message,

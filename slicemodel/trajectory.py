@@ -15,6 +15,8 @@ from slicemodel.scenario import Scenario
 
 FloatArray = NDArray[np.float64]
 
+DOUBLE = np.dtype(np.float64)
+
 BASE: Final = 1
 CAP: Final = -1
 
@@ -41,6 +43,15 @@ class Impact:
     speed_after: float
 
 
+IMPACT_FIELDS: Final = (
+    ("time", np.float64),
+    ("slice", np.int64),
+    ("end", np.int64),
+    ("speed_before", np.float64),
+    ("speed_after", np.float64),
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Impacts:
     """Impacts in order of time, held as arrays of shape (K,); iterating gives ``Impact`` records.
@@ -55,17 +66,12 @@ class Impacts:
     speed_after: FloatArray
 
     def __post_init__(self) -> None:
-        for name, kind in (
-            ("time", np.float64),
-            ("slice", np.int64),
-            ("end", np.int64),
-            ("speed_before", np.float64),
-            ("speed_after", np.float64),
-        ):
+        shape = (len(self.time),)
+        for name, kind in IMPACT_FIELDS:
             array = np.array(getattr(self, name), dtype=kind)
-            array.flags.writeable = False
+            array.setflags(write=False)
             object.__setattr__(self, name, array)
-            if array.shape != (len(self.time),):
+            if array.shape != shape:
                 raise ValueError("impact arrays must be one-dimensional and of one length")
 
     def __len__(self) -> int:
@@ -141,14 +147,17 @@ class Trajectory:
         object.__setattr__(self, "diagnostics", MappingProxyType(dict(self.diagnostics)))
         points, n = len(self.t), self.scenario.n_slices
         per_point, per_slice = ((points,),), ((points, n), (0, n))
-        for name in ("t", "theta", "omega", "r", "v", "r_cm", "inertia"):
-            values = _read_only(getattr(self, name))
-            object.__setattr__(self, name, values)
-            if values.shape not in (per_slice if name in ("r", "v") else per_point):
-                raise ValueError(f"{name} has shape {values.shape}, not {(points, n) if name in 'rv' else (points,)}")
-            if not _finite(values):
+        for name in ("t", "theta", "omega", "r_cm", "inertia", "r", "v"):
+            shapes = per_slice if name in ("r", "v") else per_point
+            given = getattr(self, name)
+            values = _read_only(given)
+            if values is not given:
+                object.__setattr__(self, name, values)
+            if values.shape not in shapes:
+                raise ValueError(f"{name} has shape {values.shape}, not {shapes[0]}")
+            if values.size and not _finite(values):
                 raise ValueError(f"{name} holds values that are not finite; return the run up to its last finite point")
-        if not (self.t[1:] > self.t[:-1]).all():
+        if np.count_nonzero(self.t[1:] > self.t[:-1]) < points - 1:
             raise ValueError("t does not increase")
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -178,6 +187,10 @@ def _finite(values: FloatArray) -> bool:
 
 def _read_only(values: ArrayLike) -> FloatArray:
     """Return ``values`` as a C-contiguous float64 array that cannot be written; copies only if it must."""
+    if type(values) is np.ndarray and values.dtype is DOUBLE:
+        flags = values.flags
+        if flags.c_contiguous and not flags.writeable:
+            return values
     array = np.ascontiguousarray(values, dtype=np.float64)
     if array.flags.writeable:
         array = array.view()
