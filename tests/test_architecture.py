@@ -60,3 +60,12 @@ def test_nouns_know_no_verb():
 def test_start_up_is_light(statement, heavy):
     code = f"import sys; {statement}; sys.exit({heavy!r} in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0, f"{heavy} is loaded"
+
+
+def test_a_relative_tolerance_says_what_holds_near_zero():
+    """``approx`` adds 1e-12 to every relative tolerance, which is a lot of a moment of inertia; say 0 or how much."""
+    for file in files_of("tests"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) == "approx":
+                given = {keyword.arg for keyword in node.keywords}
+                assert "rel" not in given or "abs" in given, f"{file}:{node.lineno}: approx with rel and without abs"

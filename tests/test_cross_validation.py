@@ -130,10 +130,10 @@ def test_all_three_start_from_the_same_state():
     runs = [slicemodel.solve(throw), ode_reference.solve(throw), engine_check.solve(throw, dt=engine_check.DEFAULT_DT)]
     for run in runs:
         np.testing.assert_allclose(run.r[0], throw.initial_positions(), rtol=0, atol=1e-12)
-        assert run.theta[0] == pytest.approx(throw.theta0, rel=1e-12)
-        assert run.omega[0] == pytest.approx(throw.omega0, rel=1e-6)
+        assert run.theta[0] == pytest.approx(throw.theta0, rel=1e-12, abs=0.0)
+        assert run.omega[0] == pytest.approx(throw.omega0, rel=1e-6, abs=0.0)
         assert run.r_cm[0] == pytest.approx(float(observables.centre_of_mass(throw, throw.initial_positions())))
-        assert run.inertia[0] == pytest.approx(observables.initial_moment_of_inertia(throw), rel=1e-12)
+        assert run.inertia[0] == pytest.approx(observables.initial_moment_of_inertia(throw), rel=1e-12, abs=0.0)
 
 
 def test_own_formulas_of_every_package_agree_with_the_shared_definitions():

@@ -83,7 +83,7 @@ def test_every_figure_is_drawn_in_the_place_kept_for_it(opened, report):
     )
     assert len(drawn) == len(report.exhibits)
     for natural, kept in drawn:
-        assert natural == pytest.approx(kept, rel=0.01)
+        assert natural == pytest.approx(kept, rel=0.01, abs=0.0)
 
 
 def test_headings_descend_one_level_at_a_time(opened):

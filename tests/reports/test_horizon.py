@@ -54,9 +54,9 @@ def made_up(change_of, spoil=None):
 def test_the_width_is_that_of_the_whole_ensemble_and_has_its_rate_and_horizon():
     growing = 1e-6 * np.exp(100 * T)
     found = ensemble(flight(0.0), flight(growing), flight(-growing))
-    assert found.width == pytest.approx(2 * growing, rel=1e-6)
+    assert found.width == pytest.approx(2 * growing, rel=1e-6, abs=0.0)
     assert found.horizon == pytest.approx(math.log(1e-3 / 2e-6) / 100, abs=1e-4)
-    assert found.growth.rate == pytest.approx(100, rel=1e-3)
+    assert found.growth.rate == pytest.approx(100, rel=1e-3, abs=0.0)
     assert found.growth.stop <= found.horizon
     assert found.largest == found.final == pytest.approx(2e-6 * math.exp(10))
     assert "beyond 0.001 from 62." in found.words
@@ -103,7 +103,7 @@ def test_the_plan_changes_one_thing_at_a_time(reach):
         turned = run.scenario.theta0 - usual.scenario.theta0
         changed = {name for name in run.settings if run.settings[name] is not usual.settings.get(name)} - {"times"}
         if "angle" in run.tag:
-            assert turned == pytest.approx(float(run.tag.split()[-1]), rel=1e-6)
+            assert turned == pytest.approx(float(run.tag.split()[-1]), rel=1e-6, abs=0.0)
             assert min(abs(abs(turned) / size - 1) for size in reach.sizes) < 1e-6
             assert run.scenario == replace(usual.scenario, theta0=run.scenario.theta0)
         if "order" in run.tag:
@@ -221,7 +221,7 @@ def test_free_flight_does_not_feel_the_angle_and_the_engine_only_by_arithmetic()
     for study in (engine, equation):
         assert claim_angle(study).verdict == "pass"
         for found, size in zip(study.of_kind("release"), SMALL.sizes, strict=True):
-            assert found.width[0] == pytest.approx(2 * size, rel=1e-5)
+            assert found.width[0] == pytest.approx(2 * size, rel=1e-5, abs=0.0)
     assert equation.of_kind("angle")[1].largest < 1e-13
     (order,) = engine.of_kind("order")
     assert 0.0 < order.largest < 1e-4

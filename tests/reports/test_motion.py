@@ -87,9 +87,9 @@ def test_the_page_holds_every_flight_to_the_steps_it_states():
     run = flown(points=FRAMES)
     packed = motion_data(THROW, made_of(run), ("eq8",))["flights"][0]
     assert packed["reached"] == FRAMES
-    assert unpacked(packed["theta"], "<f4") == pytest.approx(run.theta, rel=1e-6)
-    assert unpacked(packed["omega"], "<f4") == pytest.approx(run.omega, rel=1e-6)
-    assert unpacked(packed["r_cm"], "<f4") == pytest.approx(run.r_cm, rel=1e-6)
+    assert unpacked(packed["theta"], "<f4") == pytest.approx(run.theta, rel=1e-6, abs=0.0)
+    assert unpacked(packed["omega"], "<f4") == pytest.approx(run.omega, rel=1e-6, abs=0.0)
+    assert unpacked(packed["r_cm"], "<f4") == pytest.approx(run.r_cm, rel=1e-6, abs=0.0)
     r = unpacked(packed["r"], "<i2").reshape(FRAMES, 5) * POSITION_STEP
     assert r == pytest.approx(run.r / THROW.bottle.length, abs=0.51 * POSITION_STEP)
     assert packed["impacts"] is None
@@ -98,10 +98,10 @@ def test_the_page_holds_every_flight_to_the_steps_it_states():
 def test_impacts_keep_their_time_slice_end_and_speed():
     impacts = Impacts([0.1, 0.1, 0.25], [0, 300, 70_000], [1, -1, 1], [0.5, 0.6, 0.7], [0.2, 0.3, 0.4])
     found = motion_data(THROW, made_of(flown(impacts=impacts)), ("eq8",))["flights"][0]["impacts"]
-    assert unpacked(found["time"], "<f4") == pytest.approx([0.1, 0.1, 0.25], rel=1e-6)
+    assert unpacked(found["time"], "<f4") == pytest.approx([0.1, 0.1, 0.25], rel=1e-6, abs=0.0)
     assert unpacked(found["slice"], "<u4").tolist() == [0, 300, 70_000]
     assert unpacked(found["end"], "<i2").tolist() == [1, -1, 1]
-    assert unpacked(found["speed"], "<f4") == pytest.approx([0.5, 0.6, 0.7], rel=1e-6)
+    assert unpacked(found["speed"], "<f4") == pytest.approx([0.5, 0.6, 0.7], rel=1e-6, abs=0.0)
 
 
 def test_a_solver_that_failed_is_shown_with_its_reason_and_without_any_there_is_no_player():

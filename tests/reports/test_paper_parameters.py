@@ -80,7 +80,7 @@ def test_capacity_and_launch_speed_contradict_the_text_as_the_table_says():
     assert number("density") * math.pi * number("radius") ** 2 * number("length") == pytest.approx(1.407, abs=5e-4)
     assert "9.7 rad/s" in PARAMETERS["release-spin"].doubt
     assert number("launch-speed") / centre_of_mass_at_rest(throw) == pytest.approx(9.7, abs=0.05)
-    assert math.hypot(*throw.launch_velocity) == pytest.approx(number("launch-speed"), rel=2e-3)
+    assert math.hypot(*throw.launch_velocity) == pytest.approx(number("launch-speed"), rel=2e-3, abs=0.0)
 
 
 def test_the_caption_of_figure_5_contradicts_its_text_as_the_table_says():
@@ -113,7 +113,7 @@ def test_one_drag_for_all_slices_breaks_the_published_program_as_the_table_says(
 def test_the_throw_is_the_default_one():
     assert paper_throw() == Scenario()
     for case in family("filling"):
-        assert case.scenario.slice_mass == pytest.approx(1e-3, rel=1e-9)
+        assert case.scenario.slice_mass == pytest.approx(1e-3, rel=1e-9, abs=0.0)
         assert case.scenario.fill_fraction == pytest.approx(case.value)
 
 
@@ -137,15 +137,15 @@ def test_slices_vary_at_one_damping_rate(name):
 def test_the_aspect_ratio_changes_at_equal_volume():
     for aspect in numbers("figure-8c-aspect"):
         bottle = bottle_of_aspect(aspect)
-        assert bottle.length / (2 * bottle.radius) == pytest.approx(aspect, rel=1e-12)
-        assert bottle.length * bottle.radius**2 == pytest.approx(0.28 * 0.04**2, rel=1e-12)
+        assert bottle.length / (2 * bottle.radius) == pytest.approx(aspect, rel=1e-12, abs=0.0)
+        assert bottle.length * bottle.radius**2 == pytest.approx(0.28 * 0.04**2, rel=1e-12, abs=0.0)
     assert bottle_of_aspect(3.5) == paper_throw().bottle
 
 
 def test_the_long_flight_has_the_step_of_the_short_one():
     short, long = all_cases()[HALF_FULL], all_cases()[f"{HALF_FULL}, long"]
     step = [case.scenario.duration / (case.steps - 1) for case in (short, long)]
-    assert step[1] == pytest.approx(step[0], rel=1e-3)
+    assert step[1] == pytest.approx(step[0], rel=1e-3, abs=0.0)
     assert (long.steps - 1) % long.thin == 0
 
 
@@ -178,7 +178,7 @@ def test_the_plan_flies_every_case_with_its_damping_rate(size):
                 assert solver != PUBLISHED
                 assert case.steps < 1000 or case.scenario.n_slices > size.most_slices
                 continue
-            assert run.scenario.damping_rate == pytest.approx(case.scenario.damping_rate, rel=1e-12)
+            assert run.scenario.damping_rate == pytest.approx(case.scenario.damping_rate, rel=1e-12, abs=0.0)
             same = replace(run.scenario, n_slices=case.scenario.n_slices, drag=case.scenario.drag)
             assert same == case.scenario
             most = size.most_slices if case.slices_vary else size.slices

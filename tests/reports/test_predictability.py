@@ -53,7 +53,7 @@ def members(law, **options):
 @pytest.mark.parametrize("rate", [-20.0, 3.0, 40.0])
 def test_an_exponential_has_its_rate(rate):
     growth = fit_growth(T, 1e-6 * np.exp(rate * T))
-    assert growth.rate == pytest.approx(rate, rel=1e-6)
+    assert growth.rate == pytest.approx(rate, rel=1e-6, abs=0.0)
     assert growth.error < 1e-6
     assert growth.words.startswith("grows" if rate > 0 else "shrinks")
 
@@ -89,8 +89,8 @@ def test_growth_before_and_after_a_parting_and_the_impact_it_follows():
     other = flight(change, impacts=impacts)
     parting = study_parting_growth(study_difference("x", flight(), other), impacts)
     assert parting.time == pytest.approx(0.2, abs=1e-3)
-    assert parting.before.rate == pytest.approx(60, rel=0.02)
-    assert parting.after.rate == pytest.approx(10, rel=0.05)
+    assert parting.before.rate == pytest.approx(60, rel=0.02, abs=0.0)
+    assert parting.after.rate == pytest.approx(10, rel=0.05, abs=0.0)
     assert (parting.impact.time, parting.impact.end, parting.k) == (0.199, "base", 2)
     assert "2nd impact of slice 0 on the base" in parting.words
 
@@ -107,8 +107,8 @@ def test_the_plan_changes_angle_and_spin_by_each_size_both_ways():
     plan = plan_predictability(THROW, "eq8", sizes=(1e-6, 1e-8), members=4, settings={"rtol": 1e-9})
     assert [len(level) for level in plan] == [4, 4]
     changes = np.array([[(r.scenario.theta0 - THROW.theta0, r.scenario.omega0 / 20 - 1) for r in x] for x in plan])
-    assert np.abs(changes[0]) == pytest.approx(1e-8, rel=1e-6)
-    assert np.abs(changes[1]) == pytest.approx(1e-6, rel=1e-6)
+    assert np.abs(changes[0]) == pytest.approx(1e-8, rel=1e-6, abs=0.0)
+    assert np.abs(changes[1]) == pytest.approx(1e-6, rel=1e-6, abs=0.0)
     assert len({tuple(np.sign(pair)) for pair in changes[0]}) == 4
     assert len({run.tag for level in plan for run in level}) == 8
     assert all(run.settings == {"rtol": 1e-9} for level in plan for run in level)
@@ -123,11 +123,11 @@ def test_an_impossible_plan_is_refused(options):
 def test_a_smooth_flight_has_a_horizon_for_each_size_and_for_round_off():
     study = study_predictability(flight(), members(lambda size: size * np.exp(40 * T)))
     expected = [math.log(1e-3 / size) / 40 for size in SIZES]
-    assert study.sizes == pytest.approx(SIZES, rel=1e-6)
+    assert study.sizes == pytest.approx(SIZES, rel=1e-6, abs=0.0)
     assert study.horizons == pytest.approx(expected, abs=1e-3)
     assert study.horizon == pytest.approx(expected[-1], abs=1e-3)
-    assert study.largest_amplification == pytest.approx(math.exp(20), rel=1e-4)
-    assert [growth.rate for growth in study.growths] == pytest.approx([40] * 4, rel=1e-3)
+    assert study.largest_amplification == pytest.approx(math.exp(20), rel=1e-4, abs=0.0)
+    assert [growth.rate for growth in study.growths] == pytest.approx([40] * 4, rel=1e-3, abs=0.0)
     assert study.round_off_horizon is None
     assert study.rough_from is None
     steep = study_predictability(flight(), members(lambda size: size * np.exp(60 * T)))
@@ -145,7 +145,7 @@ def test_a_flight_without_growth_is_predictable_to_the_end():
 def test_a_jump_that_does_not_care_for_the_size_is_said_so():
     study = study_predictability(flight(), members(lambda size: np.where(T < 0.2, size, 3e-4)))
     assert study.rough_from == pytest.approx(0.2, abs=1e-3)
-    assert study.largest_amplification == pytest.approx([3e5, 3e4, 3e3, 3e2], rel=1e-3)
+    assert study.largest_amplification == pytest.approx([3e5, 3e4, 3e3, 3e2], rel=1e-3, abs=0.0)
     assert "nothing is extrapolated" in study.words
 
 
@@ -172,7 +172,7 @@ def test_eq8_is_smooth_and_ice_amplifies_nothing():
     for solver, throw, most in (("eq8", Scenario().with_slices(8), 100), ("midpoint", Scenario(frozen=True), 1.001)):
         levels = [[make(run).trajectory for run in level] for level in plan_predictability(throw, solver, (1e-7, 1e-6))]
         study = study_predictability(solve(solver, throw), levels)
-        assert study.spread[:, 0] == pytest.approx(study.sizes, rel=1e-6)
+        assert study.spread[:, 0] == pytest.approx(study.sizes, rel=1e-6, abs=0.0)
         assert study.largest_amplification.min() > 0.999
         assert study.largest_amplification.max() < most
         assert study.horizon is None

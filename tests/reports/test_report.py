@@ -115,14 +115,14 @@ def test_the_csv_of_a_figure_is_what_is_drawn(evidence, report):
     for tag in FLIGHTS:
         run = evidence.trajectory(tag)
         column = [float(row[f"omega/omega_0 {run.label} [1]"]) for row in tables["omega"]]
-        assert column == pytest.approx(run.omega / run.scenario.omega0, rel=1e-8)
+        assert column == pytest.approx(run.omega / run.scenario.omega0, rel=1e-8, abs=0.0)
     for difference in evidence.differences:
         column = [float(row[f"difference in omega/omega_0: {difference.name} [1]"]) for row in tables["differences"]]
-        assert max(map(abs, column)) == pytest.approx(difference.largest, rel=1e-8)
+        assert max(map(abs, column)) == pytest.approx(difference.largest, rel=1e-8, abs=0.0)
     waterfall = evidence.attribution.waterfalls[0]
     bars = [float(row["mean of all orders [1]"]) for row in tables["waterfall"]]
     assert sum(bars[:-1]) == pytest.approx(bars[-1], abs=1e-7)
-    assert bars[-1] == pytest.approx(waterfall.end, rel=1e-8)
+    assert bars[-1] == pytest.approx(waterfall.end, rel=1e-8, abs=0.0)
 
 
 def test_workers_draw_the_same_bytes_in_the_same_order(evidence, report):

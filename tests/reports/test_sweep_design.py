@@ -84,7 +84,7 @@ def test_derived_fields_set_what_they_are_made_of():
     text = GRID.replace("bottle.length = {from = 0.2, to = 0.3, count = 3}", "damping_rate = [3.0]\nn_slices = [4, 9]")
     for number in range(read(text).throws):
         throw = read("[bottle]\ncapacity = 0.8\n" + text).point(number).scenario()
-        assert throw.damping_rate == pytest.approx(3.0, rel=1e-15)
+        assert throw.damping_rate == pytest.approx(3.0, rel=1e-15, abs=0.0)
     assert throw.water_mass == 0.5 * 0.8
     assert throw.n_slices == 9
 
@@ -94,7 +94,7 @@ def test_log_ranges_have_equal_ratios_and_exact_ends():
     (axis, _) = read(text).axes
     assert axis.values[0] == 0.001
     assert axis.values[-1] == 1.0
-    assert axis.values == pytest.approx((0.001, 0.01, 0.1, 1.0), rel=1e-14)
+    assert axis.values == pytest.approx((0.001, 0.01, 0.1, 1.0), rel=1e-14, abs=0.0)
 
 
 def test_a_latin_hypercube_has_one_sample_in_every_part():

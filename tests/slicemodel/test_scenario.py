@@ -91,8 +91,8 @@ def test_geometry():
     r = scenario.initial_positions()
     assert r.shape == (100,)
     assert r[0] == scenario.r_max == 0.28 - 0.14 / 200
-    assert r[-1] == pytest.approx(0.14 + 0.14 / 200, rel=1e-14)
-    assert scenario.r_min == pytest.approx(0.14 / 200, rel=1e-14)
+    assert r[-1] == pytest.approx(0.14 + 0.14 / 200, rel=1e-14, abs=0.0)
+    assert scenario.r_min == pytest.approx(0.14 / 200, rel=1e-14, abs=0.0)
     assert scenario.damping_rate == pytest.approx(0.01 / (2 * 0.005))
     np.testing.assert_allclose(np.diff(r), -scenario.slice_height, rtol=1e-12)
 
@@ -100,7 +100,7 @@ def test_geometry():
 def test_with_slices_keeps_the_damping_rate():
     scenario = Scenario().with_slices(50)
     assert scenario.n_slices == 50
-    assert scenario.damping_rate == pytest.approx(5.0, rel=1e-14)
+    assert scenario.damping_rate == pytest.approx(5.0, rel=1e-14, abs=0.0)
     assert scenario.water_mass == 0.5
     with pytest.raises(ScenarioError, match="n_slices = 0"):
         Scenario().with_slices(0)

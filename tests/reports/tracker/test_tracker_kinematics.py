@@ -176,7 +176,7 @@ def test_the_band_holds_what_noise_does():
         assert ratio.min() > 0.7
         assert ratio.max() < 1.35
     noise = np.mean([film.theta_noise for film in films])
-    assert noise == pytest.approx(math.sqrt(2) * 1e-3 / LENGTH, rel=0.05)
+    assert noise == pytest.approx(math.sqrt(2) * 1e-3 / LENGTH, rel=0.05, abs=0.0)
 
 
 def test_omega_of_the_paper_is_noisier():
@@ -188,7 +188,7 @@ def test_omega_of_the_paper_is_noisier():
 def test_times_of_few_digits_do_not_spoil_omega(digits):
     printed = np.round(T, digits)
     spin = spin_of(printed, 1 + 20 * T, resolution=0.5 * 10.0**-digits)
-    assert spin.frame_time == pytest.approx(1 / 240, rel=2e-4)
+    assert spin.frame_time == pytest.approx(1 / 240, rel=2e-4, abs=0.0)
     assert np.abs(spin.omega - 20).max() < 0.01
     assert np.isfinite(spin.omega).all()
 
