@@ -754,42 +754,57 @@ def struck_or_resting(group, y_old, v_old, v, y):
     return (turned | above(size_of(y), group.reach)) & ~resting, resting
 
 
-@compiled
-def glide(common, n: int, watched, j: int, many: int, y, v, work, log, count: int):
-    """Move the watched lane groups from the j-th on until a slice hits an end in the step; return where, and rebounds.
+@merged
+def keep(work, first, second, speed) -> None:
+    """Write the partial sums of y, y^2 and v."""
+    store(work, 0, first)
+    store(work, LANES, second)
+    store(work, 2 * LANES, speed)
 
-    A trial, which only predicts sums, does not stop for hits: it need not know them better than to second order.
+
+@compiled
+def glide(common, n: int, watched, many: int, j: int, i: int, y, v, work, log, count: int):
+    """Move the watched slices, from number ``i`` in stretch ``j`` on, until one hits an end inside the step.
+
+    Return where, and the count of rebounds; j = ``many`` if there is none left. An ``i`` < 0 begins a step. A trial,
+    which only predicts sums, does not stop for hits: it need not know them better than to second order.
     """
     stands_alone()
     group, zero = spread(common), everywhere(0.0)
     first = second = speed = zero
-    if j > 0:
-        first, second, speed = load(work, 0), load(work, LANES), load(work, 2 * LANES)
-    while j < many:
+    if i < 0:
         i = int(get(watched, j))
-        y_old, v_old = load(y, i), load(v, i)
-        y_new, v_new = moved(group.way, n - i, y_old, v_old)
-        if at_an_end(group, v_old, v_new, y_new):
-            if group.in_step:
-                struck, resting = struck_or_resting(group, y_old, v_old, v_new, y_new)
-                if struck:
-                    if group.kept:
-                        break
-                    y_new, v_new = mirrored(group, y_new, v_new)
-                y_new, v_new = where(resting, y_old, y_new), where(resting, zero, v_new)
-            else:
-                y_new, v_new, count = rebound_on_grid(group, i, y_old, y_new, v_new, work, log, count)
-        if group.kept:
-            store(y, i, y_new)
-            store(v, i, v_new)
-        first, second = first + y_new, fma(y_new, y_new, second)
-        if group.weighs_velocities:
-            speed = speed + v_new
-        j += 1
-    store(work, 0, first)
-    store(work, LANES, second)
-    store(work, 2 * LANES, speed)
-    return j, count
+    else:
+        first, second, speed = load(work, 0), load(work, LANES), load(work, 2 * LANES)
+    while True:
+        end = int(get(watched, j + 1))
+        while i < end:
+            y_old, v_old = load(y, i), load(v, i)
+            y_new, v_new = moved(group.way, n - i, y_old, v_old)
+            if at_an_end(group, v_old, v_new, y_new):
+                if group.in_step:
+                    struck, resting = struck_or_resting(group, y_old, v_old, v_new, y_new)
+                    if struck:
+                        if group.kept:
+                            keep(work, first, second, speed)
+                            return j, i, count
+                        y_new, v_new = mirrored(group, y_new, v_new)
+                    y_new, v_new = where(resting, y_old, y_new), where(resting, zero, v_new)
+                else:
+                    y_new, v_new, count = rebound_on_grid(group, i, y_old, y_new, v_new, work, log, count)
+            if group.kept:
+                store(y, i, y_new)
+                store(v, i, v_new)
+            first, second = first + y_new, fma(y_new, y_new, second)
+            if group.weighs_velocities:
+                speed = speed + v_new
+            i += LANES
+        j += 2
+        if j >= many:
+            break
+        i = int(get(watched, j))
+    keep(work, first, second, speed)
+    return j, i, count
 
 
 @merged
@@ -824,17 +839,16 @@ def follow(form, constants, reach: float, common, omega: float, i: int, n: int, 
 @merged
 def step(form, constants, reach: float, group, omega: float, n: int, watched, many: int, y, v, work, log, count: int):
     """Move the watched slices by one step, unless it is a trial; return the count of rebounds, and sums in ``work``."""
-    j = 0
+    j, i = 0, -1
     while j < many:
-        j, count = glide(group, n, watched, j, many, y, v, work, log, count)
+        j, i, count = glide(group, n, watched, many, j, i, y, v, work, log, count)
         if j < many:
             # Only a step that is kept gets here: a trial stops for nothing.
-            i = int(get(watched, j))
             y_new, v_new, count = follow(form, constants, reach, group, omega, i, n, y, v, work, log, count)
             store(y, i, y_new)
             store(v, i, v_new)
             add(work, y_new, v_new)
-            j += 1
+            i += LANES
     return count
 
 
@@ -924,32 +938,31 @@ def dip(one, reach: float, centre: float, dt: float) -> float:
 def settle(map_since, n: int, watched, many: int, y, v) -> None:
     """Move the slices of the flock to where they are."""
     way, begin = in_lanes(map_since), 0
-    for j in range(many + 1):
+    for j in range(0, many + 2, 2):
         end = int(get(watched, j)) if j < many else n
         for i in range(begin, end, LANES):
             y_new, v_new = moved(way, n - i, load(y, i), load(v, i))
             store(y, i, y_new)
             store(v, i, v_new)
-        begin = end + LANES
+        begin = int(get(watched, j + 1)) if j < many else n
 
 
 @merged
 def all_watched(n: int, watched) -> int:
-    """List every lane group as watched; return how many there are."""
-    many = 0
-    for i in range(0, n, LANES):
-        put(watched, many, float(i))
-        many += 1
-    return many
+    """List all slices as watched, which are one stretch; return how many numbers are listed."""
+    put(watched, 0, 0.0)
+    put(watched, 1, float(n))
+    return 2
 
 
 @compiled
 def gathered(
     form, constants, reach: float, omega: float, centre: float, dt: float, margin: float, n: int, watched, y, v
 ):  # fmt: skip
-    """Return a flock of lane groups that should stay clear of the ends, how many are watched, and for how many steps.
+    """Return a flock of lane groups that should stay clear of the ends, and for how many steps.
 
-    Where they will be is only estimated here; ``clear_of_ends`` looks after it at every step.
+    Between the two: how many numbers are listed in ``watched``, where stretches of all others begin and end. Where
+    slices will be is only estimated here; ``clear_of_ends`` looks after it at every step.
     """
     k_squared = growth_rate_squared(form, constants, omega)
     force = k_squared * (reach + abs(centre))
@@ -965,6 +978,7 @@ def gathered(
     low = max(-room, centre - (room + centre) / growth)
     middle, half_width, ahead = everywhere(0.5 * (low + high)), everywhere(0.5 * (high - low)), everywhere(horizon)
     count = many = 0
+    ended = -1
     sum_y = sum_v = sum_y_y = sum_y_v = sum_v_v = everywhere(0.0)
     for i in range(0, n, LANES):
         y_i, v_i = load(y, i), load(v, i)
@@ -974,9 +988,12 @@ def gathered(
             sum_y, sum_v = sum_y + y_i, sum_v + v_i
             sum_y_y, sum_y_v, sum_v_v = fma(y_i, y_i, sum_y_y), fma(y_i, v_i, sum_y_v), fma(v_i, v_i, sum_v_v)
             count += min(LANES, n - i)
-        else:
+            continue
+        if i != ended:
             put(watched, many, float(i))
-            many += 1
+            many += 2
+        ended = i + LANES
+        put(watched, many - 1, float(ended))
     flock = Flock(
         float(count), total(sum_y), total(sum_v), total(sum_y_y), total(sum_y_v), total(sum_v_v), low, high, horizon
     )  # fmt: skip
@@ -1034,9 +1051,9 @@ def write_all(flock, since, frame, n: int, watched, many: int, y, v, to_r, to_v,
         for i in range(0, n, LANES):
             y_i, v_i = moved(way, n - i, load(y, i), load(v, i))
             write_slices(frame, i, n, y_i, v_i, to_r, to_v, work)
-    for j in range(many):
-        i = int(get(watched, j))
-        write_slices(frame, i, n, load(y, i), load(v, i), to_r, to_v, work)
+    for j in range(0, many, 2):
+        for i in range(int(get(watched, j)), int(get(watched, j + 1)), LANES):
+            write_slices(frame, i, n, load(y, i), load(v, i), to_r, to_v, work)
 
 
 @compiled
@@ -1050,7 +1067,7 @@ def first_outside(y, n: int, half_length: float) -> int:
 
 @compiled
 def shares_of(memory: FloatArray, n: int):
-    """Return the parts of ``memory_for(n)``: lane groups of y and of v on 64-byte boundaries, work, and watched groups.
+    """Return the parts of ``memory_for(n)``: lane groups of y and of v on 64-byte boundaries, work, and a list.
 
     Rows are half a page apart, plus pages: a processor that compares the last 12 bits of addresses only would take what
     it reads of v for what it has just written of y.
@@ -1175,4 +1192,4 @@ def fly(form, constants, frame, r0, t, dt: float, record, rebounds, memory) -> R
 
 def memory_for(n: int) -> FloatArray:
     """Return the memory that ``fly`` works in, for n slices: two rows of lane groups kept apart, work and a list."""
-    return np.empty(2 * (n + HALF_PAGE) + 3 * LANES + WORK + n // LANES + 1)
+    return np.empty(2 * (n + HALF_PAGE) + 3 * LANES + WORK + n // LANES + 3)
