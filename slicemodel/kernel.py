@@ -382,7 +382,16 @@ def cosine(x: float) -> float:
 
 @merged
 def decay(x: float):
-    """Return exp(-x) - 1 and exp(-x) for x >= 0; for small x from h = sinh(x / 2): exp(-x / 2) = sqrt(1 + h^2) - h."""
+    """Return exp(-x) - 1 and exp(-x) for x >= 0.
+
+    By the series for very small x; for small x from h = sinh(x / 2), because exp(-x / 2) = sqrt(1 + h^2) - h.
+    """
+    if x < SHORT_SERIES:
+        y = x * x
+        high = fused(y, fused(-x, 1.0 / 40320.0, 1.0 / 5040.0), fused(-x, 1.0 / 720.0, 1.0 / 120.0))
+        low = fused(y, fused(-x, 1.0 / 24.0, 1.0 / 6.0), fused(-x, 0.5, 1.0))
+        gone = x * fused(y * y, high, low)
+        return -gone, 1.0 - gone
     if x < SERIES:
         h = sinh(0.5 * x)
         root = math.sqrt(fused(h, h, 1.0)) - h
@@ -477,8 +486,8 @@ def first_guess(gamma: float, omega: float, x: float, v: float, way: float, end:
     snap = omega * omega * force - 2.0 * gamma * jerk
     root = end * math.sqrt(max(v * v + 2.0 * force * way, 0.0))
     t = 2.0 * way / (v + root) if end * v > 0.0 else (root - v) / force
-    made = t * (v + t * (force / 2.0 + t * (jerk / 6.0 + t * (snap / 24.0))))
-    speed = v + t * (force + t * (jerk / 2.0 + t * (snap / 6.0)))
+    made = t * (v + t * (0.5 * force + t * (1.0 / 6.0 * jerk + t * (1.0 / 24.0 * snap))))
+    speed = v + t * (force + t * (0.5 * jerk + t * (1.0 / 6.0 * snap)))
     return t - (made - way) / speed
 
 
