@@ -58,7 +58,7 @@ def processor() -> str:
 def rows(facts: dict[str, Any]) -> list[tuple[str, str, str]]:
     """Return what is measured, how much it is, and what is asked."""
     loop, limits = facts["kernel"]["measured"], facts["kernel"]["limits"]
-    table = [(name, f"{value:.3g}", limits[name]) for name, value in loop.items()]
+    table = [(name, f"{value:.0f}" if value >= 100 else f"{value:.3g}", limits[name]) for name, value in loop.items()]
     share, times = facts["kernel"]["fraction_of_arithmetic_limit"], facts["kernel"]["times_the_arithmetic_limit"]
     table += [
         (f"every slice looked at, N = {n}: share of what the vector units could do", f"{100 * share[n]:.0f} %", "")

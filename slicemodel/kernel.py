@@ -20,7 +20,8 @@ The instructions are written out, because no compiler may put eight sums in the 
 decides the last digit. Here the order is part of the program, and so is where a product and a sum are rounded once
 (fma): the same on every machine, however wide its registers are.
 
-All compiled functions live in this one file: numba's cache does not notice a change in a helper elsewhere.
+All compiled functions live in this one file: numba's cache does not notice a change in a helper elsewhere. A whole
+number that a loop changes starts as ``np.int64``: what it is given would be compiled twice for a literal.
 """
 
 from __future__ import annotations
@@ -848,7 +849,7 @@ def follow(form, constants, reach: float, common, omega: float, i: int, n: int, 
 @merged
 def step(form, constants, reach: float, group, omega: float, n: int, watched, many: int, y, v, work, log, count: int):
     """Move the watched slices by one step, unless it is a trial; return the count of rebounds, and sums in ``work``."""
-    j, i = 0, -1
+    j, i = np.int64(0), np.int64(-1)
     while j < many:
         j, i, count = glide(group, n, watched, many, j, i, y, v, work, log, count)
         if j < many:
@@ -961,7 +962,7 @@ def all_watched(n: int, watched) -> int:
     """List all slices as watched, which are one stretch; return how many numbers are listed."""
     put(watched, 0, 0.0)
     put(watched, 1, float(n))
-    return 2
+    return np.int64(2)
 
 
 @compiled
@@ -1109,7 +1110,7 @@ def fly(form, constants, frame, r0, t, dt: float, record, rebounds, memory) -> R
     reach = frame.r_max - middle
     water_share = (1.0 - constants.bottle_share) / n
     fading = decay(constants.gamma * dt)
-    hits = 0
+    hits = np.int64(0)
     escape_step = escape_slice = -1
     positions, velocities, rest, list_of_watched = shares_of(memory, n)
     positions[:], velocities[:], rest[:] = 0.0, 0.0, 0.0
@@ -1122,7 +1123,8 @@ def fly(form, constants, frame, r0, t, dt: float, record, rebounds, memory) -> R
     log = Log(row_of(rebounds), len(rebounds))
     full = len(record.r) > 0
     if full:
-        record.r[0], record.v[0] = r0, 0.0
+        for i in range(n):
+            record.r[0, i], record.v[0, i] = r0[i], 0.0
     # Velocities are added up for who asks for their mean, and where a number that overflows must be seen at once.
     weighs = form.follows_cm or full or not form.keeps_position
 
