@@ -64,6 +64,9 @@ SATURATED: Final = 0.2
 LEAST_SPAN: Final = 1.5
 """Cost must grow by this factor at least for an error to have a slope in it."""
 
+LAWLESS: Final = 0.25
+"""Standard error of a slope above which errors follow no law, in units of the slope or of 1, whichever is more."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reference:
@@ -372,6 +375,9 @@ def _curve(rival: Contender, points: tuple[Point, ...], held: Mapping[str, Any],
     if not reason:
         step = np.array([[1.0 / point.work] for point in used])
         slope, slope_error = observed_order(step, np.array([[point.error] for point in used]))
+        if slope_error > LAWLESS * max(1.0, abs(slope)):
+            reason = f"errors fall by no law of cost: {slope:.1f} ± {slope_error:.1f}"
+            slope = slope_error = math.nan
     return Curve(contender=rival, points=points, held=held, slope=slope, slope_error=slope_error, slope_reason=reason)
 
 

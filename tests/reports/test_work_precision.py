@@ -227,6 +227,14 @@ def test_errors_near_the_floor_and_saturated_ones_bend_no_slope(monkeypatch):
     assert [point.at_floor for point in found.points] == [False, False, False, False, False, True, True]
 
 
+def test_errors_that_follow_no_law_have_no_slope_and_say_so(monkeypatch):
+    _, found = studied(monkeypatch, [1e-2, 0.99e-2, 0.98e-2, 1e-7])
+    assert math.isnan(found.slope)
+    assert found.slope_reason.startswith("errors fall by no law of cost: ")
+    _, found = studied(monkeypatch, [1e-2, 5.2e-3, 2.4e-3, 1.3e-3])
+    assert found.slope == pytest.approx(1.0, abs=0.1)
+
+
 def test_too_few_levels_have_no_slope_and_say_so(monkeypatch):
     _, found = studied(monkeypatch, [1e-2, 1e-3])
     assert math.isnan(found.slope)
