@@ -958,7 +958,7 @@ def settle(map_since, n: int, watched, many: int, y, v) -> None:
 
 
 @merged
-def all_watched(n: int, watched) -> int:
+def all_watched(n: int, watched) -> Any:
     """List all slices as watched, which are one stretch; return how many numbers are listed."""
     put(watched, 0, 0.0)
     put(watched, 1, float(n))
@@ -1110,7 +1110,7 @@ def fly(form, constants, frame, r0, t, dt: float, record, rebounds, memory) -> R
     reach = frame.r_max - middle
     water_share = (1.0 - constants.bottle_share) / n
     fading = decay(constants.gamma * dt)
-    hits = np.int64(0)
+    hits: Any = np.int64(0)
     escape_step = escape_slice = -1
     positions, velocities, rest, list_of_watched = shares_of(memory, n)
     positions[:], velocities[:], rest[:] = 0.0, 0.0, 0.0
