@@ -21,7 +21,7 @@ decides the last digit. Here the order is part of the program, and so is where a
 (fma): the same on every machine, however wide its registers are.
 
 All compiled functions live in this one file: numba's cache does not notice a change in a helper elsewhere. A whole
-number that a loop changes starts as ``np.int64``: what it is given would be compiled twice for a literal.
+number that a loop hands on starts as ``np.int64``: for a literal, what it is handed to would be compiled once more.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ AT_LEAST_TOGETHER = 4
 """Steps a flock has to last to be worth gathering."""
 
 PUSHED = 0.03
-"""How far forces move a slice while it is in a flock, at most, in units of L/2."""
+"""About how far forces move a slice while it is in a flock, in units of L/2; sets for how long a flock is gathered."""
 
 SPARE = 0.005
 """Room that a flock leaves for what omega, theta and the centre of mass do meanwhile, in units of L/2."""
@@ -72,7 +72,10 @@ SERIES = 0.5
 """Arguments below which sinh and cosh are summed up from their series; the first term left out is 5e-17 of the sum."""
 
 SHORT_SERIES = 0.03
-"""Arguments below which four terms do; the fifth is 2e-18 of the sum."""
+"""Arguments below which a few terms do: four of sinh and cosh, eight of exp; the next is 2e-18 of the sum."""
+
+MOST_RADIANS = 1e15
+"""Angle up to which multiples of pi are taken off by hand."""
 
 REST_OF_PI = 1.2246467991473532e-16
 """pi less the number nearest to it."""
@@ -239,12 +242,6 @@ def fused(builder: Any, x: Any, y: Any, z: Any) -> Any:
     return builder.fma(x, y, z)
 
 
-@instructions(number, number)
-def now(builder: Any, x: Any) -> Any:
-    """Return x, worked out before what follows: compilers put off what is not needed yet."""
-    return builder.asm(ir.FunctionType(ir.DoubleType(), [ir.DoubleType()]), "", "=x,0", [x], side_effect=True)
-
-
 @instructions(lanes, lanes)
 def size_of(builder: Any, x: Any) -> Any:
     """Return |x|."""
@@ -362,10 +359,13 @@ def sinh(x: float) -> float:
 
 @merged
 def cosine(x: float) -> float:
-    """Return cos x to 3e-16, of any x: as (-1)^n cos(x - n pi) with the nearest n, by its series.
+    """Return cos x to 3e-16: as (-1)^n cos(x - n pi) with the nearest n, by its series.
 
-    The library's own would take a fifth of a step, and its last digit may be another one on another machine.
+    The library's own would take a fifth of a step, and its last digit may be another one on another machine. It is
+    left with angles whose n has more digits than a number.
     """
+    if not abs(x) < MOST_RADIANS:
+        return math.cos(x)
     n = np.floor(fused(x, 1.0 / math.pi, 0.5))
     x = fused(-n, REST_OF_PI, fused(-n, math.pi, x))
     y = x * x
@@ -910,7 +910,7 @@ def sums_of(flock, way):
 
 @merged
 def sums_over(flock, since, many: int, work):
-    """Return the sums of y, y^2 and v over all slices; ``work`` begins with partial sums of those that are watched."""
+    """Return the sums of y, y^2 and, if they are weighed, v over all slices; ``work`` begins with the watched ones'."""
     first = second = speed = 0.0
     if flock.n > 0.0:
         first, second, speed = sums_of(flock, since)
@@ -923,13 +923,13 @@ def sums_over(flock, since, many: int, work):
 
 @merged
 def clear_of_ends(flock, way, reach: float, margin: float) -> bool:
-    """Return whether surely no slice of the flock is nearer than ``margin`` to an end; never true of NaN.
+    """Return whether surely no slice of the flock is nearer than ``margin`` to an end; never true of NaN or below 0.
 
     The map puts a slice at a y0 + b v0 + push = (a - b / horizon) y0 + (b / horizon) (y0 + horizon v0) + push. As long
     as both weights are positive that is at most a high + push, and at least a low + push.
     """
     room = (1.0 - CLEAR) * reach - margin
-    foreseeable = 0.0 <= way.b <= (1.0 + way.a_minus_1) * flock.horizon
+    foreseeable = margin >= 0.0 and 0.0 <= way.b <= (1.0 + way.a_minus_1) * flock.horizon
     highest = flock.high + fused(way.a_minus_1, flock.high, way.push)
     deepest = flock.low + fused(way.a_minus_1, flock.low, way.push)
     return bool(foreseeable and highest < room and deepest > -room)
@@ -939,7 +939,8 @@ def clear_of_ends(flock, way, reach: float, margin: float) -> bool:
 def dip(one, reach: float, centre: float, dt: float) -> float:
     """Return how far a slice that turns inside a step may go beyond where it was before, at most v dt.
 
-    It turns if v and v' = c (y - y*) + d v differ in sign: then |v| is at most c |y - y*| / d.
+    It turns if v and v' = c (y - y*) + d v differ in sign: then |v| is at most c |y - y*| / d, with d > 0. That holds
+    of exact roots in the short steps of a flock; ``clear_of_ends`` refuses anything else.
     """
     return float(dt * one.c / one.d * (reach + abs(centre)))
 
@@ -981,8 +982,9 @@ def gathered(
     if steps < AT_LEAST_TOGETHER or form.cosh_sign < 0.0:
         return nobody(), all_watched(n, watched), AT_MOST_TOGETHER
     horizon = steps * dt * (1.0 + CLEAR)
+    # What cosh(k horizon) is at most, and a tenth more; the centre of repulsion and omega change on the way, for which
+    # some room is left. A slice at ``high`` is then carried from the centre to ``room``.
     growth = 1.0 + 0.55 * k_squared * horizon * horizon
-    # The centre of repulsion and omega change on the way, to which some room is left.
     room = (1.0 - SPARE) * reach - margin
     high = min(room, centre + (room - centre) / growth)
     low = max(-room, centre - (room + centre) / growth)
@@ -1016,17 +1018,18 @@ def foreseen(form, flock, since, one, reach: float, centre: float, dt: float):
     if flock.n == 0.0:
         return since, True
     after = followed(since, one)
+    clear = clear_of_ends(flock, after, reach, 0.0)
     if form.in_step:
-        margin = dip(one, reach, centre, dt)
-        return after, clear_of_ends(flock, since, reach, margin) and clear_of_ends(flock, after, reach, margin)
-    return after, clear_of_ends(flock, after, reach, 0.0)
+        # A slice that does not turn is between its two places; one that turns dips beyond the first.
+        clear &= clear_of_ends(flock, since, reach, dip(one, reach, centre, dt))
+    return after, clear
 
 
 @compiled
 def dissolved(since, n: int, watched, many: int, y, v):
-    """Move the slices of the flock to where they are and watch all; return what ``gathered`` does, for the moment."""
+    """Move the slices of the flock to where they are and watch all; return what ``gathered`` does, for a few steps."""
     settle(since, n, watched, many, y, v)
-    return nobody(), all_watched(n, watched), 0
+    return nobody(), all_watched(n, watched), AT_LEAST_TOGETHER
 
 
 # ---------------------------------------------------------------------- the whole flight
@@ -1128,7 +1131,7 @@ def fly(form, constants, frame, r0, t, dt: float, record, rebounds, memory) -> R
     # Velocities are added up for who asks for their mean, and where a number that overflows must be seen at once.
     weighs = form.follows_cm or full or not form.keeps_position
 
-    flock, since, many, left = nobody(), standstill(), all_watched(n, watched), 0
+    flock, since, many, steps_left = nobody(), standstill(), all_watched(n, watched), 0
     for i in range(0, n, LANES):
         add(work, load(y, i), everywhere(0.0))
     first, second, speed = sums_over(flock, since, many, work)
@@ -1150,12 +1153,12 @@ def fly(form, constants, frame, r0, t, dt: float, record, rebounds, memory) -> R
         if not frame.frozen:
             centre = centre_of_repulsion(form, constants, offset, water_share * speed, weight, w)
             way = step_map(form, constants, fading, w, centre, dt)
-            if left == 0:
+            if steps_left == 0:
                 settle(since, n, watched, many, y, v)
                 margin = dip(way, reach, centre, dt) if form.in_step else 0.0
-                flock, many, left = gathered(form, constants, reach, w, centre, dt, margin, n, watched, y, v)
+                flock, many, steps_left = gathered(form, constants, reach, w, centre, dt, margin, n, watched, y, v)
                 since = standstill()
-            left -= 1
+            steps_left -= 1
             if form.midpoint:
                 # A step as the exact step would make it predicts the end. Means over the step are then known up to
                 # second order, that of v_CM from the way of C_M, because v_CM itself jumps at an impact.
@@ -1163,18 +1166,18 @@ def fly(form, constants, frame, r0, t, dt: float, record, rebounds, memory) -> R
                 group = shared(form, constants, reach, way, centre, dt, t[k], weighs, False)
                 after, clear = foreseen(form, flock, since, way, reach, centre, dt)
                 if not clear:
-                    flock, many, left = dissolved(since, n, watched, many, y, v)
+                    flock, many, steps_left = dissolved(since, n, watched, many, y, v)
                 step(form, constants, reach, group, w, n, watched, many, y, v, work, log, log.room)
                 end_first, end_second, _ = sums_over(flock, after, many, work)
                 shift = water_share * (end_first - first)
                 w = 0.5 * (w + momentum / inertia_about(frame, n, end_first, end_second, water_share * end_first))
                 centre = centre_of_repulsion(form, constants, offset + 0.5 * shift, shift / dt, weight, w)
                 way = step_map(form, constants, fading, w, centre, dt)
-            weight = now(constants.gravity * cosine(angle + w * dt))
+            weight = constants.gravity * cosine(angle + w * dt)
             group = shared(form, constants, reach, way, centre, dt, t[k], weighs, True)
             after, clear = foreseen(form, flock, since, way, reach, centre, dt)
             if not clear:
-                flock, many, left = dissolved(since, n, watched, many, y, v)
+                flock, many, steps_left = dissolved(since, n, watched, many, y, v)
             since = after
             hits = step(form, constants, reach, group, w, n, watched, many, y, v, work, log, hits)
             first, second, speed = sums_over(flock, since, many, work)

@@ -161,8 +161,8 @@ def test_what_cannot_be_known_is_not_clear(way):
     assert not clear_of_ends(flock, way, 0.1, 0.0)
 
 
-def test_in_step_a_flock_needs_room_to_turn_before_the_step_and_after():
-    """On the grid only the places after a step count; inside a step a slice may turn beyond where it was before."""
+def test_in_step_a_flock_needs_room_to_turn_where_it_was_before_the_step():
+    """On the grid only the places after a step count; inside a step a slice may dip beyond where it was before."""
     on_grid, dt, reach = SCHEMES["exact-step"].form, 0.001, 0.1
     in_step = on_grid._replace(in_step=True)
     step = Map(0.0002, dt, 0.4, 1.0, 0.0, 0.0)
@@ -173,8 +173,9 @@ def test_in_step_a_flock_needs_room_to_turn_before_the_step_and_after():
     assert foreseen(on_grid, flock, still, inwards, reach, 0.0, dt)[1]
     assert not foreseen(in_step, flock, still, inwards, reach, 0.0, dt)[1]
     assert foreseen(in_step, flock._replace(high=reach - 2.0 * room), still, inwards, reach, 0.0, dt)[1]
-    outwards = step._replace(push=1.5 * room)
+    outwards = step._replace(push=2.5 * room)
     assert not foreseen(in_step, flock._replace(high=reach - 2.0 * room), still, outwards, reach, 0.0, dt)[1]
+    assert not clear_of_ends(flock._replace(high=0.05), still, reach, -room)
 
 
 @pytest.mark.parametrize("gamma", [0.0, 5.0, 200.0])

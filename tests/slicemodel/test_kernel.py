@@ -124,6 +124,8 @@ def test_cosine_of_any_angle():
     exact = np.cos(angles.astype(np.longdouble))
     assert max(abs(kernel.cosine(x) - y) for x, y in zip(angles, exact, strict=True)) < 3e-16
     assert kernel.cosine(0.0) == 1.0
+    for huge in (9.9e14, 1.1e15, 1e17, 1e300):
+        assert kernel.cosine(huge) == pytest.approx(np.cos(huge), abs=3e-16)
     assert all(np.isnan(kernel.cosine(x)) for x in (np.nan, np.inf, -np.inf))
 
 
