@@ -65,8 +65,7 @@ def rows(facts: dict[str, Any]) -> list[tuple[str, str, str]]:
         for n in ("1000", "10000")
     ]
     table += [
-        (f"published-python, N = {n}: speed, in units of that limit", f"{times[n]:.3g}", "")
-        for n in ("1000", "10000")
+        (f"published-python, N = {n}: speed, in units of that limit", f"{times[n]:.3g}", "") for n in ("1000", "10000")
     ]
     table += [
         (f"{run['case']}, N = 100: impacts per second", str(run["per_second"]), "at least 2000")

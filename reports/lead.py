@@ -44,7 +44,7 @@ def lead_words(differences: Sequence[Difference], free: Trajectory | None) -> st
         trusted = "stays within" if step.largest <= PARTING_BAND else "exceeds"
         sentences.append(
             f"Holding omega constant over a step costs {_share(step.largest)} at this number of steps and {trusted} "
-            f"{PARTING_BAND:.0%}."
+            f"{100 * PARTING_BAND:.0f} %."
         )
     return " ".join(sentences)
 

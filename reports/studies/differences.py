@@ -58,7 +58,7 @@ class Difference:
     def moment(self) -> str:
         """The parting in words."""
         if self.parting_time is None:
-            return f"stay within {PARTING_BAND:.0%} of ω₀"
+            return f"stay within {100 * PARTING_BAND:.0f} % of ω₀"
         words = f"part at t = {self.parting_time * 1e3:.1f} ms"
         if self.parting_impact is not None:
             impact = self.parting_impact

@@ -122,7 +122,7 @@ class PartingGrowth:
     def words(self) -> str:
         """The parting in words."""
         if self.time is None:
-            return f"{self.first} and {self.second} never part by {PARTING_BAND:.0%} of ω₀"
+            return f"{self.first} and {self.second} never part by {100 * PARTING_BAND:.0f} % of ω₀"
         words = f"{self.first} and {self.second} part at {self.time * 1e3:.1f} ms"
         if self.impact is not None and self.k is not None:
             words += (

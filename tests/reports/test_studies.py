@@ -255,9 +255,9 @@ def test_the_lead_says_what_the_numbers_say():
     assert "differ by up to 13 % of ω₀" in words
     assert "largest single part is model form: 55 %" in words
     assert "partly cancel" in words
-    assert "costs 0.5 % at this number of steps and stays within 1%" in words
+    assert "costs 0.5 % at this number of steps and stays within 1 %" in words
     assert "partly cancel" not in lead_words([named(TOTAL, "a", "b", 0.6), form], engine)
-    assert "exceeds 1%" in lead_words([total, named("s", "published-python", "published-limit", 0.02), form], engine)
+    assert "exceeds 1 %" in lead_words([total, named("s", "published-python", "published-limit", 0.02), form], engine)
 
 
 def test_the_lead_knows_ice_divergence_and_nothing_at_all():
