@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from reports.evidence import TOTAL
-from reports.studies.differences import PARTING_BAND, Difference
+from reports.studies.differences import PARTING_BAND, Difference, percent
 from slicemodel import Trajectory
 
 NOTHING = 1e-6
@@ -25,7 +25,7 @@ def lead_words(differences: Sequence[Difference], free: Trajectory | None) -> st
     worst = parts[0]
     if worst.largest < NOTHING and (total is None or total.largest < NOTHING):
         return (
-            f"On this throw all solvers agree to {_share(max(worst.largest, total.largest if total else 0.0))} of ω₀."
+            f"On this throw all solvers agree to {percent(max(worst.largest, total.largest if total else 0.0))} of ω₀."
         )
     sentences = []
     if free is None or total is None:
@@ -33,21 +33,19 @@ def lead_words(differences: Sequence[Difference], free: Trajectory | None) -> st
     else:
         until = "" if free.ok else f", up to t = {total.t[-1] * 1e3:.0f} ms, where {free.method} {free.status}"
         sentences.append(
-            f"The published program and a free bottle differ by up to {_share(total.largest)} of ω₀ "
+            f"The published program and a free bottle differ by up to {percent(total.largest)} of ω₀ "
             f"(at t = {total.largest_time * 1e3:.0f} ms{until})."
         )
-    sentences.append(f"The largest single part is {worst.name}: {_share(worst.largest)} of ω₀; the two {worst.moment}.")
+    sentences.append(
+        f"The largest single part is {worst.name}: {percent(worst.largest)} of ω₀; the two {worst.moment}."
+    )
     if total is not None and worst.largest > 1.2 * total.largest:
         sentences.append("The parts partly cancel.")
     step = next((d for d in parts if d.first == "published-python" and d.second == "published-limit"), None)
     if step is not None and step is not worst:
         trusted = "stays within" if step.largest <= PARTING_BAND else "exceeds"
         sentences.append(
-            f"Holding omega constant over a step costs {_share(step.largest)} at this number of steps and {trusted} "
-            f"{100 * PARTING_BAND:.0f} %."
+            f"Holding omega constant over a step costs {percent(step.largest)} at this number of steps and {trusted} "
+            f"{percent(PARTING_BAND)}."
         )
     return " ".join(sentences)
-
-
-def _share(value: float) -> str:
-    return f"{100 * value:.2g} %"

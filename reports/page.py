@@ -17,7 +17,7 @@ from reports.findings import Finding
 from reports.inline import data_uri, shape
 from reports.instruments import WITNESSES
 from reports.lead import lead_words
-from reports.studies.differences import Difference
+from reports.studies.differences import Difference, percent
 from reports.templating import environment
 from reports.verdict import answer, strips, tiles
 
@@ -79,7 +79,7 @@ def unbroken(text: str) -> str:
 
 def amount(difference: Difference) -> str:
     """Return the size of a difference as a percentage of omega_0 with its band, as in "0.47 %, band < 1e-5 %"."""
-    size = f"{100 * difference.largest:.2g} %"
+    size = percent(difference.largest)
     if difference.band is None:
         return size
     band = 100 * difference.band

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from reports.evidence import DIFFERENCES, FREE, TOTAL
-from reports.studies.differences import PARTING_BAND, Difference
+from reports.studies.differences import PARTING_BAND, Difference, percent
 from reports.studies.waterfall import NAMES, Waterfall
 
 State = Literal["pass", "fail", ""]
@@ -65,7 +65,7 @@ def tiles(differences: Sequence[Difference]) -> tuple[Tile, ...]:
         worst = max(parts, key=lambda part: part.largest)
         made.append(
             Tile(
-                value=_percent(worst.largest),
+                value=percent(worst.largest),
                 label=f"of ω₀: {worst.name}",
                 words=f"The largest single assumption; the two {worst.moment}.",
                 state=_state(worst),
@@ -75,7 +75,7 @@ def tiles(differences: Sequence[Difference]) -> tuple[Tile, ...]:
         largest = max((part.largest for part in parts), default=0.0)
         made.append(
             Tile(
-                value=_percent(total.largest),
+                value=percent(total.largest),
                 label="of ω₀: all assumptions together",
                 words=f"Published program against free flight, at t = {1e3 * total.largest_time:.0f} ms."
                 + (" The parts partly cancel." if largest > 1.2 * total.largest else ""),
@@ -85,7 +85,7 @@ def tiles(differences: Sequence[Difference]) -> tuple[Tile, ...]:
     if step is not None:
         made.append(
             Tile(
-                value=_percent(step.largest),
+                value=percent(step.largest),
                 label="of ω₀: ω held constant over a step",
                 words="The published program against its own equation, at this number of steps.",
                 state=_state(step),
@@ -94,7 +94,7 @@ def tiles(differences: Sequence[Difference]) -> tuple[Tile, ...]:
     if engine is not None:
         made.append(
             Tile(
-                value=_percent(engine.largest),
+                value=percent(engine.largest),
                 label="of ω₀: the check by an engine",
                 words="Free flight by event-driven integration against a physics engine.",
                 state=_state(engine),
@@ -133,7 +133,3 @@ def _named(differences: Sequence[Difference], name: str) -> Difference | None:
 
 def _state(difference: Difference) -> State:
     return "pass" if difference.largest <= PARTING_BAND else "fail"
-
-
-def _percent(value: float) -> str:
-    return f"{100 * value:.2g} %"

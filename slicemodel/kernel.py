@@ -9,9 +9,10 @@ time: they are loaded, moved, summed and stored without leaving the processor's 
                                   |                                        ^
                                   +--yes--> rebound it, list the rebound --+
 
-Most slices meet no end for many steps. Linear maps that all slices share make one such map, and sums of y, v, y^2, y v
-and v^2 go over into the sums a step later: those slices, the flock, are not looked at until somebody asks where they
-are or one of them may have come near an end. Then they are moved to where they are, and a new flock is gathered.
+Most slices meet no end for many steps. Linear maps that all slices share make one such map, and the sums of y and y^2
+after it follow from those of y, v, y^2, y v and v^2 before: those slices, the flock, are not looked at until somebody
+asks where they are or one of them may have come near an end. Then they are moved to where they are, and a new flock is
+gathered.
 
 Positions are counted from the middle of the bottle, y = r - L/2: the two ends are one number, and sums of squares lose
 no digits.

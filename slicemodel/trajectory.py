@@ -15,8 +15,6 @@ from slicemodel.scenario import Scenario
 
 FloatArray = NDArray[np.float64]
 
-DOUBLE = np.dtype(np.float64)
-
 BASE: Final = 1
 CAP: Final = -1
 
@@ -50,6 +48,7 @@ IMPACT_FIELDS: Final = (
     ("speed_before", np.float64),
     ("speed_after", np.float64),
 )
+"""Names and types of the arrays of ``Impacts``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,10 +186,6 @@ def _finite(values: FloatArray) -> bool:
 
 def _read_only(values: ArrayLike) -> FloatArray:
     """Return ``values`` as a C-contiguous float64 array that cannot be written; copies only if it must."""
-    if type(values) is np.ndarray and values.dtype is DOUBLE:
-        flags = values.flags
-        if flags.c_contiguous and not flags.writeable:
-            return values
     array = np.ascontiguousarray(values, dtype=np.float64)
     if array.flags.writeable:
         array = array.view()

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from reports.figures.style import ASSUMPTIONS, MARKERS, new_figure, shared_legend, shown_name, solver_style, styled
-from reports.studies.differences import PARTING_BAND, Difference
+from reports.studies.differences import PARTING_BAND, Difference, percent
 from slicemodel import Trajectory
 
 
@@ -85,14 +85,7 @@ def figure_differences(differences: Sequence[Difference]) -> Figure:
     """Size of every difference over time on a logarithmic scale, with the parting band and moments."""
     figure, axes = new_figure(size=(8.0, 5.4))
     axes.axhline(PARTING_BAND, color="#444444", linewidth=1.0, linestyle=":")
-    axes.text(
-        1.005,
-        PARTING_BAND,
-        f"{100 * PARTING_BAND:.0f} %",
-        transform=axes.get_yaxis_transform(),
-        va="center",
-        fontsize=9,
-    )
+    axes.text(1.005, PARTING_BAND, percent(PARTING_BAND), transform=axes.get_yaxis_transform(), va="center", fontsize=9)
     for k, difference in enumerate(differences):
         colour = ASSUMPTIONS[k % len(ASSUMPTIONS)]
         size = np.maximum(np.abs(difference.omega), 1e-12)

@@ -13,6 +13,11 @@ PARTING_BAND = 0.01
 """Two solvers part when their omega differ by this fraction of omega_0."""
 
 
+def percent(share: float) -> str:
+    """Return a fraction as the page prints it, two digits."""
+    return f"{100 * share:.2g} %"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
     """Two runs of one throw, compared on their common times.
@@ -58,7 +63,7 @@ class Difference:
     def moment(self) -> str:
         """The parting in words."""
         if self.parting_time is None:
-            return f"stay within {100 * PARTING_BAND:.0f} % of ω₀"
+            return f"stay within {percent(PARTING_BAND)} of ω₀"
         words = f"part at t = {self.parting_time * 1e3:.1f} ms"
         if self.parting_impact is not None:
             impact = self.parting_impact

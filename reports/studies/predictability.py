@@ -17,7 +17,7 @@ import numpy as np
 
 from reports.solvers import Run
 from reports.studies.alignment import LEAST_SPEED, count_key, ordinal
-from reports.studies.differences import PARTING_BAND, Difference, first_crossing
+from reports.studies.differences import PARTING_BAND, Difference, first_crossing, percent
 from slicemodel import Impact, Impacts, Scenario, Trajectory
 from slicemodel.trajectory import FloatArray
 
@@ -122,7 +122,7 @@ class PartingGrowth:
     def words(self) -> str:
         """The parting in words."""
         if self.time is None:
-            return f"{self.first} and {self.second} never part by {100 * PARTING_BAND:.0f} % of ω₀"
+            return f"{self.first} and {self.second} never part by {percent(PARTING_BAND)} of ω₀"
         words = f"{self.first} and {self.second} part at {self.time * 1e3:.1f} ms"
         if self.impact is not None and self.k is not None:
             words += (
