@@ -827,7 +827,7 @@ def add(work, y, v) -> None:
 
 
 @compiled
-def follow(form, constants, reach: float, common, omega: float, i: int, n: int, y, v, work, log, count: int):
+def follow(form, constants, common, omega: float, i: int, n: int, y, v, work, log, count: int):
     """Move one lane group of which slices hit an end in the step; return y, v and the count of rebounds."""
     group = spread(common)
     y_old, v_old = load(y, i), load(v, i)
@@ -839,7 +839,7 @@ def follow(form, constants, reach: float, common, omega: float, i: int, n: int, 
         j = lowest(struck)
         struck &= struck - 1
         y_j, v_j, count = rebound_in_step(
-            form, constants, reach, omega, group.centre, group.end - group.dt, group.dt, i + j, get(y, i + j),
+            form, constants, common.reach, omega, group.centre, group.end - group.dt, group.dt, i + j, get(y, i + j),
             get(v, i + j), get(work, LOOKED_AT + j), get(work, LOOKED_AT + LANES + j), log, count,
         )  # fmt: skip
         put(work, LOOKED_AT + j, y_j)
@@ -848,14 +848,14 @@ def follow(form, constants, reach: float, common, omega: float, i: int, n: int, 
 
 
 @merged
-def step(form, constants, reach: float, group, omega: float, n: int, watched, many: int, y, v, work, log, count: int):
+def step(form, constants, group, omega: float, n: int, watched, many: int, y, v, work, log, count: int):
     """Move the watched slices by one step, unless it is a trial; return the count of rebounds, and sums in ``work``."""
     j, i = np.int64(0), np.int64(-1)
     while j < many:
         j, i, count = glide(group, n, watched, many, j, i, y, v, work, log, count)
         if j < many:
             # Only a step that is kept gets here: a trial stops for nothing.
-            y_new, v_new, count = follow(form, constants, reach, group, omega, i, n, y, v, work, log, count)
+            y_new, v_new, count = follow(form, constants, group, omega, i, n, y, v, work, log, count)
             store(y, i, y_new)
             store(v, i, v_new)
             add(work, y_new, v_new)
@@ -1014,15 +1014,15 @@ def gathered(
 
 
 @merged
-def foreseen(form, flock, since, one, reach: float, centre: float, dt: float):
-    """Return the map of the flock after the step ``one``, and whether surely none of it meets an end in that step."""
+def foreseen(flock, since, group):
+    """Return the map of the flock after a step, and whether surely none of it meets an end in that step."""
     if flock.n == 0.0:
         return since, True
-    after = followed(since, one)
-    clear = clear_of_ends(flock, after, reach, 0.0)
-    if form.in_step:
+    after = followed(since, group.way)
+    clear = clear_of_ends(flock, after, group.reach, 0.0)
+    if group.in_step:
         # A slice that does not turn is between its two places; one that turns dips beyond the first.
-        clear &= clear_of_ends(flock, since, reach, dip(one, reach, centre, dt))
+        clear &= clear_of_ends(flock, since, group.reach, dip(group.way, group.reach, group.centre, group.dt))
     return after, clear
 
 
@@ -1165,10 +1165,10 @@ def fly(form, constants, frame, r0, t, dt: float, record, rebounds, memory) -> R
                 # second order, that of v_CM from the way of C_M, because v_CM itself jumps at an impact.
                 weight = constants.gravity * cosine(angle + 0.5 * dt * w)
                 group = shared(form, constants, reach, way, centre, dt, t[k], weighs, False)
-                after, clear = foreseen(form, flock, since, way, reach, centre, dt)
+                after, clear = foreseen(flock, since, group)
                 if not clear:
                     flock, many, steps_left = dissolved(since, n, watched, many, y, v)
-                step(form, constants, reach, group, w, n, watched, many, y, v, work, log, log.room)
+                step(form, constants, group, w, n, watched, many, y, v, work, log, log.room)
                 end_first, end_second, _ = sums_over(flock, after, many, work)
                 shift = water_share * (end_first - first)
                 w = 0.5 * (w + momentum / inertia_about(frame, n, end_first, end_second, water_share * end_first))
@@ -1176,11 +1176,11 @@ def fly(form, constants, frame, r0, t, dt: float, record, rebounds, memory) -> R
                 way = step_map(form, constants, fading, w, centre, dt)
             weight = constants.gravity * cosine(angle + w * dt)
             group = shared(form, constants, reach, way, centre, dt, t[k], weighs, True)
-            after, clear = foreseen(form, flock, since, way, reach, centre, dt)
+            after, clear = foreseen(flock, since, group)
             if not clear:
                 flock, many, steps_left = dissolved(since, n, watched, many, y, v)
             since = after
-            hits = step(form, constants, reach, group, w, n, watched, many, y, v, work, log, hits)
+            hits = step(form, constants, group, w, n, watched, many, y, v, work, log, hits)
             first, second, speed = sums_over(flock, since, many, work)
             if not form.keeps_position and escape_step < 0:
                 escape_slice = first_outside(y, n, middle)

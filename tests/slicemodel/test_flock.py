@@ -90,12 +90,15 @@ def test_slices_that_escape_leave_the_flock_in_time(every_slice_looked_at, monke
 
 # ---------------------------------------------------------------------- its parts
 
+CONSTANTS = SCHEMES["exact-step"].constants(Scenario())
 moved = numba.njit(lambda way, y, v: (y + (way.a_minus_1 * y + way.b * v + way.push), way.c * y + way.d * v + way.pull))
 followed = numba.njit(lambda first, then: kernel.followed(first, then))
 sums_of = numba.njit(lambda flock, way: kernel.sums_of(flock, way))
 clear_of_ends = numba.njit(lambda flock, way, reach, margin: kernel.clear_of_ends(flock, way, reach, margin))
 foreseen = numba.njit(
-    lambda form, flock, since, one, reach, centre, dt: kernel.foreseen(form, flock, since, one, reach, centre, dt)
+    lambda form, flock, since, one, reach, centre, dt: kernel.foreseen(
+        flock, since, kernel.shared(form, CONSTANTS, reach, one, centre, dt, dt, False, True)
+    )
 )
 dip = numba.njit(lambda way, reach, centre, dt: kernel.dip(way, reach, centre, dt))
 
