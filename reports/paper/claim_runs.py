@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from reports.paper.cases import Case, family
@@ -12,7 +12,17 @@ from reports.paper.claims_cost import MANY_STEPS, many_steps_key, same_steps_key
 from reports.paper.claims_model import FINEST, MANY_SLICES, finest_key
 from reports.paper.observe import Flights
 from reports.paper.parameters import numbers, paper_steps, paper_throw
-from reports.paper.runs import PUBLISHED, RTOL, SOLVERS, STEP_ANGLE, PaperRuns, PaperSize, scenario_of
+from reports.paper.runs import (
+    GROUP,
+    PUBLISHED,
+    RTOL,
+    SOLVERS,
+    STEP_ANGLE,
+    PaperRuns,
+    PaperSize,
+    make_thinned,
+    scenario_of,
+)
 from reports.pool import Progress, make_all
 from reports.solvers import Made, Run
 from slicemodel import Scenario, Trajectory
@@ -25,6 +35,14 @@ HALVED: Final = ("filling", "long", "drag", "spin", "angle", "aspect")
 SLICES: Final = ("slices", "slices at 5 /s")
 """Families in which the number of slices is the subject."""
 
+REBOUNDS: Final = ("beta", "beta at 5 /s")
+
+HALF_STEPS: Final = (*HALVED, *REBOUNDS, *SLICES)
+"""Families that the published program flies with half its time steps too."""
+
+LOOKED_INTO: Final = ("long", "drag", *REBOUNDS)
+"""Families of which statements read more than omega and theta, so that slices are kept."""
+
 WEIGHTLESS: Final = "eq8-weightless"
 STEADY_FILLING: Final = 0.1
 WEIGHTLESS_KEY: Final = f"filling {STEADY_FILLING:g}"
@@ -36,24 +54,29 @@ EXACT_STEP: Final = "exact-step"
 ATOL: Final = 1e-10
 
 HALF_WORDS: Final = ", half the slices"
+HALF_STEPS_WORDS: Final = ", half the steps"
 
 Pair = tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClaimRuns:
-    """Runs of the figures, those that only the statements need, and those with half the slices."""
+    """Runs of the figures, those that only the statements need, and those with half the slices or half the steps."""
 
     paper: PaperRuns
     further: Mapping[Pair, Made]
     halved: Mapping[Pair, Made]
+    half_steps: Mapping[Pair, Made] = field(default_factory=dict)
 
     def flights(self, solver: str) -> Flights:
-        """Return the flights of one equation, with those at half the slices where there are any."""
+        """Return the flights of one equation, with those at half the slices and half the steps where there are any."""
         usual = {**_of(solver, self.paper.made), **_of(solver, self.further)}
-        halved = _of(solver, self.halved)
-        coarse = _flights(solver, {**usual, **halved}) if halved else None
-        return replace(_flights(solver, usual), halved=coarse)
+
+        def coarse(made: Mapping[Pair, Made]) -> Flights | None:
+            own = _of(solver, made)
+            return _flights(solver, {**usual, **own}) if own else None
+
+        return replace(_flights(solver, usual), halved=coarse(self.halved), half_steps=coarse(self.half_steps))
 
     def trajectory(self, solver: str, key: str) -> Trajectory | None:
         """Return one trajectory, or None if it was not planned or failed."""
@@ -122,12 +145,42 @@ def plan_halved(size: PaperSize) -> dict[Pair, Run]:
     return runs
 
 
+def plan_published(half: str) -> dict[Pair, tuple[Run, int]]:
+    """Return the flights of the published program with half its slices or steps, and every how many points are kept.
+
+    Parameters
+    ----------
+    half : "slices" or "steps"
+    """
+    kept = {case.key for name in LOOKED_INTO for case in family(name)}
+    runs: dict[Pair, tuple[Run, int]] = {}
+    for name in HALVED if half == "slices" else HALF_STEPS:
+        for case in family(name):
+            scenario, steps, thin = case.scenario, case.steps, case.thin
+            if half == "slices":
+                scenario = scenario.with_slices(max(1, scenario.n_slices // 2))
+            else:
+                # As many points are kept as there are, up to the rounding that keeps the last one.
+                steps, thin = 1 + (case.steps - 1) // 2, 1
+            settings = {"steps": steps, "store": "full" if case.key in kept else "summary"}
+            words = HALF_WORDS if half == "slices" else HALF_STEPS_WORDS
+            tag = f"claims, {PUBLISHED}, {case.key}{words}"
+            runs[PUBLISHED, case.key] = Run(tag, PUBLISHED, scenario, settings), thin
+    return runs
+
+
 def gather_claims(pool: Executor, paper: PaperRuns, progress: Progress) -> ClaimRuns:
     """Make what the statements need beside the runs of the figures, at the size of those, in the same pool."""
     further, halved = plan_further(paper.size), plan_halved(paper.size)
+    half_slices, half_steps = plan_published("slices"), plan_published("steps")
+    jobs = [*half_slices.values(), *half_steps.values()]
+    thinned = [pool.submit(make_thinned, jobs[k : k + GROUP]) for k in range(0, len(jobs), GROUP)]
     made = make_all(pool, [*halved.values(), *further.values()], progress)
+    made |= {each.run.tag: each for group in thinned for each in group.result()}
     return ClaimRuns(
         paper=paper,
         further={pair: made[run.tag] for pair, run in further.items()},
-        halved={pair: made[run.tag] for pair, run in halved.items()},
+        halved={pair: made[run.tag] for pair, run in halved.items()}
+        | {pair: made[run.tag] for pair, (run, _) in half_slices.items()},
+        half_steps={pair: made[run.tag] for pair, (run, _) in half_steps.items()},
     )

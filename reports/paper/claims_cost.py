@@ -5,15 +5,11 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from reports.paper.claims_model import MANY_SLICES
-from reports.paper.observe import Flights, MissingFlightError, distance, level, level_by_points
+from reports.paper.observe import Flights, distance, level, level_by_points
 from reports.paper.parameters import numbers, paper_steps
 from reports.paper.runs import PUBLISHED
 from reports.paper.statements import OMEGA, Reading
-from reports.studies.errata import exponents_of_cost
-
-SQUARE: Final = (1.8, 2.2)
-"""Exponents that count as a square."""
+from reports.studies.errata import SQUARE, exponents_of_cost
 
 MORE: Final = 0.1
 """By how much one exponent must exceed another to be the larger."""
@@ -36,49 +32,46 @@ def same_steps_key(filling: float) -> str:
     return f"filling {filling:g}, exact-step"
 
 
-def claim_cost_of_slices(flights: Flights) -> tuple[Reading, ...]:
+def claim_cost_of_slices(flights: Flights, program: str = "MATLAB") -> tuple[Reading, ...]:
     """Work grows as the square of the number of slices."""
-    of_n, band, note = _exponent_of_slices(flights)
-    return (Reading(name="exponent of N in the work", value=of_n, unit="", admissible=SQUARE, band=band, note=note),)
+    del flights
+    of_n, _ = _exponents(program)
+    return (_square("exponent of N in the work", of_n, program),)
 
 
-def _exponent_of_slices(flights: Flights) -> tuple[float, float, str]:
-    """Return the exponent, by how much it still changes with N, and what was counted."""
-    if flights.solver == PUBLISHED:
-        of_n, _ = exponents_of_cost(copies_history=False)
-        return of_n, 0.0, "array elements of the Python program counted, no clock; the same for the MATLAB program"
-    counts = (MANY_SLICES / 5, MANY_SLICES / 2, MANY_SLICES)
-    work = [n * flights.at("slices", n).diagnostics["evaluations"] for n in counts]
-    before, last = (
-        math.log(work[k + 1] / work[k]) / math.log(counts[k + 1] / counts[k]) for k in range(len(counts) - 1)
-    )
-    words = " and ".join(f"{n:g}" for n in counts[1:])
-    return last, abs(last - before), f"slices times evaluations, N = {words}, no clock"
+def claim_cost_of_intervals(flights: Flights, program: str = "MATLAB") -> tuple[Reading, ...]:
+    """Work grows as the square of the number of time intervals, N_t or P."""
+    del flights
+    _, of_p = _exponents(program)
+    return (_square("exponent of P in the work", of_p, program),)
 
 
-def claim_cost_of_steps(flights: Flights, copies_history: bool = False) -> tuple[Reading, ...]:
-    """Work depends on the number of time steps more than on that of slices.
+def _square(name: str, exponent: float, program: str) -> Reading:
+    note = f"array elements that the {program} program touches, 250 to 1000 of each; no clock"
+    return Reading(name=name, value=exponent, unit="", admissible=SQUARE, note=note)
 
-    ``copies_history`` takes the MATLAB program, each of whose steps copies all steps before, for the Python program.
-    """
-    if flights.solver != PUBLISHED:
-        raise MissingFlightError(f"{flights.solver} chooses its own time steps; there is no P")
-    of_n, of_p = exponents_of_cost(copies_history=copies_history)
+
+def _exponents(program: str) -> tuple[float, float]:
+    return exponents_of_cost(copies_history=program == "MATLAB")
+
+
+def claim_cost_of_steps(flights: Flights, program: str = "MATLAB") -> tuple[Reading, ...]:
+    """Work depends on the number of time steps more than on that of slices."""
+    del flights
+    of_n, of_p = _exponents(program)
     return (
         Reading(
             name="exponent of P minus exponent of N in the work",
             value=of_p - of_n,
             unit="",
             admissible=(MORE, math.inf),
-            note=f"{of_p:.2f} and {of_n:.2f} in the {'MATLAB' if copies_history else 'Python'} program",
+            note=f"{of_p:.2f} and {of_n:.2f} in the {program} program",
         ),
     )
 
 
 def claim_steps_are_enough(flights: Flights) -> tuple[Reading, ...]:
     """More than the paper's 1000 time steps change nothing that a figure shows."""
-    if flights.solver not in (PUBLISHED, "eq8"):
-        raise MissingFlightError(f"{flights.solver} chooses its own time steps; there is no P")
     off = {}
     for filling in numbers("figure-S1-filling"):
         if flights.solver == PUBLISHED:

@@ -8,12 +8,13 @@ from dataclasses import replace
 from functools import cache
 from typing import Final
 
+from reports.findings import Finding
 from reports.paper.observe import Flights, MissingFlightError
 from reports.paper.parameters import paper_throw
 from reports.paper.statements import Reading
-from slicemodel import Trajectory
+from slicemodel import Bottle, Trajectory
 from slicemodel.landing import Moment, moment_at, next_upright
-from slicemodel.observables import static_toppling_angle
+from slicemodel.observables import centre_of_mass_at_rest, static_toppling_angle
 
 PEAK_DEGREES: Final = (44.9, 45.5)
 """The paper's 45 degrees: 45.2 within 0.3."""
@@ -114,21 +115,62 @@ def claim_dynamic_angle_agrees_when_full(flights: Flights, when: When = upright)
     )
 
 
-def claim_centre_of_mass_falls(flights: Flights, when: When = upright, up: float = -1.0) -> tuple[Reading, ...]:
-    """From a filling of 0.25 to 0.6 the centre of mass moves down in the landing bottle at more than 0.2 m/s.
+def claim_centre_of_mass_falls(flights: Flights, when: When = upright, base: float = 1.0) -> tuple[Reading, ...]:
+    """From a filling of 0.25 to 0.6 the centre of mass moves towards the base at more than 0.2 m/s.
 
-    ``up`` is -1 if velocities count upwards in a bottle that stands, as the argument of section 6 needs it, and +1 if
-    they are derivatives of r_CM, which counts from the cap down.
+    v_CM = dr_CM/dt is positive towards the base, as in the figures. ``base`` is 1 if the paper's negative velocity
+    means towards the base, downwards in a bottle that stands, and -1 if it is dr_CM/dt itself.
     """
     low, high = FALLING_FILLINGS
-    velocity = {case.value: up * when(run).v_cm for case, run in flights.members("long") if low <= case.value <= high}
-    worst = max(velocity, key=lambda filling: velocity[filling])
+    velocity = {case.value: when(run).v_cm for case, run in flights.members("long") if low <= case.value <= high}
+    worst = min(velocity, key=lambda filling: base * velocity[filling])
     return (
         Reading(
-            name="largest v_CM from M̃ = 0.25 to 0.6",
+            name=f"v_CM towards the base, the {'least' if base > 0 else 'largest'} from M̃ = 0.25 to 0.6",
             value=velocity[worst],
             unit="m/s",
-            admissible=(-math.inf, -FALLING),
-            note=f"at M̃ = {worst:g}; " + ", ".join(f"{v:+.2f} at {filling:g}" for filling, v in velocity.items()),
+            admissible=(FALLING, math.inf) if base > 0 else (-math.inf, -FALLING),
+            note=f"at M̃ = {worst:g}; "
+            + ", ".join(f"{v:+.2f} at {filling:g}" for filling, v in velocity.items()).replace("-", "\N{MINUS SIGN}"),
         ),
+    )
+
+
+# ---------------------------------------------------------------------- from which filling on water leaves the base
+
+
+def filling_of_change(bottle: Bottle) -> float:
+    """Return the filling at which the surface of the resting water stands as high as the centre of mass.
+
+    Below it all water lies on the base's side of the centre of mass and is thrown towards the base; above it the top
+    of the water is thrown towards the cap. L - h = r_CM(0) (Eq. 3e) gives h/L = eps / (1 + eps); with
+    eps = b / (b + M), b = M_b / M_max (Eq. 4a) and h/L = M that is M^2 + 2 b M - b = 0.
+    """
+    share = bottle.mass / bottle.capacity
+    return math.sqrt(share * (1.0 + share)) - share
+
+
+def surface_over_centre(filling: float) -> float:
+    """Return by how much the surface of the resting water is nearer to the cap than the centre of mass [m]."""
+    throw = replace(paper_throw(), water_mass=filling * paper_throw().bottle.capacity, n_slices=1)
+    return centre_of_mass_at_rest(throw) - (1.0 - filling) * throw.bottle.length
+
+
+def claim_filling_of_change() -> Finding:
+    """Water at rest reaches up to the centre of mass at the closed form's filling, where Eq. 13b has its maximum."""
+    from scipy.optimize import brentq
+
+    closed = filling_of_change(paper_throw().bottle)
+    surface = float(brentq(surface_over_centre, 1e-3, 1.0, xtol=1e-12))
+    peak, _ = toppling_peak()
+    return Finding(
+        id="paper-filling-of-change",
+        title=f"Water at rest reaches up to the centre of mass at M̃ = {closed:.4f}, where Eq. 13b has its maximum",
+        value=max(abs(surface - closed), abs(peak - closed)),
+        unit="",
+        kind="regression",
+        admissible=(0.0, 1e-6),
+        note=f"h/L = ε/(1 + ε): {closed:.7f} in closed form, {surface:.7f} where r_CM(0) = L − h, {peak:.7f} by "
+        "maximising Eq. 13b. Water that lies higher is thrown towards the cap. Slices may overlap and sink towards the "
+        "base first: in free flight the first of them goes over to the cap at 0.13 to 0.14",
     )

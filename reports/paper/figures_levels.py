@@ -116,13 +116,14 @@ def exhibits_9c(runs: PaperRuns) -> Iterator[Exhibit]:
     grid = Grid(
         rows=(_row(readings),), x=FILLING, y=(axis,), height=3.2,
         bands=(
-            Band(along="x", low=0.25, high=0.6, label="where the paper has it below −0.2 m/s"),
+            Band(along="x", low=0.25, high=0.6, label="where the paper has it beyond 0.2 m/s"),
             Band(along="y", low=-0.2, high=0.2, label="slower than 0.2 m/s"),
         ),
     )  # fmt: skip
     yield _exhibit(
         runs, "9c", "velocity of the centre of mass on landing",
-        "Velocity along the bottle, positive towards the base; the paper does not say which way it counts, nor whether "
+        "Velocity dr_CM/dt along the bottle, positive towards the base as in the table of statements; the paper has it "
+        "negative and does not say which way it counts, nor whether "
         "it means θ = 2π (filled) or T = 0.5 s (open). Where the shaded ranges cross, its statement needs points "
         "outside the horizontal one. Its photographs are not drawn again.",
         "Velocity of the centre of mass in the bottle in m/s against filling by three solvers. At theta = 2 pi: "

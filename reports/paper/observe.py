@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -40,12 +41,19 @@ class Flights:
     runs : key -> Trajectory
     reasons : key -> why there is no flight
     halved : the same flights with half the slices wherever their number is not the subject; None if there are none
+    half_steps : the same flights with half the time steps; None if the equation chooses its own
     """
 
     solver: str
     runs: Mapping[str, Trajectory]
     reasons: Mapping[str, str]
     halved: Flights | None = None
+    half_steps: Flights | None = None
+
+    def watched(self) -> tuple[Flights, Watched]:
+        """Return the same flights, and a record of those that are looked at from now on."""
+        watched = Watched(self.runs)
+        return replace(self, runs=watched), watched
 
     def run(self, key: str) -> Trajectory:
         """Return one flight.
@@ -85,6 +93,42 @@ class Flights:
             if abs(case.value - value) <= 1e-9 * max(1.0, abs(value)):
                 return self.run(case.key)
         raise MissingFlightError(f"family {name!r} has no case at {value:g}")
+
+
+class Watched(Mapping[str, Trajectory]):
+    """Flights that remember which of them were looked at."""
+
+    def __init__(self, runs: Mapping[str, Trajectory]) -> None:
+        self._runs = runs
+        self._seen: dict[str, Trajectory] = {}
+
+    def __getitem__(self, key: str) -> Trajectory:
+        """Return a flight and remember it."""
+        return self._seen.setdefault(key, self._runs[key])
+
+    def __contains__(self, key: object) -> bool:
+        """Return whether there is such a flight, without looking at it."""
+        return key in self._runs
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the keys."""
+        return iter(self._runs)
+
+    def __len__(self) -> int:
+        """Return the number of flights."""
+        return len(self._runs)
+
+    @property
+    def words(self) -> str:
+        """Slices of the flights looked at, and their time steps where they were chosen; empty if there were none."""
+        slices = [run.scenario.n_slices for run in self._seen.values() if not run.scenario.frozen]
+        steps = [run.settings["steps"] for run in self._seen.values() if run.settings.get("steps")]
+        return ", ".join(f"{name} = {_span(counts)}" for name, counts in (("N", slices), ("P", steps)) if counts)
+
+
+def _span(counts: list[int]) -> str:
+    low, high = min(counts), max(counts)
+    return f"{low}" if low == high else f"{low} to {high}"
 
 
 # ---------------------------------------------------------------------- numbers of one flight
@@ -143,8 +187,33 @@ def drop_time(run: Trajectory) -> float:
 
 def distance(run: Trajectory, other: Trajectory) -> float:
     """Return the root-mean-square difference of two omega / omega_0 over t / T."""
-    t, there = (each.t / each.scenario.duration for each in (run, other))
-    return float(np.sqrt(np.mean((normalised(run) - np.interp(t, there, normalised(other))) ** 2)))
+    return _distance_at(run, other, run.t / run.scenario.duration)
+
+
+def shape_distance(run: Trajectory, other: Trajectory) -> float:
+    """Return ``distance`` with the time of each flight counted in its own time to half the drop; NaN if one has none.
+
+    What is left is a difference of shape: one curve that takes longer to fall, all along, is the same.
+    """
+    stretch = drop_time(run) / drop_time(other)
+    if not math.isfinite(stretch):
+        return float("nan")
+    return _distance_at(run, other, run.t / run.scenario.duration / stretch)
+
+
+def delayed_distance(run: Trajectory, other: Trajectory) -> float:
+    """Return ``distance`` with one flight moved in time so that both reach half their drop at once; NaN as above."""
+    delay = drop_time(run) - drop_time(other)
+    if not math.isfinite(delay):
+        return float("nan")
+    return _distance_at(run, other, run.t / run.scenario.duration - delay)
+
+
+def _distance_at(run: Trajectory, other: Trajectory, there: FloatArray) -> float:
+    """Return the root-mean-square difference of ``run`` from ``other`` read at its shares ``there`` of the flight."""
+    both = (there >= 0.0) & (there <= 1.0)
+    curve = np.interp(there[both], other.t / other.scenario.duration, normalised(other))
+    return float(np.sqrt(np.mean((normalised(run)[both] - curve) ** 2)))
 
 
 def largest_share_near_cap(run: Trajectory) -> float:

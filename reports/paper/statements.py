@@ -1,4 +1,4 @@
-"""A statement of the paper, and how each equation judges it: a number, its band, a threshold, a verdict."""
+"""A statement of the paper, and how each equation judges it: a number, its band, a threshold, a margin, a verdict."""
 
 from __future__ import annotations
 
@@ -9,14 +9,29 @@ from typing import Any, Final, Literal
 
 from reports.findings import Finding, finite_or_none
 
-Verdict = Literal["holds", "fails", "cannot be decided"]
+Verdict = Literal["holds", "fails", "cannot be decided", "not judged"]
+Kind = Literal["claim", "admitted limit"]
 
 OMEGA: Final = "of ω₀"
 """Unit of a number that is a share of omega_0."""
 
-SIGNS: Final[Mapping[Verdict, str]] = {"holds": "✓", "fails": "✗", "cannot be decided": "?"}
-CLASSES: Final[Mapping[Verdict, str]] = {"holds": "pass", "fails": "fail", "cannot be decided": "soft"}
+SIGNS: Final[Mapping[Verdict, str]] = {"holds": "✓", "fails": "✗", "cannot be decided": "?", "not judged": "–"}
+CLASSES: Final[Mapping[Verdict, str]] = {
+    "holds": "pass", "fails": "fail", "cannot be decided": "soft", "not judged": "soft"
+}  # fmt: skip
 """How a page marks a verdict: sign and colour class beside the word."""
+
+LIMIT_WORDS: Final[Mapping[Verdict, str]] = {
+    "holds": "has this limit",
+    "fails": "is free of it",
+    "cannot be decided": "cannot be decided",
+    "not judged": "not judged",
+}
+"""The verdict on a limit that the paper admits: to have it is no success, to be free of it no failure."""
+
+NEAR: Final = 0.1
+"""Share of a threshold within which a number is marginal. Thresholds chosen here have one significant digit: another
+reader could as well have chosen one a tenth higher or lower."""
 
 
 DIGITS: Final = 3
@@ -62,6 +77,23 @@ class Reading:
         return "cannot be decided"
 
     @property
+    def margin(self) -> float:
+        """Return the distance of the value from the nearest bound [unit]: positive inside, negative outside."""
+        low, high = self.admissible
+        return min(self.value - low, high - self.value)
+
+    @property
+    def marginal(self) -> bool:
+        """Return whether the band reaches a bound, or comes within ``NEAR`` of the threshold's own size to it.
+
+        The size of a single bound is its absolute value, that of an interval half its width; a bound at zero has none.
+        """
+        low, high = self.admissible
+        size = (high - low) / 2 if math.isfinite(high - low) else abs(high if math.isinf(low) else low)
+        reach = self.band + NEAR * size
+        return 0.0 < reach < math.inf and abs(self.margin) <= reach
+
+    @property
     def sign(self) -> str:
         """The verdict as a sign."""
         return SIGNS[self.verdict]
@@ -70,6 +102,15 @@ class Reading:
     def colour(self) -> str:
         """The verdict as the class of a page's style sheet."""
         return CLASSES[self.verdict]
+
+    @property
+    def margin_text(self) -> str:
+        """The margin with its sign and unit, and whether it is marginal."""
+        if not math.isfinite(self.margin):
+            return "no margin"
+        digits = f"{self.margin:+.0f}" if abs(self.margin) >= 10.0 else f"{self.margin:+.2g}"
+        number = _signed(digits) if self.margin else "0"
+        return f"margin {number} {self.unit}".rstrip() + (", marginal" if self.marginal else "")
 
     @property
     def threshold_text(self) -> str:
@@ -99,9 +140,23 @@ class Reading:
 
     @property
     def words(self) -> str:
-        """Name, value, threshold and note as a sentence without its full stop."""
+        """Name, value, threshold, margin and note as a sentence without its full stop."""
         note = f" ({self.note})" if self.note else ""
-        return f"{self.name}: {self.value_text}, needed {self.threshold_text}{note}"
+        return f"{self.name}: {self.value_text}, needed {self.threshold_text}, {self.margin_text}{note}"
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the reading as JSON-ready data; numbers that are not finite become null."""
+        return {
+            "name": self.name,
+            "value": finite_or_none(self.value),
+            "unit": self.unit,
+            "band": finite_or_none(self.band),
+            "admissible": [finite_or_none(bound) for bound in self.admissible],
+            "margin": finite_or_none(self.margin),
+            "marginal": self.marginal,
+            "verdict": self.verdict,
+            "note": self.note,
+        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,26 +166,44 @@ class Judgement:
     Parameters
     ----------
     solver : str - name of the equation; "geometry" for a statement that no motion enters
-    readings : all must hold; the first that fails, else the first that is undecided, else the first, speaks for them
-    aside : str - the verdict under another reading of the text, or why there is no number
+    readings : all must hold; see ``deciding`` for the one that speaks for them
+    aside : str - why there is no number
+    flown : str - slices, and steps where they are chosen, of the flights that were read
+    others : (words, judgement) of every other sense that the text allows
+    silent : str - why the statement says nothing about this equation; empty if it does
     """
 
     solver: str
     readings: tuple[Reading, ...] = ()
     aside: str = ""
+    flown: str = ""
+    others: tuple[tuple[str, Judgement], ...] = ()
+    silent: str = ""
 
     @property
     def verdict(self) -> Verdict:
-        """Return "fails" if a reading fails, "holds" if all hold."""
+        """Return "fails" if a reading fails, "holds" if all hold, "not judged" if there is nothing to judge."""
+        if self.silent:
+            return "not judged"
         verdicts = [reading.verdict for reading in self.readings]
         if "fails" in verdicts:
             return "fails"
         return "holds" if verdicts and all(verdict == "holds" for verdict in verdicts) else "cannot be decided"
 
     @property
+    def marginal(self) -> bool:
+        """Return whether a reading at the edge of its threshold carries the verdict."""
+        return self.deciding is not None and self.deciding.marginal
+
+    @property
     def deciding(self) -> Reading | None:
-        """Return the reading that the verdict rests on; None if there is no number at all."""
-        return next((reading for reading in self.readings if reading.verdict == self.verdict), None)
+        """Return the reading that the verdict rests on; None if there is no number at all.
+
+        A statement fails by any reading that is clearly off, and holds only as clearly as its most marginal one.
+        """
+        found = [reading for reading in self.readings if reading.verdict == self.verdict]
+        wanted = self.verdict == "holds"
+        return next((reading for reading in found if reading.marginal == wanted), found[0] if found else None)
 
     @property
     def value(self) -> float:
@@ -148,38 +221,27 @@ class Judgement:
         return self.deciding.threshold_text if self.deciding else ""
 
     @property
-    def sign(self) -> str:
-        """The verdict as a sign."""
-        return SIGNS[self.verdict]
-
-    @property
-    def colour(self) -> str:
-        """The verdict as the class of a page's style sheet."""
-        return CLASSES[self.verdict]
-
-    @property
     def words(self) -> str:
-        """All readings and the aside, as one line."""
-        return "; ".join([*(reading.words for reading in self.readings), *([self.aside] if self.aside else [])])
+        """All readings, the flights and the other senses of the text, as one line."""
+        parts = [reading.words for reading in self.readings]
+        parts += [words for words in (self.flown, self.silent, self.aside) if words]
+        for sense, judgement in self.others:
+            deciding = judgement.deciding
+            number = f", {deciding.name} {deciding.value_text}, {deciding.margin_text}" if deciding else ""
+            reason = f", {judgement.aside}" if judgement.aside else ""
+            parts.append(f"{sense}: {judgement.verdict}{number}{reason}")
+        return "; ".join(parts)
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the judgement as JSON-ready data; numbers that are not finite become null."""
         return {
             "solver": self.solver,
             "verdict": self.verdict,
-            "aside": self.aside,
-            "readings": [
-                {
-                    "name": reading.name,
-                    "value": finite_or_none(reading.value),
-                    "unit": reading.unit,
-                    "band": finite_or_none(reading.band),
-                    "admissible": [finite_or_none(bound) for bound in reading.admissible],
-                    "verdict": reading.verdict,
-                    "note": reading.note,
-                }
-                for reading in self.readings
-            ],
+            "marginal": self.marginal,
+            "aside": self.silent or self.aside,
+            "flown": self.flown,
+            "readings": [reading.to_mapping() for reading in self.readings],
+            "others": [{"sense": sense, **judgement.to_mapping()} for sense, judgement in self.others],
         }
 
 
@@ -192,7 +254,10 @@ class Statement:
     id : str - stable name, an anchor of the page
     place : str - section and figure
     says : str - the statement in other words
-    means : str - the definition it is judged by
+    means : str - what is measured, and what it must be
+    throw : str - on which throw
+    why : str - why the threshold is what it is
+    kind : "claim", or "admitted limit" for a shortcoming of the model that the paper itself names
     judgements : one for each equation, or a single one of "geometry"
     """
 
@@ -200,7 +265,23 @@ class Statement:
     place: str
     says: str
     means: str
+    throw: str
+    why: str
+    kind: Kind
     judgements: tuple[Judgement, ...]
+
+    def word(self, judgement: Judgement) -> str:
+        """Return a verdict on this statement in words, with "marginal" where it is."""
+        verdict = LIMIT_WORDS[judgement.verdict] if self.kind == "admitted limit" else judgement.verdict
+        return f"{verdict}, marginal" if judgement.marginal else verdict
+
+    def sign(self, judgement: Judgement) -> str:
+        """Return a verdict as a sign; one on an admitted limit is neither success nor failure."""
+        return "•" if self.kind == "admitted limit" and judgement.readings else SIGNS[judgement.verdict]
+
+    def colour(self, judgement: Judgement) -> str:
+        """Return a verdict as the class of a page's style sheet."""
+        return "soft" if self.kind == "admitted limit" else CLASSES[judgement.verdict]
 
     def by(self, solver: str) -> Judgement:
         """Return the judgement of one equation.
@@ -220,8 +301,11 @@ class Statement:
         return {
             "id": self.id,
             "place": self.place,
+            "kind": self.kind,
             "says": self.says,
             "means": self.means,
+            "throw": self.throw,
+            "why": self.why,
             "judgements": [judgement.to_mapping() for judgement in self.judgements],
         }
 
@@ -230,7 +314,7 @@ class Statement:
         return tuple(
             Finding(
                 id=f"paper-{self.id}-{judgement.solver}",
-                title=f"{self.place}: {self.says} By {judgement.solver}: {judgement.verdict}",
+                title=f"{self.place}: {self.says} By {judgement.solver}: {self.word(judgement)}",
                 value=None if math.isnan(judgement.value) else judgement.value,
                 unit=judgement.deciding.unit if judgement.deciding else "",
                 kind="observation",

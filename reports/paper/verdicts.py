@@ -11,9 +11,10 @@ from typing import Any, Final
 from reports.findings import Finding
 from reports.paper.claim_runs import ClaimRuns, gather_claims
 from reports.paper.claims import STEADY, claim_weight_slows_the_tenth, judge_all
+from reports.paper.claims_landing import claim_filling_of_change
 from reports.paper.experiment import CAVEAT, Comparison, agreement, closest_overall, compare_all, times_closest
 from reports.paper.runs import SOLVERS, PaperRuns
-from reports.paper.statements import Statement, Verdict
+from reports.paper.statements import Judgement, Statement, Verdict
 from reports.pool import Progress
 
 NAMES: Final[Mapping[str, str]] = MappingProxyType(
@@ -30,7 +31,8 @@ class PaperVerdicts:
     ----------
     statements : every statement about the model, judged by each equation
     comparisons : every statement about the experiment, beside the number of each equation
-    weights : findings of what the weight does to the bottle filled to 0.1; these must hold
+    weights : findings of what the weight does to the bottle filled to 0.1, and from which filling on water leaves the
+        base; these must hold
     slices : slices of an event-driven flight at the most
     """
 
@@ -54,22 +56,32 @@ class PaperVerdicts:
         """What the comparison with the experiment is worth."""
         return CAVEAT
 
-    def count(self, solver: str, verdict: Verdict) -> int:
-        """Return how many statements an equation gives this verdict."""
-        return sum(
-            judgement.verdict == verdict
+    def judgements(self, solver: str, *, limits: bool = False) -> list[Judgement]:
+        """Return what an equation has judged: the claims, or the limits that the paper admits."""
+        return [
+            judgement
             for statement in self.statements
             for judgement in statement.judgements
-            if judgement.solver == solver
-        )
+            if judgement.solver == solver and (statement.kind == "admitted limit") is limits
+        ]
+
+    def count(self, solver: str, verdict: Verdict) -> int:
+        """Return how many claims an equation gives this verdict; limits that the paper admits are not counted."""
+        return sum(judgement.verdict == verdict for judgement in self.judgements(solver))
 
     @property
     def lead(self) -> str:
-        """Return in a sentence for each equation how many statements survive."""
-        return " ".join(
-            f"{NAMES[solver].capitalize()}: {self.count(solver, 'holds')} hold, {self.count(solver, 'fails')} fail, "
-            f"{self.count(solver, 'cannot be decided')} cannot be decided."
-            for solver in SOLVERS
+        """Return in two sentences for each equation how many claims survive, and how many admitted limits it has."""
+        return " ".join(self._lead_of(solver) for solver in SOLVERS)
+
+    def _lead_of(self, solver: str) -> str:
+        claims, limits = self.judgements(solver), self.judgements(solver, limits=True)
+        marginal = sum(judgement.marginal for judgement in claims)
+        has = sum(judgement.verdict == "holds" for judgement in limits)
+        return (
+            f"{NAMES[solver].capitalize()}: {self.count(solver, 'holds')} claims hold, {self.count(solver, 'fails')} "
+            f"fail, {self.count(solver, 'cannot be decided')} cannot be decided; {marginal} of these are marginal. It "
+            f"has {has} of the {len(limits)} limits that the paper admits."
         )
 
     @property
@@ -103,7 +115,7 @@ def judge_paper(runs: ClaimRuns) -> PaperVerdicts:
     return PaperVerdicts(
         statements=judge_all(runs),
         comparisons=compare_all(runs),
-        weights=tuple(claim_weight_slows_the_tenth(runs, solver) for solver in STEADY),
+        weights=(*(claim_weight_slows_the_tenth(runs, solver) for solver in STEADY), claim_filling_of_change()),
         slices=runs.paper.size.slices,
     )
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
+from functools import cache
+from typing import Final, Literal
 
 import numpy as np
 
@@ -24,6 +25,9 @@ MUCH_LESS = 0.1
 
 ROUND_OFF = (1.0 - 1e-6, 1.0 + 1e-6)
 """A quotient that should be 1, with room for a finite difference."""
+
+SQUARE: Final = (1.8, 2.2)
+"""Exponents that count as a square."""
 
 FILLS = (0.1, 0.25, 0.5, 0.75, 1.0)
 MANY_SLICES = 20_000
@@ -219,6 +223,37 @@ def erratum_matlab_reset() -> Erratum:
     )
 
 
+MATLAB_LINE: Final = "rho =1000; density of water"
+"""A line of Main.m exactly as printed; its comment lacks the percent sign."""
+
+MATLAB_FUNCTIONS: Final = (
+    "FindCenterOfMass", "InertiaMomentumWater", "InertiaMomentumBottle", "InstantaneousAngularFrequency", "FindTheta",
+    "FindNewlocation", "CheckBoundaryConditions",
+)  # fmt: skip
+"""Functions that the MATLAB supplement defines."""
+
+
+def stray_commands(line: str) -> list[str]:
+    """Return the statements of a line of MATLAB that assign nothing and call no function of the supplement."""
+    statements = (part.strip() for part in line.split("%")[0].split(";"))
+    return [part for part in statements if part and "=" not in part and part.split()[0] not in MATLAB_FUNCTIONS]
+
+
+def erratum_matlab_comment(line: str = MATLAB_LINE) -> Erratum:
+    """Show that Main.m as printed stops at a comment without its percent sign."""
+    stray = stray_commands(line)
+    return Erratum(
+        id="matlab-comment",
+        place="Supplement, Main.m",
+        prints=line,
+        follows="a comment starts with %, as on the lines around it",
+        value=float(len(stray)),
+        unit="statements that nothing defines",
+        admissible=(0.0, 0.0),
+        note=f"MATLAB takes “{stray[0]}” for a call and stops: the program as printed cannot run" if stray else "",
+    )
+
+
 def erratum_contact_sign(beta: float = -0.5) -> Erratum:
     """[C.S.] as typeset multiplies the velocity by minus beta: with beta = -0.5 a slice goes on into the wall."""
     before = 1.0
@@ -296,6 +331,7 @@ def count_operations(n: int, steps: int, *, copies_history: bool) -> int:
     return _Counted.elements
 
 
+@cache
 def exponents_of_cost(*, copies_history: bool) -> tuple[float, float]:
     """Return the exponents of N and of P in the elements touched, between 250 and 1000 of each."""
     base, most = 250, 1000
@@ -319,8 +355,9 @@ def erratum_cost(program: Literal["python", "matlab"]) -> Erratum:
         follows=why[program],
         value=of_n,
         unit="exponent of N",
-        admissible=(1.8, 2.2),
-        note=f"exponent of P: {of_p:.2f}; array elements counted, no clock",
+        admissible=SQUARE,
+        note=f"read as N_t, the number of time intervals, the exponent is {of_p:.2f} and the sentence "
+        f"{'right' if SQUARE[0] <= of_p <= SQUARE[1] else 'wrong too'}; array elements counted, no clock",
     )
 
 
@@ -465,6 +502,7 @@ def study_errata(throw: Scenario) -> tuple[Erratum, ...]:
         *((f"eq11e-{fill:g}", lambda fill=fill: erratum_eq11e(throw, fill)) for fill in FILLS),
         ("python-cost", lambda: erratum_cost("python")),
         ("matlab-cost", lambda: erratum_cost("matlab")),
+        ("matlab-comment", erratum_matlab_comment),
         ("matlab-damping", lambda: erratum_matlab_damping(throw)),
         ("matlab-reset", erratum_matlab_reset),
         ("python-sinh-sign", lambda: erratum_python_sign(throw)),
