@@ -236,7 +236,7 @@ MATLAB_FUNCTIONS: Final = (
 def stray_commands(line: str) -> list[str]:
     """Return the statements of a line of MATLAB that assign nothing and call no function of the supplement."""
     statements = (part.strip() for part in line.split("%")[0].split(";"))
-    return [part for part in statements if part and "=" not in part and part.split()[0] not in MATLAB_FUNCTIONS]
+    return [part for part in statements if part and "=" not in part and part.partition("(")[0] not in MATLAB_FUNCTIONS]
 
 
 def erratum_matlab_comment(line: str = MATLAB_LINE) -> Erratum:

@@ -20,7 +20,7 @@ def audit():
 def test_every_item_is_an_erratum_with_words_and_a_number(audit):
     assert {item.verdict for item in audit.values()} == {"erratum"}, {i: e.note for i, e in audit.items()}
     assert all(item.place and item.prints and item.follows and item.unit for item in audit.values())
-    assert len(audit) == 20
+    assert len(audit) == 21
 
 
 @pytest.mark.parametrize(("fill", "ratio"), [(0.1, 0.371), (0.25, 0.243), (0.5, 1.864), (0.75, 2.958), (1.0, 3.371)])
@@ -75,6 +75,25 @@ def test_matlab(audit):
     assert audit["matlab-damping"].value == pytest.approx(1 / 500**2)
     assert audit["matlab-reset"].value == pytest.approx(0.025, abs=1e-3)
     assert "overflow at t = 0.301 s" in audit["matlab-reset"].note
+
+
+def test_main_m_as_printed_stops_at_a_comment():
+    printed = errata.erratum_matlab_comment()
+    assert (printed.verdict, printed.value) == ("erratum", 1.0)
+    assert "density of water" in printed.note
+    for right in (
+        "rho =1000; %density of water",
+        "h=0.14; %height",
+        "r_CM=[];",
+        "rho =1000;",
+        "CheckBoundaryConditions(r)",
+    ):
+        assert errata.erratum_matlab_comment(right).verdict == "as printed"
+
+
+def test_the_square_is_judged_for_both_meanings_of_n(audit):
+    assert "N_t, the number of time intervals, the exponent is 1.97 and the sentence right" in audit["matlab-cost"].note
+    assert "the exponent is 1.00 and the sentence wrong too" in audit["python-cost"].note
 
 
 def test_epsilon_agrees_if_the_bottle_is_the_cylinder_it_is_said_to_be():

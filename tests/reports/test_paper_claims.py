@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reports.paper import claim_runs, claims, claims_landing, observe
+from reports.paper import claim, claim_runs, claims_landing, claims_throw, observe
 from reports.paper.cases import FAMILIES, all_cases, family
-from reports.paper.claim_runs import ClaimRuns, gather_claims, plan_further, plan_halved
-from reports.paper.claims import CLAIMS, STEADY, Claim, claim_weight_slows_the_tenth, judge, judge_all
+from reports.paper.claim import Claim, judge
+from reports.paper.claim_runs import ClaimRuns, gather_claims, plan_further, plan_halved, plan_published
+from reports.paper.claims import CLAIMS, STEADY, claim_weight_slows_the_tenth, judge_all
 from reports.paper.claims_cost import many_steps_key, same_steps_key
 from reports.paper.claims_model import finest_key
 from reports.paper.observe import Flights, MissingFlightError
@@ -22,6 +23,7 @@ from reports.paper.verdicts import judge_paper
 from reports.solvers import Run, make
 from reports.templating import environment
 from slicemodel import Trajectory
+from slicemodel.observables import centre_of_mass, plateau
 
 THROW = paper_throw().with_slices(2)
 BY_ID = {claim.id: claim for claim in CLAIMS}
@@ -82,8 +84,7 @@ def flights_of(names, curve_of, solver=PUBLISHED, **further):
 
 
 def verdict_of(name, flights):
-    claim = BY_ID[name]
-    return judge(replace(claim, otherwise=()), flights).verdict
+    return judge(replace(BY_ID[name], otherwise=()), flights).verdict
 
 
 # ---------------------------------------------------------------------- readings and judgements
@@ -148,16 +149,106 @@ def test_a_judgement_fails_with_its_first_failing_reading_and_holds_with_all():
     assert Judgement(solver="s", readings=(good, open_)).deciding is open_
     judgement = Judgement(solver="s", readings=(good, open_, bad))
     assert (judgement.verdict, judgement.deciding, judgement.value) == ("fails", bad, 2.0)
-    assert (judgement.sign, judgement.colour, judgement.threshold) == ("✗", "fail", "0 to 1")
+    assert judgement.threshold == "0 to 1"
     nothing = Judgement(solver="s", aside="no flight")
     assert nothing.verdict == "cannot be decided"
     assert math.isnan(nothing.value)
     assert nothing.words == "no flight"
 
 
+@pytest.mark.parametrize(
+    ("value", "band", "admissible", "margin", "marginal"),
+    [
+        (0.0497, 0.0, (-math.inf, 0.05), 0.0003, True),  # within a tenth of the threshold
+        (0.0449, 0.0, (-math.inf, 0.05), 0.0051, False),
+        (0.0552, 0.0, (-math.inf, 0.05), -0.0052, False),
+        (0.0549, 0.0, (-math.inf, 0.05), -0.0049, True),
+        (0.04, 0.006, (-math.inf, 0.05), 0.01, True),  # within a tenth and its band
+        (0.12, 0.0, (0.1, math.inf), 0.02, False),
+        (0.109, 0.0, (0.1, math.inf), 0.009, True),
+        (1.97, 0.0, (1.8, 2.2), 0.17, False),  # of an interval, half the width is its size
+        (2.19, 0.0, (1.8, 2.2), 0.01, True),
+        (1.0, 0.0, (1.8, 2.2), -0.8, False),
+        (0.001, 0.0, (0.0, math.inf), 0.001, False),  # a comparison has no size, only its band
+        (0.001, 0.002, (0.0, math.inf), 0.001, True),
+        (0.0, 0.0, (-math.inf, 0.0), 0.0, False),
+        (math.nan, 0.0, (0.0, 1.0), math.nan, False),
+        (0.0, math.nan, (0.0, 1.0), 0.0, False),
+    ],
+)
+def test_a_number_is_marginal_where_its_band_or_a_tenth_reaches_the_threshold(
+    value, band, admissible, margin, marginal
+):
+    reading = Reading(name="x", value=value, unit="m", admissible=admissible, band=band)
+    assert reading.margin == pytest.approx(margin, nan_ok=True)
+    assert reading.marginal is marginal
+    assert ("marginal" in reading.words) is marginal
+    assert reading.to_mapping()["marginal"] is marginal
+    if reading.verdict == "cannot be decided" and math.isfinite(value + band):
+        assert reading.marginal
+
+
+def test_margins_are_printed_with_sign_and_unit():
+    def text(value, low=-math.inf, high=0.05):
+        return Reading(name="x", value=value, unit="m", admissible=(low, high)).margin_text
+
+    assert text(0.0497) == "margin +0.0003 m, marginal"
+    assert text(0.2) == "margin −0.15 m"
+    assert text(150.0, high=0.0) == "margin −150 m"
+    assert text(0.0, high=0.0) == "margin 0 m"
+    assert text(math.nan) == "no margin"
+
+
+def test_a_statement_holds_as_clearly_as_its_most_marginal_number_and_fails_as_its_clearest():
+    clear, near, off, far = (
+        Reading(name=n, value=v, unit="", admissible=(-math.inf, 1.0))
+        for n, v in (("clear", 0.5), ("near", 0.95), ("off", 1.05), ("far", 2.0))
+    )
+    assert Judgement(solver="s", readings=(clear, near)).deciding is near
+    assert Judgement(solver="s", readings=(clear, near)).marginal
+    assert not Judgement(solver="s", readings=(clear, clear)).marginal
+    assert Judgement(solver="s", readings=(off, far)).deciding is far
+    assert not Judgement(solver="s", readings=(off, far, near)).marginal
+    assert Judgement(solver="s", readings=(clear, off)).marginal
+
+
+def test_a_limit_that_the_paper_admits_is_neither_success_nor_failure():
+    inside, outside = (
+        Judgement(solver=s, readings=(Reading(name="x", value=v, unit="", admissible=(-math.inf, 0.8)),))
+        for s, v in (("a", 0.4), ("b", 0.95))
+    )
+    limit = Statement(
+        id="x", place="section 1", says="A.", means="B.", throw="any", why="C.", kind="admitted limit",
+        judgements=(inside, outside),
+    )  # fmt: skip
+    claimed = replace(limit, kind="claim")
+    assert [limit.word(each) for each in limit.judgements] == ["has this limit", "is free of it"]
+    assert [limit.colour(each) for each in limit.judgements] == ["soft", "soft"]
+    assert {limit.sign(each) for each in limit.judgements} == {"•"}
+    assert [claimed.word(each) for each in claimed.judgements] == ["holds", "fails"]
+    assert [claimed.colour(each) for each in claimed.judgements] == ["pass", "fail"]
+    assert [claimed.sign(each) for each in claimed.judgements] == ["✓", "✗"]
+    assert limit.to_mapping()["kind"] == "admitted limit"
+    assert "has this limit" in limit.findings()[0].title
+    assert {each.id for each in CLAIMS if each.kind == "admitted limit"} == {
+        "full-slows", "tenth-slows", "low-filling-change"
+    }  # fmt: skip
+
+
+def test_every_statement_says_where_it_stands_what_is_measured_on_which_throw_and_why_so():
+    for each in CLAIMS:
+        assert all((each.place, each.says, each.means, each.throw, each.why)), each.id
+        assert each.place.startswith("section"), each.id
+        assert not each.judges or each.silent, each.id
+    assert len(BY_ID) == len(CLAIMS)
+
+
 def test_findings_of_statements_cannot_fail_a_report():
     bad = Judgement(solver="s", readings=(Reading(name="x", value=2.0, unit="m", admissible=(0.0, 1.0)),))
-    statement = Statement(id="a", place="section 1", says="A.", means="B.", judgements=(bad, Judgement(solver="t")))
+    statement = Statement(
+        id="a", place="section 1", says="A.", means="B.", throw="any", why="C.", kind="claim",
+        judgements=(bad, Judgement(solver="t")),
+    )  # fmt: skip
     first, second = statement.findings()
     assert (first.kind, first.failed, first.value) == ("observation", False, 2.0)
     assert second.value is None
@@ -202,6 +293,39 @@ def test_distance_compares_at_equal_shares_of_the_flight():
     )
 
 
+def test_the_shape_of_a_curve_is_what_no_delay_and_no_stretch_changes():
+    early, late = (flight(THROW, falls_to(0.3, time)) for time in (0.05, 0.08))
+    assert observe.distance(late, early) > 0.03
+    assert observe.shape_distance(late, early) < 2e-3
+    assert observe.shape_distance(early, late) < 2e-3
+    assert observe.shape_distance(flight(THROW, falls_to(0.5)), early) > 0.1
+
+    def moved(delay):
+        return flight(THROW, lambda s: np.where(s < delay, 1.0, falls_to(0.3)(s - delay)))
+
+    assert observe.delayed_distance(moved(0.1), moved(0.0)) < 2e-3
+    assert observe.delayed_distance(moved(0.0), moved(0.1)) < 2e-3
+    assert observe.distance(moved(0.1), moved(0.0)) > 0.1
+    level_ = flight(THROW, lambda s: 1.0 - 0.05 * s)
+    assert math.isnan(observe.shape_distance(level_, early))
+    assert math.isnan(observe.delayed_distance(level_, early))
+
+
+def test_what_a_judgement_looked_at_is_remembered():
+    usual = flights_of(["filling"], always(FLAT))
+    watched, seen = usual.watched()
+    assert seen.words == ""
+    assert "filling 0.1" in watched.runs
+    assert len(watched.runs) == len(usual.runs)
+    assert seen.words == ""
+    watched.run("filling 0.1")
+    assert seen.words == "N = 2"
+    stepped = replace(flight(THROW.with_slices(50), FLAT), settings={"steps": 1000})
+    watched, seen = replace(usual, runs={**usual.runs, "filling 0.2": stepped}).watched()
+    watched.at("filling", 0.1), watched.at("filling", 0.2)
+    assert seen.words == "N = 2 to 50, P = 1000"
+
+
 def test_share_near_the_cap_counts_slices_at_one_time():
     r = np.full((3, 4), 0.2)
     r[1, :3] = 0.1
@@ -238,8 +362,18 @@ def of_drag(none, moderate, strong):
     return flights_of(["drag"], lambda drag: none if drag == 0 else strong if drag >= 0.0125 else moderate)
 
 
+def of_settled_drag(settled, others):
+    """Curves at the drag that the paper settles on, and at all others."""
+    return flights_of(["drag"], lambda drag: settled if drag == 0.01 else others)
+
+
 def of_filling(level_at):
     return flights_of(["filling"], lambda filling: falls_to(level_at(filling)))
+
+
+def slowing(at):
+    """Plateau that is 0.95 at 0.05, falls to 0.8 at a filling and stops at 0.3."""
+    return lambda filling: max(0.3, 0.95 - 0.15 * (filling - 0.05) / (at - 0.05))
 
 
 def tub(best, slope=0.5):
@@ -274,13 +408,23 @@ CASES = [
     ("beta-others-rise", of_beta(LATE, FLAT, LATE), of_beta(LATE, FLAT, FLAT)),
     ("strong-drag-oscillates", of_drag(FLAT, FLAT, BUMPY), of_drag(BUMPY, BUMPY, FLAT)),
     ("no-drag-rises", of_drag(LATE, FLAT, FLAT), of_drag(FLAT, LATE, LATE)),
-    ("moderate-drag-flat", of_drag(LATE, FLAT, LATE), of_drag(FLAT, LATE, FLAT)),
-    ("moderate-drag-flat", of_drag(LATE, FLAT, LATE), of_drag(FLAT, falls_to(0.3, 0.5), FLAT)),
-    ("strong-drag-turns-back", of_drag(FLAT, FLAT, lambda s: 1.0 - 2.0 * s), of_drag(FLAT, FLAT, FLAT)),
+    ("moderate-drag-flat-0.0075", of_drag(LATE, FLAT, LATE), of_drag(FLAT, LATE, FLAT)),
+    ("moderate-drag-flat-0.01", of_drag(LATE, FLAT, LATE), of_drag(FLAT, falls_to(0.3, 0.5), FLAT)),
+    ("moderate-drag-flat-0.01", of_settled_drag(FLAT, LATE), of_settled_drag(LATE, FLAT)),
+    ("moderate-drag-flat-0.0075", of_settled_drag(LATE, FLAT), of_settled_drag(FLAT, LATE)),
+    ("strong-drag-turns-back", of_drag(FLAT, FLAT, BUMPY), of_drag(BUMPY, BUMPY, FLAT)),
+    ("alpha-sensitive", of_settled_drag(FLAT, falls_to(0.4)), of_settled_drag(FLAT, FLAT)),
+    ("alpha-sensitive", of_settled_drag(FLAT, falls_to(0.4)), of_drag(LATE, FLAT, falls_to(0.4))),
+    ("beta-angle-alike", of_beta(LATE, FLAT, FLAT), of_beta(FLAT, FLAT, falls_to(0.5))),
     ("plateau-range", of_filling(always(0.3)), of_filling(always(0.1))),
     ("best-filling", of_filling(tub(0.33)), of_filling(tub(0.75))),
     ("empty-keeps-spin", of_filling(always(0.95)), of_filling(always(0.85))),
     ("tenth-slows", of_filling(always(0.5)), of_filling(always(0.88))),
+    ("low-filling-change", of_filling(slowing(0.0875)), of_filling(slowing(0.11))),
+    ("low-filling-change", of_filling(slowing(0.0875)), of_filling(slowing(0.15))),
+    ("agreement-excellent", of_filling(always(0.4)), of_filling(lambda m: 0.7 if m == 0.33 else 0.4)),
+    ("agreement-excellent", of_filling(always(0.4)), of_filling(lambda m: 0.85 if m == 0.75 else 0.4)),
+    ("agreement-excellent", of_filling(always(0.16)), of_filling(always(0.13))),
     ("full-slows", of_filling(always(0.5)), of_filling(always(0.99))),
     ("fast-spin", of_spin(0.3, 0.3), of_spin(0.3, 0.2)),
     ("fast-spin", of_spin(0.3, 0.3), of_spin(0.3, 0.3, earlier=False)),
@@ -368,9 +512,15 @@ def test_landing_claims_read_the_moment_the_bottle_is_upright():
     assert {verdict_of(name, good) for name in names} == {"holds"}
     bad = of_landing(higher(lambda filling: -2.0 if filling == 0.4 else 5.0), always(-0.3))
     assert {verdict_of(name, bad) for name in names} == {"fails"}
-    # The same as the derivative of r_CM, which counts from the cap down, is the other way round.
-    aside = judge(BY_ID["landing-velocity"], good).aside
-    assert "as dr_CM/dt, counted from the cap, at θ = 2π: fails" in aside
+    # The number is dr_CM/dt, positive towards the base, as the figure has it, in every sense of the text.
+    for moving, towards_base, towards_cap in ((good, "holds", "fails"), (bad, "fails", "holds")):
+        judgement = judge(BY_ID["landing-velocity"], moving)
+        others = dict(judgement.others)
+        assert judgement.verdict == towards_base
+        assert others["as negative dr_CM/dt, towards the cap, at θ = 2π"].verdict == towards_cap
+        assert {math.copysign(1.0, each.value) for each in (judgement, *others.values())} == {
+            math.copysign(1.0, judgement.value)
+        }
 
 
 def test_a_bottle_that_never_stands_upright_leaves_the_landing_undecided():
@@ -387,7 +537,7 @@ def test_more_steps_must_not_move_the_curve():
 
     assert verdict_of("steps-enough", flights(0.301)) == "holds"
     assert verdict_of("steps-enough", flights(0.4)) == "fails"
-    assert verdict_of("steps-enough", Flights(solver="free-flight", runs={}, reasons={})) == "cannot be decided"
+    assert verdict_of("steps-enough", Flights(solver="free-flight", runs={}, reasons={})) == "not judged"
 
 
 # ---------------------------------------------------------------------- geometry and counts
@@ -402,29 +552,95 @@ def test_toppling_angle_peaks_at_45_degrees_where_the_paper_says():
     assert judge(BY_ID["toppling-peak"], Flights(solver="geometry", runs={}, reasons={})).verdict == "holds"
 
 
-def test_launch_speed_and_spin_of_the_paper_do_not_fit():
+def test_water_at_rest_reaches_the_centre_of_mass_where_the_toppling_angle_peaks():
+    """h/L = eps/(1 + eps) and M^2 + 2 b M - b = 0 against the scenario's own centre of mass and slices, to 1e-6."""
+    bottle = paper_throw().bottle
+    filling = claims_landing.filling_of_change(bottle)
+    assert filling == pytest.approx(0.1416585, abs=1e-7)
+    epsilon = bottle.mass / (bottle.mass + filling * bottle.capacity)
+    assert filling == pytest.approx(epsilon / (1.0 + epsilon), abs=1e-12)
+    assert claims_landing.toppling_peak()[0] == pytest.approx(filling, abs=1e-6)
+    assert claims_landing.surface_over_centre(filling) == pytest.approx(0.0, abs=1e-12)
+    assert claims_landing.surface_over_centre(filling - 1e-6) < 0.0 < claims_landing.surface_over_centre(filling + 1e-6)
+    # The same with slices: the topmost one lies on the centre of mass, up to half its own height.
+    for off in (-2e-6, 2e-6):
+        throw = replace(paper_throw(), water_mass=(filling + off) * bottle.capacity, n_slices=1_000_000)
+        r = throw.initial_positions()
+        over = float(centre_of_mass(throw, r)) - (float(r[-1]) - throw.slice_height / 2)
+        assert math.copysign(1.0, over) == math.copysign(1.0, off)
+    found = claims_landing.claim_filling_of_change()
+    assert (found.verdict, found.failed) == ("pass", False)
+    assert found.value < 1e-6
+
+
+def test_a_wrong_filling_of_change_fails(monkeypatch):
+    monkeypatch.setattr(claims_landing, "filling_of_change", always(0.14166))
+    assert claims_landing.claim_filling_of_change().failed
+
+
+@pytest.mark.parametrize(("filling", "over"), [(0.12, 0), (0.13, 0), (0.14, 1), (0.15, 2), (0.16, 3)])
+def test_free_flight_throws_water_to_the_cap_from_that_filling_on(filling, over):
+    """Slices may overlap and sink to the base first, which puts the centre of mass lower: 0.13 to 0.14."""
+    throw = paper_throw(filling).with_slices(20)
+    run = make(Run("around", "free-flight", throw, {"rtol": 1e-7})).trajectory
+    assert int((run.r < throw.bottle.length / 2).any(axis=0).sum()) == over
+    steady = plateau(run.t, run.omega, throw.omega0)
+    assert steady > 0.85 if over == 0 else steady < 0.75
+
+
+def test_launch_speed_and_spin_of_the_paper_agree_in_order_of_magnitude_only():
     judgement = judge(BY_ID["release-spin"], Flights(solver="geometry", runs={}, reasons={}))
-    assert judgement.verdict == "fails"
+    assert judgement.verdict == "holds"
     assert judgement.value == pytest.approx(9.7, abs=0.05)
+    ((_, strict),) = judgement.others
+    assert strict.verdict == "fails"
 
 
-def test_work_of_the_program_is_linear_in_both():
+def test_the_scale_of_spin_is_that_of_gravity_over_half_a_bottle():
+    judgement = judge(BY_ID["spin-scale"], Flights(solver="geometry", runs={}, reasons={}))
+    assert judgement.verdict == "holds"
+    assert judgement.value == pytest.approx(math.sqrt(9.81 / 0.14))
+
+
+def test_work_of_the_programs_is_linear_in_slices_and_square_in_intervals_only_where_history_is_copied():
     flights = Flights(solver=PUBLISHED, runs={}, reasons={})
-    of_slices_ = judge(BY_ID["cost-slices"], flights)
-    assert (of_slices_.verdict, round(of_slices_.value, 1)) == ("fails", 1.0)
-    of_steps = judge(BY_ID["cost-steps"], flights)
-    assert of_steps.verdict == "fails"
-    assert "MATLAB program, whose steps copy all steps before: holds" in of_steps.aside
-    counted = Flights(
-        solver="eq8",
-        reasons={},
-        runs={
-            case.key: replace(flight(case.scenario, FLAT), diagnostics={"evaluations": int(case.value)})
-            for case in family("slices")
-            if case.value in (20.0, 50.0, 100.0)
-        },
-    )
-    assert judge(BY_ID["cost-slices"], counted).value == pytest.approx(2.0)
+    found = {name: judge(BY_ID[name], flights) for name in ("cost-slices", "cost-intervals", "cost-steps")}
+    python = {name: dict(each.others)["in the Python program, which copies no history"] for name, each in found.items()}
+    assert {name: each.verdict for name, each in found.items()} == {
+        "cost-slices": "fails", "cost-intervals": "holds", "cost-steps": "holds"
+    }  # fmt: skip
+    assert {each.verdict for each in python.values()} == {"fails"}
+    assert round(found["cost-slices"].value, 1) == 1.0
+    assert found["cost-intervals"].value == pytest.approx(2.0, abs=0.05)
+    for name in found:
+        silent = judge(BY_ID[name], replace(flights, solver="eq8"))
+        assert (silent.verdict, silent.readings) == ("not judged", ())
+        assert "the sentence is about the programs" in silent.words
+
+
+def test_the_senses_of_non_monotonic_angles():
+    def turned(of_drag_):
+        return flights_of(["drag"], lambda drag: always_at(of_drag_(drag)))
+
+    def always_at(share):
+        return lambda s: share + 0.0 * s
+
+    grows = turned(lambda drag: 0.8 - 20 * drag if drag <= 0.01 else 0.2 + 20 * drag)
+    falls = turned(lambda drag: 0.8 - 20 * drag)
+    sense = "as θ(T) over α, which falls up to 0.01 and grows from 0.0125 on"
+    assert dict(judge(BY_ID["strong-drag-turns-back"], grows).others)[sense].verdict == "fails"  # 0.45 after 0.6
+    jumps = turned(lambda drag: 0.8 - 20 * drag if drag <= 0.01 else 0.5 + 20 * drag)
+    assert dict(judge(BY_ID["strong-drag-turns-back"], jumps).others)[sense].verdict == "holds"
+    assert dict(judge(BY_ID["strong-drag-turns-back"], falls).others)[sense].verdict == "fails"
+    back = of_drag(FLAT, FLAT, lambda s: 1.0 - 2.0 * s)
+    letter = "by the letter, as θ(t) turning back"
+    assert dict(judge(BY_ID["strong-drag-turns-back"], back).others)[letter].verdict == "holds"
+    assert dict(judge(BY_ID["strong-drag-turns-back"], falls).others)[letter].verdict == "fails"
+
+
+def test_the_filling_of_the_slow_down_is_interpolated():
+    assert claims_throw.filling_of_slow_down(of_filling(slowing(0.125))) == pytest.approx(0.125, abs=1e-3)
+    assert math.isnan(claims_throw.filling_of_slow_down(of_filling(always(0.5))))
 
 
 # ---------------------------------------------------------------------- bands and missing flights
@@ -436,12 +652,16 @@ def test_half_the_slices_give_the_band_and_tolerances_are_added():
     judged = judge(BY_ID["tenth-slows"], replace(usual, solver="free-flight", halved=halved))
     assert judged.readings[0].band == pytest.approx(0.06 + BANDS["free-flight"], abs=1e-4)
     assert judged.verdict == "holds"
+    # What half the steps change comes on top, unless the steps are the subject.
+    both = replace(usual, halved=of_filling(always(0.71)), half_steps=of_filling(always(0.68)))
+    assert judge(BY_ID["tenth-slows"], both).readings[0].band == pytest.approx(0.03, abs=1e-4)
+    assert judge(replace(BY_ID["tenth-slows"], of_steps=True), both).readings[0].band == pytest.approx(0.01, abs=1e-4)
     near = of_filling(always(0.86))
     assert judge(BY_ID["tenth-slows"], replace(usual, halved=near)).verdict == "cannot be decided"
     assert judge(BY_ID["tenth-slows"], usual).readings[0].band == 0.0
     metres = Reading(name="x", value=1.0, unit="m/s", admissible=(0.0, 1.0))
-    assert claims.tolerance_band("free-flight", metres) == 0.0
-    assert claims.tolerance_band("free-flight", replace(metres, unit=OMEGA)) == BANDS["free-flight"]
+    assert claim.tolerance_band("free-flight", metres) == 0.0
+    assert claim.tolerance_band("free-flight", replace(metres, unit=OMEGA)) == BANDS["free-flight"]
 
 
 def test_a_missing_or_broken_flight_leaves_a_claim_undecided_and_says_why():
@@ -449,6 +669,7 @@ def test_a_missing_or_broken_flight_leaves_a_claim_undecided_and_says_why():
     judgement = judge(BY_ID["tenth-slows"], nothing)
     assert judgement.verdict == "cannot be decided"
     assert judgement.words == "ValueError: no such bottle"
+    assert not judgement.marginal
     run = flight(THROW, FLAT)
     stopped = replace(run, status="overflow", message="at t = 0.2 s")
     with pytest.raises(MissingFlightError, match=r"'filling 0.1' by eq8: overflow, at t = 0.2 s"):
@@ -458,17 +679,23 @@ def test_a_missing_or_broken_flight_leaves_a_claim_undecided_and_says_why():
 
 
 def test_other_readings_of_the_text_stand_beside_the_verdict():
-    claim = Claim(
-        id="x", place="", says="", means="",
+    twofold = Claim(
+        id="x", place="", says="", means="", throw="", why="",
         read=lambda _: (Reading(name="first", value=0.0, unit="", admissible=(0.0, 1.0)),),
         otherwise=(
             ("the other way", lambda _: (Reading(name="second", value=2.0, unit="s", admissible=(0.0, 1.0)),)),
             ("a third", lambda _: (each for each in ()).throw(MissingFlightError("not flown"))),
         ),
     )  # fmt: skip
-    judgement = judge(claim, Flights(solver="s", runs={}, reasons={}))
+    judgement = judge(twofold, Flights(solver="s", runs={}, reasons={}))
     assert judgement.verdict == "holds"
-    assert judgement.aside == "the other way: fails, second 2 s; a third: not flown"
+    assert [(sense, each.verdict) for sense, each in judgement.others] == [
+        ("the other way", "fails"), ("a third", "cannot be decided")
+    ]  # fmt: skip
+    assert judgement.words.endswith(
+        "the other way: fails, second 2 s, margin −1 s; a third: cannot be decided, not flown"
+    )
+    assert [each["sense"] for each in judgement.to_mapping()["others"]] == ["the other way", "a third"]
 
 
 # ---------------------------------------------------------------------- plans
@@ -497,18 +724,41 @@ def test_further_runs_repeat_none_of_the_figures(size):
     assert ("eq8", same_steps_key(0.5)) in halved
 
 
+def test_the_published_program_is_flown_with_half_its_slices_and_with_half_its_steps():
+    slices, steps = plan_published("slices"), plan_published("steps")
+    assert set(slices) < set(steps)
+    tags = [run.tag for run, _ in (*slices.values(), *steps.values())]
+    assert len(set(tags)) == len(tags)
+    for (solver, key), (run, thin) in slices.items():
+        usual = all_cases()[key]
+        assert (solver, run.settings["steps"], thin) == (PUBLISHED, usual.steps, usual.thin)
+        assert run.scenario.n_slices == usual.scenario.n_slices // 2
+        assert run.scenario.damping_rate == pytest.approx(usual.scenario.damping_rate)
+    for (_, key), (run, thin) in steps.items():
+        assert run.scenario == all_cases()[key].scenario
+        assert (run.settings["steps"] - 1) * 2 == pytest.approx(all_cases()[key].steps - 1, abs=1)
+        assert (run.settings["steps"] - 1) % thin == 0  # the landing is kept
+    assert steps[PUBLISHED, "drag 0.0125"][0].settings["store"] == "full"
+
+
 def test_gathering_keeps_what_belongs_together(monkeypatch):
     scenario = replace(THROW, duration=0.01)
     one = Run("one", PUBLISHED, scenario, {"steps": 5, "store": "summary"})
     two = Run("two", PUBLISHED, replace(scenario, omega0=10.0), {"steps": 5, "store": "summary"})
     monkeypatch.setattr(claim_runs, "plan_further", lambda _: {(PUBLISHED, "a"): one})
     monkeypatch.setattr(claim_runs, "plan_halved", lambda _: {("eq8", "a"): two})
+    three = replace(two, tag="three", scenario=replace(scenario, omega0=15.0))
+    four = replace(two, tag="four", scenario=replace(scenario, omega0=16.0))
+    half = {"slices": three, "steps": four}
+    monkeypatch.setattr(claim_runs, "plan_published", lambda of: {(PUBLISHED, "a"): (half[of], 1)})
     paper = PaperRuns(size=REPORT, made={}, costs=())
     with ThreadPoolExecutor(1) as pool:
         runs = gather_claims(pool, paper, lambda *_: None)
     assert runs.trajectory(PUBLISHED, "a").scenario.omega0 == 20.0
     assert runs.flights("eq8").halved.runs["a"].scenario.omega0 == 10.0
-    assert runs.flights(PUBLISHED).halved is None
+    assert runs.flights("eq8").half_steps is None
+    assert runs.flights(PUBLISHED).halved.runs["a"].scenario.omega0 == 15.0
+    assert runs.flights(PUBLISHED).half_steps.runs["a"].scenario.omega0 == 16.0
     assert runs.trajectory("eq8", "b") is None
 
 
@@ -519,20 +769,34 @@ pytestmark = pytest.mark.xdist_group("paper-claims")
 
 @pytest.fixture(scope="module")
 def runs():
-    """All flights of the published program, and the weightless ones of the bottle filled to 0.1."""
+    """All flights of the published program, with its halves, and the weightless ones of the bottle filled to 0.1."""
     wanted = [name for name in FAMILIES if name not in ("flight", "slices at alpha 1")]
     cases = {case.key: case for name in wanted for case in FAMILIES[name]}
     drags = {case.key for case in FAMILIES["drag"]}
     made = {}
+
+    def store(key):
+        return "full" if key in drags or "beta" in key else "summary"
+
+    halves = {
+        half: {
+            pair: make(replace(run, settings={**run.settings, "store": store(pair[1])}))
+            for pair, (run, _) in plan_published(half).items()
+        }
+        for half in ("slices", "steps")
+    }
     for key, case in cases.items():
-        steps = {"steps": case.steps, "store": "full" if key in drags or "beta" in key else "summary"}
-        made[PUBLISHED, key] = make(Run(key, PUBLISHED, case.scenario, steps))
+        made[PUBLISHED, key] = make(Run(key, PUBLISHED, case.scenario, {"steps": case.steps, "store": store(key)}))
     planned = plan_further(REPORT)
     further = {pair: make(run) for pair, run in planned.items() if pair[0] in (PUBLISHED, "eq8-weightless")}
     tenth = paper_throw(0.1).with_slices(50)
     made["free-flight", "filling 0.1"] = make(Run("tenth", "free-flight", tenth, {"rtol": 1e-7}))
-    assert not [each.reason for each in (*made.values(), *further.values()) if each.trajectory is None]
-    return ClaimRuns(paper=PaperRuns(size=REPORT, made=made, costs=()), further=further, halved={})
+    everything = [*made.values(), *further.values(), *halves["slices"].values(), *halves["steps"].values()]
+    assert not [each.reason for each in everything if each.trajectory is None]
+    return ClaimRuns(
+        paper=PaperRuns(size=REPORT, made=made, costs=()), further=further, halved=halves["slices"],
+        half_steps=halves["steps"],
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -541,16 +805,23 @@ def statements(runs):
 
 
 FAILS = {
-    "beta-0-sticks", "beta-half-flat", "beta-others-rise", "cost-slices", "cost-steps", "strong-drag-turns-back",
-    "moderate-drag-flat", "release-angle", "dynamic-lower", "landing-velocity",
+    "beta-0-sticks", "beta-half-flat", "beta-others-rise", "cost-slices", "moderate-drag-flat-0.0075", "dynamic-lower",
+    "landing-velocity",
 }  # fmt: skip
 """Statements about its own results that the published program does not bear out."""
+
+UNDECIDED = {"beta-1-rises", "aspect-ratio"}
+"""Those that half its steps, or half its slices, would turn round."""
+
+MARGINAL = {*UNDECIDED, "strong-drag-impedes", "empty-keeps-spin"}
 
 
 def test_what_the_published_program_says_of_the_paper(statements):
     judged = {id_: each.by(PUBLISHED) for id_, each in statements.items() if len(each.judgements) == len(SOLVERS)}
     assert {id_ for id_, judgement in judged.items() if judgement.verdict == "fails"} == FAILS
-    assert {judgement.verdict for judgement in judged.values()} == {"holds", "fails"}
+    assert {id_ for id_, judgement in judged.items() if judgement.verdict == "cannot be decided"} == UNDECIDED
+    assert {id_ for id_, judgement in judged.items() if judgement.marginal} == MARGINAL
+    assert all(judgement.flown.startswith("N = ") for id_, judgement in judged.items() if "cost" not in id_)
 
 
 @pytest.mark.parametrize(
@@ -562,10 +833,28 @@ def test_what_the_published_program_says_of_the_paper(statements):
         ("steps-enough", 0.0026, 2e-4),
         ("dynamic-lower", -2.3, 0.1),
         ("beta-0-sticks", 9.3, 0.1),
+        ("aspect-ratio", 0.0497, 1e-4),
+        ("release-angle", 0.0432, 1e-4),
+        ("alpha-sensitive", 0.0669, 2e-4),
+        ("beta-angle-alike", 0.0105, 1e-4),
+        ("low-filling-change", 0.0677, 2e-4),
     ],
 )
 def test_numbers_behind_those_verdicts(statements, id_, value, within):
     assert statements[id_].by(PUBLISHED).value == pytest.approx(value, abs=within)
+
+
+def test_the_delay_of_the_release_angle_in_three_senses(statements):
+    """A stretch of time takes out more of the delay than a shift: the decrease itself takes longer."""
+    judgement = statements["release-angle"].by(PUBLISHED)
+    assert [(each.verdict, round(each.value, 4)) for each in (judgement, *dict(judgement.others).values())] == [
+        ("holds", 0.0432), ("fails", 0.0551), ("fails", 0.0651)
+    ]  # fmt: skip
+
+
+def test_the_published_program_has_every_limit_that_the_paper_admits(statements):
+    limits = [each for each in statements.values() if each.kind == "admitted limit"]
+    assert {each.word(each.by(PUBLISHED)) for each in limits} == {"has this limit"}
 
 
 def test_weight_is_what_slows_the_bottle_filled_to_a_tenth(runs):
@@ -607,11 +896,22 @@ def test_the_page_shows_every_verdict_with_word_sign_and_number(runs, read_page)
     page = read_page(text)
     assert len(set(page.ids)) == len(page.ids)
     assert {f"paper-{claim.id}" for claim in CLAIMS} <= set(page.ids)
-    # Once in the table, once in the list of all numbers.
-    assert text.count("✗ fails") == 2 * sum(verdicts.count(s, "fails") for s in (*SOLVERS, "geometry"))
+    # Once in the table and once in the list of all numbers; in the table every other sense of the text too.
+    judged = [(s, j) for s in verdicts.statements for j in s.judgements]
+    others = [other for s, j in judged if s.kind == "claim" for _, other in j.others]
+    failed = sum(verdicts.count(s, "fails") for s in (*SOLVERS, "geometry"))
+    assert text.count("✗ fails") == 2 * failed + sum(other.verdict == "fails" for other in others)
+    assert text.count("has this limit") == 2 * sum(s.word(j).startswith("has this limit") for s, j in judged)
+    assert text.count("A limit that the paper admits.") == 3
+    assert text.count("margin ") >= len(judged)
     assert "not its data" in text
-    assert "published program: 17 hold, 10 fail, 0 cannot be decided." in text.lower().replace("\n", " ")
-    assert len(verdicts.findings()) == len(STEADY) + sum(len(s.judgements) for s in verdicts.statements)
+    lead = " ".join(text.split())
+    assert (
+        "Published program: 21 claims hold, 7 fail, 2 cannot be decided; 4 of these are marginal. It has 3 of the 3 "
+        "limits that the paper admits."
+    ) in lead
+    assert "Two explanations, between which the text does not decide." in text
+    assert len(verdicts.findings()) == len(STEADY) + 1 + sum(len(s.judgements) for s in verdicts.statements)
     assert [finding for finding in verdicts.findings() if finding.failed] == []
     kept = json.loads(json.dumps(verdicts.to_mapping(), allow_nan=False))
     assert [statement["id"] for statement in kept["statements"]] == [claim.id for claim in CLAIMS]

@@ -20,20 +20,20 @@ from slicemodel import Trajectory
 BY_ID = {observation.id: observation for observation in OBSERVATIONS}
 
 
-def flight(scenario, level, climb=0.0):
-    """Return a flight whose omega / omega_0 is ``level`` all along, but for a climb at the end."""
+def flight(scenario, level, climb=0.0, lands=360.0):
+    """Return a flight whose omega / omega_0 is ``level`` all along, but for a climb at the end; angle in degrees."""
     scenario = scenario.with_slices(1)
     t = np.linspace(0.0, scenario.duration, 101)
     omega = scenario.omega0 * (level + climb * np.clip(t / scenario.duration - 0.9, 0.0, None) * 10)
     none = np.empty((0, 1))
     return Trajectory(
-        scenario=scenario, solver="made up", method="made up", t=t, theta=t, omega=omega, r=none, v=none,
-        r_cm=np.full_like(t, 0.2), inertia=np.ones_like(t),
+        scenario=scenario, solver="made up", method="made up", t=t, theta=np.radians(lands) * t / t[-1], omega=omega,
+        r=none, v=none, r_cm=np.full_like(t, 0.2), inertia=np.ones_like(t),
     )  # fmt: skip
 
 
-def flights(level_of, *, ice=1.0, climb=0.0):
-    runs = {case.key: flight(case.scenario, level_of(case.value), climb) for case in family("filling")}
+def flights(level_of, *, ice=1.0, climb=0.0, lands=360.0):
+    runs = {case.key: flight(case.scenario, level_of(case.value), climb, lands) for case in family("filling")}
     runs[ICE] = flight(paper_throw(), ice)
     return Flights(solver=PUBLISHED, runs=runs, reasons={})
 
@@ -57,6 +57,11 @@ def test_the_experiment_agrees_with_itself():
         ("tenth-like-ice", {"level_of": lambda _: 0.6}),
         ("minimum", {"level_of": lambda filling: abs(filling - 0.75) + 0.1}),
         ("three-quarters", {"level_of": lambda _: 0.95}),
+        ("change-of-behaviour", {"level_of": lambda filling: np.interp(filling, [0.05, 0.1], [1.0, 0.5])}),
+        ("change-of-behaviour", {"level_of": lambda filling: np.interp(filling, [0.2, 0.4], [1.0, 0.5])}),
+        ("half-a-turn", {"level_of": experimental, "lands": 170.0}),
+        ("landing-angle", {"level_of": experimental, "lands": 360.0 - 46.0}),
+        ("landing-angle", {"level_of": experimental, "lands": 360.0 + 46.0}),
         ("five-times", {"level_of": lambda _: 0.5}),
         ("five-times", {"level_of": lambda _: 0.1}),
     ],
@@ -74,13 +79,33 @@ def test_numbers_by_hand():
     assert experiment.climb_at_a_third(flights(experimental, climb=0.25)) == pytest.approx(0.25)
 
 
+def test_landing_is_judged_by_tilt_and_toppling_angle():
+    """Of the fillings filmed 0.75 topples soonest: tan theta_c = R / (L - r_CM)."""
+    epsilon = 0.028 / 0.778
+    least = math.degrees(math.atan(0.04 / (0.28 * (epsilon / 2 + (1 - epsilon) * 0.375))))
+    for lands, tilt in ((330.0, 30.0), (395.0, 35.0), (720.0, 0.0)):
+        assert experiment.worst_landing(flights(experimental, lands=lands)) == pytest.approx(tilt - least, abs=1e-9)
+    assert "θ(T): 330° at 0.1 (−30°)" in experiment.landing_angles_words(flights(experimental, lands=330.0))
+    assert experiment.ice_lands_at() == pytest.approx(90.0 + math.degrees(10.0))
+    observation = BY_ID["landing-angle"]
+    assert "come to 663°, 57° from upright" in observation.remark
+    compared = comparison(reading(0.6), reading(0.7), reading(0.9))
+    unranked = replace(compared, observation=replace(compared.observation, ranked=observation.ranked))
+    assert (compared.closest, unranked.closest) == (("free-flight",), ())
+
+
+def test_every_comparison_says_why_its_width_is_what_it_is_and_at_which_n():
+    assert all(each.why and each.place and each.means for each in OBSERVATIONS)
+    assert compare(BY_ID["five-times"], flights(experimental)).note == "N = 1"
+
+
 def reading(value, band=0.0):
     return Reading(name="x", value=value, unit="", admissible=(0.0, 1.0), band=band)
 
 
 def comparison(*readings, measured=(1.0, 1.0)):
     observation = Observation(
-        id="x", place="", says="", means="", read=lambda _: 0.0, unit="", measured=measured, slack=0.1
+        id="x", place="", says="", means="", why="", read=lambda _: 0.0, unit="", measured=measured, slack=0.1
     )
     return Comparison(observation=observation, readings=dict(zip(SOLVERS, readings, strict=True)))
 
