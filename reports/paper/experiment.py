@@ -272,7 +272,6 @@ OBSERVATIONS: Final = (
         unit="°",
         measured=(180.0, math.inf),
         why="The sentence is an inequality.",
-        numbers=landing_angles_words,
     ),
     Observation(
         id="landing-angle",

@@ -104,13 +104,19 @@ class Reading:
         return CLASSES[self.verdict]
 
     @property
+    def margin_number(self) -> str:
+        """The margin with its sign and without its unit; a dash if there is none."""
+        if not math.isfinite(self.margin):
+            return "–"
+        digits = f"{self.margin:+.0f}" if abs(self.margin) >= 10.0 else f"{self.margin:+.2g}"
+        return _signed(digits) if self.margin else "0"
+
+    @property
     def margin_text(self) -> str:
         """The margin with its sign and unit, and whether it is marginal."""
         if not math.isfinite(self.margin):
             return "no margin"
-        digits = f"{self.margin:+.0f}" if abs(self.margin) >= 10.0 else f"{self.margin:+.2g}"
-        number = _signed(digits) if self.margin else "0"
-        return f"margin {number} {self.unit}".rstrip() + (", marginal" if self.marginal else "")
+        return f"margin {self.margin_number} {self.unit}".rstrip() + (", marginal" if self.marginal else "")
 
     @property
     def threshold_text(self) -> str:

@@ -197,6 +197,8 @@ def test_margins_are_printed_with_sign_and_unit():
     assert text(150.0, high=0.0) == "margin −150 m"
     assert text(0.0, high=0.0) == "margin 0 m"
     assert text(math.nan) == "no margin"
+    assert Reading(name="x", value=0.0497, unit="m", admissible=(-math.inf, 0.05)).margin_number == "+0.0003"
+    assert Reading(name="x", value=math.nan, unit="m", admissible=(-math.inf, 0.05)).margin_number == "–"
 
 
 def test_a_statement_holds_as_clearly_as_its_most_marginal_number_and_fails_as_its_clearest():
