@@ -168,6 +168,7 @@ def test_a_judgement_fails_with_its_first_failing_reading_and_holds_with_all():
         (0.109, 0.0, (0.1, math.inf), 0.009, True),
         (1.97, 0.0, (1.8, 2.2), 0.17, False),  # of an interval, half the width is its size
         (2.19, 0.0, (1.8, 2.2), 0.01, True),
+        (2.17, 0.0, (1.8, 2.2), 0.03, False),
         (1.0, 0.0, (1.8, 2.2), -0.8, False),
         (0.001, 0.0, (0.0, math.inf), 0.001, False),  # a comparison has no size, only its band
         (0.001, 0.002, (0.0, math.inf), 0.001, True),
@@ -594,8 +595,10 @@ def test_launch_speed_and_spin_of_the_paper_agree_in_order_of_magnitude_only():
     judgement = judge(BY_ID["release-spin"], Flights(solver="geometry", runs={}, reasons={}))
     assert judgement.verdict == "holds"
     assert judgement.value == pytest.approx(9.7, abs=0.05)
+    assert judgement.readings[0].admissible == pytest.approx((20.0 / math.sqrt(10.0), 20.0 * math.sqrt(10.0)))
     ((_, strict),) = judgement.others
     assert strict.verdict == "fails"
+    assert strict.readings[0].admissible == pytest.approx((16.0, 25.0))
 
 
 def test_the_scale_of_spin_is_that_of_gravity_over_half_a_bottle():

@@ -83,7 +83,7 @@ def test_landing_is_judged_by_tilt_and_toppling_angle():
     """Of the fillings filmed 0.75 topples soonest: tan theta_c = R / (L - r_CM)."""
     epsilon = 0.028 / 0.778
     least = math.degrees(math.atan(0.04 / (0.28 * (epsilon / 2 + (1 - epsilon) * 0.375))))
-    for lands, tilt in ((330.0, 30.0), (395.0, 35.0), (720.0, 0.0)):
+    for lands, tilt in ((330.0, 30.0), (395.0, 35.0), (470.0, 110.0), (720.0, 0.0)):
         assert experiment.worst_landing(flights(experimental, lands=lands)) == pytest.approx(tilt - least, abs=1e-9)
     assert "θ(T): 330° at 0.1 (−30°)" in experiment.landing_angles_words(flights(experimental, lands=330.0))
     assert experiment.ice_lands_at() == pytest.approx(90.0 + math.degrees(10.0))
