@@ -89,9 +89,9 @@ _ENTRIES: Final = (
     ),
     Parameter(
         name="release-spin", symbol="omega_0", value=20.0, unit="rad/s", source="section 5, first paragraph",
-        words="It is let go spinning at 20 rad/s.",
-        doubt="Section 4 derives omega_0 as v_0 / r_CM(0); the fitted 2 m/s would give 9.7 rad/s for the half-full "
-        "bottle.",
+        words="It is let go spinning at 20 rad/s, a measured value.",
+        doubt="“Numerical model” also gives omega_0 as v_0 / r_CM(0); the 2 m/s fitted to ice, an order of magnitude, "
+        "would give 9.7 rad/s for the half-full bottle.",
     ),
     Parameter(
         name="launch-speed", symbol="v_0", value=2.0, unit="m/s", source="section 3, below Eq. 2",
