@@ -234,7 +234,7 @@ class Store:
             kept = (
                 "the points stored so far are safe, the same command goes on from there"
                 if safe
-                else "the same command reads through what was stored before it goes on from there"
+                else "what was stored is read through when the same command goes on from there"
             )
             raise SweepError(f"{self.folder} cannot be written ({words}); {kept}") from None
 
