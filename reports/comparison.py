@@ -13,6 +13,9 @@ from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray
 
 SYMBOLS = {"omega": "omega", "theta": "theta", "r_cm": "r_CM"}
+SAME = 1e-12
+"""Relative difference of two times that printing and reading them explains."""
+
 UNITS = {"omega": "rad/s", "theta": "rad", "r_cm": "m"}
 
 
@@ -89,7 +92,8 @@ def _apart(quantity: str, first: Curve, second: Curve) -> Apart:
     if kept.sum() < 2:
         raise ValueError(f"{first.label} has {kept.sum()} times within those of {second.label}; at least 2 are needed")
     t, values, after = t[kept], values[kept], ends[kept]
-    before, behind = np.searchsorted(times, t, "left"), np.searchsorted(times, t, "right") - 1
+    near = SAME * max(abs(times[0]), abs(times[-1]))
+    before, behind = np.searchsorted(times, t - near, "left"), np.searchsorted(times, t + near, "right") - 1
     own = before <= behind
     found = np.where(after, others[behind], others[np.minimum(before, len(times) - 1)])
     found[~own] = np.interp(t[~own], times, others)

@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 
 from slicemodel import Trajectory
+from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
-from slicemodel.words import shortened
 
 Rows = list[tuple[int, list[str]]]
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from reports.fit.problem import Measurement, Quantity
 from reports.tables import number_of, read_cells
+from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
-from slicemodel.words import shortened
 
 QUANTITIES: Final[tuple[Quantity, ...]] = ("theta", "omega")
 """What is fitted, the first that a table has: the noise of measured angles is independent from frame to frame."""

@@ -12,7 +12,7 @@ from reports.sweep.damaged import count
 from reports.sweep.design import Design
 from reports.sweep.errors import SweepError
 from reports.sweep.schema import APPLICATION, SCHEMA, columns, intact, kinds
-from slicemodel.words import shortened
+from slicemodel.scenario import shortened
 
 BEGINNING: Final = b"SQLite format 3\0"
 TABLES: Final = frozenset({"schema_version", "design", "versions", "points"})

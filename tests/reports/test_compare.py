@@ -77,6 +77,15 @@ def test_what_is_interpolated_is_said():
     assert "compared at 4 times of a; b is interpolated linearly at 2 of them" in table(found)
 
 
+def test_times_that_were_printed_are_the_same_times():
+    t = np.linspace(0, 0.5, 1000)
+    printed = np.array([float(f"{time:.15g}") for time in t])
+    assert (t != printed).any()
+    found = compare(curve("a", printed, omega=np.cos(t)), curve("b", t, omega=np.cos(t)))
+    assert found.apart[0].interpolated == 0
+    assert found.apart[0].size.max() == 0.0
+
+
 def test_before_an_event_is_compared_with_before_and_after_with_after():
     jumping = curve("a", [0, 1, 1, 2], theta=[0, 1, 5, 6])
     same = compare(jumping, curve("b", [0, 0.5, 1, 1, 1, 2], theta=[0, 0.5, 1, 3, 5, 6]))

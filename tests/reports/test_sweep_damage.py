@@ -14,6 +14,7 @@ from reports.sweep.damaged import count, rows
 from reports.sweep.design import design_of
 from reports.sweep.errors import SweepError
 from reports.sweep.export import export
+from reports.sweep.files import TEMPORARY
 from reports.sweep.salvage import salvage
 from reports.sweep.schema import PAGE, columns
 from reports.sweep.store import Store, read_curves
@@ -77,8 +78,8 @@ def slim(tmp_path_factory):
 
 
 def copied(file, folder):
-    folder.mkdir(exist_ok=True)
-    return shutil.copyfile(file, folder / "sweep.sqlite")
+    """Copy the folder of a sweep and return the file in it."""
+    return shutil.copytree(file.parent, folder, ignore=shutil.ignore_patterns("*.lock*", "*-shm")) / file.name
 
 
 def sql(*statements):
@@ -296,7 +297,7 @@ def test_one_damaged_byte_is_seen_and_costs_one_row_at_the_most(kind, request, t
     assert len(whole) == POINTS
     content = file.read_bytes()
     draw = random.Random(7)
-    damaged = tmp_path / "sweep.sqlite"
+    damaged = copied(file, tmp_path / "damaged")
     unseen = 0
     # The pages that hold the header, the schema and the roots are few: some of the bytes are drawn there.
     for place in [draw.randrange(12 * PAGE) for _ in range(60)] + [draw.randrange(len(content)) for _ in range(60)]:
@@ -306,7 +307,7 @@ def test_one_damaged_byte_is_seen_and_costs_one_row_at_the_most(kind, request, t
         found = set(rows(damaged, made, CODE))
         assert found <= set(whole), place
         assert len(found) >= POINTS - 1, place
-        said = complaint(tmp_path, made)
+        said = complaint(damaged.parent, made)
         if not said:
             unseen += 1
             assert len(found) == POINTS, place
@@ -328,10 +329,7 @@ def test_rows_that_are_only_in_the_log_are_saved(tmp_path):
     with Store(tmp_path / "killed", design(), CODE) as store:
         store.connection.execute("PRAGMA wal_autocheckpoint = 0")
         fill(store)
-        (tmp_path / "damaged").mkdir()
-        for name in ("sweep.sqlite", "sweep.sqlite-wal"):
-            shutil.copyfile(tmp_path / "killed" / name, tmp_path / "damaged" / name)
-    file = tmp_path / "damaged" / "sweep.sqlite"
+        file = copied(store.file, tmp_path / "damaged")
     file.write_bytes(b"\0" + file.read_bytes()[1:])
     assert salvage(file.parent, tmp_path / "new", design(), CODE).startswith("80 of 80 points")
     held_to_what_was_written(tmp_path / "new", POINTS)
@@ -391,9 +389,9 @@ def test_a_lock_that_is_no_lock_is_named(tmp_path):
 
 
 def test_a_program_killed_while_it_begins_leaves_nothing_that_must_be_removed(tmp_path):
-    (tmp_path / "sweep.sqlite.77.part").write_bytes(b"half")
+    (tmp_path / f"sweep.sqlite.77{TEMPORARY}").write_bytes(b"half")
     Store(tmp_path, design(), CODE).close()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["sweep.lock", "sweep.sqlite"]
+    assert not list(tmp_path.glob(f"*{TEMPORARY}"))
 
 
 def test_the_command_line_salvages_and_goes_on(tmp_path, capsys):
