@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from reports import cli
-from reports.sweep.damaged import count, rows
+from reports.sweep.damaged import POINT, _records, count, rows
 from reports.sweep.design import design_of
 from reports.sweep.errors import SweepError
 from reports.sweep.export import export
@@ -380,6 +380,18 @@ def test_flights_that_are_whole_are_saved_with_their_rows(tmp_path):
     assert salvage(tmp_path / "old", tmp_path / "new", made, CODE).startswith("1 of 80 points")
     with Store(tmp_path / "new", made, CODE) as store:
         assert list(store.done())[:3] == [0, 0, 1]
+
+
+def test_a_record_that_claims_an_absurd_size_is_not_followed(tmp_path):
+    """Its overflow pages may lead in a circle."""
+    kind = 2 * 20 * 2**20 + 12
+    claimed = bytes([0x80 | kind >> 21 & 0x7F, 0x80 | kind >> 14 & 0x7F, 0x80 | kind >> 7 & 0x7F, kind & 0x7F])
+    to_itself = (2).to_bytes(4, "big")
+    record = b"\x01\x05" + b"\x08\x00\x81\x0d" + claimed
+    for shift in range(4):  # wherever the number of the first overflow page stands
+        first = (record + (to_itself * PAGE)[shift:])[:PAGE]
+        (tmp_path / "sweep.sqlite").write_bytes(first + (to_itself * PAGE)[:PAGE])
+        assert list(_records(tmp_path / "sweep.sqlite", POINT, 3)) == []
 
 
 def test_a_lock_that_is_no_lock_is_named(tmp_path):
