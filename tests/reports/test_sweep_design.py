@@ -256,6 +256,9 @@ def test_a_sweep_may_be_as_large_as_stated_and_costs_nothing_to_state():
     design = read(text)
     assert design.size == MOST_POINTS
     assert design.point(design.size - 1).values == (1.0, 0.3)
+    # Points are counted, not throws: here each of two solvers has fewer than are admissible.
+    with pytest.raises(SweepError, match=f"500004 throws by 2 solvers make 1000008 points, more than {MOST_POINTS}"):
+        read(text.replace(f"count = {MOST_POINTS // 8}", f"count = {MOST_POINTS // 8 + 1}"))
 
 
 @pytest.mark.parametrize(("low", "high", "log"), [(0.2, 0.9, False), (0.1, 1.1, True), (0.1, 3.3, True)])
