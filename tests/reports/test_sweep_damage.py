@@ -5,6 +5,7 @@ import shutil
 import sqlite3
 import tomllib
 from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -333,6 +334,24 @@ def test_rows_that_are_only_in_the_log_are_saved(tmp_path):
     file.write_bytes(b"\0" + file.read_bytes()[1:])
     assert salvage(file.parent, tmp_path / "new", design(), CODE).startswith("80 of 80 points")
     held_to_what_was_written(tmp_path / "new", POINTS)
+
+
+def test_a_log_of_another_file_hides_no_row(sound, tmp_path):
+    file = copied(sound, tmp_path / "damaged")
+    pages = file.stat().st_size // PAGE
+    frames = b"".join(number.to_bytes(4, "big") + bytes(20) + bytes(PAGE) for number in range(1, pages + 1))
+    file.with_name("sweep.sqlite-wal").write_bytes(bytes(32) + frames)
+    assert count(file, design(), CODE) == POINTS
+
+
+def test_rows_of_every_length_are_read(tmp_path):
+    """With one to four pages, and with few and many bytes of the last one beside the first."""
+    with Store(tmp_path, design(0), CODE) as store:
+        points = [replace(outcome(k, 0), message="x" * (150 * k)) for k in range(POINTS)]
+        store.add([Returned(CODE, {}, points, 0.1)])
+        file = store.file
+    found = {row[0]: row[columns(design(0)).index("message")] for row in rows(file, design(0), CODE)}
+    assert found == {k: "x" * (150 * k) for k in range(POINTS)}
 
 
 def test_rows_keep_their_versions_and_those_that_are_lost_are_said_to_be(slim, tmp_path):
