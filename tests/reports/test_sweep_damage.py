@@ -354,6 +354,16 @@ def test_rows_of_every_length_are_read(tmp_path):
     assert found == {k: "x" * (150 * k) for k in range(POINTS)}
 
 
+def test_rows_with_large_numbers_are_read(tmp_path):
+    """A number takes one byte in the file below 128, and up to three in the largest sweep."""
+    text = TEXT.format(curves=0).replace("count = 40", "count = 250000")
+    made = design_of(tomllib.loads(text), "sweep.toml", text)
+    numbers = (0, 127, 128, 16383, 16384, 499_999)
+    with Store(tmp_path, made, CODE) as store:
+        store.add([Returned(CODE, {}, [outcome(number, 0) for number in numbers], 0.1)])
+    assert sorted(row[0] for row in rows(tmp_path / "sweep.sqlite", made, CODE)) == list(numbers)
+
+
 def test_rows_keep_their_versions_and_those_that_are_lost_are_said_to_be(slim, tmp_path):
     file = copied(slim, tmp_path / "damaged")
     flipped(place_of(b'{"Python": "3", "machine": "1"', 26))(file)
