@@ -267,6 +267,16 @@ def test_wrong_points_are_named_by_their_lines(films):
     assert any("1 frames (lines 84)" in warning for warning in warnings)
 
 
+@pytest.mark.xdist_group("films")
+@pytest.mark.parametrize(("wrong", "named"), [(0.002, False), (0.01, True)])
+def test_a_point_is_wrong_beyond_six_standard_deviations(films, wrong, named):
+    """The distance scatters by 0.7 mm here."""
+    film = films["ice"]
+    base = film.base.copy()
+    base[80] += wrong * (film.base[80] - film.cap[80]) / np.hypot(*(film.base[80] - film.cap[80]))
+    assert (84 in calibration_of(replace(film, base=base)).lines) is named
+
+
 @pytest.mark.parametrize(("g", "wrong"), [(9.81, False), (9.7, False), (10.5, True), (0.153, True), (88.3, True)])
 def test_gravity_tells_scale_and_frame_rate(g, wrong):
     assert bool(check_gravity(g, 0.05)) is wrong
