@@ -83,7 +83,7 @@ def rows(out: Path) -> list[tuple[Any, ...]]:
     connection = sqlite3.connect(file, timeout=10)
     try:
         names = [name for _, name, *_ in connection.execute("PRAGMA table_info(points)")]
-        kept = ", ".join(name for name in names if name not in ("seconds", "versions"))
+        kept = ", ".join(name for name in names if name not in ("seconds", "versions", "checksum"))
         return connection.execute(f"SELECT {kept} FROM points ORDER BY number").fetchall() if kept else []
     finally:
         connection.close()

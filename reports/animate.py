@@ -20,6 +20,7 @@ from reports.figures.film import Film, Picture, draw_frames
 from reports.motion import flight_of, frame_times
 from reports.sweep.files import whole_file
 from slicemodel import Scenario, Trajectory
+from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
 
 if TYPE_CHECKING:
@@ -176,7 +177,8 @@ def _write_mp4(frames: Iterator[Picture], fps: int, path: Path) -> None:
             pass  # what it said tells why
         if process.wait() != 0:
             said.seek(0)
-            words = " ".join(said.read().decode("utf-8", "replace").split())[-300:]
+            # The end tells why it failed.
+            words = shortened(said.read().decode("utf-8", "replace")[::-1], 300)[::-1]
             raise FilmError(f"{ENCODER} failed with exit status {process.returncode}: {words or 'it said nothing'}")
 
 

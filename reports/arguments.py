@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Final, NoReturn
 
 INTERRUPTED: Final = 130
@@ -46,6 +47,20 @@ def number(text: str) -> float:
     if not abs(value) < 1e6:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number in (-1e6, 1e6)")
     return value
+
+
+def check_writable(option: str, path: Path) -> None:
+    """Refuse, before the work begins, a file that could not be written after it.
+
+    Raises
+    ------
+    ValueError
+        If the path is a folder, or its folder does not exist.
+    """
+    if path.is_dir():
+        raise ValueError(f"{option} {path} is a folder; name a file")
+    if not path.parent.is_dir():
+        raise ValueError(f"{option} {path}: the folder {path.parent} does not exist")
 
 
 def read_scenario(path: str | None, slices: int | None = None) -> Any:

@@ -23,7 +23,7 @@ from typing import Any, Final
 import numpy as np
 
 from reports import claims, vectors
-from reports.diff import LEAST, ROUND_OFF, bands, number, read_summary, scenario_changes
+from reports.diff import LEAST, ROUND_OFF, TOLERANCE, bands, number, read_summary, scenario_changes
 from reports.evidence import CHECK, COMMON, COMMON_START, DIFFERENCES, ENGINE, ICED, LIMITS, REFERENCE
 from reports.findings import Finding
 from reports.solvers import Made, Run, catalogue, make
@@ -35,9 +35,6 @@ from slicemodel import Scenario, Trajectory
 
 SLICES: Final = 50
 """Slices at most, where no baseline says how many."""
-
-TOLERANCE: Final = 1e-6
-"""What round-off may become on another machine, by way of a flight's impacts and of finite differences."""
 
 STEPS: Final = 1000
 """Points of a scheme's grid, as in every report."""

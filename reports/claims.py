@@ -10,7 +10,7 @@ import numpy as np
 from reports.findings import Finding, Kind
 from reports.studies.differences import Difference
 from reports.studies.digits import SharedDigits
-from reports.studies.errata import Erratum
+from reports.studies.errata import ROUND_OFF, Erratum
 from reports.studies.ice import IceDrift
 from reports.studies.model_form import ModelForm, Richardson
 from reports.studies.predictability import Predictability
@@ -270,6 +270,7 @@ def claim_erratum(erratum: Erratum) -> Finding:
         value=erratum.value if math.isfinite(erratum.value) else None,
         unit=erratum.unit,
         kind="observation",
+        band=abs(erratum.value) * (ROUND_OFF[1] - 1.0) if math.isfinite(erratum.value) else None,
         note=f"prints {erratum.prints}; follows {erratum.follows}" + (f"; {erratum.note}" if erratum.note else ""),
     )
 

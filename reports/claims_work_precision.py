@@ -8,6 +8,7 @@ from typing import Final
 
 from reports.findings import Finding
 from reports.studies.work_precision import Cost, Curve, Price, WorkPrecision, price
+from slicemodel.scenario import shortened
 
 ERRORS: Final = tuple(10.0 ** (-k / 2) for k in range(2, 23))
 """Errors at which two contenders are compared, the finest that both keep."""
@@ -168,7 +169,7 @@ def _failures(study: WorkPrecision) -> Iterator[Finding]:
         unit="",
         kind="observation",
         note="; ".join(
-            f"{name}: {len(points)} of {len(study.curves[name].points)}, {points[0].reason[:90]}"
+            f"{name}: {len(points)} of {len(study.curves[name].points)}, {shortened(points[0].reason, 90)}"
             for name, points in failed.items()
         ),
     )

@@ -16,6 +16,7 @@ from typing import Any, NoReturn
 from reports.arguments import INTERRUPTED, SCENARIO_HELP, OneLineParser, add_command, count, read_scenario
 from reports.cli_animate import add_animate
 from reports.cli_check import add_checks
+from reports.cli_compare import add_compare
 from reports.cli_fit import add_fit
 from reports.cli_paper import add_paper
 from reports.cli_sweeps import add_sweeps
@@ -37,7 +38,7 @@ examples:
   flipproof report throw.toml --out my-report   another throw
   flipproof simulate --solver eq8 --out eq8.csv
   flipproof compare published-python eq8
-  flipproof compare eq8.csv measured.csv
+  flipproof compare eq8.csv my-track/track.csv --tolerance 0.05
   flipproof paper --figure 7b                   one of the paper's figures; without --figure all of them
   flipproof check throw.toml --baseline summary.json
   flipproof diff old-report new-report          what changed beyond its band
@@ -50,7 +51,8 @@ examples:
 
 exit status:
   0  done; for a report: every claim was evaluated and no regression claim failed
-  1  a regression claim failed (ice constancy, published vectors, convergence); for diff: something moved
+  1  a regression claim failed (ice constancy, published vectors, convergence); for diff: something moved;
+     for compare: the curves are farther apart than --tolerance
   2  bad input; one line on standard error says what and where
   130  interrupted; an older report is as it was, a sweep goes on where it stopped
 """
@@ -131,12 +133,7 @@ def parser() -> argparse.ArgumentParser:
     simulate.add_argument("--slices", type=count, metavar="N", help="cut the throw into N slices, alpha/2m unchanged")
     simulate.add_argument("--out", type=Path, metavar="FILE.csv", help="file to write (default: standard output)")
 
-    compare = add_command(commands, "compare", "Compare two solvers, or two CSV files, in numbers.", command_compare)
-    compare.add_argument("first", metavar="A", help="a solver's name, or a CSV file with columns t, theta, omega, r_cm")
-    compare.add_argument("second", metavar="B", help="the same; differences are B minus A")
-    compare.add_argument("--scenario", metavar="SCENARIO.toml", help=SCENARIO_HELP)
-    compare.add_argument("--slices", type=count, metavar="N", help="slices for both solvers (default 50)")
-
+    add_compare(commands)
     add_paper(commands)
     add_checks(commands)
     add_sweeps(commands)
@@ -230,29 +227,6 @@ def command_simulate(options: argparse.Namespace) -> int:
         sys.stdout.write(table)
     if not trajectory.ok:
         print(f"flipproof: {solver.name}: {trajectory.status}: {trajectory.message}", file=sys.stderr)
-    return 0
-
-
-def command_compare(options: argparse.Namespace) -> int:
-    """Compare two solvers or files and print the differences."""
-    from reports.comparison import compare, table
-    from reports.solvers import find, solve
-    from reports.tables import Curve, read_curve
-
-    scenario = read_scenario(options.scenario, options.slices)
-    if options.slices is None:
-        scenario = scenario.with_slices(min(50, scenario.n_slices))
-
-    def load(name: str) -> Curve:
-        path = Path(name)
-        if path.suffix or path.is_file():
-            return read_curve(path)
-        run = solve(find(name).name, scenario)
-        if len(run.t) < 2:
-            raise ValueError(f"{name} has nothing to compare on this throw: {run.status}: {run.message}")
-        return Curve.of(run)
-
-    print(table(compare(load(options.first), load(options.second))))
     return 0
 
 

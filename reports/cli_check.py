@@ -6,10 +6,16 @@ import argparse
 from pathlib import Path
 from typing import Any, Final
 
-from reports.arguments import add_command
+from reports.arguments import add_command, check_writable
 
 GROUPS: Final = ("ice", "vectors", "convergence", "thresholds")
 """What ``check`` can check; the last needs a baseline."""
+
+
+TOLERANCE_HELP: Final = (
+    "what a finding may move beyond its bands, in its own unit (default 1e-6: round-off of another machine; 0 for the "
+    "same one)"
+)
 
 
 def add_checks(commands: Any) -> None:
@@ -17,6 +23,10 @@ def add_checks(commands: Any) -> None:
     diff = add_command(commands, "diff", "Compare two reports: findings that changed beyond bands.", command_diff)
     diff.add_argument("old", type=Path, metavar="OLD", help="a report's folder, or its summary.json")
     diff.add_argument("new", type=Path, metavar="NEW", help="the same; changes are from OLD to NEW")
+    diff.add_argument("--tolerance", type=tolerance, metavar="X", help=TOLERANCE_HELP)
+    diff.add_argument(
+        "--html", type=Path, metavar="FILE", help="write the comparison as one page, too, with the curves of both"
+    )
 
     check = add_command(commands, "check", "Check a throw in a few seconds, one line per claim.", command_check)
     check.add_argument("scenario", metavar="SCENARIO.toml", help="scenario file (TOML with [scenario] and [bottle])")
@@ -24,10 +34,7 @@ def add_checks(commands: Any) -> None:
         "--baseline", type=Path, metavar="SUMMARY", help="summary.json of a report of this throw, or its folder: "
         "findings are compared with it, and held to the thresholds that stand in it",
     )  # fmt: skip
-    check.add_argument(
-        "--tolerance", type=_tolerance, metavar="X", help="what a finding may move beyond its bands, in its own unit "
-        "(default 1e-6: round-off of another machine; 0 for the same one)",
-    )  # fmt: skip
+    check.add_argument("--tolerance", type=tolerance, metavar="X", help=TOLERANCE_HELP)
     check.add_argument(
         "--only", type=_groups, metavar="LIST", help=f"some of {','.join(GROUPS)} (default: all; thresholds only "
         "with --baseline)",
@@ -37,9 +44,17 @@ def add_checks(commands: Any) -> None:
 
 def command_diff(options: argparse.Namespace) -> int:
     """Print what differs; return 1 if anything does."""
-    from reports.diff import compare_reports
+    if options.html:
+        check_writable("--html", options.html)
+    from reports.diff import TOLERANCE, compare_summaries, read_summary
 
-    found = compare_reports(options.old, options.new)
+    old, new = read_summary(options.old), read_summary(options.new)
+    found = compare_summaries(old, new, TOLERANCE if options.tolerance is None else options.tolerance)
+    if options.html:
+        from reports.diff_page import diff_page
+        from reports.output import write_text
+
+        write_text(options.html, diff_page(options.old, options.new, old, new, found))
     print(found.text)
     return 0 if found.same else 1
 
@@ -52,18 +67,17 @@ def command_check(options: argparse.Namespace) -> int:
     groups = options.only or (GROUPS if options.baseline else GROUPS[:-1])
     if "thresholds" in groups and options.baseline is None:
         raise ValueError("--only thresholds: needs --baseline, the summary.json of a report of this throw")
-    if options.junit and not options.junit.parent.is_dir():
-        raise ValueError(f"--junit {options.junit}: the folder {options.junit.parent} does not exist")
-    if options.junit and options.junit.is_dir():
-        raise ValueError(f"--junit {options.junit} is a folder; name a file")
-    from reports.check import TOLERANCE, check
+    if options.junit:
+        check_writable("--junit", options.junit)
+    from reports.check import check
+    from reports.diff import TOLERANCE
 
-    tolerance = TOLERANCE if options.tolerance is None else options.tolerance
+    allowed = TOLERANCE if options.tolerance is None else options.tolerance
 
     def say(line: str) -> None:
         print(line, flush=True)
 
-    found = check(scenario, groups, baseline=options.baseline, tolerance=tolerance, say=say)
+    found = check(scenario, groups, baseline=options.baseline, tolerance=allowed, say=say)
     if options.junit:
         from reports.junit import junit_text
         from reports.output import write_text
@@ -81,7 +95,8 @@ def _groups(text: str) -> tuple[str, ...]:
     return tuple(group for group in GROUPS if group in given)
 
 
-def _tolerance(text: str) -> float:
+def tolerance(text: str) -> float:
+    """Return a finite number of at least 0."""
     try:
         value = float(text)
     except ValueError:

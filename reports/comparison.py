@@ -6,27 +6,52 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from reports.findings import Finding
 from reports.studies.differences import PARTING_BAND, first_crossing
-from reports.tables import Curve
+from reports.tables import QUANTITIES, Curve
 from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray
+
+SYMBOLS = {"omega": "omega", "theta": "theta", "r_cm": "r_CM"}
+SAME = 1e-12
+"""Relative difference of two times that printing and reading them explains."""
+
+UNITS = {"omega": "rad/s", "theta": "rad", "r_cm": "m"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Apart:
+    """How far two curves are apart in one quantity, at the first one's times up to where the shorter one ends.
+
+    Parameters
+    ----------
+    t : (P,) [s]
+    first, second : (P,) - both curves
+    scale : what differences are divided by: omega at the first time, 1 for other quantities
+    interpolated : times at which the second curve has no value of its own
+    """
+
+    quantity: str
+    t: FloatArray
+    first: FloatArray
+    second: FloatArray
+    scale: float
+    interpolated: int
+
+    @property
+    def size(self) -> FloatArray:
+        """Absolute difference over the scale, shape (P,)."""
+        return np.abs(self.second - self.first) / abs(self.scale)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """Differences second minus first on the first curve's times, up to where the shorter one ends."""
+    """Two curves, and how far they are apart in every quantity that both have."""
 
     first: str
     second: str
-    omega0: float
-    end: float
-    theta: float
-    r_cm: float
-    plateaus: tuple[float, float]
-    finals: tuple[float, float]
-    largest: float
-    largest_time: float
-    parting_time: float | None
+    apart: tuple[Apart, ...]
+    notes: tuple[str, ...]
 
 
 def compare(first: Curve, second: Curve) -> Comparison:
@@ -35,52 +60,101 @@ def compare(first: Curve, second: Curve) -> Comparison:
     Raises
     ------
     ValueError
-        If the two have no common time, or the first starts without spin.
+        If the two have no quantity or no times in common, or the first starts without spin.
     """
-    if second.t[0] > first.t[-1] or first.t[0] > second.t[-1]:
-        raise ValueError(f"{first.label} and {second.label} have no common time")
-    omega0 = float(first.omega[0])
-    if omega0 == 0.0:
-        raise ValueError(f"{first.label}: omega is 0 at the first time; differences are taken relative to it")
-    t = first.t[(first.t >= second.t[0]) & (first.t <= second.t[-1])]
-    if len(t) < 2:
-        raise ValueError(f"{first.label} has {len(t)} times within those of {second.label}; at least 2 are needed")
-
-    def both(name: str) -> tuple[FloatArray, FloatArray]:
-        return np.interp(t, first.t, getattr(first, name)), np.interp(t, second.t, getattr(second, name))
-
-    omega = both("omega")
-    size = np.abs(omega[1] - omega[0]) / abs(omega0)
-    k = int(size.argmax())
-    theta, r_cm = both("theta"), both("r_cm")
+    both = [name for name in QUANTITIES if name in first.series and name in second.series]
+    if not both:
+        have = " and ".join(f"{curve.label} has {', '.join(curve.series)}" for curve in (first, second))
+        raise ValueError(f"nothing can be compared: {have}")
+    notes = [*first.notes, *second.notes]
+    for name in QUANTITIES:
+        without = [curve.label for curve in (first, second) if name not in curve.series]
+        if without:
+            notes.append(f"{SYMBOLS[name]} is not compared: {' and '.join(without)} has no values of it")
     return Comparison(
         first=first.label,
         second=second.label,
-        omega0=omega0,
-        end=float(t[-1]),
-        theta=float(theta[1][-1] - theta[0][-1]),
-        r_cm=float(r_cm[1][-1] - r_cm[0][-1]),
-        plateaus=(plateau(t, omega[0], omega0), plateau(t, omega[1], omega0)),
-        finals=(float(omega[0][-1]), float(omega[1][-1])),
-        largest=float(size[k]),
-        largest_time=float(t[k]),
-        parting_time=first_crossing(t, size, PARTING_BAND),
+        apart=tuple(_apart(name, first, second) for name in both),
+        notes=tuple(notes),
     )
 
 
-def table(c: Comparison) -> str:
+def _apart(quantity: str, first: Curve, second: Curve) -> Apart:
+    (t, values), (times, others) = first.series[quantity], second.series[quantity]
+    if times[0] > t[-1] or t[0] > times[-1]:
+        raise ValueError(f"{first.label} and {second.label} have no common time")
+    scale = float(values[0]) if quantity == "omega" else 1.0
+    if scale == 0.0:
+        raise ValueError(f"{first.label}: omega is 0 at the first time; differences are taken relative to it")
+    # At an event a curve has a value before it and one after it, and each is compared with its like.
+    begins, ends = np.diff(t, prepend=-np.inf) > 0, np.diff(t, append=np.inf) > 0
+    kept = (begins | ends) & (t >= times[0]) & (t <= times[-1])
+    if kept.sum() < 2:
+        raise ValueError(f"{first.label} has {kept.sum()} times within those of {second.label}; at least 2 are needed")
+    t, values, after = t[kept], values[kept], ends[kept]
+    near = SAME * max(abs(times[0]), abs(times[-1]))
+    before, behind = np.searchsorted(times, t - near, "left"), np.searchsorted(times, t + near, "right") - 1
+    own = before <= behind
+    found = np.where(after, others[behind], others[np.minimum(before, len(times) - 1)])
+    found[~own] = np.interp(t[~own], times, others)
+    return Apart(
+        quantity=quantity, t=t, first=values, second=found, scale=scale, interpolated=int((~own).sum())
+    )  # fmt: skip
+
+
+def table(found: Comparison) -> str:
     """Return the comparison as lines of text."""
-    parting = "never" if c.parting_time is None else f"{c.parting_time:.5g} s"
-    width = max(len(c.first), len(c.second), 12)
-    return "\n".join(
-        [
-            f"{'':34}{c.first:>{width}}  {c.second:>{width}}  difference",
-            f"{f'omega({c.end:.4g} s) [rad/s]':34}{c.finals[0]:{width}.5f}  {c.finals[1]:{width}.5f}  "
-            f"{c.finals[1] - c.finals[0]:+.5f}",
-            f"{'omega/omega_0, mean of second half':34}{c.plateaus[0]:{width}.5f}  {c.plateaus[1]:{width}.5f}  "
-            f"{c.plateaus[1] - c.plateaus[0]:+.5f}",
-            f"theta({c.end:.4g} s) differs by {c.theta:+.5f} rad, r_CM by {c.r_cm:+.3g} m",
-            f"largest |difference in omega|: {c.largest:.3%} of omega_0 at t = {c.largest_time:.5g} s",
-            f"first more than {PARTING_BAND:.0%} of omega_0 apart: {parting}",
-        ]
+    width = max(len(found.first), len(found.second), 12)
+    lines = [*found.notes, _times(found), f"{'':34}{found.first:>{width}}  {found.second:>{width}}  difference"]
+
+    def row(words: str, numbers: tuple[float, float]) -> None:
+        a, b = numbers
+        lines.append(f"{words:34}{a:{width}.5f}  {b:{width}.5f}  {b - a:+.5f}")
+
+    for one in found.apart:
+        row(f"{SYMBOLS[one.quantity]}({one.t[-1]:.4g} s) [{UNITS[one.quantity]}]", (one.first[-1], one.second[-1]))
+        if one.quantity == "omega":
+            a, b = (plateau(one.t, values, one.scale) for values in (one.first, one.second))
+            row("omega/omega_0, mean of second half", (a, b))
+    for one in found.apart:
+        k = int(one.size.argmax())
+        size = (
+            f"{one.size[k]:.3%} of omega_0" if one.quantity == "omega" else f"{one.size[k]:.3g} {UNITS[one.quantity]}"
+        )
+        lines.append(f"largest |difference in {SYMBOLS[one.quantity]}|: {size} at t = {one.t[k]:.5g} s")
+        if one.quantity == "omega":
+            parting = first_crossing(one.t, one.size, PARTING_BAND)
+            words = "never" if parting is None else f"{parting:.5g} s"
+            lines.append(f"first more than {PARTING_BAND:.0%} of omega_0 apart: {words}")
+    return "\n".join(lines)
+
+
+def _times(found: Comparison) -> str:
+    """Return at which times the two are compared, and how often one of them is interpolated."""
+    counts = {(len(one.t), one.interpolated) for one in found.apart}
+    most, interpolated = max(counts)
+    if not any(between for _, between in counts):
+        return f"compared at {most} times that both have; nothing is interpolated"
+    return (
+        f"compared at {most} times of {found.first}; {found.second} is interpolated linearly at {interpolated} of them"
     )
+
+
+def claims(found: Comparison, tolerance: float) -> tuple[Finding, ...]:
+    """Return the largest differences as findings; the first quantity is held to the tolerance, others are observed."""
+    made = []
+    for one in found.apart:
+        k = int(one.size.argmax())
+        held = one is found.apart[0]
+        made.append(
+            Finding(
+                id=f"compare-{one.quantity.replace('_', '-')}",
+                title=f"largest difference in {SYMBOLS[one.quantity]} between {found.first} and {found.second}",
+                value=float(one.size[k]),
+                unit="of omega_0" if one.quantity == "omega" else UNITS[one.quantity],
+                kind="regression" if held else "observation",
+                admissible=(0.0, tolerance) if held else (-np.inf, np.inf),
+                note=f"at t = {one.t[k]:.6g} s",
+            )
+        )
+    return tuple(made)

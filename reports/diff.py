@@ -1,10 +1,11 @@
 """Two reports compared: which findings moved beyond their bands, changed their verdict, came or went.
 
-    |new - old| <= band_new + band_old + ROUND_OFF max(|new|, |old|) + LEAST
+    |new - old| <= band_new + band_old + tolerance + ROUND_OFF max(|new|, |old|) + LEAST
 
-A finding without a band must stay the same to ``ROUND_OFF``; ``LEAST`` lets the residuals that are themselves round-off
-(ice, energy ledgers, vectors) be another round-off on another machine. Notes and run times are not compared: they hold
-the clock of the machine. Titles are, for a certificate or an erratum states its verdict there.
+A finding that moved further and states no band in either report is not comparable: a residual, a ratio of growth or a
+cost may be another on another machine, and nothing says by how much. It is told and not counted as a difference; its
+verdict, its unit and its title are compared all the same. Notes and run times are not compared: they hold the clock of
+the machine. Titles are, for a certificate or an erratum states its verdict there.
 """
 
 from __future__ import annotations
@@ -23,12 +24,16 @@ ROUND_OFF: Final = 1e-9
 LEAST: Final = 1e-12
 """Absolute change, in the unit of the finding, that nobody claims to be a change."""
 
+TOLERANCE: Final = 1e-6
+"""What a finding may move beyond its bands, in its own unit: round-off of another machine, by way of a flight's impacts
+and of finite differences."""
+
 READABLE: Final = (1, 2)
 """Versions of the summary's format that can be compared."""
 
 NEEDED: Final = ("id", "title", "value", "unit", "kind", "band", "verdict", "admissible")
 
-Kind = Literal["verdict", "moved", "words", "gone", "new"]
+Kind = Literal["verdict", "moved", "words", "gone", "new", "bandless"]
 
 HEADINGS: Final[Mapping[Kind, str]] = {
     "verdict": "changed their verdict",
@@ -36,6 +41,7 @@ HEADINGS: Final[Mapping[Kind, str]] = {
     "words": "say something else",
     "gone": "are gone",
     "new": "are new",
+    "bandless": "are not comparable: they moved, state no band, and are not counted as differences",
 }
 
 
@@ -71,7 +77,19 @@ class Comparison:
     @property
     def same(self) -> bool:
         """True if throw, slices and size are the same and no finding differs."""
-        return not self.premises and not self.changes
+        return not self.premises and not self.differences
+
+    @property
+    def differences(self) -> tuple[Change, ...]:
+        """What counts as a difference: every change but those of findings that are not comparable."""
+        return tuple(change for change in self.changes if change.kind != "bandless")
+
+    @property
+    def conclusion(self) -> str:
+        """How many findings were compared, how many differ, and how many are not comparable."""
+        count, apart = len(self.differences), len(self.changes) - len(self.differences)
+        words = f"{self.compared} findings compared: " + (f"{count} differ" if count else "no difference")
+        return words + (f", {apart} not comparable" if apart else "")
 
     @property
     def text(self) -> str:
@@ -83,11 +101,7 @@ class Comparison:
             if chosen:
                 lines.append(f"{heading} ({len(chosen)}):")
                 lines += [f"  {change.id}: {change.words}" for change in chosen]
-        lines.append(
-            f"{self.compared} findings compared: "
-            + ("no difference" if not self.changes else f"{len(self.changes)} differ")
-        )
-        return "\n".join(lines)
+        return "\n".join([*lines, self.conclusion])
 
 
 # ---------------------------------------------------------------------- reading
@@ -158,12 +172,12 @@ def number(value: Any) -> float | None:
 # ---------------------------------------------------------------------- comparing
 
 
-def compare_summaries(old: Mapping[str, Any], new: Mapping[str, Any]) -> Comparison:
-    """Compare two summaries as ``read_summary`` gives them."""
+def compare_summaries(old: Mapping[str, Any], new: Mapping[str, Any], tolerance: float = TOLERANCE) -> Comparison:
+    """Compare two summaries as ``read_summary`` gives them; ``tolerance`` is added to the bands of every finding."""
     before = {finding["id"]: finding for finding in old["findings"]}
     after = {finding["id"]: finding for finding in new["findings"]}
     both = [name for name in before if name in after]
-    changes = [change for name in both if (change := change_of(before[name], after[name])) is not None]
+    changes = [change for name in both if (change := change_of(before[name], after[name], tolerance)) is not None]
     changes += [Change(kind="gone", id=n, words=_said(f)) for n, f in before.items() if n not in after]
     changes += [Change(kind="new", id=n, words=_said(f)) for n, f in after.items() if n not in before]
     return Comparison(
@@ -174,8 +188,8 @@ def compare_summaries(old: Mapping[str, Any], new: Mapping[str, Any]) -> Compari
     )
 
 
-def change_of(old: Mapping[str, Any], new: Mapping[str, Any]) -> Change | None:
-    """Return in what a finding differs; None if it is the same within the bands."""
+def change_of(old: Mapping[str, Any], new: Mapping[str, Any], tolerance: float = TOLERANCE) -> Change | None:
+    """Return in what a finding differs; None if it is the same within the bands and the tolerance."""
     name = old["id"]
     if old["verdict"] != new["verdict"]:
         reason = f" ({new['note']})" if new["verdict"] == "not evaluated" and new.get("note") else ""
@@ -184,11 +198,18 @@ def change_of(old: Mapping[str, Any], new: Mapping[str, Any]) -> Change | None:
     if old["unit"] != new["unit"]:
         return Change(kind="moved", id=name, words=f"{_value(old)} → {_value(new)}")
     first, second = number(old["value"]), number(new["value"])
-    if first is not None and second is not None and not within(first, second, bands(old, new)):
-        return Change(kind="moved", id=name, words=_moved(old, new, first, second))
+    moved = first is not None and second is not None and not within(first, second, bands(old, new) + tolerance)
+    if moved and (_has_band(old, new) or not (math.isfinite(first or 0.0) and math.isfinite(second or 0.0))):
+        return Change(kind="moved", id=name, words=_moved(old, new))
     if old["title"] != new["title"]:
         return Change(kind="words", id=name, words=f"“{old['title']}” → “{new['title']}”")
-    return None
+    return Change(kind="bandless", id=name, words=_moved(old, new)) if moved else None
+
+
+def _has_band(*findings: Mapping[str, Any]) -> bool:
+    """Return whether one of the findings states a band."""
+    known = [number(finding["band"]) for finding in findings]
+    return any(band is not None and math.isfinite(band) for band in known)
 
 
 def bands(*findings: Mapping[str, Any]) -> float:
@@ -204,10 +225,10 @@ def within(old: float, new: float, allowed: float) -> bool:
     return abs(new - old) <= allowed + ROUND_OFF * max(abs(old), abs(new)) + LEAST
 
 
-def _moved(old: Mapping[str, Any], new: Mapping[str, Any], first: float, second: float) -> str:
-    allowed = bands(old, new)
-    words = f"{_value(old)} → {_value(new)}, moved by {second - first:+.2g}"
-    return words + (f", bands allow {allowed:.1g}" if allowed else ", no band")
+def _moved(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
+    by = float(new["value"]) - float(old["value"])
+    words = f"{_value(old)} → {_value(new)}, moved by {by:+.2g}"
+    return words + (f", bands allow {bands(old, new):.1g}" if _has_band(old, new) else ", no band")
 
 
 def _value(finding: Mapping[str, Any]) -> str:
@@ -262,14 +283,3 @@ def _circumstances(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[s
 
 def _mapping(value: Any) -> Mapping[str, Any]:
     return value if isinstance(value, Mapping) else {}
-
-
-def compare_reports(old: Path, new: Path) -> Comparison:
-    """Compare two report folders, or their ``summary.json``.
-
-    Raises
-    ------
-    ValueError
-        If one of them cannot be read.
-    """
-    return compare_summaries(read_summary(old), read_summary(new))

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from slicemodel import Trajectory
+from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
+
+Rows = list[tuple[int, list[str]]]
 
 COLUMNS = ("t", "theta", "omega", "r_cm", "inertia")
 
@@ -30,56 +35,112 @@ def trajectory_csv(trajectory: Trajectory) -> str:
     return text.getvalue()
 
 
+QUANTITIES: Final = ("omega", "theta", "r_cm")
+"""What curves are compared in: angular velocity [rad/s], angle [rad], centre of mass from the cap [m]."""
+
+IN_FLIGHT: Final = ("in_flight", "t_over_T")
+"""Columns by which a measured track says which rows are the flight, and when it began."""
+
+
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """What a CSV file must hold to be compared: t [s], theta [rad], omega [rad/s], r_cm [m], each of shape (P,)."""
+    """What is compared: by quantity its times [s] and values, each of shape (P,), P >= 2; times do not decrease.
+
+    Two values at one time are those before and after an event. ``notes`` say what was done to read the curve.
+    """
 
     label: str
-    t: FloatArray
-    theta: FloatArray
-    omega: FloatArray
-    r_cm: FloatArray
+    series: Mapping[str, tuple[FloatArray, FloatArray]]
+    notes: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, trajectory: Trajectory) -> Curve:
         """Return the curve of a run."""
-        return cls(trajectory.label, trajectory.t, trajectory.theta, trajectory.omega, trajectory.r_cm)
+        return cls(trajectory.label, {name: (trajectory.t, getattr(trajectory, name)) for name in QUANTITIES})
 
 
 def read_curve(path: Path) -> Curve:
-    """Read a CSV file with at least the columns t, theta, omega and r_cm, in any order.
+    """Read a CSV file with a column t and at least one of omega, theta and r_cm; empty cells are left out.
+
+    Of a measured track (the columns ``in_flight`` and ``t_over_T`` of ``flipproof track``) the rows in flight are
+    taken, and the times are counted from the release, as those of a solver are.
 
     Raises
     ------
     ValueError
-        Naming file, line and column of what is missing, not a number, not finite, or not increasing in time.
+        Naming file, line and column of what is missing, not a number, not finite, or goes back in time.
+    """
+    names, rows = read_cells(path)
+    there = [name for name in QUANTITIES if name in names]
+    if "t" not in names or not there:
+        what = "t" if "t" not in names else f"of {', '.join(QUANTITIES)}"
+        raise ValueError(f"{path}: the header has no column {what}; it has {shortened(', '.join(names), 80)}")
+    notes: tuple[str, ...] = ()
+    release = 0.0
+    if all(name in names for name in IN_FLIGHT):
+        rows = [(line, cells) for line, cells in rows if cells[names.index("in_flight")].strip() == "1"]
+        release = _release(path, names, rows)
+        notes = (f"{path}: rows in flight, times from the release at {release:.6g} s",)
+    series: dict[str, tuple[FloatArray, FloatArray]] = {}
+    for name in there:
+        t, values = _series(path, names, rows, name)
+        if len(t) >= 2:
+            series[name] = t - release, values
+    if not series:
+        raise ValueError(f"{path}: has fewer than 2 rows with t and one of {', '.join(there)}")
+    return Curve(str(path), series, notes)
+
+
+def _series(path: Path, names: list[str], rows: Rows, name: str) -> tuple[FloatArray, FloatArray]:
+    """Return times and values of the rows in which both cells are filled."""
+    places = names.index("t"), names.index(name)
+    found = np.array(
+        [
+            (number_of(path, line, "t", cells[places[0]]), number_of(path, line, name, cells[places[1]]), line)
+            for line, cells in rows
+            if all(cells[place].strip() for place in places)
+        ]
+    ).reshape(-1, 3)
+    back = np.flatnonzero(np.diff(found[:, 0]) < 0)
+    if len(back):
+        before, after = found[back[0], 0], found[back[0] + 1, 0]
+        raise ValueError(f"{path}: line {found[back[0] + 1, 2]:.0f}: t = {after:g} s follows t = {before:g} s")
+    return found[:, 0], found[:, 1]
+
+
+def _release(path: Path, names: list[str], rows: Rows) -> float:
+    """Return when t / T is 0: the release [s] by the table's clock."""
+    t, share = _series(path, names, rows, IN_FLIGHT[1])
+    if len(t) < 2 or not share[-1] > share[0]:
+        raise ValueError(f"{path}: fewer than 2 rows are in flight (columns {' and '.join(IN_FLIGHT)})")
+    return float(t[0] - share[0] * (t[-1] - t[0]) / (share[-1] - share[0]))
+
+
+def read_cells(path: Path) -> tuple[list[str], Rows]:
+    """Return the names of a table's columns, and line number and cells of every row that is not blank.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read, is empty, names a column twice, or has a row of another length.
     """
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
-    if not lines:
+    # Lines that begin with # tell people what the table is.
+    numbered = [(n, line) for n, line in enumerate(lines, start=1) if line.strip() and not line.startswith("#")]
+    if not numbered:
         raise ValueError(f"{path}: is empty")
-    names = [name.strip() for name in lines[0].split(",")]
-    wanted = ("t", "theta", "omega", "r_cm")
-    missing = [name for name in wanted if name not in names]
-    if missing:
-        raise ValueError(f"{path}: line 1 has no column {', '.join(missing)}; it has {', '.join(names)[:80]}")
-    places = [names.index(name) for name in wanted]
-    rows = []
-    for number, line in enumerate(lines[1:], start=2):
-        cells = line.split(",")
-        if not line.strip():
-            continue
+    names = [name.strip() for name in numbered[0][1].split(",")]
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"{path}: line {numbered[0][0]} names the column {twice!r} twice")
+    rows = [(n, line.split(",")) for n, line in numbered[1:]]
+    for n, cells in rows:
         if len(cells) != len(names):
-            raise ValueError(f"{path}: line {number} has {len(cells)} cells, the header has {len(names)}")
-        rows.append([number_of(path, number, name, cells[place]) for name, place in zip(wanted, places, strict=True)])
-    if len(rows) < 2:
-        raise ValueError(f"{path}: has {len(rows)} rows of numbers; at least 2 are needed")
-    table = np.array(rows)
-    if not np.all(np.diff(table[:, 0]) > 0):
-        raise ValueError(f"{path}: t does not increase")
-    return Curve(path.name, *table.T)
+            raise ValueError(f"{path}: line {n} has {len(cells)} cells, the header has {len(names)}")
+    return names, rows
 
 
 def number_of(path: Path, line: int, column: str, cell: str) -> float:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slicemodel.scenario import Scenario, not_whole
+from slicemodel.scenario import Scenario, not_whole, shortened
 from slicemodel.schemes import Scheme, StepForm
 from slicemodel.solver import FULL_LIMIT, Rebound, advance, checked, grid, trajectory
 from slicemodel.trajectory import FloatArray, Trajectory
@@ -159,7 +159,7 @@ def _throws(scenarios: Sequence[Scenario]) -> tuple[Scenario, ...]:
         raise ValueError("scenarios is empty; at least one Scenario is needed")
     for i, throw in enumerate(throws):
         if not isinstance(throw, Scenario):
-            raise TypeError(f"scenarios[{i}] = {throw!r:.60} is not a Scenario")
+            raise TypeError(f"scenarios[{i}] = {shortened(repr(throw), 60)} is not a Scenario")
     return throws
 
 

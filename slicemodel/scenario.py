@@ -34,6 +34,7 @@ from __future__ import annotations
 
 import math
 import numbers
+import textwrap
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -106,11 +107,22 @@ class _Checks:
             raise ScenarioError("; ".join(self.problems))
 
 
+def shortened(text: str, most: int) -> str:
+    """Return a text on one line of at most ``most`` characters, cut between two words and ended by " ..." if it is.
+
+    A single word that is longer than that, such as a number of a thousand digits, is cut inside.
+    """
+    line = " ".join(text.split())
+    if len(line) <= most:
+        return line
+    short = textwrap.shorten(line, most, placeholder=" ...", break_on_hyphens=False)
+    return short if short != "..." else line[: most - 3] + "..."
+
+
 def not_whole(name: str, value: object, least: int, most: int) -> str:
     """Return what is wrong with ``value`` as a whole number in [least, most], or an empty string."""
     if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not least <= int(value) <= most:
-        shown = repr(value)
-        return f"{name} = {shown if len(shown) < 40 else shown[:36] + '...'} is not a whole number in [{least}, {most}]"
+        return f"{name} = {shortened(repr(value), 40)} is not a whole number in [{least}, {most}]"
     return ""
 
 

@@ -1,6 +1,7 @@
 """The house rules that can be executed: who imports whom, and what start-up may load."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -53,6 +54,19 @@ def test_nouns_know_no_verb():
         for module, names in imports_of(ROOT / "slicemodel" / f"{noun}.py"):
             if module.startswith("slicemodel"):
                 assert module.partition(".")[2] in NOUNS, f"{noun} imports {module} {names}"
+
+
+def test_text_is_cut_by_one_function():
+    """A text that is cut at a number of characters ends inside a word; ``shortened`` ends it between two."""
+    for file in (file for room in ROOMS for file in files_of(room)):
+        for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), start=1):
+            found = re.search(r"(?<!hexdigest\(\))\[:\d\d+\]|\[-\d\d\d+:\]|!r:\.\d", line)
+            assert not found, f"{file.name}, line {number}: {line.strip()}"
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_every_room_says_that_it_is_typed(room):
+    assert (ROOT / room / "py.typed").is_file()
 
 
 @pytest.mark.parametrize("heavy", ["numba", "scipy", "matplotlib", "pymunk", "mujoco", "jinja2", "numpy"])

@@ -9,7 +9,8 @@ from typing import Final
 import numpy as np
 
 from reports.fit.problem import Measurement, Quantity
-from reports.tables import number_of
+from reports.tables import number_of, read_cells
+from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
 
 QUANTITIES: Final[tuple[Quantity, ...]] = ("theta", "omega")
@@ -56,14 +57,14 @@ def read_flight(
     ValueError
         Naming file, line and column.
     """
-    names, rows = _cells(path)
+    names, rows = read_cells(path)
     if "t" not in names:
-        raise ValueError(f"{path}: the header has no column t; it has {', '.join(names)[:80]}")
+        raise ValueError(f"{path}: the header has no column t; it has {shortened(', '.join(names), 80)}")
     there = [name for name in QUANTITIES if name in names]
     if not there:
-        raise ValueError(f"{path}: the header has neither theta nor omega; it has {', '.join(names)[:80]}")
+        raise ValueError(f"{path}: the header has neither theta nor omega; it has {shortened(', '.join(names), 80)}")
     if quantity is not None and quantity not in there:
-        raise ValueError(f"{path}: the header has no column {quantity}; it has {', '.join(names)[:80]}")
+        raise ValueError(f"{path}: the header has no column {quantity}; it has {shortened(', '.join(names), 80)}")
     chosen = quantity or there[0]
     places = names.index("t"), names.index(chosen)
     table = np.array(
@@ -148,24 +149,3 @@ def cut(
         noise=noise,
         operator=None if averaged is None else Averaged(points=averaged),
     )
-
-
-def _cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """Return the names of the columns, and number and cells of every row that is not blank."""
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
-    # Lines that begin with # tell people what the table is.
-    numbered = [(n, line) for n, line in enumerate(lines, start=1) if line.strip() and not line.startswith("#")]
-    if not numbered:
-        raise ValueError(f"{path}: is empty")
-    names = [name.strip() for name in numbered[0][1].split(",")]
-    if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise ValueError(f"{path}: line {numbered[0][0]} names the column {twice!r} twice")
-    rows = [(n, line.split(",")) for n, line in numbered[1:]]
-    for n, cells in rows:
-        if len(cells) != len(names):
-            raise ValueError(f"{path}: line {n} has {len(cells)} cells, the header has {len(names)}")
-    return names, rows

@@ -19,6 +19,7 @@ from reports.solvers import Made, Run
 from reports.studies.validity import vary
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import plateau
+from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
 
 ENGINE: Final = "pymunk"
@@ -205,10 +206,10 @@ def _panel(throw: Scenario, layout: Layout, mass_ratio: float, slices: int, made
         if cost > layout.budget:
             reason[at] = f"{cost:.1e} slices × iterations × steps, more than {layout.budget:.1e}"
         elif outcome is None or flight is None:
-            reason[at] = "not made" if outcome is None else outcome.reason
+            reason[at] = "not made" if outcome is None else shortened(outcome.reason, 160)
         elif not flight.ok:
             grade[at] = "sinks in" if flight.message.endswith("reduce dt") else "explodes"
-            reason[at], held[at] = flight.message, flight.t[-1]
+            reason[at], held[at] = shortened(flight.message, 160), flight.t[-1]
         elif best is None:
             reason[at] = f"{REFERENCE} has no result to hold it against"
         else:

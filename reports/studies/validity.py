@@ -19,6 +19,7 @@ from ode_reference.models import MODELS as EQUATIONS
 from reports.solvers import Made, Run
 from slicemodel import Scenario
 from slicemodel.observables import plateau
+from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
 
 Axis = Literal["gamma", "step", "restitution"]
@@ -262,7 +263,7 @@ def study_readings(
                 largest[name][at] = np.abs(reading.omega - truth).max() / abs(throw.omega0)
         for scheme, model in (("published-python", "published-limit"), ("exact-step", "eq8")):
             step_error[scheme][at] = abs(level[scheme][at] - level[model][at])
-        reason[at] = "; ".join(problems)[:80]
+        reason[at] = shortened("; ".join(problems), 80)
     return ValidityMap(
         axis=axis,
         fills=np.asarray(fills, dtype=np.float64),

@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import Any, Final, Literal
 
 from reports.sweep.errors import SweepError
-from slicemodel.scenario import Bottle, Scenario, not_whole, unknown_name
+from slicemodel.scenario import Bottle, Scenario, not_whole, shortened, unknown_name
 
 Kind = Literal["real", "whole", "truth"]
 Value = float | int | bool
@@ -193,5 +193,4 @@ def _distinct(axis: Choices, where: str) -> Choices:
 
 
 def _short(value: object) -> str:
-    shown = repr(value)
-    return shown if len(shown) < 60 else shown[:56] + "..."
+    return shortened(repr(value), 60)

@@ -12,7 +12,9 @@ from reports.sweep.entries import try_entries
 from reports.sweep.export import check_export, export
 from reports.sweep.local import Workers, local_workers
 from reports.sweep.run import Progress, run_sweep
-from reports.sweep.store import FILE, Store
+from reports.sweep.salvage import salvage
+from reports.sweep.schema import FILE
+from reports.sweep.store import Store
 from reports.sweep.work import OUTCOMES, code_identity
 
 Begin = Callable[[int, int], Progress]
@@ -27,6 +29,7 @@ def sweep(
     jobs: int | None = None,
     dask: str | None = None,
     export_to: Path | None = None,
+    damaged: Path | None = None,
 ) -> str:
     """Make every point of the design in ``file`` that has no row in ``out``; return one line that tells what is there.
 
@@ -39,6 +42,8 @@ def sweep(
         Address of a Dask scheduler whose workers take their place.
     export_to : path or None
         File to write all rows to when they are complete.
+    damaged : path or None
+        File of a damaged sweep of this design: ``out`` is begun with its whole rows, and no point is made.
 
     Raises
     ------
@@ -46,6 +51,8 @@ def sweep(
         If the file, the folder, the workers or the disk will not do; what was stored is kept.
     """
     design = read_design(file)
+    if damaged:
+        return salvage(damaged, out, design, code_identity())
     if not (out / FILE).exists():
         # Before the folder knows the design, so that the mended file may have the same folder.
         try_entries(design.entries)

@@ -15,10 +15,11 @@ from typing import Any, Final
 
 from reports.sweep.errors import SweepError
 from reports.sweep.files import whole_file
-from reports.sweep.store import Store, columns
+from reports.sweep.schema import columns
+from reports.sweep.store import Store
 
 FORMS: Final = (".csv", ".parquet")
-LEFT_OUT: Final = ("parameters", "versions", "curves")
+LEFT_OUT: Final = ("parameters", "versions", "curves", "checksum")
 CHUNK: Final = 10_000
 """Rows in memory at a time."""
 

@@ -23,6 +23,8 @@ from reports.studies.waterfall import PROGRAM, Waterfall, plan_waterfall, split_
 from reports.sweep.command import Begin, completed
 from reports.sweep.files import write_whole
 from reports.sweep.planned import Row, design_of_runs, read_runs
+from reports.sweep.salvage import salvage
+from reports.sweep.work import code_identity
 from slicemodel import Scenario
 from slicemodel.observables import toppling_angle
 
@@ -45,6 +47,7 @@ def make_split(
     jobs: int | None = None,
     dask: str | None = None,
     export_to: Path | None = None,
+    damaged: Path | None = None,
 ) -> str:
     """Make every run of the waterfall that has no row in ``out``, draw it; return its table and what is there.
 
@@ -57,6 +60,8 @@ def make_split(
     """
     runs = plan_split(throw)
     design = design_of_runs(runs, {"omega0": [throw.omega0]}, ENDS, "flipproof waterfall")
+    if damaged:
+        return salvage(damaged, out, design, code_identity())
     with completed(design, out, begin, jobs=jobs, dask=dask, export_to=export_to) as (store, summary):
         waterfalls = split_rows(throw, read_runs(store, runs))
         for waterfall in waterfalls:

@@ -8,7 +8,8 @@
 
 A number that is not known is NULL, and the row's ``reason`` says why: SQLite has no NaN, and the schema refuses a row
 with a missing number and no reason. Floats come back to the last bit, but for the sign of a negative zero. A flight is
-in its place before its row is written.
+in its place before its row is written. Every row carries a checksum, and the whole file is read through before a
+sweep goes on with it (``inspection``).
 
 - ``journal_mode = WAL``: readers see the last transaction while this program writes the next.
 - ``synchronous = NORMAL``: a killed program loses nothing that it committed; a power failure may lose the last
@@ -19,73 +20,43 @@ in its place before its row is written.
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
 
 import numpy as np
 
-from reports.sweep.axes import column
 from reports.sweep.design import Design
 from reports.sweep.entries import settings_text
 from reports.sweep.errors import SweepError
-from reports.sweep.files import sweep_away_parts, whole_file
-from reports.sweep.work import CURVES, OUTCOMES, Outcome, Returned
+from reports.sweep.files import TEMPORARY, sweep_away_parts, whole_file
+from reports.sweep.inspection import damage, inspect, is_damage, result_code
+from reports.sweep.schema import (
+    APPLICATION,
+    FILE,
+    NUMBERS,
+    PAGE,
+    SCHEMA,
+    SHARED,
+    checksum,
+    columns,
+    kinds,
+    points_table,
+)
+from reports.sweep.work import CURVES, Outcome, Returned
 from slicemodel.trajectory import FloatArray
 
-SCHEMA: Final = 1
-FILE: Final = "sweep.sqlite"
 LOCK: Final = "sweep.lock"
 FLIGHTS: Final = "trajectories"
 BUSY: Final = 10.0
 """Seconds to wait for somebody who holds the file."""
 
-NUMBERS: Final = ("plateau", "omega_end", "theta_end", "r_cm_end", "t_end")
-TYPES: Final = {"real": "REAL", "whole": "INTEGER", "truth": "INTEGER"}
-
-SHARED: Final = """
-CREATE TABLE schema_version (version INTEGER NOT NULL);
-CREATE TABLE design (
-    code TEXT NOT NULL,     -- version and fingerprint of the code that makes the points
-    size INTEGER NOT NULL,  -- points of the whole design
-    facts TEXT NOT NULL,    -- JSON: what tells this design from another
-    source TEXT NOT NULL    -- the file as it was given
-);
-CREATE TABLE versions (
-    id INTEGER PRIMARY KEY,
-    facts TEXT NOT NULL UNIQUE  -- JSON: versions and machine of a worker
-);
-"""
-
-
-def points_table(design: Design) -> str:
-    """Return the statements that make the table of points, with a column for every swept field."""
-    swept = "".join(f"    {column(axis.name)} {TYPES[axis.kind]} NOT NULL,\n" for axis in design.axes)
-    numbers = "".join(f"    {name} REAL CHECK (typeof({name}) IN ('real', 'null')),\n" for name in NUMBERS)
-    known = " AND ".join(f"{name} IS NOT NULL" for name in (*NUMBERS, "impacts"))
-    statuses = ", ".join(f"'{status}'" for status in OUTCOMES)
-    curves = f"    curves BLOB,  -- float64, little-endian: {', '.join(CURVES)}\n" if design.curves else ""
-    return f"""
-CREATE TABLE points (
-    number INTEGER PRIMARY KEY,  -- place in the design, from 0
-    key TEXT NOT NULL UNIQUE,    -- SHA-256 of parameters and code
-{swept}    solver TEXT NOT NULL,
-    settings TEXT NOT NULL,      -- JSON
-{numbers}    impacts INTEGER CHECK (typeof(impacts) IN ('integer', 'null')),
-    status TEXT NOT NULL CHECK (status IN ({statuses})),
-    message TEXT NOT NULL,
-    reason TEXT NOT NULL,        -- why a number is NULL
-    seconds REAL NOT NULL,
-    trajectory TEXT,             -- file of the flight, if it was kept
-{curves}    versions INTEGER NOT NULL REFERENCES versions (id),
-    parameters TEXT NOT NULL,    -- JSON: enough to make this row again alone
-    CHECK (reason <> '' OR ({known}))
-);
-CREATE INDEX points_by_solver ON points (solver, status);
-"""
+SAFE: Final = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM)
+"""What SQLite refuses before it has changed anything."""
 
 
 class Store:
@@ -97,26 +68,26 @@ class Store:
         Raises
         ------
         SweepError
-            If the folder holds something else, another design, rows of other code or a newer schema, if another
-            program is writing to it, or if it cannot be written.
+            If the folder holds something else, another design, rows of other code or another schema, if its file is
+            damaged, if another program is writing to it, or if it cannot be written.
         """
         self.folder, self.design, self.code = folder, design, code
         self._lock: sqlite3.Connection | None = None
         self._rows: sqlite3.Connection | None = None
-        with _plainly(folder):
+        with self._plainly():
             _check_folder(folder)
             folder.mkdir(parents=True, exist_ok=True)
         try:
             self._lock = _lock(folder)
-            with _plainly(folder):
-                self._rows = sqlite3.connect(folder / FILE, timeout=BUSY, isolation_level=None)
-                self._rows.execute("PRAGMA journal_mode = WAL").fetchall()
-                self._rows.execute("PRAGMA synchronous = NORMAL")
-                self.fresh = not _tables(self._rows)
+            with self._plainly():
+                self.fresh = not os.path.lexists(self.file)
                 if self.fresh:
                     self._begin()
                 else:
-                    self._check()
+                    inspect(self.file, design, code, BUSY)
+                self._rows = sqlite3.connect(self.file, timeout=BUSY, isolation_level=None)
+                self._rows.execute("PRAGMA journal_mode = WAL").fetchall()
+                self._rows.execute("PRAGMA synchronous = NORMAL")
                 sweep_away_parts(folder)
         except BaseException:
             self.close()
@@ -151,7 +122,7 @@ class Store:
     def done(self) -> bytearray:
         """Return one byte for each point of the design: 1 if its row is there, and its flight if flights are kept."""
         found = bytearray(self.design.size)
-        with _plainly(self.folder):
+        with self._plainly():
             for number, trajectory in self.connection.execute("SELECT number, trajectory FROM points"):
                 found[number] = trajectory is None or (self.folder / trajectory).is_file()
         return found
@@ -159,7 +130,7 @@ class Store:
     def counts(self) -> dict[str, int]:
         """Return the number of rows by status, the most frequent first."""
         query = "SELECT status, count(*) FROM points GROUP BY status ORDER BY count(*) DESC, status"
-        with _plainly(self.folder):
+        with self._plainly():
             return dict(self.connection.execute(query).fetchall())
 
     def add(self, returned: Sequence[Returned]) -> None:
@@ -170,11 +141,11 @@ class Store:
         SweepError
             If the disk is full or the file cannot be written; what was there before is there still.
         """
-        with _plainly(self.folder):
+        with self._plainly():
             flights = {o.number: self._keep(o) for batch in returned for o in batch.outcomes if o.arrays is not None}
             with _transaction(self.connection):
                 for batch in returned:
-                    versions = self._versions(batch)
+                    versions = self._versions(json.dumps(dict(batch.versions), sort_keys=True))
                     rows = (self._row(outcome, flights.get(outcome.number), versions) for outcome in batch.outcomes)
                     # A row whose flight was deleted has been made again.
                     gone = ((outcome.number,) for outcome in batch.outcomes)
@@ -182,41 +153,46 @@ class Store:
                     marks = ", ".join("?" * len(columns(self.design)))
                     self.connection.executemany(f"INSERT INTO points VALUES ({marks})", rows)
 
+    def restore(self, rows: Sequence[tuple[Any, ...]], versions: Mapping[int, str]) -> None:
+        """Write rows that were read from another file of this sweep; a point that has a row keeps it.
+
+        Parameters
+        ----------
+        rows : sequence of tuples - the cells of each, in the order of ``columns``
+        versions : mapping from the id that the rows refer to, to the versions there; one that is missing is lost
+        """
+        place = columns(self.design).index("versions")
+        marks = ", ".join("?" * len(columns(self.design)))
+        with self._plainly(), _transaction(self.connection):
+            ids = {row[place]: 0 for row in rows}
+            for old in ids:
+                ids[old] = self._versions(versions.get(old, json.dumps({"lost": f"versions {old} of a damaged file"})))
+            moved = (self._signed((*row[:place], ids[row[place]], *row[place + 1 : -1])) for row in rows)
+            self.connection.executemany(f"INSERT OR IGNORE INTO points VALUES ({marks})", moved)
+
     def _begin(self) -> None:
-        with _transaction(self.connection):
-            for statement in (SHARED + points_table(self.design)).split(";\n"):
-                self.connection.execute(statement)
-            self.connection.execute("INSERT INTO schema_version VALUES (?)", (SCHEMA,))
-            facts = json.dumps(self.design.facts())
-            self.connection.execute(
-                "INSERT INTO design VALUES (?, ?, ?, ?)", (self.code, self.design.size, facts, self.design.text)
-            )
+        """Make the file with its tables; it gets its name when it is whole, so that no kill leaves half of it."""
+        with whole_file(self.file) as part, closing(sqlite3.connect(part, isolation_level=None)) as connection:
+            connection.execute(f"PRAGMA page_size = {PAGE}")
+            connection.execute("PRAGMA journal_mode = MEMORY").fetchall()
+            with _transaction(connection):
+                connection.execute(f"PRAGMA application_id = {APPLICATION}")
+                for statement in (SHARED + points_table(self.design)).split(";\n"):
+                    connection.execute(statement)
+                connection.execute("INSERT INTO schema_version VALUES (?)", (SCHEMA,))
+                facts = (self.code, self.design.size, json.dumps(self.design.facts()), self.design.text)
+                row = (*facts, checksum(facts, ("TEXT", "INTEGER", "TEXT", "TEXT")))
+                connection.execute("INSERT INTO design VALUES (?, ?, ?, ?, ?)", row)
 
-    def _check(self) -> None:
-        if not {"schema_version", "design", "points"} <= _tables(self.connection):
-            raise SweepError(f"{self.file} is a database, but no sweep; name another --out")
-        (schema,) = self.connection.execute("SELECT version FROM schema_version").fetchone()
-        if schema != SCHEMA:
-            raise SweepError(f"{self.file} has schema {schema}; this flipproof reads schema {SCHEMA}")
-        code, facts = self.connection.execute("SELECT code, facts FROM design").fetchone()
-        difference = _difference(json.loads(facts), json.loads(json.dumps(self.design.facts())))
-        if difference:
-            raise SweepError(f"{self.folder} holds another design ({difference}); name another --out")
-        if code != self.code:
-            raise SweepError(
-                f"{self.folder} was begun by flipproof {code}, this is {self.code}; go on with that one, or name "
-                "another --out: one sweep, one code"
-            )
-
-    def _versions(self, batch: Returned) -> int:
-        facts = json.dumps(dict(batch.versions), sort_keys=True)
-        self.connection.execute("INSERT OR IGNORE INTO versions (facts) VALUES (?)", (facts,))
+    def _versions(self, facts: str) -> int:
+        row = (facts, checksum((facts,), ("TEXT",)))
+        self.connection.execute("INSERT OR IGNORE INTO versions (facts, checksum) VALUES (?, ?)", row)
         (number,) = self.connection.execute("SELECT id FROM versions WHERE facts = ?", (facts,)).fetchone()
         return int(number)
 
     def _row(self, outcome: Outcome, flight: str | None, versions: int) -> tuple[Any, ...]:
         point = self.design.point(outcome.number)
-        return (
+        cells = (
             outcome.number,
             point.key(self.code),
             *point.values,
@@ -233,6 +209,34 @@ class Store:
             versions,
             json.dumps(point.parameters()),
         )
+        return self._signed(cells)
+
+    def _signed(self, cells: Sequence[Any]) -> tuple[Any, ...]:
+        """Return cells with their checksum; cells that the tables refuse, and will say so, get none."""
+        try:
+            return (*cells, checksum(cells, kinds(self.design)[:-1]))
+        except (ValueError, TypeError, OverflowError):
+            return (*cells, "")
+
+    @contextmanager
+    def _plainly(self) -> Iterator[None]:
+        """Turn what a disk or SQLite refuses into one line."""
+        try:
+            yield
+        except sqlite3.IntegrityError as error:
+            words = "two points of the design are the same throw" if "points.key" in str(error) else "a row is refused"
+            raise SweepError(f"{self.folder}: {words} ({error})") from None
+        except (OSError, sqlite3.Error) as error:
+            if is_damage(error):
+                raise damage(self.file, self.design, self.code, str(error)) from None
+            words = getattr(error, "strerror", None) or str(error)
+            safe = isinstance(error, OSError) or result_code(error) in SAFE
+            kept = (
+                "the points stored so far are safe, the same command goes on from there"
+                if safe
+                else "what was stored is read through when the same command goes on from there"
+            )
+            raise SweepError(f"{self.folder} cannot be written ({words}); {kept}") from None
 
     def _keep(self, outcome: Outcome) -> str:
         """Write the flight of a point and return its file's name from the folder."""
@@ -246,14 +250,6 @@ class Store:
         return name
 
 
-def columns(design: Design) -> tuple[str, ...]:
-    """Return the columns of the table of points, in order."""
-    swept = (column(axis.name) for axis in design.axes)
-    kept = ("trajectory", "curves") if design.curves else ("trajectory",)
-    told = ("status", "message", "reason", "seconds", *kept, "versions", "parameters")
-    return ("number", "key", *swept, "solver", "settings", *NUMBERS, "impacts", *told)
-
-
 def read_curves(blob: bytes) -> dict[str, FloatArray]:
     """Return the curves of a row by name, each of shape (P,)."""
     return dict(zip(CURVES, np.frombuffer(blob, dtype="<f8").reshape(len(CURVES), -1), strict=True))
@@ -263,15 +259,12 @@ def _bytes(curves: FloatArray | None) -> bytes | None:
     return None if curves is None else curves.astype("<f8").tobytes()
 
 
-def _tables(connection: sqlite3.Connection) -> set[str]:
-    return {name for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
-
-
 def _check_folder(folder: Path) -> None:
     if folder.exists() and not folder.is_dir():
         raise SweepError(f"{folder} is a file; --out names a folder")
-    if folder.exists() and not (folder / FILE).is_file():
-        others = sorted(entry.name for entry in folder.iterdir() if entry.name != LOCK)
+    if folder.exists() and not os.path.lexists(folder / FILE):
+        # A program killed while it began the sweep leaves a part of the file.
+        others = sorted(e.name for e in folder.iterdir() if e.name != LOCK and not e.match(f"{FILE}.*{TEMPORARY}"))
         if others:
             raise SweepError(f"{folder} holds {others[0]} and no sweep; name an empty or a new folder")
 
@@ -284,8 +277,12 @@ def _lock(folder: Path) -> sqlite3.Connection:
     except sqlite3.Error as error:
         lock.close()
         busy = "locked" in str(error)
-        words = "another sweep is writing there; wait for it or stop it" if busy else f"cannot be locked ({error})"
-        raise SweepError(f"{folder}: {words}") from None
+        words = (
+            f"{folder}: another sweep is writing there; wait for it or stop it"
+            if busy
+            else f"{folder / LOCK} cannot be locked ({error}); it holds no rows: remove it if no sweep is writing there"
+        )
+        raise SweepError(words) from None
     return lock
 
 
@@ -300,35 +297,3 @@ def _transaction(connection: sqlite3.Connection) -> Iterator[None]:
         if connection.in_transaction:
             connection.execute("ROLLBACK")
         raise
-
-
-@contextmanager
-def _plainly(folder: Path) -> Iterator[None]:
-    """Turn what a disk or SQLite refuses into one line."""
-    try:
-        yield
-    except sqlite3.IntegrityError as error:
-        words = "two points of the design are the same throw" if "points.key" in str(error) else "a row is refused"
-        raise SweepError(f"{folder}: {words} ({error})") from None
-    except (OSError, sqlite3.Error) as error:
-        words = getattr(error, "strerror", None) or str(error)
-        raise SweepError(
-            f"{folder} cannot be written ({words}); the points stored so far are safe, "
-            "the same command goes on from there"
-        ) from None
-
-
-def _difference(there: Any, here: Any, name: str = "") -> str:
-    """Return the first thing in which two designs differ, or nothing."""
-    if isinstance(there, dict) and isinstance(here, dict):
-        for key in {**there, **here}:
-            found = _difference(there.get(key), here.get(key), f"{name}.{key}" if name else key)
-            if found:
-                return found
-        return ""
-    return "" if there == here else f"{name} is {_short(there)} there and {_short(here)} here"
-
-
-def _short(value: object) -> str:
-    shown = json.dumps(value)
-    return shown if len(shown) <= 40 else shown[:37] + "..."

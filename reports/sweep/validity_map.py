@@ -41,6 +41,8 @@ from reports.sweep.axes import DAMPING, FILL, Value
 from reports.sweep.command import Begin, completed
 from reports.sweep.files import write_whole
 from reports.sweep.planned import Row, design_of_runs, read_runs
+from reports.sweep.salvage import salvage
+from reports.sweep.work import code_identity
 from slicemodel import Scenario
 
 FILLS: Final = (0.05, 1.0)
@@ -103,6 +105,7 @@ def make_map(
     jobs: int | None = None,
     dask: str | None = None,
     export_to: Path | None = None,
+    damaged: Path | None = None,
 ) -> str:
     """Make every run of the map that has no row in ``out``, draw the map; return lines that tell what is there.
 
@@ -111,6 +114,8 @@ def make_map(
     runs = plan.runs()
     source = f"flipproof map --axis {plan.axis} --size {len(plan.fills)}x{len(plan.values)}"
     design = design_of_runs(runs, plan.varied(), CURVE, source)
+    if damaged:
+        return salvage(damaged, out, design, code_identity())
     with completed(design, out, begin, jobs=jobs, dask=dask, export_to=export_to) as (store, summary):
         study = plan.study(read_runs(store, runs))
         drawing = draw(figure_map(study))

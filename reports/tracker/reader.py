@@ -37,6 +37,7 @@ from reports.tracker.dialect import (
 )
 from reports.tracker.headings import Heading, headings_of, names_line, track_names
 from reports.tracker.table import Dialect, Track, TrackFileError, TrackTable, column_name, plain
+from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
 
 LARGEST: Final = 1e9
@@ -171,7 +172,7 @@ def _value(path: Path, line: Line, cell: str, dialect: Dialect) -> float:
     if cell in MISSING:
         return math.nan
     value = number(cell, dialect.decimal)
-    shown = cell if len(cell) < 30 else cell[:26] + "..."
+    shown = shortened(cell, 30)
     if value is None:
         raise TrackFileError(
             f"{path}, line {line.number}: {shown!r} is not a number; leave the cell empty if the point was not tracked"

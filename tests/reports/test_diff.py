@@ -4,19 +4,24 @@ import argparse
 import copy
 import dataclasses
 import json
+import re
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from types import MappingProxyType
 
+import numpy as np
 import pytest
 
 from reports import evidence as evidence_module
 from reports import instruments, pool, solvers
 from reports.attribution import Scope
 from reports.cli_check import add_checks
+from reports.columns import curves_csv
 from reports.diff import Change, change_of, compare_summaries, read_summary, scenario_changes, within
+from reports.diff_page import read_curves
 from reports.evaluation import evaluate
 from reports.evidence import QUICK, with_slices
+from reports.figures.report_pair import differences, figure_report_pair
 from reports.findings import Finding
 from reports.instruments import Bench
 from reports.provenance import provenance
@@ -157,6 +162,8 @@ def finding(**changes):
         ({"value": 0.79}, "moved"),
         ({"value": 1.3, "band": 0.25}, None),
         ({"value": 1.3, "band": None}, "moved"),
+        ({"value": 1.2 + 2e-6}, "moved"),
+        ({"value": 1.2 + 5e-7}, None),
         ({"value": float("nan")}, "moved"),
         ({"value": float("inf")}, "moved"),
         ({"band": float("nan"), "value": 1.09}, None),
@@ -171,6 +178,145 @@ def finding(**changes):
 def test_a_finding_differs_beyond_the_sum_of_both_bands(changes, kind):
     change = change_of(finding(), finding(**changes))
     assert (None if change is None else change.kind) == kind
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind"),
+    [
+        ({"value": 1.3}, "bandless"),
+        ({"value": 1.0 + 2e-6}, "bandless"),
+        ({"value": 1.0 + 5e-7}, None),
+        ({"value": 1.3, "band": float("nan")}, "bandless"),
+        ({"value": 1.3, "band": 0.1}, "moved"),
+        ({"value": float("nan")}, "moved"),
+        ({"value": float("inf")}, "moved"),
+        ({"value": None}, "verdict"),
+        ({"value": 1.3, "unit": "km"}, "moved"),
+        ({"value": 1.3, "title": "says something else"}, "words"),
+        ({"value": 3.0, "kind": "regression", "admissible": (0.0, 2.0)}, "verdict"),
+    ],
+    ids=str,
+)
+def test_without_a_band_a_number_that_moved_is_not_comparable(changes, kind):
+    change = change_of(finding(band=None), finding(**{"band": None, **changes}))
+    assert (None if change is None else change.kind) == kind
+
+
+def test_a_verdict_that_changed_counts_without_a_band():
+    held = {"band": None, "kind": "regression", "admissible": (0.0, 2.0)}
+    assert change_of(finding(**held), finding(**held, value=1.9)).kind == "bandless"
+    assert change_of(finding(**held), finding(**held, value=2.1)).kind == "verdict"
+
+
+def test_the_tolerance_is_added_to_every_band():
+    assert change_of(finding(), finding(value=1.25), 0.06) is None
+    assert change_of(finding(), finding(value=1.25), 0.04).kind == "moved"
+    assert change_of(finding(band=None), finding(value=1.05, band=None), 0.06) is None
+    assert change_of(finding(), finding(value=1.2 + 5e-7), 0.0).kind == "moved"
+
+
+def test_what_is_not_comparable_is_said_and_does_not_count(sound, tmp_path, capsys):
+    other = copy.deepcopy(sound)
+    bandless = next(f for f in other["findings"] if f["band"] is None and isinstance(f["value"], float))
+    bandless["value"] = bandless["value"] + 1e-3 * max(1.0, abs(bandless["value"]))
+    old, new = written(tmp_path / "old", sound), written(tmp_path / "new", other)
+    assert flipproof("diff", old, new) == 0
+    out = capsys.readouterr().out
+    assert "are not comparable: they moved, state no band, and are not counted as differences (1):" in out
+    assert f"  {bandless['id']}: " in out
+    assert out.endswith("findings compared: no difference, 1 not comparable\n")
+    assert flipproof("diff", old, new, "--tolerance", "1e300") == 0
+    assert "not comparable" not in capsys.readouterr().out
+
+
+def test_every_erratum_has_a_band(sound):
+    errata = [finding for finding in sound["findings"] if finding["id"].startswith("erratum-")]
+    assert len(errata) > 10
+    assert all(0 <= finding["band"] <= 2e-6 * abs(finding["value"]) for finding in errata)
+
+
+# ---------------------------------------------------------------------- the page
+
+
+def with_curves(folder, factor=1.0, name="eq8", rows=5):
+    (folder / "figures").mkdir()
+    t = np.linspace(0, 0.4, rows)
+    curves = {f"omega/omega_0 {name} [1]": (t, factor * np.cos(t)), "omega/omega_0 pymunk [1]": (t[:3], t[:3])}
+    (folder / "figures" / "omega.csv").write_text(curves_csv(curves), encoding="utf-8")
+    return folder
+
+
+def test_the_page_shows_both_curves_and_needs_nothing_else(sound, tmp_path):
+    other = copy.deepcopy(sound)
+    other["findings"][0]["value"], other["findings"][0]["band"] = 7.0, 0.1
+    other["findings"][0]["title"] = "<script>alert(1)</script>"
+    old, new = (
+        with_curves(written(tmp_path / "old", sound)),
+        with_curves(written(tmp_path / "new", other), 1.01, rows=9),
+    )
+    assert flipproof("diff", old, new, "--html", tmp_path / "diff.html") == 1
+    page = (tmp_path / "diff.html").read_text(encoding="utf-8")
+    assert f"{len(sound['findings'])} findings compared: 1 differ" in page
+    assert sound["findings"][0]["id"] in page
+    assert "<script" not in page
+    assert not re.search(r'(?:src|href)="(?!data:)', page)
+    assert page.count('<img src="data:image/svg+xml,') == 1
+    assert "Left: angular velocity ω relative to its initial value ω₀ over the\ntime t since the release" in page
+    assert "<td>eq8</td><td>+0.01 of ω₀</td><td>0 s</td>" in page
+    assert "<td>pymunk</td><td>none</td>" in page
+
+
+def test_the_figure_names_its_axes_with_units():
+    t = np.linspace(0, 1, 5)
+    old, new = {"eq8": (t, t), "pymunk": (t, t)}, {"eq8": (t, 2 * t), "pymunk": (t, t)}
+    grid = np.reshape(figure_report_pair(old, new, differences(old, new)).axes, (2, 2))
+    assert [axes.get_title(loc="left") for axes in grid[:, 0]] == ["eq8", "pymunk"]
+    assert {axes.get_ylabel() for axes in grid[:, 0]} == {"ω / ω₀ [1]"}
+    assert {axes.get_ylabel() for axes in grid[:, 1]} == {"difference [1]"}
+    assert {axes.get_xlabel() for axes in grid[1]} == {"time t [s]"}
+    assert [line.get_label() for line in grid[0, 0].lines] == ["old", "new"]
+    np.testing.assert_array_equal(grid[0, 1].lines[0].get_ydata(), t)
+
+
+def test_the_page_says_which_curves_are_missing(sound, tmp_path):
+    old, new = written(tmp_path / "old", sound), with_curves(written(tmp_path / "new", sound))
+    assert flipproof("diff", old / "summary.json", new, "--html", tmp_path / "diff.html") == 0
+    page = (tmp_path / "diff.html").read_text(encoding="utf-8")
+    assert f"The old report&#39;s curves are not shown: {old / 'figures/omega.csv'} cannot be read" in page
+    assert "The new report" not in page
+    with_curves(old, name="free-flight")
+    assert flipproof("diff", old, new, "--html", tmp_path / "diff.html") == 0
+    assert "In one of the reports alone: eq8, free-flight." in (tmp_path / "diff.html").read_text(encoding="utf-8")
+    (old / "figures" / "omega.csv").write_text("t [s],omega/omega_0 eq8 [1]\n0,fast\n")
+    assert flipproof("diff", old, new, "--html", tmp_path / "diff.html") == 0
+    assert "could not convert string to float" in (tmp_path / "diff.html").read_text(encoding="utf-8")
+
+
+def test_curves_are_read_as_they_were_written(tmp_path):
+    curves = {
+        "omega/omega_0 a [1]": (np.arange(4.0), np.arange(4.0) / 7),
+        "omega/omega_0 b [1]": (np.arange(3.0) / 3, np.ones(3)),
+    }
+    (tmp_path / "omega.csv").write_text(curves_csv(curves), encoding="utf-8")
+    found = read_curves(tmp_path / "omega.csv")
+    assert list(found) == ["a", "b"]
+    for name, (t, values) in curves.items():
+        np.testing.assert_allclose(found[name[14]][0], t, rtol=1e-8)
+        np.testing.assert_allclose(found[name[14]][1], values, rtol=1e-8)
+
+
+def test_curves_are_taken_apart_where_both_are():
+    t, late = np.linspace(0, 1, 5), np.linspace(0, 0.6, 4)
+    apart = differences({"a": (t, 2 * t), "b": (t, t)}, {"a": (late, 3 * late)})
+    assert list(apart) == ["a"]
+    np.testing.assert_allclose(apart["a"][0], [0, 0.25, 0.5])
+    np.testing.assert_allclose(apart["a"][1], [0, 0.25, 0.5])
+
+
+def test_a_page_that_cannot_be_written_is_refused_first(sound, tmp_path):
+    old = written(tmp_path / "old", sound)
+    with pytest.raises(ValueError, match=r"--html .* is a folder; name a file"):
+        flipproof("diff", old, old, "--html", tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,14 @@
 """A sweep's file: what it means, and one line for every mistake in it."""
 
 import json
+import math
 import tomllib
 from dataclasses import fields
 
 import numpy as np
 import pytest
 
-from reports.sweep.axes import KINDS, Choices, Range
+from reports.sweep.axes import KINDS, Choices, Range, read_axes
 from reports.sweep.design import MOST_POINTS, design_of, from_parameters, latin_shares, read_design
 from reports.sweep.entries import try_entries
 from reports.sweep.errors import SweepError
@@ -255,3 +256,24 @@ def test_a_sweep_may_be_as_large_as_stated_and_costs_nothing_to_state():
     design = read(text)
     assert design.size == MOST_POINTS
     assert design.point(design.size - 1).values == (1.0, 0.3)
+    # Points are counted, not throws: here each of two solvers has fewer than are admissible.
+    with pytest.raises(SweepError, match=f"500004 throws by 2 solvers make 1000008 points, more than {MOST_POINTS}"):
+        read(text.replace(f"count = {MOST_POINTS // 8}", f"count = {MOST_POINTS // 8 + 1}"))
+
+
+@pytest.mark.parametrize(("low", "high", "log"), [(0.2, 0.9, False), (0.1, 1.1, True), (0.1, 3.3, True)])
+def test_the_ends_of_a_range_are_met_exactly(low, high, log):
+    """Here the formula between the ends misses the upper one by a rounding."""
+    assert (low + (high - low) if not log else math.exp(math.log(low) + (math.log(high) - math.log(low)))) < high
+    axis = Range("drag", "real", low, high, log)
+    assert (axis.at(0.0), axis.at(1.0)) == (low, high)
+
+
+def test_every_value_of_a_list_has_an_equal_part():
+    axis = Choices("drag", "real", (1.0, 2.0, 3.0))
+    assert [axis.at(share) for share in (0.0, 0.33, 0.34, 0.66, 0.67, 0.999)] == [1.0, 1.0, 2.0, 2.0, 3.0, 3.0]
+
+
+def test_a_range_of_one_value_is_refused():
+    with pytest.raises(SweepError, match=r"from = 0\.5 is not below to = 0\.5"):
+        read_axes({"fill_fraction": {"from": 0.5, "to": 0.5, "count": 3}}, "here", grid=True)

@@ -12,7 +12,7 @@ from reports.sweep import run
 from reports.sweep.design import design_of
 from reports.sweep.errors import SweepError
 from reports.sweep.local import Processes, WorkerDiedError, Workers, local_workers
-from reports.sweep.run import GROWTH, LONE_DEATHS, MOST_BYTES, Pace, run_sweep
+from reports.sweep.run import DEATHS_IN_A_ROW, GROWTH, LONE_DEATHS, MOST_BYTES, Pace, run_sweep
 from reports.sweep.store import Store
 from reports.sweep.work import Outcome, Returned
 
@@ -160,7 +160,8 @@ def test_a_worker_killed_from_outside_costs_no_point(tmp_path):
 @pytest.mark.usefixtures("_quick")
 def test_workers_that_always_die_end_the_sweep_and_not_every_point(tmp_path):
     with pytest.raises(SweepError, match=r"workers die whatever they are given \(exit code 1\)"):
-        sweep(tmp_path, Inline(lambda _: WorkerDiedError("exit code 1")), throws=500)
+        sweep(tmp_path, executor := Inline(lambda _: WorkerDiedError("exit code 1")), throws=500)
+    assert DEATHS_IN_A_ROW < len(executor.batches) < 2 * DEATHS_IN_A_ROW
 
 
 @pytest.mark.usefixtures("_quick")

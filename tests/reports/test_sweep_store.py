@@ -13,9 +13,10 @@ import pytest
 from reports.sweep import export as exporting
 from reports.sweep.design import design_of
 from reports.sweep.errors import SweepError
-from reports.sweep.export import check_export, export
+from reports.sweep.export import LEFT_OUT, check_export, export
 from reports.sweep.files import whole_file
-from reports.sweep.store import Store, columns
+from reports.sweep.schema import columns
+from reports.sweep.store import Store
 from reports.sweep.work import OUTCOMES, Outcome, Returned, code_identity, make_batch, make_point
 
 TEXT = """
@@ -65,7 +66,7 @@ def test_floats_come_back_to_the_last_bit_and_rows_can_be_read_while_it_is_open(
         assert list(store.done()) == [1] + 11 * [0]
     with closing(sqlite3.connect(tmp_path / "sweep.sqlite")) as connection:
         assert connection.execute("PRAGMA journal_mode").fetchone() == ("wal",)
-        assert connection.execute("SELECT version FROM schema_version").fetchone() == (1,)
+        assert connection.execute("SELECT version FROM schema_version").fetchone() == (2,)
         assert connection.execute("SELECT source FROM design").fetchone() == (TEXT,)
 
 
@@ -186,8 +187,8 @@ def test_a_folder_of_something_else_is_refused(tmp_path):
 
 def test_a_newer_schema_is_refused(tmp_path):
     with Store(tmp_path, design(), CODE) as store:
-        store.connection.execute("UPDATE schema_version SET version = 2")
-    with pytest.raises(SweepError, match="has schema 2; this flipproof reads schema 1"):
+        store.connection.execute("UPDATE schema_version SET version = 3")
+    with pytest.raises(SweepError, match="has schema 3; this flipproof reads schema 2"):
         Store(tmp_path, design(), CODE)
 
 
@@ -236,8 +237,8 @@ def test_no_row_without_its_flight(tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     made = design(TEXT.replace('design = "grid"', 'design = "grid"\ntrajectories = true'))
-    monkeypatch.setattr("reports.sweep.files.os.replace", full)
     with Store(tmp_path, made, CODE) as store:
+        monkeypatch.setattr("reports.sweep.files.os.replace", full)
         with pytest.raises(SweepError, match="No space left on device"):
             store.add([returned(make_point(made.point(0), keep=True))])
         assert sum(store.done()) == 0
@@ -290,7 +291,7 @@ def test_parquet_keeps_types_and_nulls(tmp_path):
 
     with filled(tmp_path) as store:
         export(store, tmp_path / "rows.parquet")
-        names = [name for name in columns(store.design) if name not in ("parameters", "versions")]
+        names = [name for name in columns(store.design) if name not in LEFT_OUT]
     table = parquet.read_table(tmp_path / "rows.parquet")
     assert table.column_names == names
     assert table["plateau"].to_pylist() == [row[0] for row in select(tmp_path, "plateau")]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from slicemodel import Bottle, Scenario, ScenarioError
+from slicemodel.scenario import not_whole, shortened
 
 
 def test_defaults_are_the_papers_own_throw():
@@ -153,3 +154,28 @@ def test_missing_file_is_named(tmp_path):
 
 def test_pickles():
     assert pickle.loads(pickle.dumps(Scenario(drag=0.3))) == Scenario(drag=0.3)
+
+
+@pytest.mark.parametrize(
+    ("text", "most", "short"),
+    [
+        ("one two three", 13, "one two three"),
+        ("one two three", 12, "one two ..."),
+        ("one two three", 8, "one ..."),
+        ("one\n  two\tthree", 99, "one two three"),
+        ("well-known words", 15, "well-known ..."),
+        ("x" * 99, 10, "xxxxxxx..."),
+        ("one " + "x" * 99, 10, "one ..."),
+    ],
+)
+def test_a_text_is_cut_between_words(text, most, short):
+    assert shortened(text, most) == short
+    assert len(shortened(text, most)) <= most
+
+
+@pytest.mark.parametrize(
+    ("value", "good"), [(1, False), (2, True), (9, True), (10, False), (2.0, False), (True, False)]
+)
+def test_the_ends_of_a_range_of_whole_numbers_belong_to_it(value, good):
+    words = not_whole("points", value, 2, 9)
+    assert words == ("" if good else f"points = {value} is not a whole number in [2, 9]")

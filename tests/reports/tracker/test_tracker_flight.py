@@ -229,12 +229,52 @@ def test_a_squeezed_picture_is_said(films):
 
 
 @pytest.mark.xdist_group("films")
+@pytest.mark.parametrize(("squeezed", "said"), [(0.976, True), (0.984, False), (1.016, False), (1.024, True)])
+def test_a_pattern_of_one_per_cent_is_said_and_a_smaller_one_is_not(films, squeezed, said):
+    """A picture squeezed by 2 e in one direction changes the distance by +- e of its mean with the angle."""
+    spin = spin_of(films["ice"], scale=(1.0, squeezed))
+    found = check(spin, find_flight(spin, gravity=G), 1.0, None)
+    assert found.stretch == pytest.approx(abs(1.0 - squeezed) / (1.0 + squeezed), rel=0.005, abs=0.0)
+    assert any("with the angle" in warning for warning in found.warnings) is said
+
+
+@pytest.mark.xdist_group("films")
+@pytest.mark.parametrize(("change", "said"), [(0.024, True), (0.016, False), (-0.016, False), (-0.024, True)])
+def test_a_drift_of_two_per_cent_is_said_and_a_smaller_one_is_not(films, change, said):
+    film = films["ice"]
+    in_flight = film.t[find_flight(spin_of(film, 5e-4), gravity=G).inside]
+    nearer = 1.0 + change * np.clip((film.t - in_flight[0]) / np.ptp(in_flight), 0.0, 1.0)[:, None]
+    cap, base = (film.centre + nearer * (points - film.centre) for points in (film.cap, film.base))
+    found = calibration_of(replace(film, cap=cap, base=base), length=None)
+    assert found.drift == pytest.approx(change, rel=0.05, abs=0.0)
+    words = f"moves {'towards' if change > 0 else 'away from'} the camera"
+    assert any(words in warning for warning in found.warnings) is said
+
+
+@pytest.mark.xdist_group("films")
+@pytest.mark.parametrize(("length", "said"), [(0.285, False), (0.286, True), (0.275, False), (0.274, True)])
+def test_a_scale_that_is_two_per_cent_wrong_is_said_and_a_smaller_error_is_not(films, length, said):
+    warnings = calibration_of(films["ice"], length=length).warnings
+    assert any("every length is" in warning for warning in warnings) is said
+
+
+@pytest.mark.xdist_group("films")
 def test_wrong_points_are_named_by_their_lines(films):
     film = films["ice"]
     base = film.base.copy()
     base[80] += (0.1, 0.1)
     warnings = calibration_of(replace(film, base=base)).warnings
     assert any("1 frames (lines 84)" in warning for warning in warnings)
+
+
+@pytest.mark.xdist_group("films")
+@pytest.mark.parametrize(("wrong", "named"), [(0.002, False), (0.01, True)])
+def test_a_point_is_wrong_beyond_six_standard_deviations(films, wrong, named):
+    """The distance scatters by 0.7 mm here."""
+    film = films["ice"]
+    base = film.base.copy()
+    base[80] += wrong * (film.base[80] - film.cap[80]) / np.hypot(*(film.base[80] - film.cap[80]))
+    assert (84 in calibration_of(replace(film, base=base)).lines) is named
 
 
 @pytest.mark.parametrize(("g", "wrong"), [(9.81, False), (9.7, False), (10.5, True), (0.153, True), (88.3, True)])

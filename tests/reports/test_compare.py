@@ -1,0 +1,152 @@
+"""Two curves compared: what of them, at which times, under which names, and with which status."""
+
+import re
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+
+from reports import cli
+from reports.comparison import claims, compare, table
+from reports.tables import Curve, read_curve
+
+TRACK = """t,theta,omega,omega_band,r_cm,measured,in_flight,t_over_T
+0,,,,,1,0,
+0.1,0.5,9,0.1,,1,0,
+0.2,1.5,10,0.1,0.2,1,1,0.1
+0.3,2.5,9,0.1,,1,1,0.3
+0.4,,,,,0,1,0.5
+0.5,4,7,0.1,0.15,1,1,0.7
+0.6,4.5,5,0.1,0.1,1,0,
+"""
+
+
+def curve(label, t, **quantities):
+    t = np.array(t, dtype=float)
+    return Curve(label, {name: (t, np.array(values, dtype=float)) for name, values in quantities.items()})
+
+
+def written(path, text):
+    path.write_text(text)
+    return str(path)
+
+
+def flipproof(capsys, *arguments):
+    status = cli.main(["compare", *map(str, arguments)])
+    captured = capsys.readouterr()
+    return status, captured.out, captured.err
+
+
+def test_of_a_track_the_flight_is_taken_and_empty_cells_are_left_out(tmp_path):
+    found = read_curve(tmp_path / written(tmp_path / "track.csv", TRACK))
+    t, omega = found.series["omega"]
+    # t / T is 0 at 0.15 s.
+    np.testing.assert_allclose(t, [0.05, 0.15, 0.35], atol=1e-12)
+    np.testing.assert_array_equal(omega, [10, 9, 7])
+    np.testing.assert_allclose(found.series["r_cm"][0], [0.05, 0.35], atol=1e-12)
+    assert "rows in flight, times from the release at 0.15 s" in found.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "quantity", "without"),
+    [("omega", "omega", "omega", {"theta", "r_CM"}), ("theta", "theta", "theta", {"omega", "r_CM"})],
+)
+def test_two_columns_are_enough(capsys, tmp_path, first, second, quantity, without):
+    a = written(tmp_path / "a.csv", f"t,{first}\n0,1\n1,2\n2,3\n")
+    b = written(tmp_path / "b.csv", f"{second},t\n1,0\n2.5,1\n3,2\n")
+    status, out, _ = flipproof(capsys, a, b)
+    assert status == 0
+    size = "50.000% of omega_0" if quantity == "omega" else "0.5 rad"
+    assert f"largest |difference in {quantity}|: {size} at t = 1 s" in out
+    for name in without:
+        assert f"{name} is not compared: {a} and {b} has no values of it" in out
+    assert "compared at 3 times that both have; nothing is interpolated" in out
+
+
+def test_curves_are_named_by_their_files(capsys, tmp_path):
+    (tmp_path / "x").mkdir()
+    a, b = (written(tmp_path / name, "t,omega\n0,1\n1,2\n") for name in ("flight.csv", "x/flight.csv"))
+    out = flipproof(capsys, a, b)[1]
+    assert re.search(rf"^ +{re.escape(a)} +{re.escape(b)}  difference$", out, re.MULTILINE)
+
+
+def test_what_is_interpolated_is_said():
+    found = compare(curve("a", [0, 1, 2, 3], omega=[1, 1, 1, 1]), curve("b", [0, 2, 4], omega=[1, 3, 5]))
+    assert found.apart[0].interpolated == 2
+    np.testing.assert_allclose(found.apart[0].second, [1, 2, 3, 4])
+    assert "compared at 4 times of a; b is interpolated linearly at 2 of them" in table(found)
+
+
+def test_times_that_were_printed_are_the_same_times():
+    t = np.linspace(0, 0.5, 1000)
+    printed = np.array([float(f"{time:.15g}") for time in t])
+    assert (t != printed).any()
+    found = compare(curve("a", printed, omega=np.cos(t)), curve("b", t, omega=np.cos(t)))
+    assert found.apart[0].interpolated == 0
+    assert found.apart[0].size.max() == 0.0
+
+
+def test_before_an_event_is_compared_with_before_and_after_with_after():
+    jumping = curve("a", [0, 1, 1, 2], theta=[0, 1, 5, 6])
+    same = compare(jumping, curve("b", [0, 0.5, 1, 1, 1, 2], theta=[0, 0.5, 1, 3, 5, 6]))
+    np.testing.assert_array_equal(same.apart[0].size, [0, 0, 0, 0])
+    assert same.apart[0].interpolated == 0
+    # A curve that holds every event twice is compared at its first and its last value of a time.
+    again = compare(curve("b", [0, 1, 1, 1, 2], theta=[0, 1, 3, 5, 6]), jumping)
+    np.testing.assert_array_equal(again.apart[0].size, [0, 0, 0, 0])
+    smooth = compare(jumping, curve("b", [0, 2], theta=[0, 2]))
+    np.testing.assert_array_equal(smooth.apart[0].size, [0, 0, 4, 4])
+    single = compare(curve("b", [0, 1, 2], theta=[0, 5, 6]), jumping)
+    np.testing.assert_array_equal(single.apart[0].size, [0, 0, 0])
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_tolerance_sets_the_status_and_the_junit_file(capsys, tmp_path, sign):
+    a = written(tmp_path / "a.csv", f"t,omega,theta\n0,{sign * 10},0\n1,{sign * 8},9\n")
+    b = written(tmp_path / "b.csv", f"t,omega,theta\n0,{sign * 10},0\n1,{sign * 7},99\n")
+    for tolerance, status, word, failures in (("0.11", 0, "PASS", "0"), ("0.09", 1, "FAIL", "1")):
+        found, out, _ = flipproof(capsys, a, b, "--tolerance", tolerance, "--junit", tmp_path / "x.xml")
+        assert found == status
+        assert f"{word}  largest difference in omega between {a} and {b}: 0.1 of omega_0, tolerance {tolerance}" in out
+        (suite,) = ElementTree.parse(tmp_path / "x.xml").getroot()
+        assert (suite.get("name"), suite.get("tests"), suite.get("failures")) == ("flipproof compare", "1", failures)
+    assert flipproof(capsys, a, b)[0] == 0
+    assert flipproof(capsys, a, a, "--tolerance", "0")[0] == 0
+
+
+def test_without_omega_the_tolerance_is_of_theta():
+    found = compare(curve("a", [0, 1], theta=[0, 1], r_cm=[1, 1]), curve("b", [0, 1], theta=[0, 1.5], r_cm=[1, 9]))
+    assert [(claim.id, claim.verdict) for claim in claims(found, 0.4)] == [
+        ("compare-theta", "fail"), ("compare-r-cm", "observed"),
+    ]  # fmt: skip
+    assert claims(found, 0.6)[0].verdict == "pass"
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "words"),
+    [
+        ("t,omega\n0,1\n1,1\n", "t,theta\n0,1\n1,1\n", "nothing can be compared: "),
+        ("t,omega\n0,1\n1,1\n", "t,omega\n2,1\n3,1\n", "have no common time"),
+        ("t,omega\n0,1\n1,1\n", "t,omega\n0.5,1\n3,1\n", "has 1 times within those of"),
+        ("t,omega\n0,0\n1,1\n", "t,omega\n0,1\n3,1\n", "omega is 0 at the first time"),
+    ],
+)
+def test_what_cannot_be_compared_is_said_in_one_line(capsys, tmp_path, first, second, words):
+    a, b = written(tmp_path / "a.csv", first), written(tmp_path / "b.csv", second)
+    status, out, err = flipproof(capsys, a, b)
+    assert (status, out) == (2, "")
+    assert words in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--junit", "x.xml"], "--junit x.xml needs --tolerance"),
+        (["--junit", "nowhere/x.xml", "--tolerance", "1"], "the folder nowhere does not exist"),
+    ],
+)
+def test_a_junit_file_that_could_say_nothing_is_refused(capsys, arguments, words):
+    status, _, err = flipproof(capsys, "eq8", "eq8", *arguments)
+    assert status == 2
+    assert words in err
