@@ -162,7 +162,7 @@ def command_report(options: argparse.Namespace) -> int:
     from reports.output import check_replaceable, replaced_folder
     from reports.pdf import print_page, require_browser
 
-    check_replaceable(options.out)
+    check_replaceable(options.out, "report")
     if options.pdf:
         require_browser()
 
@@ -176,7 +176,7 @@ def command_report(options: argparse.Namespace) -> int:
     size = QUICK if options.quick else FULL
     size = with_slices(size, options.slices or min(size.slices, scenario.n_slices))
     command = shlex.join(["flipproof", *sys.argv[1:]])
-    with replaced_folder(options.out) as folder:
+    with replaced_folder(options.out, "report") as folder:
         with tqdm(desc="runs", unit="run", disable=None, leave=False) as bar:
 
             def progress(made: int, planned: int, tag: str) -> None:

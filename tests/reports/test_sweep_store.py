@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import sqlite3
 import tomllib
 from contextlib import closing
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from reports.ownership import MARKER, marker_text
 from reports.sweep import export as exporting
 from reports.sweep.design import design_of
 from reports.sweep.errors import SweepError
@@ -166,7 +168,7 @@ def test_another_design_or_other_code_is_refused_in_one_line(tmp_path):
 
 def test_a_folder_of_something_else_is_refused(tmp_path):
     (tmp_path / "thesis.tex").write_text("mine")
-    with pytest.raises(SweepError, match=r"holds thesis\.tex and no sweep"):
+    with pytest.raises(SweepError, match=r"holds thesis\.tex and not flipproof's own marker"):
         Store(tmp_path, design(), CODE)
     with pytest.raises(SweepError, match="is a file"):
         Store(tmp_path / "thesis.tex", design(), CODE)
@@ -175,6 +177,7 @@ def test_a_folder_of_something_else_is_refused(tmp_path):
     for content, words in ((b"not a database, but long enough" * 99, "not a database"), (None, "but no sweep")):
         folder = tmp_path / words
         folder.mkdir()
+        (folder / MARKER).write_text(marker_text("sweep"))
         if content:
             (folder / "sweep.sqlite").write_bytes(content)
         else:
@@ -192,7 +195,10 @@ def test_a_newer_schema_is_refused(tmp_path):
 
 
 def test_one_program_writes(tmp_path):
-    with Store(tmp_path, design(), CODE), pytest.raises(SweepError, match="another sweep is writing there"):
+    with (
+        Store(tmp_path, design(), CODE),
+        pytest.raises(SweepError, match=rf"is being written by another flipproof \(process {os.getpid()}\)"),
+    ):
         Store(tmp_path, design(), CODE)
     Store(tmp_path, design(), CODE).close()
 
@@ -236,8 +242,8 @@ def test_no_row_without_its_flight(tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     made = design(TEXT.replace('design = "grid"', 'design = "grid"\ntrajectories = true'))
-    monkeypatch.setattr("reports.sweep.files.os.replace", full)
     with Store(tmp_path, made, CODE) as store:
+        monkeypatch.setattr("reports.sweep.files.os.replace", full)
         with pytest.raises(SweepError, match="No space left on device"):
             store.add([returned(make_point(made.point(0), keep=True))])
         assert sum(store.done()) == 0
@@ -248,11 +254,14 @@ def test_a_killed_programs_half_files_are_swept_away(tmp_path):
     (tmp_path / "trajectories" / "ab").mkdir(parents=True)
     with Store(tmp_path / "new", design(), CODE):
         pass
-    half = tmp_path / "new" / "trajectories" / "ab.npz.77.part"
+    half = tmp_path / "new" / "trajectories" / "ab.npz.77.flipproof-part"
+    mine = half.with_name("film.mp4.part")
     half.parent.mkdir()
     half.write_bytes(b"half")
+    mine.write_bytes(b"somebody's download")
     with Store(tmp_path / "new", design(), CODE):
         assert not half.exists()
+        assert mine.read_bytes() == b"somebody's download"
 
 
 def test_a_file_is_whole_or_the_old_one(tmp_path):
