@@ -116,7 +116,7 @@ def test_track_writes_a_folder(tmp_path, capsys):
         assert words in printed
     names = {path.name for path in out.iterdir()}
     figures = {f"{name}.{kind}" for name in ("tracks", "spin", "normalised", "axis") for kind in ("svg", "png")}
-    assert names == figures | {"track.csv", "summary.json", "index.html"}
+    assert names == figures | {".flipproof", "track.csv", "summary.json", "index.html"}
     numbers = json.loads((out / "summary.json").read_text(encoding="utf-8"))
     assert numbers["omega0"]["value"] == pytest.approx(20, abs=0.5)
     assert numbers["frames"]["interpolated"] == 4
