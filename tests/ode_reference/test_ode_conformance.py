@@ -87,12 +87,12 @@ def test_a_slice_as_long_as_the_bottle_cannot_move(model):
 @pytest.mark.parametrize(
     "scenario",
     [
-        Scenario(n_slices=5, omega0=1e160),
-        Scenario(n_slices=5, drag=1e300),
-        Scenario(n_slices=5, gravity=1e300),
-        Scenario(n_slices=5, bottle=Bottle(length=1e200)),
-        Scenario(n_slices=5, omega0=1e-300),
-        Scenario(n_slices=5, duration=1e-300),
+        Scenario(n_slices=5, omega0=1e15),
+        Scenario(n_slices=5, drag=1e15),
+        Scenario(n_slices=5, gravity=1e15),
+        Scenario(n_slices=5, bottle=Bottle(length=1e15)),
+        Scenario(n_slices=5, omega0=1e-15),
+        Scenario(n_slices=5, duration=1e-15),
     ],
     ids=["omega0", "drag", "gravity", "length", "slow", "short"],
 )
