@@ -94,7 +94,7 @@ def build(scenario: Scenario, dt: float) -> World:
     Raises
     ------
     ValueError
-        For velocities that MuJoCo does not take; from its compiler, for masses below its least value of 1e-15 kg.
+        For velocities beyond the range of MuJoCo, and for masses and moments of inertia below it.
     """
     fastest = max(abs(scenario.omega0), *(abs(speed) for speed in scenario.launch_velocity), abs(scenario.theta0))
     if not fastest < mujoco.mjMAXVAL:
@@ -102,6 +102,14 @@ def build(scenario: Scenario, dt: float) -> World:
             f"omega0, theta0 or launch_velocity = {fastest:g} is outside (-{mujoco.mjMAXVAL:g}, {mujoco.mjMAXVAL:g}), "
             "the range of MuJoCo"
         )
+    bottle, least = scenario.bottle, mujoco.mjMINVAL
+    for words, value, unit in (
+        ("bottle.mass", bottle.mass, "kg"),
+        ("bottle.mass * bottle.radius^2", bottle.mass * bottle.radius**2, "kg m^2"),
+        ("water_mass / n_slices", scenario.slice_mass, "kg"),
+    ):
+        if not value > least:
+            raise ValueError(f"{words} = {value:g} {unit} is outside ({least:g}, inf), the range of MuJoCo")
     moving = not scenario.frozen and scenario.r_max - scenario.r_min > IMMOBILE * scenario.bottle.length
     spec = _options(scenario, dt)
     _bodies(spec, scenario, moving)
