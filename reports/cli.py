@@ -206,8 +206,15 @@ def command_report(options: argparse.Namespace) -> int:
     from reports.build import build, write
     from reports.evidence import FULL, QUICK, gather, with_slices
     from reports.provenance import provenance
+    from reports.stages import Stages
 
     began = time.perf_counter()
+
+    def say(stage: str) -> None:
+        # A terminal shows a bar; a log gets a line now and then, so that its reader sees where the time goes.
+        if not sys.stderr.isatty():
+            print(f"flipproof: {time.perf_counter() - began:.0f} s: {stage}", file=sys.stderr, flush=True)
+
     size = QUICK if options.quick else FULL
     size = with_slices(size, options.slices or min(size.slices, scenario.n_slices))
     command = shlex.join(["flipproof", *sys.argv[1:]])
@@ -219,7 +226,7 @@ def command_report(options: argparse.Namespace) -> int:
                 bar.set_postfix_str(tag, refresh=False)
                 bar.update(made - bar.n)
 
-            evidence = gather(scenario, size, progress, options.jobs)
+            evidence = gather(scenario, size, progress, options.jobs, Stages(say))
         report = build(evidence, provenance(command), options.jobs)
         write(report, folder)
         if options.pdf:

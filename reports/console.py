@@ -13,7 +13,7 @@ ASCII: Final = {
     "α": "alpha", "β": "beta", "γ": "gamma", "δ": "delta", "ε": "eps", "θ": "theta", "λ": "lambda", "μ": "mu",
     "µ": "u", "π": "pi", "ρ": "rho", "σ": "sigma", "τ": "tau", "φ": "phi", "χ": "chi", "ω": "omega", "Ω": "Omega",
     "²": "^2", "³": "^3", "°": " deg", "‘": "'", "’": "'", "“": '"', "”": '"', "…": "...", "′": "'", "«": '"', "»": '"',
-    "✓": "ok", "✗": "x",
+    "Σ": "sum", "⁻": "^-", "↓": "v", "↑": "^", "✓": "ok", "✗": "x",
 }  # fmt: skip
 """How a character is written where it cannot be shown."""
 
