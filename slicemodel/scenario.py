@@ -148,13 +148,24 @@ def read_text(path: Path, most: int) -> str:
     UnicodeDecodeError
         If it is not UTF-8.
     """
-    if path.exists() and not path.is_file() and not path.is_dir() and not _is_descriptor(path):
-        raise UnsuitableFileError("is a device, a pipe or a socket, not a file")
+    refuse_devices(path)
     with path.open("rb") as file:
         content = file.read(most + 1)
     if len(content) > most:
-        raise UnsuitableFileError(f"is larger than {most / 2**10:g} KiB, the most that is read of such a file")
+        largest = f"{most / 2**10:g} KiB" if most < 2**20 else f"{most / 2**20:g} MiB"
+        raise UnsuitableFileError(f"is larger than {largest}, the most that is read of such a file")
     return content.decode("utf-8")
+
+
+def refuse_devices(path: Path) -> None:
+    """Refuse a device, a pipe or a socket, which may have no end or never begin, unless this program has it open.
+
+    Raises
+    ------
+    UnsuitableFileError
+    """
+    if path.exists() and not path.is_file() and not path.is_dir() and not _is_descriptor(path):
+        raise UnsuitableFileError("is a device, a pipe or a socket, not a file")
 
 
 def _is_descriptor(path: Path) -> bool:

@@ -10,7 +10,11 @@ import numpy as np
 
 from reports.fit.problem import Measurement, Quantity
 from reports.tables import number_of
+from slicemodel.scenario import UnsuitableFileError, read_text
 from slicemodel.trajectory import FloatArray
+
+MOST_BYTES: Final = 2**26
+"""Bytes of a measured flight at the most."""
 
 QUANTITIES: Final[tuple[Quantity, ...]] = ("theta", "omega")
 """What is fitted, the first that a table has: the noise of measured angles is independent from frame to frame."""
@@ -153,7 +157,9 @@ def cut(
 def _cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
     """Return the names of the columns, and number and cells of every row that is not blank."""
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        lines = read_text(path, MOST_BYTES).removeprefix("\ufeff").splitlines()
+    except UnsuitableFileError as error:
+        raise ValueError(f"{path}: {error}") from None
     except (OSError, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
     # Lines that begin with # tell people what the table is.

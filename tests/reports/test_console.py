@@ -113,10 +113,14 @@ def test_an_endless_scenario_ends_at_once(tmp_path, place):
     os.mkfifo(tmp_path / "pipe")
     with (tmp_path / "large.toml").open("wb") as file:
         file.truncate(40 * 2**20)
-    told = flipproof(tmp_path, "simulate", place)
-    assert told.returncode == 2
-    assert told.stderr.count("\n") == 1
-    assert place in told.stderr
+    track = ("track", place, "--cap", "cap", "--base", "base", "--length-unit", "m")
+    others = (("sweep", place, "--out", "sweep"), ("fit", place), track) if place != "large.toml" else ()
+    for arguments in (("simulate", place), *others):
+        told = flipproof(tmp_path, *arguments)
+        assert told.returncode == 2
+        assert told.stderr.count("\n") == 1
+        assert place in told.stderr
+    assert not (tmp_path / "sweep").exists()
 
 
 @pytest.mark.parametrize("module", ["reports.cli", "reports.start"])
