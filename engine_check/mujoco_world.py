@@ -35,6 +35,9 @@ TUBE: Final = 1
 TUBE_DOFS: Final = 3
 """Coordinates of the tube: x, y, theta. Those of the slices follow."""
 
+FLATTEST: Final = 1e-6
+"""Length over radius below which round-off breaks the inequality A + B >= C of the tube's moments of inertia."""
+
 IMMOBILE: Final = 1e-12
 """Play between the ends below which a slice cannot move [L]: one slice as long as the tube."""
 
@@ -103,13 +106,14 @@ def build(scenario: Scenario, dt: float) -> World:
             "the range of MuJoCo"
         )
     bottle, least = scenario.bottle, mujoco.mjMINVAL
-    for words, value, unit in (
-        ("bottle.mass", bottle.mass, "kg"),
-        ("bottle.mass * bottle.radius^2", bottle.mass * bottle.radius**2, "kg m^2"),
-        ("water_mass / n_slices", scenario.slice_mass, "kg"),
+    for words, value, above in (
+        ("bottle.mass [kg]", bottle.mass, least),
+        ("bottle.mass * bottle.radius^2 [kg m^2]", bottle.mass * bottle.radius**2, least),
+        ("bottle.length / bottle.radius", bottle.length / bottle.radius, FLATTEST),
+        ("water_mass / n_slices [kg]", scenario.slice_mass, least),
     ):
-        if not value > least:
-            raise ValueError(f"{words} = {value:g} {unit} is outside ({least:g}, inf), the range of MuJoCo")
+        if not value > above:
+            raise ValueError(f"{words} = {value:g} is outside ({above:g}, inf), the range of MuJoCo")
     moving = not scenario.frozen and scenario.r_max - scenario.r_min > IMMOBILE * scenario.bottle.length
     spec = _options(scenario, dt)
     _bodies(spec, scenario, moving)

@@ -194,9 +194,10 @@ def test_what_it_does_not_have_is_refused(arguments, words):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"bottle": Bottle(mass=1e-15)}, r"bottle\.mass = 1e-15 kg is outside \(1e-15, inf\), the range of MuJoCo"),
-        ({"bottle": Bottle(radius=1e-9)}, r"bottle\.mass \* bottle\.radius\^2 = 2\.8e-20 kg m\^2 is outside"),
-        ({"water_mass": 1e-15}, r"water_mass / n_slices = .* kg is outside \(1e-15, inf\)"),
+        ({"bottle": Bottle(mass=1e-15)}, r"bottle\.mass \[kg\] = 1e-15 is outside \(1e-15, inf\), the range of MuJoCo"),
+        ({"bottle": Bottle(radius=1e-9)}, r"bottle\.mass \* bottle\.radius\^2 \[kg m\^2\] = 2\.8e-20 is outside"),
+        ({"water_mass": 1e-15}, r"water_mass / n_slices \[kg\] = .* is outside \(1e-15, inf\)"),
+        ({"bottle": Bottle(radius=1e9)}, r"bottle\.length / bottle\.radius = 2\.8e-10 is outside \(1e-06, inf\)"),
     ],
 )
 def test_what_is_too_light_for_the_engine_is_refused_by_name(change, words):
