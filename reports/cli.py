@@ -88,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(INTERRUPTED_WORDS, file=sys.stderr)
         return INTERRUPTED
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, MemoryError) as error:
         return _complain(str(error) or type(error).__name__, BAD_INPUT)
     except Exception as error:
         # Nobody is helped by a traceback at the command line; whoever wants to mend the cause asks for it.
