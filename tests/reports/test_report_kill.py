@@ -85,4 +85,4 @@ def test_ten_kills_of_a_report(tmp_path):
     target = tmp_path / "place" / "latest"
     command = [sys.executable, "-m", "reports.cli", "report", "--quick", "--slices", "4", "--out", str(target)]
     chance = random.Random(int(os.environ.get("FLIPPROOF_SEED", "1")))
-    assert kill_and_finish(command, target, [chance.uniform(0.2, 15.0) for _ in range(10)]) >= 5
+    assert kill_and_finish(command, target, [chance.uniform(0.2, 8.0) for _ in range(10)]) >= 5
