@@ -12,7 +12,8 @@ generalised coordinates.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -94,6 +95,23 @@ def run(scenario: Scenario, order: Order) -> Trajectory:
         )
     if scenario.frozen and order.ice != "rigid":
         raise ValueError(f"engine = 'mujoco' has no ice = {order.ice!r} (it has: rigid)")
+    # A velocity whose square overflows is beyond MuJoCo's largest and ends the run with a status.
+    with _no_log(), np.errstate(over="ignore"):
+        return _fly(scenario, order, settings)
+
+
+@contextmanager
+def _no_log() -> Iterator[None]:
+    """Keep MuJoCo from writing its warnings to MUJOCO_LOG.TXT in the working directory: a run says so by its status."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def _fly(scenario: Scenario, order: Order, settings: MujocoKnobs) -> Trajectory:
     world = build(scenario, order.dt)
     setup = verify(world, scenario, order.dt)
     flight = _Flight(world, scenario, Contacts(world, scenario.restitution, settings.rest_flight * order.dt), setup)
@@ -242,7 +260,7 @@ class _Flight:
     def _step(self, h: float, count: int) -> None:
         self._option.timestep = h
         mujoco.mj_step(self._world.model, self._world.data, count)
-        # Beyond mjMAXVAL the next step would write a warning to a file in the working directory.
+        # Beyond mjMAXVAL the next step would set everything back to the release.
         if not self._qvel @ self._qvel < mujoco.mjMAXVAL**2:
             raise ArithmeticError(f"a velocity exceeds MuJoCo's largest, {mujoco.mjMAXVAL:g}; reduce dt")
 

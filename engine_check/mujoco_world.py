@@ -35,6 +35,9 @@ TUBE: Final = 1
 TUBE_DOFS: Final = 3
 """Coordinates of the tube: x, y, theta. Those of the slices follow."""
 
+FLATTEST: Final = 1e-6
+"""Length over radius below which round-off breaks the inequality A + B >= C of the tube's moments of inertia."""
+
 IMMOBILE: Final = 1e-12
 """Play between the ends below which a slice cannot move [L]: one slice as long as the tube."""
 
@@ -94,7 +97,7 @@ def build(scenario: Scenario, dt: float) -> World:
     Raises
     ------
     ValueError
-        For velocities that MuJoCo does not take; from its compiler, for masses below its least value of 1e-15 kg.
+        For velocities beyond the range of MuJoCo, and for masses and moments of inertia below it.
     """
     fastest = max(abs(scenario.omega0), *(abs(speed) for speed in scenario.launch_velocity), abs(scenario.theta0))
     if not fastest < mujoco.mjMAXVAL:
@@ -102,6 +105,15 @@ def build(scenario: Scenario, dt: float) -> World:
             f"omega0, theta0 or launch_velocity = {fastest:g} is outside (-{mujoco.mjMAXVAL:g}, {mujoco.mjMAXVAL:g}), "
             "the range of MuJoCo"
         )
+    bottle, least = scenario.bottle, mujoco.mjMINVAL
+    for words, value, above in (
+        ("bottle.mass [kg]", bottle.mass, least),
+        ("bottle.mass * bottle.radius^2 [kg m^2]", bottle.mass * bottle.radius**2, least),
+        ("bottle.length / bottle.radius", bottle.length / bottle.radius, FLATTEST),
+        ("water_mass / n_slices [kg]", scenario.slice_mass, least),
+    ):
+        if not value > above:
+            raise ValueError(f"{words} = {value:g} is outside ({above:g}, inf), the range of MuJoCo")
     moving = not scenario.frozen and scenario.r_max - scenario.r_min > IMMOBILE * scenario.bottle.length
     spec = _options(scenario, dt)
     _bodies(spec, scenario, moving)

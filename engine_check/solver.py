@@ -77,6 +77,9 @@ HITS: Final = ("grid", "located")
 """When a slice's hit on an end is answered: at the next step of the grid, as engines do, or at its own time."""
 
 MOST_ITERATIONS: Final = 1_000_000
+MOST_DRIFT: Final = 5e3
+"""Largest launch velocity of an engine's throw [|omega0| L]."""
+
 MOST_SLICES: Final = 5_000
 """Slices at the most; an engine's sweep costs their number times its iterations, 2e6 constraints a step at 5 000."""
 
@@ -190,6 +193,12 @@ def solve(
             raise ValueError(f"engine = {engine!r} has no {what} = {name!r} (it has: {', '.join(offered)})")
     if scenario.n_slices > MOST_SLICES:
         raise ValueError(f"n_slices = {scenario.n_slices} is outside [1, {MOST_SLICES}] for an engine; cut it coarser")
+    fastest, spin = math.hypot(*scenario.launch_velocity), abs(scenario.omega0) * scenario.bottle.length
+    if fastest > MOST_DRIFT * spin:
+        raise ValueError(
+            f"launch_velocity = {fastest:g} m/s is outside [0, {MOST_DRIFT * spin:g}] m/s, {MOST_DRIFT:g} |omega0| L:"
+            " an engine works in the lab frame, where the spin would be lost in round-off; take a smaller one"
+        )
     if dt is None and iterations is None:
         certified = import_module("engine_check.certificate").certified
         settings = {"times": times, "tolerance": tolerance, "ice": ice, "frame": frame, "slices": slices, "hits": hits}

@@ -8,8 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
-INTERRUPTED: Final = 130
-"""Exit status of an interrupted command."""
+from reports.console import readable
 
 SCENARIO_HELP: Final = "scenario file (TOML with tables [scenario] and [bottle]); default: the paper's own throw"
 
@@ -19,7 +18,7 @@ class OneLineParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong and end with status 2."""
-        self.exit(2, f"flipproof: error: {' '.join(message.split())}\n")
+        self.exit(2, f"flipproof: error: {readable(message)}\n")
 
 
 def add_command(

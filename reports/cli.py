@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import sys
+
+if __name__ == "__main__":
+    # Before anything else is imported: an interrupt meets this program while it loads, too.
+    from reports.start import guard
+
+    guard()
+
+import _thread
 import argparse
 import os
 import shlex
 import signal
-import sys
-import threading
 import time
+import traceback
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, Final, NoReturn
 
-from reports.arguments import INTERRUPTED, SCENARIO_HELP, OneLineParser, add_command, count, read_scenario
+from reports.arguments import SCENARIO_HELP, OneLineParser, add_command, count, read_scenario
 from reports.cli_animate import add_animate
 from reports.cli_check import add_checks
 from reports.cli_compare import add_compare
@@ -21,6 +29,12 @@ from reports.cli_fit import add_fit
 from reports.cli_paper import add_paper
 from reports.cli_sweeps import add_sweeps
 from reports.cli_tracker import add_tracker
+from reports.console import readable, speak_plainly
+from reports.start import INTERRUPTED, INTERRUPTED_WORDS, SIGNALS
+
+BAD_INPUT: Final = 2
+INTERNAL: Final = 3
+"""Exit statuses of a mistake in what was given, and of one in flipproof."""
 
 DEFAULT_OUT = Path("reports/latest")
 
@@ -54,16 +68,18 @@ exit status:
   1  a regression claim failed (ice constancy, published vectors, convergence); for diff: something moved;
      for compare: the curves are farther apart than --tolerance
   2  bad input; one line on standard error says what and where
+  3  an error in flipproof itself; FLIPPROOF_TRACEBACK=1 shows where
   130  interrupted; an older report is as it was, a sweep goes on where it stopped
 """
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; return the exit status (0, 1 or 2)."""
-    options = parser().parse_args(arguments)
-    for number in (signal.SIGINT, signal.SIGTERM):
+    """Run the command line; return the exit status (0, 1, 2, 3 or 130)."""
+    speak_plainly()
+    for number in SIGNALS:
         signal.signal(number, _interrupt)
     try:
+        options = parser().parse_args(arguments)
         status = options.action(options)
         sys.stdout.flush()
         return int(status)
@@ -72,22 +88,32 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.close()
         return 0
     except KeyboardInterrupt:
-        print("flipproof: interrupted; nothing was overwritten", file=sys.stderr)
+        print(INTERRUPTED_WORDS, file=sys.stderr)
         return INTERRUPTED
-    except (ValueError, OSError) as error:
-        return _complain(str(error) or type(error).__name__)
+    except (ValueError, OSError, MemoryError) as error:
+        return _complain(str(error) or type(error).__name__, BAD_INPUT)
     except Exception as error:
         # Nobody is helped by a traceback at the command line; whoever wants to mend the cause asks for it.
+        if isinstance(error.__cause__, ModuleNotFoundError):
+            return _complain(str(error), BAD_INPUT)
         if os.environ.get("FLIPPROOF_TRACEBACK"):
-            raise
-        return _complain(f"{type(error).__name__}: {error} (set FLIPPROOF_TRACEBACK=1 to see where)")
+            traceback.print_exc()
+        return _complain(
+            f"{type(error).__name__}: {readable(str(error))} (an error in flipproof itself; "
+            "set FLIPPROOF_TRACEBACK=1 to see where)",
+            INTERNAL,
+        )
 
 
 def entry() -> NoReturn:
     """Run the command line as a program."""
+    sys.unraisablehook = _unraisable
     status = main()
-    if status == INTERRUPTED and threading.active_count() > 1:
-        # A process pool that could not end in time would hold an orderly exit up for ever. Nothing is left to clean up.
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)  # the command is done, whatever comes while Python ends
+    if status == INTERRUPTED:
+        # An orderly exit would wait for threads, and Python kills itself where an import was interrupted in the middle
+        # of an ``exec``. Nothing is left to clean up.
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(status)
@@ -95,14 +121,23 @@ def entry() -> NoReturn:
 
 
 def _interrupt(*_: object) -> NoReturn:
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)  # a second one must not break the cleaning up
     raise KeyboardInterrupt
 
 
-def _complain(words: str) -> int:
-    print(f"flipproof: error: {' '.join(words.split())}", file=sys.stderr)
-    return 2
+def _unraisable(what: sys.UnraisableHookArgs) -> None:
+    """Interrupt again if the interrupt came where Python drops exceptions, such as a finalizer."""
+    if isinstance(what.exc_value, KeyboardInterrupt):
+        signal.signal(signal.SIGINT, _interrupt)
+        _thread.interrupt_main()
+    else:
+        sys.__unraisablehook__(what)
+
+
+def _complain(words: str, status: int) -> int:
+    print(f"flipproof: error: {readable(words)}", file=sys.stderr)
+    return status
 
 
 def parser() -> argparse.ArgumentParser:
@@ -159,7 +194,7 @@ def command_report(options: argparse.Namespace) -> int:
     from reports.output import check_replaceable, replaced_folder
     from reports.pdf import print_page, require_browser
 
-    check_replaceable(options.out)
+    check_replaceable(options.out, "report")
     if options.pdf:
         require_browser()
 
@@ -168,12 +203,19 @@ def command_report(options: argparse.Namespace) -> int:
     from reports.build import build, write
     from reports.evidence import FULL, QUICK, gather, with_slices
     from reports.provenance import provenance
+    from reports.stages import Stages
 
     began = time.perf_counter()
+
+    def say(stage: str) -> None:
+        # A terminal shows a bar; a log gets a line now and then, so that its reader sees where the time goes.
+        if not sys.stderr.isatty():
+            print(f"flipproof: {time.perf_counter() - began:.0f} s: {stage}", file=sys.stderr, flush=True)
+
     size = QUICK if options.quick else FULL
     size = with_slices(size, options.slices or min(size.slices, scenario.n_slices))
     command = shlex.join(["flipproof", *sys.argv[1:]])
-    with replaced_folder(options.out) as folder:
+    with replaced_folder(options.out, "report") as folder:
         with tqdm(desc="runs", unit="run", disable=None, leave=False) as bar:
 
             def progress(made: int, planned: int, tag: str) -> None:
@@ -181,7 +223,7 @@ def command_report(options: argparse.Namespace) -> int:
                 bar.set_postfix_str(tag, refresh=False)
                 bar.update(made - bar.n)
 
-            evidence = gather(scenario, size, progress, options.jobs)
+            evidence = gather(scenario, size, progress, options.jobs, Stages(say))
         report = build(evidence, provenance(command), options.jobs)
         write(report, folder)
         if options.pdf:

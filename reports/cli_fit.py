@@ -59,7 +59,7 @@ def command_fit(options: argparse.Namespace) -> int:
     from reports.output import check_replaceable, replaced_folder
 
     if options.out is not None:
-        check_replaceable(options.out)
+        check_replaceable(options.out, "fit")
     if (options.cap is None) != (options.base is None):
         raise ValueError("--cap and --base name the two tracks of a Tracker export; give both or neither")
     if options.length_unit and options.cap is None:
@@ -82,7 +82,7 @@ def command_fit(options: argparse.Namespace) -> int:
         from reports.fit.folder import write
         from reports.provenance import provenance
 
-        with replaced_folder(options.out) as folder:
+        with replaced_folder(options.out, "fit") as folder:
             write(contenders, text, folder, provenance(shlex.join(["flipproof", *sys.argv[1:]])))
     print(text)
     if options.out is not None:

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from reports.arguments import INTERRUPTED, SCENARIO_HELP, add_command, count, read_scenario
+from reports.arguments import SCENARIO_HELP, add_command, count, read_scenario
+from reports.start import INTERRUPTED
 
 SLICES: Final = 50
 SIDE: Final = (2, 1000)

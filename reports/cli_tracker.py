@@ -74,7 +74,7 @@ def command_track(options: argparse.Namespace) -> int:
     from reports.output import check_replaceable, replaced_folder
 
     if options.out is not None:
-        check_replaceable(options.out)
+        check_replaceable(options.out, "track")
     from reports.tracker.bench import Request, measure
 
     measured = measure(
@@ -92,7 +92,7 @@ def command_track(options: argparse.Namespace) -> int:
     if options.out is not None:
         from reports.provenance import provenance
 
-        with replaced_folder(options.out) as folder:
+        with replaced_folder(options.out, "track") as folder:
             write(measured, folder, provenance(shlex.join(["flipproof", *sys.argv[1:]])))
     print("\n".join(lines(measured)))
     if options.out is not None:

@@ -117,7 +117,9 @@ def read_summary(path: Path) -> dict[str, Any]:
     """
     file = path / "summary.json" if path.is_dir() else path
     try:
-        summary = json.loads(file.read_text(encoding="utf-8-sig"))
+        summary = json.loads(read_text(file, MOST_BYTES).removeprefix("\ufeff"))
+    except UnsuitableFileError as error:
+        raise ValueError(f"{file}: {error}") from None
     except OSError as error:
         raise ValueError(f"{file}: cannot be read ({error.strerror or error}); name a report's folder") from None
     except (ValueError, RecursionError) as error:

@@ -200,7 +200,9 @@ def _tighter(scenario: Scenario, model: str) -> dict[str, Any]:
     return {"rtol": 1e-11, "atol": 1e-14, "rest_speed": rest_speed, "max_step": 0.01 / abs(scenario.omega0)}
 
 
-def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None = None) -> Evidence:
+def gather(
+    scenario: Scenario, size: Size, progress: Progress, jobs: int | None = None, stages: Stages | None = None
+) -> Evidence:
     """Make every run of a report and study them.
 
     Parameters
@@ -211,6 +213,8 @@ def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None 
     progress : callable (made, planned, tag)
     jobs : int or None
         Worker processes for the reference and the engine; None: one per core.
+    stages : Stages or None
+        The stopwatch of the report, if somebody watches it.
     """
     throw = scenario.with_slices(size.slices)
     runs = plan(throw, size)
@@ -222,7 +226,7 @@ def gather(scenario: Scenario, size: Size, progress: Progress, jobs: int | None 
         + plan_instruments(REFERENCE, throw, size.bench)
         + [run for plans in (steps, checks) for levels in plans.values() for level in levels for run in level]
     )
-    stages = Stages()
+    stages = stages or Stages()
     with workers(jobs) as pool:
         audit = pool.submit(study_errata, throw)
         with stages.lap("runs"):

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
-import threading
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
+from concurrent.futures import Executor, as_completed
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Any
 
+from reports.processes import WorkerDiedError, processes
 from reports.solvers import Made, Run, find, make
 
 Progress = Callable[[int, int, str], None]
@@ -23,8 +20,8 @@ SMALL = 8.0
 GROUP = 8
 """Runs of a group."""
 
-PATIENCE = 2.0
-"""Seconds that an interrupted report waits for its workers to end."""
+TRIES = 2
+"""Times that a call is made when its worker dies: what killed one worker may have had nothing to do with the call."""
 
 
 def make_all(pool: Executor, runs: Iterable[Run], progress: Progress) -> dict[str, Made]:
@@ -46,11 +43,24 @@ def make_all(pool: Executor, runs: Iterable[Run], progress: Progress) -> dict[st
     jobs = [[run] for run in slow if run.scenario.n_slices * run.scenario.duration >= SMALL]
     jobs += [small[k : k + GROUP] for k in range(0, len(small), GROUP)]
     made: dict[str, Made] = {}
-    for future in as_completed([pool.submit(make_each, job) for job in ([quick] if quick else []) + jobs]):
-        for result in future.result():
-            for run in others[result.run.tag]:
-                made[run.tag] = replace(result, run=run)
-            progress(len(made), len(runs), result.run.tag)
+    jobs = ([quick] if quick else []) + jobs
+    while jobs:
+        pending = {pool.submit(make_each, job): job for job in jobs}
+        jobs = []
+        for future in as_completed(pending):
+            job = pending[future]
+            try:
+                results = future.result()
+            except WorkerDiedError as error:
+                if len(job) > 1:
+                    # Each alone, so that only the run that kills its worker is lost.
+                    jobs += [[run] for run in job]
+                    continue
+                results = [Made(job[0], None, 0.0, f"the worker process died {TRIES} times with this run ({error})")]
+            for result in results:
+                for run in others[result.run.tag]:
+                    made[run.tag] = replace(result, run=run)
+                progress(len(made), len(runs), result.run.tag)
     # In the order asked, whichever worker was faster: what is read off this table must not depend on load.
     return {run.tag: made[run.tag] for run in runs}
 
@@ -60,29 +70,6 @@ def make_each(runs: Iterable[Run]) -> list[Made]:
     return [make(run) for run in runs]
 
 
-@contextmanager
-def workers(jobs: int | None) -> Iterator[Executor]:
-    """Give a pool of worker processes; when interrupted, end them at once instead of waiting for their runs."""
-    # One linear-algebra thread per worker: two workers with two each wait for one another.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    pool = ProcessPoolExecutor(
-        max_workers=jobs or cores,
-        mp_context=multiprocessing.get_context("spawn"),
-        initializer=signal.signal,
-        initargs=(signal.SIGINT, signal.SIG_IGN),
-    )
-    try:
-        yield pool
-    except KeyboardInterrupt:
-        for child in multiprocessing.active_children():
-            child.kill()
-        # A worker killed while it sends a result leaves the pool waiting for the rest of it, so the wait is bounded.
-        ending = threading.Thread(target=pool.shutdown, kwargs={"cancel_futures": True}, daemon=True)
-        ending.start()
-        ending.join(PATIENCE)
-        raise
-    except BaseException:
-        pool.shutdown(cancel_futures=True)
-        raise
-    pool.shutdown()
+def workers(jobs: int | None) -> AbstractContextManager[Executor]:
+    """Give a pool of worker processes that makes a call once more when its worker dies; one per core unless told."""
+    return processes(jobs, tries=TRIES)

@@ -48,7 +48,7 @@ def take(report: Path, place: Path = PLACE) -> None:
         if not picture.is_file():
             raise ValueError(f"{report}: has no figures/{picture.name}")
     kept = {"$schema": f"../schema/{SCHEMA_NAME}", **{name: summary[name] for name in KEPT}}
-    with replaced_folder(place) as folder:
+    with replaced_folder(place, "snapshot") as folder:
         (folder / "summary.json").write_text(summary_text(kept), encoding="utf-8")
         for picture in pictures:
             shutil.copyfile(picture, folder / picture.name)

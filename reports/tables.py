@@ -11,10 +11,13 @@ from typing import Final
 import numpy as np
 
 from slicemodel import Trajectory
-from slicemodel.scenario import shortened
+from slicemodel.scenario import UnsuitableFileError, read_text, shortened
 from slicemodel.trajectory import FloatArray
 
 Rows = list[tuple[int, list[str]]]
+
+MOST_BYTES: Final = 2**26
+"""Bytes of a table at the most."""
 
 COLUMNS = ("t", "theta", "omega", "r_cm", "inertia")
 
@@ -125,7 +128,9 @@ def read_cells(path: Path) -> tuple[list[str], Rows]:
         If the file cannot be read, is empty, names a column twice, or has a row of another length.
     """
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        lines = read_text(path, MOST_BYTES).removeprefix("\ufeff").splitlines()
+    except UnsuitableFileError as error:
+        raise ValueError(f"{path}: {error}") from None
     except (OSError, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
     # Lines that begin with # tell people what the table is.

@@ -52,6 +52,21 @@ MOST_SLICES = 10_000_000
 """Slices of a throw at the most; the paper uses 500."""
 
 
+LEAST = 1e-15
+MOST = 1e15
+"""Least and largest positive number of a field, in its unit: between them no product of fields leaves the range of
+floating point."""
+
+MOST_ANGLE = 1e6
+"""Largest angle at release [rad]; angles near it are known to 1e-10 rad."""
+
+MOST_FILE = 2**18
+"""Bytes of a scenario file at the most."""
+
+MOST_SHOWN = 60
+"""Characters of a value that an error message shows."""
+
+
 class ScenarioError(ValueError):
     """A value no bottle can have; the message names field, value and admissible range."""
 
@@ -69,26 +84,21 @@ class _Checks:
         value: object,
         unit: str,
         *,
-        above: float | None = None,
-        least: float | None = None,
-        most: float | None = None,
+        least: float,
+        most: float,
     ) -> float | None:
         """Return ``value`` as float if it is a finite number in range, else note why not."""
-        admissible = _range_words(above, least, most)
-        shown = f"{self.where}{name} = {value!r}"
+        admissible = f"[{least:g}, {most:g}]"
+        told = f"{self.where}{name} = {shown(value)}"
         if isinstance(value, bool) or not isinstance(value, numbers.Real):
-            self.problems.append(f"{shown} is not a number (admissible: {admissible} {unit})".replace(" )", ")"))
+            self.problems.append(f"{told} is not a number (admissible: {admissible} {unit})".replace(" )", ")"))
             return None
         try:
             number = float(value)
         except OverflowError:
             number = math.inf
         # Written as "not inside", because NaN passes every "outside" test.
-        inside = math.isfinite(number)
-        inside = inside and (above is None or number > above)
-        inside = inside and (least is None or number >= least)
-        inside = inside and (most is None or number <= most)
-        if not inside:
+        if not least <= number <= most:
             self.problems.append(f"{self.where}{name} = {number!r} {unit} is outside {admissible}".replace("  ", " "))
             return None
         return number
@@ -122,14 +132,57 @@ def shortened(text: str, most: int) -> str:
 def not_whole(name: str, value: object, least: int, most: int) -> str:
     """Return what is wrong with ``value`` as a whole number in [least, most], or an empty string."""
     if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not least <= int(value) <= most:
-        return f"{name} = {shortened(repr(value), 40)} is not a whole number in [{least}, {most}]"
+        return f"{name} = {shown(value)} is not a whole number in [{least}, {most}]"
     return ""
 
 
-def _range_words(above: float | None, least: float | None, most: float | None) -> str:
-    low = "(-inf" if above is None and least is None else f"({above:g}" if least is None else f"[{least:g}"
-    high = "inf)" if most is None else f"{most:g}]"
-    return f"{low}, {high}"
+def shown(value: object) -> str:
+    """Return how an error message shows a value: as Python writes it, the middle of a long one left out."""
+    text = repr(value)
+    half = MOST_SHOWN // 2
+    return text if len(text) <= MOST_SHOWN else f"{text[:half]} ... {text[-half:]}"
+
+
+class UnsuitableFileError(ValueError):
+    """What is at a path is no file of reasonable size; the message says what it is."""
+
+
+def read_text(path: Path, most: int) -> str:
+    """Return the UTF-8 text of a regular file of at most ``most`` bytes, or of what this program has open already.
+
+    A path such as /dev/stdin names an open descriptor, so that a shell may feed a pipe.
+
+    Raises
+    ------
+    UnsuitableFileError
+        For a device, a pipe or a socket, and for a file that is larger.
+    OSError
+        If it cannot be read.
+    UnicodeDecodeError
+        If it is not UTF-8.
+    """
+    refuse_devices(path)
+    with path.open("rb") as file:
+        content = file.read(most + 1)
+    if len(content) > most:
+        largest = f"{most / 2**10:g} KiB" if most < 2**20 else f"{most / 2**20:g} MiB"
+        raise UnsuitableFileError(f"is larger than {largest}, the most that is read of such a file")
+    return content.decode("utf-8")
+
+
+def refuse_devices(path: Path) -> None:
+    """Refuse a device, a pipe or a socket, which may have no end or never begin, unless this program has it open.
+
+    Raises
+    ------
+    UnsuitableFileError
+    """
+    if path.exists() and not path.is_file() and not path.is_dir() and not _is_descriptor(path):
+        raise UnsuitableFileError("is a device, a pipe or a socket, not a file")
+
+
+def _is_descriptor(path: Path) -> bool:
+    return str(path) == "/dev/stdin" or str(path.parent) in ("/dev/fd", "/proc/self/fd")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,11 +192,11 @@ class Bottle:
     Parameters
     ----------
     length, radius : float
-        Cap to base, and radius of the cylinder [m]; positive.
+        Cap to base, and radius of the cylinder [m], in [1e-15, 1e15].
     mass : float
-        Empty bottle [kg]; positive.
+        Empty bottle [kg], in [1e-15, 1e15].
     capacity : float
-        Water that fills it [kg]; positive. The paper's 1 kg is less than
+        Water that fills it [kg], in [1e-15, 1e15]. The paper's 1 kg is less than
         ``rho pi R^2 L`` = 1.407 kg of the cylinder it describes.
 
     Raises
@@ -160,7 +213,7 @@ class Bottle:
     def __post_init__(self) -> None:
         checks = _Checks("bottle.")
         for name, unit in (("length", "m"), ("radius", "m"), ("mass", "kg"), ("capacity", "kg")):
-            object.__setattr__(self, name, checks.number(name, getattr(self, name), unit, above=0.0))
+            object.__setattr__(self, name, checks.number(name, getattr(self, name), unit, least=LEAST, most=MOST))
         checks.refuse()
 
 
@@ -172,24 +225,24 @@ class Scenario:
     ----------
     bottle : Bottle
     water_mass : float
-        Mass of all slices [kg], in (0, bottle.capacity].
+        Mass of all slices [kg], in [1e-15, bottle.capacity].
     n_slices : int
         Number of slices, at least 1.
     drag : float
-        alpha, drag coefficient of one slice [kg/s] (the paper's program says kg/m), >= 0.
+        alpha, drag coefficient of one slice [kg/s] (the paper's program says kg/m), in [0, 1e15].
     restitution : float
         e = -beta, in [0, 1].
     omega0 : float
-        Angular velocity at release [rad/s]; not 0 (a bottle that does not spin has no flip).
+        Angular velocity at release [rad/s], its magnitude in [1e-15, 1e15]: a bottle that does not spin has no flip.
         Negative values spin the other way.
     theta0 : float
-        Angle at release [rad].
+        Angle at release [rad], in [-1e6, 1e6].
     duration : float
-        Time from release to landing [s], positive.
+        Time from release to landing [s], in [1e-15, 1e15].
     gravity : float
-        [m/s^2], >= 0.
+        [m/s^2], in [0, 1e15].
     launch_velocity : tuple of two floats
-        Velocity of the centre of mass at release [m/s]. The default has the paper's
+        Velocity of the centre of mass at release [m/s], each in [-1e15, 1e15]. The default has the paper's
         |v_0| of about 2 m/s. It moves the bottle through the lab and nothing else.
     frozen : bool
         The ice case: no slice may move.
@@ -215,43 +268,45 @@ class Scenario:
     def __post_init__(self) -> None:
         checks = _Checks()
         if not isinstance(self.bottle, Bottle):
-            raise ScenarioError(f"bottle = {self.bottle!r} is not a Bottle")
+            raise ScenarioError(f"bottle = {shown(self.bottle)} is not a Bottle")
         checked: dict[str, object] = {
             "water_mass": self._checked_water_mass(checks),
             "n_slices": checks.whole("n_slices", self.n_slices, least=1, most=MOST_SLICES),
-            "drag": checks.number("drag", self.drag, "kg/s", least=0.0),
+            "drag": checks.number("drag", self.drag, "kg/s", least=0.0, most=MOST),
             "restitution": checks.number("restitution", self.restitution, "", least=0.0, most=1.0),
-            "omega0": checks.number("omega0", self.omega0, "rad/s"),
-            "theta0": checks.number("theta0", self.theta0, "rad"),
-            "duration": checks.number("duration", self.duration, "s", above=0.0),
-            "gravity": checks.number("gravity", self.gravity, "m/s^2", least=0.0),
+            "omega0": checks.number("omega0", self.omega0, "rad/s", least=-MOST, most=MOST),
+            "theta0": checks.number("theta0", self.theta0, "rad", least=-MOST_ANGLE, most=MOST_ANGLE),
+            "duration": checks.number("duration", self.duration, "s", least=LEAST, most=MOST),
+            "gravity": checks.number("gravity", self.gravity, "m/s^2", least=0.0, most=MOST),
             "launch_velocity": self._checked_launch_velocity(checks),
         }
-        if checked["omega0"] == 0.0:
-            checks.problems.append("omega0 = 0.0 rad/s does not spin: any finite value but 0 is admissible")
+        if isinstance(omega0 := checked["omega0"], float) and abs(omega0) < LEAST:
+            checks.problems.append(
+                f"omega0 = {omega0!r} rad/s does not spin (its magnitude must be in [{LEAST:g}, {MOST:g}])"
+            )
         if not isinstance(self.frozen, bool):
-            checks.problems.append(f"frozen = {self.frozen!r} is neither true nor false")
+            checks.problems.append(f"frozen = {shown(self.frozen)} is neither true nor false")
         checks.refuse()
         for name, value in checked.items():
             object.__setattr__(self, name, value)
 
     def _checked_water_mass(self, checks: _Checks) -> float | None:
-        water_mass = checks.number("water_mass", self.water_mass, "kg", above=0.0)
+        water_mass = checks.number("water_mass", self.water_mass, "kg", least=LEAST, most=MOST)
         capacity = self.bottle.capacity
         if water_mass is not None and water_mass > capacity:
             checks.problems.append(
                 f"water_mass = {water_mass!r} kg exceeds the bottle's capacity {capacity!r} kg "
-                f"(admissible: (0, {capacity:g}] kg)"
+                f"(admissible: [{LEAST:g}, {capacity:g}] kg)"
             )
         return water_mass
 
     def _checked_launch_velocity(self, checks: _Checks) -> tuple[float | None, ...]:
         components = self.launch_velocity
         if isinstance(components, str) or not isinstance(components, Iterable) or len(tuple(components)) != 2:
-            checks.problems.append(f"launch_velocity = {components!r} is not a pair (v_x, v_y) of numbers in m/s")
+            checks.problems.append(f"launch_velocity = {shown(components)} is not a pair (v_x, v_y) of numbers in m/s")
             return ()
         return tuple(
-            checks.number(f"launch_velocity.{axis}", component, "m/s")
+            checks.number(f"launch_velocity.{axis}", component, "m/s", least=-MOST, most=MOST)
             for axis, component in zip("xy", components, strict=True)
         )
 
@@ -323,7 +378,9 @@ class Scenario:
         """
         name = str(path)
         try:
-            document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+            document = tomllib.loads(read_text(Path(path), MOST_FILE))
+        except UnsuitableFileError as error:
+            raise ScenarioError(f"{name}: {error}") from None
         except OSError as error:
             raise ScenarioError(f"{name}: cannot be read ({error.strerror or error})") from None
         except RecursionError:
@@ -338,7 +395,7 @@ class Scenario:
         _refuse_unknown(document, ("scenario", "bottle"), f"{source}: table")
         for table in document:
             if not isinstance(document[table], Mapping):
-                raise ScenarioError(f"{source}: {table} = {document[table]!r} is not a table; write [{table}]")
+                raise ScenarioError(f"{source}: {table} = {shown(document[table])} is not a table; write [{table}]")
         bottle_table = document.get("bottle", {})
         scenario_table = dict(document.get("scenario", {}))
         _refuse_unknown(bottle_table, [f.name for f in fields(Bottle)], f"{source}: [bottle] key")
@@ -382,11 +439,11 @@ def unknown_name(what: str, given: object, known: Iterable[str]) -> str:
     ``what`` leads to the name, such as "scheme =" or "throw.toml: [bottle] key".
     """
     by_lower_case = {name.lower(): name for name in known}
-    nearest = get_close_matches(str(given).lower(), by_lower_case, n=1)
+    nearest = get_close_matches(str(given)[:MOST_SHOWN].lower(), by_lower_case, n=1)
     advice = (
         f"did you mean {by_lower_case[nearest[0]]!r}?" if nearest else f"known: {', '.join(by_lower_case.values())}"
     )
-    return f"{what} {given!r} is unknown; {advice}"
+    return f"{what} {shown(given)} is unknown; {advice}"
 
 
 def _refuse_unknown(given: Iterable[str], known: Iterable[str], what: str) -> None:

@@ -12,7 +12,7 @@ from reports.figures.style import draw
 from reports.fit.compare import Contender, verdict
 from reports.fit.figures import figure_allowed, figure_residuals, residual_table
 from reports.fit.uncertainty import correlation
-from reports.output import MARKER, write_text
+from reports.output import write_text
 
 
 def write(contenders: Sequence[Contender], text: str, folder: Path, provenance: Mapping[str, str]) -> None:
@@ -23,7 +23,7 @@ def write(contenders: Sequence[Contender], text: str, folder: Path, provenance: 
         (folder / f"{name}.png").write_bytes(drawing.png)
     write_text(folder / "residuals.csv", residual_table(contenders))
     write_text(folder / "fit.txt", text + "\n")
-    write_text(folder / MARKER, json.dumps(summary(contenders, provenance), indent=1, allow_nan=False) + "\n")
+    write_text(folder / "summary.json", json.dumps(summary(contenders, provenance), indent=1, allow_nan=False) + "\n")
 
 
 def summary(contenders: Sequence[Contender], provenance: Mapping[str, str]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from reports.exhibit import Exhibit, drawn
-from reports.output import MARKER, check_replaceable, replaced_folder
+from reports.output import check_replaceable, replaced_folder
 from reports.paper.figures import ORDER, TIMED, check_figures, exhibits_paper, keys_of
 from reports.paper.runs import FULL, PaperRuns, PaperSize, gather_paper
 from reports.paper.tables import HEADER, parameter_rows, parameters_csv
@@ -48,8 +48,8 @@ def make_gallery(
     """
     began = time.perf_counter()
     wanted = check_figures(names) or ORDER
-    check_replaceable(out)
-    with replaced_folder(out) as folder:
+    check_replaceable(out, "paper")
+    with replaced_folder(out, "paper") as folder:
         with workers(jobs) as pool:
             costs = any(name in TIMED for name in wanted)
             runs = gather_paper(pool, size, progress, keys_of(wanted), costs=costs)
@@ -69,7 +69,7 @@ def write_gallery(exhibits: Sequence[Exhibit], runs: PaperRuns, folder: Path, pr
         (folder / f"{exhibit.name}.csv").write_text(exhibit.table or "", encoding="utf-8")
     (folder / "parameters.csv").write_text(parameters_csv(), encoding="utf-8")
     (folder / PAGE).write_text(render_gallery(exhibits, runs, provenance), encoding="utf-8")
-    (folder / MARKER).write_text(json.dumps(_summary(exhibits, runs, provenance), indent=1), encoding="utf-8")
+    (folder / "summary.json").write_text(json.dumps(_summary(exhibits, runs, provenance), indent=1), encoding="utf-8")
 
 
 def render_gallery(exhibits: Sequence[Exhibit], runs: PaperRuns, provenance: Mapping[str, str]) -> str:

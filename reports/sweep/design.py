@@ -40,8 +40,19 @@ import numpy as np
 from reports.sweep.axes import DAMPING, FILL, Axis, Choices, Range, Value, read_axes
 from reports.sweep.entries import Entry, read_entries
 from reports.sweep.errors import SweepError
-from slicemodel.scenario import Bottle, Scenario, ScenarioError, not_whole, unknown_name
+from slicemodel.scenario import (
+    Bottle,
+    Scenario,
+    ScenarioError,
+    UnsuitableFileError,
+    not_whole,
+    read_text,
+    unknown_name,
+)
 from slicemodel.trajectory import FloatArray
+
+MOST_FILE: Final = 2**25
+"""Bytes of a design at the most: a million values with all their digits."""
 
 MOST_POINTS: Final = 1_000_000
 """Points of a sweep at the most, all solvers together: a minute of bookkeeping, 100 MB of memory, 620 MB of rows."""
@@ -203,8 +214,10 @@ def read_design(path: Path) -> Design:
         Naming file, table, key, value, and what is admissible or nearest.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path, MOST_FILE)
         document = tomllib.loads(text)
+    except UnsuitableFileError as error:
+        raise SweepError(f"{path}: {error}") from None
     except OSError as error:
         raise SweepError(f"{path}: cannot be read ({error.strerror or error})") from None
     except RecursionError:

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-TEMPORARY = ".part"
-"""Ends the names of files that are being written."""
+TEMPORARY = ".flipproof-part"
+"""Ends the names of files that are being written; files of such a name are flipproof's own."""
 
 
 @contextmanager
@@ -34,6 +34,6 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 def sweep_away_parts(folder: Path) -> None:
-    """Remove what a killed program left half-written."""
+    """Remove what a killed program left half-written in a folder that is flipproof's own and locked."""
     for part in folder.rglob(f"*{TEMPORARY}"):
         part.unlink(missing_ok=True)

@@ -21,6 +21,7 @@ from reports.figures.waterfall import figure_waterfall
 from reports.solvers import Run
 from reports.studies.waterfall import PROGRAM, Waterfall, plan_waterfall, split_all
 from reports.sweep.command import Begin, completed
+from reports.sweep.errors import SweepError
 from reports.sweep.files import write_whole
 from reports.sweep.planned import Row, design_of_runs, read_runs
 from reports.sweep.salvage import salvage
@@ -53,10 +54,8 @@ def make_split(
 
     Raises
     ------
-    ArithmeticError
-        If a run is not whole: a split needs all of them.
     SweepError
-        As for ``reports.sweep.command.sweep``.
+        If a run is not whole: a split needs all of them; else as for ``reports.sweep.command.sweep``.
     """
     runs = plan_split(throw)
     design = design_of_runs(runs, {"omega0": [throw.omega0]}, ENDS, "flipproof waterfall")
@@ -77,7 +76,7 @@ def split_rows(throw: Scenario, rows: Mapping[str, Row]) -> tuple[Waterfall, ...
 
     Raises
     ------
-    ArithmeticError
+    SweepError
         If a run is not whole.
     """
     return split_all({tag: _observed(throw, tag, row) for tag, row in rows.items()})
@@ -85,7 +84,7 @@ def split_rows(throw: Scenario, rows: Mapping[str, Row]) -> tuple[Waterfall, ...
 
 def _observed(throw: Scenario, tag: str, row: Row) -> dict[str, float]:
     if row.status != "ok":
-        raise ArithmeticError(f"{tag}: {row.status}: {row.message or row.reason}")
+        raise SweepError(f"{tag}: {row.status}: {row.message or row.reason}; a waterfall needs every run whole")
     assert row.plateau is not None
     assert row.omega_end is not None
     assert row.theta_end is not None

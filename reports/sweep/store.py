@@ -4,6 +4,7 @@
 
     DIR/sweep.sqlite          schema_version, design, versions, points
     DIR/trajectories/3f/...   one NPZ for each kept flight, named by its point's key
+    DIR/.flipproof            says that the folder is flipproof's own
     DIR/sweep.lock            held by the program that writes; it ends with that program, however it dies
 
 A number that is not known is NULL, and the row's ``reason`` says why: SQLite has no NaN, and the schema refuses a row
@@ -23,17 +24,18 @@ import json
 import os
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
 
 import numpy as np
 
+from reports.ownership import MARKER, OutputError, check_own, marker_text, sole_writer
 from reports.sweep.design import Design
 from reports.sweep.entries import settings_text
 from reports.sweep.errors import SweepError
-from reports.sweep.files import TEMPORARY, sweep_away_parts, whole_file
+from reports.sweep.files import TEMPORARY, sweep_away_parts, whole_file, write_whole
 from reports.sweep.inspection import damage, inspect, is_damage, result_code
 from reports.sweep.schema import (
     APPLICATION,
@@ -51,6 +53,7 @@ from reports.sweep.work import CURVES, Outcome, Returned
 from slicemodel.trajectory import FloatArray
 
 LOCK: Final = "sweep.lock"
+KIND: Final = "sweep"
 FLIGHTS: Final = "trajectories"
 BUSY: Final = 10.0
 """Seconds to wait for somebody who holds the file."""
@@ -72,14 +75,16 @@ class Store:
             damaged, if another program is writing to it, or if it cannot be written.
         """
         self.folder, self.design, self.code = folder, design, code
-        self._lock: sqlite3.Connection | None = None
+        self._lock = ExitStack()
         self._rows: sqlite3.Connection | None = None
         with self._plainly():
             _check_folder(folder)
             folder.mkdir(parents=True, exist_ok=True)
         try:
-            self._lock = _lock(folder)
             with self._plainly():
+                self._lock.enter_context(sole_writer(folder / LOCK, folder))
+                if not (folder / MARKER).exists():
+                    write_whole(folder / MARKER, marker_text(KIND).encode())
                 self.fresh = not os.path.lexists(self.file)
                 if self.fresh:
                     self._begin()
@@ -114,10 +119,10 @@ class Store:
 
     def close(self) -> None:
         """Close the file and let go of the folder."""
-        for connection in (self._rows, self._lock):
-            if connection is not None:
-                connection.close()
-        self._rows = self._lock = None
+        if self._rows is not None:
+            self._rows.close()
+        self._rows = None
+        self._lock.close()
 
     def done(self) -> bytearray:
         """Return one byte for each point of the design: 1 if its row is there, and its flight if flights are kept."""
@@ -223,6 +228,8 @@ class Store:
         """Turn what a disk or SQLite refuses into one line."""
         try:
             yield
+        except OutputError as error:
+            raise SweepError(str(error)) from None
         except sqlite3.IntegrityError as error:
             words = "two points of the design are the same throw" if "points.key" in str(error) else "a row is refused"
             raise SweepError(f"{self.folder}: {words} ({error})") from None
@@ -262,28 +269,9 @@ def _bytes(curves: FloatArray | None) -> bytes | None:
 def _check_folder(folder: Path) -> None:
     if folder.exists() and not folder.is_dir():
         raise SweepError(f"{folder} is a file; --out names a folder")
-    if folder.exists() and not os.path.lexists(folder / FILE):
-        # A program killed while it began the sweep leaves a part of the file.
-        others = sorted(e.name for e in folder.iterdir() if e.name != LOCK and not e.match(f"{FILE}.*{TEMPORARY}"))
-        if others:
-            raise SweepError(f"{folder} holds {others[0]} and no sweep; name an empty or a new folder")
-
-
-def _lock(folder: Path) -> sqlite3.Connection:
-    """Take the folder for this program. The lock is SQLite's on a file of its own, because the kernel ends it."""
-    lock = sqlite3.connect(folder / LOCK, timeout=0, isolation_level=None)
-    try:
-        lock.execute("BEGIN EXCLUSIVE")
-    except sqlite3.Error as error:
-        lock.close()
-        busy = "locked" in str(error)
-        words = (
-            f"{folder}: another sweep is writing there; wait for it or stop it"
-            if busy
-            else f"{folder / LOCK} cannot be locked ({error}); it holds no rows: remove it if no sweep is writing there"
-        )
-        raise SweepError(words) from None
-    return lock
+    if folder.exists():
+        parts = (entry.name for entry in folder.iterdir() if entry.name.endswith(TEMPORARY))
+        check_own(folder, KIND, ignored=(LOCK, *parts))
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import Final
 
 from reports.tracker.table import TrackFileError, column_name
+from slicemodel.scenario import UnsuitableFileError, refuse_devices
 
 MOST_BYTES: Final = 50_000_000
 """Larger files are no export: an hour at 240 frames/s with ten columns holds about this."""
@@ -63,8 +64,11 @@ def read_text(path: Path) -> tuple[str, str]:
     if path.suffix.lower() in (".trk", ".trz"):
         raise TrackFileError(f"{path}: is a Tracker project, which holds pixels, not positions; {EXPORT}")
     try:
+        refuse_devices(path)
         with path.open("rb") as file:
             content = file.read(MOST_BYTES + 1)
+    except UnsuitableFileError as error:
+        raise TrackFileError(f"{path}: {error}; {EXPORT}") from None
     except OSError as error:
         raise TrackFileError(f"{path}: cannot be read ({error.strerror or error})") from None
     if len(content) > MOST_BYTES:

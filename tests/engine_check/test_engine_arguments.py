@@ -47,6 +47,15 @@ def test_more_slices_than_an_engine_can_hold_are_refused():
         solve(replace(THROW, n_slices=5001))
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("change", [{"omega0": 1e-9}, {"launch_velocity": (1e9, 0.0)}])
+def test_a_launch_in_whose_round_off_the_spin_is_lost_is_refused(engine, change):
+    with pytest.raises(ValueError, match=r"launch_velocity = .* m/s is outside \[0, .*\] m/s, 5000 \|omega0\| L"):
+        solve(replace(THROW, **change), engine=engine, dt=1e-3)
+    slow = replace(THROW, omega0=math.hypot(*THROW.launch_velocity) / THROW.bottle.length / 4999.0)
+    assert solve(slow, engine=engine, dt=1e-3).ok
+
+
 @pytest.mark.parametrize("dt", [0.0, -1e-4, math.nan, math.inf])
 def test_dt_out_of_range_is_named_with_the_range(dt):
     with pytest.raises(ValueError, match=r"dt = .* s is outside \(0, inf\) s"):

@@ -191,6 +191,29 @@ def test_what_it_does_not_have_is_refused(arguments, words):
         solve(THROW, engine="mujoco", dt=DT, **arguments)
 
 
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"bottle": Bottle(mass=1e-15)}, r"bottle\.mass \[kg\] = 1e-15 is outside \(1e-15, inf\), the range of MuJoCo"),
+        ({"bottle": Bottle(radius=1e-9)}, r"bottle\.mass \* bottle\.radius\^2 \[kg m\^2\] = 2\.8e-20 is outside"),
+        ({"water_mass": 1e-15}, r"water_mass / n_slices \[kg\] = .* is outside \(1e-15, inf\)"),
+        ({"bottle": Bottle(radius=1e9)}, r"bottle\.length / bottle\.radius = 2\.8e-10 is outside \(1e-06, inf\)"),
+    ],
+)
+def test_what_is_too_light_for_the_engine_is_refused_by_name(change, words):
+    with pytest.raises(ValueError, match=words):
+        solve(replace(THROW, **change), engine="mujoco", dt=DT)
+
+
+def test_no_log_is_left_in_the_working_directory(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    before = mujoco.get_mju_user_warning()
+    run = solve(replace(THROW, bottle=Bottle(length=1e12)), engine="mujoco", dt=DT)
+    assert run.status == "diverged"
+    assert list(tmp_path.iterdir()) == []
+    assert mujoco.get_mju_user_warning() is before
+
+
 def test_welded_ice_is_refused():
     with pytest.raises(ValueError, match=r"has no ice = 'welded' \(it has: rigid\)"):
         solve(replace(THROW, frozen=True), engine="mujoco", dt=DT, ice="welded")

@@ -87,17 +87,18 @@ def test_a_slice_as_long_as_the_bottle_cannot_move(model):
 @pytest.mark.parametrize(
     "scenario",
     [
-        Scenario(n_slices=5, omega0=1e160),
-        Scenario(n_slices=5, drag=1e300),
-        Scenario(n_slices=5, gravity=1e300),
-        Scenario(n_slices=5, bottle=Bottle(length=1e200)),
-        Scenario(n_slices=5, omega0=1e-300),
-        Scenario(n_slices=5, duration=1e-300),
+        Scenario(n_slices=5, omega0=1e15),
+        Scenario(n_slices=5, drag=1e15),
+        Scenario(n_slices=5, gravity=1e15),
+        Scenario(n_slices=5, bottle=Bottle(length=1e15)),
+        Scenario(n_slices=5, omega0=1e-15),
+        Scenario(n_slices=5, duration=1e-15),
     ],
     ids=["omega0", "drag", "gravity", "length", "slow", "short"],
 )
 def test_extreme_scenarios_end_with_a_status_and_finite_numbers(model, scenario, monkeypatch):
     monkeypatch.setattr(ode_reference.run, "WATCH", 300)
+    monkeypatch.setattr(ode_reference.run, "STEP_LIMIT", 3000)
     found = solve(scenario, model, times=np.linspace(0, 1, 5) * scenario.duration if scenario.duration > 1e-9 else None)
     assert found.status in ("ok", "overflow", "stalled")
     assert found.ok or ("t = " in found.message and model in found.message)
@@ -105,7 +106,9 @@ def test_extreme_scenarios_end_with_a_status_and_finite_numbers(model, scenario,
 
 @pytest.mark.parametrize("method", METHODS)
 def test_overflow_is_named_and_nothing_is_returned_beyond_it(method):
-    found = solve(Scenario(n_slices=5, omega0=1e160), method=method)
+    scenario = Scenario(n_slices=5)
+    object.__setattr__(scenario, "omega0", 1e160)  # no scenario admits it
+    found = solve(scenario, method=method)
     assert found.status == "overflow"
     assert len(found.t) == 0
     assert "omega0 = 1e+160 rad/s" in found.message

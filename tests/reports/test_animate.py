@@ -172,7 +172,7 @@ def test_an_mp4_is_what_the_encoder_makes_of_every_frame(tmp_path, monkeypatch):
     assert int(size) == 3 * width * height * 3
     assert arguments[arguments.index("-r") + 1] == "25"
     assert arguments[-2] == "mp4"
-    assert not list(tmp_path.glob("*.part"))
+    assert not list(tmp_path.glob("*part"))
 
 
 @pytest.mark.parametrize("reads", ["", "sys.stdin.buffer.read()"])

@@ -71,7 +71,7 @@ def test_models_lists_everything_with_reasons(capsys):
         (["report", "nowhere.toml"], ["nowhere.toml", "cannot be read"]),
         (["report", "{bad}"], ["[scenario] water_mass = 1.4 kg", "capacity 1.0 kg"]),
         (["report", "--out", "{bad}"], ["is a file"]),
-        (["report", "--out", "{full}"], ["not a flipproof report"]),
+        (["report", "--out", "{full}"], ["holds mine.txt and not flipproof's own marker"]),
         (["simulate", "--solver", "eq9"], ["solver 'eq9' is unknown", "did you mean 'eq8'?"]),
         (["simulate", "--solver", "eq8", "--steps", "5"], ["eq8 is not a scheme"]),
         (["simulate", "--steps", "1"], ["steps = 1", "[2, 1000000000]"]),

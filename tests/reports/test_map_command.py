@@ -249,7 +249,7 @@ def test_a_waterfall_s_run_that_is_not_whole_is_named(split):
         rows = read_runs(store, runs)
     tag = runs[5].tag
     rows[tag] = replace(rows[tag], status="stalled", message="time hardly passes")
-    with pytest.raises(ArithmeticError, match=f"{tag}: stalled: time hardly passes"):
+    with pytest.raises(SweepError, match=f"{tag}: stalled: time hardly passes"):
         split_rows(throw, rows)
 
 

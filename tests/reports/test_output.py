@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from reports.output import OutputError, check_replaceable, replaced_folder, write_text
+from reports.output import UNFINISHED, check_replaceable, replaced_folder, write_text
+from reports.ownership import MARKER, OutputError
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -20,13 +21,13 @@ def make_report(folder: Path, text: str) -> None:
 
 
 def read_report(folder: Path) -> set[str]:
-    return {file.read_text() for file in folder.iterdir()}
+    return {file.read_text() for file in folder.iterdir() if file.name not in (MARKER, ".DS_Store")}
 
 
 def test_a_new_report_takes_the_place_of_the_old(tmp_path):
     target = tmp_path / "out" / "latest"
     for text in ("first", "second"):
-        with replaced_folder(target) as folder:
+        with replaced_folder(target, "report") as folder:
             make_report(folder, text)
         assert read_report(target) == {text}
     assert [p.name for p in target.parent.iterdir()] == ["latest"]
@@ -35,9 +36,9 @@ def test_a_new_report_takes_the_place_of_the_old(tmp_path):
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
 def test_a_broken_run_leaves_the_old_report_whole(tmp_path, error):
     target = tmp_path / "latest"
-    with replaced_folder(target) as folder:
+    with replaced_folder(target, "report") as folder:
         make_report(folder, "old")
-    with pytest.raises(error), replaced_folder(target) as folder:  # noqa: PT012
+    with pytest.raises(error), replaced_folder(target, "report") as folder:  # noqa: PT012
         (folder / "index.html").write_text("half")
         raise error
     assert read_report(target) == {"old"}
@@ -46,29 +47,166 @@ def test_a_broken_run_leaves_the_old_report_whole(tmp_path, error):
 
 def test_a_run_that_died_between_the_two_renames_is_repaired(tmp_path):
     target = tmp_path / "latest"
-    previous = tmp_path / "latest.previous"
-    previous.mkdir()
-    make_report(previous, "old")
-    with pytest.raises(ValueError, match="broken"), replaced_folder(target):
+    with replaced_folder(target, "report") as folder:
+        make_report(folder, "old")
+    beside = tmp_path / f"latest{UNFINISHED}"
+    (beside / "new").mkdir(parents=True)
+    (beside / "lock").write_text("123456789")
+    target.rename(beside / "old")
+    with pytest.raises(ValueError, match="broken"), replaced_folder(target, "report"):
         raise ValueError("broken")
     assert read_report(target) == {"old"}
-    assert not previous.exists()
+    assert [p.name for p in tmp_path.iterdir()] == ["latest"]
 
 
 def test_other_peoples_files_are_not_replaced(tmp_path):
     (tmp_path / "thesis.tex").write_text("mine")
-    with pytest.raises(OutputError, match="not a flipproof report"):
-        check_replaceable(tmp_path)
-    with pytest.raises(OutputError, match="not a flipproof report"), replaced_folder(tmp_path):
+    with pytest.raises(OutputError, match=r"holds thesis\.tex and not flipproof's own marker"):
+        check_replaceable(tmp_path, "report")
+    with pytest.raises(OutputError, match=r"holds thesis\.tex"), replaced_folder(tmp_path, "report"):
         pass
     assert (tmp_path / "thesis.tex").read_text() == "mine"
     with pytest.raises(OutputError, match="is a file"):
-        check_replaceable(tmp_path / "thesis.tex")
+        check_replaceable(tmp_path / "thesis.tex", "report")
+
+
+def test_a_folder_with_a_summary_is_not_ours_for_that(tmp_path):
+    for name in ("summary.json", "index.html", "thesis.tex"):
+        (tmp_path / "latest").mkdir(exist_ok=True)
+        (tmp_path / "latest" / name).write_text("mine")
+    with pytest.raises(OutputError) as refused, replaced_folder(tmp_path / "latest", "report"):
+        pass
+    words = str(refused.value)
+    assert "latest holds index.html and 2 more and not flipproof's own marker .flipproof" in words
+    assert words.endswith("or move this one away if an older flipproof wrote it")
+    assert sorted(p.name for p in (tmp_path / "latest").iterdir()) == ["index.html", "summary.json", "thesis.tex"]
+    assert [p.name for p in tmp_path.iterdir()] == ["latest"]
+
+
+@pytest.mark.parametrize("place", ["notes.txt", "figures/notes.txt", "link"])
+def test_a_report_with_a_file_of_the_users_is_not_replaced(tmp_path, place):
+    target = tmp_path / "latest"
+    with replaced_folder(target, "report") as folder:
+        make_report(folder, "old")
+        (folder / "figures").mkdir()
+    if place == "link":
+        (target / place).symlink_to(tmp_path)
+    else:
+        (target / place).write_text("mine")
+    with pytest.raises(OutputError, match=rf"holds {place}, which flipproof did not write"):
+        check_replaceable(target, "report")
+    assert (target / place).exists()
+
+
+def test_a_file_put_there_while_the_report_was_made_is_not_lost(tmp_path):
+    target = tmp_path / "latest"
+    target.mkdir()
+    with pytest.raises(OutputError, match=r"holds notes\.txt"), replaced_folder(target, "report") as folder:  # noqa: PT012
+        make_report(folder, "new")
+        (target / "notes.txt").write_text("mine")
+    assert [p.name for p in tmp_path.rglob("*")] == ["latest", "notes.txt"]
+
+
+def test_what_a_desktop_leaves_behind_is_nobodys(tmp_path):
+    target = tmp_path / "latest"
+    with replaced_folder(target, "report") as folder:
+        make_report(folder, "old")
+    (target / ".DS_Store").write_text("")
+    with replaced_folder(target, "report") as folder:
+        make_report(folder, "new")
+    assert read_report(target) == {"new"}
+
+
+def test_one_kind_does_not_replace_another(tmp_path):
+    with replaced_folder(tmp_path / "latest", "report") as folder:
+        make_report(folder, "old")
+    with pytest.raises(OutputError, match="holds a flipproof report, not a fit; name another folder"):
+        check_replaceable(tmp_path / "latest", "fit")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "a .flipproof that flipproof did not write"),
+        ("[]", "a .flipproof that flipproof did not write"),
+        ('{"kind": 3, "version": 1}', "a .flipproof that flipproof did not write"),
+        ('{"kind": "report", "version": 1, "files": 5}', "a .flipproof that flipproof did not write"),
+        ("[" * 100_000, "a .flipproof that flipproof did not write"),
+        ('{"kind": "report", "version": 2}', "written by another flipproof"),
+    ],
+)
+def test_a_marker_that_is_none_is_refused(tmp_path, text, words):
+    (tmp_path / MARKER).write_text(text)
+    with pytest.raises(OutputError, match=words):
+        check_replaceable(tmp_path, "report")
+
+
+def test_folders_of_similar_names_are_nobodys_business(tmp_path):
+    for name in ("latest.previous", "latest.new-ideas", "latest.part", f"other{UNFINISHED}"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "mine.txt").write_text("mine")
+    for text in ("first", "second"):
+        with replaced_folder(tmp_path / "latest", "report") as folder:
+            make_report(folder, text)
+    assert len(list(tmp_path.glob("*/mine.txt"))) == 4
+    (tmp_path / f"latest{UNFINISHED}").mkdir()
+    (tmp_path / f"latest{UNFINISHED}" / "mine.txt").write_text("mine")
+    with (
+        pytest.raises(OutputError, match=r"holds mine\.txt, which flipproof did not write"),
+        replaced_folder(tmp_path / "latest", "report"),
+    ):
+        pass
+    assert len(list(tmp_path.glob("*/mine.txt"))) == 5
+
+
+def test_two_writers(tmp_path):
+    """The second is told who is the first, and touches nothing."""
+    target = tmp_path / "latest"
+    code = "import sys; from pathlib import Path; from reports.output import replaced_folder\n"
+    code += "with replaced_folder(Path(sys.argv[1]), 'report') as f: print('in', flush=True); input()"
+    first = subprocess.Popen(
+        [sys.executable, "-c", code, str(target)], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert first.stdout.readline() == "in\n"
+    words = rf"latest is being written by another flipproof \(process {first.pid}\); wait for it"
+    with pytest.raises(OutputError, match=words), replaced_folder(target, "report"):
+        pass
+    assert (tmp_path / f"latest{UNFINISHED}" / "new").is_dir()
+    first.kill()
+    first.communicate()
+    with replaced_folder(target, "report") as folder:
+        make_report(folder, "new")
+    assert read_report(target) == {"new"}
+    assert [p.name for p in tmp_path.iterdir()] == ["latest"]
+
+
+def test_many_writers_never_write_at_once(tmp_path):
+    """Locks are made, held, removed and refused as fast as possible; no two blocks ever overlap."""
+    code = """
+import os, sys, time
+from pathlib import Path
+from reports.output import OutputError, replaced_folder
+target, inside = Path(sys.argv[1]), Path(sys.argv[2])
+done = 0
+while done < 30:
+    try:
+        with replaced_folder(target, "report") as folder:
+            os.close(os.open(inside, os.O_CREAT | os.O_EXCL))
+            (folder / "summary.json").write_text("x")
+            inside.unlink()
+            done += 1
+    except OutputError as error:
+        assert "is being written by another flipproof" in str(error), error
+"""
+    command = [sys.executable, "-c", code, str(tmp_path / "latest"), str(tmp_path / "inside")]
+    writers = [subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) for _ in range(3)]
+    assert [(writer.communicate(timeout=120)[1], writer.returncode) for writer in writers] == [("", 0)] * 3
+    assert [p.name for p in tmp_path.iterdir()] == ["latest"]
 
 
 def test_a_parent_that_cannot_be_made_is_named(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="cannot be written"), replaced_folder(tmp_path / "file" / "latest"):
+    with pytest.raises(OutputError, match="cannot be written"), replaced_folder(tmp_path / "file" / "latest", "report"):
         pass
 
 
@@ -98,7 +236,7 @@ def test_the_current_folder_is_not_a_report(tmp_path, monkeypatch):
     (tmp_path / "summary.json").write_text("{}")
     monkeypatch.chdir(tmp_path)
     with pytest.raises(OutputError, match="current folder"):
-        check_replaceable(Path())
+        check_replaceable(Path(), "report")
 
 
 def test_text_files_are_written_whole(tmp_path):
@@ -112,7 +250,7 @@ def test_text_files_are_written_whole(tmp_path):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_report_leaves_the_old_one(tmp_path, number):
     target = tmp_path / "latest"
-    with replaced_folder(target) as folder:
+    with replaced_folder(target, "report") as folder:
         make_report(folder, "old")
     process = subprocess.Popen(
         [sys.executable, "-m", "reports.cli", "report", "--quick", "--out", str(target)],
@@ -125,7 +263,7 @@ def test_an_interrupted_report_leaves_the_old_one(tmp_path, number):
     )
     # The new folder appears when the work begins; a moment later it is well under way.
     deadline = time.monotonic() + 60
-    while not any(p.name.startswith("latest.new-") for p in tmp_path.iterdir()):
+    while not (tmp_path / f"latest{UNFINISHED}" / "new").exists():
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < deadline
         time.sleep(0.05)

@@ -242,7 +242,8 @@ def test_the_command_writes_figures_numbers_and_a_page(tmp_path, monkeypatch, ca
     told = capsys.readouterr().out
     assert "1 figure from 9 flights: " in told
     names = {file.name for file in out.iterdir()}
-    assert names == {"index.html", "paper-2b.svg", "paper-2b.png", "paper-2b.csv", "parameters.csv", "summary.json"}
+    made = {"index.html", "paper-2b.svg", "paper-2b.png", "paper-2b.csv", "parameters.csv", "summary.json"}
+    assert names == made | {".flipproof"}
     page = read_page((out / "index.html").read_text(encoding="utf-8"))
     assert [image["src"] for image in page.images] == ["paper-2b.svg"]
     assert page.images[0]["alt"]

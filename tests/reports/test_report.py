@@ -32,6 +32,7 @@ from reports.evidence import (
 from reports.exhibit import FEW, drawn
 from reports.exhibits import draw_all
 from reports.figures.style import Drawing
+from reports.ownership import MARKER, marker_text
 from reports.page import typeset
 from reports.pool import make_all, workers
 from reports.solvers import Made, Run, make
@@ -258,6 +259,7 @@ def test_a_report_that_cannot_be_written_whole_leaves_the_one_before(monkeypatch
     folder = tmp_path / "latest"
     folder.mkdir()
     (folder / "summary.json").write_text("the old one")
+    (folder / MARKER).write_text(marker_text("report", ["summary.json"]))
 
     def break_off(*_):
         raise OSError(28, "No space left on device")
@@ -266,7 +268,8 @@ def test_a_report_that_cannot_be_written_whole_leaves_the_one_before(monkeypatch
     assert run_report(monkeypatch, evidence, folder) == 2
     assert "No space left" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["latest"]
-    assert [path.read_text() for path in folder.iterdir()] == ["the old one"]
+    assert sorted(path.name for path in folder.iterdir()) == [MARKER, "summary.json"]
+    assert (folder / "summary.json").read_text() == "the old one"
 
 
 def test_the_snapshot_has_every_claim_that_the_code_makes(evidence):
@@ -339,7 +342,10 @@ def test_the_real_command_from_a_cold_start(tmp_path):
         text=True,
         check=False,
     )
-    assert result.stderr == ""
+    told = [re.fullmatch(r"flipproof: \d+ s: (.+)", line) for line in result.stderr.splitlines()]
+    assert [line and line[1] for line in told] == [
+        "runs", "work and precision", "studies", "the paper", "figures", "page",
+    ]  # fmt: skip
     assert result.returncode == 0, result.stdout
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
     assert summary["slices"] == 12

@@ -72,7 +72,7 @@ def test_a_sweep_killed_again_and_again_ends_with_the_rows_of_an_undisturbed_one
 
 def test_a_worker_does_not_outlive_a_killed_parent_even_in_a_long_call():
     code = (
-        "import time; from reports.sweep.local import Processes; p = Processes(1); f = p.submit(time.time); f.result();"
+        "import time; from reports.processes import Processes; p = Processes(1); f = p.submit(time.time); f.result();"
     )
     code += "p.submit(time.sleep, 1000); print('ready', flush=True); time.sleep(1000)"
     process = subprocess.Popen(

@@ -8,10 +8,11 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 
 import pytest
 
+from reports.processes import Processes, WorkerDiedError
 from reports.sweep import run
 from reports.sweep.design import design_of
 from reports.sweep.errors import SweepError
-from reports.sweep.local import Processes, WorkerDiedError, Workers, local_workers
+from reports.sweep.local import Workers, local_workers
 from reports.sweep.run import DEATHS_IN_A_ROW, GROWTH, LONE_DEATHS, MOST_BYTES, Pace, run_sweep
 from reports.sweep.store import Store
 from reports.sweep.work import Outcome, Returned

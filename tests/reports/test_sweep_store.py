@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import sqlite3
 import tomllib
 from contextlib import closing
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from reports.ownership import MARKER, marker_text
 from reports.sweep import export as exporting
 from reports.sweep.design import design_of
 from reports.sweep.errors import SweepError
@@ -167,7 +169,7 @@ def test_another_design_or_other_code_is_refused_in_one_line(tmp_path):
 
 def test_a_folder_of_something_else_is_refused(tmp_path):
     (tmp_path / "thesis.tex").write_text("mine")
-    with pytest.raises(SweepError, match=r"holds thesis\.tex and no sweep"):
+    with pytest.raises(SweepError, match=r"holds thesis\.tex and not flipproof's own marker"):
         Store(tmp_path, design(), CODE)
     with pytest.raises(SweepError, match="is a file"):
         Store(tmp_path / "thesis.tex", design(), CODE)
@@ -176,6 +178,7 @@ def test_a_folder_of_something_else_is_refused(tmp_path):
     for content, words in ((b"not a database, but long enough" * 99, "not a database"), (None, "but no sweep")):
         folder = tmp_path / words
         folder.mkdir()
+        (folder / MARKER).write_text(marker_text("sweep"))
         if content:
             (folder / "sweep.sqlite").write_bytes(content)
         else:
@@ -193,7 +196,10 @@ def test_a_newer_schema_is_refused(tmp_path):
 
 
 def test_one_program_writes(tmp_path):
-    with Store(tmp_path, design(), CODE), pytest.raises(SweepError, match="another sweep is writing there"):
+    with (
+        Store(tmp_path, design(), CODE),
+        pytest.raises(SweepError, match=rf"is being written by another flipproof \(process {os.getpid()}\)"),
+    ):
         Store(tmp_path, design(), CODE)
     Store(tmp_path, design(), CODE).close()
 
@@ -249,11 +255,14 @@ def test_a_killed_programs_half_files_are_swept_away(tmp_path):
     (tmp_path / "trajectories" / "ab").mkdir(parents=True)
     with Store(tmp_path / "new", design(), CODE):
         pass
-    half = tmp_path / "new" / "trajectories" / "ab.npz.77.part"
+    half = tmp_path / "new" / "trajectories" / "ab.npz.77.flipproof-part"
+    mine = half.with_name("film.mp4.part")
     half.parent.mkdir()
     half.write_bytes(b"half")
+    mine.write_bytes(b"somebody's download")
     with Store(tmp_path / "new", design(), CODE):
         assert not half.exists()
+        assert mine.read_bytes() == b"somebody's download"
 
 
 def test_a_file_is_whole_or_the_old_one(tmp_path):

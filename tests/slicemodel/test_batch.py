@@ -44,7 +44,7 @@ def test_rebounds_in_the_step_too():
 
 
 def test_a_throw_that_overflows_ends_in_nan_and_spoils_no_other():
-    throws = [Scenario(n_slices=3), Scenario(n_slices=3, omega0=1e160, duration=1.0), Scenario(n_slices=4)]
+    throws = [Scenario(n_slices=3), Scenario(n_slices=3, omega0=1e15, duration=1.0), Scenario(n_slices=4)]
     batch = solve_batch(throws, steps=10)
     assert [one.status for one in batch] == ["ok", "overflow", "ok"]
     points = len(batch[1].t)

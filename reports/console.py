@@ -1,0 +1,58 @@
+"""The console as it is: text that it cannot show is written in ASCII, and no error message is endless."""
+
+from __future__ import annotations
+
+import codecs
+import sys
+import unicodedata
+from typing import Any, Final
+
+ASCII: Final = {
+    "≤": "<=", "≥": ">=", "≠": "!=", "≈": "~", "≪": "<<", "≫": ">>", "±": "+-", "∓": "-+", "−": "-", "–": "-", "—": "-",
+    "→": "->", "←": "<-", "↔": "<->", "⇒": "=>", "·": "*", "×": "x", "√": "sqrt", "∞": "inf", "∂": "d", "Δ": "Delta",
+    "α": "alpha", "β": "beta", "γ": "gamma", "δ": "delta", "ε": "eps", "θ": "theta", "λ": "lambda", "μ": "mu",
+    "µ": "u", "π": "pi", "ρ": "rho", "σ": "sigma", "τ": "tau", "φ": "phi", "χ": "chi", "ω": "omega", "Ω": "Omega",
+    "²": "^2", "³": "^3", "°": " deg", "‘": "'", "’": "'", "“": '"', "”": '"', "…": "...", "′": "'", "«": '"', "»": '"',
+    "Σ": "sum", "⁻": "^-", "↓": "v", "↑": "^", "✓": "ok", "✗": "x",
+}  # fmt: skip
+"""How a character is written where it cannot be shown."""
+
+HANDLER: Final = "flipproof"
+
+MOST_WORD: Final = 300
+MOST_LINE: Final = 2000
+"""Characters of a word, such as a path, and of a line in an error message."""
+
+
+def readable(words: str) -> str:
+    """Return an error message as one line of readable length: a word or a line without end loses its middle."""
+    return _cut(" ".join(_cut(word, MOST_WORD) for word in words.split()), MOST_LINE)
+
+
+def _cut(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 2 :]}"
+
+
+def speak_plainly() -> None:
+    """Let standard output and error write in ASCII what their encoding cannot show, instead of raising."""
+    codecs.register_error(HANDLER, _in_ascii)
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure: Any = getattr(stream, "reconfigure", None)
+        if reconfigure is not None:
+            reconfigure(errors=HANDLER)
+
+
+def _in_ascii(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    text = error.object[error.start : error.end]
+    return "".join(_plain(character) for character in text), error.end
+
+
+def _plain(character: str) -> str:
+    if character in ASCII:
+        return ASCII[character]
+    if unicodedata.combining(character):
+        return ""
+    # An accented letter without its accent; a surrogate, as of a file name that is no UTF-8, and all else as "?".
+    return unicodedata.normalize("NFKD", character).encode("ascii", "ignore").decode() or "?"

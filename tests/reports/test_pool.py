@@ -1,0 +1,50 @@
+"""A report's runs made by worker processes that may die."""
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from reports import pool
+from reports.pool import TRIES, make_all, workers
+from reports.processes import WorkerDiedError
+from reports.solvers import Run
+from slicemodel import Scenario
+
+
+def die_the_first_time(mark: Path) -> int:
+    """End this process, unless a process before it did so."""
+    if not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return os.getpid()
+
+
+def die_with_run_2(runs):
+    """Make runs as ``make_each`` does, but die with the run of tag "2"."""
+    if any(run.tag == "2" for run in runs):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return [pool.make(run) for run in runs]
+
+
+def test_a_call_whose_worker_died_once_is_made_again(tmp_path):
+    with workers(1) as processes:
+        assert processes.submit(die_the_first_time, tmp_path / "mark").result(timeout=60) != os.getpid()
+        with pytest.raises(WorkerDiedError, match="exit code -9"):
+            processes.submit(_always_die).result(timeout=60)
+        assert processes.submit(max, 1, 2).result(timeout=60) == 2
+
+
+def _always_die():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_only_the_run_that_kills_its_worker_is_lost_and_the_order_stays(monkeypatch):
+    monkeypatch.setattr(pool, "make_each", die_with_run_2)
+    runs = [Run(f"{n}", "eq8", Scenario(n_slices=n, duration=0.02)) for n in (1, 2, 3)]
+    with workers(2) as processes:
+        made = make_all(processes, runs, lambda *_: None)
+    assert list(made) == ["1", "2", "3"]
+    assert [result.trajectory is None for result in made.values()] == [False, True, False]
+    assert made["2"].reason == f"the worker process died {TRIES} times with this run (exit code -9)"

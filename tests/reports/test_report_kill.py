@@ -1,0 +1,88 @@
+"""A report killed at any moment: the next one finds the old report whole, and leaves no process and no folder."""
+
+import importlib.util
+import os
+import random
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from reports.output import UNFINISHED
+
+ROOT = Path(__file__).resolve().parents[2]
+
+SPEC = importlib.util.spec_from_file_location("sweep_kill", ROOT / "benchmarks" / "sweep_kill.py")
+sweep_kill = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(sweep_kill)
+
+STAND_IN = """
+import sys
+from pathlib import Path
+from reports.output import replaced_folder
+from reports.pool import make_all, workers
+from reports.solvers import Run
+from slicemodel import Scenario
+
+if __name__ == "__main__":
+    runs = [Run(f"{n}", "eq8", Scenario(n_slices=n, duration=0.05)) for n in range(1, 20)]
+    with replaced_folder(Path(sys.argv[-1]), "report") as folder:
+        with workers(2) as pool:
+            made = make_all(pool, runs, lambda *_: None)
+        for tag, run in made.items():
+            (folder / f"{tag}.txt").write_text(f"{run.trajectory.omega[-1]!r}")
+        (folder / "summary.json").write_text("whole")
+"""
+"""What a report does, in small: runs in the pool, then a folder."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _path():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(ROOT))
+        yield
+
+
+def kill_and_finish(command, target, moments):
+    """Run a command to its end, kill it at every moment [s], and run it once more; return how many kills fell in it."""
+    assert subprocess.run(command, cwd=ROOT, check=False, capture_output=True).returncode == 0
+    first = sorted(path.name for path in target.iterdir())
+    kills = 0
+    for moment in moments:
+        process = subprocess.Popen(
+            command, cwd=ROOT, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        time.sleep(moment)
+        kills += process.poll() is None
+        process.kill()
+        process.wait()
+        assert sweep_kill.left_over(process.pid) == []
+        assert {path.name for path in target.parent.iterdir()} <= {target.name, f"{target.name}{UNFINISHED}"}
+    process = subprocess.Popen(command, cwd=ROOT, start_new_session=True, stdout=subprocess.DEVNULL)
+    assert process.wait() == 0
+    assert sweep_kill.left_over(process.pid) == []
+    assert [path.name for path in target.parent.iterdir()] == [target.name]
+    assert sorted(path.name for path in target.iterdir()) == first
+    return kills
+
+
+def test_a_small_report_killed_three_times(tmp_path):
+    (tmp_path / "small.py").write_text(STAND_IN)
+    (tmp_path / "place").mkdir()
+    began = time.monotonic()
+    command = [sys.executable, str(tmp_path / "small.py"), str(tmp_path / "place" / "latest")]
+    subprocess.run(command, cwd=ROOT, check=True)
+    whole = time.monotonic() - began
+    chance = random.Random(3)
+    assert kill_and_finish(command, tmp_path / "place" / "latest", [chance.uniform(0.2, whole) for _ in range(3)])
+
+
+@pytest.mark.slow
+def test_ten_kills_of_a_report(tmp_path):
+    (tmp_path / "place").mkdir()
+    target = tmp_path / "place" / "latest"
+    command = [sys.executable, "-m", "reports.cli", "report", "--quick", "--slices", "4", "--out", str(target)]
+    chance = random.Random(int(os.environ.get("FLIPPROOF_SEED", "1")))
+    assert kill_and_finish(command, target, [chance.uniform(0.2, 8.0) for _ in range(10)]) >= 5
