@@ -175,10 +175,14 @@ def plan(throw: Scenario, size: Size) -> list[Run]:
     for prefix, scenario in ((f"{CHECK}, ", REFERENCE), ("", throw)):
         if size.second_method:
             other = {"method": size.second_method}
-            runs += [Run(f"{prefix}{m}, {size.second_method}", m, scenario, other) for m in CROSS_CHECKED]
+            runs += [
+                Run(f"{prefix}{m}, {size.second_method}", m, scenario, other, confirms=f"{prefix}{m}")
+                for m in CROSS_CHECKED
+            ]
         for model in reversed(LADDER):
-            runs.append(Run(f"{prefix}{model}, tighter", model, scenario, _tighter(scenario, model)))
-            runs.append(Run(f"{prefix}{model}", model, scenario))
+            tag = f"{prefix}{model}"
+            runs.append(Run(f"{tag}, tighter", model, scenario, _tighter(scenario, model), confirms=tag))
+            runs.append(Run(tag, model, scenario))
     runs += [Run(f"{CHECK}, ledger, {m}", m, REFERENCE.with_slices(LEDGER_SLICES), {"energy": True}) for m in LADDER]
     runs += plan_welded(REFERENCE.with_slices(WELDED_SLICES), ENGINE)
     runs.append(Run(f"{ENGINE}, 10 iterations", ENGINE, throw, {"iterations": 10}))
@@ -278,14 +282,18 @@ def run_bands(made: Mapping[str, Made]) -> dict[str, float]:
     """Return each flight's numerical band as a fraction of omega_0.
 
     A scheme at its number of steps is a definite program: its step error is a difference with a bar of its own, so its
-    band is zero. For a model it is the change under tenfold tighter tolerances or another method, and never less than
+    band is zero. For a model it is the largest change of omega in a run that was planned to confirm it
+    (``Run.confirms``: tolerances and rest speed a tenth, longest step a half; another method), and never less than
     MODEL_FLOOR; for an engine that of its certificate.
     """
     bands = dict.fromkeys(LIMITS, 0.0)
-    for tag, other in [(model, other) for model in LADDER for other in made if other.startswith(f"{model}, ")]:
-        usual, better = made[tag].trajectory, made[other].trajectory
-        if usual is not None and better is not None and usual.ok and better.ok:
-            bands[tag] = max(bands.get(tag, MODEL_FLOOR), study_difference(tag, usual, better).largest)
+    for better in made.values():
+        tag = better.run.confirms
+        if tag not in LADDER or tag not in made:
+            continue
+        usual, other = made[tag].trajectory, better.trajectory
+        if usual is not None and other is not None and usual.ok and other.ok:
+            bands[tag] = max(bands.get(tag, MODEL_FLOOR), study_difference(tag, usual, other).largest)
     for tag in instruments.WITNESSES:
         run = made[tag].trajectory if tag in made else None
         certificate = {} if run is None else run.diagnostics.get("certificate", {})

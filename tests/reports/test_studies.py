@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from reports import claims
-from reports.evidence import TOTAL, run_bands
+from reports.attribution import plan_attribution
+from reports.evidence import FULL, LADDER, TOTAL, plan, run_bands
 from reports.findings import Finding
 from reports.lead import lead_words
 from reports.solvers import Made, Run
@@ -218,17 +219,21 @@ def test_a_run_that_is_not_whole_is_not_evaluated_and_says_why():
 
 
 def test_bands_of_runs():
-    def made(omega, tag):
-        return Made(Run(tag, tag, SCENARIO), curve(omega, method=tag), 0.0)
+    def made(omega, solver, confirms=""):
+        return Made(Run(solver, solver, SCENARIO, confirms=confirms), curve(omega, method=solver), 0.0)
 
     runs = {
         "published-limit": made([20, 20], "published-limit"),
-        "published-limit, tighter": made([20, 20], "published-limit"),
+        "published-limit, tighter": made([20, 20], "published-limit", "published-limit"),
         "eq8": made([20, 20], "eq8"),
-        "eq8, tighter": made([20, 20 + 2e-6], "eq8"),
-        "eq8, Radau": made([20, 20 + 4e-6], "eq8"),
+        "eq8, tighter": made([20, 20 + 2e-6], "eq8", "eq8"),
+        "eq8, Radau": made([20, 20 + 4e-6], "eq8", "eq8"),
         "pymunk": made([20, 20], "pymunk"),
         "mujoco": made([20, 20], "mujoco"),
+        # Tags that begin like those above, of throws that are other throws on purpose.
+        "eq8, release changed by 1e-06 (+θ₀, +ω₀)": made([20, 20 + 2e-3], "eq8"),
+        "eq8, 100 slices": made([20, 21], "eq8"),
+        "check, eq8, tighter": made([20, 22], "eq8", "check, eq8"),
     }
     witness = runs["pymunk"].trajectory
     certified = dataclasses.replace(witness, diagnostics={"certificate": {"band": 2e-3}})
@@ -239,6 +244,21 @@ def test_bands_of_runs():
     assert bands["pymunk"] == 2e-3
     assert "mujoco" not in bands  # without a certificate there is none
     assert bands["published-python"] == 0.0
+
+
+def test_only_tighter_runs_of_the_same_throw_are_planned_to_confirm_a_run():
+    """A disturbed throw whose tag begins with a model's name once set that model's band: 1.3e-6 where 1e-9 holds."""
+    throw = Scenario().with_slices(6)
+    runs = [*plan(throw, FULL), *plan_attribution(throw, FULL.scope, FULL.steps)]
+    assert any(run.tag.startswith("eq8, release changed") and not run.confirms for run in runs)
+    of = {run.tag: run for run in runs}
+    confirming = [run for run in runs if run.confirms]
+    assert {run.confirms for run in confirming if run.confirms in LADDER} == set(LADDER)
+    for run in confirming:
+        confirmed = of[run.confirms]
+        assert (run.solver, run.scenario) == (confirmed.solver, confirmed.scenario)
+        tighter = run.settings.get("rtol", 1.0) <= 1e-11 and run.settings.get("rest_speed", 1.0) <= 1e-4
+        assert tighter or "method" in run.settings
 
 
 def named(name, first, second, size, **changes):
