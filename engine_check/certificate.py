@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from engine_check.refinement import Level, Runs, Verdict, search
 from engine_check.restitution import Rebound, measure_restitution
 from engine_check.solver import DEFAULT_TOLERANCE, checked_number
+from engine_check.witness import witness_of
 from slicemodel.scenario import Scenario, not_whole
 from slicemodel.trajectory import FloatArray, Trajectory, output_times
 
@@ -140,6 +141,7 @@ class Certificate:
         end = float(self.richardson[-1]) if len(self.richardson) else math.nan
         return {
             "engine": self.engine,
+            "witness": asdict(witness_of(self.settings)),
             "status": self.status,
             "reason": self.reason,
             "tolerance": self.tolerance,
