@@ -1,51 +1,137 @@
-"""The sentence at the top of the page: what differs most, under which assumption. Every word of it is computed."""
+"""The verdict in sentences, as the page, the summary and the front page print them. Every word follows from numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
-from reports.evidence import TOTAL
-from reports.studies.differences import PARTING_BAND, Difference, percent
-from slicemodel import Trajectory
+from reports.headlines import Headline
+from reports.studies.differences import PARTING_BAND, percent
 
 NOTHING = 1e-6
 """Fraction of omega_0 below which two solvers are said to agree."""
 
 
-def lead_words(differences: Sequence[Difference], free: Trajectory | None) -> str:
-    """Return the verdict in a few sentences of plain text.
+def lead_words(headlines: Sequence[Headline]) -> str:
+    """Return the verdict in a few sentences of plain text."""
+    return " ".join(sentences(headlines))
 
-    ``differences`` are those of the report, the total from the published program to free flight among them;
-    ``free`` is the run of free flight, or None if there is none.
-    """
-    total = next((d for d in differences if d.name == TOTAL), None)
-    parts = sorted((d for d in differences if d.name != TOTAL), key=lambda d: -d.largest)
-    if not parts:
-        return "No two solvers could be compared on this throw; the reasons stand below."
-    worst = parts[0]
-    if worst.largest < NOTHING and (total is None or total.largest < NOTHING):
-        return (
-            f"On this throw all solvers agree to {percent(max(worst.largest, total.largest if total else 0.0))} of ω₀."
-        )
-    sentences = []
-    if free is None or total is None:
-        sentences.append("Free flight could not be computed; the reason stands below.")
-    else:
-        until = "" if free.ok else f", up to t = {total.t[-1] * 1e3:.0f} ms, where {free.method} {free.status}"
-        sentences.append(
-            f"The published program and a free bottle differ by up to {percent(total.largest)} of ω₀ "
-            f"(at t = {total.largest_time * 1e3:.0f} ms{until})."
-        )
-    sentences.append(
-        f"The largest single part is {worst.name}: {percent(worst.largest)} of ω₀; the two {worst.moment}."
+
+def answers(headlines: Sequence[Headline]) -> Iterator[tuple[str, list[str]]]:
+    """Yield the questions of the front page, each answered by yes or no and its sentences."""
+    found = {headline.id: headline for headline in headlines}
+    held = [found[id_].value for id_ in ("held", "held-through") if id_ in found]
+    asked: tuple[tuple[str, Sequence[float], Iterator[str]], ...] = (
+        ("Is it justified to hold omega constant over a step?", held, _held(found)),
+        (
+            f"Are {found['step'].note if 'step' in found else ''} enough?",
+            [found["step"].value] if "step" in found else [],
+            _step(found),
+        ),
+        ("Is Eq. 8 free flight?", [found["eq8-free"].value] if "eq8-free" in found else [], _equations(found)),
     )
-    if total is not None and worst.largest > 1.2 * total.largest:
-        sentences.append("The parts partly cancel.")
-    step = next((d for d in parts if d.first == "published-python" and d.second == "published-limit"), None)
-    if step is not None and step is not worst:
-        trusted = "stays within" if step.largest <= PARTING_BAND else "exceeds"
-        sentences.append(
-            f"Holding omega constant over a step costs {percent(step.largest)} at this number of steps and {trusted} "
-            f"{percent(PARTING_BAND)}."
+    for question, values, said in asked:
+        if values:
+            within = max(values) <= PARTING_BAND
+            yield (
+                f"{question} {'Yes' if within else 'No'}, {'within' if within else 'not within'} {percent(PARTING_BAND)}.",
+                list(said),
+            )
+    if "share" in found:
+        yield "Which assumption matters most?", list(_shares(found))
+    if "engine" in found:
+        yield (
+            "Does a physics engine agree?",
+            [f"Event-driven free flight and pymunk as it is differ in ω by up to {amount(found['engine'])}."],
         )
-    return " ".join(sentences)
+
+
+def sentences(headlines: Sequence[Headline]) -> Iterator[str]:
+    """Yield the verdict sentence by sentence; each can be read alone."""
+    found = {headline.id: headline for headline in headlines}
+    compared = [h.value for h in headlines if h.measure == "largest" and h.id in ("whole", "pair", "program-eq8")]
+    if not compared:
+        yield "No two solvers could be compared on this throw; the reasons stand below."
+        return
+    if max(compared) < NOTHING:
+        yield f"On this throw all solvers agree to {percent(max(compared))} of ω₀."
+        return
+    yield from _equations(found)
+    yield from _shares(found)
+    yield from _held(found)
+    yield from _step(found)
+
+
+def _equations(found: Mapping[str, Headline]) -> Iterator[str]:
+    whole, eq8 = found.get("whole"), found.get("program-eq8")
+    if whole is None:
+        yield "Free flight could not be computed; the reason stands below."
+    else:
+        until = f" {whole.note}" if whole.note else ""
+        yield f"The published program and free flight differ in ω by up to {amount(whole)}{until}."
+    if eq8 is not None:
+        times = "" if whole is None or not whole.value > 0.0 else f", {eq8.value / whole.value:.2g} times as far"
+        yield f"The published program and Eq. 8 differ in ω by up to {amount(eq8)}{times}."
+    free = found.get("eq8-free")
+    if free is not None:
+        yield f"Eq. 8 and free flight differ in ω by up to {amount(free)}."
+
+
+def _shares(found: Mapping[str, Headline]) -> Iterator[str]:
+    share, away, pair = found.get("share"), found.get("away"), found.get("pair")
+    if share is not None:
+        yield (
+            "Of the six assumptions between the program and free flight, the largest fair share of the change of the "
+            f"mean ω in the second half is that of “{share.what}”: {amount(share)} as the mean over all orders of "
+            f"mending, {signed(share.low)} to {signed(share.high)} in single orders."
+        )
+    if away is not None:
+        mean = found["away-share"]
+        yield (
+            f"Mended in the order of the ladder, “{away.what}” moves that mean away from free flight, by "
+            f"{signed(away.value)} of ω₀; its fair share is {signed(mean.value)}."
+        )
+    if pair is not None:
+        yield (
+            f"The largest difference in ω between neighbours on the ladder is that of “{pair.what}”, "
+            f"{amount(pair)}; it is not a share of the whole."
+        )
+
+
+def _held(found: Mapping[str, Headline]) -> Iterator[str]:
+    held, through = found.get("held"), found.get("held-through")
+    if held is not None:
+        yield (
+            "Before the first impact, holding ω, θ and the centre of mass constant over a step costs the published "
+            f"program, without its lag, {amount(held)} at {held.note}."
+        )
+    if through is not None:
+        yield (
+            "Through all impacts, holding them and the velocity of the centre of mass costs the exact step, with its "
+            f"rebounds located inside the step, {amount(through)} at {through.note}."
+        )
+
+
+def _step(found: Mapping[str, Headline]) -> Iterator[str]:
+    step = found.get("step")
+    if step is not None:
+        yield (
+            "All that a finite step does in the published program (coefficients held, J and the centre of mass a step "
+            f"behind, rebounds that wait for the grid) costs {amount(step)} at {step.note}."
+        )
+
+
+def amount(headline: Headline) -> str:
+    """Return a number with what belongs to it, as in "13 % of ω₀ (N = 50; 12 % at N = 100)"."""
+    share = headline.measure in ("share", "order")
+    text = signed if share else percent
+    more = ""
+    if headline.finer is not None and headline.finer_slices is not None:
+        more = f"; {text(headline.finer)} at N = {headline.finer_slices}"
+    return f"{text(headline.value)} of ω₀ (N = {headline.slices}{more})"
+
+
+def signed(share: float | None) -> str:
+    """Return a fraction with its sign, two digits; a dash if there is none."""
+    if share is None:
+        return "–"
+    return f"{'+' if share >= 0 else '−'}{percent(abs(share))}"

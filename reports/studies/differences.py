@@ -43,6 +43,10 @@ class Difference:
         Last impact at or before the parting, in the run given for it.
     band : float or None
         Numerical uncertainty of ``largest``: the sum of the two runs' own.
+    slices : int
+        Slices of both runs.
+    finer : (int, float) or None
+        ``largest`` of the same two solvers at another number of slices, and that number; None if not computed.
     """
 
     name: str
@@ -58,6 +62,8 @@ class Difference:
     parting_time: float | None
     parting_impact: Impact | None
     band: float | None = None
+    slices: int
+    finer: tuple[int, float] | None = None
 
     @property
     def moment(self) -> str:
@@ -78,11 +84,13 @@ def study_difference(
     *,
     impacts_of: Trajectory | None = None,
     band: float | None = None,
+    finer: tuple[Trajectory, Trajectory] | None = None,
 ) -> Difference:
     """Compare two runs of one throw.
 
     The two are compared on the first run's times, up to where the shorter one ends; the second is interpolated
-    linearly if its times differ. ``impacts_of`` is the run whose impacts the parting is set against.
+    linearly if its times differ. ``impacts_of`` is the run whose impacts the parting is set against; ``finer`` are the
+    same two solvers at more slices.
     """
     end = min(first.t[-1], second.t[-1])
     t = first.t[first.t <= end]
@@ -106,6 +114,8 @@ def study_difference(
         parting_time=parting,
         parting_impact=_last_impact(parting, impacts_of),
         band=band,
+        slices=first.scenario.n_slices,
+        finer=None if finer is None else (finer[0].scenario.n_slices, study_difference(name, *finer).largest),
     )
 
 
