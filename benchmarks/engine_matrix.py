@@ -3,7 +3,7 @@
     python benchmarks/engine_matrix.py                       all of them; half an hour of processor time
     python benchmarks/engine_matrix.py --jobs 2              in two processes
     python benchmarks/engine_matrix.py --slices 2 10         a part; --restitution, --bottle, --drag likewise
-    python benchmarks/engine_matrix.py --drag dry --hits located   pymunk's hybrid, which has no drag, in place of pymunk
+    python benchmarks/engine_matrix.py --drag dry --hits located   pymunk's hybrid, without drag
 
 Prints a table and writes ``benchmarks/results/engine_matrix.json``. Both solve the simultaneous law of impact. The band
 of free flight is what a tenth of its rest speed changes; the engine's is its certificate's. Status 1 if a throw misses.

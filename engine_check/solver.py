@@ -41,8 +41,8 @@ ENGINES: Final[Mapping[str, Engine]] = MappingProxyType(
                 name="pymunk",
                 module="engine_check.engine_pymunk",
                 equation="free flight: Newton's equations of a rigid tube and N point masses in the lab frame",
-                reason="Bodies, joints and contacts of the engine in the lab frame: no equation of motion and no law of "
-                "impact of ours enters, so that the moving origin and the recoil of the tube follow from the engine "
+                reason="Bodies, joints and contacts of the engine in the lab frame: no equation of motion and no law "
+                "of impact of ours enters, so that the moving origin and the recoil of the tube follow from the engine "
                 "alone. A hit on an end is answered at the next step of the grid.",
                 frames=("free", "rotating"),
                 contacts=("overlap", "exclude"),
@@ -53,8 +53,8 @@ ENGINES: Final[Mapping[str, Engine]] = MappingProxyType(
                 module="engine_check.engine_mujoco",
                 equation="free flight: a tree of joints in generalised coordinates, in the lab frame",
                 reason="The engine's equations of motion in generalised coordinates, by Runge-Kutta steps: the masses "
-                "cannot leave the axis. Impacts are ours: our simultaneous law, solved with the engine's mass matrix at "
-                "times that we locate.",
+                "cannot leave the axis. Impacts are ours: our simultaneous law, solved with the engine's mass matrix "
+                "at times that we locate.",
             ),
         )
     }

@@ -62,6 +62,6 @@ WITNESSES: Final[Mapping[tuple[str, str, str], Witness]] = MappingProxyType(
 
 
 def witness_of(settings: Mapping[str, Any]) -> Witness:
-    """Return what a run with these ``settings`` bears witness of; ice, which has no hits, as with those of its engine."""
+    """Return what a run with these ``settings`` bears witness of; ice has no hits and counts as its engine does."""
     offered = {key: witness for key, witness in WITNESSES.items() if key[:2] == (settings["engine"], settings["frame"])}
     return offered.get((settings["engine"], settings["frame"], settings["hits"]), next(iter(offered.values())))

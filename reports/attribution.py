@@ -60,8 +60,9 @@ FILLS: Final = (0.1, 0.25, 0.4, 0.55, 0.75, 1.0)
 class Scope:
     """How much of it.
 
-    Slices of the waterfall (those of the throw, if they are fewer) and of the maps; columns and rows of the maps (none: no maps); sizes of the changed
-    releases; models held against exact solutions; pairs of scheme and equation whose error is fitted.
+    Slices of the waterfall (those of the throw, if they are fewer) and of the maps; columns and rows of the maps (none:
+    no maps); sizes of the changed releases; models held against exact solutions; pairs of scheme and equation whose
+    error is fitted.
     """
 
     waterfall_slices: int
@@ -113,7 +114,7 @@ def plan_attribution(throw: Scenario, scope: Scope, steps: int) -> list[Run]:
     runs += [Run(f"ledger, {model}", model, few, {"energy": True}) for model in LADDER]
     small = throw.with_slices(scope.map_slices)
     for axis, values in axes_of(scope):
-        runs += plan_map(small, axis, scope.fills, values, steps=steps, tolerances=COARSE)
+        runs += plan_map(small, axis, scope.fills, values, steps=steps, tolerances=COARSE, shares=True)
     return list({run.tag: run for run in runs}.values())
 
 
@@ -198,7 +199,7 @@ def study_attribution(
     }
     maps = [
         attempt(f"map over {axis}", lambda axis=axis, values=values: study_map(  # type: ignore[misc]
-            small, axis, scope.fills, values, made, steps=steps
+            small, axis, scope.fills, values, made, steps=steps, shares=True
         ))
         for axis, values in axes_of(scope)
     ]  # fmt: skip

@@ -44,9 +44,10 @@ def _draw_waterfall(found: Attribution) -> Exhibit:
         section="assumptions",
         title="From the published program to free flight",
         caption=(
-            "Left: each bar is what mending one more assumption changes; blue raises, orange lowers. Right: the "
-            "same in other orders. Where the three marks lie apart the assumptions interact, and only the mean "
-            "over all orders is a fair share. Error bars are numerical."
+            f"At N = {waterfall.slices} slices. Left: each bar is the fair share of one assumption, the mean over all "
+            "orders in which the assumptions can be mended; blue raises, orange lowers. Right: the same assumption in "
+            "single orders. Where the marks lie apart the assumptions interact, and the bar of one order is not a "
+            "share. Error bars are numerical."
         ),
         alt=f"Waterfall of the mean of omega over omega_0 in the second half: from {waterfall.start:.3f} to "
         f"{waterfall.end:.3f}. Means over all orders: {bars}. The largest is {largest.name}.",
@@ -132,6 +133,7 @@ def _draw_predictability(found: Attribution) -> Exhibit:
 def _draw_maps(found: Attribution) -> Iterator[Exhibit]:
     for study in found.maps:
         dominant = study.dominant
+        which = "step down the ladder" if study.shares is None else "fair share (mean over all orders of mending)"
         contours = (
             "the contours are where a scheme is 1 % and 10 % of ω₀ off its own equation."
             if study.axis == "step"
@@ -144,11 +146,11 @@ def _draw_maps(found: Attribution) -> Iterator[Exhibit]:
             name=f"map-{study.axis}",
             section="maps",
             title=f"Validity over filling and {AXES[study.axis]}",
-            caption="Every cell is a throw. Its colour names the assumption that moves the plateau of ω most; "
-            f"{contours} Hatched cells could not be computed.",
+            caption=f"Every cell is a throw. Its colour names the assumption with the largest {which} in the plateau, "
+            f"the mean of ω/ω₀ over the second half; {contours} Hatched cells could not be computed.",
             alt=f"Map of {dominant.size} throws of {study.slices} slices, fill fraction {study.fills[0]:g} to "
-            f"{study.fills[-1]:g} by {AXES[study.axis]} {study.values[0]:g} to {study.values[-1]:g}. Cells by largest "
-            f"mistake: {counts or 'none could be computed'}. {_within(study)}",
+            f"{study.fills[-1]:g} by {AXES[study.axis]} {study.values[0]:g} to {study.values[-1]:g}. Cells by "
+            f"largest {which}: {counts or 'none could be computed'}. {_within(study)}",
             maker=figure_map,
             data=(study,),
             table=tables.table_map(study),

@@ -8,7 +8,9 @@ interruption, and writes ``explore_data.json`` beside this file: one file of the
     place of a throw in every list = (restitution * gammas + gamma) * fills + fill
     omega                 per solver of SHOWN: omega / omega_0 at ``points`` equal times, in steps of OMEGA_STEP
     plateau               per entry of LADDER: mean of omega / omega_0 over the second half, in steps of PLATEAU_STEP
-    dominant              index into RUNGS of the largest mistake, MISSING_RUNG where a run failed
+    shares                per entry of RUNGS: 1 + its fair share of the plateau (mean over all orders of mending), in
+                          steps of SHARE_STEP
+    dominant              index into RUNGS of the largest fair share in size, MISSING_RUNG where a run failed
     problems              place -> why a run of that throw cannot be used
 
 Numbers are whole numbers of steps, little-endian and unsigned, in base64; the largest of their type means "missing".
@@ -39,7 +41,7 @@ from reports.sweep.work import code_identity
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
-VERSION: Final = 1
+VERSION: Final = 2
 FILE: Final = "explore_data.json"
 
 SHOWN: Final = ("published-python", "eq8", "free-flight")
@@ -56,6 +58,7 @@ POINTS: Final = 61
 
 OMEGA_STEP: Final = 1e-4
 PLATEAU_STEP: Final = 2e-5
+SHARE_STEP: Final = 1e-4
 MISSING: Final = 0xFFFF
 MISSING_RUNG: Final = 0xFF
 
@@ -83,13 +86,14 @@ GRID: Final = Grid(
 
 
 def plan(throw: Scenario, grid: Grid) -> list[list[Run]]:
-    """Return the runs for each restitution: the ladder on every cell of a validity map over fill and gamma.
+    """Return the runs for each restitution: every set of assumptions on every cell of a map over fill and gamma.
 
     The tags of one restitution are unique; two restitutions share theirs.
     """
     dampings = _dampings(throw, grid)
     throws = [replace(throw, restitution=restitution) for restitution in grid.restitutions]
-    return [plan_map(t, "gamma", grid.fills, dampings, steps=STEPS, tolerances=MEDIUM, points=None) for t in throws]
+    how: dict[str, Any] = {"steps": STEPS, "tolerances": MEDIUM, "points": None, "shares": True}
+    return [plan_map(t, "gamma", grid.fills, dampings, **how) for t in throws]
 
 
 def compute(
@@ -128,11 +132,15 @@ def pack(
     shape = grid.shape
     omega = {name: np.full((*shape, points), np.nan) for name in SHOWN}
     plateau = {name: np.full(shape, np.nan) for name in LADDER}
+    shares = {name: np.full(shape, np.nan) for name in RUNGS}
     dominant = np.full(shape, MISSING_RUNG, dtype=np.uint8)
     problems: dict[str, str] = {}
     for at, (runs, rows) in enumerate(zip(planned, read, strict=True)):
         readings = {tag: _reading(row) for tag, row in rows.items()}
-        study = study_readings(throw, "gamma", grid.fills, _dampings(throw, grid), readings, steps=STEPS)
+        study = study_readings(throw, "gamma", grid.fills, _dampings(throw, grid), readings, steps=STEPS, shares=True)
+        assert study.shares is not None
+        for name, share in zip(RUNGS, study.shares, strict=True):
+            shares[name][at] = share
         dominant[at] = np.where(study.dominant < 0, MISSING_RUNG, study.dominant)
         for name in LADDER:
             plateau[name][at] = study.level[name]
@@ -158,8 +166,10 @@ def pack(
         "rungs": list(RUNGS),
         "omega_step": OMEGA_STEP,
         "plateau_step": PLATEAU_STEP,
+        "share_step": SHARE_STEP,
         "omega": {name: encoded(values, OMEGA_STEP) for name, values in omega.items()},
         "plateau": {name: encoded(values, PLATEAU_STEP) for name, values in plateau.items()},
+        "shares": {name: encoded(1.0 + values, SHARE_STEP) for name, values in shares.items()},
         "dominant": base64.b64encode(dominant.tobytes()).decode("ascii"),
         "problems": problems,
     }

@@ -32,10 +32,8 @@ def answers(headlines: Sequence[Headline]) -> Iterator[tuple[str, list[str]]]:
     for question, values, said in asked:
         if values:
             within = max(values) <= PARTING_BAND
-            yield (
-                f"{question} {'Yes' if within else 'No'}, {'within' if within else 'not within'} {percent(PARTING_BAND)}.",
-                list(said),
-            )
+            verdict = f"Yes, within {percent(PARTING_BAND)}." if within else f"No, not within {percent(PARTING_BAND)}."
+            yield f"{question} {verdict}", list(said)
     if "share" in found:
         yield "Which assumption matters most?", list(_shares(found))
     if "engine" in found:

@@ -3,7 +3,8 @@
     python -m reports.snapshot               make a full report and keep its summary and key pictures
     python -m reports.snapshot --from DIR    the same from a full report that is already there
 
-Both also write the numbers of the summary into the README, between its two marks. Run times, settings and figures are left out of the summary; what stays is compared with the code by the tests.
+Both also write the numbers of the summary into the README, between its two marks. Run times, settings and figures are
+left out of the summary; what stays is compared with the code by the tests.
 """
 
 from __future__ import annotations

@@ -16,14 +16,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from itertools import combinations
 from types import MappingProxyType
-from typing import Final
-
-import numpy as np
+from typing import Final, TypeVar
 
 from ode_reference.switches import Switches
 from reports.solvers import Run
 from reports.studies.slices import FINER, finer_tag
 from slicemodel import Scenario, Trajectory, observables
+from slicemodel.trajectory import FloatArray
 
 PROGRAM: Final = "published-python"
 
@@ -38,6 +37,8 @@ NAMES: Final = MappingProxyType(
     }
 )
 """Switch -> the assumption it mends, in the order of the ladder."""
+
+Value = TypeVar("Value", float, FloatArray)
 
 STEP: Final = "step size of the program"
 PROGRAM_TAG: Final = "waterfall, program"
@@ -119,7 +120,7 @@ class Bar:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Waterfall:
-    """The split of one observable at ``slices``. ``residual`` is the largest |total - sum of bars| of the three splits."""
+    """The split of one observable at ``slices``; ``residual`` is the largest |total - sum of bars| of the splits."""
 
     observable: Observable
     slices: int
@@ -242,14 +243,14 @@ def _split(observable: Observable, observed: Mapping[str, float], slices: int) -
                 name=NAMES[name],
                 forward=_change(name, before, values),
                 backward=_change(name, after, values),
-                average=_average(name, values),
+                average=fair_share(name, values),
                 low=min(changes),
                 high=max(changes),
                 forward_band=bands[_with(before)] + bands[_with([*before, name])],
                 average_band=sum(
                     weight * (bands[_with(chosen)] + bands[_with([*chosen, name])]) for chosen, weight in _others(name)
                 ),
-                finer=_average(name, finer),
+                finer=fair_share(name, finer),
             )
         )
     total = values[everything] - start
@@ -273,7 +274,7 @@ def _with(names: list[str] | tuple[str, ...]) -> Switches:
     return Switches(**dict.fromkeys(names, True))
 
 
-def _change(name: str, others: list[str] | tuple[str, ...], values: Mapping[Switches, float]) -> float:
+def _change(name: str, others: list[str] | tuple[str, ...], values: Mapping[Switches, Value]) -> Value:
     """Return what switching ``name`` on changes when ``others`` are on."""
     return values[_with([*others, name])] - values[_with(others)]
 
@@ -288,6 +289,7 @@ def _others(name: str) -> Iterator[tuple[tuple[str, ...], float]]:
             yield chosen, weight
 
 
-def _average(name: str, values: Mapping[Switches, float]) -> float:
-    """Return the mean of ``_change`` over all orders."""
-    return float(np.sum([weight * _change(name, chosen, values) for chosen, weight in _others(name)]))
+def fair_share(name: str, values: Mapping[Switches, Value]) -> Value:
+    """Return what switching ``name`` on changes, as the mean over all orders (the Shapley value), of values by set."""
+    shares = [weight * _change(name, chosen, values) for chosen, weight in _others(name)]
+    return sum(shares[1:], shares[0])
