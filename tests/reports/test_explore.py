@@ -15,6 +15,7 @@ from reports.explore import (
     OMEGA_STEP,
     PLATEAU_STEP,
     POINTS,
+    SHARE_STEP,
     SHOWN,
     SLICES,
     Grid,
@@ -76,13 +77,23 @@ def test_the_file_holds_what_the_solvers_say_now(data, place):
 
 
 @pytest.mark.xdist_group("explore")
-def test_the_largest_mistake_of_a_throw_is_the_one_its_ladder_has(data):
+def test_the_plateaus_of_a_throw_are_those_of_its_ladder(data):
     place = drawn_places()[0]
     flights = [make(run_of(place, name)).trajectory for name in LADDER]
     levels = np.array([plateau(flight.t, flight.omega, THROW.omega0) for flight in flights])
     kept = np.array([decoded(data["plateau"][name], data["plateau_step"])[place] for name in LADDER])
     assert kept == pytest.approx(levels, abs=PLATEAU_STEP / 2 + ROUND_OFF)
-    assert base64.b64decode(data["dominant"])[place] == np.abs(np.diff(levels)).argmax()
+
+
+def test_fair_shares_sum_to_the_whole_and_the_largest_gives_its_colour(data):
+    shares = np.array([decoded(data["shares"][name], data["share_step"]) - 1.0 for name in RUNGS])
+    ends = [decoded(data["plateau"][name], data["plateau_step"]) for name in (LADDER[-1], LADDER[0])]
+    whole = np.isfinite(shares).all(axis=0)
+    assert whole.sum() > 0.95 * shares.shape[1]
+    assert shares.sum(axis=0)[whole] == pytest.approx((ends[0] - ends[1])[whole], abs=len(RUNGS) * SHARE_STEP)
+    dominant = np.frombuffer(base64.b64decode(data["dominant"]), dtype=np.uint8)
+    largest = np.abs(shares).max(axis=0)
+    assert np.abs(shares)[dominant[whole], np.flatnonzero(whole)] == pytest.approx(largest[whole], abs=SHARE_STEP)
 
 
 def test_the_file_is_of_this_grid_and_whole(data):
@@ -195,7 +206,9 @@ def test_the_command_makes_the_file_and_goes_on_with_a_store(tmp_path, monkeypat
         return lambda *_: None
 
     again = explore.compute(Scenario().with_slices(3), explore.GRID, store, begin, jobs=1)
-    assert begun == [(len(LADDER) + 1, len(LADDER) + 1)]
+    runs = len(plan(Scenario().with_slices(3), explore.GRID)[0])
+    assert begun == [(runs, runs)]
+    assert runs == 2 + 40  # both schemes, and every equation that the six assumptions make
     assert again == first
 
 

@@ -9,9 +9,8 @@ import pytest
 
 from reports import claims
 from reports.attribution import plan_attribution
-from reports.evidence import FULL, LADDER, TOTAL, plan, run_bands
+from reports.evidence import FULL, LADDER, plan, run_bands
 from reports.findings import Finding
-from reports.lead import lead_words
 from reports.solvers import Made, Run
 from reports.studies.differences import first_crossing, study_difference
 from reports.studies.ice import study_ice
@@ -259,33 +258,3 @@ def test_only_tighter_runs_of_the_same_throw_are_planned_to_confirm_a_run():
         assert (run.solver, run.scenario) == (confirmed.solver, confirmed.scenario)
         tighter = run.settings.get("rtol", 1.0) <= 1e-11 and run.settings.get("rest_speed", 1.0) <= 1e-4
         assert tighter or "method" in run.settings
-
-
-def named(name, first, second, size, **changes):
-    difference = study_difference(name, curve([20, 20], method=first), curve([20, 20 - 20 * size], method=second))
-    return dataclasses.replace(difference, **changes)
-
-
-def test_the_lead_says_what_the_numbers_say():
-    engine = curve([20, 20], method="pymunk")
-    total = named(TOTAL, "published-python", "pymunk", 0.13)
-    step = named("step size", "published-python", "published-limit", 0.005)
-    form = named("model form", "eq8", "pymunk", 0.55)
-    words = lead_words([total, step, form], engine)
-    assert "differ by up to 13 % of ω₀" in words
-    assert "largest single part is model form: 55 %" in words
-    assert "partly cancel" in words
-    assert "costs 0.5 % at this number of steps and stays within 1 %" in words
-    assert "partly cancel" not in lead_words([named(TOTAL, "a", "b", 0.6), form], engine)
-    assert "exceeds 1 %" in lead_words([total, named("s", "published-python", "published-limit", 0.02), form], engine)
-
-
-def test_the_lead_knows_ice_divergence_and_nothing_at_all():
-    engine = curve([20, 20], method="pymunk")
-    none = [named(TOTAL, "a", "b", 0.0), named("x", "c", "d", 1e-9)]
-    assert "all solvers agree" in lead_words(none, engine)
-    burst = dataclasses.replace(engine, status="diverged")
-    words = lead_words([named(TOTAL, "a", "b", 0.02), named("x", "c", "d", 0.1)], burst)
-    assert "up to t = 500 ms, where pymunk diverged" in words
-    assert "Free flight could not be computed" in lead_words([named("x", "c", "d", 0.1)], None)
-    assert "No two solvers could be compared" in lead_words([], None)
