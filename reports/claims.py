@@ -200,7 +200,7 @@ def claim_waterfall(waterfall: Waterfall) -> Finding:
         note=f"largest fair share (mean over all orders): {largest.name}, {largest.average:+.3g} ± "
         f"{largest.average_band:.1g}, from {largest.low:+.3g} to {largest.high:+.3g} in single orders, at "
         f"N = {waterfall.slices}"
-        + (f", {largest.finer:+.3g} at N = {FINER * waterfall.slices}" if math.isfinite(largest.finer) else "")
+        + (f", {largest.finer:+.3g} at N = {FINER * waterfall.slices}" if largest.finer is not None else "")
         + f"; the bars miss the whole by {waterfall.residual:.1g}",
     )
 

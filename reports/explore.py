@@ -9,8 +9,9 @@ interruption, and writes ``explore_data.json`` beside this file: one file of the
     omega                 per solver of SHOWN: omega / omega_0 at ``points`` equal times, in steps of OMEGA_STEP
     plateau               per entry of LADDER: mean of omega / omega_0 over the second half, in steps of PLATEAU_STEP
     shares                per entry of RUNGS: 1 + its fair share of the plateau (mean over all orders of mending), in
-                          steps of SHARE_STEP
-    dominant              index into RUNGS of the largest fair share in size, MISSING_RUNG where a run failed
+                          steps of SHARE_STEP; missing in a file in which only the ladder was flown
+    dominant              index into RUNGS of the largest fair share in size, without shares of the largest step down
+                          the ladder; MISSING_RUNG where a run failed
     problems              place -> why a run of that throw cannot be used
 
 Numbers are whole numbers of steps, little-endian and unsigned, in base64; the largest of their type means "missing".
@@ -41,7 +42,7 @@ from reports.sweep.work import code_identity
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
-VERSION: Final = 2
+VERSION: Final = 1
 FILE: Final = "explore_data.json"
 
 SHOWN: Final = ("published-python", "eq8", "free-flight")
@@ -59,6 +60,10 @@ POINTS: Final = 61
 OMEGA_STEP: Final = 1e-4
 PLATEAU_STEP: Final = 2e-5
 SHARE_STEP: Final = 1e-4
+FAIR_SHARE: Final = "fair share (mean over all orders of mending)"
+LADDER_STEP: Final = "step down the ladder (no share: another order gives another number)"
+"""What the number of an assumption is, with and without the combinations of assumptions."""
+
 MISSING: Final = 0xFFFF
 MISSING_RUNG: Final = 0xFF
 
@@ -221,10 +226,15 @@ def decoded(text: str, step: float) -> FloatArray:
 def page_data() -> dict[str, Any] | None:
     """Return what the page needs, ready for JSON: the data file and, as "start", where the sliders begin; or None.
 
+    "measure" says in words what the number of an assumption is.
+
     The sliders begin at the throw nearest the one that the file varies; "start" says in numbers what they show there.
     """
     data = load()
-    return None if data is None else {**data, "start": _start(data)}
+    if data is None:
+        return None
+    measure = FAIR_SHARE if "shares" in data else LADDER_STEP
+    return {**data, "start": _start(data), "measure": measure}
 
 
 def _start(data: Mapping[str, Any]) -> dict[str, Any]:

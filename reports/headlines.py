@@ -115,7 +115,7 @@ def _shares(waterfall: Waterfall) -> Iterator[Headline]:
     bars = [bar for bar in waterfall.bars if bar.name != STEP]
 
     def headline(id_: str, bar: Bar, measure: Measure) -> Headline:
-        finer = bar.finer if measure == "share" and math.isfinite(bar.finer) else None
+        finer = bar.finer if measure == "share" else None
         return Headline(
             id=id_,
             what=bar.name,

@@ -21,7 +21,7 @@
     ([name, text]) => [name, Array.from(chart.numbers(text, Uint16Array), known(step))]));
   const omega = unpacked(data.omega, data.omega_step);
   const plateau = unpacked(data.plateau, data.plateau_step);
-  const shares = unpacked(data.shares, data.share_step);
+  const shares = data.shares && unpacked(data.shares, data.share_step);
   const dominant = chart.bytes(data.dominant);
   const times = Array.from({ length: data.points }, (_, k) => (k * data.duration) / (data.points - 1));
   const highest = Math.max(1, ...Object.values(omega).flat().filter(Number.isFinite));
@@ -44,7 +44,7 @@
   function mistakes(at) {
     return data.rungs.map((name, k) => ({
       name, letter: letters[k], colour: COLOURS[k % COLOURS.length],
-      share: shares[name][at] - 1,
+      share: shares ? shares[name][at] - 1 : plateau[data.ladder[k + 1]][at] - plateau[data.ladder[k]][at],
     }));
   }
 
@@ -150,7 +150,7 @@
     const errors = data.solvers.slice(0, -1).map(
       (name) => `${name} misses free flight by ${percent(Math.abs(plateau[name][at] - plateau[free][at]))} of ω₀`);
     const cell = rung === MISSING_RUNG ? `The map has no answer here: ${problem}.`
-      : `The largest fair share here: ${data.rungs[rung]}, ${signed(mistakes(at)[rung].share)} of ω₀.`;
+      : `The largest ${data.measure} here: ${data.rungs[rung]}, ${signed(mistakes(at)[rung].share)} of ω₀.`;
     find("said").textContent = `Filled to ${fill}, γ = ${gamma}, e = ${restitution}: on the plateau ${errors.join(", ")}. ${cell}`;
   }
 

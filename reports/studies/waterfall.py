@@ -98,7 +98,7 @@ class Bar:
     """What mending one assumption changes, in the units of the observable; a band is numerical uncertainty.
 
     ``forward`` in the order of the ladder, ``backward`` in reverse; ``average``, the fair share, is the mean over all
-    orders, between ``low`` and ``high`` in single ones; ``finer`` is the average at ``FINER`` times the slices, NaN if
+    orders, between ``low`` and ``high`` in single ones; ``finer`` is the average at ``FINER`` times the slices, None if
     that was not computed.
     """
 
@@ -110,7 +110,7 @@ class Bar:
     high: float
     forward_band: float
     average_band: float
-    finer: float = math.nan
+    finer: float | None = None
 
     @property
     def interaction(self) -> float:
@@ -216,7 +216,8 @@ def _split(observable: Observable, observed: Mapping[str, float], slices: int) -
         usual = _tag("usual", switches)
         values[switches] = observed[usual]
         bands[switches] = abs(values[switches] - observed[_tag("loose", switches)])
-        finer[switches] = observed.get(finer_tag(usual), math.nan)
+        if finer_tag(usual) in observed:
+            finer[switches] = observed[finer_tag(usual)]
     start = observed[PROGRAM_TAG]
     none, everything = Switches(), Switches(*[True] * len(NAMES))
     step = values[none] - start
@@ -230,7 +231,7 @@ def _split(observable: Observable, observed: Mapping[str, float], slices: int) -
             high=step,
             forward_band=bands[none],
             average_band=bands[none],
-            finer=finer[none] - observed.get(finer_tag(PROGRAM_TAG), math.nan),
+            finer=finer[none] - observed[finer_tag(PROGRAM_TAG)] if finer else None,
         )
     ]
     order = [field.name for field in fields(Switches)]
@@ -250,7 +251,7 @@ def _split(observable: Observable, observed: Mapping[str, float], slices: int) -
                 average_band=sum(
                     weight * (bands[_with(chosen)] + bands[_with([*chosen, name])]) for chosen, weight in _others(name)
                 ),
-                finer=fair_share(name, finer),
+                finer=fair_share(name, finer) if finer else None,
             )
         )
     total = values[everything] - start
