@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Final, Literal
 
-from reports.evidence import EQ8_FREE, FREE, PROGRAM_EQ8, TOTAL, Evidence
+from reports.evidence import BY_ENGINE, EQ8_FREE, FREE, PROGRAM_EQ8, TOTAL, Evidence
 from reports.studies.differences import Difference
 from reports.studies.finite_step import EVERYTHING, HELD, LOCATED
 from reports.studies.slices import FINER
@@ -29,8 +29,6 @@ MEASURES: Final[Mapping[Measure, str]] = {
     "share": "fair share: mean over all orders of mending the assumptions",
     "order": "change in the order of the ladder, which is no share",
 }
-
-ENGINE_PAIR: Final = "the engine's own error"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +96,7 @@ def _ended(evidence: Evidence) -> str:
 def _pairs(differences: Sequence[Difference], ended: str) -> Iterator[Headline]:
     named = {difference.name: difference for difference in differences}
     rungs = [named[name] for name in NAMES.values() if name in named]
-    wanted = {"whole": TOTAL, "program-eq8": PROGRAM_EQ8, "eq8-free": EQ8_FREE, "engine": ENGINE_PAIR}
+    wanted = {"whole": TOTAL, "program-eq8": PROGRAM_EQ8, "eq8-free": EQ8_FREE, "engine": BY_ENGINE}
     chosen = {id_: named[name] for id_, name in wanted.items() if name in named}
     if rungs:
         chosen["pair"] = max(rungs, key=lambda difference: difference.largest)

@@ -40,7 +40,7 @@ NAMES: Final = MappingProxyType(
 
 Value = TypeVar("Value", float, FloatArray)
 
-STEP: Final = "step size of the program"
+STEP: Final = "finite step of the program"
 PROGRAM_TAG: Final = "waterfall, program"
 
 LOOSER: Final = 10.0

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from reports.claims import claim_finite_step
-from reports.evidence import EQ8_FREE, PROGRAM_EQ8, TOTAL
-from reports.headlines import ENGINE_PAIR, MEASURES, Headline, headlines
+from reports.evidence import BY_ENGINE, EQ8_FREE, PROGRAM_EQ8, TOTAL
+from reports.headlines import MEASURES, Headline, headlines
 from reports.lead import amount, lead_words, sentences, signed
 from reports.snapshot import BEGIN, END, PLACE, README, front_page, write_front_page
 from reports.studies.differences import percent
@@ -21,7 +21,7 @@ from reports.verdict import LABELS, answer, tiles
 
 pytestmark = pytest.mark.xdist_group("evidence")
 
-PAIRS = {"whole": TOTAL, "program-eq8": PROGRAM_EQ8, "eq8-free": EQ8_FREE, "engine": ENGINE_PAIR}
+PAIRS = {"whole": TOTAL, "program-eq8": PROGRAM_EQ8, "eq8-free": EQ8_FREE, "engine": BY_ENGINE}
 
 
 @pytest.fixture(scope="module")
