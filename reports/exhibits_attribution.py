@@ -80,9 +80,9 @@ def _draw_frozen(found: Attribution) -> Exhibit:
         section="steps",
         title="What holding the coefficients constant costs, step by step",
         caption=(
-            "Top: how much each frozen quantity changes within a step. Middle: what freezing it misses in that "
-            "step; the highest curve costs most at that moment. Bottom: the defects added up, beside the error "
-            "they lead to."
+            "Top: how much each quantity that is held constant changes within a step. Middle: the velocity that "
+            "holding it constant misses in that step. Bottom: these defects added up, beside the error of the velocity "
+            "and of ω that they lead to."
         ),
         alt=f"Curves over time for {study.scheme} at a step of {study.dt * 1e3:.2g} ms. Share of the steps in which "
         f"freezing costs most: {shares}. Largest velocity missed in one step: {peaks or 'none'}. Largest error of "
@@ -101,7 +101,8 @@ def _draw_gantts(found: Attribution) -> Iterator[Exhibit]:
             title=f"Contacts and impacts: {first} and {second}",
             caption=(
                 "One row per slice. Bars are contacts, ticks are impacts; the upper lane of a row is the first "
-                "solver, the lower the second. Where the lanes look alike the two tell the same story of that slice."
+                "solver, the lower the second. Where the two lanes of a row look alike, both solvers have the same "
+                "contacts and impacts of that slice."
             ),
             alt=f"Contacts and impacts of {first} above those of {second}, one row per slice. "
             f"{alignment.words}.".replace("ω₀", "omega_0"),
@@ -117,11 +118,11 @@ def _draw_predictability(found: Attribution) -> Exhibit:
     return Exhibit(
         name="predictability",
         section="events",
-        title="How far ahead the curves mean anything",
+        title="How far a small change of the release moves ω",
         caption=(
-            "Flights released a hair differently. Parallel curves grow with the change: the flight is smooth. "
-            "Curves that meet at one level whatever the change show jumps, where an impact just happens or just "
-            "does not."
+            "Flights whose release differs by a small amount. Where curves are parallel, the difference in ω is "
+            "proportional to the change of the release. Where curves of different changes meet at one level, ω jumps: "
+            "an impact happens in one flight and not in the other."
         ),
         alt=f"Logarithmic plot of the spread after tiny changes. {words}".replace("ω₀", "omega_0"),
         maker=figure_predictability,
