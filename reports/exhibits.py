@@ -133,7 +133,7 @@ def _draw_differences(evidence: Evidence) -> Exhibit:
         section="differences",
         title="Where the solvers part",
         caption="Each curve is the difference in ω of one pair of solvers. A marker on the dotted line is the moment "
-        "at which it first exceeds 1 % of ω₀. The largest value of a curve belongs to that pair and is not a share of the "
+        "at which it first exceeds 1 % of ω₀. The largest value of a curve belongs to that pair. It is no share of the "
         "difference between program and free flight: such shares stand in the waterfall.",
         alt=f"Logarithmic line plot of the differences in omega. {words}.".replace("ω₀", "omega_0"),
         maker=flight_figures.figure_differences,

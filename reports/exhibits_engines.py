@@ -92,7 +92,7 @@ def draw_gallery(facts: Sequence[EngineFact]) -> Exhibit:
         section="engines",
         title="Engine behaviour that a user may not expect",
         caption=f"Each fact is measured anew with every report, and the sign says whether the number lies within its "
-        f"threshold: {held} of {len(facts)} do. The settings of the engine check are chosen so that none of them changes "
+        f"threshold: {held} of {len(facts)} do. The engine check is set so that none of them changes "
         "a result unnoticed; how each was measured stands with the findings.",
         alt=f"Table of facts about the engines. {words}".replace("ω₀", "omega_0"),
         maker=figure_gallery,
