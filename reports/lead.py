@@ -17,41 +17,59 @@ def lead_words(headlines: Sequence[Headline]) -> str:
 
 
 def answers(headlines: Sequence[Headline]) -> Iterator[tuple[str, list[str]]]:
-    """Yield the questions of the front page, each answered by yes or no and its sentences."""
+    """Yield the questions of the front page, each answered by yes or no and its sentences; none if all agree."""
     found = {headline.id: headline for headline in headlines}
+    if _nothing_compared(headlines) or _all_agree(headlines) is not None:
+        return
     held = [found[id_].value for id_ in ("held", "held-through") if id_ in found]
-    asked: tuple[tuple[str, Sequence[float], Iterator[str]], ...] = (
-        ("Is it justified to hold omega constant over a step?", held, _held(found)),
-        (
-            f"Are {found['step'].note if 'step' in found else ''} enough?",
-            [found["step"].value] if "step" in found else [],
-            _step(found),
-        ),
-        ("Is Eq. 8 free flight?", [found["eq8-free"].value] if "eq8-free" in found else [], _equations(found)),
-    )
-    for question, values, said in asked:
-        if values:
-            within = max(values) <= PARTING_BAND
-            verdict = f"Yes, within {percent(PARTING_BAND)}." if within else f"No, not within {percent(PARTING_BAND)}."
-            yield f"{question} {verdict}", list(said)
+    step = [found["step"].value] if "step" in found else []
+    free = [found["eq8-free"].value] if "eq8-free" in found else []
+    steps = found["step"].note if "step" in found else "the steps"
+    yield f"Is it justified to hold omega constant over a step? {_verdict(held)}", list(_held(found))
+    yield f"Are {steps} enough? {_verdict(step)}", list(_step(found))
+    yield f"Is Eq. 8 free flight? {_verdict(free)}", list(_equations(found))
     if "share" in found:
         yield "Which assumption matters most?", list(_shares(found))
     if "engine" in found:
         yield (
             "Does a physics engine agree?",
-            [f"Event-driven free flight and pymunk as it is differ in ω by up to {amount(found['engine'])}."],
+            [
+                "Free flight by event-driven integration and by pymunk, with its hits on the step's grid, differ in ω "
+                f"by up to {amount(found['engine'])}."
+            ],
         )
+
+
+def _verdict(values: Sequence[float]) -> str:
+    within = percent(PARTING_BAND)
+    if not values:
+        return "Not known."
+    return f"Yes, within {within}." if max(values) <= PARTING_BAND else f"No, not within {within}."
+
+
+def _compared(headlines: Sequence[Headline]) -> list[float]:
+    return [h.value for h in headlines if h.measure == "largest" and h.id in ("whole", "pair", "program-eq8")]
+
+
+def _nothing_compared(headlines: Sequence[Headline]) -> bool:
+    return not _compared(headlines)
+
+
+def _all_agree(headlines: Sequence[Headline]) -> float | None:
+    """Return the largest difference if it is nothing, else None."""
+    largest = max(_compared(headlines))
+    return largest if largest < NOTHING else None
 
 
 def sentences(headlines: Sequence[Headline]) -> Iterator[str]:
     """Yield the verdict sentence by sentence; each can be read alone."""
     found = {headline.id: headline for headline in headlines}
-    compared = [h.value for h in headlines if h.measure == "largest" and h.id in ("whole", "pair", "program-eq8")]
-    if not compared:
+    if _nothing_compared(headlines):
         yield "No two solvers could be compared on this throw; the reasons stand below."
         return
-    if max(compared) < NOTHING:
-        yield f"On this throw all solvers agree to {percent(max(compared))} of ω₀."
+    agree = _all_agree(headlines)
+    if agree is not None:
+        yield f"On this throw all solvers agree to {percent(agree)} of ω₀."
         return
     yield from _equations(found)
     yield from _shares(found)
@@ -67,8 +85,10 @@ def _equations(found: Mapping[str, Headline]) -> Iterator[str]:
         until = f" {whole.note}" if whole.note else ""
         yield f"The published program and free flight differ in ω by up to {amount(whole)}{until}."
     if eq8 is not None:
-        times = "" if whole is None or not whole.value > 0.0 else f", {eq8.value / whole.value:.2g} times as far"
-        yield f"The published program and Eq. 8 differ in ω by up to {amount(eq8)}{times}."
+        yield f"The published program and Eq. 8 differ in ω by up to {amount(eq8)}."
+        if whole is not None and whole.value > 0.0:
+            times = f"{eq8.value / whole.value:.2g}"
+            yield f"By these two numbers the program is {times} times as far from Eq. 8 as from free flight."
     free = found.get("eq8-free")
     if free is not None:
         yield f"Eq. 8 and free flight differ in ω by up to {amount(free)}."
@@ -80,18 +100,18 @@ def _shares(found: Mapping[str, Headline]) -> Iterator[str]:
         yield (
             "Of the six assumptions between the program and free flight, the largest fair share of the change of the "
             f"mean ω in the second half is that of “{share.what}”: {amount(share)} as the mean over all orders of "
-            f"mending, {signed(share.low)} to {signed(share.high)} in single orders."
+            f"mending them, {signed(share.low)} to {signed(share.high)} in single orders."
         )
     if away is not None:
         mean = found["away-share"]
         yield (
-            f"Mended in the order of the ladder, “{away.what}” moves that mean away from free flight, by "
-            f"{signed(away.value)} of ω₀; its fair share is {signed(mean.value)}."
+            f"Mended in the order of the ladder, “{away.what}” moves the mean ω of the second half away from free "
+            f"flight, by {amount(away)}; its fair share is {amount(mean)}."
         )
     if pair is not None:
         yield (
             f"The largest difference in ω between neighbours on the ladder is that of “{pair.what}”, "
-            f"{amount(pair)}; it is not a share of the whole."
+            f"{amount(pair)}; the largest difference of a pair is not a share of the whole."
         )
 
 

@@ -17,7 +17,7 @@ from reports.findings import Finding
 from reports.headlines import headlines
 from reports.inline import data_uri, shape
 from reports.instruments import witnesses
-from reports.lead import lead_words
+from reports.lead import answers, lead_words
 from reports.studies.differences import Difference, percent
 from reports.studies.slices import FINER
 from reports.templating import environment
@@ -180,6 +180,7 @@ def render(
         strips=strips(found.waterfalls[0]) if found.waterfalls else (),
         differences=sorted(evidence.differences, key=lambda difference: -difference.largest),
         lead=lead_words(verdict),
+        answers=tuple(answers(verdict)),
         regressions=regressions,
         observations=[finding for finding in findings if finding.kind == "observation"],
         failed=[finding for finding in regressions if finding.failed],

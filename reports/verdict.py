@@ -56,8 +56,8 @@ def answer(headlines: Sequence[Headline]) -> str:
 LABELS: Mapping[str, tuple[str, str]] = {
     "share": (
         "of ω₀: largest fair share",
-        "{what}: change of the mean ω in the second half, mean over all orders of mending; {low} to {high} in single "
-        "orders.",
+        "“{what}”: change of the mean ω in the second half, mean over all orders of mending the assumptions; {low} to "
+        "{high} in single orders.",
     ),
     "whole": (
         "of ω₀: program and free flight",
@@ -79,7 +79,7 @@ LABELS: Mapping[str, tuple[str, str]] = {
     ),
     "engine": (
         "of ω₀: the check by an engine",
-        "Free flight, event-driven, against pymunk as it is, largest difference.",
+        "Free flight, event-driven, against pymunk with its hits on the step's grid, largest difference.",
     ),
 }
 """Headline -> label and words of its tile, in the order of the page."""
