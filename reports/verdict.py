@@ -55,31 +55,22 @@ def answer(headlines: Sequence[Headline]) -> str:
 
 LABELS: Mapping[str, tuple[str, str]] = {
     "share": (
-        "of ω₀: largest fair share",
-        "“{what}”: change of the mean ω in the second half, mean over all orders of mending the assumptions; {low} to "
-        "{high} in single orders.",
+        "of ω₀: largest fair share of the mean ω",
+        "“{what}”: mean over all orders of mending, {low} to {high} in single orders.",
     ),
-    "whole": (
-        "of ω₀: program and free flight",
-        "Published program against free flight, largest difference, at t = {time} ms.",
-    ),
-    "program-eq8": (
-        "of ω₀: program and Eq. 8",
-        "Published program against Eq. 8, largest difference, at t = {time} ms.",
-    ),
+    "whole": ("of ω₀: published program and free flight", "Largest difference in ω, at t = {time} ms."),
+    "program-eq8": ("of ω₀: published program and Eq. 8", "Largest difference in ω, at t = {time} ms."),
     "held": (
         "of ω₀: ω held constant over a step",
-        "Published program without its lag against its own equation, largest difference before the first impact, "
-        "{note}.",
+        "Largest error of the program without its lag before the first impact, {note}.",
     ),
     "step": (
         "of ω₀: all that a finite step does",
-        "Published program against its own equation, largest difference, {note}: coefficients held, lag, rebounds "
-        "that wait for the grid.",
+        "Largest error of the program against its own equation, {note}.",
     ),
     "engine": (
-        "of ω₀: the check by an engine",
-        "Free flight, event-driven, against pymunk with its hits on the step's grid, largest difference.",
+        "of ω₀: free flight and pymunk",
+        "Largest difference in ω; hits in pymunk wait for the step's grid.",
     ),
 }
 """Headline -> label and words of its tile, in the order of the page."""
