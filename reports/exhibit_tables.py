@@ -180,7 +180,7 @@ def table_waterfall(waterfall: Waterfall) -> str:
 
 
 def table_map(study: ValidityMap) -> str:
-    """Every cell of a map: the plateau of each solver, and the largest single mistake."""
+    """Every cell of a map: the plateau of each solver, and the assumption with the largest fair share or step."""
     solvers = (*LADDER, *EXTRA)
     dominant = study.dominant
     return rows_csv(

@@ -1,4 +1,4 @@
-"""Where does which mistake matter? The ladder from the published program to free flight over maps of throws.
+"""Where does which assumption matter? The ladder from the published program to free flight over maps of throws.
 
 The mapped error is the difference of the plateau, the mean of omega / omega_0 over the second half of the flight: it is
 what the paper reads off a flight, and an average forgives a rebound that comes a little early. The largest difference
