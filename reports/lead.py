@@ -95,12 +95,21 @@ def _equations(found: Mapping[str, Headline]) -> Iterator[str]:
 
 
 def _shares(found: Mapping[str, Headline]) -> Iterator[str]:
-    share, away, pair = found.get("share"), found.get("away"), found.get("pair")
-    if share is not None:
+    away, pair = found.get("away"), found.get("pair")
+    shares = [found[id_] for id_ in ("share", "share-2", "share-3") if id_ in found]
+    if shares:
+        listed = ", ".join(f"“{share.what}” {amount(share)}" for share in shares)
+        low = min(share.low for share in shares if share.low is not None)
+        high = max(share.high for share in shares if share.high is not None)
         yield (
-            "Of the six assumptions between the program and free flight, the largest fair share of the change of the "
-            f"mean ω in the second half is that of “{share.what}”: {amount(share)} as the mean over all orders of "
-            f"mending them, {signed(share.low)} to {signed(share.high)} in single orders."
+            "Of the six assumptions between the program and free flight, these have the largest fair shares of the "
+            f"change of the mean ω in the second half, as the mean over all orders of mending them: {listed}."
+        )
+        yield f"In single orders the same assumptions change that mean by {signed(low)} to {signed(high)} of ω₀."
+    if len(shares) > 1 and tied(shares[0], shares[1]):
+        yield (
+            f"Which of “{shares[0].what}” and “{shares[1].what}” has the larger share is not settled: the number of "
+            "slices moves them by more than they differ."
         )
     if away is not None:
         mean = found["away-share"]
@@ -136,6 +145,12 @@ def _step(found: Mapping[str, Headline]) -> Iterator[str]:
             "All that a finite step does in the published program (coefficients held, J and the centre of mass a step "
             f"behind, rebounds that wait for the grid) costs {amount(step)} at {step.note}."
         )
+
+
+def tied(first: Headline, second: Headline) -> bool:
+    """Return whether two shares differ by less than either moves with the number of slices."""
+    moved = [abs(h.finer - h.value) for h in (first, second) if h.finer is not None]
+    return bool(moved) and abs(abs(first.value) - abs(second.value)) <= max(moved)
 
 
 def amount(headline: Headline) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from reports.headlines import Headline
-from reports.lead import signed
+from reports.lead import signed, tied
 from reports.studies.differences import PARTING_BAND, percent
 from reports.studies.waterfall import Waterfall
 
@@ -56,7 +56,7 @@ def answer(headlines: Sequence[Headline]) -> str:
 LABELS: Mapping[str, tuple[str, str]] = {
     "share": (
         "of ω₀: largest fair share of the mean ω",
-        "“{what}”: mean over all orders of mending, {low} to {high} in single orders.",
+        "“{what}”: mean over all orders of mending, {low} to {high} in single orders.{rival}",
     ),
     "whole": ("of ω₀: published program and free flight", "Largest difference in ω, at t = {time} ms."),
     "program-eq8": ("of ω₀: published program and Eq. 8", "Largest difference in ω, at t = {time} ms."),
@@ -79,14 +79,23 @@ LABELS: Mapping[str, tuple[str, str]] = {
 def tiles(headlines: Sequence[Headline]) -> tuple[Tile, ...]:
     """Return the numbers behind the answer; a number that could not be computed is missing."""
     found = {headline.id: headline for headline in headlines}
-    return tuple(_tile(found[id_], *words) for id_, words in LABELS.items() if id_ in found)
+    rival = ""
+    if {"share", "share-2"} <= set(found) and tied(found["share"], found["share-2"]):
+        second = found["share-2"]
+        rival = f" Not told apart from “{second.what}”, {signed(second.value)}."
+    return tuple(_tile(found[id_], *words, rival) for id_, words in LABELS.items() if id_ in found)
 
 
-def _tile(headline: Headline, label: str, words: str) -> Tile:
+def _tile(headline: Headline, label: str, words: str, rival: str) -> Tile:
     text = signed if headline.measure == "share" else percent
     time = "" if headline.time is None else f"{1e3 * headline.time:.0f}"
     said = words.format(
-        what=headline.what, low=signed(headline.low), high=signed(headline.high), time=time, note=headline.note
+        what=headline.what,
+        low=signed(headline.low),
+        high=signed(headline.high),
+        time=time,
+        note=headline.note,
+        rival=rival,
     )
     finer = "" if headline.finer is None else f"; {text(headline.finer)} at N = {headline.finer_slices}"
     return Tile(
