@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from reports.headlines import Headline
-from reports.studies.differences import PARTING_BAND, percent
+from reports.studies.differences import PARTING_BAND, moved, percent
 
 NOTHING = 1e-6
 """Fraction of omega_0 below which two solvers are said to agree."""
@@ -154,13 +154,20 @@ def tied(first: Headline, second: Headline) -> bool:
 
 
 def amount(headline: Headline) -> str:
-    """Return a number with what belongs to it, as in "13 % of ω₀ (N = 50; 12 % at N = 100)"."""
+    """Return a number with what belongs to it, as in "13 % of ω₀ (N = 50; 0.35 % less at N = 100)"."""
     share = headline.measure in ("share", "order")
     text = signed if share else percent
-    more = ""
-    if headline.finer is not None and headline.finer_slices is not None:
-        more = f"; {text(headline.finer)} at N = {headline.finer_slices}"
-    return f"{text(headline.value)} of ω₀ (N = {headline.slices}{more})"
+    return f"{text(headline.value)} of ω₀ ({at_slices(headline)})"
+
+
+def at_slices(headline: Headline) -> str:
+    """Return the number of slices, and how far the number moves with it: of a share, where it moves to."""
+    words = f"N = {headline.slices}"
+    if headline.finer is None or headline.finer_slices is None:
+        return words
+    if headline.measure in ("share", "order"):
+        return f"{words}; {signed(headline.finer)} at N = {headline.finer_slices}"
+    return f"{words}; {moved(headline.value, headline.finer, headline.finer_slices)}"
 
 
 def signed(share: float | None) -> str:

@@ -18,7 +18,7 @@ from reports.headlines import headlines
 from reports.inline import data_uri, shape
 from reports.instruments import witnesses
 from reports.lead import answers, lead_words
-from reports.studies.differences import Difference, percent
+from reports.studies.differences import Difference, moved, percent
 from reports.studies.slices import FINER
 from reports.templating import environment
 from reports.verdict import answer, strips, tiles
@@ -80,9 +80,9 @@ def unbroken(text: str) -> str:
 
 
 def amount(difference: Difference) -> str:
-    """Return the size of a difference, its numerical band, and where known the size at more slices.
+    """Return the size of a difference, its numerical band, and where known how far it moves with more slices.
 
-    As in "55 % ± < 0.001 %; 54 % at N = 100".
+    As in "13 % ± 0.03 %; 0.35 % less at N = 100".
     """
     size = percent(difference.largest)
     if difference.band is not None:
@@ -90,7 +90,7 @@ def amount(difference: Difference) -> str:
         size += f" ± {band:.1g} %" if band >= 1e-3 else " ± < 0.001 %"
     if difference.finer is not None:
         slices, largest = difference.finer
-        size += f"; {percent(largest)} at N = {slices}"
+        size += f"; {moved(difference.largest, largest, slices)}"
     return size
 
 

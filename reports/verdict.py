@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from reports.headlines import Headline
-from reports.lead import signed, tied
+from reports.lead import at_slices, signed, tied
 from reports.studies.differences import PARTING_BAND, percent
 from reports.studies.waterfall import Waterfall
 
@@ -97,11 +97,10 @@ def _tile(headline: Headline, label: str, words: str, rival: str) -> Tile:
         note=headline.note,
         rival=rival,
     )
-    finer = "" if headline.finer is None else f"; {text(headline.finer)} at N = {headline.finer_slices}"
     return Tile(
         value=text(headline.value),
         label=label,
-        words=f"{said[0].upper()}{said[1:]} N = {headline.slices}{finer}.",
+        words=f"{said[0].upper()}{said[1:]} {at_slices(headline)}.",
         state="pass" if abs(headline.value) <= PARTING_BAND else "fail",
     )
 

@@ -18,6 +18,11 @@ def percent(share: float) -> str:
     return f"{100 * share:.2g} %"
 
 
+def moved(value: float, finer: float, slices: int) -> str:
+    """Return how far a fraction moves with the number of slices, as in "0.35 % less at N = 100"."""
+    return f"{percent(abs(finer - value))} {'more' if finer >= value else 'less'} at N = {slices}"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
     """Two runs of one throw, compared on their common times.
