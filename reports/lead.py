@@ -154,7 +154,7 @@ def tied(first: Headline, second: Headline) -> bool:
 
 
 def amount(headline: Headline) -> str:
-    """Return a number with what belongs to it, as in "13 % of ω₀ (N = 50; 0.35 % less at N = 100)"."""
+    """Return a number with what belongs to it, as in "13 % of ω₀ (N = 50; 0.35 % of ω₀ less at N = 100)"."""
     share = headline.measure in ("share", "order")
     text = signed if share else percent
     return f"{text(headline.value)} of ω₀ ({at_slices(headline)})"

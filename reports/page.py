@@ -82,7 +82,7 @@ def unbroken(text: str) -> str:
 def amount(difference: Difference) -> str:
     """Return the size of a difference, its numerical band, and where known how far it moves with more slices.
 
-    As in "13 % ± 0.03 %; 0.35 % less at N = 100".
+    As in "13 % ± 0.03 %; 0.35 % of ω₀ less at N = 100".
     """
     size = percent(difference.largest)
     if difference.band is not None:

@@ -55,11 +55,11 @@ def answer(headlines: Sequence[Headline]) -> str:
 
 LABELS: Mapping[str, tuple[str, str]] = {
     "share": (
-        "of ω₀: largest fair share of the mean ω",
-        "“{what}”: mean over all orders of mending, {low} to {high} in single orders.{rival}",
+        "of ω₀: largest fair share",
+        "“{what}”, of the mean ω: mean over all orders of mending, {low} to {high} in single orders.{rival}",
     ),
-    "whole": ("of ω₀: published program and free flight", "Largest difference in ω, at t = {time} ms."),
-    "program-eq8": ("of ω₀: published program and Eq. 8", "Largest difference in ω, at t = {time} ms."),
+    "whole": ("of ω₀: program and free flight", "Largest difference in ω, at t = {time} ms."),
+    "program-eq8": ("of ω₀: program and Eq. 8", "Largest difference in ω, at t = {time} ms."),
     "held": (
         "of ω₀: ω held constant over a step",
         "Largest error of the program without its lag before the first impact, {note}.",

@@ -19,8 +19,8 @@ def percent(share: float) -> str:
 
 
 def moved(value: float, finer: float, slices: int) -> str:
-    """Return how far a fraction moves with the number of slices, as in "0.35 % less at N = 100"."""
-    return f"{percent(abs(finer - value))} {'more' if finer >= value else 'less'} at N = {slices}"
+    """Return how far a fraction moves with the number of slices, as in "0.35 % of ω₀ less at N = 100"."""
+    return f"{percent(abs(finer - value))} of ω₀ {'more' if finer >= value else 'less'} at N = {slices}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

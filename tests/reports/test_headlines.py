@@ -183,7 +183,7 @@ def test_the_lead_says_what_the_numbers_say():
             made_up("step", 0.005, note="1000 steps"),
         ]
     )
-    assert "differ in ω by up to 13 % of ω₀ (N = 50; 1 % less at N = 100)." in words
+    assert "differ in ω by up to 13 % of ω₀ (N = 50; 1 % of ω₀ less at N = 100)." in words
     assert "differ in ω by up to 42 % of ω₀ (N = 50)." in words
     assert "3.2 times as far from Eq. 8 as from free flight." in words
     assert "−6.5 % of ω₀ (N = 50) as the mean over all orders of mending them, −20 % to +1 % in single orders" in words
@@ -229,7 +229,7 @@ def test_tiles_lead_with_the_fair_share_and_name_each_number():
     ]  # fmt: skip
     assert "fair share" in shown[0].label
     assert "−20 % to +1 % in single orders" in shown[0].words
-    assert shown[1].words.endswith("at t = 344 ms. N = 50; 1 % less at N = 100.")
+    assert shown[1].words.endswith("at t = 344 ms. N = 50; 1 % of ω₀ less at N = 100.")
     assert tiles([]) == ()
     assert set(LABELS) == {"share", "whole", "program-eq8", "held", "step", "engine"}
 
