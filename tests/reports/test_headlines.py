@@ -186,8 +186,19 @@ def test_the_lead_says_what_the_numbers_say():
     assert "differ in ω by up to 13 % of ω₀ (N = 50; 1 % of ω₀ less at N = 100)." in words
     assert "differ in ω by up to 42 % of ω₀ (N = 50)." in words
     assert "3.2 times as far from Eq. 8 as from free flight." in words
-    assert "−6.5 % of ω₀ (N = 50) as the mean over all orders of mending them, −20 % to +1 % in single orders" in words
+    assert "mean over all orders of mending them: “gravity in Eq. 8” −6.5 % of ω₀ (N = 50)." in words
+    assert "In single orders the same assumptions change that mean by −20 % to +1 % of ω₀." in words
+    assert "not settled" not in words
     assert "costs 0.5 % of ω₀ (N = 50) at 1000 steps" in words
+
+
+@pytest.mark.parametrize(("finer", "settled"), [(-0.061, False), (-0.0648, True)])
+def test_two_shares_that_the_slices_move_by_more_than_they_differ_are_not_ranked(finer, settled):
+    first = made_up("share", -0.065, measure="share", low=-0.2, high=0.01, finer=finer, finer_slices=100)
+    second = replace(first, id="share-2", what="recoil", value=0.063, finer=0.0631)
+    words = lead_words([made_up(), first, second])
+    assert ("is not settled" not in words) == settled
+    assert ("Not told apart from “recoil”, +6.3 %." in tiles([first, second])[0].words) != settled
 
 
 def test_the_lead_knows_ice_divergence_and_nothing_at_all():
