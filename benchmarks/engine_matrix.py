@@ -3,6 +3,7 @@
     python benchmarks/engine_matrix.py                       all of them; half an hour of processor time
     python benchmarks/engine_matrix.py --jobs 2              in two processes
     python benchmarks/engine_matrix.py --slices 2 10         a part; --restitution, --bottle, --drag likewise
+    python benchmarks/engine_matrix.py --drag dry --hits located   pymunk's hybrid, without drag
 
 Prints a table and writes ``benchmarks/results/engine_matrix.json``. Both solve the simultaneous law of impact. The band
 of free flight is what a tenth of its rest speed changes; the engine's is its certificate's. Status 1 if a throw misses.
@@ -55,15 +56,15 @@ def cases(arguments: argparse.Namespace) -> Iterator[tuple[str, Scenario]]:
         yield f"{name}, N = {n}, e = {e:g}, {drag}", throw if drag == "drag" else replace(throw, drag=0.0)
 
 
-def compare(case: tuple[str, Scenario, str]) -> dict[str, Any]:
+def compare(case: tuple[str, Scenario, str, str | None]) -> dict[str, Any]:
     """Return what one throw gives: the certificate's words and numbers, the difference, and how the bands hold it."""
-    name, throw, engine = case
+    name, throw, engine, hits = case
     omega0 = abs(throw.omega0)
     usual, tighter = (
         ode_reference.solve(throw, model="free-flight", times=TIMES, rest_speed=speed) for speed in (1e-3, 1e-4)
     )
     began = time.process_time()
-    found = engine_check.certify(throw, engine, times=TIMES)
+    found = engine_check.certify(throw, engine, times=TIMES, hits=hits)
     seconds = time.process_time() - began
     row = {
         "case": name,
@@ -114,6 +115,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--restitution", type=float, nargs="+", choices=RESTITUTIONS, default=RESTITUTIONS)
     parser.add_argument("--drag", nargs="+", choices=("drag", "dry"), default=("drag", "dry"))
     parser.add_argument("--bottle", nargs="+", choices=list(BOTTLES), default=list(BOTTLES))
+    parser.add_argument("--hits", choices=("grid", "located"), help="how hits are answered (default: the engine's own)")
     parser.add_argument("--jobs", type=int, default=1, help="worker processes")
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder for the results")
     return parser.parse_args()
@@ -122,7 +124,7 @@ def parse() -> argparse.Namespace:
 def main() -> int:
     """Compare, print, write."""
     arguments = parse()
-    jobs = [(name, throw, arguments.engine) for name, throw in cases(arguments)]
+    jobs = [(name, throw, arguments.engine, arguments.hits) for name, throw in cases(arguments)]
     print(
         f"{'throw':28} {'status':14} {'hits':8} {'dt':7} {'apart':>8} {'band':>8} {'of ODE':>8} within   steps      s"
     )

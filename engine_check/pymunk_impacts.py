@@ -1,4 +1,4 @@
-r"""Hits in pymunk at their own time: the bodies are carried to each, an impact world answers it, and on to the grid.
+r"""A hybrid: hits in pymunk at their own time. We carry the bodies to each, an impact world answers it, on to the grid.
 
     t_n ------------- tau_1 --------- tau_2 ------------- t_n+1        x(t) = x + v t + a t^2 / 2
     v + h/2                                               v + h/2      v(t) = v + a t
@@ -13,6 +13,10 @@ Left to the grid, a hit is answered up to a step late and that much too deep, wi
 the contact swallows the pull of its step: three errors of first order, and slices that reach an end within a step of
 each other come in the wrong order. The flight's step keeps its length throughout, because Chipmunk scales the impulses
 that a contact keeps by the ratio of two steps but books them unscaled, which kicks a slice at rest when steps grow.
+
+What is the engine's here: the motion between hits, and the velocities after a hit. What is ours: the time and the order
+of hits, and when a slice counts as at rest. A run with located hits therefore bears no witness of those; one with hits
+on the grid, the engine as it is and the default, does (``engine_check.witness``).
 """
 
 from __future__ import annotations
@@ -55,7 +59,7 @@ IMPACT_STEP: Final = 1e-9
 
 
 def hits_of(scenario: Scenario, order: Order) -> str | None:
-    """Return how hits are answered, "grid" or "located", as asked or as is best; None for ice, which has none.
+    """Return how hits are answered: as asked, else on the grid, as the engine does; None for ice, which has none.
 
     Raises
     ------
@@ -71,7 +75,7 @@ def hits_of(scenario: Scenario, order: Order) -> str | None:
         problem = f"slices = {order.slices!r}: only hits on the ends are located (needed: slices = 'overlap')"
     if problem and order.hits == "located":
         raise ValueError(f"hits = 'located' is not offered with {problem}; take hits = 'grid'")
-    return order.hits or ("grid" if problem else "located")
+    return order.hits or "grid"
 
 
 def impact_iterations(iterations: int) -> int:

@@ -41,9 +41,9 @@ ENGINES: Final[Mapping[str, Engine]] = MappingProxyType(
                 name="pymunk",
                 module="engine_check.engine_pymunk",
                 equation="free flight: Newton's equations of a rigid tube and N point masses in the lab frame",
-                reason="A witness with no formula of ours: constraints keep the masses on the axis, the engine's own "
-                "solver makes the rebounds, and gravity, the moving origin and the recoil of the tube come out by "
-                "themselves.",
+                reason="Bodies, joints and contacts of the engine in the lab frame: no equation of motion and no law "
+                "of impact of ours enters, so that the moving origin and the recoil of the tube follow from the engine "
+                "alone. A hit on an end is answered at the next step of the grid.",
                 frames=("free", "rotating"),
                 contacts=("overlap", "exclude"),
                 hits=("grid", "located"),
@@ -52,8 +52,9 @@ ENGINES: Final[Mapping[str, Engine]] = MappingProxyType(
                 name="mujoco",
                 module="engine_check.engine_mujoco",
                 equation="free flight: a tree of joints in generalised coordinates, in the lab frame",
-                reason="A second witness that shares no method with the first: the masses cannot leave the axis, "
-                "Runge-Kutta steps between impacts, impulses from the engine's exact mass matrix at their own times.",
+                reason="The engine's equations of motion in generalised coordinates, by Runge-Kutta steps: the masses "
+                "cannot leave the axis. Impacts are ours: our simultaneous law, solved with the engine's mass matrix "
+                "at times that we locate.",
             ),
         )
     }
@@ -74,7 +75,8 @@ CONTACTS: Final = ("overlap", "exclude")
 """What two slices do when they meet: pass through each other as in the paper, or collide as rods of length h/N."""
 
 HITS: Final = ("grid", "located")
-"""When a slice's hit on an end is answered: at the next step of the grid, as engines do, or at its own time."""
+"""When a slice's hit on an end is answered: at the next step of the grid, as engines do, or at its own time, located by
+us: then the run is a hybrid (``witness``)."""
 
 MOST_ITERATIONS: Final = 1_000_000
 MOST_DRIFT: Final = 5e3
@@ -149,8 +151,9 @@ def solve(
     slices : str
         "overlap" or "exclude" (``CONTACTS``).
     hits : str or None
-        "grid" or "located" (``HITS``). None: what the engine does best; pymunk locates hits where the frame is free,
-        slices overlap and there is no drag (``pymunk_impacts``). ``settings`` states which.
+        "grid" or "located" (``HITS``). None: "grid" in pymunk, which is the engine as it is; "located" in MuJoCo, which
+        has no other. pymunk offers "located" where the frame is free, slices overlap and there is no drag
+        (``pymunk_impacts``). ``settings`` states which.
     **knobs
         Overrides of the engine's settings (``PymunkKnobs``), for sensitivity studies.
 

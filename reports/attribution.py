@@ -20,7 +20,7 @@ from reports.studies.predictability import Predictability, plan_predictability, 
 from reports.studies.step_size import plan_step_size
 from reports.studies.tube import Tube, study_tube
 from reports.studies.validity import COARSE, ValidityMap, plan_map, study_map
-from reports.studies.waterfall import Waterfall, plan_waterfall, study_waterfall
+from reports.studies.waterfall import Waterfall, plan_finer, plan_waterfall, study_waterfall
 from slicemodel import Scenario, Trajectory
 
 ALIGNED: Final = (("eq8", "midpoint"), ("eq8", "free-flight"))
@@ -60,8 +60,9 @@ FILLS: Final = (0.1, 0.25, 0.4, 0.55, 0.75, 1.0)
 class Scope:
     """How much of it.
 
-    Slices of the waterfall and of the maps; columns and rows of the maps (none: no maps); sizes of the changed
-    releases; models held against exact solutions; pairs of scheme and equation whose error is fitted.
+    Slices of the waterfall (those of the throw, if they are fewer) and of the maps; columns and rows of the maps (none:
+    no maps); sizes of the changed releases; models held against exact solutions; pairs of scheme and equation whose
+    error is fitted.
     """
 
     waterfall_slices: int
@@ -100,7 +101,7 @@ def axes_of(scope: Scope) -> Iterator[tuple[Any, tuple[float, ...]]]:
 
 def plan_attribution(throw: Scenario, scope: Scope, steps: int) -> list[Run]:
     """Return every run; those of flights that the report makes anyway have the same settings and are made once."""
-    runs = plan_waterfall(throw.with_slices(scope.waterfall_slices), steps)
+    runs = _plan_falls(throw, scope, steps)
     for solver in PREDICTED:
         runs += [run for level in plan_predictability(throw, solver, sizes=scope.perturbations) for run in level]
     runs += [Run(f"attribution, {solver}", solver, throw) for pair in ALIGNED for solver in pair]
@@ -113,8 +114,14 @@ def plan_attribution(throw: Scenario, scope: Scope, steps: int) -> list[Run]:
     runs += [Run(f"ledger, {model}", model, few, {"energy": True}) for model in LADDER]
     small = throw.with_slices(scope.map_slices)
     for axis, values in axes_of(scope):
-        runs += plan_map(small, axis, scope.fills, values, steps=steps, tolerances=COARSE)
+        runs += plan_map(small, axis, scope.fills, values, steps=steps, tolerances=COARSE, shares=True)
     return list({run.tag: run for run in runs}.values())
+
+
+def _plan_falls(throw: Scenario, scope: Scope, steps: int) -> list[Run]:
+    """Return the runs of the waterfall at its slices and at ``FINER`` times as many."""
+    cut = throw.with_slices(min(scope.waterfall_slices, throw.n_slices))
+    return [*plan_waterfall(cut, steps), *plan_finer(cut, steps)]
 
 
 Result = TypeVar("Result")
@@ -176,9 +183,7 @@ def study_attribution(
     exact = {model: pool.submit(study_digits, model) for model in scope.exact}
     falls = attempt(
         "waterfall",
-        lambda: study_waterfall(
-            {r.tag: run(r.tag) for r in plan_waterfall(throw.with_slices(scope.waterfall_slices), steps)}
-        ),
+        lambda: study_waterfall({r.tag: run(r.tag) for r in _plan_falls(throw, scope, steps)}),
     )
     alignments = {
         pair: attempt(
@@ -194,7 +199,7 @@ def study_attribution(
     }
     maps = [
         attempt(f"map over {axis}", lambda axis=axis, values=values: study_map(  # type: ignore[misc]
-            small, axis, scope.fills, values, made, steps=steps
+            small, axis, scope.fills, values, made, steps=steps, shares=True
         ))
         for axis, values in axes_of(scope)
     ]  # fmt: skip

@@ -11,9 +11,11 @@ from reports.findings import Finding, Kind
 from reports.studies.differences import Difference
 from reports.studies.digits import SharedDigits
 from reports.studies.errata import ROUND_OFF, Erratum
+from reports.studies.finite_step import StepCost
 from reports.studies.ice import IceDrift
 from reports.studies.model_form import ModelForm, Richardson
 from reports.studies.predictability import Predictability
+from reports.studies.slices import FINER
 from reports.studies.step_size import StepSize
 from reports.studies.tube import Tube
 from reports.studies.waterfall import Waterfall
@@ -36,6 +38,9 @@ EXACT_CASE_ERROR = 1e-9
 
 ENERGY_RESIDUAL = 1e-9
 """What an energy ledger may miss, as a fraction of the initial energy."""
+
+MODEL_BAND = 1e-9
+"""Fraction of omega_0 by which an equation without recoil may be off on the throws of a report."""
 
 GRAVITY_BAND = 1e-9
 """Fraction of omega_0 by which a free engine's omega(t) may change when gravity is switched off."""
@@ -192,8 +197,25 @@ def claim_waterfall(waterfall: Waterfall) -> Finding:
         unit="" if waterfall.observable.unit == "1" else waterfall.observable.unit,
         kind="observation",
         band=waterfall.end_band,
-        note=f"largest in the mean of all orders: {largest.name}, {largest.average:+.3g} ± {largest.average_band:.1g}; "
-        f"the bars miss the whole by {waterfall.residual:.1g}",
+        note=f"largest fair share (mean over all orders): {largest.name}, {largest.average:+.3g} ± "
+        f"{largest.average_band:.1g}, from {largest.low:+.3g} to {largest.high:+.3g} in single orders, at "
+        f"N = {waterfall.slices}"
+        + (f", {largest.finer:+.3g} at N = {FINER * waterfall.slices}" if largest.finer is not None else "")
+        + f"; the bars miss the whole by {waterfall.residual:.1g}",
+    )
+
+
+def claim_finite_step(cost: StepCost) -> Finding:
+    """What one way to take a step of finite length costs, against the equation that it converges to."""
+    before = "no slice strikes an end" if math.isnan(cost.start) else f"{cost.start:.2g} of ω₀ before the first impact"
+    return Finding(
+        id=f"finite-step-{cost.way.name}",
+        title=f"{cost.way.words}: largest difference in ω from {cost.way.model}",
+        value=cost.flight,
+        unit="of ω₀",
+        kind="observation",
+        band=MODEL_BAND,
+        note=f"{cost.steps} steps; {before}",
     )
 
 
@@ -289,7 +311,8 @@ def claim_explosion_is_reported(trajectory: Trajectory) -> Finding:
 
 
 def claim_difference(difference: Difference) -> Finding:
-    """How far two solvers part: an observation with a band and a moment."""
+    """The largest difference of one pair of solvers: an observation with a band and a moment, and no share."""
+    finer = "" if difference.finer is None else f"; {difference.finer[1]:.3g} at N = {difference.finer[0]}"
     return Finding(
         id=f"difference-{difference.first}-{difference.second}".replace(" ", "-"),
         title=f"{difference.name}: {difference.first} against {difference.second}",
@@ -297,7 +320,8 @@ def claim_difference(difference: Difference) -> Finding:
         unit="of ω₀",
         kind="observation",
         band=difference.band,
-        note=f"largest at t = {difference.largest_time * 1e3:.1f} ms; {difference.moment}",
+        note=f"largest difference of this pair, at t = {difference.largest_time * 1e3:.1f} ms, N = {difference.slices}"
+        f"{finer}; {difference.moment}",
     )
 
 

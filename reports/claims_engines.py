@@ -1,4 +1,4 @@
-"""Claims about the engines: where pymunk is stable, what engines do unasked, and up to when omega(t) means anything."""
+"""Claims about the engines: where pymunk is stable, what engines do unexpectedly, and how small changes move omega."""
 
 from __future__ import annotations
 
@@ -141,6 +141,9 @@ def claim_certificate(tag: str, certificate: Mapping[str, Any]) -> Finding:
     words = [f"Δt = {settings['step']:.3g} s" if settings.get("step") else "no step was completed"]
     if settings.get("iterations") is not None:
         words.append(f"{settings['iterations']} iterations")
+    hits = {"grid": "hits on the step's grid", "located": "hits located by us"}.get(settings.get("hits"))
+    if hits is not None:
+        words.append(hits)
     words.append(f"order {order:.2f}" if order is not None else f"no order: {certificate['order_reason']}")
     if certificate["reason"]:
         words.append(certificate["reason"])
@@ -155,7 +158,7 @@ def claim_certificate(tag: str, certificate: Mapping[str, Any]) -> Finding:
 
 
 def claim_agreement(agreement: Agreement) -> Finding:
-    """Free flight solved in three ways: the largest difference of a pair, and who is the odd one out."""
+    """Free flight by several solvers: the largest difference of a pair, and which solver differs from all others."""
     widest = max(agreement.pairs, key=lambda pair: pair.largest)
     return Finding(
         id="agreement",

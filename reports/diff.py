@@ -18,6 +18,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
+from slicemodel.scenario import UnsuitableFileError, read_text
+
+MOST_BYTES: Final = 2**28
+"""Bytes of a summary at the most."""
+
 ROUND_OFF: Final = 1e-9
 """Relative change of a number that nobody claims to be a change."""
 

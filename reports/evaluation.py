@@ -19,6 +19,8 @@ def evaluate(evidence: Evidence) -> Iterator[Finding]:
     yield from _vector_findings(evidence)
     yield from _ice_findings(evidence)
     yield from _order_findings(evidence)
+    for cost in evidence.finite_step:
+        yield claims.claim_finite_step(cost)
     yield from _reference_findings(evidence)
     yield from _engine_findings(evidence)
     yield from _instrument_findings(evidence)

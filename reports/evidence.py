@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import Any
@@ -22,9 +22,10 @@ from reports.studies import contenders
 from reports.studies.contenders import Effort
 from reports.studies.differences import Difference, study_difference
 from reports.studies.errata import study_errata
+from reports.studies.finite_step import StepCost, plan_finite_step, study_finite_step
 from reports.studies.ice import IceDrift, plan_ice, plan_welded, study_ice
 from reports.studies.predictability import PartingGrowth, study_parting_growth
-from reports.studies.slices import SliceCount, plan_slices, study_slices
+from reports.studies.slices import FINER, SliceCount, finer_tag, plan_slices, study_slices
 from reports.studies.step_size import StepSize, before_first_impact, plan_step_size, study_step_size
 from reports.studies.waterfall import NAMES
 from reports.studies.work_precision import WorkPrecision, gather_work_precision
@@ -65,17 +66,27 @@ COMMON_START = 9
 LIMITS = {"published-python": "published-limit", "exact-step": "eq8"}
 """Scheme -> the model it converges to."""
 
-TOTAL = "everything: published program to free flight"
+TOTAL = "published program to free flight"
+BY_ENGINE = "free flight, event-driven and by an engine"
+PROGRAM_EQ8 = "published program to Eq. 8"
+EQ8_FREE = "Eq. 8 to free flight"
+COMPOSITE = (PROGRAM_EQ8, EQ8_FREE, TOTAL)
+"""Differences of pairs that differ in more than one assumption."""
 
 DIFFERENCES = (
-    ("step size of the published program", "published-python", "published-limit"),
-    ("step size of the exact step", "exact-step", "eq8"),
+    ("finite step of the published program", "published-python", "published-limit"),
+    ("finite step of the exact step", "exact-step", "eq8"),
     *((NAMES[switch], first, second) for switch, first, second in zip(NAMES, LADDER, LADDER[1:], strict=False)),
-    ("the engine's own error", FREE, ENGINE),
-    ("the engine's own error in Eq. 8's world", "eq8", "pymunk rotating"),
+    (BY_ENGINE, FREE, ENGINE),
+    ("Eq. 8, event-driven and by an engine with our forces", "eq8", "pymunk rotating"),
+    (PROGRAM_EQ8, "published-python", "eq8"),
+    (EQ8_FREE, "eq8", FREE),
     (TOTAL, "published-python", FREE),
 )
-"""Name, first, second: down the ladder one assumption at a time, then the engine, then the whole."""
+"""Name, first, second: down the ladder one assumption at a time, then the engine, then several together."""
+
+REFINED = (*LIMITS, *LADDER)
+"""Solvers that fly the throw again at ``FINER`` times the slices."""
 
 
 MODEL_FLOOR = 1e-9
@@ -103,7 +114,7 @@ FULL = Size(
     levels=7,
     counts=(5, 10, 20, 50, 100, 200, 500),
     second_method="Radau",
-    scope=Scope(waterfall_slices=20, map_slices=12, fills=FILLS, rows=5),
+    scope=Scope(waterfall_slices=50, map_slices=12, fills=FILLS, rows=5),
     bench=instruments.FULL,
     precision=contenders.FULL,
     paper=REPORT,
@@ -114,7 +125,7 @@ QUICK = Size(
     counts=(5, 20, 50, 200),
     second_method=None,
     scope=Scope(
-        waterfall_slices=4,
+        waterfall_slices=10,
         map_slices=10,
         fills=(),
         rows=0,
@@ -156,6 +167,8 @@ class Evidence:
     vectors: Mapping[str, Mapping[str, float]]
     attribution: Attribution
     instruments: Instruments
+    finite_step: tuple[StepCost, ...]
+    finite_step_finer: tuple[StepCost, ...]
     precision: tuple[WorkPrecision, ...]
     paper: Paper | None
     stages: Stages
@@ -175,10 +188,14 @@ def plan(throw: Scenario, size: Size) -> list[Run]:
     for prefix, scenario in ((f"{CHECK}, ", REFERENCE), ("", throw)):
         if size.second_method:
             other = {"method": size.second_method}
-            runs += [Run(f"{prefix}{m}, {size.second_method}", m, scenario, other) for m in CROSS_CHECKED]
+            runs += [
+                Run(f"{prefix}{m}, {size.second_method}", m, scenario, other, confirms=f"{prefix}{m}")
+                for m in CROSS_CHECKED
+            ]
         for model in reversed(LADDER):
-            runs.append(Run(f"{prefix}{model}, tighter", model, scenario, _tighter(scenario, model)))
-            runs.append(Run(f"{prefix}{model}", model, scenario))
+            tag = f"{prefix}{model}"
+            runs.append(Run(f"{tag}, tighter", model, scenario, _tighter(scenario, model), confirms=tag))
+            runs.append(Run(tag, model, scenario))
     runs += [Run(f"{CHECK}, ledger, {m}", m, REFERENCE.with_slices(LEDGER_SLICES), {"energy": True}) for m in LADDER]
     runs += plan_welded(REFERENCE.with_slices(WELDED_SLICES), ENGINE)
     runs.append(Run(f"{ENGINE}, 10 iterations", ENGINE, throw, {"iterations": 10}))
@@ -187,6 +204,11 @@ def plan(throw: Scenario, size: Size) -> list[Run]:
         runs.append(Run(scheme, scheme, throw, {"steps": size.steps}))
     for scheme in LIMITS:
         runs += plan_slices(throw, scheme, size.counts)
+    fine = throw.with_slices(FINER * throw.n_slices)
+    for tag in REFINED:
+        runs.append(Run(finer_tag(tag), tag, fine, {"steps": size.steps, "store": "summary"} if tag in LIMITS else {}))
+    runs += plan_finite_step(throw, size.steps)
+    runs += [replace(run, tag=finer_tag(run.tag), scenario=fine) for run in plan_finite_step(throw, size.steps)]
     runs += [
         Run(f"vector {vector.name}", vector.scheme, vector.scenario, {"steps": vector.steps})
         for vector in vectors.load_all()
@@ -267,6 +289,8 @@ def gather(
         },
         attribution=attribution,
         instruments=study_instruments(REFERENCE, throw, size.bench, made, _band_over_time(made)),
+        finite_step=_study_finite(made, size.steps),
+        finite_step_finer=_study_finite(made, size.steps, finer_tag),
         precision=precision,
         paper=paper,
         stages=stages,
@@ -282,14 +306,18 @@ def run_bands(made: Mapping[str, Made]) -> dict[str, float]:
     """Return each flight's numerical band as a fraction of omega_0.
 
     A scheme at its number of steps is a definite program: its step error is a difference with a bar of its own, so its
-    band is zero. For a model it is the change under tenfold tighter tolerances or another method, and never less than
+    band is zero. For a model it is the largest change of omega in a run that was planned to confirm it
+    (``Run.confirms``: tolerances and rest speed a tenth, longest step a half; another method), and never less than
     MODEL_FLOOR; for an engine that of its certificate.
     """
     bands = dict.fromkeys(LIMITS, 0.0)
-    for tag, other in [(model, other) for model in LADDER for other in made if other.startswith(f"{model}, ")]:
-        usual, better = made[tag].trajectory, made[other].trajectory
-        if usual is not None and better is not None and usual.ok and better.ok:
-            bands[tag] = max(bands.get(tag, MODEL_FLOOR), study_difference(tag, usual, better).largest)
+    for better in made.values():
+        tag = better.run.confirms
+        if tag not in LADDER or tag not in made:
+            continue
+        usual, other = made[tag].trajectory, better.trajectory
+        if usual is not None and other is not None and usual.ok and other.ok:
+            bands[tag] = max(bands.get(tag, MODEL_FLOOR), study_difference(tag, usual, other).largest)
     for tag in instruments.WITNESSES:
         run = made[tag].trajectory if tag in made else None
         certificate = {} if run is None else run.diagnostics.get("certificate", {})
@@ -314,7 +342,23 @@ def _differences(made: Mapping[str, Made]) -> Iterator[Difference]:
         if one is None or other is None:
             continue
         band = bands[first] + bands[second] if first in bands and second in bands else None
-        yield study_difference(name, one, other, impacts_of=_located(first, made), band=band)
+        finer = _refined(first, second, made)
+        yield study_difference(name, one, other, impacts_of=_located(first, made), band=band, finer=finer)
+
+
+def _refined(first: str, second: str, made: Mapping[str, Made]) -> tuple[Trajectory, Trajectory] | None:
+    """Return the runs of two solvers at more slices; None if either was not made so or is not whole."""
+    runs = [made[finer_tag(tag)].trajectory for tag in (first, second) if finer_tag(tag) in made]
+    whole = [run for run in runs if run is not None and run.ok]
+    return (whole[0], whole[1]) if len(whole) == 2 else None
+
+
+def _study_finite(made: Mapping[str, Made], steps: int, tag_of: Callable[[str], str] = str) -> tuple[StepCost, ...]:
+    """Return what a finite step costs; nothing if a run is missing, whose reason stands with the solvers."""
+    try:
+        return study_finite_step(made, steps, tag_of)
+    except ArithmeticError:
+        return ()
 
 
 def _located(name: str, made: Mapping[str, Made]) -> Trajectory | None:

@@ -166,23 +166,27 @@ def table_waterfall(waterfall: Waterfall) -> str:
     """Every bar in three orders, between the two ends."""
     unit = waterfall.observable.unit
     return rows_csv(
-        ("assumption mended", f"in the order shown [{unit}]", f"its band [{unit}]", f"in reverse [{unit}]",
-         f"mean of all orders [{unit}]", f"band of the mean [{unit}]"),
+        ("assumption mended", f"in the order of the ladder [{unit}]", f"its band [{unit}]", f"in reverse [{unit}]",
+         f"mean of all orders [{unit}]", f"band of the mean [{unit}]", f"least of all orders [{unit}]",
+         f"largest of all orders [{unit}]"),
         (
-            ("(published program)", waterfall.start, None, waterfall.start, waterfall.start, None),
-            *((b.name, b.forward, b.forward_band, b.backward, b.average, b.average_band) for b in waterfall.bars),
-            ("(free flight)", waterfall.end, waterfall.end_band, waterfall.end, waterfall.end, waterfall.end_band),
+            ("(published program)", waterfall.start, None, waterfall.start, waterfall.start, None, None, None),
+            *((b.name, b.forward, b.forward_band, b.backward, b.average, b.average_band, b.low, b.high)
+              for b in waterfall.bars),
+            ("(free flight)", waterfall.end, waterfall.end_band, waterfall.end, waterfall.end, waterfall.end_band,
+             None, None),
         ),
     )  # fmt: skip
 
 
 def table_map(study: ValidityMap) -> str:
-    """Every cell of a map: the plateau of each solver, and the largest single mistake."""
+    """Every cell of a map: the plateau of each solver, and the assumption with the largest fair share or step."""
     solvers = (*LADDER, *EXTRA)
     dominant = study.dominant
     return rows_csv(
         ("fill fraction [1]", LABELS[study.axis].translate({ord("γ"): "gamma", ord("ω"): "omega", ord("₀"): "_0",
-                                                            ord("Δ"): "d"}), "largest mistake",
+                                                            ord("Δ"): "d"}),
+         "largest step down the ladder" if study.shares is None else "largest fair share",
          *(f"plateau of omega/omega_0 {name} [1]" for name in solvers), "not computed because"),
         (
             (study.fills[column], study.values[row], RUNGS[k] if k >= 0 else None,

@@ -50,8 +50,9 @@ def _draw_flights(flights: list[Trajectory]) -> Iterator[Exhibit]:
         name="omega",
         section="flights",
         title="Angular velocity",
-        caption="Compare each solid scheme with the dashed equation of the same hue: between them lies the step size. "
-        "What lies between the hues comes from the equations; free-flight and pymunk are free flight.",
+        caption="A solid scheme and the dashed equation of the same hue differ by what a finite step does. Curves of "
+        "different hues solve different equations; free-flight and pymunk both solve free flight. All have "
+        f"N = {flights[0].scenario.n_slices} slices.",
         alt=f"Line plot of omega over omega_0 against time, 1 at release. Values at the end: {_listed(ends, '.3f')}. "
         f"{_apart(ends, ' of omega_0', '.2g')}",
         maker=flight_figures.figure_omega,
@@ -63,8 +64,8 @@ def _draw_flights(flights: list[Trajectory]) -> Iterator[Exhibit]:
         name="theta",
         section="flights",
         title="Angle",
-        caption="The angle is the integral of the curve above: a difference in ω that lasts decides how far the bottle "
-        "has turned on landing. Multiples of 360° stand upright.",
+        caption="The angle is the integral of the angular velocity above, so that a lasting difference in ω adds up. "
+        "At 0° and at multiples of 360° the bottle stands upright.",
         alt=f"Line plot of the angle theta in degrees against time. Values at the end: {_listed(turns, '.0f')} degrees."
         f" {_apart(turns, ' degrees', '.1f')}",
         maker=flight_figures.figure_theta,
@@ -131,8 +132,9 @@ def _draw_differences(evidence: Evidence) -> Exhibit:
         name="differences",
         section="differences",
         title="Where the solvers part",
-        caption="Each curve is one assumption. A marker on the dotted line is the moment at which that assumption has "
-        "first cost 1 % of ω₀. An assumption whose curve stays below the line costs this throw less than that.",
+        caption="Each curve is the difference in ω of one pair of solvers. A marker on the dotted line is the moment "
+        "at which it first exceeds 1 % of ω₀. The largest value of a curve belongs to that pair. It is no share of the "
+        "difference between program and free flight: such shares stand in the waterfall.",
         alt=f"Logarithmic line plot of the differences in omega. {words}.".replace("ω₀", "omega_0"),
         maker=flight_figures.figure_differences,
         data=(evidence.differences,),
@@ -177,8 +179,8 @@ def _draw_ice(evidence: Evidence) -> Exhibit:
         name="ice",
         section="ice",
         title="Ice keeps its angular velocity",
-        caption="Nothing moves inside a bottle of ice, so every drift is the solver's own: its largest value stands in "
-        "the legend. Masses welded on by joints give in a little at the start, a quarter as much at half the step.",
+        caption="Nothing moves in a bottle of ice, so that every drift is an error of the solver; the largest value "
+        "stands in the legend. Masses held by joints yield at the start, a quarter as much at half the step.",
         alt=f"Logarithmic plot of the drift of omega over omega_0 in a bottle of ice. Largest drift: {words}.",
         maker=numeric_figures.figure_ice,
         data=(drifts,),
@@ -195,8 +197,8 @@ def _draw_slices(evidence: Evidence) -> Exhibit:
         name="slice-count",
         section="slices",
         title="What more slices would change",
-        caption="The same water cut finer and finer at the same damping rate: read off from which number of slices on "
-        "the curve no longer moves by more than the differences above.",
+        caption="The same water in more and more slices at the same damping rate. How far a curve still moves with the "
+        "number of slices is an error of every number that is computed at one of them.",
         alt="Line plots of omega over omega_0 for several numbers of slices. Largest distance from the finest cut, of "
         f"omega_0: {words}.",
         maker=numeric_figures.figure_slice_count,

@@ -44,9 +44,10 @@ def _draw_waterfall(found: Attribution) -> Exhibit:
         section="assumptions",
         title="From the published program to free flight",
         caption=(
-            "Left: each bar is what mending one more assumption changes; blue raises, orange lowers. Right: the "
-            "same in other orders. Where the three marks lie apart the assumptions interact, and only the mean "
-            "over all orders is a fair share. Error bars are numerical."
+            f"At N = {waterfall.slices} slices. Left: each bar is the fair share of one assumption, the mean over all "
+            "orders in which the assumptions can be mended; blue raises, orange lowers. Right: the same assumption in "
+            "single orders. Where the marks lie apart the assumptions interact, and the bar of one order is not a "
+            "share. Error bars are numerical."
         ),
         alt=f"Waterfall of the mean of omega over omega_0 in the second half: from {waterfall.start:.3f} to "
         f"{waterfall.end:.3f}. Means over all orders: {bars}. The largest is {largest.name}.",
@@ -79,9 +80,9 @@ def _draw_frozen(found: Attribution) -> Exhibit:
         section="steps",
         title="What holding the coefficients constant costs, step by step",
         caption=(
-            "Top: how much each frozen quantity changes within a step. Middle: what freezing it misses in that "
-            "step; the highest curve costs most at that moment. Bottom: the defects added up, beside the error "
-            "they lead to."
+            "Top: how much each quantity that is held constant changes within a step. Middle: the velocity that "
+            "holding it constant misses in that step. Bottom: these defects added up, beside the error of the velocity "
+            "and of ω that they lead to."
         ),
         alt=f"Curves over time for {study.scheme} at a step of {study.dt * 1e3:.2g} ms. Share of the steps in which "
         f"freezing costs most: {shares}. Largest velocity missed in one step: {peaks or 'none'}. Largest error of "
@@ -100,7 +101,8 @@ def _draw_gantts(found: Attribution) -> Iterator[Exhibit]:
             title=f"Contacts and impacts: {first} and {second}",
             caption=(
                 "One row per slice. Bars are contacts, ticks are impacts; the upper lane of a row is the first "
-                "solver, the lower the second. Where the lanes look alike the two tell the same story of that slice."
+                "solver, the lower the second. Where the two lanes of a row look alike, both solvers have the same "
+                "contacts and impacts of that slice."
             ),
             alt=f"Contacts and impacts of {first} above those of {second}, one row per slice. "
             f"{alignment.words}.".replace("ω₀", "omega_0"),
@@ -116,11 +118,11 @@ def _draw_predictability(found: Attribution) -> Exhibit:
     return Exhibit(
         name="predictability",
         section="events",
-        title="How far ahead the curves mean anything",
+        title="How far a small change of the release moves ω",
         caption=(
-            "Flights released a hair differently. Parallel curves grow with the change: the flight is smooth. "
-            "Curves that meet at one level whatever the change show jumps, where an impact just happens or just "
-            "does not."
+            "Flights whose release differs by a small amount. Where curves are parallel, the difference in ω is "
+            "proportional to the change of the release. Where curves of different changes meet at one level, ω jumps: "
+            "an impact happens in one flight and not in the other."
         ),
         alt=f"Logarithmic plot of the spread after tiny changes. {words}".replace("ω₀", "omega_0"),
         maker=figure_predictability,
@@ -132,6 +134,7 @@ def _draw_predictability(found: Attribution) -> Exhibit:
 def _draw_maps(found: Attribution) -> Iterator[Exhibit]:
     for study in found.maps:
         dominant = study.dominant
+        which = "step down the ladder" if study.shares is None else "fair share (mean over all orders of mending)"
         contours = (
             "the contours are where a scheme is 1 % and 10 % of ω₀ off its own equation."
             if study.axis == "step"
@@ -144,11 +147,11 @@ def _draw_maps(found: Attribution) -> Iterator[Exhibit]:
             name=f"map-{study.axis}",
             section="maps",
             title=f"Validity over filling and {AXES[study.axis]}",
-            caption="Every cell is a throw. Its colour names the assumption that moves the plateau of ω most; "
-            f"{contours} Hatched cells could not be computed.",
+            caption=f"Every cell is a throw. Its colour names the assumption with the largest {which} in the plateau, "
+            f"the mean of ω/ω₀ over the second half; {contours} Hatched cells could not be computed.",
             alt=f"Map of {dominant.size} throws of {study.slices} slices, fill fraction {study.fills[0]:g} to "
-            f"{study.fills[-1]:g} by {AXES[study.axis]} {study.values[0]:g} to {study.values[-1]:g}. Cells by largest "
-            f"mistake: {counts or 'none could be computed'}. {_within(study)}",
+            f"{study.fills[-1]:g} by {AXES[study.axis]} {study.values[0]:g} to {study.values[-1]:g}. Cells by "
+            f"largest {which}: {counts or 'none could be computed'}. {_within(study)}",
             maker=figure_map,
             data=(study,),
             table=tables.table_map(study),

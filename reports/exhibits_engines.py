@@ -39,10 +39,10 @@ def draw_overlap(study: Overlap) -> Exhibit:
     return Exhibit(
         name="overlap",
         section="engines",
-        title="What slices cost that share their place",
+        title="How far ω falls because slices may overlap",
         caption="In the paper slices pass through each other, and a full bottle, which ought to behave like ice, slows "
-        "down. The same engine with rods that exclude each other keeps a full bottle turning; what lies between the "
-        "two curves is the price of overlap. Bars: what halving the step changes, twice.",
+        "down. In the same engine, slices that are rods and exclude each other keep the angular velocity of a full "
+        "bottle. The two curves differ by what overlap does. Bars: twice what halving the step changes.",
         alt=f"Line plot of the plateau of omega over omega_0 against the fill fraction; ice is 1. {rows}.",
         maker=figure_overlap,
         data=(study,),
@@ -90,10 +90,10 @@ def draw_gallery(facts: Sequence[EngineFact]) -> Exhibit:
     return Exhibit(
         name="engine-facts",
         section="engines",
-        title="What an engine does unasked",
+        title="Engine behaviour that a user may not expect",
         caption=f"Each fact is measured anew with every report, and the sign says whether the number lies within its "
-        f"threshold: {held} of {len(facts)} do. The knobs of the engine check are chosen so that none of them can bite "
-        "unseen; how each was measured stands with the findings.",
+        f"threshold: {held} of {len(facts)} do. The engine check is set so that none of them changes "
+        "a result unnoticed; how each was measured stands with the findings.",
         alt=f"Table of facts about the engines. {words}".replace("ω₀", "omega_0"),
         maker=figure_gallery,
         data=(findings, engines),

@@ -8,7 +8,10 @@ interruption, and writes ``explore_data.json`` beside this file: one file of the
     place of a throw in every list = (restitution * gammas + gamma) * fills + fill
     omega                 per solver of SHOWN: omega / omega_0 at ``points`` equal times, in steps of OMEGA_STEP
     plateau               per entry of LADDER: mean of omega / omega_0 over the second half, in steps of PLATEAU_STEP
-    dominant              index into RUNGS of the largest mistake, MISSING_RUNG where a run failed
+    shares                per entry of RUNGS: 1 + its fair share of the plateau (mean over all orders of mending), in
+                          steps of SHARE_STEP; missing in a file in which only the ladder was flown
+    dominant              index into RUNGS of the largest fair share in size, without shares of the largest step down
+                          the ladder; MISSING_RUNG where a run failed
     problems              place -> why a run of that throw cannot be used
 
 Numbers are whole numbers of steps, little-endian and unsigned, in base64; the largest of their type means "missing".
@@ -56,6 +59,11 @@ POINTS: Final = 61
 
 OMEGA_STEP: Final = 1e-4
 PLATEAU_STEP: Final = 2e-5
+SHARE_STEP: Final = 1e-4
+FAIR_SHARE: Final = "fair share (mean over all orders of mending)"
+LADDER_STEP: Final = "step down the ladder (no share: another order gives another number)"
+"""What the number of an assumption is, with and without the combinations of assumptions."""
+
 MISSING: Final = 0xFFFF
 MISSING_RUNG: Final = 0xFF
 
@@ -83,13 +91,14 @@ GRID: Final = Grid(
 
 
 def plan(throw: Scenario, grid: Grid) -> list[list[Run]]:
-    """Return the runs for each restitution: the ladder on every cell of a validity map over fill and gamma.
+    """Return the runs for each restitution: every set of assumptions on every cell of a map over fill and gamma.
 
     The tags of one restitution are unique; two restitutions share theirs.
     """
     dampings = _dampings(throw, grid)
     throws = [replace(throw, restitution=restitution) for restitution in grid.restitutions]
-    return [plan_map(t, "gamma", grid.fills, dampings, steps=STEPS, tolerances=MEDIUM, points=None) for t in throws]
+    how: dict[str, Any] = {"steps": STEPS, "tolerances": MEDIUM, "points": None, "shares": True}
+    return [plan_map(t, "gamma", grid.fills, dampings, **how) for t in throws]
 
 
 def compute(
@@ -128,11 +137,15 @@ def pack(
     shape = grid.shape
     omega = {name: np.full((*shape, points), np.nan) for name in SHOWN}
     plateau = {name: np.full(shape, np.nan) for name in LADDER}
+    shares = {name: np.full(shape, np.nan) for name in RUNGS}
     dominant = np.full(shape, MISSING_RUNG, dtype=np.uint8)
     problems: dict[str, str] = {}
     for at, (runs, rows) in enumerate(zip(planned, read, strict=True)):
         readings = {tag: _reading(row) for tag, row in rows.items()}
-        study = study_readings(throw, "gamma", grid.fills, _dampings(throw, grid), readings, steps=STEPS)
+        study = study_readings(throw, "gamma", grid.fills, _dampings(throw, grid), readings, steps=STEPS, shares=True)
+        assert study.shares is not None
+        for name, share in zip(RUNGS, study.shares, strict=True):
+            shares[name][at] = share
         dominant[at] = np.where(study.dominant < 0, MISSING_RUNG, study.dominant)
         for name in LADDER:
             plateau[name][at] = study.level[name]
@@ -158,8 +171,10 @@ def pack(
         "rungs": list(RUNGS),
         "omega_step": OMEGA_STEP,
         "plateau_step": PLATEAU_STEP,
+        "share_step": SHARE_STEP,
         "omega": {name: encoded(values, OMEGA_STEP) for name, values in omega.items()},
         "plateau": {name: encoded(values, PLATEAU_STEP) for name, values in plateau.items()},
+        "shares": {name: encoded(1.0 + values, SHARE_STEP) for name, values in shares.items()},
         "dominant": base64.b64encode(dominant.tobytes()).decode("ascii"),
         "problems": problems,
     }
@@ -211,10 +226,15 @@ def decoded(text: str, step: float) -> FloatArray:
 def page_data() -> dict[str, Any] | None:
     """Return what the page needs, ready for JSON: the data file and, as "start", where the sliders begin; or None.
 
+    "measure" says in words what the number of an assumption is.
+
     The sliders begin at the throw nearest the one that the file varies; "start" says in numbers what they show there.
     """
     data = load()
-    return None if data is None else {**data, "start": _start(data)}
+    if data is None:
+        return None
+    measure = FAIR_SHARE if "shares" in data else LADDER_STEP
+    return {**data, "start": _start(data), "measure": measure}
 
 
 def _start(data: Mapping[str, Any]) -> dict[str, Any]:

@@ -26,15 +26,19 @@ TOLERANCE: Final = DEFAULT_TOLERANCE
 UNCERTIFIED_DT: Final = 1.25e-4
 """Step of a witness that is not certified [s]: where a certificate begins."""
 
+LOCATED: Final = "pymunk located"
+"""Tag of the hybrid, which exists for throws without drag only."""
+
 WITNESSES: Final[Mapping[str, tuple[str, Mapping[str, Any]]]] = {
     "pymunk": ("pymunk", {}),
+    LOCATED: ("pymunk", {"hits": "located"}),
     "mujoco": ("mujoco", {}),
     "pymunk rotating": ("pymunk", {"frame": "rotating"}),
 }
-"""Tag -> engine and settings of every engine run that the report certifies."""
+"""Tag -> engine and settings of every engine run that the report certifies, where the throw allows it."""
 
-SAME_EQUATION: Final = ("free-flight", "pymunk", "mujoco")
-"""What solves the same equation on the same throw, in three different ways."""
+SAME_EQUATION: Final = ("free-flight", "pymunk", LOCATED, "mujoco")
+"""What solves the same equation on the same throw in different ways."""
 
 REFERENCE: Final = SAME_EQUATION[0]
 
@@ -77,7 +81,7 @@ class Instruments:
     certificates : mapping tag -> mapping
         As ``engine_check.Certificate.to_mapping`` gives it, of each run in ``WITNESSES`` that was made.
     agreement : Agreement or None
-        Of the three solvers of free flight, on the report's throw.
+        Of the solvers of free flight, on the report's throw.
     full_bottle : Trajectory or None
         The full bottle whose slices exclude each other.
     """
@@ -92,12 +96,18 @@ class Instruments:
     problems: Mapping[str, str] = field(default_factory=dict)
 
 
+def witnesses(throw: Scenario) -> dict[str, tuple[str, Mapping[str, Any]]]:
+    """Return those of ``WITNESSES`` that can fly the throw: hits are located only without drag, and ice has none."""
+    dry = throw.drag == 0.0 and not throw.frozen
+    return {tag: how for tag, how in WITNESSES.items() if dry or tag != LOCATED}
+
+
 def plan_witnesses(throw: Scenario, bench: Bench) -> list[Run]:
     """Return the engine runs of the report's throw, certified where the bench says so."""
     uncertified = {"dt": UNCERTIFIED_DT}
     return [
         Run(tag, engine, throw, {**settings, **({"tolerance": TOLERANCE} if tag in bench.certified else uncertified)})
-        for tag, (engine, settings) in WITNESSES.items()
+        for tag, (engine, settings) in witnesses(throw).items()
     ]
 
 

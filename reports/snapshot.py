@@ -3,7 +3,8 @@
     python -m reports.snapshot               make a full report and keep its summary and key pictures
     python -m reports.snapshot --from DIR    the same from a full report that is already there
 
-Run times, settings and figures are left out of the summary; what stays is compared with the code by the tests.
+Both also write the numbers of the summary into the README, between its two marks. Run times, settings and figures are
+left out of the summary; what stays is compared with the code by the tests.
 """
 
 from __future__ import annotations
@@ -12,19 +13,26 @@ import argparse
 import shutil
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from textwrap import fill
+from typing import Any, Final
 
 from reports.diff import read_summary
+from reports.headlines import Headline
+from reports.lead import answers
 from reports.output import replaced_folder
 from reports.summary import SCHEMA_NAME, SUMMARY_VERSION, summary_text
 
 PLACE: Final = Path(__file__).resolve().parent / "snapshot"
 
-KEPT: Final = ("flipproof", "version", "scenario", "slices", "size", "lead", "findings", "differences")
+KEPT: Final = ("flipproof", "version", "scenario", "slices", "size", "lead", "headlines", "findings", "differences")
 
 PICTURES: Final = ("omega", "waterfall", "differences")
+
+README: Final = PLACE.parents[1] / "README.md"
+BEGIN: Final = "<!-- findings: written by python -m reports.snapshot -->"
+END: Final = "<!-- end of findings -->"
 
 
 def take(report: Path, place: Path = PLACE) -> None:
@@ -54,6 +62,36 @@ def take(report: Path, place: Path = PLACE) -> None:
             shutil.copyfile(picture, folder / picture.name)
 
 
+def front_page(summary: Mapping[str, Any]) -> str:
+    """Return what the README says that was found, from a summary alone."""
+    found = [Headline.from_mapping(mapping) for mapping in summary["headlines"]]
+    parts = (f"- **{question}** {' '.join(said)}" for question, said in answers(found))
+    wrapped = (
+        fill(part.replace("ω₀", "omega_0").replace("ω", "omega").replace("θ", "theta"), 118, subsequent_indent="  ")
+        for part in parts
+    )
+    return "\n".join(wrapped) + "\n"
+
+
+def write_front_page(summary: Mapping[str, Any], readme: Path) -> None:
+    """Write what was found between the two marks of the README.
+
+    Raises
+    ------
+    ValueError
+        If the README cannot be read or lacks the marks.
+    """
+    try:
+        text = readme.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ValueError(f"{readme}: cannot be read ({error})") from error
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise ValueError(f"{readme}: has no {BEGIN} … {END}")
+    readme.write_text(before + begin + "\n" + front_page(summary) + end + after, encoding="utf-8")
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Take the snapshot; return 0, 1 if the report could not be made, 2 if the folder cannot be used."""
     parser = argparse.ArgumentParser(prog="python -m reports.snapshot", description=__doc__.partition("\n")[0])
@@ -71,6 +109,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 if status:
                     return status
                 take(Path(scratch, "report"), options.to)
+        if options.to == PLACE:
+            write_front_page(read_summary(PLACE), README)
     except ValueError as error:
         sys.stderr.write(f"flipproof: error: {error}\n")
         return 2

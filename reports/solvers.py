@@ -56,12 +56,17 @@ def find(name: str) -> Solver:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One run to make: solver, scenario and settings. ``tag`` tells runs of one solver apart; it must be unique."""
+    """One run to make: solver, scenario and settings. ``tag`` tells runs of one solver apart; it must be unique.
+
+    ``confirms`` is the tag of the run whose numerical error this one shows: the same solver on the same throw, by
+    tighter tolerances or another method. "" if it confirms none.
+    """
 
     tag: str
     solver: str
     scenario: Scenario
     settings: Mapping[str, Any] = field(default_factory=dict)
+    confirms: str = ""
 
 
 @dataclass(frozen=True, slots=True)

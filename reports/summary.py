@@ -9,10 +9,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
-from reports.evidence import FLIGHTS, FREE, OTHERS, Evidence
+from engine_check.witness import witness_of
+from reports.evidence import FLIGHTS, OTHERS, Evidence
 from reports.exhibit import Exhibit
 from reports.exhibits_work_precision import summarise_work_precision
 from reports.findings import Finding
+from reports.headlines import headlines
 from reports.lead import lead_words
 from reports.solvers import find
 from reports.studies.differences import PARTING_BAND, Difference
@@ -51,6 +53,7 @@ def summarise(
     twice = sorted({name for name in ids if ids.count(name) > 1})
     if twice:
         raise ValueError(f"findings share an id: {', '.join(twice)}")
+    verdict = headlines(evidence)
     summary = {
         "$schema": SCHEMA_NAME,
         "flipproof": provenance["flipproof"],
@@ -58,7 +61,8 @@ def summarise(
         "scenario": evidence.scenario.to_mapping(),
         "slices": evidence.throw.n_slices,
         "size": evidence.size.name,
-        "lead": lead_words(evidence.differences, evidence.trajectory(FREE)),
+        "lead": lead_words(verdict),
+        "headlines": [headline.to_mapping() for headline in verdict],
         "findings": [finding.to_mapping() for finding in findings],
         "differences": [_difference_mapping(difference) for difference in evidence.differences],
         "solvers": list(solvers),
@@ -80,7 +84,7 @@ def summary_text(summary: Mapping[str, Any]) -> str:
 
 def solver_rows(evidence: Evidence) -> list[dict[str, Any]]:
     """Return what the report says of every solver on the throw: status, end, plateau, impacts, diagnostics."""
-    return [_solver_row(evidence, tag) for tag in (*FLIGHTS, *OTHERS)]
+    return [_solver_row(evidence, tag) for tag in (*FLIGHTS, *OTHERS) if tag in evidence.made]
 
 
 def _solver_row(evidence: Evidence, tag: str) -> dict[str, Any]:
@@ -96,6 +100,9 @@ def _solver_row(evidence: Evidence, tag: str) -> dict[str, Any]:
     trajectory = made.trajectory
     if trajectory is None:
         return row | {"status": "failed", "message": made.reason}
+    if solver.package == "engine_check":
+        witness = witness_of(trajectory.settings)
+        row |= {"equation": witness.equation, "reason": witness.words}
     return row | {
         "status": trajectory.status,
         "message": trajectory.message,
@@ -130,7 +137,13 @@ def _difference_mapping(difference: Difference) -> dict[str, Any]:
         for name in ("name", "first", "second", "largest", "largest_time", "final", "parting_time", "band")
     }
     impact = difference.parting_impact
-    return mapping | {"parting_band": PARTING_BAND, "parting_impact": None if impact is None else asdict(impact)}
+    slices, largest = difference.finer or (None, None)
+    return mapping | {
+        "slices": difference.slices,
+        "finer": None if slices is None else {"slices": slices, "largest": largest},
+        "parting_band": PARTING_BAND,
+        "parting_impact": None if impact is None else asdict(impact),
+    }
 
 
 def _figure_mapping(exhibit: Exhibit) -> dict[str, Any]:

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from reports.evidence import DIFFERENCES, FREE, TOTAL
-from reports.studies.differences import PARTING_BAND, Difference, percent
-from reports.studies.waterfall import NAMES, Waterfall
+from reports.headlines import Headline
+from reports.lead import at_slices, signed, tied
+from reports.studies.differences import PARTING_BAND, percent
+from reports.studies.waterfall import Waterfall
 
 State = Literal["pass", "fail", ""]
-
-STEP = DIFFERENCES[0][0]
-ENGINE = next(name for name, first, _ in DIFFERENCES if first == FREE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,76 +36,80 @@ class Strip:
     kind: Literal["whole", "up", "down"]
 
 
-def answer(differences: Sequence[Difference]) -> str:
-    """Return the verdict in one sentence: whether the step can be trusted, and whether the equation in it can.
+def answer(headlines: Sequence[Headline]) -> str:
+    """Return the verdict in one sentence: whether the step is short enough, and whether Eq. 8 is free flight.
 
-    Either is trusted if no curve of omega moves by more than PARTING_BAND of omega_0.
+    Either holds if no curve of omega moves by more than PARTING_BAND of omega_0.
     """
-    step = _named(differences, STEP)
-    parts = [difference for difference in differences if difference.name in NAMES.values()]
-    if step is None or not parts:
+    found = {headline.id: headline for headline in headlines}
+    if not {"step", "eq8-free"} <= set(found):
         return "No verdict: what it needs could not be computed; the reasons stand below."
-    holds = step.largest <= PARTING_BAND, max(part.largest for part in parts) <= PARTING_BAND
+    within = percent(PARTING_BAND)
     return {
-        (True, False): "The step can be trusted. The equation in it cannot.",
-        (True, True): "On this throw both the step and the equation in it can be trusted.",
-        (False, True): "On this throw the equation can be trusted. The step is too long.",
-        (False, False): "Neither the step nor the equation in it can be trusted on this throw.",
-    }[holds]
+        (True, False): "The step is short enough. Eq. 8 is not free flight.",
+        (True, True): f"On this throw the step is short enough, and Eq. 8 is free flight within {within} of ω₀.",
+        (False, True): f"On this throw Eq. 8 is free flight within {within} of ω₀. The step is too long.",
+        (False, False): "On this throw the step is too long, and Eq. 8 is not free flight.",
+    }[found["step"].value <= PARTING_BAND, found["eq8-free"].value <= PARTING_BAND]
 
 
-def tiles(differences: Sequence[Difference]) -> tuple[Tile, ...]:
+LABELS: Mapping[str, tuple[str, str]] = {
+    "share": (
+        "of ω₀: largest fair share",
+        "“{what}”, of the mean ω: mean over all orders of mending, {low} to {high} in single orders.{rival}",
+    ),
+    "whole": ("of ω₀: program and free flight", "Largest difference in ω, at t = {time} ms."),
+    "program-eq8": ("of ω₀: program and Eq. 8", "Largest difference in ω, at t = {time} ms."),
+    "held": (
+        "of ω₀: ω held constant over a step",
+        "Largest error of the program without its lag before the first impact, {note}.",
+    ),
+    "step": (
+        "of ω₀: all that a finite step does",
+        "Largest error of the program against its own equation, {note}.",
+    ),
+    "engine": (
+        "of ω₀: free flight and pymunk",
+        "Largest difference in ω; hits in pymunk wait for the step's grid.",
+    ),
+}
+"""Headline -> label and words of its tile, in the order of the page."""
+
+
+def tiles(headlines: Sequence[Headline]) -> tuple[Tile, ...]:
     """Return the numbers behind the answer; a number that could not be computed is missing."""
-    step, total, engine = (_named(differences, name) for name in (STEP, TOTAL, ENGINE))
-    parts = [difference for difference in differences if difference.name in NAMES.values()]
-    made = []
-    if parts:
-        worst = max(parts, key=lambda part: part.largest)
-        made.append(
-            Tile(
-                value=percent(worst.largest),
-                label=f"of ω₀: {worst.name}",
-                words=f"The largest single assumption; the two {worst.moment}.",
-                state=_state(worst),
-            )
-        )
-    if total is not None:
-        largest = max((part.largest for part in parts), default=0.0)
-        made.append(
-            Tile(
-                value=percent(total.largest),
-                label="of ω₀: all assumptions together",
-                words=f"Published program against free flight, at t = {1e3 * total.largest_time:.0f} ms."
-                + (" The parts partly cancel." if largest > 1.2 * total.largest else ""),
-                state=_state(total),
-            )
-        )
-    if step is not None:
-        made.append(
-            Tile(
-                value=percent(step.largest),
-                label="of ω₀: ω held constant over a step",
-                words="The published program against its own equation, at this number of steps.",
-                state=_state(step),
-            )
-        )
-    if engine is not None:
-        made.append(
-            Tile(
-                value=percent(engine.largest),
-                label="of ω₀: the check by an engine",
-                words="Free flight by event-driven integration against a physics engine.",
-                state=_state(engine),
-            )
-        )
-    return tuple(made)
+    found = {headline.id: headline for headline in headlines}
+    rival = ""
+    if {"share", "share-2"} <= set(found) and tied(found["share"], found["share-2"]):
+        second = found["share-2"]
+        rival = f" Not told apart from “{second.what}”, {signed(second.value)}."
+    return tuple(_tile(found[id_], *words, rival) for id_, words in LABELS.items() if id_ in found)
+
+
+def _tile(headline: Headline, label: str, words: str, rival: str) -> Tile:
+    text = signed if headline.measure == "share" else percent
+    time = "" if headline.time is None else f"{1e3 * headline.time:.0f}"
+    said = words.format(
+        what=headline.what,
+        low=signed(headline.low),
+        high=signed(headline.high),
+        time=time,
+        note=headline.note,
+        rival=rival,
+    )
+    return Tile(
+        value=text(headline.value),
+        label=label,
+        words=f"{said[0].upper()}{said[1:]} {at_slices(headline)}.",
+        state="pass" if abs(headline.value) <= PARTING_BAND else "fail",
+    )
 
 
 def strips(waterfall: Waterfall) -> tuple[Strip, ...]:
-    """Return the bars from published program to free flight; none if a value is not finite."""
+    """Return the fair shares as bars from published program to free flight; none if a value is not finite."""
     levels = [waterfall.start]
     for bar in waterfall.bars:
-        levels.append(levels[-1] + bar.forward)
+        levels.append(levels[-1] + bar.average)
     if not all(math.isfinite(value) for value in (*levels, waterfall.end)):
         return ()
     low, high = min(0.0, waterfall.end, *levels), max(0.0, waterfall.end, *levels)
@@ -120,16 +122,8 @@ def strips(waterfall: Waterfall) -> tuple[Strip, ...]:
     return (
         strip("published program", f"{waterfall.start:.3f}", 0.0, waterfall.start, "whole"),
         *(
-            strip(bar.name, f"{bar.forward:+.3f}".replace("-", "−"), a, b, "up" if bar.forward >= 0 else "down")
+            strip(bar.name, f"{bar.average:+.3f}".replace("-", "−"), a, b, "up" if bar.average >= 0 else "down")
             for bar, a, b in zip(waterfall.bars, levels, levels[1:], strict=False)
         ),
         strip("free flight", f"{waterfall.end:.3f}", 0.0, waterfall.end, "whole"),
     )
-
-
-def _named(differences: Sequence[Difference], name: str) -> Difference | None:
-    return next((difference for difference in differences if difference.name == name), None)
-
-
-def _state(difference: Difference) -> State:
-    return "pass" if difference.largest <= PARTING_BAND else "fail"

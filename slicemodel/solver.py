@@ -33,6 +33,7 @@ def solve(
     store: Store = "full",
     *,
     rebound: Rebound | None = None,
+    lagged: bool | None = None,
 ) -> Trajectory:
     """Advance the slice model on a uniform grid of ``steps`` points over [0, duration].
 
@@ -52,6 +53,9 @@ def solve(
         Where a slice that hits an end rebounds: at the next grid point ([C.S.]), or at the hit itself, located by the
         closed form. "in-step" needs a scheme with exact roots. None: as the scheme does, "in-step" for ``midpoint``,
         "grid" for the others.
+    lagged : bool or None
+        Whether r_CM, J and omega are those of the slices a step before (``StepForm.lagged``). None: as the scheme does;
+        of all schemes only ``published-python`` lags.
 
     Returns
     -------
@@ -72,6 +76,8 @@ def solve(
     there, with a far smaller constant: an impact makes r'_CM jump, and the drag of a step knows one mean of it.
     """
     chosen, form, steps = checked(scheme, steps, rebound)
+    if lagged is not None:
+        form = form._replace(lagged=bool(lagged))
     if store not in get_args(Store):
         raise ValueError(unknown_name("store =", store, get_args(Store)))
     size = 16 * steps * scenario.n_slices
@@ -180,6 +186,7 @@ def trajectory(
             "dt": scenario.duration / (len(t) - 1),
             "store": "full" if len(record.r) else "summary",
             "rebound": "in-step" if form.in_step else "grid",
+            "lagged": form.lagged,
             **constants._asdict(),
         },
         diagnostics={"rebounds": run.rebounds},

@@ -21,6 +21,7 @@
     ([name, text]) => [name, Array.from(chart.numbers(text, Uint16Array), known(step))]));
   const omega = unpacked(data.omega, data.omega_step);
   const plateau = unpacked(data.plateau, data.plateau_step);
+  const shares = data.shares && unpacked(data.shares, data.share_step);
   const dominant = chart.bytes(data.dominant);
   const times = Array.from({ length: data.points }, (_, k) => (k * data.duration) / (data.points - 1));
   const highest = Math.max(1, ...Object.values(omega).flat().filter(Number.isFinite));
@@ -28,7 +29,7 @@
   const letters = "ABCDEFGHIJ";
   const sliders = { fill: data.fills, gamma: data.gammas, restitution: data.restitutions };
   const percent = (share, digits = 1) => (Number.isFinite(share) ? `${chart.shown(100 * share, digits)} %` : "not computed");
-  const signed = (share) => (share >= 0 && Number.isFinite(share) ? "+" : "") + percent(share);
+  const signed = (share, digits = 1) => (share >= 0 && Number.isFinite(share) ? "+" : "") + percent(share, digits);
   const number = (value) => (Number.isFinite(value) ? chart.shown(value, 4) : "–");
 
   const chosen = (name) => Number(find(name).value);
@@ -43,7 +44,7 @@
   function mistakes(at) {
     return data.rungs.map((name, k) => ({
       name, letter: letters[k], colour: COLOURS[k % COLOURS.length],
-      share: Math.abs(plateau[data.ladder[k + 1]][at] - plateau[data.ladder[k]][at]),
+      share: shares ? shares[name][at] - 1 : plateau[data.ladder[k + 1]][at] - plateau[data.ladder[k]][at],
     }));
   }
 
@@ -101,7 +102,7 @@
           class: "explore-cell", x, y, width: cell, height: ROW, fill: rung === MISSING_RUNG ? "none" : COLOURS[rung % COLOURS.length],
         }, svg);
         box.addEventListener("click", () => choose({ gamma: k, fill }));
-        const hint = rung === MISSING_RUNG ? data.problems[at] ?? "not computed" : `${data.rungs[rung]}: ${percent(mistakes(at)[rung].share)}`;
+        const hint = rung === MISSING_RUNG ? data.problems[at] ?? "not computed" : `${data.rungs[rung]}: ${signed(mistakes(at)[rung].share)}`;
         chart.element("title", {}, box).textContent = hint;
         chart.words(rung === MISSING_RUNG ? "–" : letters[rung], { class: "explore-letter", x: x + cell / 2, y: y + ROW / 2 + 4 }, svg);
       });
@@ -123,17 +124,17 @@
 
   function fillMistakes(at) {
     const found = mistakes(at);
-    const largest = Math.max(...found.map((mistake) => mistake.share).filter(Number.isFinite), 1e-9);
+    const largest = Math.max(...found.map((mistake) => Math.abs(mistake.share)).filter(Number.isFinite), 1e-9);
     find("mistakes").tBodies[0].replaceChildren(...found.map((mistake, k) => {
       const row = document.createElement("tr");
       if (k === dominant[at]) row.style.fontWeight = "700";
       row.insertCell().textContent = `${mistake.letter} ${mistake.name}${k === dominant[at] ? " (largest)" : ""}`;
       const share = row.insertCell();
       share.className = "number";
-      share.textContent = percent(mistake.share, 2);
+      share.textContent = signed(mistake.share, 2);
       const bar = document.createElement("span");
       bar.className = "explore-bar";
-      bar.style.width = `${Number.isFinite(mistake.share) ? (100 * mistake.share) / largest : 0}%`;
+      bar.style.width = `${Number.isFinite(mistake.share) ? (100 * Math.abs(mistake.share)) / largest : 0}%`;
       bar.style.background = mistake.colour;
       const last = row.insertCell();
       last.style.width = "40%";
@@ -149,7 +150,7 @@
     const errors = data.solvers.slice(0, -1).map(
       (name) => `${name} misses free flight by ${percent(Math.abs(plateau[name][at] - plateau[free][at]))} of ω₀`);
     const cell = rung === MISSING_RUNG ? `The map has no answer here: ${problem}.`
-      : `The largest single mistake here: ${data.rungs[rung]}, ${percent(mistakes(at)[rung].share)}.`;
+      : `The largest ${data.measure} here: ${data.rungs[rung]}, ${signed(mistakes(at)[rung].share)} of ω₀.`;
     find("said").textContent = `Filled to ${fill}, γ = ${gamma}, e = ${restitution}: on the plateau ${errors.join(", ")}. ${cell}`;
   }
 

@@ -52,7 +52,8 @@ def figure_map(study: ValidityMap, approximation: str = "published-python", meas
     axes.grid(visible=False)
     axes.set_xlabel("fill fraction M_w / M_max [1]")
     axes.set_ylabel(LABELS[study.axis])
-    axes.set_title(f"largest single mistake in the plateau of ω / ω₀, {study.slices} slices", fontsize=10, loc="left")
+    which = "step down the ladder" if study.shares is None else "fair share"
+    axes.set_title(f"largest {which} in the plateau of ω / ω₀, {study.slices} slices", fontsize=10, loc="left")
     reasons = _reasons(study)
     if reasons:
         handles.append(Patch(facecolor="none", edgecolor="#555555", hatch=HATCH, label=f"not computed: {reasons}"))

@@ -12,7 +12,7 @@ UP, DOWN, WHOLE = "#0072B2", "#D55E00", "#666666"
 
 @styled
 def figure_waterfall(waterfall: Waterfall) -> Figure:
-    """Left: the ladder, each bar from the value before to the value after. Right: the same bars in three orders."""
+    """Left: the fair shares, each bar from the value before to the value after. Right: the same in single orders."""
     figure, (ladder, orders) = new_figure(1, 2, size=(8.0, 4.6), sharey=True, width_ratios=(1.5, 1.0))
     names = ["published program", *(bar.name for bar in waterfall.bars), "free flight"]
     places = list(range(len(names) - 1, -1, -1))
@@ -21,11 +21,12 @@ def figure_waterfall(waterfall: Waterfall) -> Figure:
     level = waterfall.start
     for place, bar in zip(places[1:-1], waterfall.bars, strict=True):
         ladder.barh(
-            place, bar.forward, left=level, color=UP if bar.forward >= 0 else DOWN, height=0.6,
-            xerr=bar.forward_band, capsize=3, ecolor="#222222",
+            place, bar.average, left=level, color=UP if bar.average >= 0 else DOWN, height=0.6,
+            xerr=bar.average_band, capsize=3, ecolor="#222222",
         )  # fmt: skip
-        level += bar.forward
+        level += bar.average
         ladder.plot([level, level], [place - 1.3, place + 0.3], color="#888888", linewidth=0.8)
+        orders.plot([bar.low, bar.high], [place, place], color="#BBBBBB", linewidth=4.0, solid_capstyle="butt")
         orders.errorbar(
             bar.average, place, xerr=bar.average_band, fmt="o", color="black", capsize=3, markersize=6
         )  # fmt: skip
@@ -37,15 +38,16 @@ def figure_waterfall(waterfall: Waterfall) -> Figure:
         )
     ladder.set_yticks(places, names)
     ladder.set_xlabel(f"{waterfall.observable.words} [{waterfall.observable.unit}]")
-    ladder.set_title("mended one after the other", fontsize=10, loc="left")
+    ladder.set_title("fair shares: means over all orders", fontsize=10, loc="left")
     orders.axvline(0.0, color="#444444", linewidth=0.8)
     orders.set_xlabel(f"change [{waterfall.observable.unit}]")
-    orders.set_title("in other orders", fontsize=10, loc="left")
+    orders.set_title("in single orders", fontsize=10, loc="left")
     for axes in (ladder, orders):
         axes.grid(visible=False, axis="y")
-    orders.plot([], [], ">", color=UP, label="in the order shown")
+    orders.plot([], [], ">", color=UP, label="in the order of the ladder")
     orders.plot([], [], "<", color="#888888", label="in reverse")
-    orders.plot([], [], "o", color="black", label="mean of all orders")
+    orders.plot([], [], color="#BBBBBB", linewidth=4.0, label="range of all orders")
+    orders.plot([], [], "o", color="black", label="mean over all orders")
     handles, labels = orders.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
     return figure

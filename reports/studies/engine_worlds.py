@@ -1,4 +1,4 @@
-"""The smallest worlds that show what an engine does unasked: one or two bodies, no bottle, nothing of ``engine_check``.
+"""The smallest worlds in which an engine behaves unexpectedly: one or two bodies, no bottle, no ``engine_check``.
 
 Lengths in metres, times in seconds; x to the right, y up. The engines are imported where a world is built.
 """

@@ -4,12 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from reports.solvers import Run
 from slicemodel import Scenario, Trajectory
 from slicemodel.trajectory import FloatArray
+
+FINER: Final = 2
+"""Multiple of the slices at which every number of the verdict is computed again, to show how far it moves with N."""
+
+
+def finer_tag(tag: str) -> str:
+    """Return the tag of the same run at ``FINER`` times the slices."""
+    return f"{tag}, {FINER} times the slices"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

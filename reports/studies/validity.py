@@ -1,8 +1,11 @@
-"""Where does which mistake matter? The ladder from the published program to free flight over maps of throws.
+"""Where does which assumption matter? The ladder from the published program to free flight over maps of throws.
 
 The mapped error is the difference of the plateau, the mean of omega / omega_0 over the second half of the flight: it is
 what the paper reads off a flight, and an average forgives a rebound that comes a little early. The largest difference
 max |d omega| / omega_0 is kept beside it; a single impact that shifts in time saturates it.
+
+An assumption's number on a map is its fair share, the mean over all orders of mending (``waterfall.fair_share``), where
+every combination of assumptions was flown; else what it changes in the order of the ladder, and another order differs.
 """
 
 from __future__ import annotations
@@ -16,7 +19,9 @@ from numpy.typing import NDArray
 
 from ode_reference.models import LADDER as MODELS
 from ode_reference.models import MODELS as EQUATIONS
+from ode_reference.switches import Switches
 from reports.solvers import Made, Run
+from reports.studies.waterfall import NAMES, canonical, fair_share
 from slicemodel import Scenario
 from slicemodel.observables import plateau
 from slicemodel.scenario import shortened
@@ -38,6 +43,15 @@ RUNGS: Final = (
     "recoil",
 )
 """The mistake between each entry of LADDER and the next."""
+
+SETS: Final = {
+    switches: next(
+        (name for name in MODELS if canonical(EQUATIONS[name].switches) == canonical(switches)),
+        canonical(switches).name,
+    )
+    for switches in Switches.every()
+}
+"""Every set of assumptions mended -> the model that flies it, a rung of the ladder where there is one."""
 
 EXTRA: Final = ("exact-step",)
 """Held against its own equation, beside the ladder."""
@@ -112,6 +126,8 @@ class ValidityMap:
     slices : int
     level : name -> array - plateau of every entry of LADDER and EXTRA; NaN where it could not be computed
     largest : name -> array - max |d omega| / omega_0 against free flight; of a scheme, against its own equation too
+    shares : array, shape (rungs, rows, columns), or None
+        Fair share of every rung in the plateau, signed; None if only the ladder was flown.
     step_error : scheme -> array - error against the scheme's own equation, by plateau
     reason : array of str - "" or why the cell, or a part of it, could not be computed
     """
@@ -124,6 +140,7 @@ class ValidityMap:
     largest: Mapping[str, FloatArray]
     step_error: Mapping[str, FloatArray]
     reason: NDArray[np.str_]
+    shares: FloatArray | None = None
 
     def error(self, name: str, measure: Measure = "plateau") -> FloatArray:
         """Return the error of an approximation against free flight as a fraction of omega_0."""
@@ -139,8 +156,8 @@ class ValidityMap:
 
     @property
     def dominant(self) -> NDArray[np.int64]:
-        """Index into RUNGS of the largest difference; -1 where any of them is missing."""
-        differences = self.differences
+        """Index into RUNGS of the largest share, or of the largest step of the ladder; -1 where any is missing."""
+        differences = self.differences if self.shares is None else np.abs(self.shares)
         missing = ~np.isfinite(differences).all(axis=0)
         return np.where(missing, -1, np.nan_to_num(differences, nan=-1.0).argmax(axis=0))
 
@@ -186,16 +203,18 @@ def plan_map(
     steps: int = 1000,
     tolerances: Mapping[str, float] = FINE,
     points: int | None = POINTS,
+    shares: bool = False,
 ) -> list[Run]:
     """Return the runs of one map; tags are unique within and across maps of different axes.
 
     A model does not know a step: along "step" it runs once per fill fraction. ``points`` are its output times; None:
-    its own.
+    its own. With ``shares`` every set of assumptions is flown, 40 models in place of 7.
     """
-    usual = {name: _settings(throw, name, tolerances, points) for name in MODELS}
+    names = _solvers(shares)
+    usual = {name: _settings(throw, name, tolerances, points) for name in names if name not in SCHEMES}
     runs = []
     for cell in cells(throw, axis, fills, values, steps):
-        for name in (*LADDER, *EXTRA):
+        for name in names:
             if axis == "step" and cell.row > 0 and name not in SCHEMES:
                 continue
             settings = {"steps": cell.steps, "store": "summary"} if name in SCHEMES else usual[name]
@@ -203,9 +222,13 @@ def plan_map(
     return runs
 
 
+def _solvers(shares: bool) -> tuple[str, ...]:
+    return tuple(dict.fromkeys((*LADDER, *EXTRA, *(SETS.values() if shares else ()))))
+
+
 def _settings(throw: Scenario, model: str, tolerances: Mapping[str, float], points: int | None) -> dict[str, Any]:
     settings: dict[str, Any] = {name: tolerances[name] for name in ("rtol", "atol", "rest_speed")}
-    switches = EQUATIONS[model].switches
+    switches = EQUATIONS[model].switches if model in EQUATIONS else Switches.from_name(model)
     # Without recoil a tube that accelerates is pushed by resting slices alone; with it the impacts push as well.
     special = "rest_speed_with_recoil" if switches.recoil else "rest_speed_with_origin" if switches.origin else ""
     settings["rest_speed"] = tolerances.get(special, tolerances["rest_speed"])
@@ -229,11 +252,12 @@ def study_map(
     made: Mapping[str, Made],
     *,
     steps: int = 1000,
+    shares: bool = False,
 ) -> ValidityMap:
     """Read the runs that ``plan_map`` planned with the same arguments; ``made`` maps tags to what became of them."""
-    wanted = {tag(axis, cell, n) for cell in cells(throw, axis, fills, values, steps) for n in (*LADDER, *EXTRA)}
+    wanted = {tag(axis, cell, n) for cell in cells(throw, axis, fills, values, steps) for n in _solvers(shares)}
     readings = {name: _read(made[name]) for name in wanted if name in made}
-    return study_readings(throw, axis, fills, values, readings, steps=steps)
+    return study_readings(throw, axis, fills, values, readings, steps=steps, shares=shares)
 
 
 def study_readings(
@@ -244,10 +268,11 @@ def study_readings(
     readings: Mapping[str, Reading],
     *,
     steps: int = 1000,
+    shares: bool = False,
 ) -> ValidityMap:
     """Make the map of what was read off the runs of ``plan_map``; ``readings`` maps their tags."""
     shape = (len(values), len(fills))
-    names = (*LADDER, *EXTRA)
+    names = _solvers(shares)
     level = {name: np.full(shape, np.nan) for name in names}
     largest = {name: np.full(shape, np.nan) for name in names}
     step_error = {name: np.full(shape, np.nan) for name in SCHEMES}
@@ -269,11 +294,18 @@ def study_readings(
         fills=np.asarray(fills, dtype=np.float64),
         values=np.asarray(values, dtype=np.float64),
         slices=throw.n_slices,
-        level=level,
-        largest=largest,
+        level={name: level[name] for name in (*LADDER, *EXTRA)},
+        largest={name: largest[name] for name in (*LADDER, *EXTRA)},
         step_error=step_error,
         reason=reason,
+        shares=_shares(level) if shares else None,
     )
+
+
+def _shares(level: Mapping[str, FloatArray]) -> FloatArray:
+    """Return the fair share of every rung, the step size first; together they lead from program to free flight."""
+    of_sets = {switches: level[name] for switches, name in SETS.items()}
+    return np.array([level[LADDER[1]] - level[LADDER[0]], *(fair_share(name, of_sets) for name in NAMES)])
 
 
 def _read(made: Made) -> Reading:

@@ -79,7 +79,7 @@ def split_rows(throw: Scenario, rows: Mapping[str, Row]) -> tuple[Waterfall, ...
     SweepError
         If a run is not whole.
     """
-    return split_all({tag: _observed(throw, tag, row) for tag, row in rows.items()})
+    return split_all({tag: _observed(throw, tag, row) for tag, row in rows.items()}, throw.n_slices)
 
 
 def _observed(throw: Scenario, tag: str, row: Row) -> dict[str, float]:

@@ -124,7 +124,7 @@ def make_map(
         write_whole(out / "map.csv", map_csv(study).encode())
         write_whole(out / "map.json", json.dumps(map_facts(study, plan.throw), indent=1, allow_nan=False).encode())
     shares = ", ".join(f"{name} {count}" for name, count in _dominating(study).items() if count)
-    return f"{summary}\ncells by largest mistake: {shares or 'none'}; see {out / 'map.png'}"
+    return f"{summary}\ncells by largest step down the ladder: {shares or 'none'}; see {out / 'map.png'}"
 
 
 def map_csv(study: ValidityMap) -> str:
@@ -151,14 +151,14 @@ def map_csv(study: ValidityMap) -> str:
 
 
 def map_facts(study: ValidityMap, throw: Scenario) -> dict[str, Any]:
-    """Return what a program reads off a map: contours as lines of (fill fraction, value), cells by largest mistake."""
+    """Return what a program reads off a map: contours as lines of (fill fraction, value), cells by largest step."""
     return {
         "throw": throw.to_mapping(),
         "x": FILL,
         "y": _value_name(study.axis),
         "tolerances": dict(MEDIUM),
         "ladder": list(LADDER),
-        "cells by largest mistake": _dominating(study),
+        "cells by largest step down the ladder": _dominating(study),
         "cells without": int((study.dominant < 0).sum()),
         "contours": [
             {

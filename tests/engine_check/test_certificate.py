@@ -12,6 +12,7 @@ import engine_check
 import ode_reference
 from engine_check import DEFAULT_DT, ENGINES, certificate, certify, engine_pymunk, measure_restitution
 from engine_check.refinement import BENT, COARSEST, DOUBLE, EARLIER, ITERATED, coarsest_step
+from engine_check.witness import WITNESSES, witness_of
 from slicemodel.scenario import Bottle, Scenario
 from slicemodel.trajectory import output_times
 
@@ -48,6 +49,31 @@ def test_a_certificate_confirms_step_iterations_and_order_of_impacts_at_its_own_
     assert roles(of_ten)[-5:] == [BENT] * 4 + [ITERATED]
 
 
+@pytest.mark.parametrize(
+    ("settings", "name", "shared"),
+    [
+        ({}, "pymunk", "the initial state and the settings"),
+        ({"hits": "located"}, "pymunk, hits located (a hybrid)", "the times and the order of hits"),
+        ({"frame": "rotating"}, "pymunk in Eq. 8's frame", "the forces of Eq. 8"),
+        ({"engine": "mujoco"}, "mujoco", "the simultaneous law of impact"),
+    ],
+)
+def test_a_certificate_says_what_is_the_engines_and_what_is_ours(settings, name, shared):
+    dry = replace(SHORT, drag=0.0, duration=0.002)
+    witness = certify(dry, times=[0.002], **settings).to_mapping()["witness"]
+    assert witness["name"] == name
+    assert shared in witness["ours"]
+    assert ("law of impact" in witness["theirs"]) == (name.startswith("pymunk") and "frame" not in name)
+
+
+def test_every_way_to_run_an_engine_has_a_witness_and_ice_has_that_of_its_engine():
+    for engine in ENGINES.values():
+        assert {(engine.name, frame) for frame in engine.frames} <= {key[:2] for key in WITNESSES}
+    ways = {(e.name, "free", hits) for e in ENGINES.values() for hits in e.hits}
+    assert ways <= set(WITNESSES)
+    assert witness_of({"engine": "mujoco", "frame": "free", "hits": None}).name == "mujoco"
+
+
 def test_half_the_certified_step_changes_less_than_the_tolerance(of_ten):
     half = engine_check.solve(TEN, dt=of_ten.settings["dt"] / 2, times=TIMES)
     assert np.max(np.abs(half.omega - of_ten.trajectory.omega)) < of_ten.tolerance * TEN.omega0
@@ -81,13 +107,21 @@ def free_flight(scenario):
 
 
 @pytest.mark.parametrize(
-    "scenario",
-    [LIGHT, replace(LIGHT, drag=0.0, restitution=0.35), replace(PAIR, restitution=0.35), replace(TEN, drag=0.0)],
-    ids=["light, e = 0", "light, dry, e = 0.35", "pair, e = 0.35", "ten, dry"],
+    ("scenario", "hits"),
+    [
+        (LIGHT, "grid"),
+        (replace(LIGHT, drag=0.0, restitution=0.35), "grid"),
+        (replace(LIGHT, drag=0.0, restitution=0.35), "located"),
+        (replace(PAIR, restitution=0.35), "grid"),
+        (replace(TEN, drag=0.0), "grid"),
+        (replace(TEN, drag=0.0), "located"),
+    ],
+    ids=["light", "light, dry", "light, dry, located", "pair", "ten, dry", "ten, dry, located"],
 )
-def test_certified_runs_are_free_flight_within_their_bands(scenario):
-    found = certify(scenario, times=TIMES)
+def test_certified_runs_are_free_flight_within_their_bands(scenario, hits):
+    found = certify(scenario, times=TIMES, hits=hits)
     assert found.ok, found.reason
+    assert found.settings["hits"] == hits
     exact, band = free_flight(scenario)
     error = np.abs(found.trajectory.omega - exact) / scenario.omega0
     assert np.max(error) <= 3e-3
@@ -122,11 +156,10 @@ def test_impacts_that_share_a_step_are_not_certified_away():
 def test_located_hits_put_those_impacts_in_order_and_are_certified():
     """On the grid this throw is certified at 7.8e-6 s and off by 1e-2 omega_0."""
     dry = replace(Scenario(restitution=0.35).with_slices(20), drag=0.0)
-    found = certify(dry, times=TIMES)
+    found = certify(dry, times=TIMES, hits="located")
     exact, band = free_flight(dry)
     error = np.abs(found.trajectory.omega - exact) / dry.omega0
     assert found.ok, found.reason
-    assert found.settings["hits"] == "located"
     assert np.max(error) <= 3e-3
     assert np.mean(error <= found.band + band) >= 0.95
 

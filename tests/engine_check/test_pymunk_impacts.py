@@ -86,7 +86,7 @@ def test_elastic_hits_keep_the_energy():
 
 
 def test_the_order_of_the_bodies_in_the_space_does_not_matter():
-    one, other = (solve(dry(5, 0.5), dt=1e-4, times=TIMES, shuffle=seed) for seed in (0, 3))
+    one, other = (solve(dry(5, 0.5), dt=1e-4, times=TIMES, hits="located", shuffle=seed) for seed in (0, 3))
     assert one.settings["hits"] == other.settings["hits"] == "located"
     np.testing.assert_allclose(other.omega, one.omega, rtol=1e-6)
 
@@ -118,8 +118,8 @@ def test_angular_momentum_lost_in_carrying_is_seen(monkeypatch):
 @pytest.mark.parametrize(
     ("change", "settings", "hits"),
     [
-        ({}, {}, "located"),
-        ({}, {"hits": "grid"}, "grid"),
+        ({}, {}, "grid"),
+        ({}, {"hits": "located"}, "located"),
         ({"drag": 0.1}, {}, "grid"),
         ({}, {"slices": "exclude"}, "grid"),
         ({}, {"frame": "rotating"}, "grid"),
@@ -198,8 +198,8 @@ def test_the_certificate_is_of_the_world_that_it_measures(monkeypatch):
     short = replace(dry(2, 0.5), duration=0.02)
     damped = replace(short, drag=0.1)
     found = [
+        engine_check.certify(short, times=[0.02], hits="located"),
         engine_check.certify(short, times=[0.02]),
-        engine_check.certify(short, times=[0.02], hits="grid"),
         engine_check.certify(damped, times=[0.02]),
         engine_check.certify(damped, times=[0.02], slices="exclude"),
         engine_check.certify(damped, times=[0.02], frame="rotating"),

@@ -15,6 +15,7 @@ from reports.explore import (
     OMEGA_STEP,
     PLATEAU_STEP,
     POINTS,
+    SHARE_STEP,
     SHOWN,
     SLICES,
     Grid,
@@ -76,13 +77,32 @@ def test_the_file_holds_what_the_solvers_say_now(data, place):
 
 
 @pytest.mark.xdist_group("explore")
-def test_the_largest_mistake_of_a_throw_is_the_one_its_ladder_has(data):
+def test_the_plateaus_of_a_throw_are_those_of_its_ladder(data):
     place = drawn_places()[0]
     flights = [make(run_of(place, name)).trajectory for name in LADDER]
     levels = np.array([plateau(flight.t, flight.omega, THROW.omega0) for flight in flights])
     kept = np.array([decoded(data["plateau"][name], data["plateau_step"])[place] for name in LADDER])
     assert kept == pytest.approx(levels, abs=PLATEAU_STEP / 2 + ROUND_OFF)
-    assert base64.b64decode(data["dominant"])[place] == np.abs(np.diff(levels)).argmax()
+
+
+def check_shares(data):
+    """They sum to the whole, and the largest gives its cell the colour."""
+    shares = np.array([decoded(data["shares"][name], data["share_step"]) - 1.0 for name in RUNGS])
+    ends = [decoded(data["plateau"][name], data["plateau_step"]) for name in (LADDER[-1], LADDER[0])]
+    whole = np.isfinite(shares).all(axis=0)
+    assert whole.all()
+    assert shares.sum(axis=0) == pytest.approx((ends[0] - ends[1]), abs=len(RUNGS) * SHARE_STEP)
+    dominant = np.frombuffer(base64.b64decode(data["dominant"]), dtype=np.uint8)
+    largest = np.abs(shares).max(axis=0)
+    assert np.abs(shares)[dominant, np.arange(len(largest))] == pytest.approx(largest, abs=SHARE_STEP)
+
+
+def test_the_page_says_what_the_number_of_an_assumption_is(data, monkeypatch):
+    """A file in which only the ladder was flown has no shares, and the page does not call its numbers so."""
+    ladder = {name: value for name, value in data.items() if name != "shares"}
+    for file, words in (({**ladder, "shares": {}}, explore.FAIR_SHARE), (ladder, explore.LADDER_STEP)):
+        monkeypatch.setattr(explore, "load", lambda file=file: file)
+        assert explore.page_data()["measure"] == words
 
 
 def test_the_file_is_of_this_grid_and_whole(data):
@@ -105,7 +125,8 @@ def test_the_file_is_of_this_grid_and_whole(data):
 def test_the_sliders_begin_at_the_papers_throw(data):
     start = explore.page_data()["start"]
     assert (start["at"]["fill"], start["at"]["gamma"], start["at"]["restitution"]) == (0.5, 5.0, 0.5)
-    assert start["dominant"] == "gravity"
+    place = np.ravel_multi_index([start["at"][name] for name in ("restitutions", "gammas", "fills")], GRID.shape)
+    assert start["dominant"] == RUNGS[base64.b64decode(data["dominant"])[place]]
     # tests/vectors holds omega(T) = 5.6547 rad/s of the published program at N = 50, P = 1000.
     assert start["rows"][0]["end"] == pytest.approx(5.6547 / 20.0, abs=1e-4)
     assert data["solvers"][0] == start["rows"][0]["name"] == "published-python"
@@ -188,6 +209,7 @@ def test_the_command_makes_the_file_and_goes_on_with_a_store(tmp_path, monkeypat
     flight = make(plan(Scenario().with_slices(3), explore.GRID)[0][LADDER.index("eq8")]).trajectory
     times = np.linspace(0.0, 0.5, POINTS)
     assert omega == pytest.approx(np.interp(times, flight.t, flight.omega) / 20.0, abs=OMEGA_STEP)
+    check_shares(first)
     begun = []
 
     def begin(there, size):
@@ -195,7 +217,9 @@ def test_the_command_makes_the_file_and_goes_on_with_a_store(tmp_path, monkeypat
         return lambda *_: None
 
     again = explore.compute(Scenario().with_slices(3), explore.GRID, store, begin, jobs=1)
-    assert begun == [(len(LADDER) + 1, len(LADDER) + 1)]
+    runs = len(plan(Scenario().with_slices(3), explore.GRID)[0])
+    assert begun == [(runs, runs)]
+    assert runs == 2 + 40  # both schemes, and every equation that the six assumptions make
     assert again == first
 
 

@@ -9,9 +9,9 @@ from engine_check.solver import DEFAULT_TOLERANCE
 from reports import instruments
 from reports.build import build
 from reports.evidence import REFERENCE
-from reports.instruments import WITNESSES, plan_witnesses, study_instruments
+from reports.instruments import plan_witnesses, study_instruments, witnesses
 from reports.provenance import provenance
-from reports.solvers import Made
+from reports.solvers import Made, make
 
 pytestmark = pytest.mark.xdist_group("evidence")
 
@@ -25,8 +25,20 @@ def without(evidence, tag, reason="RuntimeError: not installed"):
 
 def test_a_report_certifies_to_what_solve_asks_by_itself():
     assert instruments.TOLERANCE == DEFAULT_TOLERANCE
-    assert [run.tag for run in plan_witnesses(REFERENCE, instruments.FULL)] == list(WITNESSES)
+    assert [run.tag for run in plan_witnesses(REFERENCE, instruments.FULL)] == list(witnesses(REFERENCE))
     assert all(run.settings["tolerance"] == DEFAULT_TOLERANCE for run in plan_witnesses(REFERENCE, instruments.FULL))
+
+
+def test_the_hybrid_stands_beside_the_grid_where_there_is_no_drag_and_nowhere_else():
+    dry = dataclasses.replace(REFERENCE, drag=0.0)
+    assert list(witnesses(REFERENCE)) == ["pymunk", "mujoco", "pymunk rotating"]
+    assert list(witnesses(dry)) == ["pymunk", "pymunk located", "mujoco", "pymunk rotating"]
+    assert list(witnesses(dataclasses.replace(dry, frozen=True))) == ["pymunk", "mujoco", "pymunk rotating"]
+    short = dataclasses.replace(dry.with_slices(3), duration=0.02)
+    runs = {run.tag: make(run).trajectory for run in plan_witnesses(short, instruments.QUICK)}
+    assert {tag: run.settings["hits"] for tag, run in runs.items()} == {
+        "pymunk": "grid", "pymunk located": "located", "mujoco": "located", "pymunk rotating": "grid",
+    }  # fmt: skip
 
 
 def test_a_quick_report_says_what_it_does_not_certify(evidence):
@@ -40,7 +52,7 @@ def test_a_quick_report_says_what_it_does_not_certify(evidence):
 def test_every_witness_has_its_certificate(evidence, read_page):
     found = evidence.instruments
     assert not found.problems
-    assert list(found.certificates) == list(WITNESSES)
+    assert list(found.certificates) == list(witnesses(evidence.throw))
     assert all(certificate["status"] == "certified" for certificate in found.certificates.values())
     assert found.agreement is not None
     assert set(found.agreement.names) == {"free-flight", "pymunk", "mujoco"}

@@ -129,7 +129,7 @@ def test_a_map_killed_midway_goes_on_to_the_rows_and_the_picture_of_an_undisturb
     assert not (tmp_path / "killed" / "map.png").exists()
     status, out, _ = run(capsys, *options, "--out", tmp_path / "killed")
     assert status == 0
-    assert f"; {there} were there\ncells by largest mistake: " in out
+    assert f"; {there} were there\ncells by largest step down the ladder: " in out
     with monkeypatch.context() as patch:
         patch.setattr("reports.sweep.command.local_workers", lambda _: nullcontext(Workers(**HERE)))
         assert run(capsys, *options, "--out", tmp_path / "whole")[0] == 0
@@ -179,7 +179,7 @@ def test_table_and_contours_say_what_the_map_holds(tmp_path):
         assert row["dominating"] == RUNGS[study.dominant[at]]
         assert row["reason"] == ""
     facts = json.loads(json.dumps(map_facts(study, THROW), allow_nan=False))
-    assert sum(facts["cells by largest mistake"].values()) == 9
+    assert sum(facts["cells by largest step down the ladder"].values()) == 9
     assert [contour["level"] for contour in facts["contours"]] == [0.01, 0.1]
     error = study.error("published-python")
     for contour in facts["contours"]:

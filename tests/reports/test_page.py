@@ -6,66 +6,19 @@ from types import SimpleNamespace
 
 import pytest
 
-from reports.evidence import FLIGHTS, TOTAL
+from reports.evidence import FLIGHTS
 from reports.page import CONTENTS, PLACES, read_assets, render, sort_problems, unbroken
 from reports.pdf import VARIABLE, PrintError, find_browser, print_page, require_browser
 from reports.provenance import provenance
 from reports.solvers import Made
-from reports.studies.waterfall import NAMES
 from reports.summary import solver_rows
-from reports.verdict import ENGINE, STEP, answer, strips, tiles
+from reports.verdict import strips
 
 pytestmark = pytest.mark.xdist_group("evidence")
 
 
-def difference(name, largest):
-    return SimpleNamespace(name=name, largest=largest, largest_time=0.3, moment="part at t = 50.3 ms")
-
-
-GRAVITY = NAMES["weightless"]
-
-
-@pytest.mark.parametrize(
-    ("step", "part", "words"),
-    [
-        (0.005, 0.55, "The step can be trusted. The equation in it cannot."),
-        (0.01, 0.01, "On this throw both the step and the equation in it can be trusted."),
-        (0.02, 0.001, "On this throw the equation can be trusted. The step is too long."),
-        (0.02, 0.55, "Neither the step nor the equation in it can be trusted on this throw."),
-    ],
-)
-def test_the_answer_follows_from_step_and_equation(step, part, words):
-    assert answer([difference(STEP, step), difference(GRAVITY, part), difference(TOTAL, 0.9)]) == words
-
-
-def test_there_is_no_answer_without_its_numbers():
-    assert answer([]).startswith("No verdict")
-    assert answer([difference(STEP, 0.5)]).startswith("No verdict")
-    assert answer([difference(GRAVITY, 0.5)]).startswith("No verdict")
-    nothing = float("nan")
-    assert answer([difference(STEP, nothing), difference(GRAVITY, nothing)]).startswith("Neither")
-
-
-def test_tiles_name_the_largest_part_the_whole_the_step_and_the_engine():
-    all_tiles = tiles(
-        [
-            difference(STEP, 0.0047),
-            difference(GRAVITY, 0.55),
-            difference(NAMES["recoil"], 0.06),
-            difference(TOTAL, 0.13),
-            difference(ENGINE, 0.0011),
-        ]
-    )
-    assert [(tile.value, tile.state) for tile in all_tiles] == [
-        ("55 %", "fail"), ("13 %", "fail"), ("0.47 %", "pass"), ("0.11 %", "pass"),
-    ]  # fmt: skip
-    assert GRAVITY in all_tiles[0].label
-    assert "partly cancel" in all_tiles[1].words
-    assert tiles([]) == ()
-
-
-def waterfall(start, end, *forward):
-    bars = tuple(SimpleNamespace(name=f"part {k}", forward=value) for k, value in enumerate(forward))
+def waterfall(start, end, *shares):
+    bars = tuple(SimpleNamespace(name=f"part {k}", average=value) for k, value in enumerate(shares))
     return SimpleNamespace(start=start, end=end, bars=bars)
 
 

@@ -6,6 +6,7 @@ import sqlite3
 import tomllib
 from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -282,8 +283,12 @@ def test_what_is_no_damage_is_not_called_so(name, slim, tmp_path):
 def test_a_file_that_may_not_be_read_is_not_called_damaged(slim, tmp_path, monkeypatch):
     file = copied(slim, tmp_path / "locked")
 
-    def refused(*_):
-        raise PermissionError(13, "Permission denied")
+    usual = Path.open
+
+    def refused(path, *rest, **options):
+        if path == file:
+            raise PermissionError(13, "Permission denied")
+        return usual(path, *rest, **options)
 
     monkeypatch.setattr("pathlib.Path.open", refused)
     with pytest.raises(SweepError, match=r"sweep\.sqlite cannot be read \(Permission denied\)"):

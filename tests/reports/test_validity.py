@@ -8,7 +8,7 @@ import pytest
 from reports.figures.style import draw
 from reports.figures.validity import figure_map
 from reports.solvers import Made, Run, make
-from reports.studies.validity import COARSE, EXTRA, LADDER, RUNGS, SCHEMES, cells, plan_map, study_map, vary
+from reports.studies.validity import COARSE, EXTRA, LADDER, RUNGS, SCHEMES, SETS, cells, plan_map, study_map, vary
 from slicemodel import Scenario, Trajectory
 
 THROW = Scenario().with_slices(6)
@@ -94,6 +94,34 @@ def test_the_largest_step_of_the_ladder_dominates(rung):
     assert study.error("free-flight") == pytest.approx(0.0)
     assert study.error("published-python", "largest") == pytest.approx(0.26)
     assert (study.reason == "").all()
+
+
+def by_set(worth):
+    """Levels that add up what each mended assumption is worth, with one interaction of signs and recoil."""
+
+    def level(run):
+        if run.solver not in SETS.values():
+            return 0.3
+        s = next(s for s, name in SETS.items() if name == run.solver)
+        return 0.4 + sum(w for name, w in worth.items() if getattr(s, name)) + 0.1 * (s.signs and s.recoil)
+
+    return level
+
+
+def test_fair_shares_colour_a_map_where_every_set_was_flown():
+    """In the order of the ladder the interaction is all recoil's; a fair share gives each of the two half of it."""
+    worth = {"signs": 0.06, "roots": -0.02, "weightless": 0.05, "origin": 0.01, "recoil": -0.01}
+    runs = plan_map(THROW, "gamma", FILLS, (0.1, 0.2), shares=True)
+    assert len(runs) == 4 * (2 + 40)
+    made = {run.tag: flat(run, by_set(worth)(run)) for run in runs}
+    study = study_map(THROW, "gamma", FILLS, (0.1, 0.2), made, shares=True)
+    assert study.shares[:, 1, 0] == pytest.approx([0.1, 0.11, -0.02, 0.0, 0.05, 0.01, 0.04], abs=1e-12)
+    assert (study.dominant == RUNGS.index("sign of Eq. 9d")).all()
+    assert study.shares.sum(axis=0) == pytest.approx(study.level["free-flight"] - study.level["published-python"])
+    ladder = study_map(THROW, "gamma", FILLS, (0.1, 0.2), made)
+    assert ladder.shares is None
+    missing = {**made, runs[5].tag: Made(runs[5], None, 0.0, "MemoryError: too much")}
+    assert (study_map(THROW, "gamma", FILLS, (0.1, 0.2), missing, shares=True).dominant == -1).sum() == 1
 
 
 def test_step_errors_are_held_against_the_scheme_s_own_equation():

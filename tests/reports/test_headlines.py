@@ -1,0 +1,266 @@
+"""The numbers of the verdict: what each is, that every sentence follows from them, and that the README shows them."""
+
+import html
+import json
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from reports.claims import claim_finite_step
+from reports.evidence import BY_ENGINE, EQ8_FREE, PROGRAM_EQ8, TOTAL
+from reports.headlines import MEASURES, Headline, headlines
+from reports.lead import amount, lead_words, sentences, signed
+from reports.snapshot import BEGIN, END, PLACE, README, front_page, write_front_page
+from reports.studies.differences import percent
+from reports.studies.finite_step import EVERYTHING, HELD, LOCATED, WAYS
+from reports.studies.slices import FINER
+from reports.studies.waterfall import STEP
+from reports.verdict import LABELS, answer, tiles
+
+pytestmark = pytest.mark.xdist_group("evidence")
+
+PAIRS = {"whole": TOTAL, "program-eq8": PROGRAM_EQ8, "eq8-free": EQ8_FREE, "engine": BY_ENGINE}
+
+
+@pytest.fixture(scope="module")
+def kept():
+    return json.loads((PLACE / "summary.json").read_text(encoding="utf-8"))
+
+
+def of(summary):
+    return {mapping["id"]: Headline.from_mapping(mapping) for mapping in summary["headlines"]}
+
+
+def made_up(id_="whole", value=0.13, **changes):
+    headline = Headline(id=id_, what="gravity in Eq. 8", measure="largest", value=value, slices=50)
+    return replace(headline, **changes)
+
+
+# ---------------------------------------------------------------------- each number is what its name says
+
+
+def check_against_the_rest(summary):
+    """Every headline is computed a second time from the summary's own differences and findings."""
+    found = of(summary)
+    differences = {d["name"]: d for d in summary["differences"]}
+    findings = {f["id"]: f for f in summary["findings"]}
+    for id_, name in PAIRS.items():
+        difference = differences[name]
+        assert found[id_].value == difference["largest"]
+        assert found[id_].slices == difference["slices"] == summary["slices"]
+        finer = difference["finer"] or {"slices": None, "largest": None}
+        assert (found[id_].finer_slices, found[id_].finer) == (finer["slices"], finer["largest"])
+        tag = f"difference-{difference['first']}-{difference['second']}".replace(" ", "-")
+        assert findings[tag]["value"] == found[id_].value
+    rungs = [d for d in summary["differences"] if d["name"] == found["pair"].what]
+    assert [d["largest"] for d in rungs] == [found["pair"].value]
+    assert findings[f"finite-step-{EVERYTHING}"]["value"] == found["step"].value
+    assert findings[f"finite-step-{LOCATED}"]["value"] == found["held-through"].value
+    assert f"{found['held'].value:.2g} of ω₀ before" in findings[f"finite-step-{HELD}"]["note"]
+    shares = [h for h in found.values() if re.fullmatch(r"share(-\d)?", h.id)]
+    assert len(shares) == 6
+    assert [abs(h.value) for h in shares] == sorted((abs(h.value) for h in shares), reverse=True)
+    assert all(h.low <= h.value <= h.high for h in shares)
+    plateau = findings["waterfall-plateau"]
+    step = plateau["value"] - sum(h.value for h in shares)
+    assert abs(step) <= 0.01  # what is left is the share of the step
+    assert f"{found['share'].what}, {found['share'].value:+.3g}" in plateau["note"]
+    assert found["away"].value * plateau["value"] < 0.0
+
+
+def test_the_snapshots_numbers_are_those_of_its_differences_and_findings(kept):
+    check_against_the_rest(kept)
+
+
+def test_a_fresh_reports_numbers_are_those_of_its_differences_and_findings(report, evidence):
+    check_against_the_rest(report.summary)
+    found = {headline.id: headline for headline in headlines(evidence)}
+    assert found == of(report.summary)
+    waterfall = evidence.attribution.waterfalls[0]
+    bars = {bar.name: bar for bar in waterfall.bars if bar.name != STEP}
+    best = max(bars.values(), key=lambda bar: abs(bar.average))
+    share = found["share"]
+    assert (share.what, share.value, share.low, share.high) == (best.name, best.average, best.low, best.high)
+    assert (share.slices, share.finer, share.finer_slices) == (
+        waterfall.slices, best.finer, FINER * waterfall.slices,
+    )  # fmt: skip
+    assert found["away"].value == bars[found["away"].what].forward
+
+
+@pytest.mark.parametrize("id_", ["whole", "program-eq8", "eq8-free", "pair", "share", "held", "held-through", "step"])
+def test_every_number_stands_at_two_numbers_of_slices(kept, id_):
+    headline = of(kept)[id_]
+    assert headline.finer_slices == FINER * headline.slices
+    assert math.isfinite(headline.finer)
+    assert f"(N = {headline.slices}; " in amount(headline)
+    assert amount(headline).endswith(f" at N = {headline.finer_slices})")
+
+
+# ---------------------------------------------------------------------- lead, tiles and front page follow from them
+
+
+def test_the_lead_is_made_of_the_headlines(kept, report):
+    for summary in (kept, report.summary):
+        assert summary["lead"] == lead_words(list(of(summary).values()))
+
+
+def numbers_allowed(headline):
+    text = signed if headline.measure in ("share", "order") else percent
+    moved = [] if headline.finer is None else [text(headline.finer), percent(abs(headline.finer - headline.value))]
+    return {text(headline.value), *moved, signed(headline.low), signed(headline.high), signed(headline.value)}
+
+
+def test_every_percentage_of_lead_tiles_and_front_page_is_a_headline(kept, report):
+    """1 % is the limit that the answer is held against; nothing else may stand there."""
+    for summary in (kept, report.summary):
+        found = list(of(summary).values())
+        allowed = {"1 %"} | {number for headline in found for number in numbers_allowed(headline)}
+        shown = [tile.value for tile in tiles(found)]
+        texts = [summary["lead"], front_page(summary), *(tile.words for tile in tiles(found))]
+        for text in texts:
+            shown += re.findall(r"[+−]?\d[\d.e+-]* %", " ".join(text.split()))
+        assert len(shown) > 20
+        assert {number for number in shown if number not in allowed} == set()
+
+
+def test_the_page_shows_the_same_tiles_and_lead(report):
+    found = list(of(report.summary).values())
+    text = re.sub(r"\s+", " ", html.unescape(report.html).replace("\N{NO-BREAK SPACE}", " "))
+    assert answer(found) in text
+    for tile in tiles(found):
+        assert tile.value in text
+        assert tile.label in text
+        assert tile.words in text
+    for sentence in sentences(found):
+        assert sentence in text
+
+
+def test_the_readme_says_what_the_snapshot_found(kept):
+    """``python -m reports.snapshot`` writes both."""
+    _, _, rest = README.read_text(encoding="utf-8").partition(BEGIN)
+    assert rest.partition(END)[0].strip() == front_page(kept).strip()
+
+
+def test_numbers_that_go_with_the_snapshot_stand_nowhere_else_in_the_readme():
+    before, _, rest = README.read_text(encoding="utf-8").partition(BEGIN)
+    after = rest.partition(END)[2]
+    assert not re.search(r"\d %", before)
+    head = after.partition("## Speed")[0]
+    assert not re.search(r"\d %", head)
+
+
+def test_the_front_page_is_written_between_its_marks_and_nowhere_else(kept, tmp_path):
+    readme = tmp_path / "README.md"
+    readme.write_text(f"above\n{BEGIN}\nold\n{END}\nbelow\n", encoding="utf-8")
+    write_front_page(kept, readme)
+    assert readme.read_text(encoding="utf-8") == f"above\n{BEGIN}\n{front_page(kept)}{END}\nbelow\n"
+    readme.write_text("no marks", encoding="utf-8")
+    with pytest.raises(ValueError, match="has no <!-- findings"):
+        write_front_page(kept, readme)
+    with pytest.raises(ValueError, match="cannot be read"):
+        write_front_page(kept, Path(tmp_path / "nowhere.md"))
+
+
+def test_headlines_come_back_from_json():
+    for headline in (made_up(), made_up(value=math.inf, finer=0.1, finer_slices=100, low=-0.1, high=0.2, time=0.3)):
+        mapping = json.loads(json.dumps({**headline.to_mapping(), "value": str(headline.value)}))
+        assert Headline.from_mapping(mapping) == headline
+    assert set(MEASURES) == {"largest", "start", "share", "order"}
+
+
+# ---------------------------------------------------------------------- sentences
+
+
+def test_the_lead_says_what_the_numbers_say():
+    words = lead_words(
+        [
+            made_up(finer=0.12, finer_slices=100),
+            made_up("program-eq8", 0.42),
+            made_up("share", -0.065, measure="share", low=-0.2, high=0.01),
+            made_up("step", 0.005, note="1000 steps"),
+        ]
+    )
+    assert "differ in ω by up to 13 % of ω₀ (N = 50; 1 % of ω₀ less at N = 100)." in words
+    assert "differ in ω by up to 42 % of ω₀ (N = 50)." in words
+    assert "3.2 times as far from Eq. 8 as from free flight." in words
+    assert "mean over all orders of mending them: “gravity in Eq. 8” −6.5 % of ω₀ (N = 50)." in words
+    assert "In single orders the same assumptions change that mean by −20 % to +1 % of ω₀." in words
+    assert "not settled" not in words
+    assert "costs 0.5 % of ω₀ (N = 50) at 1000 steps" in words
+
+
+@pytest.mark.parametrize(("finer", "settled"), [(-0.061, False), (-0.0648, True)])
+def test_two_shares_that_the_slices_move_by_more_than_they_differ_are_not_ranked(finer, settled):
+    first = made_up("share", -0.065, measure="share", low=-0.2, high=0.01, finer=finer, finer_slices=100)
+    second = replace(first, id="share-2", what="recoil", value=0.063, finer=0.0631)
+    words = lead_words([made_up(), first, second])
+    assert ("is not settled" not in words) == settled
+    assert ("Not told apart from “recoil”, +6.3 %." in tiles([first, second])[0].words) != settled
+
+
+def test_the_lead_knows_ice_divergence_and_nothing_at_all():
+    assert "all solvers agree" in lead_words([made_up(value=0.0), made_up("pair", 1e-9)])
+    assert "up to t = 500 ms, where pymunk diverged." in lead_words(
+        [made_up(note="up to t = 500 ms, where pymunk diverged")]
+    )
+    assert "Free flight could not be computed" in lead_words([made_up("pair", 0.1)])
+    assert "No two solvers could be compared" in lead_words([])
+
+
+@pytest.mark.parametrize(
+    ("step", "equation", "words"),
+    [
+        (0.005, 0.55, "The step is short enough. Eq. 8 is not free flight."),
+        (0.01, 0.01, "On this throw the step is short enough, and Eq. 8 is free flight within 1 % of ω₀."),
+        (0.02, 0.001, "On this throw Eq. 8 is free flight within 1 % of ω₀. The step is too long."),
+        (0.02, 0.55, "On this throw the step is too long, and Eq. 8 is not free flight."),
+        (math.nan, math.nan, "On this throw the step is too long, and Eq. 8 is not free flight."),
+    ],
+)
+def test_the_answer_follows_from_step_and_equation(step, equation, words):
+    assert answer([made_up("step", step), made_up("eq8-free", equation)]) == words
+    assert answer([made_up("step", step)]).startswith("No verdict")
+    assert answer([]).startswith("No verdict")
+
+
+def test_tiles_lead_with_the_fair_share_and_name_each_number():
+    shown = tiles(
+        [
+            made_up("engine", 0.0011),
+            made_up("whole", 0.13, time=0.344, finer=0.12, finer_slices=100),
+            made_up("share", -0.065, measure="share", low=-0.2, high=0.01),
+            made_up("step", 0.0047, note="1000 steps"),
+        ]
+    )
+    assert [(tile.value, tile.state) for tile in shown] == [
+        ("−6.5 %", "fail"), ("13 %", "fail"), ("0.47 %", "pass"), ("0.11 %", "pass"),
+    ]  # fmt: skip
+    assert "fair share" in shown[0].label
+    assert "−20 % to +1 % in single orders" in shown[0].words
+    assert shown[1].words.endswith("at t = 344 ms. N = 50; 1 % of ω₀ less at N = 100.")
+    assert tiles([]) == ()
+    assert set(LABELS) == {"share", "whole", "program-eq8", "held", "step", "engine"}
+
+
+# ---------------------------------------------------------------------- the finite step
+
+
+def test_a_step_is_taken_apart_by_changing_one_thing_at_a_time(evidence):
+    costs = {cost.way.name: cost for cost in evidence.finite_step}
+    assert list(costs) == [way.name for way in WAYS]
+    # Without the lag the start costs far less; with the lag alone it is most of what the program loses.
+    assert 0.0 < 5 * costs[HELD].start < costs[EVERYTHING].start
+    # Where nothing strikes an end, where rebounds are answered makes no difference but that of slices at rest.
+    assert costs[LOCATED].start == pytest.approx(costs["exact"].start, rel=0.2, abs=0.0)
+    # Mending either of two errors is not enough: both are of first order. Mending both is.
+    assert costs["neither"].flight < min(costs["waiting"].flight, costs[LOCATED].flight) / 10
+    assert claim_finite_step(costs[HELD]).value == costs[HELD].flight
+
+
+def test_what_is_called_everything_is_the_difference_of_the_program_from_its_own_equation(evidence):
+    found = {headline.id: headline for headline in headlines(evidence)}
+    step = next(d for d in evidence.differences if d.first == "published-python" and d.second == "published-limit")
+    assert found["step"].value == pytest.approx(step.largest, rel=1e-12, abs=0.0)
