@@ -8,21 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slicemodel.compiled import compiled, kept_on_disk
-from slicemodel.kernel.closed_form import Map, coefficients, growth_rate_squared
-from slicemodel.kernel.flock import (
-    EMPTY,
-    FEWEST_STEPS,
-    NO_STEP,
-    bring_up_to_date,
-    followed,
-    gathered,
-    room_to_turn,
-    stays_clear,
-    sums_of,
-    watch_all,
-)
-from slicemodel.kernel.rebound import Step, moved, step_in_step, step_on_grid
+from slicemodel.compiled import compiled, kept_on_disk, merged
+from slicemodel.kernel.closed_form import Map, coefficients, cosine, growth_rate_squared, moved
+from slicemodel.kernel.flock import NO_STEP, bring_up_to_date, dissolved, foreseen, gathered, room_to_turn, sums_of
+from slicemodel.kernel.rebound import Step, Watched, predicted, step_in_step, step_on_grid
 from slicemodel.schemes import form as schemes_form
 from slicemodel.trajectory import FloatArray
 
@@ -61,7 +50,7 @@ class Run(NamedTuple):
     escape_slice: int
 
 
-@compiled
+@merged
 def centre_of_repulsion(form, constants, offset, v_cm, weight, omega):
     """Return y* (module docstring of ``schemes.form``); ``weight`` is g cos(theta), ``offset`` is r_CM - L/2."""
     pull = weight
@@ -70,7 +59,7 @@ def centre_of_repulsion(form, constants, offset, v_cm, weight, omega):
     return offset - pull / (omega * omega)
 
 
-@compiled
+@merged
 def step_map(form, constants, fade_minus_1, fade, omega, centre, dt):
     """Return the map of one step."""
     k_squared = growth_rate_squared(form, constants, omega)
@@ -78,7 +67,7 @@ def step_map(form, constants, fade_minus_1, fade, omega, centre, dt):
     return Map(a_minus_1, b, c, d, -a_minus_1 * centre, -c * centre)
 
 
-@compiled
+@merged
 def inertia_about(frame, n, first, second, offset):
     """Return J (Eq. 11b to 11d) about a point ``offset`` from the middle, from sums taken about the middle."""
     water = second - offset * (2.0 * first - n * offset)
@@ -86,26 +75,26 @@ def inertia_about(frame, n, first, second, offset):
 
 
 @compiled
-def write_slices(frame, since, watched, many, y, v, k, to_r, to_v):
-    """Write r and v of all slices into row k; at the cap r is r_min, of which L/2 - (r_max - L/2) may miss the last digit."""
+def write_slices(frame, since, y, v, many, watched, k, to_r, to_v):
+    """Write r and v of all slices into row k; at the cap r is r_min, of which L/2 - (r_max - L/2) may miss a digit."""
+    i, near_y, near_v, _, _ = watched
     middle = frame.length / 2
     cap = middle - frame.r_max
     if many < len(y):
         # First as if all were of the flock, then those that are watched.
-        for i in range(len(y)):
-            y_i, to_v[k, i] = moved(since, y[i], v[i])
-            to_r[k, i] = y_i + middle
+        for j in range(len(y)):
+            y_j, to_v[k, j] = moved(since, y[j], v[j])
+            to_r[k, j] = y_j + middle
     for j in range(many):
-        i = watched[j]
-        to_r[k, i] = frame.r_min if y[i] == cap else y[i] + middle
-        to_v[k, i] = v[i]
+        to_r[k, i[j]] = frame.r_min if near_y[j] == cap else near_y[j] + middle
+        to_v[k, i[j]] = near_v[j]
 
 
 @kept_on_disk(Path(schemes_form.__file__))
 def fly(form, constants, frame, r0, t, dt, record, rebounds) -> Run:
     """Advance the slices, at rest at ``r0``, over the uniform grid ``t`` of step ``dt``; write to ``record``.
 
-    Rebounds are counted; the first K of them are listed in ``rebounds``, shape (K, 4).
+    All rebounds are counted. ``rebounds``, shape (K, 4) with K >= 1, lists them if they are K at most.
     """
     theta, omega, r_cm, inertia = record.rows[0], record.rows[1], record.rows[2], record.rows[3]
     n = len(r0)
@@ -113,7 +102,8 @@ def fly(form, constants, frame, r0, t, dt, record, rebounds) -> Run:
     reach = frame.r_max - middle
     water_share = (1.0 - constants.bottle_share) / n
     fade_minus_1, fade = math.expm1(-constants.gamma * dt), math.exp(-constants.gamma * dt)
-    y, v, watched = np.empty(n), np.zeros(n), np.empty(n, np.int64)
+    y, v = np.empty(n), np.zeros(n)
+    watched = Watched(np.empty(n, np.int64), np.empty(n), np.empty(n), np.empty(n), np.empty(n))
     first = second = speed = 0.0
     for i in range(n):
         offset = r0[i] - middle
@@ -128,12 +118,12 @@ def fly(form, constants, frame, r0, t, dt, record, rebounds) -> Run:
             record.r[0, i], record.v[0, i] = r0[i], 0.0
     offset = water_share * first
     spin, angle = frame.omega0, frame.theta0
-    weight = constants.gravity * math.cos(angle)
+    weight = constants.gravity * cosine(angle)
     moment = inertia_about(frame, n, first, second, offset)
     momentum = moment * spin
     theta[0], omega[0], r_cm[0], inertia[0] = angle, spin, middle + offset, moment
     hits, points, escape_step, escape_slice = 0, 1, -1, -1
-    flock, many, _ = watch_all(watched)
+    flock, many, _ = dissolved(NO_STEP, y, v, 0, watched)
     since, steps_left = NO_STEP, 0
 
     for k in range(1, len(t)):
@@ -144,56 +134,45 @@ def fly(form, constants, frame, r0, t, dt, record, rebounds) -> Run:
             centre = centre_of_repulsion(form, constants, offset, water_share * speed, weight, w)
             way = step_map(form, constants, fade_minus_1, fade, w, centre, dt)
             if steps_left == 0:
-                bring_up_to_date(since, watched, many, y, v)
+                bring_up_to_date(since, y, v, many, watched)
                 margin = room_to_turn(way, reach, centre, dt) if form.in_step else 0.0
-                flock, many, steps_left = gathered(form, constants, reach, w, centre, dt, margin, watched, y, v)
+                flock, many, steps_left = gathered(form, constants, reach, w, centre, dt, margin, y, v, watched)
                 since = NO_STEP
             steps_left -= 1
             if form.midpoint:
                 # A step as the exact step would make it predicts the end. Means over the step are then known up to
                 # second order, that of v_CM from the way of C_M, because v_CM itself jumps at an impact.
-                weight = constants.gravity * math.cos(angle + 0.5 * dt * w)
-                one = Step(way, reach, w, centre, dt, t[k], True)
-                after = followed(since, way) if flock.n > 0.0 else since
-                if not stays_clear(form, flock, since, after, one):
-                    bring_up_to_date(since, watched, many, y, v)
-                    flock, many, _ = watch_all(watched)
-                    steps_left = FEWEST_STEPS
-                if form.in_step:
-                    seen = step_in_step(form, constants, one, watched, many, y, v, rebounds, hits)
-                else:
-                    seen = step_on_grid(form, constants.restitution, one, watched, many, y, v, rebounds, hits)
-                end_first, end_second = seen[0], seen[1]
-                if flock.n > 0.0:
-                    of_flock = sums_of(flock, after)
-                    end_first, end_second = end_first + of_flock[0], end_second + of_flock[1]
+                weight = constants.gravity * cosine(angle + 0.5 * dt * w)
+                one = Step(way, reach, w, centre, dt, t[k])
+                after, clear = foreseen(form, flock, since, one)
+                if not clear:
+                    flock, many, steps_left = dissolved(since, y, v, many, watched)
+                seen = predicted(form, constants.restitution, one, watched, many)
+                more = sums_of(flock, after)
+                end_first, end_second = seen[0] + more[0], seen[1] + more[1]
                 shift = water_share * (end_first - first)
                 w = 0.5 * (w + momentum / inertia_about(frame, n, end_first, end_second, water_share * end_first))
                 centre = centre_of_repulsion(form, constants, offset + 0.5 * shift, shift / dt, weight, w)
                 way = step_map(form, constants, fade_minus_1, fade, w, centre, dt)
-            weight = constants.gravity * math.cos(angle + w * dt)
-            one = Step(way, reach, w, centre, dt, t[k], False)
-            after = followed(since, way) if flock.n > 0.0 else since
-            if not stays_clear(form, flock, since, after, one):
-                bring_up_to_date(since, watched, many, y, v)
-                flock, many, _ = watch_all(watched)
-                steps_left = FEWEST_STEPS
+            weight = constants.gravity * cosine(angle + w * dt)
+            one = Step(way, reach, w, centre, dt, t[k])
+            after, clear = foreseen(form, flock, since, one)
+            if not clear:
+                flock, many, steps_left = dissolved(since, y, v, many, watched)
             since = after
             if form.in_step:
-                seen = step_in_step(form, constants, one, watched, many, y, v, rebounds, hits)
+                seen = step_in_step(form, constants, one, watched, many, rebounds, hits)
             else:
-                seen = step_on_grid(form, constants.restitution, one, watched, many, y, v, rebounds, hits)
-            first, second, speed, hits = seen
-            if flock.n > 0.0:
-                of_flock = sums_of(flock, since)
-                first, second, speed = first + of_flock[0], second + of_flock[1], speed + of_flock[2]
+                seen = step_on_grid(form, constants.restitution, one, watched, many, rebounds, hits)
+            more = sums_of(flock, since)
+            first, second, speed, hits = seen[0] + more[0], seen[1] + more[1], seen[2] + more[2], seen[3]
             if not form.keeps_position and escape_step < 0:
                 for j in range(many):
-                    if abs(y[watched[j]]) > middle:
-                        escape_step, escape_slice = k, watched[j]
+                    if abs(watched.y[j]) > middle:
+                        escape_step, escape_slice = k, watched.i[j]
                         break
         if full:
-            write_slices(frame, since, watched, many, y, v, k, record.r, record.v)
+            write_slices(frame, since, y, v, many, watched, k, record.r, record.v)
         if form.lagged:
             offset = water_share * lagged_first
             moment = inertia_about(frame, n, lagged_first, lagged_second, lagged_offset)

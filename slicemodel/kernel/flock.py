@@ -1,9 +1,9 @@
 """The flock: slices that meet no end for some steps, moved by one map and weighed by their moments.
 
 Linear maps that all slices share make one such map, and the sums of y and y^2 after it follow from those of y, v, y^2,
-y v and v^2 before (docs/theory.md, "Slices that meet no end"). The slices of the flock are not looked at until somebody
-asks where they are or one of them may have come near an end. All other slices are watched: they are looked at in every
-step, and their numbers are listed in ``watched``, from the lowest to the highest.
+y v and v^2 before (docs/theory.md, "Slices that meet no end"). The slices of the flock are not looked at until they are
+to be recorded or one of them may have come near an end. All others are watched: copies of their y and v are moved in
+every step (``rebound.Watched``). ``y`` and ``v`` of all slices are those of the last gathering.
 """
 
 from __future__ import annotations
@@ -11,9 +11,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from slicemodel.compiled import compiled
-from slicemodel.kernel.closed_form import Map, growth_rate_squared
-from slicemodel.kernel.rebound import moved
+from slicemodel.compiled import compiled, merged
+from slicemodel.kernel.closed_form import Map, growth_rate_squared, moved
 
 MOST_STEPS = 32
 """Steps after which a flock is gathered anew."""
@@ -54,7 +53,7 @@ class Flock(NamedTuple):
 EMPTY = Flock(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-@compiled
+@merged
 def followed(first, then):
     """Return the map that does ``first`` and ``then``."""
     return Map(
@@ -67,9 +66,11 @@ def followed(first, then):
     )
 
 
-@compiled
+@merged
 def sums_of(flock, way):
     """Return the sums of y, y^2 and v over the flock after ``way``, from its moments before; u = y' - y."""
+    if flock.n == 0.0:
+        return 0.0, 0.0, 0.0
     u = flock.n * way.push + (way.a_minus_1 * flock.y + way.b * flock.v)
     u_y = flock.y * way.push + (way.a_minus_1 * flock.y_y + way.b * flock.y_v)
     u_v = flock.v * way.push + (way.a_minus_1 * flock.y_v + way.b * flock.v_v)
@@ -78,7 +79,7 @@ def sums_of(flock, way):
     return flock.y + u, flock.y_y + (2.0 * u_y + u_u), speed
 
 
-@compiled
+@merged
 def clear_of_ends(flock, way, reach, margin):
     """Return whether surely no slice of the flock is nearer than ``margin`` to an end; never true of NaN or below 0.
 
@@ -92,7 +93,7 @@ def clear_of_ends(flock, way, reach, margin):
     return foreseeable and highest < room and lowest > -room
 
 
-@compiled
+@merged
 def room_to_turn(way, reach, centre, dt):
     """Return how far a slice that turns inside a step may go beyond where it was before, at most v dt.
 
@@ -102,32 +103,27 @@ def room_to_turn(way, reach, centre, dt):
     return dt * way.c / way.d * (reach + abs(centre))
 
 
-@compiled
-def stays_clear(form, flock, since, after, one):
-    """Return whether surely no slice of the flock meets an end in a step; ``since`` and ``after`` end where it does."""
-    if flock.n == 0.0:
-        return True
-    clear = clear_of_ends(flock, after, one.reach, 0.0)
-    if form.in_step:
-        # A slice that does not turn is between its two places; one that turns goes beyond the first.
-        clear = clear and clear_of_ends(flock, since, one.reach, room_to_turn(one.way, one.reach, one.centre, one.dt))
-    return clear
+@merged
+def foreseen(form, flock, since, one):
+    """Return the map of the flock after a step, and whether surely none of it meets an end in that step."""
+    after, clear = since, True
+    if flock.n > 0.0:
+        after = followed(since, one.way)
+        clear = clear_of_ends(flock, after, one.reach, 0.0)
+        if form.in_step:
+            # A slice that does not turn is between its two places; one that turns goes beyond the first.
+            room = room_to_turn(one.way, one.reach, one.centre, one.dt)
+            clear = clear and clear_of_ends(flock, since, one.reach, room)
+    return after, clear
 
 
 @compiled
-def watch_all(watched):
-    """List all slices as watched; return an empty flock, their number, and after how many steps to gather one."""
-    for i in range(len(watched)):
-        watched[i] = i
-    return EMPTY, len(watched), MOST_STEPS
-
-
-@compiled
-def gathered(form, constants, reach, omega, centre, dt, margin, watched, y, v):
+def gathered(form, constants, reach, omega, centre, dt, margin, y, v, watched):
     """Return a flock of slices that should stay clear of the ends, how many are watched, and for how many steps.
 
     Where slices will be is only estimated here; ``clear_of_ends`` looks after it at every step.
     """
+    i, near_y, near_v, _, _ = watched
     k_squared = growth_rate_squared(form, constants, omega)
     force = k_squared * (reach + abs(centre))
     lasting = math.sqrt(2.0 * PUSHED * reach / force)
@@ -144,26 +140,36 @@ def gathered(form, constants, reach, omega, centre, dt, margin, watched, y, v):
         steps, half_width = MOST_STEPS, -1.0
     many = 0
     s_y = s_v = s_y_y = s_y_v = s_v_v = 0.0
-    for i in range(len(y)):
-        y_i, v_i = y[i], v[i]
-        if abs(y_i - middle) <= half_width and abs(y_i + horizon * v_i - middle) <= half_width:
-            s_y += y_i
-            s_v += v_i
-            s_y_y += y_i * y_i
-            s_y_v += y_i * v_i
-            s_v_v += v_i * v_i
+    for k in range(len(y)):
+        y_k, v_k = y[k], v[k]
+        if abs(y_k - middle) <= half_width and abs(y_k + horizon * v_k - middle) <= half_width:
+            s_y += y_k
+            s_v += v_k
+            s_y_y += y_k * y_k
+            s_y_v += y_k * v_k
+            s_v_v += v_k * v_k
         else:
-            watched[many] = i
+            i[many], near_y[many], near_v[many] = k, y_k, v_k
             many += 1
     return Flock(float(len(y) - many), s_y, s_v, s_y_y, s_y_v, s_v_v, low, high, horizon), many, steps
 
 
+@merged
+def bring_up_to_date(since, y, v, many, watched):
+    """Move all slices by what the flock has done ``since``, then put the watched ones where they are."""
+    i, near_y, near_v, _, _ = watched
+    if many < len(y):
+        for k in range(len(y)):
+            y[k], v[k] = moved(since, y[k], v[k])
+    for j in range(many):
+        y[i[j]], v[i[j]] = near_y[j], near_v[j]
+
+
 @compiled
-def bring_up_to_date(since, watched, many, y, v):
-    """Move the slices of the flock to where they are; the watched ones are there already."""
-    begin = 0
-    for j in range(many + 1):
-        end = watched[j] if j < many else len(y)
-        for i in range(begin, end):
-            y[i], v[i] = moved(since, y[i], v[i])
-        begin = end + 1
+def dissolved(since, y, v, many, watched):
+    """Watch all slices; return an empty flock, how many are watched, and after how many steps to gather a new one."""
+    i, near_y, near_v, _, _ = watched
+    bring_up_to_date(since, y, v, many, watched)
+    for k in range(len(y)):
+        i[k], near_y[k], near_v[k] = k, y[k], v[k]
+    return EMPTY, len(y), FEWEST_STEPS
