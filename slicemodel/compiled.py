@@ -57,7 +57,7 @@ def kept_on_disk(*elsewhere: Path) -> Callable[[Callable[..., Any]], Any]:
 
 def cache_of_sources(function: Callable[..., Any], elsewhere: tuple[Path, ...]) -> Any:
     """Return numba's cache of a function, with the sources it may have been made of in the place of its own file."""
-    cache = FunctionCache(function)
+    cache = FunctionCache(function)  # type: ignore[no-untyped-call]
     cache._cache_file._source_stamp = stamp_of_sources(function, elsewhere)
     return cache
 

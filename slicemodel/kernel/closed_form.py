@@ -65,8 +65,10 @@ def cosine(x):
         1.0 / 2432902008176640000.0 - y * (1.0 / 1124000727777607680000.0)
     )
     middle = (1.0 / 40320.0 - y * (1.0 / 3628800.0)) + z * (1.0 / 479001600.0 - y * (1.0 / 87178291200.0))
-    low = 1.0 - y * (0.5 - y * (1.0 / 24.0 - y * (1.0 / 720.0)))
-    value = low + z * z * (middle + z * z * high)
+    low = (1.0 / 24.0 - y * (1.0 / 720.0)) + z * (middle + z * z * high)
+    near = 1.0 - 0.5 * y
+    # What is lost of 1 - y/2 is added with the rest.
+    value = near + (((1.0 - near) - 0.5 * y) + z * low)
     return value if n == 2.0 * np.floor(0.5 * n) else -value
 
 

@@ -7,8 +7,16 @@ import numpy as np
 import pytest
 
 import slicemodel
-from slicemodel import Bottle, Scenario, kernel
+from slicemodel import Bottle, Scenario
+from slicemodel.kernel import closed_form
+from slicemodel.kernel.rebound import Step, Watched, step_in_step
 from slicemodel.schemes import SCHEMES
+
+step = numba.njit(
+    lambda form, constants, one, watched, many, log, count: step_in_step(
+        form, constants, one, watched, many, log, count
+    )
+)
 
 IN_STEP = ["roots-corrected", "exact-step", "midpoint"]
 
@@ -69,21 +77,16 @@ def test_a_dip_through_the_end_and_back_within_one_step_is_found():
     reach, centre, y, omega = 0.13, 0.36, 0.11, 10.0
     x = y - centre
     v = math.sqrt(omega**2 * (x**2 - (reach + 0.002 - centre) ** 2))
-    turn = kernel.turning_time(constants.gamma, omega, x, v)
-    assert centre + kernel.path(form, constants, omega, x, v, turn)[0] > reach
-    distance, v_end = kernel.path(form, constants, omega, x, v, 2 * turn)
-    y_end = centre + distance
-    assert y_end < reach
+    turn = closed_form.turning_time(constants.gamma, omega, x, v)
+    assert centre + closed_form.path(form, constants, omega, x, v, turn)[0] > reach
+    assert centre + closed_form.path(form, constants, omega, x, v, 2 * turn)[0] < reach
     log = np.empty((4, 4))
-
-    @numba.njit
-    def follow(form, constants, log):
-        room = kernel.Log(kernel.row_of(log), len(log))
-        return kernel.rebound_in_step(
-            form, constants, reach, omega, centre, 1.0, 2 * turn, 5, y, v, y_end, v_end, room, 0
-        )
-
-    new, speed, count = follow(form, constants, log)
+    watched = Watched(np.array([5]), np.array([y]), np.array([v]), np.empty(1), np.empty(1))
+    a_minus_1, b, c, d = closed_form.step_coefficients(form, constants, omega, 2 * turn)
+    way = closed_form.Map(a_minus_1, b, c, d, -a_minus_1 * centre, -c * centre)
+    one = Step(way, reach, omega, centre, 2 * turn, 1.0 + 2 * turn)
+    *_, count = step(form, constants, one, watched, 1, log, 0)
+    new, speed = watched.y[0], watched.v[0]
     assert count == 1
     assert tuple(log[0, 1:3]) == (5.0, 1.0)
     assert 1.0 < log[0, 0] < 1.0 + turn
