@@ -69,6 +69,16 @@ def test_many_hits_in_one_step_equal_many_steps(scheme, restitution):
     np.testing.assert_allclose(one.impacts.time[fast], many.impacts.time[many.impacts.speed_before > 1e-3], atol=1e-9)
 
 
+@pytest.mark.parametrize("gamma", [0.0, 5.0, 40.0])
+def test_a_slice_turns_where_its_velocity_vanishes(gamma):
+    form = SCHEMES["exact-step"].form
+    constants = SCHEMES["exact-step"].constants(Scenario())._replace(gamma=gamma, gamma_position=gamma)
+    turn = closed_form.turning_time(gamma, 10.0, -0.25, 0.9)
+    assert 0.0 < turn < 0.1
+    assert closed_form.path(form, constants, 10.0, -0.25, 0.9, turn)[1] == pytest.approx(0.0, abs=1e-13)
+    assert closed_form.turning_time(gamma, 10.0, 0.25, 0.9) == math.inf
+
+
 def test_a_dip_through_the_end_and_back_within_one_step_is_found():
     form = SCHEMES["exact-step"].form._replace(in_step=True)
     scenario = heavy(duration=0.05, drag=0.0)
