@@ -8,6 +8,8 @@ import pytest
 import slicemodel
 from slicemodel import Scenario
 from slicemodel.kernel import closed_form
+from slicemodel.kernel.flock import NO_STEP
+from slicemodel.kernel.rebound import Step, Watched, step_on_grid
 from slicemodel.schemes import SCHEMES
 
 
@@ -84,6 +86,21 @@ def test_cosine_of_any_angle():
     for huge in (3.9e8, 4.1e8, 1e17, 1e300):
         assert closed_form.cosine(huge) == pytest.approx(np.cos(huge), abs=3e-16)
     assert all(np.isnan(closed_form.cosine(x)) for x in (np.nan, np.inf, -np.inf))
+
+
+def test_a_slice_at_an_end_rebounds_unless_the_scheme_compares_strictly():
+    """[C.S.] says <= and >=, the published programs < and >; a step that moves nothing tells them apart."""
+    form, reach = SCHEMES["exact-step"].form, 0.1
+    one = Step(NO_STEP, reach, 10.0, 0.0, 0.001, 0.001)
+
+    def rebounds(y, strict):
+        watched = Watched(np.array([0]), np.array([y]), np.array([0.0]), np.empty(1), np.empty(1))
+        return step_on_grid(form._replace(strict=strict), 0.5, one, watched, 1, np.empty((2, 4)), 0)[3]
+
+    for end in (-reach, reach):
+        assert (rebounds(end, False), rebounds(end, True)) == (1, 0)
+        assert rebounds(np.nextafter(end, 0.0), False) == 0
+        assert rebounds(np.nextafter(end, 2 * end), True) == 1
 
 
 def test_every_rebound_is_listed_however_many(monkeypatch):
