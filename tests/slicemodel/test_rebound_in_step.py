@@ -9,7 +9,7 @@ import pytest
 import slicemodel
 from slicemodel import Bottle, Scenario
 from slicemodel.kernel import closed_form
-from slicemodel.kernel.rebound import Step, Watched, step_in_step
+from slicemodel.kernel.rebound import Step, Watched, predicted, step_in_step
 from slicemodel.schemes import SCHEMES
 
 step = numba.njit(
@@ -17,6 +17,8 @@ step = numba.njit(
         form, constants, one, watched, many, log, count
     )
 )
+
+predict = numba.njit(lambda form, restitution, one, watched, many: predicted(form, restitution, one, watched, many))
 
 IN_STEP = ["roots-corrected", "exact-step", "midpoint"]
 
@@ -117,6 +119,28 @@ def test_slices_stay_inside_and_resting_ones_rest(scheme):
     assert (run.r[early, 0] == scenario.r_max).all()
     assert not run.v[early, 0].any()
     assert np.all(np.diff(run.impacts.time) >= 0)
+
+
+@pytest.mark.parametrize("restitution", [0.5, 1.0])
+def test_a_predicted_step_knows_its_rebounds_to_second_order_and_moves_nothing(restitution):
+    form = SCHEMES["midpoint"].form
+    constants = SCHEMES["midpoint"].constants(Scenario())._replace(restitution=restitution)
+    reach, omega, centre, errors = 0.1, 10.0, 0.02, []
+    for dt in (1e-3, 5e-4):
+        # It hits the base in the middle of the step.
+        watched = Watched(np.array([0]), np.array([reach - 0.25 * dt]), np.array([0.5]), np.empty(1), np.empty(1))
+        a_minus_1, b, c, d = closed_form.step_coefficients(form, constants, omega, dt)
+        way = closed_form.Map(a_minus_1, b, c, d, -a_minus_1 * centre, -c * centre)
+        one = Step(way, reach, omega, centre, dt, dt)
+        before = watched.y[0], watched.v[0]
+        first, second = predict(form, restitution, one, watched, 1)
+        assert (watched.y[0], watched.v[0]) == before
+        assert second == first * first
+        made = step(form, constants, one, watched, 1, np.empty((4, 4)), 0)
+        assert made[3] == 1
+        errors.append(abs(first - made[0]))
+    assert errors[0] < 1e-5
+    assert errors[1] < 0.3 * errors[0]
 
 
 @pytest.mark.parametrize("scheme", IN_STEP)
