@@ -59,14 +59,6 @@ def rows(facts: dict[str, Any]) -> list[tuple[str, str, str]]:
     """Return what is measured, how much it is, and what is asked."""
     loop, limits = facts["kernel"]["measured"], facts["kernel"]["limits"]
     table = [(name, f"{value:.0f}" if value >= 100 else f"{value:.3g}", limits[name]) for name, value in loop.items()]
-    share, times = facts["kernel"]["fraction_of_arithmetic_limit"], facts["kernel"]["times_the_arithmetic_limit"]
-    table += [
-        (f"every slice looked at, N = {n}: share of what the vector units could do", f"{100 * share[n]:.0f} %", "")
-        for n in ("1000", "10000")
-    ]
-    table += [
-        (f"published-python, N = {n}: speed, in units of that limit", f"{times[n]:.3g}", "") for n in ("1000", "10000")
-    ]
     table += [
         (f"{run['case']}, N = 100: impacts per second", str(run["per_second"]), "at least 2000")
         for run in facts["impacts"]["runs"][-4:]

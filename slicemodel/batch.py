@@ -134,7 +134,7 @@ def solve_batch(
     rows = np.empty((len(throws), 4, steps))
     workers = min(jobs or cores, len(throws))
     part = -(-len(throws) // (PARTS_PER_JOB * workers))
-    unlisted = np.empty((0, 4))
+    unlisted = np.empty((1, 4))
 
     def run(i: int) -> Run:
         t = grid(throws[i].duration, steps)

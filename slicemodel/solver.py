@@ -145,8 +145,7 @@ def advance(
         frozen=scenario.frozen,
     )
     dt = scenario.duration / (len(t) - 1)
-    memory = kernel.memory_for(scenario.n_slices)
-    run: Run = kernel.fly(form, constants, frame, scenario.initial_positions(), t, dt, record, rebounds, memory)
+    run: Run = kernel.fly(form, constants, frame, scenario.initial_positions(), t, dt, record, rebounds)
     return run
 
 

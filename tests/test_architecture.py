@@ -11,6 +11,9 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = ("slicemodel", "ode_reference", "engine_check", "reports")
 NOUNS = {"scenario", "trajectory", "observables"}
+HELPERS = {"compiled"}
+"""Files of slicemodel that are about no equation and that the others may use too: how to compile with numba."""
+
 NOUN_NAMES = {"Bottle", "Scenario", "ScenarioError", "Trajectory", "Impact", "Impacts"}
 
 
@@ -38,7 +41,7 @@ def test_independent_verbs_share_only_nouns(room):
             top, _, rest = module.partition(".")
             assert top not in {"reports", *ROOMS} - {room, "slicemodel"}, f"{file} imports {module}"
             if top == "slicemodel":
-                allowed = rest in NOUNS if rest else bool(names) and names <= NOUN_NAMES | NOUNS
+                allowed = rest in NOUNS | HELPERS if rest else bool(names) and names <= NOUN_NAMES | NOUNS
                 assert allowed, f"{file} imports {module} {names or ''}"
 
 
@@ -67,6 +70,12 @@ def test_text_is_cut_by_one_function():
 @pytest.mark.parametrize("room", ROOMS)
 def test_every_room_says_that_it_is_typed(room):
     assert (ROOT / room / "py.typed").is_file()
+
+
+def test_helpers_know_nothing_of_the_model():
+    for helper in HELPERS:
+        for module, _ in imports_of(ROOT / "slicemodel" / f"{helper}.py"):
+            assert not module.startswith(ROOMS), f"{helper} imports {module}"
 
 
 @pytest.mark.parametrize("heavy", ["numba", "scipy", "matplotlib", "pymunk", "mujoco", "jinja2", "numpy"])

@@ -1,6 +1,6 @@
 """Slices that meet no end are moved by one map and weighed by sums: nothing may tell them from slices looked at."""
 
-import importlib.util
+import importlib
 import sys
 from pathlib import Path
 
@@ -10,23 +10,29 @@ import pytest
 
 import slicemodel
 from slicemodel import Scenario, kernel
-from slicemodel.kernel import Flock, Map
+from slicemodel.kernel import closed_form, flock
+from slicemodel.kernel.closed_form import Map
+from slicemodel.kernel.flock import Flock
+from slicemodel.kernel.rebound import Step
 from slicemodel.schemes import SCHEMES
 
 
 @pytest.fixture(scope="module")
 def every_slice_looked_at(tmp_path_factory):
     """The same loop, told that a flock would have to last longer than it may."""
-    text = Path(kernel.__file__).read_text(encoding="utf-8")
-    assert text.count("AT_LEAST_TOGETHER = 4\n") == 1
-    place = tmp_path_factory.mktemp("kernel") / "kernel_without_flock.py"
-    place.write_text(text.replace("AT_LEAST_TOGETHER = 4\n", "AT_LEAST_TOGETHER = 1000\n"), encoding="utf-8")
-    found = importlib.util.spec_from_file_location("kernel_without_flock", place)
-    other = importlib.util.module_from_spec(found)
-    sys.modules[found.name] = other
-    found.loader.exec_module(other)
-    yield other
-    del sys.modules[found.name]
+    place = tmp_path_factory.mktemp("kernel") / "kernel_without_flock"
+    place.mkdir()
+    changed = 0
+    for file in Path(kernel.__file__).parent.glob("*.py"):
+        text = file.read_text(encoding="utf-8").replace("slicemodel.kernel", place.name)
+        changed += text.count("FEWEST_STEPS = 4\n")
+        (place / file.name).write_text(text.replace("FEWEST_STEPS = 4\n", "FEWEST_STEPS = 1000\n"), encoding="utf-8")
+    assert changed == 1
+    sys.path.insert(0, str(place.parent))
+    yield importlib.import_module(place.name)
+    sys.path.remove(str(place.parent))
+    for name in [name for name in sys.modules if name.partition(".")[0] == place.name]:
+        del sys.modules[name]
 
 
 def throws(count: int):
@@ -90,17 +96,12 @@ def test_slices_that_escape_leave_the_flock_in_time(every_slice_looked_at, monke
 
 # ---------------------------------------------------------------------- its parts
 
-CONSTANTS = SCHEMES["exact-step"].constants(Scenario())
-moved = numba.njit(lambda way, y, v: (y + (way.a_minus_1 * y + way.b * v + way.push), way.c * y + way.d * v + way.pull))
-followed = numba.njit(lambda first, then: kernel.followed(first, then))
-sums_of = numba.njit(lambda flock, way: kernel.sums_of(flock, way))
-clear_of_ends = numba.njit(lambda flock, way, reach, margin: kernel.clear_of_ends(flock, way, reach, margin))
-foreseen = numba.njit(
-    lambda form, flock, since, one, reach, centre, dt: kernel.foreseen(
-        flock, since, kernel.shared(form, CONSTANTS, reach, one, centre, dt, dt, False, True)
-    )
-)
-dip = numba.njit(lambda way, reach, centre, dt: kernel.dip(way, reach, centre, dt))
+moved = numba.njit(lambda way, y, v: closed_form.moved(way, y, v))
+followed = numba.njit(lambda first, then: flock.followed(first, then))
+sums_of = numba.njit(lambda some, way: flock.sums_of(some, way))
+clear_of_ends = numba.njit(lambda some, way, reach, margin: flock.clear_of_ends(some, way, reach, margin))
+room_to_turn = numba.njit(lambda way, reach, centre, dt: flock.room_to_turn(way, reach, centre, dt))
+foreseen = numba.njit(lambda form, some, since, one: flock.foreseen(form, some, since, one))
 
 
 def some_map(random) -> Map:
@@ -121,7 +122,7 @@ def test_sums_are_those_of_the_slices():
         y, v = random.normal(size=(2, n)) * [[0.1], [1.0]]
         flock = Flock(float(n), y.sum(), v.sum(), y @ y, y @ v, v @ v, -1.0, 1.0, 1.0)
         way = some_map(random)
-        y_new, v_new = moved.py_func(way, y, v)
+        y_new, v_new = closed_form.moved.py_func(way, y, v)
         assert sums_of(flock, way) == pytest.approx((y_new.sum(), y_new @ y_new, v_new.sum()), rel=1e-11, abs=1e-12)
 
 
@@ -165,24 +166,29 @@ def test_what_cannot_be_known_is_not_clear(way):
 
 
 def test_in_step_a_flock_needs_room_to_turn_where_it_was_before_the_step():
-    """On the grid only the places after a step count; inside a step a slice may dip beyond where it was before."""
+    """On the grid only the places after a step count; inside a step a slice may turn beyond where it was before."""
     on_grid, dt, reach = SCHEMES["exact-step"].form, 0.001, 0.1
     in_step = on_grid._replace(in_step=True)
-    step = Map(0.0002, dt, 0.4, 1.0, 0.0, 0.0)
-    room = dip(step, reach, 0.0, dt)
-    still = Map(0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
-    flock = Flock(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.05, reach - 0.5 * room, 0.01)
-    inwards = step._replace(push=-room)
-    assert foreseen(on_grid, flock, still, inwards, reach, 0.0, dt)[1]
-    assert not foreseen(in_step, flock, still, inwards, reach, 0.0, dt)[1]
-    assert foreseen(in_step, flock._replace(high=reach - 2.0 * room), still, inwards, reach, 0.0, dt)[1]
-    outwards = step._replace(push=2.5 * room)
-    assert not foreseen(in_step, flock._replace(high=reach - 2.0 * room), still, outwards, reach, 0.0, dt)[1]
-    assert not clear_of_ends(flock._replace(high=0.05), still, reach, -room)
+    way = Map(0.0002, dt, 0.4, 1.0, 0.0, 0.0)
+    room = room_to_turn(way, reach, 0.0, dt)
+    some = Flock(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.05, reach - 0.5 * room, 0.01)
+
+    def clear(form, some, push):
+        return foreseen(form, some, flock.NO_STEP, Step(way._replace(push=push), reach, 10.0, 0.0, dt, dt))[1]
+
+    assert clear(on_grid, some, -room)
+    assert not clear(in_step, some, -room)
+    assert clear(in_step, some._replace(high=reach - 2.0 * room), -room)
+    assert not clear(in_step, some._replace(high=reach - 2.0 * room), 2.5 * room)
+    assert not clear_of_ends(some._replace(high=0.05), flock.NO_STEP, reach, -room)
+
+
+def test_an_empty_flock_weighs_nothing_whatever_its_map():
+    assert sums_of(flock.EMPTY, Map(np.inf, np.nan, 1.0, 1.0, np.inf, 0.0)) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("gamma", [0.0, 5.0, 200.0])
-def test_no_slice_dips_deeper_than_said(gamma):
+def test_no_slice_turns_farther_out_than_said(gamma):
     """Slices that turn inside a step, on the closed form: how far they get beyond the farther of their two places."""
     form, reach, dt = SCHEMES["exact-step"].form, 0.1, 2e-3
     constants = SCHEMES["exact-step"].constants(Scenario())._replace(gamma=gamma, gamma_position=gamma)
@@ -192,10 +198,12 @@ def test_no_slice_dips_deeper_than_said(gamma):
         omega, centre = random.uniform(1.0, 40.0), random.uniform(-0.5, 0.5)
         y = random.uniform(-reach, reach)
         a_minus_1, b, c, d = kernel.step_coefficients(form, constants, omega, dt)
-        deepest = dip(Map(a_minus_1, b, c, d, -a_minus_1 * centre, -c * centre), reach, centre, dt)
+        deepest = room_to_turn(Map(a_minus_1, b, c, d, -a_minus_1 * centre, -c * centre), reach, centre, dt)
         v = -random.uniform(0.0, 1.5) * c * (y - centre) / d
         times = np.linspace(0.0, dt, 101)
-        places = y + np.array([kernel.path(form, constants, omega, y - centre, v, t)[0] - (y - centre) for t in times])
+        places = y + np.array(
+            [closed_form.path(form, constants, omega, y - centre, v, t)[0] - (y - centre) for t in times]
+        )
         beyond = np.abs(places - y).max()
         if v * (c * (y - centre) + d * v) < 0.0:
             turned += 1

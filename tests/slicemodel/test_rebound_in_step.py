@@ -7,8 +7,18 @@ import numpy as np
 import pytest
 
 import slicemodel
-from slicemodel import Bottle, Scenario, kernel
+from slicemodel import Bottle, Scenario
+from slicemodel.kernel import closed_form
+from slicemodel.kernel.rebound import Step, Watched, predicted, step_in_step
 from slicemodel.schemes import SCHEMES
+
+step = numba.njit(
+    lambda form, constants, one, watched, many, log, count: step_in_step(
+        form, constants, one, watched, many, log, count
+    )
+)
+
+predict = numba.njit(lambda form, restitution, one, watched, many: predicted(form, restitution, one, watched, many))
 
 IN_STEP = ["roots-corrected", "exact-step", "midpoint"]
 
@@ -61,6 +71,16 @@ def test_many_hits_in_one_step_equal_many_steps(scheme, restitution):
     np.testing.assert_allclose(one.impacts.time[fast], many.impacts.time[many.impacts.speed_before > 1e-3], atol=1e-9)
 
 
+@pytest.mark.parametrize("gamma", [0.0, 5.0, 40.0])
+def test_a_slice_turns_where_its_velocity_vanishes(gamma):
+    form = SCHEMES["exact-step"].form
+    constants = SCHEMES["exact-step"].constants(Scenario())._replace(gamma=gamma, gamma_position=gamma)
+    turn = closed_form.turning_time(gamma, 10.0, -0.25, 0.9)
+    assert 0.0 < turn < 0.1
+    assert closed_form.path(form, constants, 10.0, -0.25, 0.9, turn)[1] == pytest.approx(0.0, abs=1e-13)
+    assert closed_form.turning_time(gamma, 10.0, 0.25, 0.9) == math.inf
+
+
 def test_a_dip_through_the_end_and_back_within_one_step_is_found():
     form = SCHEMES["exact-step"].form._replace(in_step=True)
     scenario = heavy(duration=0.05, drag=0.0)
@@ -69,21 +89,16 @@ def test_a_dip_through_the_end_and_back_within_one_step_is_found():
     reach, centre, y, omega = 0.13, 0.36, 0.11, 10.0
     x = y - centre
     v = math.sqrt(omega**2 * (x**2 - (reach + 0.002 - centre) ** 2))
-    turn = kernel.turning_time(constants.gamma, omega, x, v)
-    assert centre + kernel.path(form, constants, omega, x, v, turn)[0] > reach
-    distance, v_end = kernel.path(form, constants, omega, x, v, 2 * turn)
-    y_end = centre + distance
-    assert y_end < reach
+    turn = closed_form.turning_time(constants.gamma, omega, x, v)
+    assert centre + closed_form.path(form, constants, omega, x, v, turn)[0] > reach
+    assert centre + closed_form.path(form, constants, omega, x, v, 2 * turn)[0] < reach
     log = np.empty((4, 4))
-
-    @numba.njit
-    def follow(form, constants, log):
-        room = kernel.Log(kernel.row_of(log), len(log))
-        return kernel.rebound_in_step(
-            form, constants, reach, omega, centre, 1.0, 2 * turn, 5, y, v, y_end, v_end, room, 0
-        )
-
-    new, speed, count = follow(form, constants, log)
+    watched = Watched(np.array([5]), np.array([y]), np.array([v]), np.empty(1), np.empty(1))
+    a_minus_1, b, c, d = closed_form.step_coefficients(form, constants, omega, 2 * turn)
+    way = closed_form.Map(a_minus_1, b, c, d, -a_minus_1 * centre, -c * centre)
+    one = Step(way, reach, omega, centre, 2 * turn, 1.0 + 2 * turn)
+    *_, count = step(form, constants, one, watched, 1, log, 0)
+    new, speed = watched.y[0], watched.v[0]
     assert count == 1
     assert tuple(log[0, 1:3]) == (5.0, 1.0)
     assert 1.0 < log[0, 0] < 1.0 + turn
@@ -104,6 +119,28 @@ def test_slices_stay_inside_and_resting_ones_rest(scheme):
     assert (run.r[early, 0] == scenario.r_max).all()
     assert not run.v[early, 0].any()
     assert np.all(np.diff(run.impacts.time) >= 0)
+
+
+@pytest.mark.parametrize("restitution", [0.5, 1.0])
+def test_a_predicted_step_knows_its_rebounds_to_second_order_and_moves_nothing(restitution):
+    form = SCHEMES["midpoint"].form
+    constants = SCHEMES["midpoint"].constants(Scenario())._replace(restitution=restitution)
+    reach, omega, centre, errors = 0.1, 10.0, 0.02, []
+    for dt in (1e-3, 5e-4):
+        # It hits the base in the middle of the step.
+        watched = Watched(np.array([0]), np.array([reach - 0.25 * dt]), np.array([0.5]), np.empty(1), np.empty(1))
+        a_minus_1, b, c, d = closed_form.step_coefficients(form, constants, omega, dt)
+        way = closed_form.Map(a_minus_1, b, c, d, -a_minus_1 * centre, -c * centre)
+        one = Step(way, reach, omega, centre, dt, dt)
+        before = watched.y[0], watched.v[0]
+        first, second = predict(form, restitution, one, watched, 1)
+        assert (watched.y[0], watched.v[0]) == before
+        assert second == first * first
+        made = step(form, constants, one, watched, 1, np.empty((4, 4)), 0)
+        assert made[3] == 1
+        errors.append(abs(first - made[0]))
+    assert errors[0] < 1e-5
+    assert errors[1] < 0.3 * errors[0]
 
 
 @pytest.mark.parametrize("scheme", IN_STEP)

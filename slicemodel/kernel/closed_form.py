@@ -1,0 +1,191 @@
+"""One slice between the ends of the bottle: the closed-form step, its turning point, and when it reaches an end.
+
+Positions are counted from the middle of the bottle, y = r - L/2: the two ends are one number, and sums of squares lose
+no digits. x = y - y* is the distance from the centre of repulsion y*.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from slicemodel.compiled import compiled, merged
+
+SHORT_SERIES = 0.03
+"""Arguments below which four terms of sinh and cosh do: the next is 2e-18 of the sum."""
+
+SERIES = 0.5
+"""Arguments below which sinh and cosh are summed up from their series; the first term left out is 5e-17 of the sum."""
+
+ROUNDING = 4e-16
+"""Rounding of a sum of two numbers, in units of the larger."""
+
+PI_IN_PARTS = (3.140625, 0.0009676535846665502, 5.126688303189038e-12)
+"""Three numbers whose sum is pi to 1e-27; the first two are so short that their products with n < 2^27 are exact."""
+
+MOST_RADIANS = 4e8
+"""Angle up to which multiples of pi are taken off in parts."""
+
+
+class Map(NamedTuple):
+    """The affine map of one step or several: y' = y + ((a - 1) y + b v + push), v' = c y + d v + pull.
+
+    The centre of repulsion y* contributes push = (1 - a) y* and pull = -c y*.
+    """
+
+    a_minus_1: float
+    b: float
+    c: float
+    d: float
+    push: float
+    pull: float
+
+
+@merged
+def moved(way, y, v):
+    """Return y and v after the map ``way``: what moves the slice is summed up before it is added to y."""
+    return y + (way.push + way.a_minus_1 * y + way.b * v), way.pull + way.c * y + way.d * v
+
+
+@compiled
+def cosine(x):
+    """Return cos x to 3e-16: as (-1)^n cos(x - n pi) with the nearest n, by its series.
+
+    The library's own takes longer, and its last digit may be another one on another machine.
+    """
+    if not abs(x) < MOST_RADIANS:
+        return math.cos(x)
+    n = np.floor(x * (1.0 / math.pi) + 0.5)
+    x = ((x - n * PI_IN_PARTS[0]) - n * PI_IN_PARTS[1]) - n * PI_IN_PARTS[2]
+    y = x * x
+    z = y * y
+    high = (1.0 / 20922789888000.0 - y * (1.0 / 6402373705728000.0)) + z * (
+        1.0 / 2432902008176640000.0 - y * (1.0 / 1124000727777607680000.0)
+    )
+    middle = (1.0 / 40320.0 - y * (1.0 / 3628800.0)) + z * (1.0 / 479001600.0 - y * (1.0 / 87178291200.0))
+    low = (1.0 / 24.0 - y * (1.0 / 720.0)) + z * (middle + z * z * high)
+    near = 1.0 - 0.5 * y
+    # What is lost of 1 - y/2 is added with the rest.
+    value = near + (((1.0 - near) - 0.5 * y) + z * low)
+    return value if n == 2.0 * np.floor(0.5 * n) else -value
+
+
+@merged
+def growth_rate_squared(form, constants, omega):
+    """Return k^2 (module docstring of ``schemes.form``)."""
+    return omega * omega + constants.gamma * constants.gamma if form.exact_roots else omega * omega
+
+
+@compiled
+def hyperbolic(y):
+    """Return sinh(x) / x and (cosh(x) - 1) / x^2 of y = x^2, for small x by their series: no root and no quotient."""
+    if y < SHORT_SERIES * SHORT_SERIES:
+        odd, even = 1.0 / 120.0 + y * (1.0 / 5040.0), 1.0 / 720.0 + y * (1.0 / 40320.0)
+        return 1.0 + y * (1.0 / 6.0 + y * odd), 0.5 + y * (1.0 / 24.0 + y * even)
+    if y < SERIES * SERIES:
+        odd = 1.0 / 5040.0 + y * (1.0 / 362880.0 + y * (1.0 / 39916800.0 + y * (1.0 / 6227020800.0)))
+        even = 1.0 / 40320.0 + y * (1.0 / 3628800.0 + y * (1.0 / 479001600.0 + y * (1.0 / 87178291200.0)))
+        odd, even = 1.0 / 120.0 + y * odd, 1.0 / 720.0 + y * even
+        return 1.0 + y * (1.0 / 6.0 + y * odd), 0.5 + y * (1.0 / 24.0 + y * even)
+    x = math.sqrt(y)
+    half = math.sinh(0.5 * x) / x
+    return math.sinh(x) / x, 2.0 * half * half
+
+
+@merged
+def coefficients(form, constants, k_squared, fade_minus_1, fade, dt):
+    """Return a - 1, b, c, d of the closed-form step (module docstring of ``schemes.form``; Eq. 9c, 9d).
+
+    ``fade`` is E = exp(-gamma dt). a is close to 1 for a short step: a - 1 is formed without the subtraction, which
+    would lose the digits that move the slice (E C - 1 = expm1(-gamma dt) + E (C - 1)).
+    """
+    gamma = constants.gamma
+    y = k_squared * (dt * dt)
+    odd, even = hyperbolic(y)
+    cosh_minus_1 = y * even
+    b = fade * dt * odd
+    a_minus_1 = fade_minus_1 + (constants.gamma_position * b + fade * cosh_minus_1)
+    c = (k_squared - gamma * gamma) * b
+    signed = form.cosh_sign * fade
+    d = signed + (form.sinh_sign * gamma * b + signed * cosh_minus_1)
+    return a_minus_1, b, c, d
+
+
+@merged
+def coefficients_at(form, constants, k_squared, t):
+    """Return a - 1, b, c, d of a step of any length t."""
+    return coefficients(form, constants, k_squared, math.expm1(-constants.gamma * t), math.exp(-constants.gamma * t), t)
+
+
+@compiled
+def step_coefficients(form, constants, omega, dt):
+    """Return a - 1, b, c, d of the closed-form step of any omega and dt."""
+    return coefficients_at(form, constants, growth_rate_squared(form, constants, omega), dt)
+
+
+@compiled
+def path(form, constants, omega, x, v, t):
+    """Return distance from the centre and velocity after time t, from distance x and velocity v."""
+    a_minus_1, b, c, d = step_coefficients(form, constants, omega, t)
+    return x + (a_minus_1 * x + b * v), c * x + d * v
+
+
+@compiled
+def turning_time(gamma, omega, x, v):
+    """Return when the velocity changes sign, or infinity: tanh(k t) = k v / (gamma v - omega^2 x), once at most."""
+    k = math.sqrt(omega * omega + gamma * gamma)
+    ratio = k * v / (gamma * v - omega * omega * x)
+    return math.atanh(ratio) / k if 0.0 < ratio < 1.0 else math.inf
+
+
+@merged
+def first_guess(gamma, omega, x, v, way, end):
+    """Return about when a slice moving towards ``end``, at last, has made ``way``: of constant force, then mended once.
+
+    The series of the path to fourth order is off by (k t)^4 / 120 of the way, which one step of Newton squares.
+    """
+    force = omega * omega * x - 2.0 * gamma * v
+    jerk = omega * omega * v - 2.0 * gamma * force
+    snap = omega * omega * force - 2.0 * gamma * jerk
+    root = end * math.sqrt(max(v * v + 2.0 * force * way, 0.0))
+    t = 2.0 * way / (v + root) if end * v > 0.0 else (root - v) / force
+    made = t * (v + t * (0.5 * force + t * (1.0 / 6.0 * jerk + t * (1.0 / 24.0 * snap))))
+    speed = v + t * (force + t * (0.5 * jerk + t * (1.0 / 6.0 * snap)))
+    return t - (made - way) / speed
+
+
+@merged
+def hit(form, constants, omega, k_squared, x, v, way, end, high):
+    """Return when the path has made ``way`` and goes on towards ``end``, before ``high``, and the velocity then.
+
+    Newton's method on the closed form, kept inside the bracket. The way, not the place, is compared: it keeps its
+    digits however short a hop is.
+    """
+    low = 0.0
+    t = first_guess(constants.gamma, omega, x, v, way, end)
+    if not low < t < high:
+        t = high
+    for _ in range(100):
+        a_minus_1, b, c, d = coefficients_at(form, constants, k_squared, t)
+        pushed, flown = a_minus_1 * x, b * v
+        gap = (pushed + flown) - way
+        speed = c * x + d * v
+        if gap * end > 0.0:
+            high = t
+        else:
+            low = t
+        shift = -gap / speed
+        better = t + shift
+        if not low <= better <= high:
+            t = 0.5 * (low + high)
+            continue
+        force = omega * omega * (x + pushed + flown) - 2.0 * constants.gamma * speed
+        # What Newton leaves is shift^2 force / (2 speed); what the gap cannot tell is the rounding of its terms.
+        if shift * shift * abs(force) <= ROUNDING * abs(speed) * better or abs(gap) <= ROUNDING * (
+            abs(pushed) + abs(flown)
+        ):
+            return better, speed + force * shift
+        t = better
+    return t, speed

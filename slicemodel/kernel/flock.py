@@ -1,0 +1,175 @@
+"""The flock: slices that meet no end for some steps, moved by one map and weighed by their moments.
+
+Linear maps that all slices share make one such map, and the sums of y and y^2 after it follow from those of y, v, y^2,
+y v and v^2 before (docs/theory.md, "Slices that meet no end"). The slices of the flock are not looked at until they are
+to be recorded or one of them may have come near an end. All others are watched: copies of their y and v are moved in
+every step (``rebound.Watched``). ``y`` and ``v`` of all slices are those of the last gathering.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from slicemodel.compiled import compiled, merged
+from slicemodel.kernel.closed_form import Map, growth_rate_squared, moved
+
+MOST_STEPS = 32
+"""Steps after which a flock is gathered anew."""
+
+FEWEST_STEPS = 4
+"""Steps a flock has to last to be worth gathering."""
+
+PUSHED = 0.03
+"""About how far forces move a slice while it is in a flock, in units of L/2; sets for how long a flock is gathered."""
+
+SPARE = 0.005
+"""Room that a flock leaves for what omega, theta and the centre of mass do meanwhile, in units of L/2."""
+
+CLEAR = 1e-9
+"""Distance a flock keeps from the ends, in units of L/2: far more than its places are rounded by."""
+
+NO_STEP = Map(0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+"""The map that moves nothing."""
+
+
+class Flock(NamedTuple):
+    """How many slices there are in the flock, and their moments when they were gathered.
+
+    Then y and y + ``horizon`` v of each lay between ``low`` and ``high``. One map, kept beside it, moves them since.
+    """
+
+    n: float
+    y: float
+    v: float
+    y_y: float
+    y_v: float
+    v_v: float
+    low: float
+    high: float
+    horizon: float
+
+
+EMPTY = Flock(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@merged
+def followed(first, then):
+    """Return the map that does ``first`` and ``then``."""
+    return Map(
+        first.a_minus_1 + (then.a_minus_1 + (then.a_minus_1 * first.a_minus_1 + then.b * first.c)),
+        first.b + (then.a_minus_1 * first.b + then.b * first.d),
+        then.c + (then.c * first.a_minus_1 + then.d * first.c),
+        then.c * first.b + then.d * first.d,
+        first.push + (then.push + (then.a_minus_1 * first.push + then.b * first.pull)),
+        then.pull + (then.c * first.push + then.d * first.pull),
+    )
+
+
+@merged
+def sums_of(flock, way):
+    """Return the sums of y, y^2 and v over the flock after ``way``, from its moments before; u = y' - y."""
+    if flock.n == 0.0:
+        return 0.0, 0.0, 0.0
+    u = flock.n * way.push + (way.a_minus_1 * flock.y + way.b * flock.v)
+    u_y = flock.y * way.push + (way.a_minus_1 * flock.y_y + way.b * flock.y_v)
+    u_v = flock.v * way.push + (way.a_minus_1 * flock.y_v + way.b * flock.v_v)
+    u_u = way.push * u + (way.a_minus_1 * u_y + way.b * u_v)
+    speed = flock.n * way.pull + (way.c * flock.y + way.d * flock.v)
+    return flock.y + u, flock.y_y + (2.0 * u_y + u_u), speed
+
+
+@merged
+def clear_of_ends(flock, way, reach, margin):
+    """Return whether surely no slice of the flock is nearer than ``margin`` to an end; never true of NaN or below 0.
+
+    The map puts a slice at a y0 + b v0 + push = (a - b / horizon) y0 + (b / horizon) (y0 + horizon v0) + push. As long
+    as both weights are positive that is at most a high + push, and at least a low + push.
+    """
+    room = (1.0 - CLEAR) * reach - margin
+    foreseeable = margin >= 0.0 and 0.0 <= way.b <= (1.0 + way.a_minus_1) * flock.horizon
+    highest = flock.high + (way.push + way.a_minus_1 * flock.high)
+    lowest = flock.low + (way.push + way.a_minus_1 * flock.low)
+    return foreseeable and highest < room and lowest > -room
+
+
+@merged
+def room_to_turn(way, reach, centre, dt):
+    """Return how far a slice that turns inside a step may go beyond where it was before, at most v dt.
+
+    It turns if v and v' = c (y - y*) + d v differ in sign: then abs(v) is at most c abs(y - y*) / d, with d > 0. That
+    holds of exact roots in the short steps of a flock; ``clear_of_ends`` refuses anything else.
+    """
+    return dt * way.c / way.d * (reach + abs(centre))
+
+
+@merged
+def foreseen(form, flock, since, one):
+    """Return the map of the flock after a step, and whether surely none of it meets an end in that step."""
+    after, clear = since, True
+    if flock.n > 0.0:
+        after = followed(since, one.way)
+        clear = clear_of_ends(flock, after, one.reach, 0.0)
+        if form.in_step:
+            # A slice that does not turn is between its two places; one that turns goes beyond the first.
+            room = room_to_turn(one.way, one.reach, one.centre, one.dt)
+            clear = clear and clear_of_ends(flock, since, one.reach, room)
+    return after, clear
+
+
+@compiled
+def gathered(form, constants, reach, omega, centre, dt, margin, y, v, watched):
+    """Return a flock of slices that should stay clear of the ends, how many are watched, and for how many steps.
+
+    Where slices will be is only estimated here; ``clear_of_ends`` looks after it at every step.
+    """
+    i, near_y, near_v, _, _ = watched
+    k_squared = growth_rate_squared(form, constants, omega)
+    force = k_squared * (reach + abs(centre))
+    lasting = math.sqrt(2.0 * PUSHED * reach / force)
+    steps = int(lasting / dt) if lasting < MOST_STEPS * dt else MOST_STEPS
+    horizon = steps * dt * (1.0 + CLEAR)
+    # What cosh(k horizon) is at most, and a tenth more; the centre of repulsion and omega change on the way, for which
+    # some room is left. A slice at ``high`` is then carried from the centre to ``room``.
+    growth = 1.0 + 0.55 * k_squared * horizon * horizon
+    room = (1.0 - SPARE) * reach - margin
+    high = min(room, centre + (room - centre) / growth)
+    low = max(-room, centre - (room + centre) / growth)
+    middle, half_width = 0.5 * (low + high), 0.5 * (high - low)
+    if steps < FEWEST_STEPS or form.cosh_sign < 0.0:
+        steps, half_width = MOST_STEPS, -1.0
+    many = 0
+    s_y = s_v = s_y_y = s_y_v = s_v_v = 0.0
+    for k in range(len(y)):
+        y_k, v_k = y[k], v[k]
+        if abs(y_k - middle) <= half_width and abs(y_k + horizon * v_k - middle) <= half_width:
+            s_y += y_k
+            s_v += v_k
+            s_y_y += y_k * y_k
+            s_y_v += y_k * v_k
+            s_v_v += v_k * v_k
+        else:
+            i[many], near_y[many], near_v[many] = k, y_k, v_k
+            many += 1
+    return Flock(float(len(y) - many), s_y, s_v, s_y_y, s_y_v, s_v_v, low, high, horizon), many, steps
+
+
+@merged
+def bring_up_to_date(since, y, v, many, watched):
+    """Move all slices by what the flock has done ``since``, then put the watched ones where they are."""
+    i, near_y, near_v, _, _ = watched
+    if many < len(y):
+        for k in range(len(y)):
+            y[k], v[k] = moved(since, y[k], v[k])
+    for j in range(many):
+        y[i[j]], v[i[j]] = near_y[j], near_v[j]
+
+
+@compiled
+def dissolved(since, y, v, many, watched):
+    """Watch all slices; return an empty flock, how many are watched, and after how many steps to gather a new one."""
+    i, near_y, near_v, _, _ = watched
+    bring_up_to_date(since, y, v, many, watched)
+    for k in range(len(y)):
+        i[k], near_y[k], near_v[k] = k, y[k], v[k]
+    return EMPTY, len(y), FEWEST_STEPS

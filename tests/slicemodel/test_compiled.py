@@ -1,0 +1,125 @@
+"""The cache of compiled functions: what makes it stale, and what happens where it cannot be written."""
+
+import importlib
+import logging
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numba.core.caching
+import numba.core.dispatcher
+import pytest
+
+from slicemodel import compiled, kernel
+
+ENTRY = """
+from pathlib import Path
+
+from slicemodel.compiled import kept_on_disk
+from {name}.helper import add
+
+
+@kept_on_disk({elsewhere})
+def entry(x):
+    return add(x)
+"""
+HELPER = """
+from slicemodel.compiled import compiled
+
+
+@compiled
+def add(x):
+    return x + {number}
+"""
+RUN = "from {name}.entry import entry; x = entry(1.0); print(x, sum(entry.stats.cache_hits.values()))"
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A package of two files with a function kept on disk; call it to run it in a process of its own."""
+    name = "kept_for_a_test"
+    folder = tmp_path / name
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    other = tmp_path / "other.py"
+    other.write_text("A = 1", encoding="utf-8")
+    (folder / "entry.py").write_text(ENTRY.format(name=name, elsewhere=f"Path({str(other)!r})"), encoding="utf-8")
+    (folder / "helper.py").write_text(HELPER.format(number=1), encoding="utf-8")
+    root = str(Path(compiled.__file__).parent.parent)
+
+    def run() -> str:
+        path = os.pathsep.join([str(tmp_path), root])
+        environment = {**os.environ, "PYTHONPATH": path, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+        command = [sys.executable, "-c", RUN.format(name=name)]
+        return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.strip()
+
+    run.folder, run.other, run.root = folder, other, tmp_path
+    return run
+
+
+def test_a_change_in_another_file_of_the_folder_is_noticed(package):
+    """numba itself looks at the file of the function only."""
+    assert package() == "2.0 0"
+    assert package() == "2.0 1"
+    (package.folder / "helper.py").write_text(HELPER.format(number=2), encoding="utf-8")
+    assert package() == "3.0 0"
+    assert package() == "3.0 1"
+
+
+def test_so_is_a_change_in_a_file_that_is_named_and_a_file_that_is_new(package):
+    assert [package(), package()] == ["2.0 0", "2.0 1"]
+    package.other.write_text("A = 2", encoding="utf-8")
+    assert [package(), package()] == ["2.0 0", "2.0 1"]
+    (package.folder / "another.py").write_text("", encoding="utf-8")
+    assert [package(), package()] == ["2.0 0", "2.0 1"]
+    shutil.rmtree(package.folder / "__pycache__", ignore_errors=True)
+    assert package() == "2.0 1"
+
+
+def test_how_functions_are_compiled_is_part_of_what_they_are_made_of():
+    stamp = compiled.stamp_of_sources(kernel.fly.py_func)
+    assert stamp == compiled.stamp_of_sources(kernel.fly.py_func)
+    assert stamp != compiled.stamp_of_sources(kernel.fly.py_func, (Path(__file__),))
+    assert stamp != compiled.stamp_of_sources(compiled.merged)
+
+
+def test_the_loop_is_compiled_anew_when_the_switches_of_a_scheme_change():
+    """Their order is part of what is compiled."""
+    form = Path(kernel.__file__).parent.parent / "schemes" / "form.py"
+    assert kernel.fly._cache._cache_file._source_stamp == compiled.stamp_of_sources(kernel.fly.py_func, (form,))
+
+
+def test_without_a_writable_cache_it_compiles_in_memory_and_says_so_once(caplog, monkeypatch):
+    monkeypatch.setattr(numba.core.caching.CacheImpl, "_locator_classes", [])
+    with caplog.at_level(logging.WARNING, logger="slicemodel"):
+        twice = compiled.kept_on_disk()(lambda x: 2 * x)
+    assert twice(21) == 42
+    assert [record.name for record in caplog.records] == ["slicemodel.compiled"]
+    assert caplog.text.count("compiling in memory") == 1
+
+
+def test_without_sources_to_read_it_compiles_in_memory(caplog, tmp_path):
+    with caplog.at_level(logging.WARNING, logger="slicemodel"):
+        twice = compiled.kept_on_disk(tmp_path / "gone.py")(lambda x: 2 * x)
+    assert twice(21) == 42
+    assert isinstance(twice._cache, numba.core.caching.NullCache)
+    assert caplog.text.count("compiling in memory") == 1
+
+
+def test_one_function_of_the_loop_is_kept_on_disk():
+    """One entry, hence one line if there is no place for it, and no helper that could be stale beside it."""
+    files = [
+        importlib.import_module(f"slicemodel.kernel.{file.stem}")
+        for file in Path(kernel.__file__).parent.glob("[a-z]*.py")
+    ]
+    functions = {
+        name: item
+        for file in files
+        for name, item in vars(file).items()
+        if isinstance(item, numba.core.dispatcher.Dispatcher)
+    }
+    kept = {name for name, item in functions.items() if not isinstance(item._cache, numba.core.caching.NullCache)}
+    assert len(functions) > 10
+    assert kept == {"fly"}
