@@ -11,6 +11,11 @@ Function = TypeVar("Function", bound=Callable[..., object])
 
 
 def compiled(function: Function) -> Function:
-    """Return ``function`` compiled on its first call; with ``NUMBA_DISABLE_JIT=1`` the function itself."""
-    made: Function = numba.njit(error_model="numpy", nogil=True)(function)
+    """Return ``function`` compiled when a compiled one calls it; with ``NUMBA_DISABLE_JIT=1`` the function itself.
+
+    It cannot be called from Python: what numba would wrap around it for that takes a third of the time to compile.
+    """
+    made: Function = numba.njit(
+        error_model="numpy", nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True
+    )(function)
     return made
