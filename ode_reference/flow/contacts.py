@@ -31,7 +31,7 @@ from ode_reference.flow.layout import (
     WATCHED,
     IntArray,
 )
-from ode_reference.flow.points import enter, inertia_of, leave, place_of, set_body, speed_of
+from ode_reference.flow.points import enter, leave, place_of, set_body, set_scales, speed_of
 from ode_reference.flow.search import ROUNDING, watch
 from slicemodel.trajectory import FloatArray
 
@@ -63,7 +63,7 @@ def meet(now: Any, points: FloatArray, marks: IntArray, impacts: FloatArray) -> 
     """Resolve all contacts of this instant together; impacts that have a speed are listed."""
     # Nothing moves in an instant: omega and the centre of mass belong to all that follows.
     m = now.slice_mass
-    now.omega = now.momentum / inertia_of(now)
+    set_scales(now)
     now.y_cm = m * (now.free * now.y_mean + now.wall * (now.on_base - now.on_cap)) / now.total_mass
     book_jump(now, 0)
     if now.sequential == 1 and now.hits > 0 and now.on_base + now.on_cap > 0:
@@ -168,8 +168,7 @@ def is_pressed(now: Any, end: float, v: float, on_base: int, on_cap: int, moving
     else:
         thrown = square * (place - now.y_cm)
         drag = d * v - now.drag_on_centre * d * m * moving / now.total_mass
-    parts = abs(square) * now.wall + abs(force) + abs(drag)
-    return end * (thrown + force - drag) >= -ROUNDING * parts  # type: ignore[no-any-return]
+    return end * (thrown + force - drag) >= -ROUNDING * now.thrust  # type: ignore[no-any-return]
 
 
 @compiled

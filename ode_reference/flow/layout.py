@@ -19,7 +19,7 @@ In a full bottle hits on both ends belong to one instant, and rounding parts the
 rest speed of 1e-5 m/s crosses this distance in 2e-9 s.
 """
 
-STEP_LIMIT: Final = 100_000_000
+STEP_LIMIT: Final = 20_000_000
 """Most steps of one flight; every event ends a step, so this bounds the events too."""
 
 WATCH: Final = 10_000
@@ -33,7 +33,7 @@ _REAL = {
     "rest_speed tolerance duration",
     "body": "centre body_inertia reduced_mass spring damping weight push_z push_dz",
     "state": "t theta A dA B dB y_mean dy_mean mu mw U P V",
-    "search": "base_time span low_u high_u low_far high_far fastest rest_A rest_B rest_z h root",
+    "search": "base_time span low_u high_u low_far high_far fastest rate thrust rest_A rest_B rest_z h root",
     "contacts": "omega y_cm base_speed cap_speed shift squares speeds",
     "checks": "largest_snap wronskian_error inertia_error watched_from",
     "ledger": "work_drag work_weight work_spring work_origin work_impacts work_rests work_recoil initial final",

@@ -11,7 +11,7 @@ from ode_reference.flow.compiled import compiled
 from ode_reference.flow.contacts import meet, touch
 from ode_reference.flow.layout import HIT, NEAR, OVERFLOW, PLACE, SIDE, SPEED, STALLED, STILL, IntArray
 from ode_reference.flow.ledger import book_step, energy_of
-from ode_reference.flow.points import inertia_of, rebase
+from ode_reference.flow.points import inertia_of, rebase, set_scales
 from ode_reference.flow.search import find, flock_is_clear, gather, guessed_step, sum_rests
 from ode_reference.flow.series import MOST, ROWS, THETA, A, B, Z, advance, expand, slope, value
 from slicemodel.trajectory import FloatArray
@@ -133,8 +133,8 @@ def new_base(now: Any, points: FloatArray, marks: IntArray) -> None:
     if now.stale == 0:
         few = now.near < 8.0 + 0.7 * np.sqrt(points.shape[1]) or now.instants - now.since < 12
         now.span *= 1.25 if few else 0.8
-    omega = abs(now.momentum) / inertia_of(now)
-    now.span = min(now.span, TURN / max(omega, max(now.drag_rate, np.sqrt(now.kappa))))
+    set_scales(now)
+    now.span = min(now.span, TURN / now.rate)
     gather(now, points, marks)
     now.since, now.stale, now.fresh = now.instants, 0, 1
 
@@ -154,6 +154,7 @@ def smooth_piece(
         new_base(now, points, marks)
     left = now.duration - now.t
     h = min(guessed_step(now, points, marks, now.base_time + 0.95 * now.span - now.t), left)
+    set_scales(now)
     expand(now, table, h)
     now.series += 1
     sum_rests(now, table)

@@ -37,6 +37,15 @@ def inertia_of(now: Any) -> float:
 
 
 @compiled
+def set_scales(now: Any) -> None:
+    """Set omega, the fastest rate of the equations [1/s] and the magnitude of what their terms add up to [m/s^2]."""
+    now.omega = now.momentum / inertia_of(now)
+    spring = max(now.omega * now.omega, now.kappa)
+    now.rate = max(math.sqrt(spring), now.drag_rate)
+    now.thrust = 2.0 * now.wall * spring + now.gravity * (1.0 + now.kappa / now.omega / now.omega)
+
+
+@compiled
 def start_map(now: Any) -> None:
     """Let the map start here: A = 1, A' = 0, B = 0, B' = 1."""
     now.A, now.dA, now.B, now.dB = 1.0, 0.0, 0.0, 1.0

@@ -32,7 +32,7 @@ MARGIN = 1e-13
 """Room that the bound leaves for rounding, in units of the wall's distance."""
 
 ROUNDING = 1e-13
-"""Magnitude, against its summands, below which a leading coefficient is taken as zero: the next one decides."""
+"""Magnitude, against that of its summands, below which a first coefficient is zero: the sign of the next decides."""
 
 
 @compiled
@@ -65,11 +65,16 @@ def first_zero(table: FloatArray, order: int, x: float) -> tuple[float, bool]:
 
 
 @compiled
-def without_leading_zeros(table: FloatArray, order: int) -> int:
-    """Divide the polynomial by the power of x that it has as a factor; return the order of the rest."""
+def without_leading_zeros(now: Any, table: FloatArray, order: int, unit: float) -> int:
+    """Divide the polynomial by the power of x that it has as a factor, but for rounding; return the order of the rest.
+
+    ``unit`` is the magnitude of what adds up to the first coefficient, and falls by rate * h from one to the next. The
+    order is -1 if nothing is left.
+    """
     lead = 0
-    while lead < order and table[POLYNOMIAL, lead] == 0.0:
+    while lead <= order and abs(table[POLYNOMIAL, lead]) <= ROUNDING * unit:
         lead += 1
+        unit *= now.rate * now.h
     for k in range(order - lead + 1):
         table[POLYNOMIAL, k] = table[POLYNOMIAL, k + lead]
     return order - lead
@@ -90,9 +95,7 @@ def sum_rests(now: Any, table: FloatArray) -> None:
 def gather(now: Any, points: FloatArray, marks: IntArray) -> None:
     """List the slices that may come near an end within the span; take the extremes of the others, the flock."""
     wall, span = now.wall, now.span
-    rate = now.momentum / now.body_inertia if now.free == 0 else now.momentum / table_free_inertia(now)
-    pull = max(rate * rate, now.kappa) * 2.0 * wall + now.gravity * (1.0 + now.kappa / (rate * rate))
-    clear = wall - 0.5 * pull * span * span - 1e-6 * wall
+    clear = wall - 0.5 * now.thrust * span * span - 1e-6 * wall
     now.near = 0
     now.low_u = now.low_far = math.inf
     now.high_u = now.high_far = -math.inf
@@ -108,13 +111,6 @@ def gather(now: Any, points: FloatArray, marks: IntArray) -> None:
                 now.low_u, now.high_u = min(now.low_u, u), max(now.high_u, u)
                 now.low_far, now.high_far = min(now.low_far, far), max(now.high_far, far)
                 now.fastest = max(now.fastest, abs(w))
-
-
-@compiled
-def table_free_inertia(now: Any) -> float:
-    """Return J where the map starts."""
-    z = now.y_mean - now.centre
-    return now.body_inertia + now.slice_mass * now.U + now.reduced_mass * z * z  # type: ignore[no-any-return]
 
 
 @compiled
@@ -158,14 +154,14 @@ def contact(now: Any, table: FloatArray, points: FloatArray, marks: IntArray, j:
         table[POLYNOMIAL, k] = -end * (table[Z, k] + table[A, k] * u + table[B, k] * w)
     table[POLYNOMIAL, 0] += now.wall - end * now.centre
     if marks[STILL, j] == end:
-        table[POLYNOMIAL, 0] = table[POLYNOMIAL, 1] = 0.0
-        parts = abs(table[Z, 2]) + abs(table[A, 2] * u) + abs(table[B, 2] * w)
-        if abs(table[POLYNOMIAL, 2]) <= ROUNDING * parts:
-            table[POLYNOMIAL, 2] = 0.0
-        order = without_leading_zeros(table, p)
+        for k in range(2, p + 1):
+            table[POLYNOMIAL, k - 2] = table[POLYNOMIAL, k]
+        p = without_leading_zeros(now, table, p - 2, now.thrust * now.h * now.h)
+        if p < 0:
+            return NONE, False
         if table[POLYNOMIAL, 0] < 0.0:
             return 0.0, True
-        return first_zero(table, order, 0.0)
+        return first_zero(table, p, 0.0)
     if table[POLYNOMIAL, 0] < 0.0 < table[POLYNOMIAL, 1]:
         table[POLYNOMIAL, 0] = 0.0
     return first_zero(table, p, 0.0)
@@ -179,14 +175,11 @@ def release(now: Any, table: FloatArray, end: float) -> tuple[float, bool]:
         drag = now.push_dz * (k + 1) * table[Z, k + 1] / now.h
         thrown = table[SQUARE, k] * arm - now.push_z * table[PULL, k]
         table[POLYNOMIAL, k] = end * (thrown + drag + now.weight * table[FORCE, k])
-    parts = abs(table[SQUARE, 0] * arm) + abs(now.push_z * table[PULL, 0]) + abs(now.weight * table[FORCE, 0])
-    if abs(table[POLYNOMIAL, 0]) <= ROUNDING * parts:
-        table[POLYNOMIAL, 0] = 0.0
-        p = without_leading_zeros(table, p)
+    p = without_leading_zeros(now, table, p, now.thrust)
+    if p < 0:
+        return NONE, False
     if table[POLYNOMIAL, 0] < 0.0:
         return 0.0, True
-    if table[POLYNOMIAL, 0] == 0.0:
-        return NONE, False
     return first_zero(table, p, 0.0)
 
 

@@ -12,7 +12,7 @@ MOST = 30
 """Highest order; a step whose terms do not vanish by then is made shorter."""
 
 TRUNCATION = 1e-17
-"""Terms below this, twice in a row, end the series: of A, of omega B, of z in units of the wall, and of theta."""
+"""Terms below this, twice in a row, end the series: of A, of B times the rate, of z over the wall, and of theta."""
 
 ROWS = 14
 A, B, Z, THETA, OMEGA, SQUARE, J, FORCE, PULL, U_A, V_B, COS, SIN, SHARE = range(ROWS)
@@ -100,7 +100,7 @@ def expand(now: Any, table: FloatArray, h: float) -> None:
 @compiled
 def size(now: Any, table: FloatArray, k: int) -> float:
     """Return how large the terms of order k are, without dimension."""
-    turned = max(abs(table[A, k]), abs(table[OMEGA, 0] * table[B, k]))
+    turned = max(abs(table[A, k]), now.rate * abs(table[B, k]))
     return max(turned, abs(table[Z, k]) / now.wall, abs(table[THETA, k - 1]))
 
 
