@@ -28,7 +28,7 @@ THROWS = {"water": WATER, "ice": ICE, "backwards": BACKWARDS}
 @pytest.fixture(scope="module")
 def films():
     return {
-        name: synthetic_video(ode_reference.solve(throw, model="free-flight", rtol=1e-8, atol=1e-10))
+        name: synthetic_video(ode_reference.solve(throw, model="free-flight"))
         for name, throw in THROWS.items()
     }
 
