@@ -176,7 +176,7 @@ def solve_batch(
             rows.append(output_times(throw, given[k] if given is not None and given.ndim == 2 else given))
         except ValueError as error:
             raise ValueError(f"throws[{k}]: {error}") from None
-    moments = np.array(rows).reshape(len(throws), -1)
+    moments = np.array(rows).reshape(len(throws), len(rows[0]) if rows else 0)
     ask = api.Ask(
         model=chosen.name,
         switches=chosen.switches,

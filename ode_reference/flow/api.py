@@ -112,6 +112,7 @@ def fly(scenario: Scenario, moments: FloatArray, ask: Ask) -> Flown:
     impacts = impacts[: int(record["impacts"][0])]
     if ask.states:
         r += scenario.bottle.length / 2
+        r[r == np.inf], r[r == -np.inf] = scenario.r_max, scenario.r_min
         if reached and moments[0] == 0.0:
             r[0] = scenario.initial_positions()  # to the last digit, as output at release
     return Flown(scenario, ask, moments[:reached], rows[:, :reached], r[:reached], v[:reached], impacts, record, frozen)

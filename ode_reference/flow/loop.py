@@ -60,7 +60,7 @@ def fly(
     points, marks : arrays, shape (6, N) - as ``layout.points_at`` makes them
     moments : array, shape (P,) - output times [s]
     rows : array, shape (3, P) - receives theta, J and y_CM
-    r, v : array, shape (P, N) - receive y and y' [m], [m/s]; of shape (0, N) nothing
+    r, v : array, shape (P, N) - receive y, infinite at rest, and y' [m], [m/s]; of shape (0, N) nothing
     """
     now = flight[0]
     impacts, table = np.empty((64, 5)), np.zeros((ROWS + 1, MOST + 1))
@@ -212,5 +212,5 @@ def record(
                     u, w = points[PLACE, i] - now.mu, points[SPEED, i] - now.mw
                     r[q, i], v[q, i] = now.centre + z + a * u + b * w, dz + da * u + db * w
                 else:
-                    r[q, i], v[q, i] = marks[SIDE, i] * now.wall, 0.0
+                    r[q, i], v[q, i] = marks[SIDE, i] * np.inf, 0.0
         now.recorded += 1
