@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ode_reference import METHODS, MODELS, solve
-from ode_reference.closed_forms import CASES, case_release, case_symmetric_pair, case_zeno, first_integral
+from ode_reference.closed_forms import CASES, case_elliptic, case_release, case_symmetric_pair, case_zeno, first_integral
 from slicemodel.scenario import Bottle, Scenario
 
 
@@ -48,6 +48,17 @@ def test_exact_case_by_the_other_steppers(make, method):
     case = make("eq8")
     found = solve(case.scenario, times=case.t, rest_speed=case.rest_speed, method=method, rtol=1e-12, atol=1e-15)
     assert_reproduced(found, case, 1e-9, 1e-6)
+
+
+@pytest.mark.parametrize("model", ["eq8", "free-flight"])
+@pytest.mark.parametrize("n_slices", range(1, 51))
+def test_elliptic_case_holds_for_any_number_of_slices(n_slices, model):
+    case = case_elliptic(model, n_slices)
+    found = solve(case.scenario, model, case.t)
+    assert_reproduced(found, case, 1e-12, 1e-12)
+    np.testing.assert_allclose(found.inertia, case.omega[0] * found.inertia[0] / case.omega, rtol=1e-12)
+    if n_slices > 3:
+        assert np.ptp(case.r, axis=0).max() > 1e-3
 
 
 def test_heavy_tube_without_drag_follows_the_hyperbolic_cosine_until_the_first_rebound():
