@@ -2,13 +2,13 @@
 
     python benchmarks/flow_agreement.py [--throws 200] [--seed 1]
 
-Every throw has its own equation (the seven rungs, or a random set of switches), bottle, filling, drag, restitution, spin
-and impact law. DOP853 integrates it at rtol 1e-13 with steps of at most 0.005 radians. Of each slice the impacts must
-come in the same order, on the same ends, at times within 1e-8 s, and omega must agree to 1e-9 omega_0. A throw is called
-chaotic if changing omega_0 by 1e-11 of it moves omega by more than 1e-8 omega_0, or an impact by more than 1e-8 s:
-nothing can be asked of it. Where lists part, the first impact is printed that one of the two does not have. Slices at
-one place with one velocity are the same to the equations: where rounding decides which of them strikes first, the two
-lists may exchange their numbers, and agree in everything else; these throws are counted apart.
+Every throw has its own equation (one of the seven rungs or a random set of switches), bottle, filling, drag,
+restitution, spin and impact law. DOP853 integrates it at rtol 1e-13 with steps of at most 0.005 radians. Of each slice
+the impacts must come in the same order, on the same ends, at times within 1e-8 s, and omega must agree to 1e-9 omega_0.
+A throw is called chaotic if changing omega_0 by 1e-11 of it moves omega by more than 1e-8 omega_0, or an impact by more
+than 1e-8 s: nothing can be asked of it. Where lists part, the first impact is printed that one of the two does not
+have. Slices at one place with one velocity are the same to the equations: where rounding decides which of them strikes
+first, the two lists may exchange their numbers, and agree in everything else; these throws are counted apart.
 
 The contacts of DOP853 are resolved within the same distance of an end as those of the reduced flow: at 64 eps L hits on
 both ends of a full bottle, which belong to one instant, come apart.
@@ -165,8 +165,8 @@ def main() -> None:
             print(f"{calm}: {case}\n    {statuses}; omega {apart:.1e} omega_0; {parting}", flush=True)
     print(
         f"{calm} throws that are not chaotic ({chaotic} that are), {impacts} impacts: {calm - len(exceptions)} with "
-        f"identical lists ({exchanged} but for the numbers of slices that are the same to the equations) and omega within "
-        f"{OMEGA:g} omega_0; median difference of omega {np.median(differences):.1e}"
+        f"identical lists ({exchanged} but for the numbers of slices that are the same to the equations) and omega "
+        f"within {OMEGA:g} omega_0; median difference of omega {np.median(differences):.1e}"
     )
 
 

@@ -1,7 +1,7 @@
 """Free flight without drag between two impacts: a central motion in a plane, whatever the number of slices is.
 
-With z the mean of the free slices less the centre y_c of the tube and the slices that rest in it, a the mass of the free
-slices, M_c and J_c mass and inertia of that body (y counts from the tube's centre), the vector
+With z the mean of the free slices less the centre y_c of the tube and the slices that rest in it, a the mass of the
+free slices, M_c and J_c mass and inertia of that body (y counts from the tube's centre), the vector
 
     X = (sqrt(m) (y_i - mean y), sqrt(a M_c / M) z)    obeys    X'' = omega^2 X,    J = J_c + |X|^2,    omega = L / J.
 
@@ -50,14 +50,14 @@ def spread_from_rest(
     fixed = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12) + m * float((y[~free] ** 2).sum())
     fixed -= body * centre**2
     spread = m * float((away**2).sum()) - (m * float(away.sum())) ** 2 / scenario.total_mass
-    phi = np.zeros(1)
+    phi: FloatArray = np.zeros(1)
     if moves.any():
         reach = np.where(away > 0, wall - centre, wall + centre)[moves] / np.abs(away[moves])
         phi = math.acos(1 / float(reach.min())) * np.linspace(0.0, 1.0, points + 1)[:-1]
     parameter = fixed / (fixed + spread)
     root = np.sqrt(1 - parameter * np.sin(phi) ** 2)
-    turned = ellipkinc(phi, parameter)
-    t = (np.tan(phi) * root + turned - ellipeinc(phi, parameter)) / spin
+    turned = np.asarray(ellipkinc(phi, parameter), dtype=np.float64)
+    t: FloatArray = np.asarray((np.tan(phi) * root + turned - ellipeinc(phi, parameter)) / spin, dtype=np.float64)
     stretch = 1 / np.cos(phi)
     omega = spin * (fixed + spread) / (fixed + spread * stretch**2)
     # d theta / d phi = 1 / root, d lambda / d phi = lambda tan(phi)

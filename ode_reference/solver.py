@@ -1,4 +1,4 @@
-"""The verb of this room: one scenario and one equation of motion in, one trajectory out; or many in, and a batch out."""
+"""The verb of this room: one scenario and one equation of motion in, one trajectory out; or many, and a batch."""
 
 from __future__ import annotations
 
@@ -151,8 +151,8 @@ def solve_batch(
     Returns
     -------
     Batch
-        Arrays ``t``, ``theta``, ``omega`` of shape (K, P), ``status`` of K names; ``batch[k]`` is the Trajectory of throw
-        k, with its impacts.
+        Arrays ``t``, ``theta``, ``omega`` of shape (K, P), ``status`` of K names; ``batch[k]`` is the Trajectory of
+        throw k, with its impacts.
 
     Raises
     ------

@@ -29,7 +29,7 @@ _STATUSES: Final = {OVERFLOW: "overflow", STALLED: "stalled", WRONSKIAN: "diverg
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ask:
-    """What is asked of every flight: the equation by name and switches, contacts, ledger, and whether r and v are kept."""
+    """What is asked of every flight: the equation and its switches, contacts, ledger, and whether r and v are kept."""
 
     model: str
     switches: Switches
@@ -258,7 +258,9 @@ class Batch(Sequence[Trajectory]):
 
 def fly_all(throws: Sequence[Scenario], moments: FloatArray, ask: Ask) -> Batch:
     """Fly all throws on all cores; ``moments`` are their output times, shape (K, P) [s]."""
-    workers = min(len(throws), len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
+    workers = min(
+        len(throws), len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
     compiled_loop()
 
     def one(k: int) -> Flown:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numba
 
@@ -15,7 +15,7 @@ def compiled(function: Function) -> Function:
 
     It cannot be called from Python: what numba would wrap around it for that takes a third of the time to compile.
     """
-    made: Function = numba.njit(
-        error_model="numpy", nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True
-    )(function)
+    # The names of the two last options are missing from numba's types.
+    options: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    made: Function = numba.njit(error_model="numpy", nogil=True, **options)(function)
     return made

@@ -15,7 +15,6 @@ import math
 from typing import Any
 
 from ode_reference.flow.compiled import compiled
-from ode_reference.flow.ledger import book_jump
 from ode_reference.flow.laws import sort, strike
 from ode_reference.flow.layout import (
     AFTER,
@@ -31,6 +30,7 @@ from ode_reference.flow.layout import (
     WATCHED,
     IntArray,
 )
+from ode_reference.flow.ledger import book_jump
 from ode_reference.flow.points import enter, leave, place_of, set_body, set_scales, speed_of
 from ode_reference.flow.search import ROUNDING, watch
 from slicemodel.trajectory import FloatArray
@@ -78,7 +78,7 @@ def meet(now: Any, points: FloatArray, marks: IntArray, impacts: FloatArray) -> 
         now.largest_snap = max(now.largest_snap, abs(abs(y) - now.wall))
     rebound(now, points, marks)
     book_jump(now, 1)
-    choose(now, points, marks)
+    choose(now, points)
     settle(now, points, marks, impacts)
     book_jump(now, 2)
     now.instants += 1
@@ -89,7 +89,7 @@ def wake(now: Any, points: FloatArray, marks: IntArray) -> None:
     """Let every resting slice take part as one that touches its end with no speed; ``side`` says where it rested."""
     for i in range(points.shape[1]):
         if marks[SIDE, i] != 0:
-            enter(now, points, marks, i, marks[SIDE, i] * now.wall, 0.0)
+            enter(now, points, i, marks[SIDE, i] * now.wall, 0.0)
             marks[HIT, now.hits] = i
             now.hits += 1
     now.on_base = now.on_cap = 0
@@ -105,11 +105,11 @@ def rebound(now: Any, points: FloatArray, marks: IntArray) -> None:
     for k in range(now.hits):
         j = marks[HIT, k]
         leave(now, points[PLACE, j], points[SPEED, j])
-        enter(now, points, marks, j, points[END, k] * now.wall, points[END, k] * points[AFTER, k])
+        enter(now, points, j, points[END, k] * now.wall, points[END, k] * points[AFTER, k])
 
 
 @compiled
-def choose(now: Any, points: FloatArray, marks: IntArray) -> None:
+def choose(now: Any, points: FloatArray) -> None:
     """Set ``stay_base``, ``stay_cap``: which ends keep their slow slices; and ``shift``, what all others then lose."""
     rest, ratio = now.rest_speed, now.recoil * now.slice_mass / now.bottle_mass
     base = now.on_base if abs(now.base_speed) < rest else 0
@@ -205,13 +205,13 @@ def settle(now: Any, points: FloatArray, marks: IntArray, impacts: FloatArray) -
             marks[SIDE, j] = 1 if base else -1
             now.on_base, now.on_cap = now.on_base + int(base), now.on_cap + int(not base)
         else:
-            set_off(now, points, marks, j, 1 if base else -1, v)
+            set_off(now, marks, j, 1 if base else -1, v)
     if now.free == 0:
         now.dy_mean = 0.0
     set_body(now)
     if now.free == 0:
         now.y_mean = now.centre
-    forget_resting(now, points, marks)
+    forget_resting(now, marks)
 
 
 @compiled
@@ -220,19 +220,19 @@ def free_group(now: Any, points: FloatArray, marks: IntArray, side: int, v: floa
     for i in range(points.shape[1]):
         if marks[SIDE, i] == side:
             marks[SIDE, i] = 0
-            enter(now, points, marks, i, side * now.wall, v)
-            set_off(now, points, marks, i, side, v)
+            enter(now, points, i, side * now.wall, v)
+            set_off(now, marks, i, side, v)
 
 
 @compiled
-def set_off(now: Any, points: FloatArray, marks: IntArray, i: int, side: int, v: float) -> None:
+def set_off(now: Any, marks: IntArray, i: int, side: int, v: float) -> None:
     """Watch a free slice on an end; note whether it stands still there."""
-    watch(now, points, marks, i)
+    watch(now, marks, i)
     marks[STILL, i] = side if abs(v) <= STANDING * now.wall * abs(now.omega) else 0
 
 
 @compiled
-def forget_resting(now: Any, points: FloatArray, marks: IntArray) -> None:
+def forget_resting(now: Any, marks: IntArray) -> None:
     """Take slices at rest off the list of those that are watched; the others keep their order."""
     kept = 0
     for k in range(now.near):

@@ -93,7 +93,7 @@ def prepare(
 ) -> tuple[NDArray[Any], FloatArray]:
     """Return the record of a flight at its release, shape (1,), and the places y of its slices, shape (N,) [m]."""
     throw, n = Throw.of(scenario), scenario.n_slices
-    flight = np.zeros(1, dtype=RECORD)
+    flight: NDArray[Any] = np.zeros(1, dtype=RECORD)
     now = flight.view(np.recarray)[0]
     gamma = throw.drag_rate / 2
     now.slice_mass, now.bottle_mass, now.total_mass = throw.slice_mass, throw.bottle_mass, throw.total_mass
@@ -110,7 +110,7 @@ def prepare(
     set_body(now)
     # A full bottle is mirror symmetric to the last digit: its stack is as high as the tube is long.
     empty = (1.0 - scenario.fill_fraction) * scenario.bottle.length / 2
-    y = empty + ((n - 1) / 2 - np.arange(n)) * scenario.slice_height
+    y: FloatArray = empty + ((n - 1) / 2 - np.arange(n, dtype=np.float64)) * scenario.slice_height
     now.A = now.dB = 1.0
     now.y_mean = now.mu = y.mean()
     now.U = ((y - now.mu) ** 2).sum()

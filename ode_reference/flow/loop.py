@@ -24,7 +24,7 @@ LEAST_ADVANCE = 1e-7
 
 
 def under(key: str) -> Callable[..., FloatArray]:
-    """Return ``fly`` as a closure over ``key``, which numba makes part of the name under which it keeps what it compiles."""
+    """Return ``fly`` as a closure over ``key``: numba makes that part of the name under which it keeps the loop."""
 
     def flight(
         flight: Any,
@@ -142,7 +142,8 @@ def new_base(now: Any, points: FloatArray, marks: IntArray) -> None:
 @compiled
 def smooth_piece(
     now: Any,
-    points: FloatArray, marks: IntArray,
+    points: FloatArray,
+    marks: IntArray,
     table: FloatArray,
     moments: FloatArray,
     rows: FloatArray,
@@ -150,7 +151,7 @@ def smooth_piece(
     v: FloatArray,
 ) -> None:
     """Advance to the next event, or as far as the map, the series or the duration let it."""
-    if now.stale == 1 or now.t - now.base_time > 0.7 * now.span or now.B > 0.75 * now.A * now.span:
+    if now.stale == 1 or now.t - now.base_time > 0.7 * now.span or 0.75 * now.A * now.span < now.B:
         new_base(now, points, marks)
     left = now.duration - now.t
     h = min(guessed_step(now, points, marks, now.base_time + 0.95 * now.span - now.t), left)
@@ -188,7 +189,8 @@ def smooth_piece(
 def record(
     now: Any,
     table: FloatArray,
-    points: FloatArray, marks: IntArray,
+    points: FloatArray,
+    marks: IntArray,
     moments: FloatArray,
     until: float,
     rows: FloatArray,

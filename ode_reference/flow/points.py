@@ -116,7 +116,7 @@ def leave(now: Any, u: float, w: float) -> None:
 
 
 @compiled
-def enter(now: Any, points: FloatArray, marks: IntArray, j: int, y: float, v: float) -> None:
+def enter(now: Any, points: FloatArray, j: int, y: float, v: float) -> None:
     """Give slice j the point (u, w) that the map takes to place y and speed v now, and add it to the moments."""
     n = now.free
     now.free = n + 1

@@ -106,7 +106,7 @@ def gather(now: Any, points: FloatArray, marks: IntArray) -> None:
             u, w = points[PLACE, i], points[SPEED, i]
             far = u + span * w
             if max(abs(u), abs(far)) > clear:
-                watch(now, points, marks, i)
+                watch(now, marks, i)
             else:
                 now.low_u, now.high_u = min(now.low_u, u), max(now.high_u, u)
                 now.low_far, now.high_far = min(now.low_far, far), max(now.high_far, far)
@@ -114,7 +114,7 @@ def gather(now: Any, points: FloatArray, marks: IntArray) -> None:
 
 
 @compiled
-def watch(now: Any, points: FloatArray, marks: IntArray, i: int) -> None:
+def watch(now: Any, marks: IntArray, i: int) -> None:
     """Put slice i on the list of those that are looked at one by one."""
     if marks[WATCHED, i] == 0:
         marks[NEAR, now.near] = i

@@ -101,7 +101,7 @@ def expand(now: Any, table: FloatArray, h: float) -> None:
 def size(now: Any, table: FloatArray, k: int) -> float:
     """Return how large the terms of order k are, without dimension."""
     turned = max(abs(table[A, k]), now.rate * abs(table[B, k]))
-    return max(turned, abs(table[Z, k]) / now.wall, abs(table[THETA, k - 1]))
+    return max(turned, abs(table[Z, k]) / now.wall, abs(table[THETA, k - 1]))  # type: ignore[no-any-return]
 
 
 @compiled

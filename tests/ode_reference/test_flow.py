@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -106,14 +107,14 @@ def test_no_loss_and_no_drag_keep_the_energy_over_many_impacts():
 
 @pytest.mark.parametrize("n", [1, 2, 7, 50])
 def test_the_plane_motion_of_free_flight_keeps_its_momentum_between_impacts(n):
-    """Without drag X = (slices about their mean, z) obeys X'' = omega^2 X: E and l are constant from impact to impact."""
+    """Without drag X = (slices about their mean, z) has X'' = omega^2 X: E and l are constant between impacts."""
     scenario = replace(Scenario(theta0=0.3).with_slices(n), drag=0.0, water_mass=0.6)
     found = solve(scenario, "free-flight", times=np.linspace(0, 0.5, 4000))
     m, wall = scenario.slice_mass, scenario.r_max - scenario.bottle.length / 2
     edges = np.unique(np.concatenate([[0.0], found.impacts.time, [0.5]]))
     momentum = found.omega[0] * found.inertia[0]
     worst, looked_at = 0.0, 0
-    for begin, end in zip(edges[:-1], edges[1:], strict=True):
+    for begin, end in pairwise(edges):
         rows = np.flatnonzero((found.t > begin) & (found.t <= end))
         if len(rows) < 2:
             continue

@@ -101,7 +101,10 @@ def agrees(found, reference):
 
 @pytest.fixture(scope="module")
 def integrated():
-    return {model: solve(throw, model, method="DOP853", rtol=1e-13, atol=1e-15, max_step=1e-4) for model, throw in THROWS.items()}
+    return {
+        model: solve(throw, model, method="DOP853", rtol=1e-13, atol=1e-15, max_step=1e-4)
+        for model, throw in THROWS.items()
+    }
 
 
 @pytest.mark.parametrize("model", THROWS)

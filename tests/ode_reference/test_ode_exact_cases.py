@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from ode_reference import METHODS, MODELS, solve
-from ode_reference.closed_forms import CASES, case_elliptic, case_release, case_symmetric_pair, case_zeno, first_integral
+from ode_reference.closed_forms import (
+    CASES,
+    case_elliptic,
+    case_release,
+    case_symmetric_pair,
+    case_zeno,
+    first_integral,
+)
 from slicemodel.scenario import Bottle, Scenario
 
 

@@ -49,7 +49,9 @@ def cases(models):
 
 
 def change(model, scenario, coarse, fine, **options):
-    runs = [solve(scenario, model, method="DOP853", rtol=rtol, rest_speed=rest, **options) for rtol, rest in (coarse, fine)]
+    runs = [
+        solve(scenario, model, method="DOP853", rtol=rtol, rest_speed=rest, **options) for rtol, rest in (coarse, fine)
+    ]
     assert all(run.ok for run in runs)
     return float(np.abs(runs[0].omega - runs[1].omega).max() / abs(scenario.omega0))
 
@@ -74,7 +76,9 @@ def test_free_flight_converges_within_its_band(model, throw, law):
 def test_two_slices_tell_the_impact_laws_apart(law, omega):
     scenario = Scenario(n_slices=2, drag=0.0, duration=0.3)
     found = [
-        solve(scenario, "free-flight", method="DOP853", impact_law=law, rtol=rtol, rest_speed=rest, times=[0.3]).omega[0]
+        solve(scenario, "free-flight", method="DOP853", impact_law=law, rtol=rtol, rest_speed=rest, times=[0.3]).omega[
+            0
+        ]
         for rtol, rest in ((1e-10, 1e-3), (1e-12, 1e-6))
     ]
     assert found[0] == pytest.approx(found[1], rel=1e-9, abs=0.0)

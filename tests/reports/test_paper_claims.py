@@ -582,7 +582,9 @@ def test_weight_is_what_slows_the_bottle_filled_to_a_tenth(runs):
 
 def test_free_flight_does_not_know_where_down_is():
     made = {
-        ("free-flight", case.key): make(Run(case.key, "free-flight", case.scenario.with_slices(5), {"method": "DOP853", "rtol": 1e-6}))
+        ("free-flight", case.key): make(
+            Run(case.key, "free-flight", case.scenario.with_slices(5), {"method": "DOP853", "rtol": 1e-6})
+        )
         for case in family("angle")
     }
     runs = ClaimRuns(paper=PaperRuns(size=REPORT, made=made, costs=()), further={}, halved={})

@@ -246,7 +246,11 @@ def test_a_setting_out_of_range_is_refused_before_the_first_point(settings, word
 
 
 def test_settings_in_range_are_tried_without_their_cost():
-    try_entries(read(GRID.replace("steps = 50", "steps = 1000000000") + 'times = [0.0, 0.5]\nmethod = "DOP853"\nmax_step = 0.01').entries)
+    try_entries(
+        read(
+            GRID.replace("steps = 50", "steps = 1000000000") + 'times = [0.0, 0.5]\nmethod = "DOP853"\nmax_step = 0.01'
+        ).entries
+    )
 
 
 def test_a_sweep_may_be_as_large_as_stated_and_costs_nothing_to_state():
