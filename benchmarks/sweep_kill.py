@@ -52,6 +52,7 @@ steps = 50
 
 [[solvers]]
 name = "eq8"
+method = "DOP853"
 rtol = 1e-6
 atol = 1e-9
 max_step = 0.01

@@ -1,7 +1,8 @@
-"""The reference: the slice equations integrated by SciPy, with every rebound, rest and release located as an event.
+"""The reference: the slice equations solved with every rebound, rest and release located as an event.
 
-It shares no formula with the slice model or with the engines: from ``slicemodel`` come only the scenario and
-the trajectory. Importing this package does not load SciPy.
+By default through the seven equations to which they reduce (``ode_reference.flow``), else integrated one by one by
+SciPy. It shares no formula with the slice model or with the engines: from ``slicemodel`` come only the scenario and
+the trajectory. Importing this package loads neither SciPy nor numba.
 """
 
 from __future__ import annotations
@@ -12,11 +13,11 @@ if TYPE_CHECKING:
     from ode_reference.combinations import model_of
     from ode_reference.impacts import LAWS
     from ode_reference.models import LADDER, MODELS
-    from ode_reference.solver import solve
+    from ode_reference.solver import solve, solve_batch
     from ode_reference.steppers import METHODS
     from ode_reference.switches import Switches
 
-__all__ = ["LADDER", "LAWS", "METHODS", "MODELS", "Switches", "model_of", "solve"]
+__all__ = ["LADDER", "LAWS", "METHODS", "MODELS", "Switches", "model_of", "solve", "solve_batch"]
 
 _HOMES = {
     "LADDER": "ode_reference.models",
@@ -26,6 +27,7 @@ _HOMES = {
     "Switches": "ode_reference.switches",
     "model_of": "ode_reference.combinations",
     "solve": "ode_reference.solver",
+    "solve_batch": "ode_reference.solver",
 }
 
 

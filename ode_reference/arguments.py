@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Collection
 
 from slicemodel.scenario import unknown_name
 
 
-def known_name(what: str, name: object, known: Mapping[str, Any]) -> str:
+def known_name(what: str, name: object, known: Collection[str]) -> str:
     """Return ``name`` if it is a key of ``known``, else raise ValueError with the nearest key."""
     if isinstance(name, str) and name in known:
         return name

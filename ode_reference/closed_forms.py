@@ -2,7 +2,7 @@
 
 Each ``case_*`` takes the name of a model and returns an ``ExactCase``; ``CASES`` lists them all. Most live in a tube
 too heavy to feel the water (``ode_reference.heavy_tube``), where the slices are independent of each other; the
-symmetric pair and ``first_integral`` hold in a free bottle.
+symmetric pair, the elliptic case and ``first_integral`` hold in a free bottle.
 """
 
 from __future__ import annotations
@@ -15,7 +15,9 @@ from typing import Final
 import numpy as np
 from scipy.integrate import quad
 
+from ode_reference.elliptic import spread_from_rest
 from ode_reference.heavy_tube import Flight, Hits, history
+from ode_reference.models import MODELS
 from slicemodel.scenario import Bottle, Scenario
 from slicemodel.trajectory import BASE, CAP, FloatArray, Impacts
 
@@ -263,6 +265,27 @@ def case_symmetric_pair(model: str = "eq8") -> ExactCase:
     )
 
 
+def case_elliptic(model: str = "eq8", n_slices: int = 12) -> ExactCase:
+    """Return slices that fly from rest, without drag and gravity, until the first meets an end: elliptic integrals.
+
+    Where the tube does not accelerate (no ``origin``) z has a rate of its own, and the bottle is full: z = 0.
+    """
+    filling = 0.6 if MODELS[model].switches.origin else 1.0
+    scenario = Scenario(water_mass=filling, n_slices=n_slices, drag=0.0, gravity=0.0, theta0=0.3)
+    t, theta, omega, r, v = spread_from_rest(scenario, 13)
+    return ExactCase(
+        name=f"elliptic, N = {n_slices}",
+        model=model,
+        scenario=replace(scenario, duration=float(t[-1]) if len(t) > 1 else 0.1),
+        t=t,
+        theta=theta,
+        omega=omega,
+        r=r,
+        v=v,
+        impacts=_impacts([]),
+    )
+
+
 CASES: Final[tuple[Callable[[str], ExactCase], ...]] = (
     case_ice,
     case_single_slice,
@@ -271,6 +294,7 @@ CASES: Final[tuple[Callable[[str], ExactCase], ...]] = (
     case_release,
     case_zeno,
     case_symmetric_pair,
+    case_elliptic,
 )
 """Every exact case; each takes the name of any rung of the ladder."""
 

@@ -1,8 +1,9 @@
-"""The verb of this room: one scenario and one equation of motion in, one trajectory out."""
+"""The verb of this room: one scenario and one equation of motion in, one trajectory out; or many, and a batch."""
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,11 +13,18 @@ from ode_reference.combinations import model_of
 from ode_reference.impacts import LAWS, immovable
 from ode_reference.models import MODELS
 from ode_reference.motion import Model, Motion, Throw
-from ode_reference.run import STEP_LIMIT, Run
-from ode_reference.steppers import METHODS
 from ode_reference.switches import PREFIX, Switches
 from slicemodel.scenario import Scenario
-from slicemodel.trajectory import Trajectory, output_times
+from slicemodel.trajectory import FloatArray, Trajectory, output_times
+
+if TYPE_CHECKING:
+    from ode_reference.flow.api import Batch
+
+TAYLOR: Final = "taylor"
+"""The name of the reduced flow among the methods."""
+
+INTEGRATORS: Final = ("DOP853", "LSODA", "Radau")
+"""The names of the methods that integrate all 2N + 1 equations, as ``ode_reference.METHODS`` has them."""
 
 REST_SPEED: Final = 1e-5
 """Default speed below which a slice stays on its end [m/s], for models without recoil."""
@@ -28,17 +36,17 @@ REST_SPEED_WITH_RECOIL: Final = 1e-3
 def solve(
     scenario: Scenario,
     model: str | Switches = "eq8",
-    rtol: float = 1e-10,
-    atol: float = 1e-13,
-    rest_speed: float | None = None,
     times: ArrayLike | None = None,
     *,
-    impact_law: str = "simultaneous",
-    method: str = "DOP853",
+    method: str = "taylor",
+    rtol: float | None = None,
+    atol: float | None = None,
     max_step: float | None = None,
+    rest_speed: float | None = None,
+    impact_law: str = "simultaneous",
     energy: bool = False,
 ) -> Trajectory:
-    """Integrate one equation of motion through all its rebounds, rests and releases.
+    """Solve one equation of motion through all its rebounds, rests and releases.
 
     Parameters
     ----------
@@ -47,26 +55,23 @@ def solve(
         A name in ``ode_reference.MODELS``, from "published-limit" (what the published program solves as its time
         step goes to zero) by way of "eq8" (Eq. 8 exactly as printed) to "free-flight"; or any ``Switches``, or
         their name, such as "switches:110000".
-    rtol : float
-        Relative tolerance of a step, in [1e-13, 1e-2].
-    atol : float
-        Absolute tolerance of a step, in (0, 1e-2], one number for [rad], [m] and [m/s].
+    times : array, shape (P,), optional
+        Increasing output times in [0, duration] [s]; 1000 uniform ones by default. They do not change the
+        solution. At the time of an impact the state just before it is returned.
+    method : str
+        "taylor", the reduced flow (``ode_reference.flow``): exact to rounding between events, with no tolerance to
+        choose. Or an integration of all 2N + 1 equations: a name in ``ode_reference.METHODS``.
+    rtol, atol, max_step : float, optional
+        Of those other methods only: relative tolerance of a step, in [1e-13, 1e-2], 1e-10 by default; absolute
+        tolerance, in (0, 1e-2], 1e-13 by default, one number for [rad], [m] and [m/s]; longest step, at least
+        duration / 1e6 [s], by default 0.02 / |omega0|, within duration / 1e5 and duration.
     rest_speed : float, optional
         Speed below which a slice that an end pushes back stays there, in [1e-8, 0.1] [m/s]. By default 1e-5, and 1e-3
         with recoil: there the tube shakes resting slices off at every impact, and a tenth of the rest speed makes
         several times as many impacts without narrowing the band of omega.
-    times : array, shape (P,), optional
-        Increasing output times in [0, duration] [s]; 1000 uniform ones by default. They do not change the
-        steps. At the time of an impact the state just before it is returned.
     impact_law : str
         "simultaneous" (Newton-Moreau) or "sequential" (the fastest pair first): which impulses act when several
         slices touch the ends. Matters only for models whose impacts move the tube.
-    method : str
-        A name in ``ode_reference.METHODS``.
-    max_step : float, optional
-        Longest step, at least duration / 1e6 [s]. By default 0.02 / |omega0|, within duration / 1e5 and
-        duration: a short step leaves no slice the time to reverse more than twice in it, and keeps the
-        dense output as accurate as the step itself.
     energy : bool
         Whether to keep the energy ledger, ``diagnostics["energy"]`` [J] (``ode_reference.energy``): "initial", "final",
         the work of each term, of impacts and of rests, and the "residual" that none of them explains.
@@ -74,10 +79,12 @@ def solve(
     Returns
     -------
     Trajectory
-        With ``impacts``, ``settings`` to repeat the run and ``diagnostics`` (counts of steps, evaluations,
-        impacts, rests and releases; ``largest_snap`` [m], how far from the end an impact was located at most;
-        ``grazes``, contacts too faint for the band below).
-        Status "overflow" or "stalled" returns the output times reached and says where it stopped.
+        With ``impacts``, ``settings`` to repeat the run and ``diagnostics``: counts of steps, evaluations (of the
+        series, or of the right-hand side), impacts, rests and releases; ``largest_snap`` [m], how far from the end an
+        impact was located at most; ``grazes``, contacts so faint that omega depends on the last digits. By "taylor"
+        also ``opposite_hits``, strikes on both ends within 1e-9 s, and the largest relative errors of its two checks,
+        ``wronskian_error`` and ``inertia_error``.
+        Status "overflow", "stalled" or "diverged" returns the output times reached and says where it stopped.
 
     Raises
     ------
@@ -86,46 +93,147 @@ def solve(
 
     Accuracy
     --------
-    Without recoil omega(t) changes by less than 1e-7 omega_0 when rtol and rest_speed are cut tenfold, unless a slice
-    grazes an end (``grazes``); the other methods and an independent program agree to the same band. The exception is
+    By "taylor" the state between two impacts is exact to some 1e-15. Without recoil omega(t) changes by less than 1e-7
+    omega_0 when the rest speed is cut tenfold, unless a slice grazes an end (``grazes``). The exception is
     "accelerating-origin" with 1e-4 omega_0, since there only a slice at rest pushes the tube. With recoil the band is
-    3e-3 omega_0: which slice rests when decides the order of all later impacts. Two velocity reversals of one slice
-    are seen within a step, more are not.
-    "Radau" has a dense output of order 3 only: longer steps than the default cost it accuracy at the events.
+    3e-3 omega_0: which slice rests when decides the order of all later impacts. The other methods add the error of
+    their steps, and see two velocity reversals of one slice within a step and no more; "Radau" has a dense output of
+    order 3 only.
     """
     if not isinstance(scenario, Scenario):
         raise ValueError(f"scenario = {scenario!r} is not a slicemodel.Scenario")
     chosen = _model(model)
-    with_recoil = LAWS[known_name("impact_law", impact_law, LAWS)]
-    law = with_recoil if chosen.switches.recoil else immovable
-    stepper = METHODS[known_name("method", method, METHODS)]
-    rtol = number_within("rtol", rtol, 1e-13, 1e-2)
-    atol = number_above("atol", atol, 0.0, 1e-2)
-    if rest_speed is None:
-        rest_speed = REST_SPEED_WITH_RECOIL if chosen.switches.recoil else REST_SPEED
-    rest_speed = number_within("rest_speed", rest_speed, 1e-8, 0.1, unit=" m/s")
+    known_name("impact_law", impact_law, LAWS)
+    known_name("method", method, (TAYLOR, *INTEGRATORS))
+    speed = _rest_speed(rest_speed, chosen)
+    moments = output_times(scenario, times)
+    if method != TAYLOR:
+        return _integrate(
+            scenario, chosen, moments, speed, method=method, rtol=rtol, atol=atol, max_step=max_step,
+            impact_law=impact_law, energy=energy,
+        )  # fmt: skip
+    for name, value in (("rtol", rtol), ("atol", atol), ("max_step", max_step)):
+        if value is not None:
+            raise ValueError(
+                f"{name} = {value!r} cannot be asked of method 'taylor', whose series are exact to rounding: "
+                f"leave it out, or choose a method that has it: {', '.join(INTEGRATORS)}"
+            )
+    from ode_reference.flow import api
+
+    # Overflow is a result here, reported as a status: it must not also appear as a warning.
+    with np.errstate(all="ignore"):
+        ask = api.Ask(
+            model=chosen.name, switches=chosen.switches, rest_speed=speed, impact_law=impact_law, energy=energy
+        )
+        return api.trajectory(api.fly(scenario, moments, ask))
+
+
+def solve_batch(
+    throws: Sequence[Scenario],
+    model: str | Switches = "eq8",
+    times: ArrayLike | None = None,
+    *,
+    rest_speed: float | None = None,
+    impact_law: str = "simultaneous",
+    energy: bool = False,
+    states: bool = False,
+) -> Batch:
+    """Solve one equation for many throws by "taylor", on all cores; each equals its single run to the last digit.
+
+    Parameters
+    ----------
+    throws : sequence of K Scenario - of any numbers of slices
+    times : array, shape (P,) or (K, P), optional
+        Output times of all throws, or of each [s]; 1000 uniform ones over each throw's duration by default.
+    states : bool - whether r and v are kept; without, they have shape (0, N) in the trajectories
+    model, rest_speed, impact_law, energy - as of ``solve``
+
+    Returns
+    -------
+    Batch
+        Arrays ``t``, ``theta``, ``omega`` of shape (K, P), ``status`` of K names; ``batch[k]`` is the Trajectory of
+        throw k, with its impacts.
+
+    Raises
+    ------
+    ValueError
+        Naming the throw, if one is concerned, the argument, its value and the admissible values.
+    """
+    from ode_reference.flow import api
+
+    throws = tuple(throws)
+    for k, throw in enumerate(throws):
+        if not isinstance(throw, Scenario):
+            raise ValueError(f"throws[{k}] = {throw!r} is not a slicemodel.Scenario")
+    chosen = _model(model)
+    known_name("impact_law", impact_law, LAWS)
+    given = None if times is None else np.asarray(times, dtype=np.float64)
+    if given is not None and given.ndim == 2 and len(given) != len(throws):
+        raise ValueError(f"times has shape {given.shape}; {len(throws)} throws need ({len(throws)}, P) or (P,)")
+    rows = []
+    for k, throw in enumerate(throws):
+        try:
+            rows.append(output_times(throw, given[k] if given is not None and given.ndim == 2 else given))
+        except ValueError as error:
+            raise ValueError(f"throws[{k}]: {error}") from None
+    moments = np.array(rows).reshape(len(throws), len(rows[0]) if rows else 0)
+    ask = api.Ask(
+        model=chosen.name,
+        switches=chosen.switches,
+        rest_speed=_rest_speed(rest_speed, chosen),
+        impact_law=impact_law,
+        energy=energy,
+        states=states,
+    )
+    return api.fly_all(throws, moments, ask)
+
+
+def _rest_speed(given: float | None, model: Model) -> float:
+    """Return the rest speed of a run [m/s]."""
+    if given is None:
+        return REST_SPEED_WITH_RECOIL if model.switches.recoil else REST_SPEED
+    return number_within("rest_speed", given, 1e-8, 0.1, unit=" m/s")
+
+
+def _integrate(
+    scenario: Scenario,
+    chosen: Model,
+    moments: FloatArray,
+    rest_speed: float,
+    *,
+    method: str,
+    rtol: float | None,
+    atol: float | None,
+    max_step: float | None,
+    impact_law: str,
+    energy: bool,
+) -> Trajectory:
+    """Integrate the 2N + 1 equations with one of SciPy's methods."""
+    from ode_reference.run import STEP_LIMIT, Run
+    from ode_reference.steppers import METHODS
+
+    law = LAWS[impact_law] if chosen.switches.recoil else immovable
+    rtol = number_within("rtol", 1e-10 if rtol is None else rtol, 1e-13, 1e-2)
+    atol = number_above("atol", 1e-13 if atol is None else atol, 0.0, 1e-2)
     duration = scenario.duration
     if max_step is None:
         max_step = min(max(0.02 / abs(scenario.omega0), 1e-5 * duration), duration)
     else:
         max_step = number_within("max_step", max_step, duration / STEP_LIMIT, unit=" s")
-    moments = output_times(scenario, times)
-
     settings = {
         "model": chosen.name,
+        "method": method,
         "rtol": rtol,
         "atol": atol,
+        "max_step": max_step,
         "rest_speed": rest_speed,
         "impact_law": impact_law,
-        "method": method,
-        "max_step": max_step,
         "energy": energy,
     }
-    # Overflow is a result here, reported as a status: it must not also appear as a warning.
     with np.errstate(all="ignore"):
         motion = Motion(Throw.of(scenario), chosen, np.zeros(scenario.n_slices, dtype=bool))
         run = Run(scenario, motion, moments, rest_speed, law, energy)
-        run.integrate(stepper(motion, duration, rtol=rtol, atol=atol, max_step=max_step))
+        run.integrate(METHODS[method](motion, duration, rtol=rtol, atol=atol, max_step=max_step))
         return run.trajectory(settings)
 
 

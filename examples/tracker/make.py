@@ -34,7 +34,7 @@ ICE_THROW = replace(THROW, frozen=True, omega0=20.0, theta0=np.pi / 2, duration=
 
 def video(throw: Scenario) -> SyntheticVideo:
     """Return what the camera would see without noise."""
-    return synthetic_video(ode_reference.solve(throw, model="free-flight", rtol=1e-8, atol=1e-10))
+    return synthetic_video(ode_reference.solve(throw, model="free-flight"))
 
 
 def tracks_of(seen: SyntheticVideo, ice: bool = False) -> dict[str, dict[str, np.ndarray]]:
@@ -77,7 +77,7 @@ def files() -> dict[str, bytes]:
     for name, columns in tracks_of(water).items():
         made[f"single_{name}.txt"] = tracker_text(water.t, {name: columns}, STYLES["single"]).encode()
     made["ice.txt"] = tracker_text(ice.t, tracks_of(ice, ice=True), STYLES["tab"]).encode()
-    run = ode_reference.solve(THROW, model="free-flight", rtol=1e-8, atol=1e-10, times=frame_times(THROW, 240.0))
+    run = ode_reference.solve(THROW, model="free-flight", times=frame_times(THROW, 240.0))
     made["data_track.txt"] = data_track_text(run).encode()
     return made
 

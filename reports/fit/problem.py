@@ -237,7 +237,7 @@ def flights(throws: Sequence[Scenario], solver: str, times: FloatArray) -> tuple
     theta, omega = (np.full((len(throws), len(times)), np.nan) for _ in range(2))
     for row, throw in enumerate(throws):
         loosest = max(min(0.04 / abs(throw.omega0), throw.duration), 1e-5 * throw.duration)
-        run = integrate(throw, model=solver, rtol=1e-8, max_step=loosest, times=times)
+        run = integrate(throw, model=solver, method="DOP853", rtol=1e-8, max_step=loosest, times=times)
         theta[row, : len(run.t)], omega[row, : len(run.t)] = run.theta, run.omega
     return theta, omega
 

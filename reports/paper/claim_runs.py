@@ -120,7 +120,7 @@ def _run(solver: str, key: str, scenario: Scenario, steps: int | None = None, wo
     settings: dict[str, Any] = {"steps": steps, "store": "summary"}
     if steps is None:
         longest = min(STEP_ANGLE / abs(scenario.omega0), scenario.duration)
-        settings = {"rtol": RTOL, "atol": ATOL, "max_step": longest}
+        settings = {"method": "DOP853", "rtol": RTOL, "atol": ATOL, "max_step": longest}
     return Run(f"claims, {solver}, {key}{words}", solver, scenario, settings)
 
 

@@ -146,7 +146,7 @@ def _settings(solver: str, case: Case) -> dict[str, Any]:
     points = 1 + (case.steps - 1) // case.thin
     times = {} if points == paper_steps() else {"times": np.linspace(0.0, case.scenario.duration, points)}
     step = min(STEP_ANGLE / abs(case.scenario.omega0), case.scenario.duration)
-    return {"rtol": RTOL, "atol": 1e-10, "max_step": step, **times}
+    return {"method": "DOP853", "rtol": RTOL, "atol": 1e-10, "max_step": step, **times}
 
 
 def gather_paper(

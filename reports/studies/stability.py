@@ -39,7 +39,7 @@ GRADES: Final = ("excellent", "good", "wrong", "sinks in", "explodes", "not run"
 """Best first. "sinks in": the watch asks for a shorter step; "explodes": it asks for more iterations."""
 
 USUAL: Final[Mapping[str, Any]] = {}
-TIGHTER: Final[Mapping[str, Any]] = {"rtol": 1e-11, "atol": 1e-14, "rest_speed": 1e-4}
+TIGHTER: Final[Mapping[str, Any]] = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-14, "rest_speed": 1e-4}
 """Settings of the reference whose difference is its band; ``max_step`` is halved as well."""
 
 

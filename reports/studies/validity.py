@@ -228,6 +228,7 @@ def _solvers(shares: bool) -> tuple[str, ...]:
 
 def _settings(throw: Scenario, model: str, tolerances: Mapping[str, float], points: int | None) -> dict[str, Any]:
     settings: dict[str, Any] = {name: tolerances[name] for name in ("rtol", "atol", "rest_speed")}
+    settings["method"] = "DOP853"
     switches = EQUATIONS[model].switches if model in EQUATIONS else Switches.from_name(model)
     # Without recoil a tube that accelerates is pushed by resting slices alone; with it the impacts push as well.
     special = "rest_speed_with_recoil" if switches.recoil else "rest_speed_with_origin" if switches.origin else ""

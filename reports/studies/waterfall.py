@@ -47,12 +47,12 @@ LOOSER: Final = 10.0
 """Tolerance and rest speed of the second set of runs, in units of the first: what they change is a value's band."""
 
 
-def tolerances(throw: Scenario, switches: Switches, *, loose: bool) -> dict[str, float]:
+def tolerances(throw: Scenario, switches: Switches, *, loose: bool) -> dict[str, float | str]:
     """Return the settings of a run; a rest speed ten times smaller with recoil would multiply the impacts by ten."""
     factor = LOOSER if loose else 1.0
     rest_speed = 1e-3 if switches.recoil else 1e-5
     longest = min(0.04 * (2.0 if loose else 1.0) / abs(throw.omega0), throw.duration)
-    return {"rtol": 1e-9 * factor, "rest_speed": rest_speed * factor, "max_step": longest}
+    return {"method": "DOP853", "rtol": 1e-9 * factor, "rest_speed": rest_speed * factor, "max_step": longest}
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@
 
     [[solvers]]
     name = "eq8"
-    rtol = 1e-9
+    rest_speed = 1e-6
 
 A field is set as it stands: sweeping ``n_slices`` alone leaves the drag of a slice, so that alpha/2m changes with it.
 ``damping_rate`` (alpha/2m) holds that, and ``fill_fraction`` sets the water from the capacity; one value is a list too.

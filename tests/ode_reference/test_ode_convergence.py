@@ -23,7 +23,7 @@ def largest_difference(found, reference):
 @pytest.mark.parametrize(("model", "n_slices"), PAPER)
 def test_cutting_rtol_and_rest_speed_tenfold_leaves_omega_in_the_band(paper_runs, model, n_slices):
     coarse = paper_runs(model, n_slices)
-    fine = solve(coarse.scenario, model, rtol=1e-11, rest_speed=1e-6)
+    fine = solve(coarse.scenario, model, method="DOP853", rtol=1e-11, rest_speed=1e-6)
     assert largest_difference(coarse, fine) < BAND
     assert len(fine.impacts) >= len(coarse.impacts)
 
@@ -48,7 +48,7 @@ def test_other_steppers_agree_within_the_band(paper_runs, model, n_slices, metho
 def test_step_bound_and_output_times_do_not_matter(paper_runs):
     reference = paper_runs("eq8", 20)
     for max_step in (2e-4, 2e-3, 0.5):
-        assert largest_difference(solve(reference.scenario, max_step=max_step), reference) < BAND
+        assert largest_difference(solve(reference.scenario, method="DOP853", max_step=max_step), reference) < BAND
     sparse = solve(reference.scenario, times=reference.t[[0, 500, 999]])
     np.testing.assert_array_equal(sparse.omega, reference.omega[[0, 500, 999]])
     np.testing.assert_array_equal(sparse.impacts.time, reference.impacts.time)
@@ -68,6 +68,6 @@ def test_hard_case_keeps_all_its_impacts(hard_scenario, rest_speed):
 
 
 def test_hard_case_with_unbounded_steps_loses_no_impact(hard_scenario):
-    found = solve(hard_scenario, rtol=1e-9, max_step=hard_scenario.duration)
+    found = solve(hard_scenario, method="DOP853", rtol=1e-9, max_step=hard_scenario.duration)
     assert found.omega[-1] == pytest.approx(15.947334, abs=1e-6)
     assert (found.impacts.speed_before > 1e-3).sum() == 116

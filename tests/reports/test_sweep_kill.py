@@ -183,6 +183,7 @@ def test_all_three_packages_in_one_sweep_with_their_flights(capsys, tmp_path):
         steps = 20
         [[solvers]]
         name = "switches:110000"
+        method = "DOP853"
         max_step = 0.01
         [[solvers]]
         name = "pymunk"

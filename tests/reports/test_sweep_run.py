@@ -27,7 +27,7 @@ def design(throws, solvers=2, trajectories=False):
             "trajectories": trajectories,
             "fields": {"omega0": {"from": 1.0, "to": 2.0, "count": throws}},
         },
-        "solvers": [{"name": "eq8", "rtol": 10.0**-k} for k in range(4, 4 + solvers)],
+        "solvers": [{"name": "eq8", "method": "DOP853", "rtol": 10.0**-k} for k in range(4, 4 + solvers)],
     }
     return design_of(document, "sweep.toml")
 

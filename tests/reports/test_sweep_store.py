@@ -32,6 +32,7 @@ fill_fraction = [0.25, 0.5, 1.25]
 frozen = [false, true]
 [[solvers]]
 name = "eq8"
+method = "DOP853"
 max_step = 0.01
 [[solvers]]
 name = "published-matlab"
@@ -124,7 +125,7 @@ def test_an_unfinished_flight_has_no_numbers_of_its_end():
 
 
 def test_an_engine_counts_no_impacts_and_a_failing_solver_is_a_row():
-    text = TEXT.replace('"eq8"\nmax_step = 0.01', '"pymunk"\ndt = 0.01')
+    text = TEXT.replace('"eq8"\nmethod = "DOP853"\nmax_step = 0.01', '"pymunk"\ndt = 0.01')
     outcome = make_point(design(text).point(0))
     assert outcome.status in ("ok", "diverged")
     assert "pymunk counts no impacts" in outcome.reason

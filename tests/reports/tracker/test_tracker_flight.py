@@ -27,10 +27,7 @@ THROWS = {"water": WATER, "ice": ICE, "backwards": BACKWARDS}
 
 @pytest.fixture(scope="module")
 def films():
-    return {
-        name: synthetic_video(ode_reference.solve(throw, model="free-flight", rtol=1e-8, atol=1e-10))
-        for name, throw in THROWS.items()
-    }
+    return {name: synthetic_video(ode_reference.solve(throw, model="free-flight")) for name, throw in THROWS.items()}
 
 
 def table_of(film, noise, seed, scale=(1.0, 1.0), unit=1.0):

@@ -1,0 +1,280 @@
+"""Scenarios in, trajectories out: one flight, or many on all cores."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ode_reference.flow import layout
+from ode_reference.flow.layout import ESCAPED, INERTIA, OVERFLOW, STALLED, WRONSKIAN
+from ode_reference.switches import Switches
+from slicemodel.scenario import Scenario
+from slicemodel.trajectory import FloatArray, Impacts, Trajectory
+
+OPPOSITE: Final = 1e-9
+"""Time between strikes on opposite ends below which they may be one instant [s]."""
+
+_STATUSES: Final = {OVERFLOW: "overflow", STALLED: "stalled", WRONSKIAN: "diverged", INERTIA: "diverged"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ask:
+    """What is asked of every flight: the equation and its switches, contacts, ledger, and whether r and v are kept."""
+
+    model: str
+    switches: Switches
+    rest_speed: float
+    impact_law: str = "simultaneous"
+    energy: bool = False
+    states: bool = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Flown:
+    """One flight as the compiled loop leaves it; ``now`` is its record, ``rows`` theta, J and y_CM."""
+
+    scenario: Scenario
+    ask: Ask
+    t: FloatArray
+    rows: FloatArray
+    r: FloatArray
+    v: FloatArray
+    impacts: FloatArray
+    record: NDArray[Any]
+    frozen: bool
+
+    @property
+    def now(self) -> Any:
+        """The record with its fields as attributes."""
+        return self.record.view(np.recarray)[0]
+
+    @property
+    def status(self) -> str:
+        """As of ``Trajectory``."""
+        return "ok" if self.now.status == layout.OK else _STATUSES.get(int(self.now.status), "diverged")
+
+
+def stamp() -> str:
+    """Return a hash of the sources of this folder.
+
+    numba's cache looks at the file of the function that is called alone. The loop is compiled as a closure over this
+    hash, which is part of the key under which numba keeps it: a change in any file compiles anew.
+    """
+    found = sha256()
+    for file in sorted(Path(__file__).parent.glob("*.py")):
+        found.update(file.name.encode() + file.read_bytes())
+    return found.hexdigest()
+
+
+@cache
+def compiled_loop() -> Callable[..., FloatArray]:
+    """Return the loop, compiled on its first call and kept on disk; without a writable place, in memory only."""
+    import numba
+
+    from ode_reference.flow.loop import under
+
+    options: dict[str, Any] = {"error_model": "numpy", "nogil": True}
+    try:
+        made: Callable[..., FloatArray] = numba.njit(cache=True, **options)(under(stamp()))
+    except RuntimeError as error:
+        logging.getLogger(__name__).warning("compiling in memory, once per process: %s", error)
+        made = numba.njit(**options)(under(stamp()))
+    return made
+
+
+def fly(scenario: Scenario, moments: FloatArray, ask: Ask) -> Flown:
+    """Fly one scenario; ``moments`` are its output times, shape (P,) [s]."""
+    points, n = len(moments), scenario.n_slices
+    record, y = layout.prepare(
+        scenario, ask.switches, ask.rest_speed, sequential=ask.impact_law == "sequential", ledger=ask.energy
+    )
+    rows = np.empty((3, points))
+    r, v = (np.empty((points if ask.states else 0, n)) for _ in range(2))
+    frozen = scenario.frozen or 2 * (scenario.r_max - scenario.bottle.length / 2) <= layout.TOLERANCE
+    if frozen:
+        impacts = _hold(record, y, moments, rows, r, v)
+    else:
+        loop = compiled_loop()
+        # With NUMBA_DISABLE_JIT the fields of the record are attributes of a recarray alone.
+        given = record if hasattr(loop, "signatures") else record.view(np.recarray)
+        impacts = loop(given, *layout.points_at(y), moments, rows, r, v)
+    reached = int(record["recorded"][0])
+    impacts = impacts[: int(record["impacts"][0])]
+    if ask.states:
+        r += scenario.bottle.length / 2
+        r[r == np.inf], r[r == -np.inf] = scenario.r_max, scenario.r_min
+        if reached and moments[0] == 0.0:
+            r[0] = scenario.initial_positions()  # to the last digit, as output at release
+    return Flown(scenario, ask, moments[:reached], rows[:, :reached], r[:reached], v[:reached], impacts, record, frozen)
+
+
+def _hold(
+    record: NDArray[Any], y: FloatArray, moments: FloatArray, rows: FloatArray, r: FloatArray, v: FloatArray
+) -> FloatArray:
+    """Write the flight of a bottle in which nothing moves: theta is linear; return its impacts, none."""
+    now = record.view(np.recarray)[0]
+    inertia = now.body_inertia + now.slice_mass * now.U + now.reduced_mass * now.y_mean**2
+    omega = now.momentum / inertia
+    rows[0], rows[1], rows[2] = now.theta + omega * moments, inertia, now.slice_mass * y.sum() / now.total_mass
+    if len(r):
+        r[:], v[:] = y, 0.0
+    now.initial = now.final = now.momentum * omega / 2
+    finite = np.isfinite(now.momentum * omega) and np.isfinite(rows).all()
+    now.recorded, now.status = (len(moments), layout.OK) if finite else (0, OVERFLOW)
+    return np.empty((0, 5))
+
+
+def trajectory(flown: Flown) -> Trajectory:
+    """Return the trajectory of a flight, with its settings and what it measured of itself."""
+    now, ask, hits = flown.now, flown.ask, flown.impacts
+    theta, inertia, centre = flown.rows
+    impacts = Impacts(hits[:, 0], hits[:, 1].astype(np.int64), hits[:, 2].astype(np.int64), hits[:, 3], hits[:, 4])
+    return Trajectory(
+        scenario=flown.scenario,
+        solver="ode_reference",
+        method=ask.model,
+        t=flown.t,
+        theta=theta,
+        omega=now.momentum / inertia,
+        r=flown.r,
+        v=flown.v,
+        r_cm=flown.scenario.bottle.length / 2 + centre,
+        inertia=inertia,
+        impacts=impacts,
+        status=flown.status,
+        message=message(flown),
+        settings={
+            "model": ask.model,
+            "method": "taylor",
+            "rest_speed": ask.rest_speed,
+            "impact_law": ask.impact_law,
+            "energy": ask.energy,
+        },
+        diagnostics=diagnostics(flown, impacts),
+    )
+
+
+def diagnostics(flown: Flown, impacts: Impacts) -> dict[str, Any]:
+    """Return counts, and what the flight's own checks measured."""
+    now = flown.now
+    found: dict[str, Any] = {name: int(getattr(now, name)) for name in ("steps", "impacts", "rests", "releases")}
+    found["evaluations"] = int(now.series)
+    found["grazes"] = grazes(impacts, flown.ask.rest_speed)
+    found["opposite_hits"] = opposite_hits(impacts)
+    for name in ("largest_snap", "wronskian_error", "inertia_error"):
+        found[name] = float(getattr(now, name))
+    if flown.ask.energy:
+        works = {work: float(getattr(now, field)) for work, field in layout.WORKS.items()}
+        initial, final = float(now.initial), float(now.final)
+        residual = final - initial - sum(works.values())
+        found["energy"] = {"initial": initial, "final": final, **works, "residual": residual}
+    return found
+
+
+def grazes(impacts: Impacts, rest_speed: float) -> int:
+    """Return how many contacts were slower than the rest speed by slices that had left their last one twice as fast.
+
+    Such a contact might as well have been missed, and its time is uncertain as 1 / speed: where there is one, omega(t)
+    depends on the last digits. A rebound that comes back at the speed it left with is none.
+    """
+    order = np.lexsort((impacts.time, impacts.slice))
+    slices, before, after = impacts.slice[order], impacts.speed_before[order], impacts.speed_after[order]
+    same = slices[1:] == slices[:-1]
+    left = np.concatenate([[np.inf], np.where(same, after[:-1], np.inf)])[: len(before)]
+    return int(np.count_nonzero((before < rest_speed) & (left > 2 * rest_speed)))
+
+
+def opposite_hits(impacts: Impacts) -> int:
+    """Return how many pairs of successive impacts struck opposite ends within 1e-9 s, or at one instant.
+
+    Whether such a pair is one instant or two decides, with recoil, what follows: the impact laws of one instant and of
+    two in turn differ.
+    """
+    near = np.diff(impacts.time) <= OPPOSITE
+    return int(np.count_nonzero(near & (impacts.end[1:] != impacts.end[:-1])))
+
+
+def message(flown: Flown) -> str:
+    """Return why a flight stopped, where and when; nothing for one that is complete."""
+    now, ask, scenario = flown.now, flown.ask, flown.scenario
+    status, at = int(now.status), f"t = {now.t:.9g} s"
+    if status == layout.OK:
+        return ""
+    if status == OVERFLOW:
+        return (
+            f"{ask.model}: a number exceeded the floating-point range after {at}; omega0 = {scenario.omega0:g} rad/s, "
+            f"drag = {scenario.drag:g} kg/s and gravity = {scenario.gravity:g} m/s^2 cannot be computed together"
+        )
+    if status == STALLED:
+        who = ", ".join(str(int(i)) for i in np.unique(flown.impacts[-20:, 1])) or "none"
+        return (
+            f"{ask.model}: time hardly passes after {now.steps} steps at {at}; slices of the last impacts: {who}; "
+            f"if they chatter, raise rest_speed (now {ask.rest_speed:g} m/s), else check omega0, gravity and drag"
+        )
+    broken = {
+        WRONSKIAN: f"A B' - A' B differs from exp(-d t) by {now.wronskian_error:.1e} of it",
+        INERTIA: f"J of the moments differs from J of the slices by {now.inertia_error:.1e} of it",
+        ESCAPED: "a slice is outside the bottle",
+    }[status]
+    return f"{ask.model}: {broken} at {at}; the run is given up, report it with its scenario"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Batch(Sequence[Trajectory]):
+    """Many flights under one equation: arrays over all of them, and each one's trajectory on demand.
+
+    Parameters
+    ----------
+    flights : tuple of Flown
+    t, theta, omega : (K, P) [s], [rad], [rad/s] - NaN in theta and omega beyond where a flight stopped
+    status : tuple of str - one a flight, as of ``Trajectory``
+    """
+
+    flights: tuple[Flown, ...]
+    t: FloatArray
+    theta: FloatArray
+    omega: FloatArray
+    status: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.flights)
+
+    def __getitem__(self, k: Any) -> Any:
+        return [trajectory(one) for one in self.flights[k]] if isinstance(k, slice) else trajectory(self.flights[k])
+
+    def __iter__(self) -> Iterator[Trajectory]:
+        return (trajectory(one) for one in self.flights)
+
+
+def fly_all(throws: Sequence[Scenario], moments: FloatArray, ask: Ask) -> Batch:
+    """Fly all throws on all cores; ``moments`` are their output times, shape (K, P) [s]."""
+    workers = min(
+        len(throws), len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
+    compiled_loop()
+
+    def one(k: int) -> Flown:
+        # NumPy's switch for warnings belongs to a thread.
+        with np.errstate(all="ignore"):
+            return fly(throws[k], moments[k], ask)
+
+    if workers > 1:
+        with ThreadPoolExecutor(workers) as pool:
+            flights = tuple(pool.map(one, range(len(throws))))
+    else:
+        flights = tuple(one(k) for k in range(len(throws)))
+    theta, omega = np.full(moments.shape, np.nan), np.full(moments.shape, np.nan)
+    for k, flown in enumerate(flights):
+        reached = len(flown.t)
+        theta[k, :reached], omega[k, :reached] = flown.rows[0], float(flown.record["momentum"][0]) / flown.rows[1]
+    return Batch(flights, moments, theta, omega, tuple(flown.status for flown in flights))

@@ -1,0 +1,283 @@
+"""The reduced flow: constants, symmetries, invariants, statuses, and the API around it."""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ode_reference import LADDER, LAWS, MODELS, Switches, solve, solve_batch
+from ode_reference.combinations import acceleration_of
+from ode_reference.flow import api, layout
+from ode_reference.motion import Throw
+from slicemodel.scenario import Bottle, Scenario
+
+HALF = Scenario().with_slices(20)
+FULL = replace(Scenario(water_mass=1.0).with_slices(20), drag=0.0)
+
+
+def record_of(scenario, switches, free, on_base, on_cap):
+    flight, _ = layout.prepare(scenario, switches, 1e-5, sequential=False, ledger=False)
+    now = flight.view(np.recarray)[0]
+    now.free, now.on_base, now.on_cap = free, on_base, on_cap
+    layout.set_body(now)
+    return now
+
+
+# ---------------------------------------------------------------------- the constants
+
+
+@settings(max_examples=200, derandomize=True, deadline=None)
+@given(
+    switches=st.sampled_from(Switches.every()),
+    counts=st.tuples(st.integers(1, 5), st.integers(0, 4), st.integers(0, 4)),
+    theta=st.floats(-3, 3),
+    seed=st.integers(0, 1000),
+)
+def test_the_constants_give_the_accelerations_of_the_equations(switches, counts, theta, seed):
+    """z'' and the push on both ends, from c, d_z, W, q_1, q_2, against the right-hand side slice by slice."""
+    free, on_base, on_cap = counts
+    n = free + on_base + on_cap
+    scenario = Scenario(n_slices=n, water_mass=0.4, drag=3.0 / n)
+    now, throw = record_of(scenario, switches, free, on_base, on_cap), Throw.of(scenario)
+    rng = np.random.default_rng(seed)
+    y = np.concatenate([rng.uniform(-0.1, 0.1, free), np.full(on_base, now.wall), np.full(on_cap, -now.wall)])
+    v = np.concatenate([rng.uniform(-2, 2, free), np.zeros(on_base + on_cap)])
+    _, s, inertia = throw.about_centre_of_mass(y + scenario.bottle.length / 2)
+    omega = throw.angular_momentum / inertia
+    is_free = np.where(np.arange(n) < free, 1.0, 0.0)
+    exact = acceleration_of(switches)(throw, theta, omega, s, v, is_free)
+
+    z, dz = y[:free].mean() - now.centre, v[:free].mean()
+    square = omega**2 - now.kappa
+    force = now.gravity * math.cos(theta) * (1 - now.kappa / omega**2)
+    mean = now.spring * square * z - now.damping * dz + now.weight * force
+    assert mean == pytest.approx(exact[:free].mean(), rel=1e-11, abs=1e-9)
+    for end, at_rest in ((1, slice(free, free + on_base)), (-1, slice(free + on_base, n))):
+        push = square * (end * now.wall - now.centre - now.push_z * z) + now.push_dz * dz + now.weight * force
+        np.testing.assert_allclose(exact[at_rest], push, rtol=1e-11, atol=1e-9)
+    spread = throw.slice_mass * ((y[:free] - y[:free].mean()) ** 2).sum()
+    assert now.body_inertia + spread + now.reduced_mass * z**2 == pytest.approx(inertia, rel=1e-13, abs=0.0)
+
+
+# ---------------------------------------------------------------------- numbers that other programs found
+
+
+@pytest.mark.parametrize(("law", "omega"), [("simultaneous", 7.47610762), ("sequential", 3.31509339)])
+def test_two_slices_tell_the_impact_laws_apart(law, omega):
+    found = solve(Scenario(n_slices=2, drag=0.0), "free-flight", [0.3], impact_law=law, rest_speed=1e-6)
+    assert found.omega[0] == pytest.approx(omega, abs=1e-7)
+
+
+@pytest.mark.parametrize(("n", "e", "omega"), [(4, 1.0, 14.744493), (20, 0.9, 12.387855)])
+def test_hits_on_both_ends_of_a_full_bottle_are_one_instant(n, e, omega):
+    """Two programs and MuJoCo; split into two instants the hits follow another law, to 16.2836 and 11.9385 rad/s."""
+    found = solve(replace(FULL, n_slices=n, restitution=e), "free-flight", [0.5])
+    assert found.omega[0] == pytest.approx(omega, abs=1e-6)
+    assert found.diagnostics["opposite_hits"] > 0
+
+
+@pytest.mark.parametrize("e", [0.0, 0.2, 0.5, 0.8, 0.95, 1.0])
+@pytest.mark.parametrize("gamma", [0.0, 5.0, 15.0])
+@pytest.mark.parametrize("n", [2, 3, 4, 7, 12, 31, 60])
+def test_a_full_bottle_in_free_flight_stays_mirror_symmetric(n, e, gamma):
+    scenario = Scenario(water_mass=1.0, n_slices=n, drag=2 * gamma / n, restitution=e)
+    found = solve(scenario, "free-flight")
+    assert found.ok
+    np.testing.assert_allclose(found.r + found.r[:, ::-1], scenario.bottle.length, rtol=0, atol=1e-10)
+
+
+# ---------------------------------------------------------------------- invariants
+
+
+def test_no_loss_and_no_drag_keep_the_energy_over_many_impacts():
+    scenario = replace(Scenario(water_mass=1.0, duration=2.0).with_slices(100), drag=0.0, restitution=1.0)
+    found = solve(scenario, "free-flight", [2.0], rest_speed=1e-8, energy=True)
+    ledger = found.diagnostics["energy"]
+    assert len(found.impacts) > 1500
+    assert abs(ledger["final"] / ledger["initial"] - 1) < 1e-12
+    assert abs(ledger["residual"]) < 1e-12 * ledger["initial"]
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 50])
+def test_the_plane_motion_of_free_flight_keeps_its_momentum_between_impacts(n):
+    """Without drag X = (slices about their mean, z) has X'' = omega^2 X: E and l are constant between impacts."""
+    scenario = replace(Scenario(theta0=0.3).with_slices(n), drag=0.0, water_mass=0.6)
+    found = solve(scenario, "free-flight", times=np.linspace(0, 0.5, 4000))
+    m, wall = scenario.slice_mass, scenario.r_max - scenario.bottle.length / 2
+    edges = np.unique(np.concatenate([[0.0], found.impacts.time, [0.5]]))
+    momentum = found.omega[0] * found.inertia[0]
+    worst, looked_at = 0.0, 0
+    for begin, end in pairwise(edges):
+        rows = np.flatnonzero((found.t > begin) & (found.t <= end))
+        if len(rows) < 2:
+            continue
+        y, v = found.r[rows] - scenario.bottle.length / 2, found.v[rows]
+        resting = np.all((np.abs(np.abs(y) - wall) < 1e-12) & (v == 0.0), axis=0)
+        if resting.all():
+            continue
+        y, v, held = y[:, ~resting], v[:, ~resting], y[:, resting]
+        body = scenario.bottle.mass + m * held.shape[1]
+        centre = m * held.sum(axis=1) / body
+        reduced = m * y.shape[1] * body / scenario.total_mass
+        z, dz = y.mean(axis=1) - centre, v.mean(axis=1)
+        dy, dv = y - y.mean(axis=1)[:, None], v - v.mean(axis=1)[:, None]
+        q = m * (dy**2).sum(axis=1) + reduced * z**2
+        k = m * (dv**2).sum(axis=1) + reduced * dz**2
+        half = m * (dy * dv).sum(axis=1) + reduced * z * dz
+        energy, square = k / 2 + momentum**2 / (2 * found.inertia[rows]), q * k - half**2
+        worst = max(worst, np.ptp(energy) / energy[0], np.ptp(square) / max((q * k).max(), 1e-300))
+        looked_at += 1
+    assert looked_at >= 3 or n == 1
+    assert worst < 1e-12
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_momentum_is_kept_at_every_impact(law):
+    """Against C_M, a slice far from both ends has the same velocity just before and just after each impact."""
+    first = solve(HALF, "free-flight", impact_law=law)
+    instants = np.unique(first.impacts.time)[:60]
+    instants = instants[np.diff(instants, prepend=-1.0) > 1e-9]
+    times = np.sort(np.concatenate([instants, instants + 1e-12]))
+    found = solve(HALF, "free-flight", times, impact_law=law)
+    drift = HALF.slice_mass * found.v.sum(axis=1) / HALF.total_mass
+    against = found.v - drift[:, None]
+    inside = (found.r > HALF.r_min + 1e-3) & (found.r < HALF.r_max - 1e-3)
+    jump = np.abs(against[1::2] - against[::2])[inside[::2] & inside[1::2]]
+    assert len(jump) > 100
+    assert jump.max() < 1e-8
+
+
+# ---------------------------------------------------------------------- zero speed and zero push
+
+
+@pytest.mark.parametrize("gravity", [0.0, 9.81])
+@pytest.mark.parametrize("model", ["published-limit", "signs-limit"])
+def test_where_nothing_pushes_nothing_moves(model, gravity):
+    """omega_0 = gamma: k^2 = 0, and the weight with it. Rounding alone would decide who leaves the base."""
+    found = solve(Scenario(n_slices=10, drag=2 * 20.0 * 0.05, gravity=gravity), model)
+    assert found.ok
+    assert len(found.impacts) == 0
+    assert np.ptp(found.r, axis=0).max() < 1e-13
+
+
+def test_a_release_is_not_undone_by_rounding():
+    """k^2 < 0 and a push that passes through zero slowly, on dozens of slices at once."""
+    scenario = Scenario(
+        bottle=Bottle(length=0.386, radius=0.058, mass=0.097),
+        water_mass=1.0,
+        n_slices=97,
+        drag=0.232,
+        restitution=0.0,
+        omega0=23.333,
+        theta0=1.0537,
+        duration=0.416,
+    )
+    found = solve(scenario, "switches:000100")
+    assert found.ok
+    assert found.diagnostics["steps"] < 200
+
+
+# ---------------------------------------------------------------------- statuses
+
+
+def test_a_flight_in_which_time_stops_passing_is_stalled(monkeypatch):
+    monkeypatch.setattr(layout, "WATCH", 20)
+    monkeypatch.setattr(layout, "STEP_LIMIT", 60)
+    found = solve(HALF)
+    assert found.status == "stalled"
+    assert "60 steps" in found.message
+    assert "slices of the last impacts: " in found.message
+    assert 0 < len(found.t) < 1000
+
+
+@pytest.mark.parametrize(
+    ("status", "words"),
+    [(layout.WRONSKIAN, "A B' - A' B"), (layout.INERTIA, "J of the moments"), (layout.ESCAPED, "outside the bottle")],
+)
+def test_a_broken_check_is_a_status_that_says_which(status, words):
+    ask = api.Ask(model="eq8", switches=MODELS["eq8"].switches, rest_speed=1e-5)
+    flown = api.fly(HALF, np.array([0.1]), ask)
+    flown.record["status"] = status
+    found = api.trajectory(flown)
+    assert found.status == "diverged"
+    assert words in found.message
+    assert "eq8" in found.message
+
+
+def test_its_own_checks_are_at_rounding():
+    for model in LADDER:
+        found = solve(HALF, model)
+        assert found.diagnostics["wronskian_error"] < 1e-13
+        assert 0 < found.diagnostics["inertia_error"] < 1e-13
+        assert found.diagnostics["largest_snap"] < 1e-14
+
+
+@pytest.mark.parametrize("name", ["rtol", "atol", "max_step"])
+def test_a_tolerance_is_refused_with_the_reason(name):
+    with pytest.raises(ValueError, match=rf"{name} = 1e-06 cannot be asked of method 'taylor'.*DOP853"):
+        solve(HALF, **{name: 1e-6})
+
+
+# ---------------------------------------------------------------------- many at once
+
+
+def throws(count):
+    rng = np.random.default_rng(5)
+    return [
+        Scenario(n_slices=int(n), water_mass=float(f), omega0=float(w), drag=0.3, frozen=k == 3, duration=0.3)
+        for k, (n, f, w) in enumerate(
+            zip(rng.integers(1, 40, count), rng.uniform(0.1, 1, count), rng.uniform(5, 25, count), strict=True)
+        )
+    ]
+
+
+@pytest.mark.parametrize(("model", "law"), [("eq8", "simultaneous"), ("free-flight", "sequential")])
+def test_a_batch_equals_single_runs_to_the_last_digit(model, law):
+    many = throws(30)
+    batch = solve_batch(many, model, impact_law=law, states=True, energy=True)
+    assert len(batch) == 30
+    for k, throw in enumerate(many):
+        alone, found = solve(throw, model, impact_law=law, energy=True), batch[k]
+        for name in ("t", "theta", "omega", "r", "v", "r_cm", "inertia"):
+            np.testing.assert_array_equal(getattr(found, name), getattr(alone, name))
+        np.testing.assert_array_equal(found.impacts.time, alone.impacts.time)
+        assert dict(found.diagnostics) == dict(alone.diagnostics)
+        assert dict(found.settings) == dict(alone.settings)
+        np.testing.assert_array_equal(batch.omega[k], alone.omega)
+        np.testing.assert_array_equal(batch.theta[k], alone.theta)
+        assert batch.status[k] == "ok"
+
+
+def test_a_batch_keeps_no_slices_unless_asked_and_marks_what_was_not_reached():
+    many = [HALF, replace(HALF, omega0=1e160), replace(HALF, duration=0.7)]
+    batch = solve_batch(many, "eq8", [0.1, 0.5])
+    assert batch.t.shape == batch.theta.shape == batch.omega.shape == (3, 2)
+    assert batch.status == ("ok", "overflow", "ok")
+    assert np.isnan(batch.omega[1]).all()
+    assert batch[0].r.shape == (0, 20)
+    np.testing.assert_array_equal(batch[2].omega, solve(many[2], "eq8", [0.1, 0.5]).omega)
+    each = solve_batch(many[:1], "eq8", [[0.2, 0.3]])
+    np.testing.assert_array_equal(each.t, [[0.2, 0.3]])
+
+
+def test_threads_share_nothing():
+    with ThreadPoolExecutor(4) as pool:
+        runs = list(pool.map(lambda _: solve(HALF, "free-flight").omega, range(8)))
+    assert all(np.array_equal(runs[0], other) for other in runs[1:])
+
+
+def test_a_batch_names_the_throw_that_cannot_be():
+    with pytest.raises(ValueError, match=r"throws\[1\]: times = .* outside \[0, 0.2\]"):
+        solve_batch([HALF, replace(HALF, duration=0.2)], times=[0.1, 0.4])
+    with pytest.raises(ValueError, match=r"throws\[0\] = 3 is not a slicemodel.Scenario"):
+        solve_batch([3])
+    with pytest.raises(ValueError, match=r"times has shape \(1, 2\); 2 throws need"):
+        solve_batch([HALF, HALF], times=[[0.1, 0.2]])
+    assert len(solve_batch([])) == 0

@@ -1,0 +1,86 @@
+"""The reduced flow against the integration of all equations: lists of impacts and omega(t); the full form of it is
+``benchmarks/flow_agreement.py``."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ode_reference import LADDER, LAWS, Switches
+from slicemodel.scenario import Bottle, Scenario
+
+FILE = Path(__file__).resolve().parents[2] / "benchmarks" / "flow_agreement.py"
+
+
+@pytest.fixture(scope="module")
+def agreement():
+    spec = importlib.util.spec_from_file_location("flow_agreement", FILE)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    yield module
+    del sys.modules[spec.name]
+
+
+def assert_agree(agreement, case):
+    mine, theirs = agreement.flow(case), agreement.integrated(case)
+    assert mine.ok, mine.message
+    assert theirs.ok, theirs.message
+    parting = agreement.first_parting(mine, theirs)
+    assert parting == "" or agreement.is_exchange(mine, theirs), parting
+    assert agreement.omega_apart(mine, theirs) < agreement.OMEGA
+    return mine
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("model", LADDER)
+def test_every_rung_has_the_same_impacts(agreement, model, law):
+    scenario = replace(Scenario(restitution=0.4, duration=0.25).with_slices(9), theta0=0.9)
+    mine = assert_agree(agreement, agreement.Case(scenario, model, law))
+    assert len(mine.impacts) >= 3
+
+
+@pytest.mark.parametrize("switches", Switches.every()[::3], ids=lambda switches: switches.name)
+def test_sets_of_switches_have_the_same_impacts(agreement, switches):
+    scenario = Scenario(
+        bottle=Bottle(length=0.22, radius=0.033, mass=0.05), water_mass=0.45, n_slices=7, drag=0.3, duration=0.25
+    )
+    assert_agree(agreement, agreement.Case(scenario, switches.name))
+
+
+@pytest.mark.parametrize("e", [0.0, 0.2, 0.35, 0.5, 0.8, 0.95, 1.0])
+@pytest.mark.parametrize("model", ["eq8", "free-flight"])
+def test_every_restitution_has_the_same_impacts(agreement, model, e):
+    scenario = Scenario(water_mass=0.7, n_slices=6, drag=0.5, restitution=e, omega0=-17.0, duration=0.25)
+    assert_agree(agreement, agreement.Case(scenario, model))
+
+
+@pytest.mark.parametrize("n", [2, 5, 8])
+@pytest.mark.parametrize("drag", [0.0, 0.4])
+def test_a_full_bottle_has_the_same_impacts(agreement, n, drag):
+    scenario = Scenario(water_mass=1.0, n_slices=n, drag=drag, restitution=0.6, duration=0.3)
+    assert_agree(agreement, agreement.Case(scenario, "free-flight"))
+
+
+def test_a_release_and_a_rest_have_the_same_times(agreement):
+    """Eight slices with e = 0: every slice rests at its first impact; gravity takes them off the end again."""
+    scenario = Scenario(n_slices=8, water_mass=0.3, drag=0.4, restitution=0.0, omega0=8.0, theta0=0.3, duration=0.8)
+    for model in ("eq8", "published-limit"):
+        mine = assert_agree(agreement, agreement.Case(scenario, model))
+        assert mine.diagnostics["releases"] > 0
+
+
+def test_random_throws_have_the_same_impacts(agreement):
+    rng = np.random.default_rng(20)
+    calm = 0
+    while calm < 20:
+        case = agreement.random_case(rng, 10)
+        mine = agreement.flow(case)
+        if not agreement.is_chaotic(case, mine):
+            assert_agree(agreement, case)
+            calm += 1

@@ -1,0 +1,69 @@
+"""When the compiled loop is made, kept and made anew."""
+
+from __future__ import annotations
+
+import logging
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numba.core.caching
+import pytest
+
+from ode_reference.flow import api
+
+ROOT = Path(__file__).resolve().parents[2]
+CODE = (
+    "from slicemodel.scenario import Scenario; import ode_reference\n"
+    "print(ode_reference.solve(Scenario(n_slices=5, drag=1.0), times=[0.5]).omega[0])"
+)
+
+
+def test_asking_for_the_verb_does_not_load_numba():
+    code = "from ode_reference import solve, solve_batch; import sys; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_the_stamp_is_that_of_every_file_of_the_folder(monkeypatch, tmp_path):
+    for file in Path(api.__file__).parent.glob("*.py"):
+        shutil.copy(file, tmp_path)
+    right = api.stamp()
+    monkeypatch.setattr(api, "__file__", str(tmp_path / "api.py"))
+    assert api.stamp() == right
+    for file in sorted(tmp_path.glob("*.py")):
+        before = file.read_text()
+        file.write_text(before + "\n")
+        assert api.stamp() != right, file.name
+        file.write_text(before)
+
+
+def test_without_a_writable_place_it_is_compiled_in_memory(monkeypatch, caplog):
+    monkeypatch.setattr(numba.core.caching.CacheImpl, "_locator_classes", [])
+    with caplog.at_level(logging.WARNING):
+        api.compiled_loop.__wrapped__()
+    assert "compiling in memory" in caplog.text
+
+
+@pytest.mark.slow
+def test_a_change_in_a_helper_is_compiled_anew(tmp_path):
+    for room in ("ode_reference", "slicemodel"):
+        shutil.copytree(ROOT / room, tmp_path / room, ignore=shutil.ignore_patterns("__pycache__"))
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(tmp_path)}
+
+    def omega():
+        done = subprocess.run(
+            [sys.executable, "-c", CODE], env=environment, cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+        return float(done.stdout)
+
+    first = omega()
+    assert omega() == first
+    helper = tmp_path / "ode_reference" / "flow" / "laws.py"
+    text = helper.read_text()
+    helper.write_text(text.replace("= -now.restitution *", "= -0.5 * now.restitution *"))
+    assert helper.read_text() != text
+    assert omega() != first
+    helper.write_text(text)
+    assert omega() == first
