@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from typing import Final
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from ode_reference.arguments import known_name, number_above, number_within
+from ode_reference import witness
+from ode_reference.arguments import known_name, number_within
 from ode_reference.combinations import model_of
-from ode_reference.impacts import LAWS, immovable
+from ode_reference.impacts import LAWS
 from ode_reference.models import MODELS
-from ode_reference.motion import Model, Motion, Throw
-from ode_reference.run import STEP_LIMIT, Run
-from ode_reference.steppers import METHODS
+from ode_reference.motion import Model
 from ode_reference.switches import PREFIX, Switches
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import Trajectory, output_times
@@ -28,8 +26,8 @@ REST_SPEED_WITH_RECOIL: Final = 1e-3
 def solve(
     scenario: Scenario,
     model: str | Switches = "eq8",
-    rtol: float = 1e-10,
-    atol: float = 1e-13,
+    rtol: float | None = None,
+    atol: float | None = None,
     rest_speed: float | None = None,
     times: ArrayLike | None = None,
     *,
@@ -96,37 +94,21 @@ def solve(
     if not isinstance(scenario, Scenario):
         raise ValueError(f"scenario = {scenario!r} is not a slicemodel.Scenario")
     chosen = _model(model)
-    with_recoil = LAWS[known_name("impact_law", impact_law, LAWS)]
-    law = with_recoil if chosen.switches.recoil else immovable
-    stepper = METHODS[known_name("method", method, METHODS)]
-    rtol = number_within("rtol", rtol, 1e-13, 1e-2)
-    atol = number_above("atol", atol, 0.0, 1e-2)
+    known_name("impact_law", impact_law, LAWS)
     if rest_speed is None:
         rest_speed = REST_SPEED_WITH_RECOIL if chosen.switches.recoil else REST_SPEED
-    rest_speed = number_within("rest_speed", rest_speed, 1e-8, 0.1, unit=" m/s")
-    duration = scenario.duration
-    if max_step is None:
-        max_step = min(max(0.02 / abs(scenario.omega0), 1e-5 * duration), duration)
-    else:
-        max_step = number_within("max_step", max_step, duration / STEP_LIMIT, unit=" s")
-    moments = output_times(scenario, times)
-
-    settings = {
-        "model": chosen.name,
-        "rtol": rtol,
-        "atol": atol,
-        "rest_speed": rest_speed,
-        "impact_law": impact_law,
-        "method": method,
-        "max_step": max_step,
-        "energy": energy,
-    }
-    # Overflow is a result here, reported as a status: it must not also appear as a warning.
-    with np.errstate(all="ignore"):
-        motion = Motion(Throw.of(scenario), chosen, np.zeros(scenario.n_slices, dtype=bool))
-        run = Run(scenario, motion, moments, rest_speed, law, energy)
-        run.integrate(stepper(motion, duration, rtol=rtol, atol=atol, max_step=max_step))
-        return run.trajectory(settings)
+    return witness.integrate(
+        scenario,
+        chosen,
+        method=method,
+        rtol=rtol,
+        atol=atol,
+        max_step=max_step,
+        rest_speed=number_within("rest_speed", rest_speed, 1e-8, 0.1, unit=" m/s"),
+        impact_law=impact_law,
+        energy=energy,
+        moments=output_times(scenario, times),
+    )
 
 
 def _model(model: str | Switches) -> Model:
