@@ -46,7 +46,7 @@ METHODS: Final = {
 RTOL: Final = 1e-10
 ATOL: Final = 1e-13
 
-LONGEST_TURN: Final = 0.4
+LONGEST_TURN: Final = 1.0
 """Longest step by default, in radians of the bottle at release."""
 
 STEP_LIMIT: Final = 1_000_000
@@ -86,7 +86,9 @@ def integrate(
     """
     duration = scenario.duration
     if max_step is None:
-        max_step = min(LONGEST_TURN / abs(scenario.omega0), duration)
+        max_step = min(max(LONGEST_TURN / abs(scenario.omega0), 1e-5 * duration), duration)
+    else:
+        max_step = number_within("max_step", max_step, duration / STEP_LIMIT, unit=" s")
     settings = {
         "model": model.name,
         "rtol": number_within("rtol", RTOL if rtol is None else rtol, 1e-13, 1e-2),
@@ -94,7 +96,7 @@ def integrate(
         "rest_speed": rest_speed,
         "impact_law": impact_law,
         "method": known_name("method", method, METHODS),
-        "max_step": number_within("max_step", max_step, duration / STEP_LIMIT, unit=" s"),
+        "max_step": max_step,
         "energy": energy,
     }
     # Overflow is a result here, reported as a status: it must not also appear as a warning.
@@ -104,8 +106,8 @@ def integrate(
         return flight.trajectory()
 
 
-class _NoEnd(Exception):
-    """Raised in the right-hand side when time has ceased to pass."""
+class _StandstillError(Exception):
+    """The time has ceased to pass; raised by the right-hand side, since ``solve_ivp`` cannot be stopped otherwise."""
 
 
 class _Flight:
@@ -163,7 +165,7 @@ class _Flight:
                 self._slope, (self.t, self.scenario.duration), self.y, dense_output=True,
                 events=[event for _, event in watch] or None, **options,
             )  # fmt: skip
-        except _NoEnd:
+        except _StandstillError:
             return self._stall(f"time hardly passes after {self.motion.evaluations} evaluations")
         except ValueError as error:  # the linear algebra of an implicit method refuses inf and NaN
             return self._stall(str(error))
@@ -199,7 +201,7 @@ class _Flight:
         count, since = self.watched
         if self.motion.evaluations - count >= WATCH:
             if t - since < LEAST_ADVANCE * self.scenario.duration or self.motion.evaluations > 16 * STEP_LIMIT:
-                raise _NoEnd
+                raise _StandstillError
             self.watched = (self.motion.evaluations, t)
         return self.motion(t, y)
 
@@ -289,9 +291,11 @@ class _Flight:
         """Return when slice ``i`` passes the end ``side`` between ``a`` and ``b``, or None if it turns back inside."""
         foremost = self._foremost(side, np.flatnonzero(self.ends.beyond(side, self.y[1 : self.n + 1]) >= 0))
 
+        others = np.arange(self.n) != i
+
         def beyond(t: float) -> float:
             y = self.y.copy() if t == self.t else np.asarray(path(t))
-            y[1 : self.n + 1] = np.where(np.arange(self.n) == i, y[1 : self.n + 1], (self.ends.low + self.ends.high) / 2)
+            y[1 : self.n + 1][others] = (self.ends.low + self.ends.high) / 2
             return foremost(t, y)
 
         def speed(t: float) -> float:

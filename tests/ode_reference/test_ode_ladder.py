@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ode_reference import LAWS, MODELS, solve
-from ode_reference.run import grazes
+from ode_reference.witness import grazes
 from slicemodel import observables
 from slicemodel.scenario import Bottle, Scenario
 from slicemodel.trajectory import Impacts
