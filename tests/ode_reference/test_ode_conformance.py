@@ -120,8 +120,6 @@ def test_a_run_in_which_time_stops_passing_is_stalled(monkeypatch):
     assert "slices of the last impacts: " in found.message
     assert 0 < len(found.t) < 1000
     assert found.t[-1] < 0.3
-    whole = solve(SMALL, max_step=0.3)
-    assert whole.ok
 
 
 @pytest.mark.parametrize(
