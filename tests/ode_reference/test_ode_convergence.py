@@ -8,6 +8,8 @@ import pytest
 from ode_reference import solve
 from slicemodel.scenario import Scenario
 
+pytestmark = pytest.mark.arithmetic
+
 BAND = 1e-7
 """Of omega_0: what the reference promises for omega(t)."""
 

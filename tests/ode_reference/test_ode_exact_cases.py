@@ -11,6 +11,8 @@ from ode_reference import METHODS, MODELS, solve
 from ode_reference.closed_forms import CASES, case_release, case_symmetric_pair, case_zeno, first_integral
 from slicemodel.scenario import Bottle, Scenario
 
+pytestmark = pytest.mark.arithmetic
+
 
 def sharp(scenario):
     """Settings under which the integration errs by round-off alone: short steps and the tightest tolerances."""

@@ -18,6 +18,8 @@ from scipy.integrate import solve_ivp
 from ode_reference import solve
 from slicemodel.scenario import Scenario
 
+pytestmark = pytest.mark.arithmetic
+
 
 def omega_of_eq8(scenario, times, *, rest_speed=1e-6, method="DOP853", rtol=1e-11, atol=1e-14, max_step=1e-3):
     """omega [rad/s] at ``times`` and the number of impacts."""

@@ -68,6 +68,7 @@ def test_free_flight_converges_within_its_band(model, throw, law):
     assert change(model, THROWS[throw], (1e-10, 1e-3), (1e-11, 3e-4), impact_law=law) < BAND_WITH_RECOIL
 
 
+@pytest.mark.arithmetic
 @pytest.mark.parametrize(("law", "omega"), [("simultaneous", 7.4761), ("sequential", 3.3151)])
 def test_two_slices_tell_the_impact_laws_apart(law, omega):
     scenario = Scenario(n_slices=2, drag=0.0, duration=0.3)
@@ -79,6 +80,7 @@ def test_two_slices_tell_the_impact_laws_apart(law, omega):
     assert found[1] == pytest.approx(omega, abs=5e-5)
 
 
+@pytest.mark.arithmetic
 @pytest.mark.parametrize("law", LAWS)
 def test_free_flight_of_the_papers_throw_ends_where_the_engines_end(law):
     # A rigid-body engine, extrapolated to dt = 0 and converged in iterations, ends at 3.300 to 3.301 rad/s. This

@@ -10,6 +10,8 @@ from ode_reference.witness import TOGETHER, opposite_hits
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import Impacts
 
+pytestmark = pytest.mark.arithmetic
+
 
 def full_bottle(n_slices, restitution, damping_rate):
     return Scenario(
