@@ -86,9 +86,9 @@ def solve(
     --------
     Without recoil, over half a second, omega(t) changes by less than 1e-7 omega_0 when rtol and rest_speed are cut
     tenfold, unless a slice grazes an end (``grazes``); the other methods and an independent program agree to the same
-    band. An error grows as slices fly apart, and rests end it: with e = 1 and without drag none comes to rest, and Eq. 8
-    at N = 20 is off by 1e-9 omega_0 after half a second and by 1e-4 omega_0 after three; rtol = 1e-13 leaves 1e-8 omega_0
-    there. Another exception is "accelerating-origin" with 1e-4 omega_0, since there only a slice at rest pushes the
+    band. An error grows as slices fly apart, and rests end it: with e = 1 and without drag none comes to rest, and
+    Eq. 8 at N = 20 is off by 1e-9 omega_0 after half a second and by 1e-4 omega_0 after three; rtol = 1e-13 leaves
+    1e-8 omega_0 there. "accelerating-origin" has 1e-4 omega_0, since there only a slice at rest pushes the
     tube. With recoil the band is 3e-3 omega_0: which slice rests when decides the order of all later impacts.
     "Radau" has a dense output of order 3 only: at rtol above 1e-8 its rebounds need max_step = 0.02 / |omega0|.
     """

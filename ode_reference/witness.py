@@ -106,6 +106,12 @@ def integrate(
         return flight.trajectory()
 
 
+Event = Callable[[float, FloatArray], float]
+
+Found = tuple[str, int, int | None]
+"""What ends a leg: "wall" or "release", the end, and the slice if it is known."""
+
+
 class _StandstillError(Exception):
     """The time has ceased to pass; raised by the right-hand side, since ``solve_ivp`` cannot be stopped otherwise."""
 
@@ -155,45 +161,47 @@ class _Flight:
 
     def _leg(self) -> None:
         """Integrate up to the first event, the duration or a failure, and resolve the event."""
-        left = self.scenario.duration - self.t
-        options = {name: self.settings[name] for name in ("method", "rtol", "atol", "max_step")}
-        if self.length is not None and self.settings["method"] != "LSODA":  # which starts at order 1, by short steps
-            options["first_step"] = min(self.length, self.settings["max_step"], left)
         watch = [] if self.immobile else self._events()
-        try:
-            leg = solve_ivp(
-                self._slope, (self.t, self.scenario.duration), self.y, dense_output=True,
-                events=[event for _, event in watch] or None, **options,
-            )  # fmt: skip
-        except _StandstillError:
-            return self._stall(f"time hardly passes after {self.motion.evaluations} evaluations")
-        except ValueError as error:  # the linear algebra of an implicit method refuses inf and NaN
-            return self._stall(str(error))
-        self.counts["steps"] += len(leg.t) - 1
+        leg = self._solved([event for _, event in watch])
+        if leg is None:
+            return
         path = leg.sol
-        end, struck = float(leg.t[-1]), None
-        if path.interpolants and not self.immobile:
+        self.counts["steps"] += len(leg.t) - 1
+        if path.interpolants:
             # What the last step would have been without the event; one step a leg says nothing of how long it may be.
             last = path.interpolants[-1]
             self.length = float(last.t - last.t_old) * (1.5 if len(leg.t) == 2 else 1.0)
-            missed = self._first_missed(leg.t, path)
-            if missed is not None:
-                end, struck = missed
-        y = leg.y[:, -1].copy() if struck is None else np.asarray(path(end))
-        if end > self.t:
-            self._record(end, path)
-            if self.ledger is not None:
-                for begin, stop in zip(leg.t[:-1], np.minimum(leg.t[1:], end), strict=True):
-                    if stop > begin:
-                        self.ledger.smooth(begin, stop, path(nodes(begin, stop)))
+        missed = None if self.immobile else self._first_missed(leg.t, path)
+        if missed is None:
+            end, y = float(leg.t[-1]), leg.y[:, -1].copy()
+        else:
+            end, y = missed[0], path(missed[0])
+        self._record(end, path)
+        if self.ledger is not None:
+            for begin, stop in zip(leg.t[:-1], np.minimum(leg.t[1:], end), strict=True):
+                if stop > begin:
+                    self.ledger.smooth(begin, stop, path(nodes(begin, stop)))
         self.t, self.y = end, y
-        if struck is None and leg.status < 0:
-            return None if self._overflowed() else self._stall(leg.message)
-        what = [name for (name, _), times in zip(watch, leg.t_events or [], strict=False) if len(times)]
-        if struck is not None:
-            self._meet(struck)
-        elif what:
-            self._meet(self._struck(what), *(side for name, side in what if name == "release"))
+        found = [name for (name, _), times in zip(watch, leg.t_events or [], strict=False) if len(times)]
+        if missed is not None:
+            self._meet(self._struck([missed[1]]))
+        elif found:
+            self._meet(self._struck(found), *(side for kind, side, _ in found if kind == "release"))
+        elif leg.status < 0 and not self._overflowed():
+            self._stall(leg.message)
+
+    def _solved(self, events: list[Event]) -> Any:
+        """Return what ``solve_ivp`` makes of a leg that starts now, or None if it cannot go on."""
+        options = {name: self.settings[name] for name in ("method", "rtol", "atol", "max_step")}
+        if self.length is not None and self.settings["method"] != "LSODA":  # which starts at order 1, by short steps
+            options["first_step"] = min(self.length, options["max_step"], self.scenario.duration - self.t)
+        span = self.t, self.scenario.duration
+        try:
+            return solve_ivp(self._slope, span, self.y, events=events or None, dense_output=True, **options)
+        except _StandstillError:
+            self._stall(f"time hardly passes after {self.motion.evaluations} evaluations")
+        except ValueError as error:  # the linear algebra of an implicit method refuses inf and NaN
+            self._stall(str(error))
         return None
 
     def _slope(self, t: float, y: FloatArray) -> FloatArray:
@@ -207,21 +215,21 @@ class _Flight:
 
     # ------------------------------------------------------------------ events
 
-    def _events(self) -> list[tuple[tuple[str, int], Callable[[float, FloatArray], float]]]:
-        """Return what ends a leg that starts now: a name and a function that changes sign, for each."""
+    def _events(self) -> list[tuple[Found, Event]]:
+        """Return what ends a leg that starts now: what it is called, and a function that changes sign there."""
         r, v = self.y[1 : self.n + 1], self.y[self.n + 1 :]
-        events: list[tuple[tuple[str, int], Callable[[float, FloatArray], float]]] = []
+        events: list[tuple[Found, Event]] = []
         for side in (BASE, CAP):
             leaves = ~self.motion.held & (np.abs(self.ends.beyond(side, r)) <= self.ends.reach) & (side * v <= 0)
-            events.append((("wall", side), self._foremost(side, np.flatnonzero(leaves))))
+            events.append((("wall", side, None), self._foremost(side, np.flatnonzero(leaves))))
             members = np.flatnonzero(self.resting == side)
             if members.size:
-                events.append((("release", side), self._push(side, int(members[0]))))
-        for (name, _), event in events:
-            event.terminal, event.direction = True, 1.0 if name == "wall" else -1.0  # type: ignore[attr-defined]
+                events.append((("release", side, None), self._push(side, int(members[0]))))
+        for (kind, *_), event in events:
+            event.terminal, event.direction = True, 1.0 if kind == "wall" else -1.0  # type: ignore[attr-defined]
         return events
 
-    def _foremost(self, side: int, leaves: NDArray[np.int64]) -> Callable[[float, FloatArray], float]:
+    def _foremost(self, side: int, leaves: NDArray[np.int64]) -> Event:
         """Return what rises through zero when the first free slice passes the end ``side``.
 
         It is the largest distance beyond that end, of the slices ``leaves`` divided by the time since they were on it;
@@ -241,23 +249,24 @@ class _Flight:
 
         return foremost
 
-    def _push(self, side: int, member: int) -> Callable[[float, FloatArray], float]:
+    def _push(self, side: int, member: int) -> Event:
         """Return what falls through zero when the end ``side`` no longer presses; ``member`` speaks for all there."""
         return lambda _, y: side * float(self.motion.acceleration(y, self.motion.free)[1][member])
 
-    def _struck(self, what: list[tuple[str, int]]) -> SideArray:
-        """Return the end that each free slice strikes now, the one whose event has been found included."""
+    def _struck(self, found: list[Found]) -> SideArray:
+        """Return the end that each free slice strikes now, the one that has been found included."""
         free = ~self.motion.held
         r, v = self.y[1 : self.n + 1], self.y[self.n + 1 :]
         struck = self.ends.struck(self.t, r, v, free)
-        for name, side in what:
-            if name == "wall" and not (struck == side).any():
+        for kind, side, who in found:
+            if kind == "wall" and not (struck == side).any():
                 # Located there, even if round-off now calls it a hair away from contact or from approach.
-                struck[int(np.argmax(np.where(free, self.ends.beyond(side, r), -np.inf)))] = side
+                foremost = int(np.argmax(np.where(free, self.ends.beyond(side, r), -np.inf)))
+                struck[foremost if who is None else who] = side
         return struck
 
-    def _first_missed(self, t: FloatArray, path: Callable[[Any], FloatArray]) -> tuple[float, SideArray] | None:
-        """Return the first time before the end of the leg at which a slice passed an end unseen, and who strikes.
+    def _first_missed(self, t: FloatArray, path: Callable[[Any], FloatArray]) -> tuple[float, Found] | None:
+        """Return the first time before the end of the leg at which a slice passed an end unseen, and which did.
 
         ``solve_ivp`` looks at events where its steps end. A slice that passes an end and is back inside by then, or
         behind which another passes, shows between: it is beyond the end where one part of a step ends, or it turns
@@ -269,12 +278,13 @@ class _Flight:
         if len(times) < 2 or not times[-1] > times[0]:
             return None
         states = path(times)
-        first: tuple[float, SideArray] | None = None
+        first: tuple[float, Found] | None = None
         dt = np.diff(times)
         for side in (BASE, CAP):
             beyond = self.ends.beyond(side, states[1 : n + 1])
             speed = side * states[n + 1 :]
-            # A slice that turns back rises above its tangents by nothing, if it bends inward all the while.
+            # One that turns back within a part rises by less than its first speed times the part, if it bends inward
+            # all the while; twice that is on the safe side.
             top = beyond[:, :-1] + 2 * dt * np.maximum(speed[:, :-1], 0.0)
             turns = (speed[:, :-1] > 0) & (speed[:, 1:] < 0) & (top > self.ends.reach)
             out = np.zeros_like(turns)
@@ -282,15 +292,12 @@ class _Flight:
             for i, k in np.argwhere((turns | out) & free[:, None]).tolist():
                 found = self._passage(side, i, float(times[k]), float(times[k + 1]), path)
                 if found is not None and found < t[-1] and (first is None or found < first[0]):
-                    struck = self.ends.struck(found, *np.split(np.asarray(path(found))[1:], 2), free)
-                    struck[i] = side
-                    first = found, struck
+                    first = found, ("wall", side, i)
         return first
 
     def _passage(self, side: int, i: int, a: float, b: float, path: Callable[[Any], FloatArray]) -> float | None:
         """Return when slice ``i`` passes the end ``side`` between ``a`` and ``b``, or None if it turns back inside."""
         foremost = self._foremost(side, np.flatnonzero(self.ends.beyond(side, self.y[1 : self.n + 1]) >= 0))
-
         others = np.arange(self.n) != i
 
         def beyond(t: float) -> float:
