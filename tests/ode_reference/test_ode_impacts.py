@@ -122,6 +122,14 @@ def test_the_sequential_law_takes_the_fastest_approach_first():
     assert gained == pytest.approx(0.0, abs=1e-15)
 
 
+def test_between_equally_fast_approaches_the_last_digit_does_not_choose():
+    side = np.array([1, -1])
+    exact, _ = sequential(np.array([1.0, 1.0]), side, 0.5, 2.0, 1e-6)
+    for x in ([1.0, 1.0 + 1e-15], [1.0 + 1e-15, 1.0], [1.0, 1.0 - 1e-12]):
+        after, _ = sequential(np.array(x), side, 0.5, 2.0, 1e-6)
+        np.testing.assert_allclose(after, exact, rtol=0, atol=1e-10)
+
+
 def test_elastic_exchange_conserves_energy_by_either_law():
     x, side = np.array([1.3, 0.0, 0.2]), np.array([1, -1, -1])
     for law in LAWS.values():
