@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import ode_reference.witness
 from ode_reference import MODELS, solve
 from ode_reference.contact import Ends, resolve
 from ode_reference.impacts import immovable
@@ -238,7 +240,9 @@ scenarios = st.builds(
 @settings(max_examples=60, derandomize=True, deadline=None)
 @given(scenario=scenarios, model=st.sampled_from(sorted(MODELS)), bounded=st.booleans())
 def test_no_slice_is_ever_outside_and_every_impact_obeys_the_law(scenario, model, bounded):
-    found = solve(scenario, model, times=np.linspace(0, 0.3, 200), max_step=None if bounded else 0.3)
+    # With e = 1 and strong drag slices hop faster and faster: a few thousand impacts of such a run are enough.
+    with patch.multiple(ode_reference.witness, WATCH=10_000, STEP_LIMIT=2_000):
+        found = solve(scenario, model, times=np.linspace(0, 0.3, 200), max_step=None if bounded else 0.3)
     assert found.status in ("ok", "stalled")
     assert found.ok or "chatter" in found.message
     assert found.r.min() >= scenario.r_min - 1e-12
