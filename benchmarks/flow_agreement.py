@@ -18,13 +18,10 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import dataclass, replace
-from unittest.mock import patch
 
 import numpy as np
 
 import ode_reference
-from ode_reference.contact import Walls
-from ode_reference.flow.layout import TOLERANCE
 from slicemodel.scenario import Bottle, Scenario
 from slicemodel.trajectory import Trajectory
 
@@ -80,20 +77,15 @@ def flow(case: Case) -> Trajectory:
 
 def integrated(case: Case) -> Trajectory:
     """Return the run by DOP853."""
-
-    def between(low: float, high: float, length: float) -> Walls:
-        return Walls(low, high, TOLERANCE * length)
-
-    with patch.object(Walls, "between", between):
-        return ode_reference.solve(
-            case.scenario,
-            case.model,
-            method="DOP853",
-            rtol=1e-13,
-            atol=1e-15,
-            max_step=min(0.005 / abs(case.scenario.omega0), case.scenario.duration),
-            impact_law=case.impact_law,
-        )
+    return ode_reference.solve(
+        case.scenario,
+        case.model,
+        method="DOP853",
+        rtol=1e-13,
+        atol=1e-15,
+        max_step=min(0.005 / abs(case.scenario.omega0), case.scenario.duration),
+        impact_law=case.impact_law,
+    )
 
 
 def first_parting(one: Trajectory, other: Trajectory, within: float = TIME) -> str:

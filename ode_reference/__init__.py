@@ -14,15 +14,15 @@ if TYPE_CHECKING:
     from ode_reference.impacts import LAWS
     from ode_reference.models import LADDER, MODELS
     from ode_reference.solver import solve, solve_batch
-    from ode_reference.steppers import METHODS
     from ode_reference.switches import Switches
+    from ode_reference.witness import METHODS
 
 __all__ = ["LADDER", "LAWS", "METHODS", "MODELS", "Switches", "model_of", "solve", "solve_batch"]
 
 _HOMES = {
     "LADDER": "ode_reference.models",
     "LAWS": "ode_reference.impacts",
-    "METHODS": "ode_reference.steppers",
+    "METHODS": "ode_reference.witness",
     "MODELS": "ode_reference.models",
     "Switches": "ode_reference.switches",
     "model_of": "ode_reference.combinations",

@@ -1,4 +1,4 @@
-"""Contact with the two ends: touching, rebound, rest and release.
+r"""Contact with the two ends: touching, rebound, rest and release.
 
       cap: side = -1                                        base: side = +1
       r = low = h/2N                                        r = high = L - h/2N
@@ -9,9 +9,9 @@ A slice is free (side 0) or rests on one side. With ``side`` as sign, side * v >
 presses, at either end. ``a`` is the acceleration of the model, so the model alone decides who rests.
 
     rebound  by the impact law, the position set exactly on the end
-    rest     after a rebound slower than the rest speed if the slice is pressed (side * a >= 0): v = 0, held.
-             Restitution below 1 under a steady push makes infinitely many rebounds in finite time; the
-             rest speed ends that sequence a time of about 2 (rest speed) / a before its limit.
+    rest     after a rebound slower than the rest speed u if the slice is pressed (side * a >= 0): v = 0, held.
+             Restitution e < 1 under a steady push a makes infinitely many rebounds in finite time; the rest speed
+             ends that sequence at most 2 u / (a (1 - e)) before its limit: flights of 2 u / a, 2 e u / a, ...
     release  as soon as side * a < 0, or at once where an impact throws the end out from under the slice
 
 All slices at rest on one end have the same acceleration, so that only two groups decide: who stays is found
@@ -29,74 +29,80 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ode_reference.impacts import Law
-from ode_reference.motion import BoolArray, Instant, Motion
+from ode_reference.motion import BoolArray, Motion
+from slicemodel.scenario import Scenario
 from slicemodel.trajectory import BASE, CAP, FloatArray
 
 SideArray = NDArray[np.int64]
 FREE: Final = 0
 
+TOUCH: Final = 64 * float(np.finfo(np.float64).eps)
+"""Distance from an end, as a fraction of L, at which a slice touches it: positions carry a few units in the last
+place of L."""
+
+TOUCH_WITH_RECOIL: Final = 1e4 * float(np.finfo(np.float64).eps)
+"""The same with recoil. There hits at the same time are one impact, and one after the other they are another; slices
+that a symmetry keeps together, on one end or on opposite ones, part by round-off that grows while they fly."""
+
 
 @dataclass(frozen=True, slots=True)
-class Walls:
+class Ends:
     """The two ends as a slice's centre meets them: ``low`` at the cap, ``high`` at the base [m].
 
-    ``tolerance`` [m] is the distance below which round-off cannot tell contact from no contact.
+    ``reach`` [m] is the distance at which an approaching slice touches an end.
     """
 
     low: float
     high: float
-    tolerance: float
+    reach: float
 
     @classmethod
-    def between(cls, low: float, high: float, length: float) -> Walls:
-        """Return the walls of a tube of ``length`` [m]; positions carry a few units in the last place of it."""
-        return cls(low, high, 64 * float(np.finfo(np.float64).eps) * length)
+    def of(cls, scenario: Scenario, *, recoil: bool) -> Ends:
+        """Return the ends of the tube of ``scenario``."""
+        share = TOUCH_WITH_RECOIL if recoil else TOUCH
+        return cls(scenario.r_min, scenario.r_max, share * scenario.bottle.length)
 
-    def gap(self, side: int, r: float) -> float:
-        """Return the distance of a slice at ``r`` from the end ``side`` [m], negative beyond it."""
-        return self.high - r if side == BASE else r - self.low
+    def beyond(self, side: int, r: FloatArray) -> FloatArray:
+        """Return how far ``r`` lies beyond the end ``side`` [m], negative inside."""
+        return r - self.high if side == BASE else self.low - r
 
-    def struck(self, now: Instant, free: BoolArray) -> SideArray:
+    def struck(self, t: float, r: FloatArray, v: FloatArray, free: BoolArray) -> SideArray:
         """Return the end that each free slice touches while approaching, 0 where it does neither; shape (N,).
 
-        Two slices that strike at the same time are located at times that differ by round-off: contact is
-        also what the slice reaches within four units in the last place of the time.
+        Contact is also what the slice reaches within four units in the last place of the time.
         """
-        reach = np.maximum(self.tolerance, 4 * np.spacing(now.t) * np.abs(now.v))
-        at_base = free & (now.v > 0) & (self.high - now.r <= reach)
-        at_cap = free & (now.v < 0) & (now.r - self.low <= reach)
+        reach = np.maximum(self.reach, 4 * np.spacing(t) * np.abs(v))
+        at_base = free & (v > 0) & (self.high - r <= reach)
+        at_cap = free & (v < 0) & (r - self.low <= reach)
         return np.where(at_base, BASE, np.where(at_cap, CAP, FREE))
 
     def touched(self, r: FloatArray) -> SideArray:
         """Return the end that each slice touches, whatever its velocity, 0 where none; shape (N,)."""
-        return np.where(self.high - r <= self.tolerance, BASE, np.where(r - self.low <= self.tolerance, CAP, FREE))
+        return np.where(self.high - r <= self.reach, BASE, np.where(r - self.low <= self.reach, CAP, FREE))
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The state after an event: ``y``, the end each slice rests on (``resting``), and how many came to rest or left.
+    """The state after an event: ``y``, and the end that each slice rests on (``resting``).
 
-    ``rebounded`` is the state after the impacts, before anything came to rest; ``speed_after`` has one entry per
-    struck slice, in the order of the slices [m/s].
+    ``rebounded`` is the state after the impacts, before anything came to rest.
     """
 
     y: FloatArray
     rebounded: FloatArray
     resting: SideArray
-    speed_after: FloatArray
-    rests: int
-    releases: int
 
 
 def resolve(
     motion: Motion,
-    now: Instant,
+    y: FloatArray,
     struck: SideArray,
     resting: SideArray,
-    walls: Walls,
+    ends: Ends,
     restitution: float,
     rest_speed: float,
     law: Law,
+    lets_go: int = FREE,
 ) -> Outcome:
     """Return the state after all contacts of one instant, resolved together.
 
@@ -109,38 +115,35 @@ def resolve(
     Parameters
     ----------
     motion : Motion - gives accelerations
-    now : Instant - the state before the event; not changed
+    y : array, shape (2N + 1,) - the state before the event; not changed
     struck : array, shape (N,) - side that a free slice strikes now, else 0
     resting : array, shape (N,) - side that a slice rests on before the event, else 0
-    walls : Walls
+    ends : Ends
     restitution : float - e
     rest_speed : float [m/s]
     law : callable - of ``ode_reference.impacts``
+    lets_go : int - the end whose push has just been found to vanish, even if round-off now calls it a push; else 0
     """
     n = len(struck)
     ratio = motion.throw.slice_mass / motion.throw.bottle_mass
-    y = now.y.copy()
+    y = y.copy()
     r, v = y[1 : n + 1], y[n + 1 :]
     contact = struck + resting
     touching = np.flatnonzero(contact)
     side = contact[touching]
-    r[touching] = np.where(side == BASE, walls.high, walls.low)
+    r[touching] = np.where(side == BASE, ends.high, ends.low)
     if struck.any():
-        after, gained = law(side * v[touching], side, restitution, ratio, rest_speed)
+        after, gained = law(np.maximum(side * v[touching], 0.0), side, restitution, ratio, rest_speed)
         v -= gained
         v[touching] = side * after
     mass_ratio = ratio if motion.model.switches.recoil else 0.0
-    stays = np.zeros(n, dtype=np.int64)
     slow = np.abs(v[touching]) < rest_speed
-    rebounded = y
-    if slow.any():
-        stays = _staying(motion, y, np.where(slow, side, FREE), touching, mass_ratio)
-        y = y.copy()
-        y[n + 1 :] = _stuck(v, stays, mass_ratio)
-    speed_after = np.abs(y[n + 1 :][struck != FREE])
-    rests = int(np.count_nonzero((stays != FREE) & (resting == FREE)))
-    releases = int(np.count_nonzero((stays == FREE) & (resting != FREE)))
-    return Outcome(y, rebounded, stays, speed_after, rests, releases)
+    if not slow.any():
+        return Outcome(y, y, np.zeros(n, dtype=np.int64))
+    stays = _staying(motion, y, np.where(slow, side, FREE), touching, mass_ratio, lets_go)
+    settled = y.copy()
+    settled[n + 1 :] = _stuck(v, stays, mass_ratio)
+    return Outcome(settled, y, stays)
 
 
 def _stuck(v: FloatArray, stays: SideArray, mass_ratio: float) -> FloatArray:
@@ -158,7 +161,7 @@ def _stuck(v: FloatArray, stays: SideArray, mass_ratio: float) -> FloatArray:
 
 
 def _staying(
-    motion: Motion, y: FloatArray, slow: SideArray, touching: NDArray[np.int64], mass_ratio: float
+    motion: Motion, y: FloatArray, slow: SideArray, touching: NDArray[np.int64], mass_ratio: float, lets_go: int
 ) -> SideArray:
     """Return the end on which each of the slow touching slices stays, 0 where none; shape (N,).
 
@@ -168,10 +171,11 @@ def _staying(
     slow : array, shape (K,) - for each touching slice its side if it is slow, else 0
     touching : array, shape (K,)
     mass_ratio : float - m / M_b, 0 without recoil
+    lets_go : int - as in ``resolve``
     """
     n = (len(y) - 1) // 2
     groups = [(side, touching[slow == side]) for side in (BASE, CAP)]
-    groups = [(side, members) for side, members in groups if members.size]
+    groups = [(side, members) for side, members in groups if members.size and side != lets_go]
     pressed_only: SideArray | None = None
     for choice in product((True, False), repeat=len(groups)):
         stays: SideArray = np.zeros(n, dtype=np.int64)

@@ -25,6 +25,9 @@ from numpy.typing import NDArray
 
 from slicemodel.trajectory import FloatArray
 
+TIE: Final = 1e-9
+"""Approach speeds that differ by no more than this fraction are equal to ``sequential``."""
+
 Law = Callable[[FloatArray, NDArray[np.int64], float, float, float], tuple[FloatArray, float]]
 
 PASSES: Final = 1000
@@ -110,6 +113,8 @@ def sequential(
 ) -> tuple[FloatArray, float]:
     """Return the velocities after binary impacts, the fastest approach first, until nothing approaches.
 
+    Of slices that approach equally fast the first one (the nearest to the base at release) comes first.
+
     One impact of slice i alone: x_i -> -e x_i, the tube gains s_i (1+e) x_i (m/M_b) / (1 + m/M_b), and every other
     touching slice, the resting ones included, sees its end come or go by that.
 
@@ -121,7 +126,8 @@ def sequential(
     signs = side.astype(np.float64)
     gained = 0.0
     for _ in range(PASSES * len(x)):
-        i = int(np.argmax(x))
+        # The first of those that are equally fast: between mirror images round-off must not choose.
+        i = int(np.argmax(x >= (1.0 - TIE) * x.max()))
         fastest = x[i]
         if fastest < rest_speed:
             break

@@ -45,6 +45,49 @@ def test_independent_verbs_share_only_nouns(room):
                 assert allowed, f"{file} imports {module} {names or ''}"
 
 
+SHARED_BY_SOLVERS = {"arguments": None, "switches": None, "motion": {"Throw"}}
+"""Modules of ``ode_reference`` that the witness and the reduced flow may share, and which names of them (None: all)."""
+
+
+def own_imports(file: Path):
+    """Yield (module, names) of what a file imports from ``ode_reference``, the module without the room's name."""
+    for module, names in imports_of(file):
+        top, _, rest = module.partition(".")
+        if top == "ode_reference":
+            yield from ((name, set()) for name in names) if not rest else [(rest, names)]
+
+
+def reach_of(modules: set[str]) -> set[str]:
+    """Return the modules of ``ode_reference`` that ``modules`` import, themselves included, at any remove."""
+    reached: set[str] = set()
+    waiting = set(modules)
+    while waiting:
+        module = waiting.pop()
+        reached.add(module)
+        path = ROOT / "ode_reference" / module.replace(".", "/")
+        file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+        assert file.exists(), f"ode_reference.{module}"
+        waiting |= {name for name, _ in own_imports(file)} - reached
+    return reached
+
+
+def test_the_witness_and_the_reduced_flow_share_no_mechanics():
+    """Two programs that share a formula prove nothing: only what is thrown, its constants and names are common."""
+    room = ROOT / "ode_reference"
+    flow = sorted((room / "flow").rglob("*.py")) if (room / "flow").is_dir() else []
+    witness = reach_of({"witness"})
+    assert {"contact", "impacts", "energy"} <= witness
+    assert not {module for module in witness if module.partition(".")[0] == "flow"}
+    for file in flow:
+        for module, names in own_imports(file):
+            if module.partition(".")[0] == "flow":
+                continue
+            assert module in SHARED_BY_SOLVERS, f"{file} imports ode_reference.{module}"
+            allowed = SHARED_BY_SOLVERS[module]
+            assert allowed is None or (names and names <= allowed), f"{file} imports {names} of {module}"
+    assert not reach_of(set(SHARED_BY_SOLVERS)) - set(SHARED_BY_SOLVERS)
+
+
 def test_the_slice_model_imports_no_other_room():
     for file in files_of("slicemodel"):
         for module, _ in imports_of(file):

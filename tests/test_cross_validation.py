@@ -41,6 +41,7 @@ def start_of(throw, model):
     return before_first_impact(throw, ode_reference.solve(throw, model))
 
 
+@pytest.mark.arithmetic
 @pytest.mark.parametrize("scheme", LIMITS)
 @pytest.mark.parametrize("name", THROWS)
 def test_order_1_before_the_first_impact(name, scheme):
@@ -136,6 +137,7 @@ def test_all_three_start_from_the_same_state():
         assert run.inertia[0] == pytest.approx(observables.initial_moment_of_inertia(throw), rel=1e-12, abs=0.0)
 
 
+@pytest.mark.arithmetic
 def test_own_formulas_of_every_package_agree_with_the_shared_definitions():
     throw = THROWS["fuller, softer"]
     for run in (

@@ -28,13 +28,15 @@ import numpy as np
 from engine_check.solver import ENGINES
 from ode_reference.models import MODELS
 from ode_reference.solver import REST_SPEED, REST_SPEED_WITH_RECOIL
-from ode_reference.steppers import METHODS
 from reports.studies.frozen import LIMITS
 from slicemodel import Bottle, Scenario
 from slicemodel.schemes import SCHEMES
 from slicemodel.trajectory import FloatArray
 
 Family = Literal["scheme", "method", "engine"]
+
+METHODS: Final = ("DOP853", "LSODA", "Radau")
+"""The methods of ``ode_reference`` that compete."""
 
 COMMON: Final = 40
 """Intervals that all runs of a throw share."""

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 
-import ode_reference.run
+import ode_reference.witness
 from ode_reference import METHODS, MODELS, solve
 from slicemodel import observables
 from slicemodel.scenario import Bottle, Scenario
@@ -48,7 +48,7 @@ def test_settings_repeat_the_run_bit_for_bit():
     np.testing.assert_array_equal(first.r, again.r)
     np.testing.assert_array_equal(first.omega, again.omega)
     assert dict(first.settings) == dict(again.settings)
-    assert first.settings["max_step"] == 0.02 / 20
+    assert first.settings["max_step"] == 1.0 / 20
 
 
 @pytest.mark.parametrize("times", [[0.0], [0.3], [0.1], [0.0, 0.3], [1e-9, 0.123456, 0.3]])
@@ -98,8 +98,7 @@ def test_a_slice_as_long_as_the_bottle_cannot_move(model):
     ids=["omega0", "drag", "gravity", "length", "slow", "short"],
 )
 def test_extreme_scenarios_end_with_a_status_and_finite_numbers(model, scenario, method, monkeypatch):
-    monkeypatch.setattr(ode_reference.run, "WATCH", 300)
-    monkeypatch.setattr(ode_reference.run, "STEP_LIMIT", 3000)
+    monkeypatch.setattr(ode_reference.witness, "WATCH", 5000)
     times = np.linspace(0, 1, 5) * scenario.duration if scenario.duration > 1e-9 else None
     found = solve(scenario, model, times, method=method)
     assert found.status in ("ok", "overflow", "stalled")
@@ -117,16 +116,14 @@ def test_overflow_is_named_and_nothing_is_returned_beyond_it(method):
 
 
 def test_a_run_in_which_time_stops_passing_is_stalled(monkeypatch):
-    monkeypatch.setattr(ode_reference.run, "WATCH", 50)
-    monkeypatch.setattr(ode_reference.run, "STEP_LIMIT", 200)
+    monkeypatch.setattr(ode_reference.witness, "WATCH", 300)
+    monkeypatch.setattr(ode_reference.witness, "LEAST_ADVANCE", 0.1)
     found = solve(SMALL, method="DOP853")
     assert found.status == "stalled"
-    assert "200 steps" in found.message
+    assert "time hardly passes after 900 evaluations" in found.message
     assert "slices of the last impacts: " in found.message
     assert 0 < len(found.t) < 1000
     assert found.t[-1] < 0.3
-    whole = solve(SMALL, method="DOP853", max_step=0.3)
-    assert whole.ok
 
 
 @pytest.mark.parametrize(
@@ -139,7 +136,7 @@ def test_a_run_in_which_time_stops_passing_is_stalled(monkeypatch):
         ({"model": None}, ["model = None"]),
         ({"model": ["eq8"]}, ["model = ['eq8']"]),
         ({"method": "radau"}, ["method = 'radau'", "did you mean 'Radau'"]),
-        ({"method": "RK23"}, ["known: taylor, DOP853, LSODA, Radau"]),
+        ({"method": "RK23"}, ["known: taylor, DOP853, RK45, LSODA, Radau"]),
         ({"rtol": 0.0}, ["rtol = 0.0", "[1e-13, 0.01]"]),
         ({"rtol": math.nan}, ["rtol = nan", "[1e-13, 0.01]"]),
         ({"rtol": "1e-9"}, ["rtol = '1e-9'"]),

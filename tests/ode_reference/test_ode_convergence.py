@@ -8,6 +8,8 @@ import pytest
 from ode_reference import solve
 from slicemodel.scenario import Scenario
 
+pytestmark = pytest.mark.arithmetic
+
 BAND = 1e-7
 """Of omega_0: what the reference promises for omega(t)."""
 
@@ -52,6 +54,43 @@ def test_step_bound_and_output_times_do_not_matter(paper_runs):
     sparse = solve(reference.scenario, times=reference.t[[0, 500, 999]])
     np.testing.assert_array_equal(sparse.omega, reference.omega[[0, 500, 999]])
     np.testing.assert_array_equal(sparse.impacts.time, reference.impacts.time)
+
+
+def test_rtol_decides_the_error():
+    """From 1e-4 to 1e-8 no step bound hides it: the error falls about as rtol does."""
+    scenario = Scenario(drag=0.0, restitution=1.0).with_slices(20)
+    times = np.linspace(0.0, 0.5, 101)
+    exact = solve(scenario, times=times, rtol=1e-13, atol=1e-15, max_step=1e-3)
+    errors = [largest_difference(solve(scenario, times=times, rtol=rtol), exact) for rtol in (1e-4, 1e-6, 1e-8, 1e-10)]
+    assert errors[0] > 3 * errors[1] > 9 * errors[2] > 27 * errors[3] > 0.0
+    assert 0.6 < np.log10(errors[0] / errors[3]) / 6 < 1.2, errors
+
+
+@pytest.mark.parametrize(
+    ("model", "changed"),
+    [
+        ("eq8", {"rtol": 1e-11}),
+        ("eq8", {"atol": 1e-7}),
+        ("eq8", {"max_step": 1e-3}),
+        ("eq8", {"rest_speed": 1e-3}),
+        ("eq8", {"method": "RK45"}),
+        ("free-flight", {"impact_law": "sequential"}),
+    ],
+)
+def test_every_setting_changes_the_result(model, changed):
+    scenario = Scenario(duration=0.4).with_slices(12)
+    assert solve(scenario, model, times=[0.4]).omega[0] != solve(scenario, model, times=[0.4], **changed).omega[0]
+
+
+def test_without_drag_the_band_holds_over_half_a_second_and_not_over_three():
+    def error(duration):
+        scenario = Scenario(drag=0.0, restitution=1.0, duration=duration).with_slices(20)
+        times = np.linspace(0.0, duration, 301)
+        fine = solve(scenario, times=times, rtol=1e-13, atol=1e-15, max_step=1e-3)
+        return largest_difference(solve(scenario, times=times), fine)
+
+    assert error(0.5) < BAND
+    assert BAND < error(3.0) < 1e-3
 
 
 @pytest.mark.parametrize(("model", "omega"), [("eq8", 6.4108), ("published-limit", 5.6380)])

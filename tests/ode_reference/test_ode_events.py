@@ -3,120 +3,148 @@
 from __future__ import annotations
 
 import math
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import ode_reference.witness
 from ode_reference import MODELS, solve
-from ode_reference.contact import Walls, resolve
-from ode_reference.events import event_release, event_wall
+from ode_reference.contact import Ends, resolve
 from ode_reference.impacts import immovable
-from ode_reference.motion import Instant, Model, Motion, Throw
+from ode_reference.motion import Model, Motion, Throw
+from ode_reference.witness import _Flight
 from slicemodel.scenario import Bottle, Scenario
 
-WALLS = Walls.between(0.1, 0.9, 1.0)
+NEVER = math.inf
+
+BLUR = 1e-14
+"""Of times at which slices of some 0.2 to 1 m/s pass an end [s]: positions near 1 m are integrated to 1e-15 m."""
 
 
-class path_of:  # noqa: N801 - reads as a function
-    """The instants of slices whose positions are given as polynomials in t, lowest power first."""
+def flight_of(*polynomials, stop, parts=1, on_base=False):
+    """A run whose slices move as polynomials in t, lowest power first, between ends at 0.1 and 0.9.
 
-    def __init__(self, *polynomials):
-        self.polynomials = polynomials
+    The tube is too heavy to feel them, so that the angle is the time; the first leg is tried in ``parts`` equal steps.
+    """
+    n = len(polynomials)
+    curvature = [np.polynomial.Polynomial(p).deriv(2) for p in polynomials]
 
-    def __call__(self, t):
-        r = np.array([p(t) for p in self.polynomials])
-        v = np.array([p.deriv()(t) for p in self.polynomials])
-        a = np.array([p.deriv(2)(t) for p in self.polynomials])
-        y = np.concatenate([[0.0], r, v])
-        n = len(self.polynomials)
-        return Instant(t, y, y[1 : n + 1], y[n + 1 :], a, math.nan)
+    def acceleration(_, theta, *__):
+        return np.array([c(float(theta)) for c in curvature])
 
-    def of_slice(self, t, i):
-        return float(self.polynomials[i](t)), float(self.polynomials[i].deriv()(t))
+    scenario = Scenario(
+        bottle=Bottle(length=1.0, mass=1e15), water_mass=0.2 * n, n_slices=n, omega0=1.0, theta0=0.0, restitution=1.0,
+        duration=stop,
+    )  # fmt: skip
+    settings = {"method": "DOP853", "rtol": 1e-3, "atol": 1e-3, "max_step": stop / parts, "rest_speed": 1e-9}
+    flight = _Flight(
+        scenario,
+        Model("made", "given", "A motion of our choice.", acceleration),
+        settings | {"impact_law": "simultaneous", "energy": False},
+        np.array([stop]),
+    )
+    start = [np.polynomial.Polynomial(p) for p in polynomials]
+    flight.y = np.array([0.0, *(p(0.0) for p in start), *(p.deriv()(0.0) for p in start)])
+    flight.length = stop / parts
+    if on_base:
+        flight.resting = np.ones(n, dtype=int)
+        flight.motion.hold(flight.resting != 0)
+    return flight
 
 
-def polynomial(*coefficients):
-    return np.polynomial.Polynomial(coefficients)
-
-
-def first_wall(path, stop, free=None):
-    start, end = path(0.0), path(stop)
-    free = np.ones(len(start.r), dtype=bool) if free is None else free
-    return event_wall(start, end, path, free, WALLS)
+def first_wall(*polynomials, stop, parts=1):
+    """Time and slice of what ends the first leg, or NEVER."""
+    flight = flight_of(*polynomials, stop=stop, parts=parts)
+    with np.errstate(all="ignore"):
+        flight._leg()
+    if not flight.counts["impacts"]:
+        assert flight.t == stop
+        return NEVER, None
+    assert flight.counts["steps"] <= parts
+    return flight.t, int(flight.impacts[0][1][0])
 
 
 def test_plain_crossing_is_located_to_round_off():
     # 0.5 + t + t^2 = 0.9
-    found = first_wall(path_of(polynomial(0.5, 1.0, 1.0)), 0.5)
-    assert found[0].t == pytest.approx((-1 + math.sqrt(2.6)) / 2, abs=2e-16)
+    assert first_wall([0.5, 1.0, 1.0], stop=0.5)[0] == pytest.approx((-1 + math.sqrt(2.6)) / 2, abs=BLUR)
 
 
-def test_dip_through_the_wall_and_back_within_one_step_is_found():
-    # Inside at both ends, beyond the base between 0.4 and 0.6.
-    path = path_of(polynomial(0.9 - 0.24, 1.0, -1.0))
-    assert path(1.0).r[0] < WALLS.high
-    assert first_wall(path, 1.0)[0].t == pytest.approx(0.4, abs=1e-15)
+@pytest.mark.parametrize("parts", [1, 2, 3])
+@pytest.mark.parametrize("stop", [1.0, 0.55])
+def test_dip_through_the_wall_is_found_whether_or_not_it_is_over_when_the_step_ends(stop, parts):
+    # Beyond the base between 0.4 and 0.6.
+    assert first_wall([0.9 - 0.24, 1.0, -1.0], stop=stop, parts=parts)[0] == pytest.approx(0.4, abs=BLUR)
+    # Beyond the cap.
+    assert first_wall([0.1 + 0.24, -1.0, 1.0], stop=stop, parts=parts)[0] == pytest.approx(0.4, abs=BLUR)
 
 
-def test_dip_that_ends_beyond_the_wall_while_returning_is_found():
-    assert first_wall(path_of(polynomial(0.9 - 0.24, 1.0, -1.0)), 0.55)[0].t == pytest.approx(0.4, abs=1e-15)
+def test_dip_behind_which_another_slice_passes_is_found():
+    # The second slice passes for good at 0.9, the first is out between 0.4 and 0.6: the foremost is found at 0.9.
+    time, who = first_wall([0.9 - 0.24, 1.0, -1.0], [0.0 + 0.495, 0.0, 0.5], stop=1.0)
+    assert (time, who) == (pytest.approx(0.4, abs=BLUR), 0)
 
 
 def test_dip_that_stops_short_of_the_wall_is_no_event():
-    assert first_wall(path_of(polynomial(0.9 - 0.24, 0.97, -1.0)), 1.0) is None
+    assert first_wall([0.9 - 0.24, 0.97, -1.0], stop=1.0)[0] == NEVER
 
 
 def test_slice_that_leaves_the_wall_is_not_found_at_the_start():
-    assert first_wall(path_of(polynomial(0.9, -1.0, 0.3)), 1.0) is None
+    assert first_wall([0.9, -1.0, 0.3], stop=1.0)[0] == NEVER
+    # Nor when another slice ends the step.
+    assert first_wall([0.9, -1.0, 0.3], [0.5, 1.0], stop=1.0) == (pytest.approx(0.4, abs=BLUR), 1)
 
 
 @pytest.mark.parametrize("speed", [1.0, 1e-3, 1e-6])
 def test_slice_that_leaves_and_returns_within_one_step_is_found_at_its_return(speed):
-    found = first_wall(path_of(polynomial(0.9, -speed, 0.5 * 40.0)), 1.0)
-    assert found[0].t == pytest.approx(2 * speed / 40.0, rel=1e-13 / speed**2 + 1e-14, abs=0.0)
+    time, _ = first_wall([0.9, -speed, 0.5 * 40.0], stop=1.0)
+    assert time == pytest.approx(2 * speed / 40.0, rel=1e-12 / speed, abs=0.0)
 
 
 def test_slice_released_at_rest_that_is_pushed_back_within_one_step_is_found_at_its_return():
     # r = 0.9 - 0.05 t^2 + t^3 is back at the base at t = 0.05, and starts there with v = 0 and a < 0.
-    assert first_wall(path_of(polynomial(0.9, 0.0, -0.05, 1.0)), 1.0)[0].t == pytest.approx(0.05, abs=1e-12)
+    assert first_wall([0.9, 0.0, -0.05, 1.0], stop=1.0)[0] == pytest.approx(0.05, abs=1e-12)
 
 
 def test_slice_that_turns_twice_within_one_step_is_found_at_its_first_contact():
     # r = 0.898 + 0.12 t (t - 0.5)^2: beyond 0.9 around t = 1/6, inside and rising at both ends of the step.
-    path = path_of(polynomial(0.898, 0.03, -0.12, 0.12))
-    assert path(0.0).v[0] > 0
-    assert path(0.6).v[0] > 0
-    assert path(0.6).r[0] < WALLS.high
     exact = min(root.real for root in np.roots([0.12, -0.12, 0.03, -0.002]) if abs(root.imag) < 1e-12)
-    assert first_wall(path, 0.6)[0].t == pytest.approx(exact, abs=1e-12)
+    assert first_wall([0.898, 0.03, -0.12, 0.12], stop=0.6)[0] == pytest.approx(exact, abs=1e-12)
 
 
 def test_the_earliest_of_several_is_returned_even_if_another_is_deeper():
-    deep, early, dip = polynomial(0.5, 0.0, 2.0), polynomial(0.8, 1.0, -0.9), polynomial(0.14, -1.0, 6.2)
-    found = first_wall(path_of(deep, early, dip), 0.9)
     times = [math.sqrt(0.2), (1 - math.sqrt(1 - 0.36)) / 1.8, (1 - math.sqrt(1 - 4 * 6.2 * 0.04)) / 12.4]
-    assert found[1] == int(np.argmin(times)) == 2
-    assert found[0].t == pytest.approx(min(times), abs=1e-15)
+    found = first_wall([0.5, 0.0, 2.0], [0.8, 1.0, -0.9], [0.14, -1.0, 6.2], stop=0.9)
+    assert found == (pytest.approx(min(times), abs=BLUR), 2)
+    assert int(np.argmin(times)) == 2
 
 
 def test_held_slices_are_not_asked():
-    assert first_wall(path_of(polynomial(0.5, 1.0, 1.0)), 0.5, np.array([False])) is None
+    flight = flight_of([0.9, 0.0, 0.5], [0.9, 0.0, 0.7], stop=0.5, on_base=True)
+    flight._leg()
+    assert (flight.t, flight.counts["impacts"]) == (0.5, 0)
+    np.testing.assert_array_equal(flight.y[1:], [0.9, 0.9, 0.0, 0.0])
 
 
-def test_slice_within_the_tolerance_beyond_the_wall_and_approaching_is_an_event_now():
-    assert first_wall(path_of(polynomial(0.9 + 1e-15, 1.0)), 0.1)[0].t == 0.0
+def test_release_is_located_where_the_end_no_longer_presses():
+    a = [0.9, 0.0, 0.5, -0.5 / 3 / 0.37]  # a = 1 - t / 0.37
+    flight = flight_of(a, stop=1.0, on_base=True)
+    flight._leg()
+    assert flight.t == pytest.approx(0.37, abs=BLUR)
+    assert flight.counts["releases"] == 1
+    short = flight_of(a, stop=0.36, on_base=True)
+    short._leg()
+    assert (short.t, short.counts["releases"]) == (0.36, 0)
 
 
-def test_release_is_located_on_the_side_where_the_end_no_longer_presses():
-    path = path_of(polynomial(0.9, 0.0, 0.5, -0.5 / 3 / 0.37))  # a = 1 - t / 0.37
-    start, end = path(0.0), path(1.0)
-    found = event_release(start, end, path, np.array([1]))
-    assert found.t == pytest.approx(0.37, abs=1e-15)
-    assert found.a[0] < 0
-    assert event_release(start, path(0.36), path, np.array([1])) is None
-    assert event_release(start, end, path, np.array([0])) is None
+def test_only_what_approaches_strikes():
+    ends = Ends(0.1, 0.9, 1e-14)
+    r = np.array([0.9, 0.9, 0.9, 0.1, 0.1, 0.1, 0.5, 0.9])
+    v = np.array([1.0, 0.0, -1.0, -1.0, 0.0, 1.0, 1.0, 1.0])
+    free = np.array([True] * 7 + [False])
+    np.testing.assert_array_equal(ends.struck(0.1, r, v, free), [1, 0, 0, -1, 0, 0, 0, 0])
 
 
 def pressed_by(values):
@@ -125,18 +153,31 @@ def pressed_by(values):
     return Motion(Throw.of(scenario), model, np.zeros(len(values), dtype=bool))
 
 
+ENDS = Ends(0.1, 0.9, 1e-14)
+
+
 def test_contacts_of_one_instant_are_resolved_together():
     motion = pressed_by([-5.0, -5.0, -5.0, 5.0, -5.0])
     y = np.array([0.0, 0.9, 0.1, 0.9, 0.5, 0.1, 2.0, -1e-6, 1e-6, 1.0, 0.0])
-    outcome = resolve(
-        motion, motion.at(0.2, y), np.array([1, -1, 1, 0, 0]), np.array([0, 0, 0, 0, -1]), WALLS, 0.5, 1e-5, immovable
-    )
+    outcome = resolve(motion, y, np.array([1, -1, 1, 0, 0]), np.array([0, 0, 0, 0, -1]), ENDS, 0.5, 1e-5, immovable)
     np.testing.assert_allclose(outcome.y[6:], [-1.0, 0.0, -5e-7, 1.0, 0.0])
     # fast: leaves; slow and pressed: rests; slow but pulled away: leaves; free; pressed on the cap: stays
     np.testing.assert_array_equal(outcome.resting, [0, -1, 0, 0, -1])
-    np.testing.assert_allclose(outcome.speed_after, [1.0, 0.0, 5e-7])
-    assert (outcome.rests, outcome.releases) == (1, 0)
     assert y[6] == 2.0
+
+
+@pytest.mark.parametrize(("push", "stays"), [(-1e-300, 0), (0.0, 1), (-0.0, 1), (1e-300, 1)])
+def test_a_slice_at_rest_stays_until_its_end_no_longer_presses(push, stays):
+    y = np.array([0.0, 0.9, 0.1, 0.0, 0.0])
+    outcome = resolve(pressed_by([push, -push]), y, np.array([0, 0]), np.array([1, -1]), ENDS, 0.5, 1e-5, immovable)
+    np.testing.assert_array_equal(outcome.resting, [stays, -stays])
+
+
+def test_an_end_found_to_let_go_lets_go_even_if_round_off_calls_it_a_push():
+    y = np.array([0.0, 0.9, 0.1, 0.0, 0.0])
+    motion, resting = pressed_by([1e-16, -1.0]), np.array([1, -1])
+    outcome = resolve(motion, y, np.array([0, 0]), resting, ENDS, 0.5, 1e-5, immovable, 1)
+    np.testing.assert_array_equal(outcome.resting, [0, -1])
 
 
 def test_resting_slice_is_released_at_once_when_an_impact_turns_the_push_around():
@@ -151,9 +192,8 @@ def test_resting_slice_is_released_at_once_when_an_impact_turns_the_push_around(
         Throw.of(scenario), Model("test", "given", "a push of our choice", acceleration), np.array([True, False])
     )
     y = np.array([0.0, 0.9, 0.9, 0.0, 4.0])
-    outcome = resolve(motion, motion.at(0.1, y), np.array([0, 1]), np.array([1, 0]), WALLS, 0.5, 1e-5, immovable)
+    outcome = resolve(motion, y, np.array([0, 1]), np.array([1, 0]), ENDS, 0.5, 1e-5, immovable)
     np.testing.assert_array_equal(outcome.resting, [0, 0])
-    assert outcome.releases == 1
 
 
 def test_first_slice_is_released_at_once_when_nothing_presses_it():
@@ -201,7 +241,9 @@ scenarios = st.builds(
 @given(scenario=scenarios, model=st.sampled_from(sorted(MODELS)), bounded=st.booleans(), integrated=st.booleans())
 def test_no_slice_is_ever_outside_and_every_impact_obeys_the_law(scenario, model, bounded, integrated):
     settings = {"method": "DOP853", "max_step": None if bounded else 0.3} if integrated else {}
-    found = solve(scenario, model, times=np.linspace(0, 0.3, 200), **settings)
+    # With e = 1 and strong drag slices hop faster and faster: a few thousand impacts of such a run are enough.
+    with patch.multiple(ode_reference.witness, WATCH=10_000, STEP_LIMIT=2_000):
+        found = solve(scenario, model, times=np.linspace(0, 0.3, 200), **settings)
     assert found.status in ("ok", "stalled")
     assert found.ok or "chatter" in found.message
     assert found.r.min() >= scenario.r_min - 1e-12
@@ -213,5 +255,6 @@ def test_no_slice_is_ever_outside_and_every_impact_obeys_the_law(scenario, model
             hits.speed_after[~stuck], scenario.restitution * hits.speed_before[~stuck], rtol=1e-14, atol=0
         )
         assert np.all(scenario.restitution * hits.speed_before[stuck] < 1e-5)
-    assert found.diagnostics["largest_snap"] < 1e-13
+    # With recoil slices that strike within a small distance of each other strike together.
+    assert found.diagnostics["largest_snap"] < (1e-12 if model == "free-flight" else 1e-13)
     np.testing.assert_allclose(found.omega * found.inertia, found.omega[0] * found.inertia[0], rtol=1e-14)

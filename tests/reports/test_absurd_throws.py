@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-import ode_reference.run
+from ode_reference.flow import layout
 from reports.solvers import catalogue, solve
 from slicemodel import Bottle, Scenario
 from slicemodel.scenario import LEAST, MOST, MOST_ANGLE
@@ -48,9 +48,8 @@ def throw_with(name, value):
 
 @pytest.fixture(autouse=True)
 def _short_runs(monkeypatch):
-    """A stiff throw is told to be stalled after a million steps; here after a thousand."""
-    monkeypatch.setattr(ode_reference.run, "STEP_LIMIT", 1000)
-    monkeypatch.setattr(ode_reference.run, "WATCH", 250)
+    """A stiff throw is told to be stalled after twenty million steps; here after a hundred thousand."""
+    monkeypatch.setattr(layout, "STEP_LIMIT", 100_000)
 
 
 def settings_of(solver, throw):

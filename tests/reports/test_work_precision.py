@@ -11,7 +11,6 @@ import pytest
 import slicemodel
 from engine_check.solver import ENGINES
 from ode_reference.models import MODELS
-from ode_reference.steppers import METHODS
 from reports.claims_work_precision import claim_work_precision
 from reports.exhibits_work_precision import (
     draw_work_precision,
@@ -27,6 +26,7 @@ from reports.studies.contenders import (
     COMPLETE,
     EQUATION_OF_SCHEME,
     FULL,
+    METHODS,
     OWN_LIMIT,
     QUICK,
     Asked,

@@ -1,0 +1,429 @@
+r"""The witness: ``scipy.integrate.solve_ivp`` over the 2N + 1 equations, stopped at every contact and started again.
+
+    |------------------ solve_ivp ------------------x            x: the terminal event that ends the leg.
+    t_0   y = [theta, r_0..r_N-1, v_0..v_N-1]       t_x          There ``contact.resolve`` makes the new state,
+                                                    |------ ...  and the next leg starts.
+
+Four events end a leg: the foremost free slice passes the base or the cap, or the push on the slices that rest on the
+base or on the cap changes sign. Four things ``solve_ivp`` does not do, and what is done about each:
+
+- It reports only the first of simultaneous events: at each stop every slice is tested for contact.
+- A leg that starts on a wall finds that wall again at its first instant: a slice that has just left an end at t_0 is
+  watched by (distance beyond the end) / (t - t_0), which has the same sign, no zero at t_0, and there the value v.
+- An event that comes and goes within one step is missed: when a leg is done, its dense output is looked through
+  (``_first_missed``), and the leg is cut at the first contact that no event reported.
+- Its ``t_eval`` drops the end of a leg: output is taken from the dense output.
+
+The program shares with the seven reduced equations the scenario, the trajectory and ``Throw``, and no other code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from ode_reference.arguments import known_name, number_above, number_within
+from ode_reference.contact import FREE, TOUCH, Ends, SideArray, resolve
+from ode_reference.energy import Ledger, nodes
+from ode_reference.impacts import LAWS, immovable
+from ode_reference.motion import Model, Motion, Throw
+from slicemodel.scenario import Scenario
+from slicemodel.trajectory import BASE, CAP, FloatArray, Impacts, Trajectory
+
+METHODS: Final = {
+    "DOP853": "explicit Runge-Kutta, order 8",
+    "RK45": "explicit Runge-Kutta, order 5",
+    "LSODA": "multistep of varying order, stiff or not",
+    "Radau": "implicit Runge-Kutta, order 5",
+}
+"""The methods of ``solve_ivp`` that are passed through."""
+
+RTOL: Final = 1e-10
+ATOL: Final = 1e-13
+
+LONGEST_TURN: Final = 1.0
+"""Longest step by default, in radians of the bottle at release."""
+
+STEP_LIMIT: Final = 1_000_000
+"""Most steps of one run, as ``max_step`` may ask for."""
+
+WATCH: Final = 200_000
+"""Evaluations of the right-hand side in which the time must advance by ``LEAST_ADVANCE`` of the duration."""
+
+LEAST_ADVANCE: Final = 1e-7
+
+PARTS: Final = 4
+"""Parts of one step between which a leg is looked through; a slice that turns twice within one part is not seen."""
+
+TOGETHER: Final = 1e-9
+"""Impacts on opposite ends that are no farther apart are counted in ``diagnostics["opposite_hits"]`` [s]."""
+
+
+def integrate(
+    scenario: Scenario,
+    model: Model,
+    *,
+    method: str = "DOP853",
+    rtol: float | None = None,
+    atol: float | None = None,
+    max_step: float | None = None,
+    rest_speed: float,
+    impact_law: str = "simultaneous",
+    energy: bool = False,
+    moments: FloatArray,
+) -> Trajectory:
+    """Return the run of ``model``; parameters and accuracy as in ``ode_reference.solve``, whose defaults these are.
+
+    Raises
+    ------
+    ValueError
+        If method, rtol, atol or max_step is not admissible.
+    """
+    duration = scenario.duration
+    if max_step is None:
+        max_step = min(max(LONGEST_TURN / abs(scenario.omega0), 1e-5 * duration), duration)
+    else:
+        max_step = number_within("max_step", max_step, duration / STEP_LIMIT, unit=" s")
+    settings = {
+        "model": model.name,
+        "rtol": number_within("rtol", RTOL if rtol is None else rtol, 1e-13, 1e-2),
+        "atol": number_above("atol", ATOL if atol is None else atol, 0.0, 1e-2),
+        "rest_speed": rest_speed,
+        "impact_law": impact_law,
+        "method": known_name("method", method, METHODS),
+        "max_step": max_step,
+        "energy": energy,
+    }
+    # Overflow is a result here, reported as a status: it must not also appear as a warning.
+    with np.errstate(all="ignore"):
+        flight = _Flight(scenario, model, settings, moments)
+        flight.integrate()
+        return flight.trajectory()
+
+
+Event = Callable[[float, FloatArray], float]
+
+Found = tuple[str, int, int | None]
+"""What ends a leg: "wall" or "release", the end, and the slice if it is known."""
+
+
+class _StandstillError(Exception):
+    """The time has ceased to pass; raised by the right-hand side, since ``solve_ivp`` cannot be stopped otherwise."""
+
+
+class _Flight:
+    """One run in progress: the state, who rests where, and what has been recorded so far."""
+
+    def __init__(self, scenario: Scenario, model: Model, settings: Mapping[str, Any], moments: FloatArray) -> None:
+        n = scenario.n_slices
+        recoil = model.switches.recoil
+        self.scenario, self.settings, self.moments, self.n = scenario, settings, moments, n
+        self.motion = Motion(Throw.of(scenario), model, np.zeros(n, dtype=bool))
+        self.law = LAWS[settings["impact_law"]] if recoil else immovable
+        self.ends = Ends.of(scenario, recoil=recoil)
+        # Ice, or a single slice as long as the tube: nothing can move.
+        self.immobile = scenario.frozen or self.ends.high - self.ends.low <= self.ends.reach
+        self.t = 0.0
+        self.y = np.concatenate([[scenario.theta0], scenario.initial_positions(), np.zeros(n)])
+        self.resting: SideArray = np.zeros(n, dtype=np.int64)
+        self.length: float | None = None
+        self.states = np.empty((len(moments), 2 * n + 1))
+        self.recorded = 0
+        self.impacts: list[tuple[NDArray[Any], ...]] = []
+        self.counts = {"steps": 0, "impacts": 0, "rests": 0, "releases": 0}
+        self.largest_snap = 0.0
+        self.ledger = Ledger(self.motion, self.y) if settings["energy"] else None
+        self.watched = (0, 0.0)
+        self.status, self.message = "ok", ""
+
+    # ------------------------------------------------------------------ the loop
+
+    def integrate(self) -> None:
+        """Advance to the duration, or to where the run must stop; ``status`` says which."""
+        duration = self.scenario.duration
+        self.motion.hold(np.full(self.n, self.immobile))
+        if self._overflowed():
+            return
+        self._record(0.0, None)
+        if not self.immobile:
+            self._meet(self.ends.touched(self.y[1 : self.n + 1]))
+        while self.status == "ok" and duration - self.t > 4 * np.spacing(duration):
+            if not self._overflowed():
+                self._leg()
+        if self.status == "ok":
+            self.states[self.recorded :] = self.y
+            self.recorded = len(self.moments)
+
+    def _leg(self) -> None:
+        """Integrate up to the first event, the duration or a failure, and resolve the event."""
+        watch = [] if self.immobile else self._events()
+        leg = self._solved([event for _, event in watch])
+        if leg is None:
+            return
+        path = leg.sol
+        self.counts["steps"] += len(leg.t) - 1
+        if path.interpolants:
+            # What the last step would have been without the event; one step a leg says nothing of how long it may be.
+            last = path.interpolants[-1]
+            self.length = float(last.t - last.t_old) * (1.5 if len(leg.t) == 2 else 1.0)
+        missed = None if self.immobile else self._first_missed(leg.t, path)
+        if missed is None:
+            end, y = float(leg.t[-1]), leg.y[:, -1].copy()
+        else:
+            end, y = missed[0], path(missed[0])
+        self._record(end, path)
+        if self.ledger is not None:
+            for begin, stop in zip(leg.t[:-1], np.minimum(leg.t[1:], end), strict=True):
+                if stop > begin:
+                    self.ledger.smooth(begin, stop, path(nodes(begin, stop)))
+        self.t, self.y = end, y
+        found = [name for (name, _), times in zip(watch, leg.t_events or [], strict=False) if len(times)]
+        if missed is not None:
+            self._meet(self._struck([missed[1]]))
+        elif found:
+            self._meet(self._struck(found), *(side for kind, side, _ in found if kind == "release"))
+        elif leg.status < 0 and not self._overflowed():
+            self._stall(leg.message)
+
+    def _solved(self, events: list[Event]) -> Any:
+        """Return what ``solve_ivp`` makes of a leg that starts now, or None if it cannot go on."""
+        options = {name: self.settings[name] for name in ("method", "rtol", "atol", "max_step")}
+        if self.length is not None and self.settings["method"] != "LSODA":  # which starts at order 1, by short steps
+            options["first_step"] = min(self.length, options["max_step"], self.scenario.duration - self.t)
+        span = self.t, self.scenario.duration
+        try:
+            return solve_ivp(self._slope, span, self.y, events=events or None, dense_output=True, **options)
+        except _StandstillError:
+            self._stall(f"time hardly passes after {self.motion.evaluations} evaluations")
+        except ValueError as error:  # the linear algebra of an implicit method refuses inf and NaN
+            self._stall(str(error))
+        return None
+
+    def _slope(self, t: float, y: FloatArray) -> FloatArray:
+        """Return dy/dt; stop the run if time has ceased to pass."""
+        count, since = self.watched
+        if self.motion.evaluations - count >= WATCH:
+            if t - since < LEAST_ADVANCE * self.scenario.duration or self.motion.evaluations > 16 * STEP_LIMIT:
+                raise _StandstillError
+            self.watched = (self.motion.evaluations, t)
+        return self.motion(t, y)
+
+    # ------------------------------------------------------------------ events
+
+    def _events(self) -> list[tuple[Found, Event]]:
+        """Return what ends a leg that starts now: what it is called, and a function that changes sign there."""
+        r, v = self.y[1 : self.n + 1], self.y[self.n + 1 :]
+        events: list[tuple[Found, Event]] = []
+        for side in (BASE, CAP):
+            leaves = ~self.motion.held & (np.abs(self.ends.beyond(side, r)) <= self.ends.reach) & (side * v <= 0)
+            events.append((("wall", side, None), self._foremost(side, np.flatnonzero(leaves))))
+            members = np.flatnonzero(self.resting == side)
+            if members.size:
+                events.append((("release", side, None), self._push(side, int(members[0]))))
+        for (kind, *_), event in events:
+            event.terminal, event.direction = True, 1.0 if kind == "wall" else -1.0  # type: ignore[attr-defined]
+        return events
+
+    def _foremost(self, side: int, leaves: NDArray[np.int64]) -> Event:
+        """Return what rises through zero when the first free slice passes the end ``side``.
+
+        It is the largest distance beyond that end, of the slices ``leaves`` divided by the time since they were on it;
+        while round-off cannot tell whether such a slice has left, its velocity does.
+        """
+        begin, held, n = self.t, self.motion.held_speeds - self.n - 1, self.n
+        blurred, least = TOUCH * self.scenario.bottle.length, float(np.finfo(np.float64).tiny)
+
+        def foremost(t: float, y: FloatArray) -> float:
+            beyond = self.ends.beyond(side, y[1 : n + 1])
+            if leaves.size:
+                distance, speed = beyond[leaves], side * y[n + 1 :][leaves]
+                still = (speed <= 0) & (distance <= blurred)
+                beyond[leaves] = np.where(still, np.minimum(speed, -least), distance / max(t - begin, least))
+            beyond[held] = -1.0
+            return float(beyond.max())
+
+        return foremost
+
+    def _push(self, side: int, member: int) -> Event:
+        """Return what falls through zero when the end ``side`` no longer presses; ``member`` speaks for all there."""
+        return lambda _, y: side * float(self.motion.acceleration(y, self.motion.free)[1][member])
+
+    def _struck(self, found: list[Found]) -> SideArray:
+        """Return the end that each free slice strikes now, the one that has been found included."""
+        free = ~self.motion.held
+        r, v = self.y[1 : self.n + 1], self.y[self.n + 1 :]
+        struck = self.ends.struck(self.t, r, v, free)
+        for kind, side, who in found:
+            if kind == "wall" and not (struck == side).any():
+                # Located there, even if round-off now calls it a hair away from contact or from approach.
+                foremost = int(np.argmax(np.where(free, self.ends.beyond(side, r), -np.inf)))
+                struck[foremost if who is None else who] = side
+        return struck
+
+    def _first_missed(self, t: FloatArray, path: Callable[[Any], FloatArray]) -> tuple[float, Found] | None:
+        """Return the first time before the end of the leg at which a slice passed an end unseen, and which did.
+
+        ``solve_ivp`` looks at events where its steps end. A slice that passes an end and is back inside by then, or
+        behind which another passes, shows between: it is beyond the end where one part of a step ends, or it turns
+        back within a part. The turning point is then located, and the passage before it.
+        """
+        n, free = self.n, ~self.motion.held
+        share = np.arange(PARTS) / PARTS
+        times = np.append((t[:-1, None] + share * np.diff(t)[:, None]).ravel(), t[-1])
+        if len(times) < 2 or not times[-1] > times[0]:
+            return None
+        states = path(times)
+        first: tuple[float, Found] | None = None
+        dt = np.diff(times)
+        for side in (BASE, CAP):
+            beyond = self.ends.beyond(side, states[1 : n + 1])
+            speed = side * states[n + 1 :]
+            # One that turns back within a part rises by less than its first speed times the part, if it bends inward
+            # all the while; twice that is on the safe side.
+            top = beyond[:, :-1] + 2 * dt * np.maximum(speed[:, :-1], 0.0)
+            turns = (speed[:, :-1] > 0) & (speed[:, 1:] < 0) & (top > self.ends.reach)
+            out = np.zeros_like(turns)
+            out[:, :-1] = beyond[:, 1:-1] > self.ends.reach
+            for i, k in np.argwhere((turns | out) & free[:, None]).tolist():
+                found = self._passage(side, i, float(times[k]), float(times[k + 1]), path)
+                if found is not None and found < t[-1] and (first is None or found < first[0]):
+                    first = found, ("wall", side, i)
+        return first
+
+    def _passage(self, side: int, i: int, a: float, b: float, path: Callable[[Any], FloatArray]) -> float | None:
+        """Return when slice ``i`` passes the end ``side`` between ``a`` and ``b``, or None if it turns back inside."""
+        foremost = self._foremost(side, np.flatnonzero(self.ends.beyond(side, self.y[1 : self.n + 1]) >= 0))
+        others = np.arange(self.n) != i
+
+        def beyond(t: float) -> float:
+            y = self.y.copy() if t == self.t else np.asarray(path(t))
+            y[1 : self.n + 1][others] = (self.ends.low + self.ends.high) / 2
+            return foremost(t, y)
+
+        def speed(t: float) -> float:
+            return side * float(path(t)[self.n + 1 + i])
+
+        if speed(a) > 0 > speed(b):
+            b = _root(speed, a, b)
+        if beyond(b) <= self.ends.reach or beyond(a) >= 0:
+            return None
+        return _root(beyond, a, b)
+
+    # ------------------------------------------------------------------ contacts and bookkeeping
+
+    def _meet(self, struck: SideArray, lets_go: int = FREE) -> None:
+        """Resolve the contacts of this instant and take over the state after them."""
+        hits = np.flatnonzero(struck)
+        r, v = self.y[1 : self.n + 1], self.y[self.n + 1 :]
+        side = struck[hits]
+        snaps = np.abs(r[hits] - np.where(side == BASE, self.ends.high, self.ends.low))
+        self.largest_snap = max(self.largest_snap, float(snaps.max(initial=0.0)))
+        outcome = resolve(
+            self.motion, self.y, struck, self.resting, self.ends, self.scenario.restitution,
+            self.settings["rest_speed"], self.law, lets_go,
+        )  # fmt: skip
+        speed, after = np.abs(v[hits]), np.abs(outcome.y[self.n + 1 :][hits])
+        real = speed > 0
+        self.impacts.append((np.full(int(real.sum()), self.t), hits[real], side[real], speed[real], after[real]))
+        self.counts["impacts"] += int(real.sum())
+        self.counts["rests"] += int(np.count_nonzero((outcome.resting != FREE) & (self.resting == FREE)))
+        self.counts["releases"] += int(np.count_nonzero((outcome.resting == FREE) & (self.resting != FREE)))
+        if self.ledger is not None:
+            self.ledger.jump("impacts", self.y, outcome.rebounded)
+            self.ledger.jump("rests", outcome.rebounded, outcome.y)
+        self.y, self.resting = outcome.y, outcome.resting
+        self.motion.hold(self.resting != FREE)
+
+    def _record(self, until: float, path: Callable[[Any], FloatArray] | None) -> None:
+        """Keep the states at the output times up to ``until``; without a path the present state."""
+        stop = int(np.searchsorted(self.moments, until, side="right"))
+        if stop > self.recorded:
+            chosen = slice(self.recorded, stop)
+            self.states[chosen] = self.y if path is None else path(self.moments[chosen]).T
+            self.recorded = stop
+
+    def _overflowed(self) -> bool:
+        """Note and return whether the state or its acceleration has left the floating-point range."""
+        if np.isfinite(self.y).all() and np.isfinite(self.motion.acceleration(self.y, self.motion.free)[1]).all():
+            return False
+        self.status = "overflow"
+        self.message = (
+            f"{self.motion.model.name}: a number exceeded the floating-point range after t = {self.t:.9g} s; "
+            f"omega0 = {self.scenario.omega0:g} rad/s, drag = {self.scenario.drag:g} kg/s and "
+            f"gravity = {self.scenario.gravity:g} m/s^2 cannot be computed together"
+        )
+        return True
+
+    def _stall(self, why: str) -> None:
+        recent = np.concatenate([slices for _, slices, *_ in self.impacts[-20:]]) if self.impacts else np.zeros(0)
+        who = ", ".join(str(int(i)) for i in np.unique(recent)) or "none"
+        self.status = "stalled"
+        self.message = (
+            f"{self.motion.model.name}: {why.rstrip('.')} at t = {self.t:.9g} s; slices of the last impacts: {who}; "
+            f"if they chatter, raise rest_speed (now {self.settings['rest_speed']:g} m/s), else check omega0, gravity "
+            "and drag"
+        )
+
+    def trajectory(self) -> Trajectory:
+        """Return what has been recorded, with omega, r_CM and J of each recorded state."""
+        n, throw = self.n, self.motion.throw
+        states = self.states[: self.recorded]
+        axis = [throw.about_centre_of_mass(y[1 : n + 1]) for y in states]
+        inertia = np.array([j for _, _, j in axis])
+        columns = zip(*self.impacts, strict=True) if self.impacts else [()] * 5
+        impacts = Impacts(*(np.concatenate([np.zeros(0), *column]) for column in columns))
+        return Trajectory(
+            scenario=self.scenario,
+            solver="ode_reference",
+            method=self.motion.model.name,
+            t=self.moments[: self.recorded],
+            theta=states[:, 0],
+            omega=throw.angular_momentum / inertia,
+            r=states[:, 1 : n + 1],
+            v=states[:, n + 1 :],
+            r_cm=np.array([r_cm for r_cm, _, _ in axis]),
+            inertia=inertia,
+            impacts=impacts,
+            status=self.status,
+            message=self.message,
+            settings=self.settings,
+            diagnostics={
+                **self.counts,
+                "evaluations": self.motion.evaluations,
+                "largest_snap": self.largest_snap,
+                "grazes": grazes(impacts, self.settings["rest_speed"]),
+                "opposite_hits": opposite_hits(impacts),
+                **({} if self.ledger is None else {"energy": self.ledger.closed(self.y)}),
+            },
+        )
+
+
+def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    """Return the zero of ``function`` between two times at which it has opposite signs, to round-off [s]."""
+    return float(brentq(function, low, high, xtol=float(np.spacing(high)), rtol=4 * float(np.finfo(np.float64).eps)))
+
+
+def grazes(impacts: Impacts, rest_speed: float) -> int:
+    """Return how many contacts were slower than the rest speed by slices that had left their last one twice as fast.
+
+    Such a contact might as well have been missed, and its time is uncertain as 1 / speed: where there is one, omega(t)
+    need not converge as fast as its settings promise. A rebound that comes back at the speed it left with is none.
+    """
+    order = np.lexsort((impacts.time, impacts.slice))
+    slices, before, after = impacts.slice[order], impacts.speed_before[order], impacts.speed_after[order]
+    same = slices[1:] == slices[:-1]
+    left = np.concatenate([[np.inf], np.where(same, after[:-1], np.inf)])[: len(before)]
+    return int(np.count_nonzero((before < rest_speed) & (left > 2 * rest_speed)))
+
+
+def opposite_hits(impacts: Impacts) -> int:
+    """Return how many instants saw both ends struck; impacts no more than ``TOGETHER`` apart share an instant."""
+    if len(impacts) == 0:
+        return 0
+    begins = np.concatenate([[0], np.flatnonzero(np.diff(impacts.time) > TOGETHER) + 1])
+    return int(np.count_nonzero(np.minimum.reduceat(impacts.end, begins) != np.maximum.reduceat(impacts.end, begins)))
