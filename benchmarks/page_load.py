@@ -13,7 +13,7 @@ from pathlib import Path
 
 from playwright.sync_api import Page, sync_playwright
 
-from reports.pdf import require_browser
+from flipproof.page.pdf import require_browser
 
 VISITS = 7
 SECONDS = 3.0

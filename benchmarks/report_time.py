@@ -28,7 +28,7 @@ def measure(arguments: list[str]) -> dict[str, Any]:
     """Return wall seconds, also stage by stage, and peak memory [MiB] of one report, and its exit status."""
     with tempfile.TemporaryDirectory() as scratch:
         environment = {**os.environ, "NUMBA_CACHE_DIR": f"{scratch}/numba", "MPLCONFIGDIR": f"{scratch}/matplotlib"}
-        command = [sys.executable, "-m", "reports.cli", "report", *arguments, "--out", f"{scratch}/report"]
+        command = [sys.executable, "-m", "flipproof", "report", *arguments, "--out", f"{scratch}/report"]
         began = time.perf_counter()
         status = subprocess.run(command, cwd=ROOT, env=environment, stdout=subprocess.DEVNULL, check=False).returncode
         seconds = time.perf_counter() - began

@@ -63,7 +63,7 @@ times = [0.0, 0.025, 0.05]
 
 def start(design: Path, out: Path, *arguments: str) -> subprocess.Popen[str]:
     """Start a sweep in a session of its own."""
-    command = [sys.executable, "-m", "reports.cli", "sweep", str(design), "--out", str(out), *arguments]
+    command = [sys.executable, "-m", "flipproof", "sweep", str(design), "--out", str(out), *arguments]
     pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     return subprocess.Popen(command, cwd=ROOT, start_new_session=True, **pipes)
 

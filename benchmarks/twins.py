@@ -22,8 +22,8 @@ from statistics import median
 
 from tqdm import tqdm
 
-from reports.fit.problem import ALSO, EVENT_SLICES, SCHEME_SLICES, is_scheme
-from reports.fit.twins import CAMERA_NOISE, RANGES, RATE, Twin, fit_twin
+from flipproof.film.fit.problem import ALSO, EVENT_SLICES, SCHEME_SLICES, is_scheme
+from flipproof.film.fit.twins import CAMERA_NOISE, RANGES, RATE, Twin, fit_twin
 
 NEEDED = 0.90
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from reports.build import Report, build
-from reports.evidence import QUICK, Evidence, gather, with_slices
-from reports.instruments import WITNESSES
-from reports.provenance import provenance
-from reports.studies import contenders
+from flipproof.build import Report, build
+from flipproof.evidence import QUICK, Evidence, gather, with_slices
+from flipproof.instruments import WITNESSES
+from flipproof.output.provenance import provenance
+from flipproof.studies import contenders
 from slicemodel import Scenario
 
 

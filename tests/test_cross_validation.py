@@ -6,9 +6,9 @@ import pytest
 import engine_check
 import ode_reference
 import slicemodel
-from reports import claims
-from reports.evidence import LIMITS
-from reports.studies.step_size import before_first_impact, plan_step_size, study_step_size
+from flipproof import claims
+from flipproof.evidence import LIMITS
+from flipproof.studies.step_size import before_first_impact, plan_step_size, study_step_size
 from slicemodel import Bottle, Scenario, observables
 
 # Other bottles, fillings, angles, spins and restitutions; each shifts the phase of every impact.

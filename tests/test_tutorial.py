@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from reports.cli import main
+from flipproof.cli.main import main
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "tutorial.md"
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from reports.build import write
-from reports.pdf import VARIABLE, find_browser
+from flipproof.build import write
+from flipproof.page.pdf import VARIABLE, find_browser
 
 HERE = Path(__file__).parent
 AXE = Path(os.environ.get("FLIPPROOF_AXE", HERE / "node_modules" / "axe-core" / "axe.min.js"))

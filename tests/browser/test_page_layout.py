@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from reports.pdf import print_page
+from flipproof.page.pdf import print_page
 
 PAPER = (695, 1013)
 """A4 within the margins of the style sheet, in pixels."""

@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from reports.page import CONTENTS
+from flipproof.page.render import CONTENTS
 
 LARGEST = 5e6
 """Bytes of the whole page, the validity maps of a full report included."""

@@ -162,7 +162,7 @@ def test_nan_and_absence_are_differences():
 def test_a_missing_mujoco_says_what_to_install():
     code = (
         "import sys; sys.modules['mujoco'] = None\n"
-        "from reports.solvers import Run, make; from slicemodel import Scenario\n"
+        "from flipproof.frame.solvers import Run, make; from slicemodel import Scenario\n"
         "made = make(Run('m', 'mujoco', Scenario().with_slices(2), {'dt': 1e-4}))\n"
         "assert made.trajectory is None; print(made.reason)"
     )

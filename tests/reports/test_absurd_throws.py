@@ -5,8 +5,8 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from flipproof.frame.solvers import catalogue, solve
 from ode_reference.flow import layout
-from reports.solvers import catalogue, solve
 from slicemodel import Bottle, Scenario
 from slicemodel.scenario import LEAST, MOST, MOST_ANGLE
 

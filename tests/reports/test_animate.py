@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from reports.animate import HOLD, FilmError, check_target, film_of, frame_durations, plan_film, write_film
-from reports.cli_animate import add_animate, chosen_solvers
-from reports.figures.film import draw_frames, outline, slice_corners
-from reports.motion import FLOWN
+from flipproof.animate import HOLD, FilmError, check_target, film_of, frame_durations, plan_film, write_film
+from flipproof.cli.animate import add_animate, chosen_solvers
+from flipproof.figures.film import draw_frames, outline, slice_corners
+from flipproof.page.motion import FLOWN
 from slicemodel import Scenario, Trajectory
 
 THROW = Scenario().with_slices(4)

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import pytest
 
-from reports import check as check_module
-from reports.check import CHECKS, check, line
-from reports.cli_check import GROUPS, add_checks
-from reports.findings import Finding
-from reports.solvers import Made
-from reports.solvers import make as really_make
-from reports.summary import summary_text
+from flipproof.check import throw as check_module
+from flipproof.check.throw import CHECKS, check, line
+from flipproof.cli.check import GROUPS, add_checks
+from flipproof.frame.findings import Finding
+from flipproof.frame.solvers import Made
+from flipproof.frame.solvers import make as really_make
+from flipproof.output.summary import summary_text
 from slicemodel import Scenario
 
 pytestmark = pytest.mark.xdist_group("check")

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from reports import cli
+from flipproof.cli import main as cli
 
 
 def run(capsys, *arguments):

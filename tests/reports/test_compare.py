@@ -6,9 +6,9 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
-from reports import cli
-from reports.comparison import claims, compare, table
-from reports.tables import Curve, read_curve
+from flipproof.check.comparison import claims, compare, table
+from flipproof.cli import main as cli
+from flipproof.output.tables import Curve, read_curve
 
 TRACK = """t,theta,omega,omega_band,r_cm,measured,in_flight,t_over_T
 0,,,,,1,0,

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from reports import cli, console
-from reports.console import readable, speak_plainly
+from flipproof.cli import console
+from flipproof.cli import main as cli
+from flipproof.cli.console import readable, speak_plainly
 
 ROOT = Path(__file__).resolve().parents[2]
 SNAPSHOT = ROOT / "reports" / "snapshot" / "summary.json"
@@ -19,7 +20,7 @@ SNAPSHOT = ROOT / "reports" / "snapshot" / "summary.json"
 
 def flipproof(place, *arguments, encoding="ascii", **settings):
     return subprocess.run(
-        [sys.executable, "-m", "reports.cli", *map(str, arguments)],
+        [sys.executable, "-m", "flipproof", *map(str, arguments)],
         cwd=place, env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": encoding}, capture_output=True,
         text=True, encoding="utf-8", errors="replace", timeout=120, check=False, **settings,
     )  # fmt: skip
@@ -123,18 +124,18 @@ def test_an_endless_scenario_ends_at_once(tmp_path, place):
     assert not (tmp_path / "sweep").exists()
 
 
-@pytest.mark.parametrize("module", ["reports.cli", "reports.start"])
+@pytest.mark.parametrize("module", ["flipproof.cli.main", "flipproof.cli.start"])
 def test_an_interrupt_while_the_program_loads_is_one_line(tmp_path, module):
     """Python itself must have started: what it says before it reads the program is its own."""
-    run = "from reports.start import entry; print('here', flush=True); entry()"
-    start = ["-c", run] if module == "reports.start" else ["-X", "importtime", "-m", module]
+    run = "from flipproof.cli.start import entry; print('here', flush=True); entry()"
+    start = ["-c", run] if module == "flipproof.cli.start" else ["-X", "importtime", "-m", module]
     for wait in (0.0, 0.05, 0.2, 0.5, 1.0):
         process = subprocess.Popen(
             [sys.executable, *start, "simulate", "--solver", "eq8", "--slices", "3", "--out", "out.csv"],
             cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
             text=True,
         )  # fmt: skip
-        if module == "reports.start":
+        if module == "flipproof.cli.start":
             assert process.stdout.readline() == "here\n"
         else:
             while "argparse" not in process.stderr.readline():  # imported after the guard

@@ -12,22 +12,23 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
-from reports import evidence as evidence_module
-from reports import instruments, pool, solvers
-from reports.attribution import Scope
-from reports.cli_check import add_checks
-from reports.columns import curves_csv
-from reports.diff import Change, change_of, compare_summaries, read_summary, scenario_changes, within
-from reports.diff_page import read_curves
-from reports.evaluation import evaluate
-from reports.evidence import QUICK, with_slices
-from reports.figures.report_pair import differences, figure_report_pair
-from reports.findings import Finding
-from reports.instruments import Bench
-from reports.provenance import provenance
-from reports.studies.horizon import Reach
-from reports.studies.stability import Layout
-from reports.summary import solver_rows, summarise, summary_text
+from flipproof import evidence as evidence_module
+from flipproof import instruments
+from flipproof.attribution import Scope
+from flipproof.check.diff import Change, change_of, compare_summaries, read_summary, scenario_changes, within
+from flipproof.check.diff_page import read_curves
+from flipproof.cli.check import add_checks
+from flipproof.evaluation import evaluate
+from flipproof.evidence import QUICK, with_slices
+from flipproof.figures.report_pair import differences, figure_report_pair
+from flipproof.frame import pool, solvers
+from flipproof.frame.findings import Finding
+from flipproof.instruments import Bench
+from flipproof.output.columns import curves_csv
+from flipproof.output.provenance import provenance
+from flipproof.output.summary import solver_rows, summarise, summary_text
+from flipproof.studies.horizon import Reach
+from flipproof.studies.stability import Layout
 from slicemodel import Scenario, schemes
 from slicemodel import solver as slice_solver
 

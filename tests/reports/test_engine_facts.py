@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from reports.claims_engines import claim_engine_fact
-from reports.exhibits_engines import draw_gallery
-from reports.figures.engines import figure_gallery
-from reports.solvers import Made, make
-from reports.studies import engine_worlds as worlds
-from reports.studies.engine_facts import plan_engine_facts, study_engine_facts
+from flipproof.claims_engines import claim_engine_fact
+from flipproof.exhibits_engines import draw_gallery
+from flipproof.figures.engines import figure_gallery
+from flipproof.frame.solvers import Made, make
+from flipproof.studies import engine_worlds as worlds
+from flipproof.studies.engine_facts import plan_engine_facts, study_engine_facts
 from slicemodel import Scenario
 
 PYMUNK = (

@@ -8,8 +8,9 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from reports import explore
-from reports.explore import (
+from flipproof.frame.solvers import make
+from flipproof.page import explore
+from flipproof.page.explore import (
     GRID,
     MISSING_RUNG,
     OMEGA_STEP,
@@ -24,10 +25,9 @@ from reports.explore import (
     pack,
     plan,
 )
-from reports.solvers import make
-from reports.studies.validity import LADDER, RUNGS
-from reports.sweep.planned import Row
-from reports.templating import environment
+from flipproof.page.templating import environment
+from flipproof.studies.validity import LADDER, RUNGS
+from flipproof.sweep.planned import Row
 from slicemodel import Scenario
 from slicemodel.observables import plateau
 
@@ -37,7 +37,7 @@ ROUND_OFF = 1e-6
 """Last bits may differ between versions of NumPy and SciPy. Where restitution is at most 0.5 a relative change of 1e-13
 at release moved free flight by less than 1e-12 omega_0; at 0.9 by up to 1.4e-3, so these throws are not drawn here."""
 
-ASSETS = files("reports") / "assets"
+ASSETS = files("flipproof.page") / "assets"
 
 
 @pytest.fixture(scope="module")
@@ -239,7 +239,7 @@ def test_the_template_is_whole_and_holds_what_the_script_looks_for(read_page):
 def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
     (tmp_path / explore.FILE).write_text('{"version": 99}', encoding="utf-8")
     monkeypatch.setattr(explore, "files", lambda _package: tmp_path)
-    with pytest.raises(ValueError, match=r"version = 99 is not 1; run python -m reports\.explore"):
+    with pytest.raises(ValueError, match=r"version = 99 is not 1; run python -m flipproof\.page\.explore"):
         explore.load()
     (tmp_path / explore.FILE).unlink()
     assert explore.load() is None

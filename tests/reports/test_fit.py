@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 import ode_reference
-from reports.cli_fit import add_fit
-from reports.fit.compare import compare, promise, told, verdict
-from reports.fit.estimate import THOROUGH, estimate, scan
-from reports.fit.landscape import HUBER, Landscape, loss
-from reports.fit.problem import ALWAYS, FAR, Measurement, Problem, first_frames, noise_of, pose, predict
-from reports.fit.reading import Averaged, read_flight
-from reports.fit.sampling import Points, cool, roughness
-from reports.fit.temperature import autocovariance, temperature
-from reports.fit.twins import film
-from reports.fit.uncertainty import correlation, intervals
-from reports.tracker.kinematics import angle
+from flipproof.cli.fit import add_fit
+from flipproof.film.fit.compare import compare, promise, told, verdict
+from flipproof.film.fit.estimate import THOROUGH, estimate, scan
+from flipproof.film.fit.landscape import HUBER, Landscape, loss
+from flipproof.film.fit.problem import ALWAYS, FAR, Measurement, Problem, first_frames, noise_of, pose, predict
+from flipproof.film.fit.reading import Averaged, read_flight
+from flipproof.film.fit.sampling import Points, cool, roughness
+from flipproof.film.fit.temperature import autocovariance, temperature
+from flipproof.film.fit.twins import film
+from flipproof.film.fit.uncertainty import correlation, intervals
+from flipproof.film.tracker.kinematics import angle
 from slicemodel import Scenario
 
 CUT = Scenario().with_slices(20)

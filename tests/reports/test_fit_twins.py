@@ -7,9 +7,9 @@ from statistics import median
 import numpy as np
 import pytest
 
-from reports.fit.estimate import SPARING
-from reports.fit.twins import CAMERA_NOISE, RANGES, draw_truth, film, film_table, fit_twin
-from reports.tracker.kinematics import angle
+from flipproof.film.fit.estimate import SPARING
+from flipproof.film.fit.twins import CAMERA_NOISE, RANGES, draw_truth, film, film_table, fit_twin
+from flipproof.film.tracker.kinematics import angle
 from slicemodel import Scenario
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reports.figures.frozen import figure_frozen
-from reports.figures.style import draw
-from reports.solvers import make
-from reports.studies.frozen import LIMITS, QUANTITIES, plan_frozen, study_frozen
+from flipproof.figures.frozen import figure_frozen
+from flipproof.figures.style import draw
+from flipproof.frame.solvers import make
+from flipproof.studies.frozen import LIMITS, QUANTITIES, plan_frozen, study_frozen
 from slicemodel import Bottle, Scenario
 
 THROW = Scenario().with_slices(20)

@@ -9,16 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from reports.claims import claim_finite_step
-from reports.evidence import BY_ENGINE, EQ8_FREE, PROGRAM_EQ8, TOTAL
-from reports.headlines import MEASURES, Headline, headlines
-from reports.lead import amount, lead_words, sentences, signed
-from reports.snapshot import BEGIN, END, PLACE, README, front_page, write_front_page
-from reports.studies.differences import percent
-from reports.studies.finite_step import EVERYTHING, HELD, LOCATED, WAYS
-from reports.studies.slices import FINER
-from reports.studies.waterfall import STEP
-from reports.verdict import LABELS, answer, tiles
+from flipproof.claims import claim_finite_step
+from flipproof.evidence import BY_ENGINE, EQ8_FREE, PROGRAM_EQ8, TOTAL
+from flipproof.output.snapshot import BEGIN, END, PLACE, README, front_page, write_front_page
+from flipproof.page.headlines import MEASURES, Headline, headlines
+from flipproof.page.lead import amount, lead_words, sentences, signed
+from flipproof.page.verdict import LABELS, answer, tiles
+from flipproof.studies.differences import percent
+from flipproof.studies.finite_step import EVERYTHING, HELD, LOCATED, WAYS
+from flipproof.studies.slices import FINER
+from flipproof.studies.waterfall import STEP
 
 pytestmark = pytest.mark.xdist_group("evidence")
 
@@ -139,7 +139,7 @@ def test_the_page_shows_the_same_tiles_and_lead(report):
 
 
 def test_the_readme_says_what_the_snapshot_found(kept):
-    """``python -m reports.snapshot`` writes both."""
+    """``python -m flipproof.output.snapshot`` writes both."""
     _, _, rest = README.read_text(encoding="utf-8").partition(BEGIN)
     assert rest.partition(END)[0].strip() == front_page(kept).strip()
 

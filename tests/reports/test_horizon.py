@@ -9,12 +9,12 @@ import pytest
 from engine_check import PymunkKnobs
 from engine_check.pymunk_settings import insertion_order
 from engine_check.pymunk_world import build
-from reports.claims_engines import claim_angle, claim_horizon, claim_order_of_bodies
-from reports.exhibits_engines import draw_horizon, draw_instruments
-from reports.figures.engines import figure_horizon
-from reports.instruments import Instruments
-from reports.solvers import Made, make, solve
-from reports.studies.horizon import FULL, QUICK, Reach, plan_horizon, study_ensemble, study_horizon
+from flipproof.claims_engines import claim_angle, claim_horizon, claim_order_of_bodies
+from flipproof.exhibits_engines import draw_horizon, draw_instruments
+from flipproof.figures.engines import figure_horizon
+from flipproof.frame.solvers import Made, make, solve
+from flipproof.instruments import Instruments
+from flipproof.studies.horizon import FULL, QUICK, Reach, plan_horizon, study_ensemble, study_horizon
 from slicemodel import Scenario, Trajectory
 
 THROW = Scenario(duration=0.1)

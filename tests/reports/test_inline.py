@@ -7,8 +7,8 @@ from xml.etree import ElementTree
 import pytest
 from matplotlib.figure import Figure
 
-from reports.figures.style import draw
-from reports.inline import DIGITS, compact_svg, data_uri, shape
+from flipproof.figures.style import draw
+from flipproof.page.inline import DIGITS, compact_svg, data_uri, shape
 
 
 @pytest.fixture(scope="module")

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from engine_check.solver import DEFAULT_TOLERANCE
-from reports import instruments
-from reports.build import build
-from reports.evidence import REFERENCE
-from reports.instruments import plan_witnesses, study_instruments, witnesses
-from reports.provenance import provenance
-from reports.solvers import Made, make
+from flipproof import instruments
+from flipproof.build import build
+from flipproof.evidence import REFERENCE
+from flipproof.frame.solvers import Made, make
+from flipproof.instruments import plan_witnesses, study_instruments, witnesses
+from flipproof.output.provenance import provenance
 
 pytestmark = pytest.mark.xdist_group("evidence")
 

@@ -14,18 +14,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reports import cli
-from reports.solvers import make
-from reports.studies.validity import CURVE, LADDER, RUNGS, study_map
-from reports.studies.waterfall import OBSERVABLES, study_waterfall
-from reports.sweep.design import design_of
-from reports.sweep.errors import SweepError
-from reports.sweep.local import Workers
-from reports.sweep.planned import design_of_runs, read_runs
-from reports.sweep.split import ENDS, plan_split, split_rows, waterfall_csv
-from reports.sweep.store import Store
-from reports.sweep.validity_map import Plan, map_csv, map_facts
-from reports.sweep.work import code_identity, make_batch
+from flipproof.cli import main as cli
+from flipproof.frame.solvers import make
+from flipproof.studies.validity import CURVE, LADDER, RUNGS, study_map
+from flipproof.studies.waterfall import OBSERVABLES, study_waterfall
+from flipproof.sweep.design import design_of
+from flipproof.sweep.errors import SweepError
+from flipproof.sweep.local import Workers
+from flipproof.sweep.planned import design_of_runs, read_runs
+from flipproof.sweep.split import ENDS, plan_split, split_rows, waterfall_csv
+from flipproof.sweep.store import Store
+from flipproof.sweep.validity_map import Plan, map_csv, map_facts
+from flipproof.sweep.work import code_identity, make_batch
 from slicemodel import Scenario
 
 pytestmark = pytest.mark.xdist_group("map")
@@ -117,7 +117,7 @@ def test_a_map_killed_midway_goes_on_to_the_rows_and_the_picture_of_an_undisturb
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     options = ["map", "--axis", "gamma", "--size", "5x4", "--slices", "3", "--jobs", "1"]
     process = subprocess.Popen(
-        [sys.executable, "-m", "reports.cli", *options, "--out", tmp_path / "killed"],
+        [sys.executable, "-m", "flipproof", *options, "--out", tmp_path / "killed"],
         cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
     )  # fmt: skip
     while process.poll() is None and not stored(tmp_path / "killed"):
@@ -131,7 +131,7 @@ def test_a_map_killed_midway_goes_on_to_the_rows_and_the_picture_of_an_undisturb
     assert status == 0
     assert f"; {there} were there\ncells by largest step down the ladder: " in out
     with monkeypatch.context() as patch:
-        patch.setattr("reports.sweep.command.local_workers", lambda _: nullcontext(Workers(**HERE)))
+        patch.setattr("flipproof.sweep.command.local_workers", lambda _: nullcontext(Workers(**HERE)))
         assert run(capsys, *options, "--out", tmp_path / "whole")[0] == 0
     assert stored(tmp_path / "killed") == stored(tmp_path / "whole")
     for name in ("map.svg", "map.png", "map.csv", "map.json"):
@@ -152,12 +152,12 @@ def stored(folder):
 
 
 def test_a_finished_map_is_only_drawn_again(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("reports.sweep.command.local_workers", lambda _: nullcontext(Workers(**HERE)))
+    monkeypatch.setattr("flipproof.sweep.command.local_workers", lambda _: nullcontext(Workers(**HERE)))
     options = ["map", "--axis", "restitution", "--size", "2x2", "--slices", "2", "--out", tmp_path / "out"]
     assert run(capsys, *options)[0] == 0
     drawn = (tmp_path / "out" / "map.svg").read_bytes()
     (tmp_path / "out" / "map.svg").unlink()
-    monkeypatch.setattr("reports.sweep.command.local_workers", None)
+    monkeypatch.setattr("flipproof.sweep.command.local_workers", None)
     status, out, err = run(capsys, *options, "--export", tmp_path / "out" / "rows.csv")
     assert (status, err) == (0, "")
     assert "; 36 were there" in out
@@ -254,7 +254,7 @@ def test_a_waterfall_s_run_that_is_not_whole_is_named(split):
 
 
 def test_the_waterfall_command_draws_every_observable(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("reports.sweep.command.local_workers", lambda _: nullcontext(Workers(**HERE)))
+    monkeypatch.setattr("flipproof.sweep.command.local_workers", lambda _: nullcontext(Workers(**HERE)))
     (tmp_path / "throw.toml").write_text("[scenario]\nduration = 0.05\n")
     options = ["waterfall", tmp_path / "throw.toml", "--slices", "1", "--out", tmp_path / "out"]
     status, out, err = run(capsys, *options, "--quiet")
@@ -288,7 +288,7 @@ def test_every_mistake_is_one_line_and_status_2(capsys, tmp_path, arguments, wor
 
 
 def test_another_throw_does_not_go_on_in_the_same_folder(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("reports.sweep.command.local_workers", lambda _: nullcontext(Workers(**HERE)))
+    monkeypatch.setattr("flipproof.sweep.command.local_workers", lambda _: nullcontext(Workers(**HERE)))
     options = ["map", "--axis", "step", "--size", "2x2", "--out", tmp_path / "out"]
     assert run(capsys, *options, "--slices", "1")[0] == 0
     status, _, err = run(capsys, *options, "--slices", "2")

@@ -9,7 +9,8 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from reports.motion import (
+from flipproof.frame.solvers import Made, Run
+from flipproof.page.motion import (
     FRAMES,
     MOST_SLICES,
     POSITION_STEP,
@@ -19,13 +20,12 @@ from reports.motion import (
     frame_times,
     motion_data,
 )
-from reports.solvers import Made, Run
-from reports.templating import environment
+from flipproof.page.templating import environment
 from slicemodel import Bottle, Scenario, Trajectory
 from slicemodel.trajectory import Impacts
 
 THROW = Scenario(theta0=0.7, launch_velocity=(0.6, 1.8), duration=0.4).with_slices(5)
-ASSETS = files("reports") / "assets"
+ASSETS = files("flipproof.page") / "assets"
 
 
 def flown(name="eq8", scenario=THROW, points=400, end=None, status="ok", impacts=None):

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from reports.output import UNFINISHED, check_replaceable, replaced_folder, write_text
-from reports.ownership import MARKER, OutputError
+from flipproof.output.folder import UNFINISHED, check_replaceable, replaced_folder, write_text
+from flipproof.output.ownership import MARKER, OutputError
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -162,7 +162,7 @@ def test_folders_of_similar_names_are_nobodys_business(tmp_path):
 def test_two_writers(tmp_path):
     """The second is told who is the first, and touches nothing."""
     target = tmp_path / "latest"
-    code = "import sys; from pathlib import Path; from reports.output import replaced_folder\n"
+    code = "import sys; from pathlib import Path; from flipproof.output.folder import replaced_folder\n"
     code += "with replaced_folder(Path(sys.argv[1]), 'report') as f: print('in', flush=True); input()"
     first = subprocess.Popen(
         [sys.executable, "-c", code, str(target)], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -185,7 +185,7 @@ def test_many_writers_never_write_at_once(tmp_path):
     code = """
 import os, sys, time
 from pathlib import Path
-from reports.output import OutputError, replaced_folder
+from flipproof.output.folder import OutputError, replaced_folder
 target, inside = Path(sys.argv[1]), Path(sys.argv[2])
 done = 0
 while done < 30:
@@ -253,7 +253,7 @@ def test_an_interrupted_report_leaves_the_old_one(tmp_path, number):
     with replaced_folder(target, "report") as folder:
         make_report(folder, "old")
     process = subprocess.Popen(
-        [sys.executable, "-m", "reports.cli", "report", "--quick", "--out", str(target)],
+        [sys.executable, "-m", "flipproof", "report", "--quick", "--out", str(target)],
         cwd=ROOT,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

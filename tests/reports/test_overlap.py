@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reports.figures.overlap import figure_overlap
-from reports.figures.style import draw
-from reports.solvers import Made, make
-from reports.studies.overlap import CHECK, COARSER, EXCLUDE, PASS, plan_overlap, study_overlap
+from flipproof.figures.overlap import figure_overlap
+from flipproof.figures.style import draw
+from flipproof.frame.solvers import Made, make
+from flipproof.studies.overlap import CHECK, COARSER, EXCLUDE, PASS, plan_overlap, study_overlap
 from slicemodel import Scenario, Trajectory
 
 THROW = Scenario().with_slices(50)

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from reports.evidence import FLIGHTS
-from reports.page import CONTENTS, PLACES, read_assets, render, sort_problems, unbroken
-from reports.pdf import VARIABLE, PrintError, find_browser, print_page, require_browser
-from reports.provenance import provenance
-from reports.solvers import Made
-from reports.summary import solver_rows
-from reports.verdict import strips
+from flipproof.evidence import FLIGHTS
+from flipproof.frame.solvers import Made
+from flipproof.output.provenance import provenance
+from flipproof.output.summary import solver_rows
+from flipproof.page.pdf import VARIABLE, PrintError, find_browser, print_page, require_browser
+from flipproof.page.render import CONTENTS, PLACES, read_assets, render, sort_problems, unbroken
+from flipproof.page.verdict import strips
 
 pytestmark = pytest.mark.xdist_group("evidence")
 
@@ -94,7 +94,7 @@ def test_without_a_browser_printing_says_what_to_install(monkeypatch, tmp_path):
         require_browser()
     monkeypatch.delenv(VARIABLE)
     monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.setattr("reports.pdf.BROWSERS", ("chromium",))
+    monkeypatch.setattr("flipproof.page.pdf.BROWSERS", ("chromium",))
     with pytest.raises(PrintError, match="--pdf needs Chromium, Chrome or Edge"):
         require_browser()
 

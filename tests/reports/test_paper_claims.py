@@ -8,20 +8,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reports.paper import claim, claim_runs, claims_landing, claims_throw, observe
-from reports.paper.cases import FAMILIES, all_cases, family
-from reports.paper.claim import Claim, judge
-from reports.paper.claim_runs import ClaimRuns, gather_claims, plan_further, plan_halved, plan_published
-from reports.paper.claims import CLAIMS, STEADY, claim_weight_slows_the_tenth, judge_all
-from reports.paper.claims_cost import many_steps_key, same_steps_key
-from reports.paper.claims_model import finest_key
-from reports.paper.observe import Flights, MissingFlightError
-from reports.paper.parameters import numbers, paper_throw
-from reports.paper.runs import BANDS, FULL, PUBLISHED, REPORT, SOLVERS, PaperRuns, plan_paper, scenario_of
-from reports.paper.statements import OMEGA, Reading
-from reports.paper.verdicts import judge_paper
-from reports.solvers import Run, make
-from reports.templating import environment
+from flipproof.frame.solvers import Run, make
+from flipproof.page.templating import environment
+from flipproof.paper import claim, claim_runs, claims_landing, claims_throw, observe
+from flipproof.paper.cases import FAMILIES, all_cases, family
+from flipproof.paper.claim import Claim, judge
+from flipproof.paper.claim_runs import ClaimRuns, gather_claims, plan_further, plan_halved, plan_published
+from flipproof.paper.claims import CLAIMS, STEADY, claim_weight_slows_the_tenth, judge_all
+from flipproof.paper.claims_cost import many_steps_key, same_steps_key
+from flipproof.paper.claims_model import finest_key
+from flipproof.paper.observe import Flights, MissingFlightError
+from flipproof.paper.parameters import numbers, paper_throw
+from flipproof.paper.runs import BANDS, FULL, PUBLISHED, REPORT, SOLVERS, PaperRuns, plan_paper, scenario_of
+from flipproof.paper.statements import OMEGA, Reading
+from flipproof.paper.verdicts import judge_paper
 from slicemodel import Trajectory
 from slicemodel.observables import centre_of_mass, plateau
 

@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reports.paper import experiment
-from reports.paper.cases import ICE, family
-from reports.paper.claim_runs import ClaimRuns
-from reports.paper.experiment import OBSERVATIONS, Comparison, Observation, agreement, closest_overall, compare
-from reports.paper.observe import Flights
-from reports.paper.parameters import paper_throw
-from reports.paper.runs import PUBLISHED, REPORT, SOLVERS, PaperRuns
-from reports.paper.statements import Reading
-from reports.solvers import Made, Run
+from flipproof.frame.solvers import Made, Run
+from flipproof.paper import experiment
+from flipproof.paper.cases import ICE, family
+from flipproof.paper.claim_runs import ClaimRuns
+from flipproof.paper.experiment import OBSERVATIONS, Comparison, Observation, agreement, closest_overall, compare
+from flipproof.paper.observe import Flights
+from flipproof.paper.parameters import paper_throw
+from flipproof.paper.runs import PUBLISHED, REPORT, SOLVERS, PaperRuns
+from flipproof.paper.statements import Reading
 from slicemodel import Trajectory
 
 BY_ID = {observation.id: observation for observation in OBSERVATIONS}

@@ -13,15 +13,15 @@ from functools import partial
 import numpy as np
 import pytest
 
-from reports import cli_paper
-from reports.output import OutputError
-from reports.paper import gallery
-from reports.paper.cases import HALF_FULL, family
-from reports.paper.costs import Cost
-from reports.paper.figures import FIGURES, ORDER, check_figures, exhibits_paper, keys_of
-from reports.paper.figures_bottle import tipping
-from reports.paper.figures_panels import Axis, Grid, Line, Panel, figure_grid, ranked, stretched, table_grid
-from reports.paper.runs import PUBLISHED, SOLVERS, PaperSize, gather_paper
+from flipproof.cli import paper as cli_paper
+from flipproof.output.folder import OutputError
+from flipproof.paper import gallery
+from flipproof.paper.cases import HALF_FULL, family
+from flipproof.paper.costs import Cost
+from flipproof.paper.figures import FIGURES, ORDER, check_figures, exhibits_paper, keys_of
+from flipproof.paper.figures_bottle import tipping
+from flipproof.paper.figures_panels import Axis, Grid, Line, Panel, figure_grid, ranked, stretched, table_grid
+from flipproof.paper.runs import PUBLISHED, SOLVERS, PaperSize, gather_paper
 from slicemodel.observables import plateau_of_points, static_toppling_angle, toppling_angle
 
 pytestmark = pytest.mark.xdist_group("paper-figures")

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import slicemodel
-from reports import vectors
-from reports.paper import cases, parameters, runs, tables
-from reports.paper.cases import FAMILIES, HALF_FULL, all_cases, bottle_of_aspect, family
-from reports.paper.examples import EXAMPLES
-from reports.paper.parameters import CHOSEN, PARAMETERS, number, numbers, paper_throw
-from reports.paper.runs import FULL, PUBLISHED, REPORT, SOLVERS, plan_paper, scenario_of
+from flipproof import vectors
+from flipproof.paper import cases, parameters, runs, tables
+from flipproof.paper.cases import FAMILIES, HALF_FULL, all_cases, bottle_of_aspect, family
+from flipproof.paper.examples import EXAMPLES
+from flipproof.paper.parameters import CHOSEN, PARAMETERS, number, numbers, paper_throw
+from flipproof.paper.runs import FULL, PUBLISHED, REPORT, SOLVERS, plan_paper, scenario_of
 from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass_at_rest
 

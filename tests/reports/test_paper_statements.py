@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from reports.paper.claims import CLAIMS
-from reports.paper.statements import Judgement, Reading, Statement
+from flipproof.paper.claims import CLAIMS
+from flipproof.paper.statements import Judgement, Reading, Statement
 
 
 @pytest.mark.parametrize(

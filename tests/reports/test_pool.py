@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from reports import pool
-from reports.pool import TRIES, make_all, workers
-from reports.processes import WorkerDiedError
-from reports.solvers import Run
+from flipproof.frame import pool
+from flipproof.frame.pool import TRIES, make_all, workers
+from flipproof.frame.processes import WorkerDiedError
+from flipproof.frame.solvers import Run
 from slicemodel import Scenario
 
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reports.figures.events import figure_predictability
-from reports.figures.style import draw
-from reports.solvers import make, solve
-from reports.studies.differences import study_difference
-from reports.studies.predictability import (
+from flipproof.figures.events import figure_predictability
+from flipproof.figures.style import draw
+from flipproof.frame.solvers import make, solve
+from flipproof.studies.differences import study_difference
+from flipproof.studies.predictability import (
     SIZES,
     fit_growth,
     plan_predictability,

@@ -18,24 +18,26 @@ from pathlib import Path
 import pytest
 from jsonschema import validate
 
-from reports import build as build_module
-from reports import claims, cli, pool
-from reports import evidence as evidence_module
-from reports.evaluation import evaluate
-from reports.evidence import (
+from flipproof import build as build_module
+from flipproof import claims
+from flipproof import evidence as evidence_module
+from flipproof.cli import main as cli
+from flipproof.evaluation import evaluate
+from flipproof.evidence import (
     CHECK,
     DIFFERENCES,
     ENGINE,
     FLIGHTS,
     OTHER_SCHEMES,
 )
-from reports.exhibit import FEW, drawn
-from reports.exhibits import draw_all
-from reports.figures.style import Drawing
-from reports.ownership import MARKER, marker_text
-from reports.page import typeset
-from reports.pool import make_all, workers
-from reports.solvers import Made, Run, make
+from flipproof.exhibits import draw_all
+from flipproof.figures.style import Drawing
+from flipproof.frame import pool
+from flipproof.frame.exhibit import FEW, drawn
+from flipproof.frame.pool import make_all, workers
+from flipproof.frame.solvers import Made, Run, make
+from flipproof.output.ownership import MARKER, marker_text
+from flipproof.page.render import typeset
 from slicemodel import Scenario
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -145,8 +147,8 @@ def test_every_figure_can_be_sent_to_a_worker(evidence):
 
 
 def test_axes_carry_units(evidence):
-    from reports.figures import flights as drawn
-    from reports.figures import numerics
+    from flipproof.figures import flights as drawn
+    from flipproof.figures import numerics
 
     flights = [evidence.trajectory(tag) for tag in FLIGHTS]
     made = [
@@ -170,8 +172,8 @@ def test_axes_carry_units(evidence):
 
 
 def test_the_same_data_draw_the_same_bytes(evidence):
-    from reports.figures.flights import figure_omega
-    from reports.figures.style import draw
+    from flipproof.figures.flights import figure_omega
+    from flipproof.figures.style import draw
 
     flights = [evidence.trajectory(tag) for tag in FLIGHTS]
     first, second = (draw(figure_omega(flights)) for _ in range(2))
@@ -335,7 +337,7 @@ def test_the_real_command_from_a_cold_start(tmp_path):
     scenario = tmp_path / "throw.toml"
     scenario.write_text("[scenario]\nwater_mass = 0.3\nn_slices = 12\ndrag = 0.25\nrestitution = 0.4\n")
     result = subprocess.run(
-        [sys.executable, "-m", "reports.cli", "report", str(scenario), "--quick", "--out", str(tmp_path / "out")],
+        [sys.executable, "-m", "flipproof", "report", str(scenario), "--quick", "--out", str(tmp_path / "out")],
         cwd=ROOT,
         env={**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
         capture_output=True,

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from reports.output import UNFINISHED
+from flipproof.output.folder import UNFINISHED
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -21,9 +21,9 @@ SPEC.loader.exec_module(sweep_kill)
 STAND_IN = """
 import sys
 from pathlib import Path
-from reports.output import replaced_folder
-from reports.pool import make_all, workers
-from reports.solvers import Run
+from flipproof.output.folder import replaced_folder
+from flipproof.frame.pool import make_all, workers
+from flipproof.frame.solvers import Run
 from slicemodel import Scenario
 
 if __name__ == "__main__":
@@ -83,6 +83,6 @@ def test_a_small_report_killed_three_times(tmp_path):
 def test_ten_kills_of_a_report(tmp_path):
     (tmp_path / "place").mkdir()
     target = tmp_path / "place" / "latest"
-    command = [sys.executable, "-m", "reports.cli", "report", "--quick", "--slices", "4", "--out", str(target)]
+    command = [sys.executable, "-m", "flipproof", "report", "--quick", "--slices", "4", "--out", str(target)]
     chance = random.Random(int(os.environ.get("FLIPPROOF_SEED", "1")))
     assert kill_and_finish(command, target, [chance.uniform(0.2, 8.0) for _ in range(10)]) >= 5

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import slicemodel
+from flipproof.frame.solvers import make
+from flipproof.studies.waterfall import NAMES, STEP, plan_waterfall, study_waterfall
 from ode_reference import combinations, motion, run, solver
-from reports.solvers import make
-from reports.studies.waterfall import NAMES, STEP, plan_waterfall, study_waterfall
 from slicemodel import Scenario
 
 TESTS = Path(__file__).resolve().parents[1]

@@ -7,11 +7,11 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from reports import snapshot
-from reports.check import check
-from reports.diff import read_summary
-from reports.snapshot import KEPT, PICTURES, PLACE, main, take
-from reports.summary import SUMMARY_VERSION, schema_text, summary_text
+from flipproof.check.diff import read_summary
+from flipproof.check.throw import check
+from flipproof.output import snapshot
+from flipproof.output.snapshot import KEPT, PICTURES, PLACE, main, take
+from flipproof.output.summary import SUMMARY_VERSION, schema_text, summary_text
 from slicemodel import Scenario
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -116,7 +116,7 @@ def test_a_report_with_a_failed_claim_is_no_snapshot(report, tmp_path, kept):
 
 
 def test_without_a_folder_it_makes_the_report_itself(report, tmp_path, monkeypatch):
-    from reports import cli
+    from flipproof.cli import main as cli
 
     asked = []
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reports.claims_engines import claim_default_iterations_explode, claim_rule_of_iterations, claim_whole_and_wrong
-from reports.exhibits_engines import draw_stability
-from reports.figures.engines import COLOURS, SIGNS, figure_stability
-from reports.solvers import Made, make
-from reports.studies.stability import (
+from flipproof.claims_engines import claim_default_iterations_explode, claim_rule_of_iterations, claim_whole_and_wrong
+from flipproof.exhibits_engines import draw_stability
+from flipproof.figures.engines import COLOURS, SIGNS, figure_stability
+from flipproof.frame.solvers import Made, make
+from flipproof.studies.stability import (
     FULL,
     GRADES,
     QUICK,

@@ -7,15 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from reports import claims
-from reports.attribution import plan_attribution
-from reports.evidence import FULL, LADDER, plan, run_bands
-from reports.findings import Finding
-from reports.solvers import Made, Run
-from reports.studies.differences import first_crossing, study_difference
-from reports.studies.ice import study_ice
-from reports.studies.slices import study_slices
-from reports.studies.step_size import PHASES, levels, observed_order, study_step_size
+from flipproof import claims
+from flipproof.attribution import plan_attribution
+from flipproof.evidence import FULL, LADDER, plan, run_bands
+from flipproof.frame.findings import Finding
+from flipproof.frame.solvers import Made, Run
+from flipproof.studies.differences import first_crossing, study_difference
+from flipproof.studies.ice import study_ice
+from flipproof.studies.slices import study_slices
+from flipproof.studies.step_size import PHASES, levels, observed_order, study_step_size
 from slicemodel import Impacts, Scenario, Trajectory
 
 SCENARIO = Scenario(n_slices=1)

@@ -10,10 +10,10 @@ import jsonschema
 import numpy as np
 import pytest
 
-from reports.columns import columns_csv, curves_csv, rows_csv
-from reports.findings import Finding
-from reports.junit import junit_text
-from reports.summary import SUMMARY_VERSION, json_ready, schema_text, summarise, summary_text
+from flipproof.frame.findings import Finding
+from flipproof.output.columns import columns_csv, curves_csv, rows_csv
+from flipproof.output.junit import junit_text
+from flipproof.output.summary import SUMMARY_VERSION, json_ready, schema_text, summarise, summary_text
 
 SCHEMA = json.loads(schema_text())
 

@@ -11,16 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reports import cli
-from reports.sweep.damaged import POINT, _records, count, rows
-from reports.sweep.design import design_of
-from reports.sweep.errors import SweepError
-from reports.sweep.export import export
-from reports.sweep.files import TEMPORARY
-from reports.sweep.salvage import salvage
-from reports.sweep.schema import PAGE, columns
-from reports.sweep.store import Store, read_curves
-from reports.sweep.work import Outcome, Returned, code_identity
+from flipproof.cli import main as cli
+from flipproof.sweep.damaged import POINT, _records, count, rows
+from flipproof.sweep.design import design_of
+from flipproof.sweep.errors import SweepError
+from flipproof.sweep.export import export
+from flipproof.sweep.files import TEMPORARY
+from flipproof.sweep.salvage import salvage
+from flipproof.sweep.schema import PAGE, columns
+from flipproof.sweep.store import Store, read_curves
+from flipproof.sweep.work import Outcome, Returned, code_identity
 
 TEXT = """
 [scenario]

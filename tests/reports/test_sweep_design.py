@@ -8,10 +8,10 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from reports.sweep.axes import KINDS, Choices, Range, read_axes
-from reports.sweep.design import MOST_POINTS, design_of, from_parameters, latin_shares, read_design
-from reports.sweep.entries import try_entries
-from reports.sweep.errors import SweepError
+from flipproof.sweep.axes import KINDS, Choices, Range, read_axes
+from flipproof.sweep.design import MOST_POINTS, design_of, from_parameters, latin_shares, read_design
+from flipproof.sweep.entries import try_entries
+from flipproof.sweep.errors import SweepError
 from slicemodel import Bottle, Scenario, ScenarioError
 
 GRID = """

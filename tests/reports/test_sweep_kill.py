@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from reports import cli
-from reports.solvers import solve
-from reports.sweep.design import from_parameters, read_design
+from flipproof.cli import main as cli
+from flipproof.frame.solvers import solve
+from flipproof.sweep.design import from_parameters, read_design
 from slicemodel.observables import plateau
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -71,9 +71,8 @@ def test_a_sweep_killed_again_and_again_ends_with_the_rows_of_an_undisturbed_one
 
 
 def test_a_worker_does_not_outlive_a_killed_parent_even_in_a_long_call():
-    code = (
-        "import time; from reports.processes import Processes; p = Processes(1); f = p.submit(time.time); f.result();"
-    )
+    code = "import time; from flipproof.frame.processes import Processes; p = Processes(1);"
+    code += "f = p.submit(time.time); f.result();"
     code += "p.submit(time.sleep, 1000); print('ready', flush=True); time.sleep(1000)"
     process = subprocess.Popen(
         [sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.PIPE, text=True, start_new_session=True
@@ -141,7 +140,7 @@ def test_a_disk_that_takes_no_more_ends_the_sweep_in_one_line(undisturbed, tmp_p
     design, out = undisturbed
     # No file may grow beyond 100 kB: SQLite meets an error in the middle of a transaction.
     code = (
-        "import resource, sys; from reports.cli import entry; "
+        "import resource, sys; from flipproof.cli.main import entry; "
         "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, resource.RLIM_INFINITY)); entry()"
     )
     command = [sys.executable, "-c", code, "sweep", str(design), "--out", str(tmp_path / "out"), "--jobs", "1"]
@@ -233,7 +232,7 @@ def test_every_mistake_is_one_line_and_status_2(undisturbed, capsys, tmp_path, a
 
 
 def test_nobody_at_the_address_is_one_line(undisturbed, capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("reports.sweep.cluster.CONNECT", 0.5)
+    monkeypatch.setattr("flipproof.sweep.cluster.CONNECT", 0.5)
     design, _ = undisturbed
     status, _, err = run(capsys, design, "--out", tmp_path / "out", "--dask", "tcp://127.0.0.1:1")
     assert status == 2
@@ -244,7 +243,7 @@ def test_dask_that_is_not_installed_is_one_line(undisturbed, capsys, tmp_path, m
     def missing(name):
         raise ModuleNotFoundError(name=name)
 
-    monkeypatch.setattr("reports.sweep.cluster.import_module", missing)
+    monkeypatch.setattr("flipproof.sweep.cluster.import_module", missing)
     design, _ = undisturbed
     status, _, err = run(capsys, design, "--out", tmp_path / "out", "--dask", "tcp://127.0.0.1:1")
     assert status == 2

@@ -8,14 +8,14 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 
 import pytest
 
-from reports.processes import Processes, WorkerDiedError
-from reports.sweep import run
-from reports.sweep.design import design_of
-from reports.sweep.errors import SweepError
-from reports.sweep.local import Workers, local_workers
-from reports.sweep.run import DEATHS_IN_A_ROW, GROWTH, LONE_DEATHS, MOST_BYTES, Pace, run_sweep
-from reports.sweep.store import Store
-from reports.sweep.work import Outcome, Returned
+from flipproof.frame.processes import Processes, WorkerDiedError
+from flipproof.sweep import run
+from flipproof.sweep.design import design_of
+from flipproof.sweep.errors import SweepError
+from flipproof.sweep.local import Workers, local_workers
+from flipproof.sweep.run import DEATHS_IN_A_ROW, GROWTH, LONE_DEATHS, MOST_BYTES, Pace, run_sweep
+from flipproof.sweep.store import Store
+from flipproof.sweep.work import Outcome, Returned
 
 CODE = "0.1.0+test"
 

@@ -11,15 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reports.ownership import MARKER, marker_text
-from reports.sweep import export as exporting
-from reports.sweep.design import design_of
-from reports.sweep.errors import SweepError
-from reports.sweep.export import LEFT_OUT, check_export, export
-from reports.sweep.files import whole_file
-from reports.sweep.schema import columns
-from reports.sweep.store import Store
-from reports.sweep.work import OUTCOMES, Outcome, Returned, code_identity, make_batch, make_point
+from flipproof.output.ownership import MARKER, marker_text
+from flipproof.sweep import export as exporting
+from flipproof.sweep.design import design_of
+from flipproof.sweep.errors import SweepError
+from flipproof.sweep.export import LEFT_OUT, check_export, export
+from flipproof.sweep.files import whole_file
+from flipproof.sweep.schema import columns
+from flipproof.sweep.store import Store
+from flipproof.sweep.work import OUTCOMES, Outcome, Returned, code_identity, make_batch, make_point
 
 TEXT = """
 [scenario]
@@ -138,7 +138,7 @@ def test_a_mistake_in_a_solver_is_a_row(monkeypatch):
     def broken(*_):
         raise TypeError("a mistake")
 
-    monkeypatch.setattr("reports.sweep.work.make", broken)
+    monkeypatch.setattr("flipproof.sweep.work.make", broken)
     outcome = make_point(design().point(0))
     assert (outcome.status, outcome.reason) == ("failed", "TypeError: a mistake")
 
@@ -245,7 +245,7 @@ def test_no_row_without_its_flight(tmp_path, monkeypatch):
 
     made = design(TEXT.replace('design = "grid"', 'design = "grid"\ntrajectories = true'))
     with Store(tmp_path, made, CODE) as store:
-        monkeypatch.setattr("reports.sweep.files.os.replace", full)
+        monkeypatch.setattr("flipproof.sweep.files.os.replace", full)
         with pytest.raises(SweepError, match="No space left on device"):
             store.add([returned(make_point(made.point(0), keep=True))])
         assert sum(store.done()) == 0

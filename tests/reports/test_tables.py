@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import slicemodel
-from reports.tables import read_curve, trajectory_csv
+from flipproof.output.tables import read_curve, trajectory_csv
 from slicemodel import Scenario
 
 

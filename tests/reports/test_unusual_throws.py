@@ -5,14 +5,14 @@ import json
 
 import pytest
 
-from reports import evidence as evidence_module
-from reports.attribution import Scope
-from reports.build import build
-from reports.evidence import QUICK, with_slices
-from reports.instruments import Bench
-from reports.provenance import provenance
-from reports.studies.horizon import Reach
-from reports.studies.stability import Layout
+from flipproof import evidence as evidence_module
+from flipproof.attribution import Scope
+from flipproof.build import build
+from flipproof.evidence import QUICK, with_slices
+from flipproof.instruments import Bench
+from flipproof.output.provenance import provenance
+from flipproof.studies.horizon import Reach
+from flipproof.studies.stability import Layout
 from slicemodel import Scenario
 
 SMALL_BENCH = Bench(

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reports.figures.style import draw
-from reports.figures.validity import figure_map
-from reports.solvers import Made, Run, make
-from reports.studies.validity import COARSE, EXTRA, LADDER, RUNGS, SCHEMES, SETS, cells, plan_map, study_map, vary
+from flipproof.figures.style import draw
+from flipproof.figures.validity import figure_map
+from flipproof.frame.solvers import Made, Run, make
+from flipproof.studies.validity import COARSE, EXTRA, LADDER, RUNGS, SCHEMES, SETS, cells, plan_map, study_map, vary
 from slicemodel import Scenario, Trajectory
 
 THROW = Scenario().with_slices(6)

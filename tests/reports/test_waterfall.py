@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from flipproof.studies import waterfall
+from flipproof.studies.waterfall import NAMES, OBSERVABLES, canonical, plan_waterfall, study_waterfall
 from ode_reference.switches import Switches
-from reports.studies import waterfall
-from reports.studies.waterfall import NAMES, OBSERVABLES, canonical, plan_waterfall, study_waterfall
 from slicemodel import Scenario, Trajectory
 
 THROW = Scenario(n_slices=1)

@@ -10,16 +10,16 @@ import pytest
 
 import slicemodel
 from engine_check.solver import ENGINES
-from ode_reference.models import MODELS
-from reports.claims_work_precision import claim_work_precision
-from reports.exhibits_work_precision import (
+from flipproof.claims_work_precision import claim_work_precision
+from flipproof.exhibits_work_precision import (
     draw_work_precision,
     summarise_work_precision,
     tabulate_work_precision,
 )
-from reports.figures.work_precision import figure_work_precision
-from reports.solvers import Made, Run, make
-from reports.studies.contenders import (
+from flipproof.figures.work_precision import figure_work_precision
+from flipproof.frame.solvers import Made, Run, make
+from flipproof.frame.timing import at_times, make_all_timed, make_timed, sampled
+from flipproof.studies.contenders import (
     AT_REST,
     CASES,
     COMMON,
@@ -35,7 +35,7 @@ from reports.studies.contenders import (
     contenders,
     left_out,
 )
-from reports.studies.work_precision import (
+from flipproof.studies.work_precision import (
     Price,
     gather_work_precision,
     plan_work_precision,
@@ -43,7 +43,7 @@ from reports.studies.work_precision import (
     study_work_precision,
     work_of,
 )
-from reports.timing import at_times, make_all_timed, make_timed, sampled
+from ode_reference.models import MODELS
 from slicemodel import Scenario, Trajectory
 from slicemodel.schemes import SCHEMES
 
@@ -185,7 +185,7 @@ CASE = Case(name="made-up", title="made up", scenario=Scenario(n_slices=2))
 
 def studied(monkeypatch, errors, floor=1e-9, spoiled=None):
     """Return the curve that the study makes of a scheme with these errors at 40, 80, 160 ... steps."""
-    from reports.studies import work_precision
+    from flipproof.studies import work_precision
 
     rival = Contender(
         name="exact-step",

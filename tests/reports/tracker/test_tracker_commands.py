@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reports.cli_tracker import add_tracker
-from reports.tracker.bench import Request, measure
-from reports.tracker.page import COLUMNS
-from reports.tracker.reader import read_track_table
+from flipproof.cli.tracker import add_tracker
+from flipproof.film.tracker.bench import Request, measure
+from flipproof.film.tracker.page import COLUMNS
+from flipproof.film.tracker.reader import read_track_table
 from slicemodel import Scenario
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "tracker"
@@ -316,7 +316,7 @@ def test_export_to_standard_output(capsys):
     ],
 )
 def test_refusals_of_export(arguments, words, monkeypatch):
-    monkeypatch.setattr("reports.solvers.solve", lambda *_: pytest.fail("solved before the refusal"))
+    monkeypatch.setattr("flipproof.frame.solvers.solve", lambda *_: pytest.fail("solved before the refusal"))
     with pytest.raises(ValueError, match=words):
         run("export", "--solver", "exact-step", "--slices", 5, *arguments)
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import ode_reference
-from reports.tracker.calibration import check, check_gravity
-from reports.tracker.kinematics import omega_from_tracks
-from reports.tracker.moments import NoFlightError, find_flight
-from reports.tracker.parabola import distance_from_cap, fit_axis, fit_track
-from reports.tracker.synthetic import synthetic_video, with_noise
-from reports.tracker.table import Track, TrackTable
+from flipproof.film.tracker.calibration import check, check_gravity
+from flipproof.film.tracker.kinematics import omega_from_tracks
+from flipproof.film.tracker.moments import NoFlightError, find_flight
+from flipproof.film.tracker.parabola import distance_from_cap, fit_axis, fit_track
+from flipproof.film.tracker.synthetic import synthetic_video, with_noise
+from flipproof.film.tracker.table import Track, TrackTable
 from slicemodel import Scenario
 
 G = 9.81

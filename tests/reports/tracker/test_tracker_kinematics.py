@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import savgol_filter
 
-from reports.tracker.angles import check_angles
-from reports.tracker.kinematics import angle, frame_grid, omega_from_tracks
-from reports.tracker.smoothing import apply, central_difference, interpolation, local_polynomial, moving_average
-from reports.tracker.table import Track, TrackTable
+from flipproof.film.tracker.angles import check_angles
+from flipproof.film.tracker.kinematics import angle, frame_grid, omega_from_tracks
+from flipproof.film.tracker.smoothing import apply, central_difference, interpolation, local_polynomial, moving_average
+from flipproof.film.tracker.table import Track, TrackTable
 
 LENGTH = 0.28
 

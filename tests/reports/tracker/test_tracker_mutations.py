@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from reports.tracker.reader import read_track_table
-from reports.tracker.table import TrackFileError
+from flipproof.film.tracker.reader import read_track_table
+from flipproof.film.tracker.table import TrackFileError
 
 SEEDS = range(200)
 

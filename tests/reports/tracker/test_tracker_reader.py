@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from reports.tracker.export import STYLES, tracker_number, tracker_text
-from reports.tracker.headings import stated_unit
-from reports.tracker.reader import read_track_table
-from reports.tracker.table import METRES, TrackFileError, column_name
+from flipproof.film.tracker.export import STYLES, tracker_number, tracker_text
+from flipproof.film.tracker.headings import stated_unit
+from flipproof.film.tracker.reader import read_track_table
+from flipproof.film.tracker.table import METRES, TrackFileError, column_name
 
 TABS = "#multi:\n\tcap\t\tbase\t\t\nt\tx\ty\tx\ty\t\n0.0\t1\t2\t3\t4\n4.1E-3\t5\t6\t\t\n8.3E-3\t7\t8\t9\t1.5\n"
 

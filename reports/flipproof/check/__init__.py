@@ -1,0 +1,1 @@
+"""A throw held to a report, two reports held together, two solvers compared."""

@@ -1,0 +1,160 @@
+"""Two curves of one throw, compared in numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flipproof.frame.findings import Finding
+from flipproof.output.tables import QUANTITIES, Curve
+from flipproof.studies.differences import PARTING_BAND, first_crossing
+from slicemodel.observables import plateau
+from slicemodel.trajectory import FloatArray
+
+SYMBOLS = {"omega": "omega", "theta": "theta", "r_cm": "r_CM"}
+SAME = 1e-12
+"""Relative difference of two times that printing and reading them explains."""
+
+UNITS = {"omega": "rad/s", "theta": "rad", "r_cm": "m"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Apart:
+    """How far two curves are apart in one quantity, at the first one's times up to where the shorter one ends.
+
+    Parameters
+    ----------
+    t : (P,) [s]
+    first, second : (P,) - both curves
+    scale : what differences are divided by: omega at the first time, 1 for other quantities
+    interpolated : times at which the second curve has no value of its own
+    """
+
+    quantity: str
+    t: FloatArray
+    first: FloatArray
+    second: FloatArray
+    scale: float
+    interpolated: int
+
+    @property
+    def size(self) -> FloatArray:
+        """Absolute difference over the scale, shape (P,)."""
+        return np.abs(self.second - self.first) / abs(self.scale)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """Two curves, and how far they are apart in every quantity that both have."""
+
+    first: str
+    second: str
+    apart: tuple[Apart, ...]
+    notes: tuple[str, ...]
+
+
+def compare(first: Curve, second: Curve) -> Comparison:
+    """Compare two curves; omega is taken relative to the first curve's initial value.
+
+    Raises
+    ------
+    ValueError
+        If the two have no quantity or no times in common, or the first starts without spin.
+    """
+    both = [name for name in QUANTITIES if name in first.series and name in second.series]
+    if not both:
+        have = " and ".join(f"{curve.label} has {', '.join(curve.series)}" for curve in (first, second))
+        raise ValueError(f"nothing can be compared: {have}")
+    notes = [*first.notes, *second.notes]
+    for name in QUANTITIES:
+        without = [curve.label for curve in (first, second) if name not in curve.series]
+        if without:
+            notes.append(f"{SYMBOLS[name]} is not compared: {' and '.join(without)} has no values of it")
+    return Comparison(
+        first=first.label,
+        second=second.label,
+        apart=tuple(_apart(name, first, second) for name in both),
+        notes=tuple(notes),
+    )
+
+
+def _apart(quantity: str, first: Curve, second: Curve) -> Apart:
+    (t, values), (times, others) = first.series[quantity], second.series[quantity]
+    if times[0] > t[-1] or t[0] > times[-1]:
+        raise ValueError(f"{first.label} and {second.label} have no common time")
+    scale = float(values[0]) if quantity == "omega" else 1.0
+    if scale == 0.0:
+        raise ValueError(f"{first.label}: omega is 0 at the first time; differences are taken relative to it")
+    # At an event a curve has a value before it and one after it, and each is compared with its like.
+    begins, ends = np.diff(t, prepend=-np.inf) > 0, np.diff(t, append=np.inf) > 0
+    kept = (begins | ends) & (t >= times[0]) & (t <= times[-1])
+    if kept.sum() < 2:
+        raise ValueError(f"{first.label} has {kept.sum()} times within those of {second.label}; at least 2 are needed")
+    t, values, after = t[kept], values[kept], ends[kept]
+    near = SAME * max(abs(times[0]), abs(times[-1]))
+    before, behind = np.searchsorted(times, t - near, "left"), np.searchsorted(times, t + near, "right") - 1
+    own = before <= behind
+    found = np.where(after, others[behind], others[np.minimum(before, len(times) - 1)])
+    found[~own] = np.interp(t[~own], times, others)
+    return Apart(
+        quantity=quantity, t=t, first=values, second=found, scale=scale, interpolated=int((~own).sum())
+    )  # fmt: skip
+
+
+def table(found: Comparison) -> str:
+    """Return the comparison as lines of text."""
+    width = max(len(found.first), len(found.second), 12)
+    lines = [*found.notes, _times(found), f"{'':34}{found.first:>{width}}  {found.second:>{width}}  difference"]
+
+    def row(words: str, numbers: tuple[float, float]) -> None:
+        a, b = numbers
+        lines.append(f"{words:34}{a:{width}.5f}  {b:{width}.5f}  {b - a:+.5f}")
+
+    for one in found.apart:
+        row(f"{SYMBOLS[one.quantity]}({one.t[-1]:.4g} s) [{UNITS[one.quantity]}]", (one.first[-1], one.second[-1]))
+        if one.quantity == "omega":
+            a, b = (plateau(one.t, values, one.scale) for values in (one.first, one.second))
+            row("omega/omega_0, mean of second half", (a, b))
+    for one in found.apart:
+        k = int(one.size.argmax())
+        size = (
+            f"{one.size[k]:.3%} of omega_0" if one.quantity == "omega" else f"{one.size[k]:.3g} {UNITS[one.quantity]}"
+        )
+        lines.append(f"largest |difference in {SYMBOLS[one.quantity]}|: {size} at t = {one.t[k]:.5g} s")
+        if one.quantity == "omega":
+            parting = first_crossing(one.t, one.size, PARTING_BAND)
+            words = "never" if parting is None else f"{parting:.5g} s"
+            lines.append(f"first more than {PARTING_BAND:.0%} of omega_0 apart: {words}")
+    return "\n".join(lines)
+
+
+def _times(found: Comparison) -> str:
+    """Return at which times the two are compared, and how often one of them is interpolated."""
+    counts = {(len(one.t), one.interpolated) for one in found.apart}
+    most, interpolated = max(counts)
+    if not any(between for _, between in counts):
+        return f"compared at {most} times that both have; nothing is interpolated"
+    return (
+        f"compared at {most} times of {found.first}; {found.second} is interpolated linearly at {interpolated} of them"
+    )
+
+
+def claims(found: Comparison, tolerance: float) -> tuple[Finding, ...]:
+    """Return the largest differences as findings; the first quantity is held to the tolerance, others are observed."""
+    made = []
+    for one in found.apart:
+        k = int(one.size.argmax())
+        held = one is found.apart[0]
+        made.append(
+            Finding(
+                id=f"compare-{one.quantity.replace('_', '-')}",
+                title=f"largest difference in {SYMBOLS[one.quantity]} between {found.first} and {found.second}",
+                value=float(one.size[k]),
+                unit="of omega_0" if one.quantity == "omega" else UNITS[one.quantity],
+                kind="regression" if held else "observation",
+                admissible=(0.0, tolerance) if held else (-np.inf, np.inf),
+                note=f"at t = {one.t[k]:.6g} s",
+            )
+        )
+    return tuple(made)

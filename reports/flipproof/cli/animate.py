@@ -1,0 +1,84 @@
+"""The command ``flipproof animate``: the flights as GIF or MP4."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any, Final
+
+from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, read_scenario
+
+SLICES: Final = 50
+DEFAULT_OUT: Final = Path("flips.gif")
+
+
+def add_animate(commands: Any) -> None:
+    """Add the command."""
+    animate = add_command(commands, "animate", "Write the flights, side by side, as GIF or MP4.", command_animate)
+    animate.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
+    animate.add_argument("--solvers", metavar="A,B,C", help="see 'flipproof models' (default: those of the report)")
+    animate.add_argument(
+        "--out", type=Path, default=DEFAULT_OUT, metavar="FILE", help="file.gif or file.mp4 (%(default)s)"
+    )
+    animate.add_argument(
+        "--slow", type=float, default=9.6, metavar="X", help="times slower than the flight (%(default)s)"
+    )
+    animate.add_argument("--fps", type=count, default=25, metavar="N", help="frames per second (%(default)s)")
+    animate.add_argument("--slices", type=count, metavar="N", help=f"slices (default {SLICES}, or the file's if fewer)")
+    animate.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def command_animate(options: argparse.Namespace) -> int:
+    """Throw the bottles and write the film."""
+    scenario = read_scenario(options.scenario)
+    throw = scenario.with_slices(options.slices or min(SLICES, scenario.n_slices))
+    from flipproof.animate import check_target, film_of, plan_film, write_film
+    from flipproof.page.motion import FLOWN
+
+    check_target(options.out)
+    times = plan_film(throw, options.slow, options.fps)
+    names = chosen_solvers(options.solvers, FLOWN)
+
+    from tqdm import tqdm
+
+    from flipproof.frame.solvers import solve
+
+    hide = True if options.quiet else None
+    runs = []
+    for name in tqdm(names, desc="throwing", unit="bottle", disable=hide, leave=False):
+        run = solve(name, throw)
+        if len(run.t) < 2:
+            raise ValueError(f"--solvers {name}: nothing to show on this throw: {run.status}: {run.message}")
+        runs.append(run)
+    film = film_of(runs, times, fps=options.fps, slow=options.slow)
+    with tqdm(total=len(times), desc="drawing", unit="frame", disable=hide, leave=False) as bar:
+
+        def step(drawn: int, _frames: int) -> None:
+            bar.update(drawn - bar.n)
+
+        write_film(film, options.out, step)
+    seconds = throw.duration * options.slow
+    print(f"{options.out}: {len(times)} frames, {len(runs)} bottles, {seconds:.1f} s ({options.slow:g} times slower)")
+    return 0
+
+
+def chosen_solvers(text: str | None, usual: tuple[str, ...]) -> list[str]:
+    """Return the solvers that ``--solvers`` names, or the usual ones.
+
+    Raises
+    ------
+    ValueError
+        If one is unknown or named twice, or if they are too many to stand side by side.
+    """
+    if text is None:
+        return list(usual)
+    from flipproof.animate import MOST_BOTTLES
+    from flipproof.frame.solvers import find
+
+    names = [find(name.strip()).name for name in text.split(",")]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"--solvers {text}: {name} is there twice")
+    if len(names) > MOST_BOTTLES:
+        raise ValueError(f"--solvers {text}: {len(names)} bottles do not fit (admissible: at most {MOST_BOTTLES})")
+    return names

@@ -1,0 +1,70 @@
+"""What the commands of ``flipproof`` share: how one is added, and the arguments that several take."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final, NoReturn
+
+from flipproof.cli.console import readable
+
+SCENARIO_HELP: Final = "scenario file (TOML with tables [scenario] and [bottle]); default: the paper's own throw"
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """A parser whose complaints are one line, like those of the commands; ``--help`` tells the rest."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong and end with status 2."""
+        self.exit(2, f"flipproof: error: {readable(message)}\n")
+
+
+def add_command(
+    commands: Any, name: str, description: str, action: Callable[[argparse.Namespace], int]
+) -> argparse.ArgumentParser:
+    """Add a command that ``action`` runs and return its parser."""
+    command: argparse.ArgumentParser = commands.add_parser(name, description=description, help=description)
+    command.set_defaults(action=action)
+    return command
+
+
+def count(text: str) -> int:
+    """Return a whole number of at least 1."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
+    return int(text)
+
+
+def number(text: str) -> float:
+    """Return a number that is neither endless nor absurd."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not abs(value) < 1e6:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number in (-1e6, 1e6)")
+    return value
+
+
+def check_writable(option: str, path: Path) -> None:
+    """Refuse, before the work begins, a file that could not be written after it.
+
+    Raises
+    ------
+    ValueError
+        If the path is a folder, or its folder does not exist.
+    """
+    if path.is_dir():
+        raise ValueError(f"{option} {path} is a folder; name a file")
+    if not path.parent.is_dir():
+        raise ValueError(f"{option} {path}: the folder {path.parent} does not exist")
+
+
+def read_scenario(path: str | None, slices: int | None = None) -> Any:
+    """Return the throw of a file, or the paper's own, cut into ``slices`` if given."""
+    from slicemodel import Scenario
+
+    scenario = Scenario() if path is None else Scenario.from_toml(path)
+    return scenario.with_slices(slices) if slices else scenario

@@ -1,0 +1,106 @@
+"""The commands of ``flipproof`` for other people's pipelines: diff compares two reports, check holds a throw to one."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any, Final
+
+from flipproof.cli.arguments import add_command, check_writable
+
+GROUPS: Final = ("ice", "vectors", "convergence", "thresholds")
+"""What ``check`` can check; the last needs a baseline."""
+
+
+TOLERANCE_HELP: Final = (
+    "what a finding may move beyond its bands, in its own unit (default 1e-6: round-off of another machine; 0 for the "
+    "same one)"
+)
+
+
+def add_checks(commands: Any) -> None:
+    """Add the two commands."""
+    diff = add_command(commands, "diff", "Compare two reports: findings that changed beyond bands.", command_diff)
+    diff.add_argument("old", type=Path, metavar="OLD", help="a report's folder, or its summary.json")
+    diff.add_argument("new", type=Path, metavar="NEW", help="the same; changes are from OLD to NEW")
+    diff.add_argument("--tolerance", type=tolerance, metavar="X", help=TOLERANCE_HELP)
+    diff.add_argument(
+        "--html", type=Path, metavar="FILE", help="write the comparison as one page, too, with the curves of both"
+    )
+
+    check = add_command(commands, "check", "Check a throw in a few seconds, one line per claim.", command_check)
+    check.add_argument("scenario", metavar="SCENARIO.toml", help="scenario file (TOML with [scenario] and [bottle])")
+    check.add_argument(
+        "--baseline", type=Path, metavar="SUMMARY", help="summary.json of a report of this throw, or its folder: "
+        "findings are compared with it, and held to the thresholds that stand in it",
+    )  # fmt: skip
+    check.add_argument("--tolerance", type=tolerance, metavar="X", help=TOLERANCE_HELP)
+    check.add_argument(
+        "--only", type=_groups, metavar="LIST", help=f"some of {','.join(GROUPS)} (default: all; thresholds only "
+        "with --baseline)",
+    )  # fmt: skip
+    check.add_argument("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML, too")
+
+
+def command_diff(options: argparse.Namespace) -> int:
+    """Print what differs; return 1 if anything does."""
+    if options.html:
+        check_writable("--html", options.html)
+    from flipproof.check.diff import TOLERANCE, compare_summaries, read_summary
+
+    old, new = read_summary(options.old), read_summary(options.new)
+    found = compare_summaries(old, new, TOLERANCE if options.tolerance is None else options.tolerance)
+    if options.html:
+        from flipproof.check.diff_page import diff_page
+        from flipproof.output.folder import write_text
+
+        write_text(options.html, diff_page(options.old, options.new, old, new, found))
+    print(found.text)
+    return 0 if found.same else 1
+
+
+def command_check(options: argparse.Namespace) -> int:
+    """Print one line per claim, the verdict first; return 1 if one fails."""
+    from slicemodel import Scenario
+
+    scenario = Scenario.from_toml(options.scenario)
+    groups = options.only or (GROUPS if options.baseline else GROUPS[:-1])
+    if "thresholds" in groups and options.baseline is None:
+        raise ValueError("--only thresholds: needs --baseline, the summary.json of a report of this throw")
+    if options.junit:
+        check_writable("--junit", options.junit)
+    from flipproof.check.diff import TOLERANCE
+    from flipproof.check.throw import check
+
+    allowed = TOLERANCE if options.tolerance is None else options.tolerance
+
+    def say(line: str) -> None:
+        print(line, flush=True)
+
+    found = check(scenario, groups, baseline=options.baseline, tolerance=allowed, say=say)
+    if options.junit:
+        from flipproof.output.folder import write_text
+        from flipproof.output.junit import junit_text
+
+        write_text(options.junit, junit_text(found.findings, "flipproof check"))
+    say(found.conclusion)
+    return 1 if found.failed else 0
+
+
+def _groups(text: str) -> tuple[str, ...]:
+    given = [word.strip() for word in text.split(",") if word.strip()]
+    unknown = [word for word in given if word not in GROUPS]
+    if unknown or not given:
+        raise argparse.ArgumentTypeError(f"{', '.join(unknown) or text!r} is not among {', '.join(GROUPS)}")
+    return tuple(group for group in GROUPS if group in given)
+
+
+def tolerance(text: str) -> float:
+    """Return a finite number of at least 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not 0.0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number of at least 0")
+    return value

@@ -1,0 +1,216 @@
+"""The command ``flipproof fit``: drag and restitution from a measured flight."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import shlex
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, number, read_scenario
+
+MODELS = ("midpoint",)
+
+
+def add_fit(commands: Any) -> None:
+    """Add the command."""
+    fit = add_command(commands, "fit", "Estimate drag and restitution from a measured flight.", command_fit)
+    fit.add_argument(
+        "file", type=Path, metavar="FILE", help="CSV with columns t [s] and theta [rad] or omega [rad/s], or, with "
+        "--cap and --base, an export of the Tracker video tool",
+    )  # fmt: skip
+    fit.add_argument("--scenario", metavar="THROW.toml", help=f"what is known: bottle, water, release; {SCENARIO_HELP}")
+    fit.add_argument(
+        "--model", nargs="+", default=list(MODELS), metavar="NAME", help="equations to fit and compare, see 'flipproof "
+        "models'; midpoint solves eq8, several hundred times faster (default midpoint)",
+    )  # fmt: skip
+    fit.add_argument(
+        "--also", nargs="+", default=[], choices=("omega0", "theta0"), help="fit these too, instead of trusting the "
+        "scenario",
+    )  # fmt: skip
+    fit.add_argument("--starts", type=count, metavar="K", help="descents from different starts (default 4)")
+    fit.add_argument(
+        "--slices", type=count, metavar="N", help="slices of every throw, alpha/2m unchanged (50; 20 when an equation "
+        "is integrated event by event)",
+    )  # fmt: skip
+    fit.add_argument("--quantity", choices=("theta", "omega"), help="column to fit (theta if there is one)")
+    fit.add_argument(
+        "--averaged", type=count, metavar="N", help="omega was made of theta by differences and a mean over N points"
+    )
+    fit.add_argument(
+        "--noise", type=_positive, metavar="S", help="standard deviation of one value [rad or rad/s] (default: "
+        "estimated from neighbouring values)",
+    )  # fmt: skip
+    fit.add_argument("--release", type=number, metavar="S", help="time of release by the file's clock [s]")
+    fit.add_argument("--landing", type=number, metavar="S", help="time of landing by the file's clock [s]")
+    fit.add_argument("--cap", metavar="NAME", help="track of the cap in a Tracker export")
+    fit.add_argument("--base", metavar="NAME", help="track of the base in a Tracker export")
+    fit.add_argument("--length-unit", default="", metavar="UNIT", help="of a Tracker export: m, cm, mm")
+    fit.add_argument("--out", type=Path, metavar="DIR", help="folder for figures, residuals and summary.json")
+    fit.add_argument("--jobs", type=count, metavar="N", help="worker processes for costly equations (one per core)")
+
+
+def command_fit(options: argparse.Namespace) -> int:
+    """Fit every equation, print estimates and comparison, and write the folder."""
+    from flipproof.output.folder import check_replaceable, replaced_folder
+
+    if options.out is not None:
+        check_replaceable(options.out, "fit")
+    if (options.cap is None) != (options.base is None):
+        raise ValueError("--cap and --base name the two tracks of a Tracker export; give both or neither")
+    if options.length_unit and options.cap is None:
+        raise ValueError(f"--length-unit {options.length_unit} is that of a Tracker export; give --cap and --base, too")
+    if len(set(options.model)) < len(options.model):
+        raise ValueError(f"--model names {next(n for n in options.model if options.model.count(n) > 1)} twice")
+    throw = read_scenario(options.scenario)
+    measured, remarks = _read(options)
+
+    from flipproof.film.fit.compare import compare
+    from flipproof.film.fit.problem import pose
+
+    slices = options.slices or _common_slices(options.model, throw.n_slices)
+    also = tuple(options.also)
+    problems = [pose(measured, throw, name, also=also, slices=slices) for name in options.model]
+    remarks += _disagreements(problems[0], throw, also)
+    contenders = compare(_estimates(problems, options.starts, options.jobs))
+    text = _report(contenders, remarks)
+    if options.out is not None:
+        from flipproof.film.fit.folder import write
+        from flipproof.output.provenance import provenance
+
+        with replaced_folder(options.out, "fit") as folder:
+            write(contenders, text, folder, provenance(shlex.join(["flipproof", *sys.argv[1:]])))
+    print(text)
+    if options.out is not None:
+        print(f"written  {options.out / 'fit.txt'}")
+    return 0
+
+
+def _read(options: argparse.Namespace) -> tuple[Any, list[str]]:
+    """Return the measurement, and remarks on how it was read."""
+    from flipproof.film.fit.reading import read_flight, read_tracker
+
+    if options.cap is None:
+        measured = read_flight(
+            options.file, quantity=options.quantity, release=options.release, landing=options.landing,
+            noise=options.noise, averaged=options.averaged,
+        )  # fmt: skip
+        return measured, []
+    if options.quantity == "omega" or options.averaged is not None:
+        raise ValueError(
+            "a Tracker export is fitted by its theta (Eq. 1); --quantity omega and --averaged are for tables"
+        )
+    measured, words = read_tracker(
+        options.file, cap=options.cap, base=options.base, length_unit=options.length_unit, release=options.release,
+        landing=options.landing, noise=options.noise,
+    )  # fmt: skip
+    return measured, [words]
+
+
+def _common_slices(models: Sequence[str], most: int) -> int:
+    """Return the slices that all equations are compared at."""
+    from flipproof.film.fit.problem import EVENT_SLICES, SCHEME_SLICES, is_scheme
+
+    schemes = [is_scheme(name) for name in models]
+    return min(most, SCHEME_SLICES if all(schemes) else EVENT_SLICES)
+
+
+def _disagreements(problem: Any, throw: Any, also: tuple[str, ...]) -> list[str]:
+    """Return what of the scenario the first frames contradict although it is not fitted."""
+    from flipproof.film.fit.problem import first_frames
+
+    found = first_frames(problem.measured)
+    near = {"omega0": 0.1 * abs(throw.omega0), "theta0": 0.05}
+    return [
+        f"the first frames say {name} = {found[name]:.3g}, the scenario {getattr(throw, name):.3g}: correct it or add "
+        f"--also {name}"
+        for name in ("omega0", "theta0")
+        if name in found and name not in also and abs(found[name] - getattr(throw, name)) > near[name]
+    ]
+
+
+def _estimates(problems: Sequence[Any], starts: int | None, jobs: int | None) -> list[Any]:
+    """Fit one problem after the other under a bar that counts flights."""
+    from dataclasses import replace
+
+    from tqdm import tqdm
+
+    from flipproof.film.fit.estimate import effort_for, estimate
+    from flipproof.film.fit.problem import is_scheme
+
+    with ExitStack() as stack:
+        pool = None
+        if not all(is_scheme(problem.solver) for problem in problems):
+            from flipproof.frame.pool import workers
+
+            pool = stack.enter_context(workers(jobs))
+        bar = stack.enter_context(tqdm(unit="flight", disable=None, leave=False))
+        estimates = []
+        for problem in problems:
+            bar.set_description(problem.solver)
+            effort = effort_for(problem.solver)
+            effort = replace(effort, starts=starts) if starts else effort
+            estimates.append(estimate(problem, effort, tick=bar.update, pool=pool))
+        return estimates
+
+
+def _report(contenders: Sequence[Any], remarks: Sequence[str]) -> str:
+    from flipproof.film.fit.compare import verdict
+
+    problem = contenders[0].estimate.problem
+    measured = problem.measured
+    how = "given" if measured.noise is not None else "estimated from neighbouring values"
+    frames = f"{len(measured.t)} values of {measured.quantity} over {measured.t[-1]:.3f} s"
+    lines = [f"{measured.label}: {frames}; noise of one {problem.noise:.3g} {measured.unit} ({how})"]
+    if measured.quantity == "omega":
+        lines.append("neighbouring values of omega share noise; intervals are widened by the residuals' autocovariance")
+    lines += remarks
+    for one in contenders:
+        lines += ["", *_fit_lines(one)]
+    lines += ["", verdict(contenders)]
+    return "\n".join(lines)
+
+
+def _fit_lines(one: Any) -> list[str]:
+    from flipproof.film.fit.compare import digits, promise, told
+    from flipproof.film.fit.problem import UNITS
+    from flipproof.film.fit.uncertainty import correlation
+
+    estimate = one.estimate
+    throw = estimate.problem.throw
+    lines = [f"{one.solver}, {throw.n_slices} slices; {promise(one.solver, fits=one.fits)}"]
+    for found in one.intervals:
+        places = digits(found)
+        numbers = f"{found.value:.{places}f} [{found.low:.{places}f}, {found.high:.{places}f}]"
+        note = told(found)
+        lines.append(f"  {found.name:12} {numbers} {UNITS[found.name]}{'  ' + note if note else ''}")
+        if found.name == "drag":
+            gamma = [value / (2 * throw.slice_mass) for value in (found.value, found.low, found.high)]
+            lines.append(f"  {'alpha/2m':12} {gamma[0]:.4g} [{gamma[1]:.4g}, {gamma[2]:.4g}] /s")
+    pairs = correlation(estimate)
+    names = estimate.problem.free
+    words = [f"{names[i]}-{names[j]} {pairs[i, j]:+.2f}" for i in range(len(names)) for j in range(i + 1, len(names))]
+    lines.append(f"  correlation  {', '.join(words)}")
+    lines.append(
+        f"  chi^2        {estimate.chi2:.0f} for {estimate.freedom} degrees of freedom; residual "
+        f"{one.root_mean_square:.3g} {estimate.problem.measured.unit} (root mean square)"
+    )
+    levels = estimate.minima[:, -1]
+    ends = ", ".join(f"{level:.0f}" for level in levels[:4]) + (" ..." if len(levels) > 4 else "")
+    lines.append(
+        f"  search       {estimate.flights} flights; {len(levels)} descents to chi^2 of {ends}; intervals "
+        f"{math.sqrt(max(1.0, estimate.temperature)):.2f} times wider for misfit or shared noise, "
+        f"{math.sqrt(estimate.roughness):.2f} for roughness"
+    )
+    return lines
+
+
+def _positive(text: str) -> float:
+    value = number(text)
+    if not value > 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is outside (0, 1e6)")
+    return value

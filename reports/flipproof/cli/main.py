@@ -1,0 +1,295 @@
+"""The command ``flipproof``. Heavy packages load only inside the command that needs them."""
+
+from __future__ import annotations
+
+import sys
+
+if __name__ == "__main__":
+    # Before anything else is imported: an interrupt meets this program while it loads, too.
+    from flipproof.cli.start import guard
+
+    guard()
+
+import _thread
+import argparse
+import os
+import shlex
+import signal
+import time
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final, NoReturn
+
+from flipproof.cli.animate import add_animate
+from flipproof.cli.arguments import SCENARIO_HELP, OneLineParser, add_command, count, read_scenario
+from flipproof.cli.check import add_checks
+from flipproof.cli.compare import add_compare
+from flipproof.cli.console import readable, speak_plainly
+from flipproof.cli.fit import add_fit
+from flipproof.cli.paper import add_paper
+from flipproof.cli.start import INTERRUPTED, INTERRUPTED_WORDS, SIGNALS
+from flipproof.cli.sweeps import add_sweeps
+from flipproof.cli.tracker import add_tracker
+
+BAD_INPUT: Final = 2
+INTERNAL: Final = 3
+"""Exit statuses of a mistake in what was given, and of one in flipproof."""
+
+DEFAULT_OUT = Path("reports/latest" if Path("reports/flipproof").is_dir() else "flipproof-report")
+"""Where a report goes without --out: into the checkout if the command runs in one, else beside what the user has."""
+
+MANUAL = """\
+flipproof throws one bottle with many solvers and names every difference between them.
+
+The slice model of a flipping water bottle (closed-form steps, omega held constant over each)
+is compared with an event-driven integration of the paper's Eq. 8 and with a rigid tube full
+of sliding masses in the physics engines pymunk and MuJoCo.
+"""
+
+EXAMPLES = """\
+examples:
+  flipproof report                              the paper's own throw, report in flipproof-report
+  flipproof report throw.toml --out my-report   another throw
+  flipproof simulate --solver eq8 --out eq8.csv
+  flipproof compare published-python eq8
+  flipproof compare eq8.csv my-track/track.csv --tolerance 0.05
+  flipproof paper --figure 7b                   one of the paper's figures; without --figure all of them
+  flipproof check throw.toml --baseline summary.json
+  flipproof diff old-report new-report          what changed beyond its band
+  flipproof sweep sweep.toml --out my-sweep     many throws and solvers; run it again to go on
+  flipproof map --axis gamma --out my-map       which step down the ladder is largest where; run it again to go on
+  flipproof waterfall --out my-waterfall        from the published program to free flight, one bar per assumption
+  flipproof track video.txt --cap cap --base base --length-unit m
+  flipproof fit flight.csv --model midpoint free-flight
+  flipproof animate --out flips.gif             the flights side by side, 9.6 times slower
+
+exit status:
+  0  done; for a report: every claim was evaluated and no regression claim failed
+  1  a regression claim failed (ice constancy, published vectors, convergence); for diff: something moved;
+     for compare: the curves are farther apart than --tolerance
+  2  bad input; one line on standard error says what and where
+  3  an error in flipproof itself; FLIPPROOF_TRACEBACK=1 shows where
+  130  interrupted; an older report is as it was, a sweep goes on where it stopped
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; return the exit status (0, 1, 2, 3 or 130)."""
+    speak_plainly()
+    for number in SIGNALS:
+        signal.signal(number, _interrupt)
+    try:
+        options = parser().parse_args(arguments)
+        status = options.action(options)
+        sys.stdout.flush()
+        return int(status)
+    except BrokenPipeError:
+        # The reader of our output went away (a closed pager): not an error of ours.
+        sys.stderr.close()
+        return 0
+    except KeyboardInterrupt:
+        print(INTERRUPTED_WORDS, file=sys.stderr)
+        return INTERRUPTED
+    except (ValueError, OSError, MemoryError) as error:
+        return _complain(str(error) or type(error).__name__, BAD_INPUT)
+    except Exception as error:
+        # Nobody is helped by a traceback at the command line; whoever wants to mend the cause asks for it.
+        if isinstance(error.__cause__, ModuleNotFoundError):
+            return _complain(str(error), BAD_INPUT)
+        if os.environ.get("FLIPPROOF_TRACEBACK"):
+            traceback.print_exc()
+        return _complain(
+            f"{type(error).__name__}: {readable(str(error))} (an error in flipproof itself; "
+            "set FLIPPROOF_TRACEBACK=1 to see where)",
+            INTERNAL,
+        )
+
+
+def entry() -> NoReturn:
+    """Run the command line as a program."""
+    sys.unraisablehook = _unraisable
+    status = main()
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)  # the command is done, whatever comes while Python ends
+    if status == INTERRUPTED:
+        # An orderly exit would wait for threads, and Python kills itself where an import was interrupted in the middle
+        # of an ``exec``. Nothing is left to clean up.
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+    sys.exit(status)
+
+
+def _interrupt(*_: object) -> NoReturn:
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)  # a second one must not break the cleaning up
+    raise KeyboardInterrupt
+
+
+def _unraisable(what: sys.UnraisableHookArgs) -> None:
+    """Interrupt again if the interrupt came where Python drops exceptions, such as a finalizer."""
+    if isinstance(what.exc_value, KeyboardInterrupt):
+        signal.signal(signal.SIGINT, _interrupt)
+        _thread.interrupt_main()
+    else:
+        sys.__unraisablehook__(what)
+
+
+def _complain(words: str, status: int) -> int:
+    print(f"flipproof: error: {readable(words)}", file=sys.stderr)
+    return status
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the whole command line."""
+    top = OneLineParser(
+        prog="flipproof", description=MANUAL, epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    top.add_argument("--version", action="version", version=f"flipproof {_version()}")
+    commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    report = add_command(commands, "report", "Run everything and write a validation report.", command_report)
+    report.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
+    report.add_argument("--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="folder (default %(default)s)")
+    report.add_argument("--quick", action="store_true", help="fewer refinements, no second method, no validity maps")
+    report.add_argument(
+        "--slices", type=count, metavar="N", help="slices at which solvers are compared (default 50, or the file's "
+        "number if smaller)",
+    )  # fmt: skip
+    report.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
+    report.add_argument(
+        "--pdf", action="store_true", help="also print the page to report.pdf (needs Chromium, Chrome or Edge)"
+    )
+
+    simulate = add_command(commands, "simulate", "Run one solver and write its trajectory as CSV.", command_simulate)
+    simulate.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
+    simulate.add_argument("--solver", default="exact-step", metavar="NAME", help="see 'flipproof models' (%(default)s)")
+    simulate.add_argument("--steps", type=count, metavar="P", help="points of a scheme's grid (default 1000)")
+    simulate.add_argument("--slices", type=count, metavar="N", help="cut the throw into N slices, alpha/2m unchanged")
+    simulate.add_argument("--out", type=Path, metavar="FILE.csv", help="file to write (default: standard output)")
+
+    add_compare(commands)
+    add_paper(commands)
+    add_checks(commands)
+    add_sweeps(commands)
+    add_tracker(commands)
+    add_fit(commands)
+    add_animate(commands)
+    add_command(commands, "models", "List every scheme, model and engine.", command_models)
+    return top
+
+
+def _version() -> str:
+    from importlib import metadata
+
+    try:
+        return metadata.version("flipproof")
+    except metadata.PackageNotFoundError:
+        return "checkout"
+
+
+def command_report(options: argparse.Namespace) -> int:
+    """Write a report; return 1 if a regression claim failed."""
+    scenario = read_scenario(options.scenario)
+    from flipproof.output.folder import check_replaceable, replaced_folder
+    from flipproof.page.pdf import print_page, require_browser
+
+    check_replaceable(options.out, "report")
+    if options.pdf:
+        require_browser()
+
+    from tqdm import tqdm
+
+    from flipproof.build import build, write
+    from flipproof.evidence import FULL, QUICK, gather, with_slices
+    from flipproof.frame.stages import Stages
+    from flipproof.output.provenance import provenance
+
+    began = time.perf_counter()
+
+    def say(stage: str) -> None:
+        # A terminal shows a bar; a log gets a line now and then, so that its reader sees where the time goes.
+        if not sys.stderr.isatty():
+            print(f"flipproof: {time.perf_counter() - began:.0f} s: {stage}", file=sys.stderr, flush=True)
+
+    size = QUICK if options.quick else FULL
+    size = with_slices(size, options.slices or min(size.slices, scenario.n_slices))
+    command = shlex.join(["flipproof", *sys.argv[1:]])
+    with replaced_folder(options.out, "report") as folder:
+        with tqdm(desc="runs", unit="run", disable=None, leave=False) as bar:
+
+            def progress(made: int, planned: int, tag: str) -> None:
+                bar.total = planned
+                bar.set_postfix_str(tag, refresh=False)
+                bar.update(made - bar.n)
+
+            evidence = gather(scenario, size, progress, options.jobs, Stages(say))
+        report = build(evidence, provenance(command), options.jobs)
+        write(report, folder)
+        if options.pdf:
+            print_page(folder / "index.html", folder / "report.pdf")
+    _print_report(report, options.out, time.perf_counter() - began)
+    return 1 if report.failed else 0
+
+
+def _print_report(report: Any, out: Path, seconds: float) -> None:
+    print("Largest |difference in omega| / omega_0:")
+    for finding in report.findings:
+        if finding.id.startswith("difference-"):
+            print(f"  {finding.value:8.3%}  {finding.title}")
+    regressions = [finding for finding in report.findings if finding.kind == "regression"]
+    for finding in report.failed:
+        print(f"FAIL  {finding.title}: {finding.value_text} (threshold {finding.threshold_text}) {finding.note}")
+    print(f"{len(regressions) - len(report.failed)} of {len(regressions)} regression claims hold.")
+    print(f"Report: {out / 'index.html'} ({seconds:.0f} s)")
+
+
+def command_simulate(options: argparse.Namespace) -> int:
+    """Run one solver and write CSV."""
+    from flipproof.frame.solvers import find, solve
+    from flipproof.output.folder import write_text
+    from flipproof.output.tables import trajectory_csv
+
+    scenario = read_scenario(options.scenario, options.slices)
+    solver = find(options.solver)
+    settings: dict[str, Any] = {}
+    if options.steps is not None:
+        if solver.package != "slicemodel":
+            raise ValueError(f"--steps {options.steps}: {solver.name} is not a scheme and chooses its own steps")
+        settings["steps"] = options.steps
+    if options.out and options.out.is_dir():
+        raise ValueError(f"--out {options.out} is a folder; name a file")
+    if options.out and not options.out.parent.is_dir():
+        raise ValueError(f"--out {options.out}: the folder {options.out.parent} does not exist")
+    trajectory = solve(solver.name, scenario, **settings)
+    table = trajectory_csv(trajectory)
+    if options.out:
+        write_text(options.out, table)
+    else:
+        sys.stdout.write(table)
+    if not trajectory.ok:
+        print(f"flipproof: {solver.name}: {trajectory.status}: {trajectory.message}", file=sys.stderr)
+    return 0
+
+
+def command_models(options: argparse.Namespace) -> int:
+    """List every solver with its equation and the reason it is there."""
+    del options
+    import textwrap
+
+    from flipproof.frame.solvers import catalogue
+
+    package = ""
+    for solver in catalogue().values():
+        if solver.package != package:
+            package = solver.package
+            print(f"\n{package}.solve(scenario, {solver.keyword}=...)\n")
+        print(f"  {solver.name}")
+        for text in (solver.equation, solver.reason):
+            print(textwrap.fill(text, width=100, initial_indent="      ", subsequent_indent="      "))
+    return 0
+
+
+if __name__ == "__main__":
+    entry()

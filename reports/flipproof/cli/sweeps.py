@@ -1,0 +1,142 @@
+"""The commands of ``flipproof`` that fill a folder with runs and can be run again to go on: sweep, map, waterfall."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, read_scenario
+from flipproof.cli.start import INTERRUPTED
+
+SLICES: Final = 50
+SIDE: Final = (2, 1000)
+"""Cells along a side of a map."""
+
+
+def add_sweeps(commands: Any) -> None:
+    """Add the three commands."""
+    sweep = add_command(commands, "sweep", "Run many throws by many solvers, or go on with them.", command_sweep)
+    sweep.add_argument("design", type=Path, metavar="SWEEP.toml", help="which fields vary, and which solvers")
+    _add_store(sweep)
+
+    drawn = add_command(commands, "map", "Map which mistake matters where, or go on with it.", command_map)
+    drawn.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
+    drawn.add_argument(
+        "--axis", choices=("gamma", "step", "restitution"), required=True, help="what varies beside the fill fraction"
+    )
+    drawn.add_argument(
+        "--size", type=_size, default=(20, 20), metavar="CxR", help="fill fractions by values of the axis (20x20)"
+    )
+    drawn.add_argument("--slices", type=count, default=SLICES, metavar="N", help="slices of every throw (%(default)s)")
+    _add_store(drawn)
+
+    waterfall = add_command(
+        commands, "waterfall", "Split the published program's error over its assumptions, or go on with it.",
+        command_waterfall,
+    )  # fmt: skip
+    waterfall.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
+    waterfall.add_argument("--slices", type=count, default=SLICES, metavar="N", help="slices (%(default)s)")
+    _add_store(waterfall)
+
+
+def command_sweep(options: argparse.Namespace) -> int:
+    """Make the points of a design that have no row yet."""
+    from flipproof.sweep.command import sweep
+
+    return _fill(options, lambda begin, where: sweep(options.design, options.out, begin, **where))
+
+
+def command_map(options: argparse.Namespace) -> int:
+    """Make the runs of a map that have no row yet, and draw it."""
+    throw = read_scenario(options.scenario, options.slices)
+    from flipproof.sweep.validity_map import Plan, make_map
+
+    plan = Plan.of_size(throw, options.axis, *options.size)
+    return _fill(options, lambda begin, where: make_map(plan, options.out, begin, **where))
+
+
+def command_waterfall(options: argparse.Namespace) -> int:
+    """Make the runs of a waterfall that have no row yet, and draw it."""
+    throw = read_scenario(options.scenario, options.slices)
+    from flipproof.sweep.split import make_split
+
+    return _fill(options, lambda begin, where: make_split(throw, options.out, begin, **where))
+
+
+def _add_store(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder; holds one SQLite file of rows")
+    where = command.add_mutually_exclusive_group()
+    where.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
+    where.add_argument(
+        "--dask", type=_address, metavar="ADDRESS", help="scheduler whose workers do the work: tcp://127.0.0.1:8786"
+    )
+    command.add_argument(
+        "--export", type=Path, metavar="FILE", help="when complete, write all rows to a .csv or .parquet"
+    )
+    command.add_argument(
+        "--salvage", type=Path, metavar="FILE", help="begin DIR with the rows that are whole in a damaged sweep's "
+        "FILE, and end; the same command without it makes the others",
+    )  # fmt: skip
+    command.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def _address(text: str) -> str:
+    """Return the address of a scheduler; Dask itself takes twenty seconds and a traceback to refuse a misspelt one."""
+    match = re.fullmatch(r"(?:(?:tcp|tls|ws|wss)://)?[^\s/]+:([0-9]{1,5})", text)
+    if not match or not 1 <= int(match[1]) <= 65535:
+        raise argparse.ArgumentTypeError(f"{text!r} is not tcp://HOST:PORT with a port in [1, 65535]")
+    return text
+
+
+def _size(text: str) -> tuple[int, int]:
+    columns, _, rows = text.partition("x")
+    least, most = SIDE
+    if not all(side.isdecimal() and least <= int(side) <= most for side in (columns, rows)):
+        raise argparse.ArgumentTypeError(f"{text!r} is not COLUMNSxROWS, each in [{least}, {most}], such as 20x20")
+    return int(columns), int(rows)
+
+
+def _fill(options: argparse.Namespace, make: Callable[[Any, dict[str, Any]], str]) -> int:
+    """Run ``make(begin, where)`` under a bar of progress and print what it returns; an interrupt says what is kept."""
+    from contextlib import ExitStack
+
+    from tqdm import tqdm
+
+    stored = [0, 0]
+
+    def begin(there: int, size: int) -> Callable[[int, int], None]:
+        if 0 < there < size and not options.quiet:
+            print(f"flipproof: {there} of {size} points are there; going on", file=sys.stderr)
+        stored[:] = there, size
+        hide = True if options.quiet else None
+        bar = bars.enter_context(
+            tqdm(total=size, initial=there, unit="point", disable=hide, leave=False, smoothing=0.05)
+        )
+        without = 0
+
+        def progress(points: int, unfinished: int) -> None:
+            nonlocal without
+            stored[0] += points
+            without += unfinished
+            if without:
+                bar.set_postfix_str(f"{without} without a whole flight", refresh=False)
+            bar.update(points)
+
+        return progress
+
+    try:
+        with ExitStack() as bars:
+            words = make(
+                begin,
+                {"jobs": options.jobs, "dask": options.dask, "export_to": options.export, "damaged": options.salvage},
+            )
+    except KeyboardInterrupt:
+        there = f"{stored[0]} of {stored[1]} points are stored; " if stored[1] else ""
+        print(f"flipproof: interrupted; {there}the same command goes on from there", file=sys.stderr)
+        return INTERRUPTED
+    print(words)
+    return 0

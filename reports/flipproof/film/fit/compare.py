@@ -1,0 +1,133 @@
+"""Which equation a measured flight speaks for: the fits side by side, in numbers and in plain words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from flipproof.film.fit.estimate import Estimate
+from flipproof.film.fit.problem import is_scheme
+from flipproof.film.fit.temperature import fits
+from flipproof.film.fit.uncertainty import Interval, intervals
+
+INDISTINCT: Final = 4.0
+"""Difference of AIC up to which two equations are said to do equally well."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contender:
+    """One equation and how well its best parameters do.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    intervals : tuple of Interval
+    misfit : float - root mean square residual in units of the noise
+    fits : whether noise alone makes residuals this large
+    aic : float - Akaike's criterion less that of the best, chi^2 taken in units of what the best equation leaves if
+        that is more than the noise (quasi-AIC)
+    """
+
+    estimate: Estimate
+    intervals: tuple[Interval, ...]
+    misfit: float
+    fits: bool
+    aic: float
+
+    @property
+    def solver(self) -> str:
+        """Name of the equation's solver."""
+        return self.estimate.problem.solver
+
+    @property
+    def root_mean_square(self) -> float:
+        """Root mean square residual [rad or rad/s]."""
+        return self.misfit * self.estimate.problem.noise
+
+
+def compare(estimates: Sequence[Estimate]) -> tuple[Contender, ...]:
+    """Return the fits of one measurement by several equations, the best first.
+
+    Raises
+    ------
+    ValueError
+        If the measurements or the assumed noise are not the same.
+    """
+    first = estimates[0].problem
+    for estimate in estimates[1:]:
+        if estimate.problem.measured is not first.measured or estimate.problem.noise != first.noise:
+            raise ValueError("equations can be compared on one measurement with one noise only")
+    ordered = sorted(estimates, key=lambda one: one.chi2 + 2 * len(one.x))
+    best = ordered[0]
+    unit = max(1.0, best.chi2 / best.freedom)
+    least = best.chi2 / unit + 2 * len(best.x)
+    return tuple(
+        Contender(
+            estimate=one,
+            intervals=intervals(one),
+            misfit=float(np.sqrt(np.mean(one.residual() ** 2))) / one.problem.noise,
+            fits=fits(one.chi2, one.freedom),
+            aic=one.chi2 / unit + 2 * len(one.x) - least,
+        )
+        for one in ordered
+    )
+
+
+def verdict(contenders: Sequence[Contender]) -> str:
+    """Return what a comparison says, in plain words."""
+    best, *others = contenders
+    if best.estimate.problem.measured.quantity == "omega":
+        noise = "the noise of its neighbours' differences"
+    else:
+        noise = "the camera's noise"
+    words = [
+        f"{best.solver} leaves {best.misfit:.3g} times {noise}"
+        + (": it explains the flight." if best.fits else ", more than chance: it does not explain the flight.")
+    ]
+    if not best.fits and others:
+        words.append("No equation does; what follows ranks misfits, and all intervals are widened by theirs.")
+    equal = [one.solver for one in others if one.aic <= INDISTINCT]
+    worse = [one for one in others if one.aic > INDISTINCT]
+    if equal:
+        words.append(f"The data cannot tell it from {_listed(equal)}.")
+    words += [f"{one.solver} leaves {one.misfit:.3g} times the noise (AIC {one.aic:.0f} higher)." for one in worse]
+    return " ".join(words)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def promise(solver: str, *, fits: bool) -> str:
+    """Return what the intervals of a fit are worth.
+
+    How often they hold the truth was counted for schemes, on flights that the fitted scheme had made; equations
+    integrated event by event are searched with far fewer flights.
+    """
+    if not fits:
+        return "intervals widened by the misfit; no coverage is claimed for an equation that does not fit"
+    if not is_scheme(solver):
+        return "intervals meant to hold drag and restitution together in 95 %, which was not measured for this equation"
+    return "intervals that hold drag and restitution together in 95 %"
+
+
+def told(interval: Interval) -> str:
+    """Return what an interval says that numbers alone do not, or nothing."""
+    low, high = interval.searched
+    if interval.verdict == "not told":
+        return f"the data cannot tell it: the interval all but covers [{low:.3g}, {high:.3g}], all that was searched"
+    if interval.verdict == "bounded below":
+        return f"bounded from below only: the search ended at {high:.3g}"
+    if interval.verdict == "bounded above":
+        return f"bounded from above only: {low:.3g} is not excluded"
+    return ""
+
+
+def digits(interval: Interval) -> int:
+    """Return the digits after the point that an interval is worth: two of its width."""
+    width = interval.high - interval.low
+    return min(12, max(0, 1 - math.floor(math.log10(width)))) if width > 0 else 6

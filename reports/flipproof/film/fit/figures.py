@@ -1,0 +1,88 @@
+"""What a fit looks like: measured and fitted flight, residuals, and the parameters that the data allow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from flipproof.figures.style import new_figure, solver_style, styled
+from flipproof.film.fit.compare import Contender
+from flipproof.film.fit.problem import SYMBOLS, UNITS
+
+MEASURED = {"color": "#000000", "marker": ".", "linestyle": "none", "markersize": 2.5, "zorder": 5}
+
+
+@styled
+def figure_residuals(contenders: Sequence[Contender]) -> Figure:
+    """Measured and fitted flight above, measured minus fitted below, one panel for each equation."""
+    problem = contenders[0].estimate.problem
+    measured = problem.measured
+    angle = measured.quantity == "theta"
+    rows = 1 + len(contenders)
+    heights = [2.2] + [1.0] * len(contenders)
+    figure, axes = new_figure(
+        rows, size=(8.0, 3.2 + 1.4 * len(contenders)), sharex=True, gridspec_kw={"height_ratios": heights}
+    )
+    for k, one in enumerate(contenders):
+        fitted = measured.values - one.estimate.residual()
+        axes[0].plot(measured.t, fitted, label=one.solver, **solver_style(one.solver, k))
+        _residual(axes[k + 1], one, k, 1e3 if angle else 1.0)
+    axes[0].plot(measured.t, measured.values, label="measured", **MEASURED)
+    axes[0].set_ylabel("θ [rad]" if angle else "ω [rad/s]")
+    axes[0].legend()
+    axes[0].set_title(f"{measured.label}: measured and fitted", fontsize=10, loc="left")
+    axes[-1].set_xlabel("time from release [s]")
+    figure.supylabel(f"measured − fitted [{'mrad' if angle else 'rad/s'}]", fontsize=10, y=0.3)
+    return figure
+
+
+def _residual(axes: Axes, one: Contender, k: int, scale: float) -> None:
+    problem = one.estimate.problem
+    noise = scale * problem.noise
+    axes.axhspan(-2 * noise, 2 * noise, color="#dddddd", linewidth=0)
+    axes.axhline(0.0, color="#444444", linewidth=0.8)
+    colour = solver_style(one.solver, k)["color"]
+    axes.plot(problem.measured.t, scale * one.estimate.residual(), ".", color=colour, markersize=4)
+    axes.set_title(
+        f"{one.solver}: {one.misfit:.3g} times the noise (grey: twice the noise either way)", fontsize=9, loc="left"
+    )
+
+
+@styled
+def figure_allowed(contenders: Sequence[Contender]) -> Figure:
+    """Drag and restitution that the data allow under each equation, with estimate and intervals."""
+    figure, grid = new_figure(1, len(contenders), size=(max(4.5, 3.6 * len(contenders)), 3.6), squeeze=False)
+    for k, (axes, one) in enumerate(zip(grid[0], contenders, strict=True)):
+        problem = one.estimate.problem
+        drag, restitution = one.intervals[:2]
+        colour = solver_style(one.solver, k)["color"]
+        allowed = [problem.value("drag", float(u)) for u in one.estimate.cloud[:, 0]]
+        axes.plot(allowed, one.estimate.cloud[:, 1], ".", color=colour, markersize=2, alpha=0.4, rasterized=True)
+        for interval, line in ((drag, axes.axvline), (restitution, axes.axhline)):
+            for end in (interval.low, interval.high):
+                line(end, color="#444444", linestyle=":", linewidth=1.0)
+        axes.plot(drag.value, restitution.value, "k+", markersize=12, markeredgewidth=1.6)
+        for interval, limit in ((drag, axes.set_xlim), (restitution, axes.set_ylim)):
+            margin = 0.35 * (interval.high - interval.low) or 1e-3
+            low, high = interval.searched
+            limit(max(low, interval.low - margin) - 0.02 * margin, min(high, interval.high + margin) + 0.02 * margin)
+        axes.set_xlabel(f"{SYMBOLS['drag']} of one of {problem.throw.n_slices} slices [{UNITS['drag']}]")
+        axes.set_title(one.solver, fontsize=10, loc="left")
+        axes.locator_params(axis="x", nbins=5)
+    grid[0][0].set_ylabel("restitution e [1]")
+    return figure
+
+
+def residual_table(contenders: Sequence[Contender]) -> str:
+    """Return measured, fitted and residual of every equation as CSV text."""
+    measured = contenders[0].estimate.problem.measured
+    names, columns = ["t", measured.quantity], [measured.t, measured.values]
+    for one in contenders:
+        residual = one.estimate.residual()
+        names += [f"fitted {one.solver}", f"residual {one.solver}"]
+        columns += [measured.values - residual, residual]
+    rows = [",".join(f"{value:.9g}" for value in row) for row in np.column_stack(columns)]
+    return "\n".join([",".join(names), *rows]) + "\n"

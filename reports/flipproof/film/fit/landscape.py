@@ -1,0 +1,131 @@
+"""chi^2 over the parameters of a fit: asked for point by point or for many points at once, and descended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipproof.film.fit.problem import Problem, is_scheme
+from slicemodel.trajectory import FloatArray
+
+HUBER: Final = 3.0
+"""Residuals beyond this many standard deviations count linearly (Huber's loss), so that a slipped marker does not
+decide; within it nothing changes."""
+
+PARTS: Final = 16
+"""Jobs that many flights are dealt out in."""
+
+Index = NDArray[np.intp]
+Tick = Callable[[int], object]
+
+
+class Landscape:
+    """chi^2 of a problem, and how often it was asked for.
+
+    Parameters
+    ----------
+    problem : Problem
+    scale : float - residuals are divided by ``problem.noise * scale`` before the loss
+    tick : callable - called with the number of flights that were made
+    pool : Executor or None - makes flights of costly equations side by side
+    """
+
+    def __init__(
+        self, problem: Problem, *, scale: float = 1.0, tick: Tick = lambda _: None, pool: Executor | None = None
+    ) -> None:
+        self.problem, self.scale, self.tick, self.pool = problem, scale, tick, pool
+        self.low, self.high = problem.bounds()
+        self.flights = 0
+
+    def rescaled(self, scale: float) -> Landscape:
+        """Return the same landscape in other units of residuals; flights are counted on."""
+        other = Landscape(self.problem, scale=scale, tick=self.tick, pool=self.pool)
+        other.flights = self.flights
+        return other
+
+    def residuals(self, points: FloatArray) -> FloatArray:
+        """Return the residuals at many points (M, K) in standard deviations, shape (M, P)."""
+        if self.pool is None or len(points) < 2 or is_scheme(self.problem.solver):
+            rows = self.problem.residuals(points)
+        else:
+            parts = np.array_split(points, min(len(points), PARTS))
+            rows = np.concatenate(list(self.pool.map(self.problem.residuals, parts)))
+        self.flights += len(points)
+        self.tick(len(points))
+        return np.asarray(rows / self.scale)
+
+    def residual(self, x: FloatArray) -> FloatArray:
+        """Return the residuals at ``x`` in standard deviations, shape (P,)."""
+        return np.asarray(self.residuals(x[np.newaxis])[0])
+
+    def many(self, points: FloatArray) -> FloatArray:
+        """Return chi^2 at many points (M, K), shape (M,)."""
+        return loss(self.residuals(points)) if len(points) else np.empty(0)
+
+    def chi2(self, x: FloatArray) -> float:
+        """Return the sum of Huber's loss over the residuals at ``x``."""
+        return float(loss(self.residual(x)))
+
+    def jacobian(self, x: FloatArray, steps: FloatArray, free: Index) -> FloatArray:
+        """Return d residual / d x[free] by central difference quotients over ``steps``, shape (P, F).
+
+        At a bound the quotient is one-sided.
+        """
+        up, down = (np.tile(x, (len(free), 1)) for _ in range(2))
+        rows = np.arange(len(free))
+        up[rows, free] = np.minimum(x + steps, self.high)[free]
+        down[rows, free] = np.maximum(x - steps, self.low)[free]
+        residuals = self.residuals(np.concatenate((up, down)))
+        rises = residuals[: len(free)] - residuals[len(free) :]
+        return np.asarray(rises.T / (up - down)[rows, free])
+
+    def descend(self, x: FloatArray, steps: FloatArray, free: Index, flights: int) -> tuple[FloatArray, float]:
+        """Minimise chi^2 over the coordinates ``free`` from ``x``; return where it ended, and chi^2 there.
+
+        Parameters
+        ----------
+        steps : (K,) - of the difference quotients
+        free : (F,) - indices of the coordinates that move
+        flights : int - trial points at the most
+        """
+        from scipy.optimize import least_squares
+
+        def whole(part: FloatArray) -> FloatArray:
+            moved = x.copy()
+            moved[free] = part
+            return moved
+
+        # The solver wants its start strictly inside.
+        margin = 1e-9 * (self.high - self.low)[free]
+        began = np.clip(x[free], self.low[free] + margin, self.high[free] - margin)
+
+        def rows(part: FloatArray) -> FloatArray:
+            return self.residual(whole(part))
+
+        def slopes(part: FloatArray) -> FloatArray:
+            return self.jacobian(whole(part), steps, free)
+
+        found = least_squares(
+            rows,
+            began,
+            jac=slopes,
+            bounds=(self.low[free], self.high[free]),
+            x_scale=steps[free],
+            loss="huber",
+            f_scale=HUBER,
+            ftol=1e-5,
+            xtol=1e-5,
+            gtol=1e-8,
+            max_nfev=flights,
+        )
+        return whole(found.x), 2.0 * float(found.cost)
+
+
+def loss(residuals: FloatArray) -> FloatArray:
+    """Return the sum of Huber's loss over the last axis: squares up to ``HUBER``, straight lines beyond."""
+    size = np.abs(residuals)
+    return np.asarray(np.where(size <= HUBER, size * size, 2.0 * HUBER * size - HUBER * HUBER).sum(axis=-1))

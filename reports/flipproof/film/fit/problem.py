@@ -1,0 +1,327 @@
+"""What is fitted: a measured flight, an equation, and the parameters that are free.
+
+The search runs in coordinates in which equal steps matter about equally: drag as asinh(gamma / gamma_1), which is
+linear near no drag and logarithmic above, everything else as it is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final, Literal
+
+import numpy as np
+
+from slicemodel import Scenario
+from slicemodel.scenario import unknown_name
+from slicemodel.trajectory import FloatArray
+
+Quantity = Literal["theta", "omega"]
+Operator = Callable[[FloatArray, FloatArray], FloatArray]
+"""What made a measured omega of a measured theta: (t, theta) -> omega."""
+
+ALWAYS: Final = ("drag", "restitution")
+ALSO: Final = ("omega0", "theta0")
+UNITS: Final[Mapping[str, str]] = {"drag": "kg/s", "restitution": "", "omega0": "rad/s", "theta0": "rad"}
+SYMBOLS: Final[Mapping[str, str]] = {"drag": "α", "restitution": "e", "omega0": "ω₀", "theta0": "θ₀"}
+
+FEWEST: Final = 12
+"""Frames of a flight that can be fitted at the least."""
+
+MOST_DAMPING: Final = 5.0
+"""Largest damping rate that is searched, in units of |omega0|: there a slice creeps less than a fifth of its distance
+from the centre in the time the bottle turns by 2 rad."""
+
+SCHEME_SLICES: Final = 50
+EVENT_SLICES: Final = 20
+"""Slices of a throw by an equation that is integrated event by event, where a rebound costs a millisecond."""
+
+FAR: Final = 1e6
+"""Residual, in standard deviations, of a flight that the solver could not finish."""
+
+STEP: Final = 5e-4
+"""Longest step of a scheme [s]: the paper's own, 1000 of them in half a second."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measurement:
+    """A measured flight from release to landing.
+
+    Parameters
+    ----------
+    label : str
+    t : (P,) - seconds from release, increasing, the first at least 0
+    values : (P,) - theta [rad] or omega [rad/s]
+    quantity : "theta" or "omega"
+    noise : float or None - standard deviation of one value; None: not known, estimated from the values
+    operator : callable or None - for an omega that was made of theta(t): how, so that the equation's own theta(t) is
+        treated alike; None: omega as it is at the instant
+    """
+
+    label: str
+    t: FloatArray
+    values: FloatArray
+    quantity: Quantity = "theta"
+    noise: float | None = None
+    operator: Operator | None = field(default=None, compare=False)
+
+    def __post_init__(self) -> None:
+        if len(self.t) < FEWEST:
+            raise ValueError(f"{self.label}: {len(self.t)} frames between release and landing; {FEWEST} are needed")
+        if self.t.shape != self.values.shape:
+            raise ValueError(f"{self.label}: {len(self.t)} times and {len(self.values)} values")
+        if not (np.isfinite(self.t).all() and np.isfinite(self.values).all()):
+            raise ValueError(f"{self.label}: holds values that are not finite")
+        if not (self.t[0] >= 0.0 and (np.diff(self.t) > 0).all()):
+            raise ValueError(f"{self.label}: t must start at 0 or later and increase")
+        if self.noise is not None and not (math.isfinite(self.noise) and self.noise > 0):
+            raise ValueError(f"noise = {self.noise!r} is outside (0, inf)")
+
+    @property
+    def unit(self) -> str:
+        """Unit of ``values``."""
+        return "rad" if self.quantity == "theta" else "rad/s"
+
+
+def noise_of(values: FloatArray) -> float:
+    """Return the standard deviation of independent noise on a smooth curve, from its third differences.
+
+    Third differences remove parabolas; of white noise they leave sqrt(20) times its standard deviation, which 120
+    values give to about 10 %. Differences beyond three standard deviations are left out until none is, so that a few
+    slipped frames do no harm.
+    """
+    differences = np.diff(values, 3) / math.sqrt(20.0)
+    spread = 1.4826 * float(np.median(np.abs(differences)))
+    for _ in range(20):
+        inside = differences[np.abs(differences) <= 3.0 * spread]
+        # A normal distribution cut at three standard deviations has 0.9866 of its width.
+        wider = float(np.sqrt(np.mean(inside**2))) / 0.9866 if len(inside) else spread
+        if abs(wider - spread) <= 1e-6 * spread:
+            break
+        spread = wider
+    return spread
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Problem:
+    """One measurement, one equation, and what is free.
+
+    Parameters
+    ----------
+    measured : Measurement
+    throw : Scenario
+        Everything that is not fitted, cut into the slices of the fit; its duration is that of the flight.
+    solver : str
+        A scheme of ``slicemodel`` or a model of ``ode_reference``.
+    free : tuple of str
+        Names of the fitted parameters, from ``ALWAYS`` and ``ALSO``.
+    noise : float
+        Standard deviation of one value [rad or rad/s].
+    """
+
+    measured: Measurement
+    throw: Scenario
+    solver: str
+    free: tuple[str, ...]
+    noise: float
+
+    @property
+    def points(self) -> int:
+        """Number of measured values."""
+        return len(self.measured.t)
+
+    @property
+    def most_damping(self) -> float:
+        """Largest damping rate that is searched [1/s]."""
+        return MOST_DAMPING * abs(self.throw.omega0)
+
+    @property
+    def _damping_scale(self) -> float:
+        return abs(self.throw.omega0) / 20.0
+
+    # ------------------------------------------------------------------ coordinates
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Return lowest and highest admissible coordinates, each of shape (K,)."""
+        reach = 0.3 * abs(self.throw.omega0)
+        limits = {
+            "drag": (0.0, math.asinh(self.most_damping / self._damping_scale)),
+            "restitution": (0.0, 1.0),
+            "omega0": (self.throw.omega0 - reach, self.throw.omega0 + reach),
+            "theta0": (self.throw.theta0 - 0.5, self.throw.theta0 + 0.5),
+        }
+        low, high = np.array([limits[name] for name in self.free]).T
+        return low, high
+
+    def coarse_steps(self) -> FloatArray:
+        """Return steps of a difference quotient that no single rebound decides, shape (K,)."""
+        steps = {"drag": 0.04, "restitution": 0.03, "omega0": 0.003 * abs(self.throw.omega0), "theta0": 0.01}
+        return np.array([steps[name] for name in self.free])
+
+    def value(self, name: str, coordinate: float) -> float:
+        """Return a parameter [SI] from its coordinate."""
+        if name == "drag":
+            return 2.0 * self.throw.slice_mass * self._damping_scale * math.sinh(coordinate)
+        return float(coordinate)
+
+    def coordinate(self, name: str, value: float) -> float:
+        """Return the coordinate of a parameter [SI]."""
+        if name == "drag":
+            return math.asinh(value / (2.0 * self.throw.slice_mass * self._damping_scale))
+        return float(value)
+
+    def slope(self, name: str, coordinate: float) -> float:
+        """Return d(parameter) / d(coordinate)."""
+        if name == "drag":
+            return 2.0 * self.throw.slice_mass * self._damping_scale * math.cosh(coordinate)
+        return 1.0
+
+    def start(self) -> FloatArray:
+        """Return the coordinates of the throw itself, moved inside the bounds, shape (K,)."""
+        low, high = self.bounds()
+        here = np.array([self.coordinate(name, getattr(self.throw, name)) for name in self.free])
+        return np.asarray(np.clip(here, low, high))
+
+    # ------------------------------------------------------------------ prediction
+
+    def throw_at(self, x: FloatArray) -> Scenario:
+        """Return the throw at the coordinates ``x``, shape (K,)."""
+        low, high = self.bounds()
+        inside = np.clip(x, low, high)
+        changed = {name: self.value(name, float(c)) for name, c in zip(self.free, inside, strict=True)}
+        return replace(self.throw, **changed)  # type: ignore[arg-type]
+
+    def predicted(self, x: FloatArray) -> FloatArray:
+        """Return what would be measured at the coordinates ``x``, shape (P,); NaN where the solver gave up."""
+        return np.asarray(predict([self.throw_at(x)], self.solver, self.measured)[0])
+
+    def residuals(self, points: FloatArray) -> FloatArray:
+        """Return (measured - predicted) / noise at many coordinates (M, K), shape (M, P).
+
+        Where a solver gave up the residual counts as ``FAR``.
+        """
+        predicted = predict([self.throw_at(x) for x in points], self.solver, self.measured)
+        difference = (self.measured.values - predicted) / self.noise
+        return np.asarray(np.where(np.isfinite(difference), difference, FAR))
+
+
+def predict(throws: Sequence[Scenario], solver: str, measured: Measurement) -> FloatArray:
+    """Return what a camera without noise would measure of throws (M of them), shape (M, P); NaN where a run ended."""
+    theta, omega = flights(throws, solver, measured.t)
+    if measured.quantity == "theta":
+        return theta
+    if measured.operator is None:
+        return omega
+    return np.array([measured.operator(measured.t, one) for one in theta])
+
+
+def flights(throws: Sequence[Scenario], solver: str, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return theta and omega of throws of equal duration at ``times`` by the settings of a fit, each of shape (M, P).
+
+    A scheme runs on a grid of ``STEP`` and is interpolated; the reference is asked for the times themselves.
+
+    Raises
+    ------
+    ValueError
+        If the solver is no scheme and no model of the reference.
+    """
+    if is_scheme(solver):
+        from slicemodel.batch import solve_batch
+
+        steps = math.ceil(throws[0].duration / STEP) + 1
+        batch = solve_batch(throws, solver, steps)
+        return sampled(np.linspace(0.0, throws[0].duration, steps), batch.theta, batch.omega, times)
+    from ode_reference.solver import solve as integrate
+
+    theta, omega = (np.full((len(throws), len(times)), np.nan) for _ in range(2))
+    for row, throw in enumerate(throws):
+        loosest = max(min(0.04 / abs(throw.omega0), throw.duration), 1e-5 * throw.duration)
+        run = integrate(throw, model=solver, method="DOP853", rtol=1e-8, max_step=loosest, times=times)
+        theta[row, : len(run.t)], omega[row, : len(run.t)] = run.theta, run.omega
+    return theta, omega
+
+
+def sampled(grid: FloatArray, theta: FloatArray, omega: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return theta and omega, given on a uniform ``grid`` (G,) as rows (M, G), at ``times``, shapes (M, P).
+
+    theta is Hermite's cubic from both angles and both angular velocities of a step, omega a straight line.
+    """
+    h = grid[1] - grid[0]
+    k = np.clip((times / h).astype(int), 0, len(grid) - 2)
+    s = (times - grid[k]) / h
+    rise = theta[:, k + 1] - theta[:, k]
+    bend_0, bend_1 = h * omega[:, k] - rise, h * omega[:, k + 1] - rise
+    between = theta[:, k] + s * rise + s * (1 - s) * ((1 - s) * bend_0 - s * bend_1)
+    return between, (1 - s) * omega[:, k] + s * omega[:, k + 1]
+
+
+def is_scheme(solver: str) -> bool:
+    """Return whether a solver is a scheme of the slice model, whose runs cost less than a millisecond.
+
+    Raises
+    ------
+    ValueError
+        If there is no such solver, or it is an engine.
+    """
+    from flipproof.frame.solvers import catalogue, find
+
+    package = find(solver).package
+    if package == "engine_check":
+        able = [name for name, other in catalogue().items() if other.package != package]
+        raise ValueError(f"model = {solver!r} is a physics engine, too slow to fit with; choose from {', '.join(able)}")
+    return package == "slicemodel"
+
+
+def pose(
+    measured: Measurement,
+    throw: Scenario,
+    solver: str,
+    *,
+    also: tuple[str, ...] = (),
+    slices: int | None = None,
+) -> Problem:
+    """Return the problem of fitting ``solver`` to ``measured``.
+
+    Parameters
+    ----------
+    measured : Measurement
+    throw : Scenario - what is known of the throw; its duration gives way to the measured one
+    solver : str
+    also : names from ``ALSO`` - fitted too; they start from the measurement's first frames
+    slices : int or None - None: ``SCHEME_SLICES`` or ``EVENT_SLICES``, or the throw's if fewer
+
+    Raises
+    ------
+    ValueError
+        Naming what cannot be fitted and why.
+    """
+    for name in also:
+        if name not in ALSO:
+            raise ValueError(unknown_name("also =", name, ALSO))
+    if slices is None:
+        slices = min(throw.n_slices, SCHEME_SLICES if is_scheme(solver) else EVENT_SLICES)
+    known = replace(throw.with_slices(slices), duration=float(measured.t[-1]))
+    guess = first_frames(measured)
+    first = {name: guess[name] for name in also if name in guess}
+    if first.get("omega0") == 0.0:
+        raise ValueError(f"{measured.label}: does not turn in its first frames")
+    noise = measured.noise if measured.noise is not None else noise_of(measured.values)
+    if not noise > 0:
+        # Values of a simulation, written with few digits, can have none.
+        noise = 1e-6 * float(np.ptp(measured.values)) or 1e-9
+    if "theta0" in also and measured.quantity == "omega":
+        first["theta0"] = known.theta0
+    free = ALWAYS + tuple(name for name in ALSO if name in also)
+    return Problem(measured=measured, throw=replace(known, **first), solver=solver, free=free, noise=noise)  # type: ignore[arg-type]
+
+
+def first_frames(measured: Measurement) -> dict[str, float]:
+    """Return omega0, and theta0 if the angle was measured, by a parabola through the first eighth of the flight."""
+    count = max(6, len(measured.t) // 8)
+    t, values = measured.t[:count], measured.values[:count]
+    degree = 2 if measured.quantity == "theta" else 1
+    polynomial = np.polynomial.Polynomial.fit(t, values, degree)
+    if measured.quantity == "theta":
+        return {"theta0": float(polynomial(0.0)), "omega0": float(polynomial.deriv()(0.0))}
+    return {"omega0": float(polynomial(0.0))}

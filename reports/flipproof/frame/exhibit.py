@@ -1,0 +1,72 @@
+"""One figure as the page shows it: its words, its numbers, and how it is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from flipproof.figures.style import Drawing, draw
+from flipproof.frame.pool import workers
+
+FEW = 3
+"""Figures that are sooner drawn here than workers are started."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Exhibit:
+    """A figure with its words, and the section of the page it belongs to.
+
+    Parameters
+    ----------
+    name, section, title, caption, alt : str
+        ``caption`` says how to read the figure, ``alt`` what this throw shows, with its numbers.
+    maker : callable
+        A function of a module that makes the figure of ``data``: both must reach a worker process.
+    data : tuple
+        Arguments of ``maker``.
+    table : str or None
+        The numbers that are drawn, as CSV with a unit in every header.
+    drawn : Drawing or None
+        The finished figure; None if nobody has drawn it yet.
+    """
+
+    name: str
+    section: str
+    title: str
+    caption: str
+    alt: str
+    maker: Callable[..., Figure]
+    data: tuple[Any, ...]
+    table: str | None
+    drawn: Drawing | None = None
+
+    @property
+    def drawing(self) -> Drawing:
+        """The finished figure; it is drawn now, and each time anew, if nobody has drawn it yet."""
+        return self.drawn or draw(self.maker(*self.data))
+
+
+def drawn(exhibits: Sequence[Exhibit], jobs: int | None = None) -> tuple[Exhibit, ...]:
+    """Return the exhibits with their figures, in the order given.
+
+    Parameters
+    ----------
+    exhibits : sequence of Exhibit
+    jobs : int or None
+        Worker processes; None: one per core. One job, and few figures, are drawn in this process. The bytes are the
+        same either way.
+    """
+    if jobs == 1 or len(exhibits) <= FEW:
+        return tuple(replace(exhibit, drawn=exhibit.drawing) for exhibit in exhibits)
+    with workers(jobs) as pool:
+        # The figures with most to draw first, so that no worker is left with a long one at the end.
+        order = sorted(exhibits, key=lambda exhibit: -len(exhibit.table or ""))
+        pending = {exhibit.name: pool.submit(_draw, exhibit.maker, exhibit.data) for exhibit in order}
+        return tuple(replace(exhibit, drawn=pending[exhibit.name].result()) for exhibit in exhibits)
+
+
+def _draw(maker: Callable[..., Figure], data: tuple[Any, ...]) -> Drawing:
+    return draw(maker(*data))

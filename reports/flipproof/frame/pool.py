@@ -1,0 +1,75 @@
+"""Runs made on all cores, in the order asked, until somebody interrupts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from concurrent.futures import Executor, as_completed
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from typing import Any
+
+from flipproof.frame.processes import WorkerDiedError, processes
+from flipproof.frame.solvers import Made, Run, find, make
+
+Progress = Callable[[int, int, str], None]
+"""Called with runs made, runs planned and the last run's tag."""
+
+SMALL = 8.0
+"""Slices times seconds of flight below which runs are made in groups."""
+
+GROUP = 8
+"""Runs of a group."""
+
+TRIES = 2
+"""Times that a call is made when its worker dies: what killed one worker may have had nothing to do with the call."""
+
+
+def make_all(pool: Executor, runs: Iterable[Run], progress: Progress) -> dict[str, Made]:
+    """Make runs in worker processes: one job for each slow run, one for all of the slice model's.
+
+    This process only waits, so that it can be interrupted at any time; the slice model compiles in one worker only.
+    """
+    runs = list(runs)
+    # Runs that differ in their tag only are made once.
+    same: dict[tuple[Any, ...], list[Run]] = {}
+    for run in runs:
+        same.setdefault((run.solver, run.scenario, repr(sorted(run.settings.items()))), []).append(run)
+    different = [group[0] for group in same.values()]
+    others = {group[0].tag: group for group in same.values()}
+    quick = [run for run in different if find(run.solver).package == "slicemodel"]
+    slow = [run for run in different if find(run.solver).package != "slicemodel"]
+    # Small runs go in groups: sending each away alone would cost as much as making it.
+    small = [run for run in slow if run.scenario.n_slices * run.scenario.duration < SMALL]
+    jobs = [[run] for run in slow if run.scenario.n_slices * run.scenario.duration >= SMALL]
+    jobs += [small[k : k + GROUP] for k in range(0, len(small), GROUP)]
+    made: dict[str, Made] = {}
+    jobs = ([quick] if quick else []) + jobs
+    while jobs:
+        pending = {pool.submit(make_each, job): job for job in jobs}
+        jobs = []
+        for future in as_completed(pending):
+            job = pending[future]
+            try:
+                results = future.result()
+            except WorkerDiedError as error:
+                if len(job) > 1:
+                    # Each alone, so that only the run that kills its worker is lost.
+                    jobs += [[run] for run in job]
+                    continue
+                results = [Made(job[0], None, 0.0, f"the worker process died {TRIES} times with this run ({error})")]
+            for result in results:
+                for run in others[result.run.tag]:
+                    made[run.tag] = replace(result, run=run)
+                progress(len(made), len(runs), result.run.tag)
+    # In the order asked, whichever worker was faster: what is read off this table must not depend on load.
+    return {run.tag: made[run.tag] for run in runs}
+
+
+def make_each(runs: Iterable[Run]) -> list[Made]:
+    """Make runs one after the other."""
+    return [make(run) for run in runs]
+
+
+def workers(jobs: int | None) -> AbstractContextManager[Executor]:
+    """Give a pool of worker processes that makes a call once more when its worker dies; one per core unless told."""
+    return processes(jobs, tries=TRIES)

@@ -1,0 +1,131 @@
+"""Runs made for their cost: processor time of the run alone, the least of several, on a solver that is warm.
+
+A report makes its runs in a pool on a machine that does other things too: wall time would measure those. Processor
+time of this process does not, but still grows when the caches are shared; the least of several runs is closest to what
+the run needs. Compiling, importing and reading caches belong to the first run of a solver in a process, and are not
+what a step costs: each batch first makes a short flight with every solver in it, which is thrown away.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, as_completed
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipproof.frame.solvers import Made, Run, find, make
+from slicemodel import Trajectory
+from slicemodel.trajectory import FloatArray
+
+REPEATS: Final = 3
+"""Times that a run is made at the most."""
+
+LONG: Final = 0.01
+"""Processor seconds of one run, repeated or not, after which it is not made again: it outlasts what disturbs it."""
+
+WARM: Final = 0.02
+"""Share of the flight that warms a solver up."""
+
+SAME_TIME: Final = 1e-9
+"""Share of the duration by which two times may differ and be the same."""
+
+WARMED_BY: Final = ("method", "frame")
+"""Settings, beside the solver, that load code of their own."""
+
+
+def make_timed(runs: Sequence[tuple[Run, FloatArray]]) -> list[Made]:
+    """Make runs one after the other; ``seconds`` is processor time, trajectories are kept at the given times only."""
+    for run in _one_of_each(run for run, _ in runs):
+        make(_short(run))
+    return [_made_timed(run, times) for run, times in runs]
+
+
+def make_all_timed(pool: Executor, runs: Iterable[tuple[Run, FloatArray]], batch: int = 12) -> dict[str, Made]:
+    """Make runs in the workers of ``pool``, those of one solver together; return them by tag, in the order asked."""
+    runs = list(runs)
+    made: dict[str, Made] = {}
+    for future in as_completed([pool.submit(make_timed, job) for job in _batches(runs, batch)]):
+        made |= {result.run.tag: result for result in future.result()}
+    return {run.tag: made[run.tag] for run, _ in runs}
+
+
+def at_times(t: FloatArray, times: FloatArray) -> NDArray[np.int64]:
+    """Return the indices at which ``t`` holds ``times``.
+
+    Raises
+    ------
+    ValueError
+        If one of them is not there: an interpolation would have an error of its own.
+    """
+    slack = SAME_TIME * times[-1]
+    at: NDArray[np.int64] = np.minimum(np.searchsorted(t, times - slack), len(t) - 1)
+    if not np.all(np.abs(t[at] - times) <= slack):
+        missing = times[~(np.abs(t[at] - times) <= slack)][0]
+        raise ValueError(f"the run holds no point at t = {missing:.9g} s; its grid does not share the common times")
+    return at
+
+
+def _batches(runs: list[tuple[Run, FloatArray]], batch: int) -> Iterator[list[tuple[Run, FloatArray]]]:
+    """Yield jobs, the slice model's first: one for all of it, so that its loop is compiled in one worker only."""
+    compiled = [job for job in runs if find(job[0].solver).package == "slicemodel"]
+    if compiled:
+        yield compiled
+    groups: dict[tuple[Any, ...], list[tuple[Run, FloatArray]]] = {}
+    for run, times in runs:
+        if find(run.solver).package != "slicemodel":
+            groups.setdefault(_kind(run), []).append((run, times))
+    for group in groups.values():
+        yield from (group[k : k + batch] for k in range(0, len(group), batch))
+
+
+def _kind(run: Run) -> tuple[Any, ...]:
+    return (run.solver, *(run.settings.get(name) for name in WARMED_BY))
+
+
+def _one_of_each(runs: Iterable[Run]) -> list[Run]:
+    return list({_kind(run): run for run in runs}.values())
+
+
+def _short(run: Run) -> Run:
+    scenario = replace(run.scenario, duration=WARM * run.scenario.duration)
+    settings: Mapping[str, Any] = {
+        name: value for name, value in run.settings.items() if name not in ("times", "max_step")
+    }
+    if "steps" in settings:
+        return replace(run, scenario=scenario, settings={**settings, "steps": 16})
+    return replace(run, scenario=scenario, settings={**settings, "times": [scenario.duration]})
+
+
+def _made_timed(run: Run, times: FloatArray) -> Made:
+    least, together = float("inf"), 0.0
+    for _ in range(REPEATS):
+        began = time.process_time()
+        made = make(run)
+        spent = time.process_time() - began
+        least, together = min(least, spent), together + spent
+        if together > LONG:
+            break
+    thinned = None if made.trajectory is None else sampled(made.trajectory, times)
+    return replace(made, trajectory=thinned, seconds=least)
+
+
+def sampled(trajectory: Trajectory, times: FloatArray) -> Trajectory:
+    """Return the run at those of the times that it reached, without slices and impacts, with all it says of itself."""
+    reached = times[times <= trajectory.t[-1] * (1 + SAME_TIME)]
+    at = at_times(trajectory.t, reached)
+    none = np.empty((0, trajectory.scenario.n_slices))
+    return replace(
+        trajectory,
+        t=trajectory.t[at],
+        theta=trajectory.theta[at],
+        omega=trajectory.omega[at],
+        r=none,
+        v=none,
+        r_cm=trajectory.r_cm[at],
+        inertia=trajectory.inertia[at],
+        impacts=None,
+    )

@@ -1,0 +1,67 @@
+"""The verdicts as JUnit XML, which continuous-integration systems show beside their own tests.
+
+A regression claim is a test case: one that holds is bare, one that does not carries a failure, one that could not be
+evaluated carries an error with its reason. Observations cannot fail; they stand among the properties of the suite.
+"""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
+from typing import Final
+
+from flipproof.frame.findings import Finding
+
+FORBIDDEN: Final = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""Characters that XML 1.0 cannot hold, not even escaped; the reason of a failed run may have any."""
+
+
+def junit_text(findings: Sequence[Finding], suite: str = "flipproof") -> str:
+    """Return the findings as one test suite; ``time`` is zero, since a claim is read off runs that it shares."""
+    cases = [finding for finding in findings if finding.kind == "regression"]
+    counts = {
+        "name": suite,
+        "tests": str(len(cases)),
+        "failures": str(sum(finding.verdict == "fail" for finding in cases)),
+        "errors": str(sum(finding.verdict == "not evaluated" for finding in cases)),
+        "skipped": "0",
+        "time": "0",
+    }
+    root = ElementTree.Element("testsuites", {key: value for key, value in counts.items() if key != "skipped"})
+    tests = ElementTree.SubElement(root, "testsuite", counts)
+    observations = [finding for finding in findings if finding.kind == "observation"]
+    if observations:
+        properties = ElementTree.SubElement(tests, "properties")
+        for finding in observations:
+            words = {"name": finding.id, "value": _clean(f"{_numbers(finding)}; {finding.title}")}
+            ElementTree.SubElement(properties, "property", words)
+    for finding in cases:
+        _add_case(tests, finding, suite)
+    ElementTree.indent(root, " ")
+    text: str = ElementTree.tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
+
+
+def _add_case(tests: ElementTree.Element, finding: Finding, suite: str) -> None:
+    group = finding.id.partition("-")[0]
+    case = ElementTree.SubElement(tests, "testcase", {"classname": f"{suite}.{group}", "name": finding.id, "time": "0"})
+    numbers = f"{_numbers(finding)}, threshold {finding.threshold_text}"
+    if finding.verdict == "fail":
+        failure = ElementTree.SubElement(case, "failure", {"message": _clean(numbers), "type": "threshold"})
+        failure.text = _clean(f"{finding.title}\n{numbers}\n{finding.note}")
+    elif finding.verdict == "not evaluated":
+        error = ElementTree.SubElement(case, "error", {"message": _clean(finding.note), "type": "not evaluated"})
+        error.text = _clean(f"{finding.title}\n{finding.note}")
+    said = ElementTree.SubElement(case, "system-out")
+    said.text = _clean(f"{finding.title}: {numbers}" + (f"; {finding.note}" if finding.note else ""))
+
+
+def _numbers(finding: Finding) -> str:
+    if finding.value is None:
+        return f"not evaluated ({finding.note})"
+    return finding.value_text + (f" {finding.band_text}" if finding.band_text != "–" else "")
+
+
+def _clean(text: str) -> str:
+    return FORBIDDEN.sub("�", text)

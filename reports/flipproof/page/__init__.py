@@ -1,0 +1,1 @@
+"""The page: templates, assets and what fills them."""

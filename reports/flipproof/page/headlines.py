@@ -1,0 +1,165 @@
+"""The numbers of the verdict, each named by what it is: one list, from which lead, tiles and front page are written.
+
+    largest   max |omega_b - omega_a| / omega_0 of one pair of solvers during the flight
+    start     the same before the first impact
+    share     mean over all orders of mending of what an assumption changes: the only fair share, since it sums
+    order     what mending an assumption changes in the order of the ladder: no share, since another order differs
+
+Every number is computed at N slices and, where that is affordable, at another number of slices beside it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from typing import Any, Final, Literal
+
+from flipproof.evidence import BY_ENGINE, EQ8_FREE, FREE, PROGRAM_EQ8, TOTAL, Evidence
+from flipproof.studies.differences import Difference
+from flipproof.studies.finite_step import EVERYTHING, HELD, LOCATED
+from flipproof.studies.slices import FINER
+from flipproof.studies.waterfall import NAMES, STEP, Bar, Waterfall
+
+Measure = Literal["largest", "start", "share", "order"]
+
+MEASURES: Final[Mapping[Measure, str]] = {
+    "largest": "largest difference of one pair of solvers during the flight",
+    "start": "largest difference of one pair of solvers before the first impact",
+    "share": "fair share: mean over all orders of mending the assumptions",
+    "order": "change in the order of the ladder, which is no share",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Headline:
+    """One number of the verdict, a fraction of omega_0.
+
+    Parameters
+    ----------
+    id : str - what it answers
+    what : str - which pair or assumption
+    measure : str - of ``MEASURES``
+    value : float - signed if a share
+    slices : int - slices it was computed at
+    finer, finer_slices : float or None, int or None - the same at another number of slices
+    band : float or None - numerical uncertainty
+    time : float or None - when the largest difference occurs [s]
+    low, high : float or None - range over single orders, of a share
+    note : str - what limits it, "" if nothing does
+    """
+
+    id: str
+    what: str
+    measure: Measure
+    value: float
+    slices: int
+    finer: float | None = None
+    finer_slices: int | None = None
+    band: float | None = None
+    time: float | None = None
+    low: float | None = None
+    high: float | None = None
+    note: str = ""
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the headline for ``summary.json``."""
+        return asdict(self)
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any]) -> Headline:
+        """Return the headline that ``to_mapping`` wrote; "nan" and "inf" are numbers again."""
+        known: dict[str, Any] = {field.name: mapping[field.name] for field in fields(cls)}
+        for name in ("value", "finer", "band", "time", "low", "high"):
+            known[name] = None if known[name] is None else float(known[name])
+        return cls(**known)
+
+
+def headlines(evidence: Evidence) -> tuple[Headline, ...]:
+    """Return the numbers of the verdict that could be computed."""
+    found = evidence.attribution
+    plateau = found.waterfalls[0] if found.waterfalls else None
+    return (
+        *_pairs(evidence.differences, _ended(evidence)),
+        *(_shares(plateau) if plateau is not None else ()),
+        *_steps(evidence),
+    )
+
+
+def _ended(evidence: Evidence) -> str:
+    free = evidence.trajectory(FREE)
+    if free is None or free.ok:
+        return ""
+    return f"up to t = {1e3 * free.t[-1]:.0f} ms, where {free.method} {free.status}"
+
+
+def _pairs(differences: Sequence[Difference], ended: str) -> Iterator[Headline]:
+    named = {difference.name: difference for difference in differences}
+    rungs = [named[name] for name in NAMES.values() if name in named]
+    wanted = {"whole": TOTAL, "program-eq8": PROGRAM_EQ8, "eq8-free": EQ8_FREE, "engine": BY_ENGINE}
+    chosen = {id_: named[name] for id_, name in wanted.items() if name in named}
+    if rungs:
+        chosen["pair"] = max(rungs, key=lambda difference: difference.largest)
+    for id_, d in chosen.items():
+        finer_slices, finer = d.finer or (None, None)
+        yield Headline(
+            id=id_, what=d.name, measure="largest", value=d.largest, slices=d.slices, finer=finer,
+            finer_slices=finer_slices, band=d.band, time=d.largest_time,
+            note=ended if FREE in (d.first, d.second) else "",
+        )  # fmt: skip
+
+
+def _shares(waterfall: Waterfall) -> Iterator[Headline]:
+    bars = [bar for bar in waterfall.bars if bar.name != STEP]
+
+    def headline(id_: str, bar: Bar, measure: Measure) -> Headline:
+        finer = bar.finer if measure == "share" else None
+        return Headline(
+            id=id_,
+            what=bar.name,
+            measure=measure,
+            value=bar.average if measure == "share" else bar.forward,
+            slices=waterfall.slices,
+            finer=finer,
+            finer_slices=None if finer is None else FINER * waterfall.slices,
+            band=bar.average_band if measure == "share" else bar.forward_band,
+            low=bar.low if measure == "share" else None,
+            high=bar.high if measure == "share" else None,
+        )
+
+    ranked = sorted(bars, key=lambda bar: -abs(bar.average))
+    for k, bar in enumerate(ranked):
+        yield headline("share" if k == 0 else f"share-{k + 1}", bar, "share")
+    away = waterfall.away
+    if away is not None and away.name != STEP:
+        yield headline("away", away, "order")
+        yield headline("away-share", away, "share")
+
+
+def _steps(evidence: Evidence) -> Iterator[Headline]:
+    costs = {cost.way.name: cost for cost in evidence.finite_step}
+    finer = {cost.way.name: cost for cost in evidence.finite_step_finer}
+    n = evidence.throw.n_slices
+    asked: tuple[tuple[str, str, Measure], ...] = (
+        ("held", HELD, "start"),
+        ("held-through", LOCATED, "largest"),
+        ("step", EVERYTHING, "largest"),
+    )
+    for id_, name, measure in asked:
+        if name not in costs:
+            continue
+        cost, more = costs[name], finer.get(name)
+        value = cost.start if measure == "start" else cost.flight
+        if not math.isfinite(value):
+            continue
+        yield Headline(
+            id=id_,
+            what=cost.way.words,
+            measure=measure,
+            value=value,
+            slices=n,
+            finer=None if more is None else more.start if measure == "start" else more.flight,
+            finer_slices=None if more is None else FINER * n,
+            time=cost.first_impact if measure == "start" else None,
+            note=f"{cost.steps} steps",
+        )

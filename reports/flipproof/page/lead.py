@@ -1,0 +1,177 @@
+"""The verdict in sentences, as the page, the summary and the front page print them. Every word follows from numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from flipproof.page.headlines import Headline
+from flipproof.studies.differences import PARTING_BAND, moved, percent
+
+NOTHING = 1e-6
+"""Fraction of omega_0 below which two solvers are said to agree."""
+
+
+def lead_words(headlines: Sequence[Headline]) -> str:
+    """Return the verdict in a few sentences of plain text."""
+    return " ".join(sentences(headlines))
+
+
+def answers(headlines: Sequence[Headline]) -> Iterator[tuple[str, list[str]]]:
+    """Yield the questions of the front page, each answered by yes or no and its sentences; none if all agree."""
+    found = {headline.id: headline for headline in headlines}
+    if _nothing_compared(headlines) or _all_agree(headlines) is not None:
+        return
+    held = [found[id_].value for id_ in ("held", "held-through") if id_ in found]
+    step = [found["step"].value] if "step" in found else []
+    free = [found["eq8-free"].value] if "eq8-free" in found else []
+    steps = found["step"].note if "step" in found else "the steps"
+    yield f"Is it justified to hold omega constant over a step? {_verdict(held)}", list(_held(found))
+    yield f"Are {steps} enough? {_verdict(step)}", list(_step(found))
+    yield f"Is Eq. 8 free flight? {_verdict(free)}", list(_equations(found))
+    if "share" in found:
+        yield "Which assumption matters most?", list(_shares(found))
+    if "engine" in found:
+        yield (
+            "Does a physics engine agree?",
+            [
+                "Free flight by event-driven integration and by pymunk, with its hits on the step's grid, differ in ω "
+                f"by up to {amount(found['engine'])}."
+            ],
+        )
+
+
+def _verdict(values: Sequence[float]) -> str:
+    within = percent(PARTING_BAND)
+    if not values:
+        return "Not known."
+    return f"Yes, within {within}." if max(values) <= PARTING_BAND else f"No, not within {within}."
+
+
+def _compared(headlines: Sequence[Headline]) -> list[float]:
+    return [h.value for h in headlines if h.measure == "largest" and h.id in ("whole", "pair", "program-eq8")]
+
+
+def _nothing_compared(headlines: Sequence[Headline]) -> bool:
+    return not _compared(headlines)
+
+
+def _all_agree(headlines: Sequence[Headline]) -> float | None:
+    """Return the largest difference if it is nothing, else None."""
+    largest = max(_compared(headlines))
+    return largest if largest < NOTHING else None
+
+
+def sentences(headlines: Sequence[Headline]) -> Iterator[str]:
+    """Yield the verdict sentence by sentence; each can be read alone."""
+    found = {headline.id: headline for headline in headlines}
+    if _nothing_compared(headlines):
+        yield "No two solvers could be compared on this throw; the reasons stand below."
+        return
+    agree = _all_agree(headlines)
+    if agree is not None:
+        yield f"On this throw all solvers agree to {percent(agree)} of ω₀."
+        return
+    yield from _equations(found)
+    yield from _shares(found)
+    yield from _held(found)
+    yield from _step(found)
+
+
+def _equations(found: Mapping[str, Headline]) -> Iterator[str]:
+    whole, eq8 = found.get("whole"), found.get("program-eq8")
+    if whole is None:
+        yield "Free flight could not be computed; the reason stands below."
+    else:
+        until = f" {whole.note}" if whole.note else ""
+        yield f"The published program and free flight differ in ω by up to {amount(whole)}{until}."
+    if eq8 is not None:
+        yield f"The published program and Eq. 8 differ in ω by up to {amount(eq8)}."
+        if whole is not None and whole.value > 0.0:
+            times = f"{eq8.value / whole.value:.2g}"
+            yield f"By these two numbers the program is {times} times as far from Eq. 8 as from free flight."
+    free = found.get("eq8-free")
+    if free is not None:
+        yield f"Eq. 8 and free flight differ in ω by up to {amount(free)}."
+
+
+def _shares(found: Mapping[str, Headline]) -> Iterator[str]:
+    away, pair = found.get("away"), found.get("pair")
+    shares = [found[id_] for id_ in ("share", "share-2", "share-3") if id_ in found]
+    if shares:
+        listed = ", ".join(f"“{share.what}” {amount(share)}" for share in shares)
+        low = min(share.low for share in shares if share.low is not None)
+        high = max(share.high for share in shares if share.high is not None)
+        yield (
+            "Of the six assumptions between the program and free flight, these have the largest fair shares of the "
+            f"change of the mean ω in the second half, as the mean over all orders of mending them: {listed}."
+        )
+        yield f"In single orders the same assumptions change that mean by {signed(low)} to {signed(high)} of ω₀."
+    if len(shares) > 1 and tied(shares[0], shares[1]):
+        yield (
+            f"Which of “{shares[0].what}” and “{shares[1].what}” has the larger share is not settled: the number of "
+            "slices moves them by more than they differ."
+        )
+    if away is not None:
+        mean = found["away-share"]
+        yield (
+            f"Mended in the order of the ladder, “{away.what}” moves the mean ω of the second half away from free "
+            f"flight, by {amount(away)}; its fair share is {amount(mean)}."
+        )
+    if pair is not None:
+        yield (
+            f"The largest difference in ω between neighbours on the ladder is that of “{pair.what}”, "
+            f"{amount(pair)}; the largest difference of a pair is not a share of the whole."
+        )
+
+
+def _held(found: Mapping[str, Headline]) -> Iterator[str]:
+    held, through = found.get("held"), found.get("held-through")
+    if held is not None:
+        yield (
+            "Before the first impact, holding ω, θ and the centre of mass constant over a step costs the published "
+            f"program, without its lag, {amount(held)} at {held.note}."
+        )
+    if through is not None:
+        yield (
+            "Through all impacts, holding them and the velocity of the centre of mass costs the exact step, with its "
+            f"rebounds located inside the step, {amount(through)} at {through.note}."
+        )
+
+
+def _step(found: Mapping[str, Headline]) -> Iterator[str]:
+    step = found.get("step")
+    if step is not None:
+        yield (
+            "All that a finite step does in the published program (coefficients held, J and the centre of mass a step "
+            f"behind, rebounds that wait for the grid) costs {amount(step)} at {step.note}."
+        )
+
+
+def tied(first: Headline, second: Headline) -> bool:
+    """Return whether two shares differ by less than either moves with the number of slices."""
+    moved = [abs(h.finer - h.value) for h in (first, second) if h.finer is not None]
+    return bool(moved) and abs(abs(first.value) - abs(second.value)) <= max(moved)
+
+
+def amount(headline: Headline) -> str:
+    """Return a number with what belongs to it, as in "13 % of ω₀ (N = 50; 0.35 % of ω₀ less at N = 100)"."""
+    share = headline.measure in ("share", "order")
+    text = signed if share else percent
+    return f"{text(headline.value)} of ω₀ ({at_slices(headline)})"
+
+
+def at_slices(headline: Headline) -> str:
+    """Return the number of slices, and how far the number moves with it: of a share, where it moves to."""
+    words = f"N = {headline.slices}"
+    if headline.finer is None or headline.finer_slices is None:
+        return words
+    if headline.measure in ("share", "order"):
+        return f"{words}; {signed(headline.finer)} at N = {headline.finer_slices}"
+    return f"{words}; {moved(headline.value, headline.finer, headline.finer_slices)}"
+
+
+def signed(share: float | None) -> str:
+    """Return a fraction with its sign, two digits; a dash if there is none."""
+    if share is None:
+        return "–"
+    return f"{'+' if share >= 0 else '−'}{percent(abs(share))}"

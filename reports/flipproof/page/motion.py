@@ -1,0 +1,216 @@
+r"""The flights as frames: what the page's player and ``flipproof animate`` draw.
+
+::
+
+    y ^      cap = C_M - r_CM u_r                      u_r = (sin theta, -cos theta), cap to base
+      |          \   . C_M on the parabola
+      |           \                                    C_M(t) = C_M(0) + v_0 t - (0, g t^2 / 2)   (Eq. 2a, 2b)
+      +-----> x   base = C_M + (L - r_CM) u_r          the cap is released at the origin
+
+In the lab frame every solver's centre of mass follows the same parabola: solvers differ in how the bottle turns about
+it, and in where it lies in the bottle.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flipproof.frame.solvers import Made
+from slicemodel import Scenario, Trajectory
+from slicemodel.trajectory import FloatArray, Impacts
+
+FLOWN: Final = ("published-python", "eq8", "free-flight", "pymunk")
+"""The solvers whose bottles the page throws."""
+
+SLOW: Final = 9.6
+"""The paper's slow motion: 240 pictures per second shown at 25."""
+
+FRAMES: Final = 301
+"""Frames of a flight on the page."""
+
+MOST_SLICES: Final = 50
+"""Slices of one bottle that are drawn at the most."""
+
+POSITION_STEP: Final = 1e-4
+"""Positions of slices on the page are whole numbers of this, in bottle lengths."""
+
+FARTHEST: Final = 3.0
+"""A slice that left the bottle is drawn no farther from the cap than so many bottle lengths."""
+
+ROWS: Final = 11
+"""Times in the table that says the same in numbers."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Flight:
+    """One solver's throw at the times of the frames that it reached.
+
+    Parameters
+    ----------
+    name : str
+    t, theta, omega, r_cm : (F,) [s, rad, rad/s, m]
+    r : (F, n) - positions of the slices that are drawn, from the cap [m]
+    drawn : (n,) - their numbers, from 0 (starts on the base)
+    status, message : as of the trajectory
+    impacts : Impacts or None - None where the solver does not know them
+    """
+
+    name: str
+    t: FloatArray
+    theta: FloatArray
+    omega: FloatArray
+    r_cm: FloatArray
+    r: FloatArray
+    drawn: NDArray[np.int64]
+    status: str
+    message: str
+    impacts: Impacts | None
+
+
+def frame_times(scenario: Scenario, frames: int) -> FloatArray:
+    """Return the times of the frames, from release to landing, shape (frames,) [s]."""
+    return np.linspace(0.0, scenario.duration, frames)
+
+
+def flight_of(trajectory: Trajectory, times: FloatArray) -> Flight:
+    """Return a run at those of ``times`` that it reached, linear between its own output times."""
+    reached = times[times <= trajectory.t[-1] * (1 + 1e-12)]
+    drawn = drawn_slices(trajectory.r.shape[1] if len(trajectory.r) else 0)
+
+    def at(values: FloatArray) -> FloatArray:
+        return np.asarray(np.interp(reached, trajectory.t, values))
+
+    slices = [at(trajectory.r[:, i]) for i in drawn]
+    return Flight(
+        name=trajectory.label,
+        t=reached,
+        theta=at(trajectory.theta),
+        omega=at(trajectory.omega),
+        r_cm=at(trajectory.r_cm),
+        r=np.stack(slices, axis=1) if slices else np.zeros((len(reached), 0)),
+        drawn=drawn,
+        status=trajectory.status,
+        message=trajectory.message,
+        impacts=trajectory.impacts,
+    )
+
+
+def drawn_slices(n_slices: int) -> NDArray[np.int64]:
+    """Return the numbers of the slices that are drawn: all, or MOST_SLICES of them with the first and the last."""
+    if n_slices <= MOST_SLICES:
+        return np.arange(n_slices, dtype=np.int64)
+    return np.rint(np.linspace(0, n_slices - 1, MOST_SLICES)).astype(np.int64)
+
+
+def release_point(scenario: Scenario, r_cm: float) -> FloatArray:
+    """Return where C_M is at release if the cap is at the origin, shape (2,) [m]."""
+    return r_cm * np.array([np.sin(scenario.theta0), -np.cos(scenario.theta0)])
+
+
+def parabola(scenario: Scenario, start: FloatArray, t: ArrayLike) -> FloatArray:
+    """Return C_M in the lab frame, shape (F, 2) [m] (Eq. 2a, 2b)."""
+    times = np.asarray(t, dtype=np.float64)
+    v_x, v_y = scenario.launch_velocity
+    return np.stack([start[0] + v_x * times, start[1] + v_y * times - 0.5 * scenario.gravity * times * times], axis=-1)
+
+
+def cap_and_base(scenario: Scenario, flight: Flight) -> tuple[FloatArray, FloatArray]:
+    """Return cap and base in the lab frame, shape (F, 2) each [m]."""
+    centre = parabola(scenario, release_point(scenario, float(flight.r_cm[0])), flight.t)
+    along = np.stack([np.sin(flight.theta), -np.cos(flight.theta)], axis=-1)
+    to_base = (scenario.bottle.length - flight.r_cm)[:, np.newaxis]
+    return centre - flight.r_cm[:, np.newaxis] * along, centre + to_base * along
+
+
+def motion_data(
+    throw: Scenario, made: Mapping[str, Made], solvers: Sequence[str] = FLOWN, *, frames: int = FRAMES
+) -> dict[str, Any] | None:
+    """Return what the player needs, ready for JSON; None if no solver flew.
+
+    Parameters
+    ----------
+    throw : Scenario - the throw of all runs, cut as they were
+    made : mapping from tag to outcome - a solver that failed is shown with its reason
+    solvers : tags, in the order of the bottles
+    frames : int - frames of a whole flight
+    """
+    times = frame_times(throw, frames)
+    shown, failed = [], []
+    for name in solvers:
+        if name not in made:
+            continue
+        trajectory = made[name].trajectory
+        if trajectory is None:
+            failed.append({"name": name, "reason": made[name].reason})
+        else:
+            shown.append((name, flight_of(trajectory, times)))
+    if not shown:
+        return None
+    bottle = throw.bottle
+    first = shown[0][1]
+    return {
+        "duration": throw.duration,
+        "frames": frames,
+        "length": bottle.length,
+        "radius": bottle.radius,
+        "slice_height": throw.slice_height,
+        "slices": throw.n_slices,
+        "gravity": throw.gravity,
+        "launch_velocity": list(throw.launch_velocity),
+        "release": release_point(throw, float(first.r_cm[0])).tolist(),
+        "omega0": throw.omega0,
+        "slow": SLOW,
+        "position_step": POSITION_STEP,
+        "flights": [_packed(name, flight, bottle.length) for name, flight in shown],
+        "failed": failed,
+        "table": _table(times, [flight for _, flight in shown]),
+    }
+
+
+def _packed(name: str, flight: Flight, length: float) -> dict[str, Any]:
+    """Return one flight with its arrays in base64, little-endian."""
+    places = np.rint(np.clip(flight.r / length, -FARTHEST, FARTHEST) / POSITION_STEP)
+    impacts = flight.impacts
+    return {
+        "name": name,
+        "status": flight.status,
+        "message": flight.message,
+        "reached": len(flight.t),
+        "drawn": flight.drawn.tolist(),
+        "theta": _encoded(flight.theta, "<f4"),
+        "omega": _encoded(flight.omega, "<f4"),
+        "r_cm": _encoded(flight.r_cm, "<f4"),
+        "r": _encoded(places, "<i2"),
+        "impacts": None
+        if impacts is None
+        else {
+            "time": _encoded(impacts.time, "<f4"),
+            "slice": _encoded(impacts.slice, "<u4"),
+            "end": _encoded(impacts.end, "<i2"),
+            "speed": _encoded(impacts.speed_before, "<f4"),
+        },
+    }
+
+
+def _encoded(values: ArrayLike, kind: str) -> str:
+    return base64.b64encode(np.asarray(values).astype(kind).tobytes()).decode("ascii")
+
+
+def _table(times: FloatArray, flights: Sequence[Flight]) -> list[dict[str, Any]]:
+    """Return angle [degrees] and angular velocity [rad/s] of every flight at a few times; None after its end."""
+    rows = []
+    for k in np.unique(np.rint(np.linspace(0, len(times) - 1, ROWS)).astype(int)):
+        values = [
+            {"theta_deg": float(np.degrees(flight.theta[k])), "omega": float(flight.omega[k])}
+            if k < len(flight.t)
+            else None
+            for flight in flights
+        ]
+        rows.append({"t": float(times[k]), "values": values})
+    return rows

@@ -1,0 +1,16 @@
+"""The one way in which pages are made of templates: escaped by themselves, and a name that is missing is an error."""
+
+from __future__ import annotations
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+
+def environment() -> Environment:
+    """Return a fresh environment over the package's templates."""
+    return Environment(
+        loader=PackageLoader("flipproof.page"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )

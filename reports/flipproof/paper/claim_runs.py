@@ -1,0 +1,186 @@
+"""The runs that the statements need beside those of the figures, and all of them as flights of one equation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+from flipproof.frame.pool import Progress, make_all
+from flipproof.frame.solvers import Made, Run
+from flipproof.paper.cases import Case, family
+from flipproof.paper.claims_cost import MANY_STEPS, many_steps_key, same_steps_key
+from flipproof.paper.claims_model import FINEST, MANY_SLICES, finest_key
+from flipproof.paper.observe import Flights
+from flipproof.paper.parameters import numbers, paper_steps, paper_throw
+from flipproof.paper.runs import (
+    GROUP,
+    PUBLISHED,
+    RTOL,
+    SOLVERS,
+    STEP_ANGLE,
+    PaperRuns,
+    PaperSize,
+    make_thinned,
+    scenario_of,
+)
+from slicemodel import Scenario, Trajectory
+
+EVENT_DRIVEN: Final = SOLVERS[1:]
+
+HALVED: Final = ("filling", "long", "drag", "spin", "angle", "aspect")
+"""Families flown with half the slices too; in the others their number is the subject."""
+
+SLICES: Final = ("slices", "slices at 5 /s")
+"""Families in which the number of slices is the subject."""
+
+REBOUNDS: Final = ("beta", "beta at 5 /s")
+
+HALF_STEPS: Final = (*HALVED, *REBOUNDS, *SLICES)
+"""Families that the published program flies with half its time steps too."""
+
+LOOKED_INTO: Final = ("long", "drag", *REBOUNDS)
+"""Families of which statements read more than omega and theta, so that slices are kept."""
+
+WEIGHTLESS: Final = "eq8-weightless"
+STEADY_FILLING: Final = 0.1
+WEIGHTLESS_KEY: Final = f"filling {STEADY_FILLING:g}"
+"""The bottle that does not slow down without weight, and the key of its flight."""
+
+EXACT_STEP: Final = "exact-step"
+"""The scheme that solves Eq. 8 as printed at the paper's number of time steps."""
+
+ATOL: Final = 1e-10
+
+HALF_WORDS: Final = ", half the slices"
+HALF_STEPS_WORDS: Final = ", half the steps"
+
+Pair = tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClaimRuns:
+    """Runs of the figures, those that only the statements need, and those with half the slices or half the steps."""
+
+    paper: PaperRuns
+    further: Mapping[Pair, Made]
+    halved: Mapping[Pair, Made]
+    half_steps: Mapping[Pair, Made] = field(default_factory=dict)
+
+    def flights(self, solver: str) -> Flights:
+        """Return the flights of one equation, with those at half the slices and half the steps where there are any."""
+        usual = {**_of(solver, self.paper.made), **_of(solver, self.further)}
+
+        def coarse(made: Mapping[Pair, Made]) -> Flights | None:
+            own = _of(solver, made)
+            return _flights(solver, {**usual, **own}) if own else None
+
+        return replace(_flights(solver, usual), halved=coarse(self.halved), half_steps=coarse(self.half_steps))
+
+    def trajectory(self, solver: str, key: str) -> Trajectory | None:
+        """Return one trajectory, or None if it was not planned or failed."""
+        made = self.further.get((solver, key)) or self.paper.made.get((solver, key))
+        return None if made is None else made.trajectory
+
+
+def _of(solver: str, made: Mapping[Pair, Made]) -> dict[str, Made]:
+    return {key: outcome for (name, key), outcome in made.items() if name == solver}
+
+
+def _flights(solver: str, made: Mapping[str, Made]) -> Flights:
+    return Flights(
+        solver=solver,
+        runs={key: outcome.trajectory for key, outcome in made.items() if outcome.trajectory is not None},
+        reasons={key: outcome.reason for key, outcome in made.items() if outcome.trajectory is None},
+    )
+
+
+def plan_further(size: PaperSize) -> dict[Pair, Run]:
+    """Return the runs that no figure needs: finer in slices and in time, and without weight."""
+    runs: dict[Pair, Run] = {}
+    for name in SLICES:
+        many = next(case for case in family(name) if case.value == MANY_SLICES)
+        for solver in EVENT_DRIVEN:
+            finest = finest_key(name.removeprefix("slices"))
+            runs[solver, finest] = _run(solver, finest, many.scenario.with_slices(FINEST))
+            if scenario_of(solver, many, size) is None:
+                runs[solver, many.key] = _run(solver, many.key, many.scenario)
+    for filling in numbers("figure-S1-filling"):
+        throw, key, same = paper_throw(filling), many_steps_key(filling), same_steps_key(filling)
+        runs[PUBLISHED, key] = _run(PUBLISHED, key, throw, steps=MANY_STEPS)
+        runs["eq8", same] = _run(EXACT_STEP, same, _cut(throw, size), steps=paper_steps())
+    light = paper_throw(STEADY_FILLING)
+    runs[WEIGHTLESS, WEIGHTLESS_KEY] = _run(WEIGHTLESS, WEIGHTLESS_KEY, _cut(light, size))
+    return runs
+
+
+def _run(solver: str, key: str, scenario: Scenario, steps: int | None = None, words: str = "") -> Run:
+    """Return one run: of a scheme with its steps, of an equation with the tolerances of the figures."""
+    settings: dict[str, Any] = {"steps": steps, "store": "summary"}
+    if steps is None:
+        longest = min(STEP_ANGLE / abs(scenario.omega0), scenario.duration)
+        settings = {"method": "DOP853", "rtol": RTOL, "atol": ATOL, "max_step": longest}
+    return Run(f"claims, {solver}, {key}{words}", solver, scenario, settings)
+
+
+def _cut(throw: Scenario, size: PaperSize) -> Scenario:
+    return throw.with_slices(min(size.slices, throw.n_slices))
+
+
+def plan_halved(size: PaperSize) -> dict[Pair, Run]:
+    """Return the event-driven flights with half the slices of the figures'."""
+    cases: dict[str, Case] = {case.key: case for name in HALVED for case in family(name)}
+    runs: dict[Pair, Run] = {}
+    for solver in EVENT_DRIVEN:
+        for key, case in cases.items():
+            usual = scenario_of(solver, case, size)
+            if usual is not None and usual.n_slices > 1:
+                half = usual.with_slices(usual.n_slices // 2)
+                runs[solver, key] = _run(solver, key, half, words=HALF_WORDS)
+    for filling in numbers("figure-S1-filling"):
+        same, usual = same_steps_key(filling), _cut(paper_throw(filling), size)
+        half = usual.with_slices(usual.n_slices // 2)
+        runs["eq8", same] = _run(EXACT_STEP, same, half, steps=paper_steps(), words=HALF_WORDS)
+    return runs
+
+
+def plan_published(half: str) -> dict[Pair, tuple[Run, int]]:
+    """Return the flights of the published program with half its slices or steps, and every how many points are kept.
+
+    Parameters
+    ----------
+    half : "slices" or "steps"
+    """
+    kept = {case.key for name in LOOKED_INTO for case in family(name)}
+    runs: dict[Pair, tuple[Run, int]] = {}
+    for name in HALVED if half == "slices" else HALF_STEPS:
+        for case in family(name):
+            scenario, steps, thin = case.scenario, case.steps, case.thin
+            if half == "slices":
+                scenario = scenario.with_slices(max(1, scenario.n_slices // 2))
+            else:
+                # As many points are kept as there are, up to the rounding that keeps the last one.
+                steps, thin = 1 + (case.steps - 1) // 2, 1
+            settings = {"steps": steps, "store": "full" if case.key in kept else "summary"}
+            words = HALF_WORDS if half == "slices" else HALF_STEPS_WORDS
+            tag = f"claims, {PUBLISHED}, {case.key}{words}"
+            runs[PUBLISHED, case.key] = Run(tag, PUBLISHED, scenario, settings), thin
+    return runs
+
+
+def gather_claims(pool: Executor, paper: PaperRuns, progress: Progress) -> ClaimRuns:
+    """Make what the statements need beside the runs of the figures, at the size of those, in the same pool."""
+    further, halved = plan_further(paper.size), plan_halved(paper.size)
+    half_slices, half_steps = plan_published("slices"), plan_published("steps")
+    jobs = [*half_slices.values(), *half_steps.values()]
+    thinned = [pool.submit(make_thinned, jobs[k : k + GROUP]) for k in range(0, len(jobs), GROUP)]
+    made = make_all(pool, [*halved.values(), *further.values()], progress)
+    made |= {each.run.tag: each for group in thinned for each in group.result()}
+    return ClaimRuns(
+        paper=paper,
+        further={pair: made[run.tag] for pair, run in further.items()},
+        halved={pair: made[run.tag] for pair, run in halved.items()}
+        | {pair: made[run.tag] for pair, (run, _) in half_slices.items()},
+        half_steps={pair: made[run.tag] for pair, (run, _) in half_steps.items()},
+    )

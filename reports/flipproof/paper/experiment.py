@@ -1,0 +1,343 @@
+"""What the text says about the bottles that were really thrown, and which equation comes closest to that.
+
+The measurements themselves are not published as numbers: a statement of the text is all there is to compare with.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+
+from flipproof.paper.cases import ICE
+from flipproof.paper.claim import banded
+from flipproof.paper.claim_runs import ClaimRuns
+from flipproof.paper.claims_throw import CLEAR, filling_of_slow_down
+from flipproof.paper.observe import FLAT, Flights, MissingFlightError, climb, normalised
+from flipproof.paper.parameters import paper_throw
+from flipproof.paper.runs import SOLVERS
+from flipproof.paper.statements import OMEGA, Reading, Verdict
+from slicemodel import Trajectory
+from slicemodel.observables import plateau, static_toppling_angle
+
+CAVEAT: Final = (
+    "What is compared here is the text of the paper, not its data: the curves of its Fig. 4 are not available as "
+    "numbers, and a statement such as “close to” is given a width that is chosen here."
+)
+
+UP_TO_FIVE: Final = 0.05
+"""Share of omega_0 by which a lowest mean may miss a fifth."""
+
+VIDEOS: Final = (0.1, 0.25, 0.33, 0.5, 0.75)
+"""Fillings of the bottles that were thrown and filmed."""
+
+Value = Callable[[Flights], float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observation:
+    """One statement of the text about the experiment.
+
+    Parameters
+    ----------
+    id, place, says : as in ``Statement``
+    means : str - the number that is compared
+    read : flights of one equation -> that number [unit]
+    measured : (low, high) - what the text gives for it
+    slack : float - by how much it may be missed and still count as met
+    why : str - why the width is what it is
+    numbers : flights -> the numbers behind, in words
+    remark : str - what else must be known to judge a miss
+    ranked : bool - whether a smaller miss comes closer
+    """
+
+    id: str
+    place: str
+    says: str
+    means: str
+    read: Value
+    unit: str
+    measured: tuple[float, float]
+    why: str
+    slack: float = 0.0
+    numbers: Callable[[Flights], str] | None = None
+    remark: str = ""
+    ranked: bool = True
+
+    def miss(self, value: float) -> float:
+        """Return by how much a number lies outside what the text gives; 0 inside."""
+        low, high = self.measured
+        return max(0.0, low - value, value - high)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """One statement with the number of every equation.
+
+    Parameters
+    ----------
+    observation : Observation
+    readings : solver -> Reading; a solver without flights has NaN and the reason as its note
+    """
+
+    observation: Observation
+    readings: Mapping[str, Reading]
+
+    @property
+    def closest(self) -> tuple[str, ...]:
+        """Return the equations that come closest: several where bands do not tell them apart.
+
+        None if none flew, or if misses are no measure.
+        """
+        misses = {
+            solver: (self.observation.miss(reading.value), reading.band)
+            for solver, reading in self.readings.items()
+            if math.isfinite(reading.value)
+        }
+        if not misses or not self.observation.ranked:
+            return ()
+        least, band = min(misses.values())
+        return tuple(solver for solver, (miss, own) in misses.items() if miss <= least + band + own)
+
+    def verdict(self, solver: str) -> Verdict:
+        """Return whether an equation agrees with the text."""
+        return self.readings[solver].verdict
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the comparison as JSON-ready data."""
+        return {
+            "id": self.observation.id,
+            "place": self.observation.place,
+            "says": self.observation.says,
+            "means": self.observation.means,
+            "why": self.observation.why,
+            "remark": self.observation.remark,
+            "closest": list(self.closest),
+            "equations": {solver: reading.to_mapping() for solver, reading in self.readings.items()},
+        }
+
+
+def steady_level(run: Trajectory) -> float:
+    """Return the mean of omega / omega_0 over the second half of the flight, the average of Fig. 4d."""
+    return plateau(run.t, run.omega, run.scenario.omega0)
+
+
+def ice_drift(flights: Flights) -> float:
+    """Return the largest |omega / omega_0 - 1| of the bottle of ice."""
+    return float(np.abs(normalised(flights.run(ICE)) - 1.0).max())
+
+
+def level_of(filling: float) -> Value:
+    """Return a reader of the average at one filling."""
+
+    def read(flights: Flights) -> float:
+        return steady_level(flights.at("filling", filling))
+
+    return read
+
+
+def slowest_filling(flights: Flights) -> float:
+    """Return the filling with the lowest average."""
+    levels = {case.value: steady_level(run) for case, run in flights.members("filling")}
+    return min(levels, key=lambda filling: levels[filling])
+
+
+def lowest_level(flights: Flights) -> float:
+    """Return the lowest average of all fillings."""
+    return min(steady_level(run) for _, run in flights.members("filling"))
+
+
+def climb_at_a_third(flights: Flights) -> float:
+    """Return by how much the bottle of 0.33 spins up again after it has slowed down."""
+    return climb(flights.at("filling", 0.33))
+
+
+def least_turned(flights: Flights) -> float:
+    """Return the smallest angle at landing of the fillings filmed [degrees]."""
+    return min(_landing_angles(flights).values())
+
+
+def _landing_angles(flights: Flights) -> dict[float, float]:
+    """Return theta at the paper's time of landing by filling filmed [degrees]."""
+    return {filling: math.degrees(float(flights.at("filling", filling).theta[-1])) for filling in VIDEOS}
+
+
+def landing_angles_words(flights: Flights) -> str:
+    """Return theta at the time of landing, and how far that is from the nearest upright, by filling."""
+    angles = _landing_angles(flights)
+    words = (f"{angle:.0f}° at {fill:g} ({math.remainder(angle, 360.0):+.0f}°)" for fill, angle in angles.items())
+    return "θ(T): " + ", ".join(words).replace("-", "\N{MINUS SIGN}")
+
+
+def worst_landing(flights: Flights) -> float:
+    """Return by how much the tilt on landing exceeds the angle at which the bottle topples, the most [degrees]."""
+    return max(
+        abs(math.remainder(angle, 360.0)) - math.degrees(static_toppling_angle(paper_throw(filling)))
+        for filling, angle in _landing_angles(flights).items()
+    )
+
+
+def ice_lands_at() -> float:
+    """Return the angle of the bottle of ice after the paper's T, which no model enters [degrees]."""
+    throw = paper_throw()
+    return math.degrees(throw.theta0 + throw.omega0 * throw.duration)
+
+
+OBSERVATIONS: Final = (
+    Observation(
+        id="ice",
+        place="section 3, Fig. 4a",
+        says="A bottle of ice keeps its angular velocity, about 20 rad/s.",
+        means="largest |ω/ω₀ − 1|; every flight is released at 20 rad/s",
+        read=ice_drift,
+        unit="",
+        measured=(0.0, 0.0),
+        slack=0.01,
+        why="A hundredth of ω₀: less than a film shows.",
+    ),
+    Observation(
+        id="two-phases",
+        place="section 3, Fig. 4b",
+        says="At M̃ = 0.33 ω first decays quickly and then stays constant.",
+        means="largest climb of ω over its lowest value until then",
+        read=climb_at_a_third,
+        unit=OMEGA,
+        measured=(0.0, 0.0),
+        slack=FLAT,
+        why="“Flat” is a word of ours: a rise of at most 0.1 ω₀.",
+    ),
+    Observation(
+        id="tenth-like-ice",
+        place="section 3, Fig. 4c, 4d",
+        says="M̃ = 0.10 behaves very much like ice.",
+        means="mean ω over the second half of the flight",
+        read=level_of(0.1),
+        unit=OMEGA,
+        measured=(1.0, 1.0),
+        slack=FLAT,
+        why="“Very close” is taken as 0.1 ω₀.",
+    ),
+    Observation(
+        id="minimum",
+        place="section 3, Fig. 4d",
+        says="ω/ω₀ is lowest between M̃ = 0.25 and 0.50.",
+        means="filling with the lowest mean ω over the second half of the flight",
+        read=slowest_filling,
+        unit="",
+        measured=(0.25, 0.5),
+        why="The range is the paper's.",
+    ),
+    Observation(
+        id="three-quarters",
+        place="section 3, Fig. 4d",
+        says="At M̃ = 0.75 ω is already clearly reduced.",
+        means="mean ω over the second half of the flight, at most 0.8",
+        read=level_of(0.75),
+        unit=OMEGA,
+        measured=(0.0, CLEAR),
+        why="“Significant” is taken as a fifth of ω₀.",
+    ),
+    Observation(
+        id="five-times",
+        place="section 6",
+        says="ω becomes up to five times lower than that of a rigid filling.",
+        means="lowest mean ω over the second half of the flight, of all fillings",
+        read=lowest_level,
+        unit=OMEGA,
+        measured=(0.2, 0.2),
+        slack=UP_TO_FIVE,
+        why="A fifth, with 0.05 ω₀ either way.",
+    ),
+    Observation(
+        id="change-of-behaviour",
+        place="section 5, Fig. 4d",
+        says="The bottle begins to slow down at a filling between 0.1 and 0.2.",
+        means="filling at which ω_f falls to 0.8 ω₀",
+        read=filling_of_slow_down,
+        unit="",
+        measured=(0.1, 0.2),
+        why="The range is the paper's; 0.8 ω₀ is a choice of ours for “slower”.",
+        remark="Resting water lies below the centre of mass, and is not thrown towards the cap, up to h/L = ε/(1 + ε), "
+        "M̃ = 0.1417: inside the measured range, and where Eq. 13b has its maximum.",
+    ),
+    Observation(
+        id="half-a-turn",
+        place="section 3, below Fig. 3",
+        says="The bottle spins by more than half a revolution: θ exceeds π.",
+        means="smallest θ at T = 0.5 s, of the fillings filmed",
+        read=least_turned,
+        unit="°",
+        measured=(180.0, math.inf),
+        why="The sentence is an inequality.",
+    ),
+    Observation(
+        id="landing-angle",
+        place="section 3, Fig. 3 and 4",
+        says="Every bottle lands upright: θ ends close to 0 modulo 2π.",
+        means="tilt at T = 0.5 s minus the θ_c of that filling at rest (Eq. 13b), the largest of the fillings filmed",
+        read=worst_landing,
+        unit="°",
+        measured=(-math.inf, 0.0),
+        why="θ_c is the largest tilt from which a bottle at rest comes back; more than that is no upright landing.",
+        numbers=landing_angles_words,
+        remark="Two explanations, between which the text does not decide. θ₀ = 90°, ω₀ = 20 rad/s and T = 0.5 s may "
+        "not be one throw: each is stated as typical, one set for all fillings, and with them ice, whose ω no model "
+        f"changes, would come to {ice_lands_at():.0f}°, {abs(math.remainder(ice_lands_at(), 360.0)):.0f}° from "
+        "upright. Or the equation turns the bottle by a wrong angle. Misses modulo a turn are not ranked.",
+        ranked=False,
+    ),
+)
+
+
+def compare(observation: Observation, flights: Flights) -> Reading:
+    """Return the number of one equation with its band; NaN with the reason where a flight is missing."""
+    low, high = observation.measured
+    admissible = (low - observation.slack, high + observation.slack)
+
+    def read(each: Flights) -> tuple[Reading, ...]:
+        value = observation.read(each)
+        return (Reading(name=observation.means, value=value, unit=observation.unit, admissible=admissible),)
+
+    watched, seen = flights.watched()
+    try:
+        reading = banded(read, watched)[0]
+    except MissingFlightError as reason:
+        return Reading(
+            name=observation.means, value=math.nan, unit=observation.unit, admissible=admissible, note=str(reason)
+        )
+    numbers = observation.numbers(flights) if observation.numbers else ""
+    return replace(reading, note="; ".join(words for words in (numbers, seen.words) if words))
+
+
+def compare_all(runs: ClaimRuns) -> tuple[Comparison, ...]:
+    """Return every statement about the experiment with the numbers of all equations."""
+    flights = {solver: runs.flights(solver) for solver in SOLVERS}
+    return tuple(
+        Comparison(
+            observation=observation,
+            readings={solver: compare(observation, each) for solver, each in flights.items()},
+        )
+        for observation in OBSERVATIONS
+    )
+
+
+def agreement(comparisons: tuple[Comparison, ...]) -> dict[str, int]:
+    """Return how many statements each equation agrees with."""
+    return {
+        solver: sum(comparison.verdict(solver) == "holds" for comparison in comparisons) for solver in SOLVERS
+    }  # fmt: skip
+
+
+def times_closest(comparisons: tuple[Comparison, ...]) -> dict[str, int]:
+    """Return for how many statements each equation is the closest, or one of those."""
+    return {solver: sum(solver in comparison.closest for comparison in comparisons) for solver in SOLVERS}
+
+
+def closest_overall(comparisons: tuple[Comparison, ...]) -> tuple[str, ...]:
+    """Return the equation that agrees with most statements; among several, those that are most often the closest."""
+    agrees, closest = agreement(comparisons), times_closest(comparisons)
+    best = max((agrees[solver], closest[solver]) for solver in SOLVERS)
+    return tuple(solver for solver in SOLVERS if (agrees[solver], closest[solver]) == best)

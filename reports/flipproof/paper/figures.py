@@ -1,0 +1,77 @@
+"""Every figure of the paper that has numbers in it: its name, the families of throws it needs, and how it is made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from flipproof.frame.exhibit import Exhibit
+from flipproof.paper import figures_bottle, figures_curves, figures_levels, figures_slices
+from flipproof.paper.cases import family
+from flipproof.paper.runs import PaperRuns
+
+ORDER: Final = (
+    "2b", "3b", "5a", "5b", "5c", "5d", "6a", "6b", "6c", "7a", "7b", "8a", "8b", "8c", "9a", "9b", "9c",
+    "S1a", "S1b", "S1c",
+)  # fmt: skip
+"""The figures in the paper's order. Figures 1, 2a, 3a and 4 are photographs, notation and measurements."""
+
+TIMED: Final = ("S1b", "S1c")
+"""Figures that need the measured costs."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PaperFigure:
+    """One figure: its name, the families of throws that it shows, and what makes its exhibits."""
+
+    name: str
+    families: tuple[str, ...]
+    make: Callable[[PaperRuns], Iterator[Exhibit]]
+
+
+def _figures() -> dict[str, PaperFigure]:
+    recipes = {
+        **figures_bottle.RECIPES,
+        **figures_slices.RECIPES,
+        **figures_curves.RECIPES,
+        **figures_levels.RECIPES,
+    }
+    return {name: PaperFigure(name=name, families=recipes[name][0], make=recipes[name][1]) for name in ORDER}
+
+
+FIGURES: Final[Mapping[str, PaperFigure]] = MappingProxyType(_figures())
+
+
+def check_figures(names: Iterable[str]) -> tuple[str, ...]:
+    """Return the names as the paper writes them, once each, in its order.
+
+    Raises
+    ------
+    ValueError
+        Naming what is no figure, and those that are.
+    """
+    by_lower_case = {name.lower(): name for name in ORDER}
+    wanted = set()
+    for name in names:
+        plain = name.strip().lower()
+        if plain not in by_lower_case:
+            raise ValueError(f"figure {name!r} is unknown; known: {', '.join(ORDER)}")
+        wanted.add(by_lower_case[plain])
+    return tuple(name for name in ORDER if name in wanted)
+
+
+def keys_of(names: Iterable[str]) -> set[str]:
+    """Return the keys of the cases that these figures need."""
+    return {case.key for name in names for of in FIGURES[name].families for case in family(of)}
+
+
+def exhibits_paper(runs: PaperRuns, names: Iterable[str] = ORDER) -> Iterator[Exhibit]:
+    """Yield the exhibits of the figures, in the paper's order; a figure may have several.
+
+    Figures of cost are left out where costs were not measured.
+    """
+    for name in check_figures(names):
+        if runs.costs or name not in TIMED:
+            yield from FIGURES[name].make(runs)

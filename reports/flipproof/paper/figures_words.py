@@ -1,0 +1,43 @@
+"""What the captions and alternative texts of all the paper's figures have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from flipproof.paper.figures_panels import NAMES
+from flipproof.paper.runs import BANDS, PaperRuns
+
+SECTION: Final = "paper"
+
+
+def settings_words(runs: PaperRuns) -> str:
+    """Return how the runs were made: slices and bands."""
+    size = runs.size
+    own = ", ".join(f"{_plain(BANDS[solver])} ({NAMES[solver]})" for solver in BANDS)
+    cut = ", ".join(f"{error:g} ({NAMES[solver]})" for solver, error in size.slice_error.items())
+    return (
+        f"The published program has the paper's own slices and steps. Eq. 8 and free flight are event-driven, with at "
+        f"most {size.slices} slices at the same damping rate; as fractions of ω₀ their ω is certain to {own} for that "
+        f"number of slices, and at most {cut} from that of 200."
+    )
+
+
+def same_slices_words() -> str:
+    """Return how runs were made that have the same slices by every solver."""
+    own = ", ".join(f"{_plain(BANDS[solver])} ({NAMES[solver]})" for solver in BANDS)
+    return f"Every solver has the same slices; as fractions of ω₀ the event-driven ω is certain to {own}."
+
+
+def listed(values: Mapping[str, Mapping[str, float]], digits: int = 3) -> str:
+    """Return solver -> label -> number as words."""
+    return "; ".join(
+        f"{NAMES[solver]}: " + ", ".join(f"{label} {value:.{digits}f}" for label, value in found.items())
+        for solver, found in values.items()
+        if found
+    )
+
+
+def _plain(value: float) -> str:
+    """Return a small number as "1e-7" or "0.003"."""
+    return f"{value:g}".replace("e-0", "e-")

@@ -1,0 +1,331 @@
+"""A statement of the paper, and how each equation judges it: a number, its band, a threshold, a margin, a verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+from flipproof.frame.findings import Finding, finite_or_none
+
+Verdict = Literal["holds", "fails", "cannot be decided", "not judged"]
+Kind = Literal["claim", "admitted limit"]
+
+OMEGA: Final = "of ω₀"
+"""Unit of a number that is a share of omega_0."""
+
+SIGNS: Final[Mapping[Verdict, str]] = {"holds": "✓", "fails": "✗", "cannot be decided": "?", "not judged": "–"}
+CLASSES: Final[Mapping[Verdict, str]] = {
+    "holds": "pass", "fails": "fail", "cannot be decided": "soft", "not judged": "soft"
+}  # fmt: skip
+"""How a page marks a verdict: sign and colour class beside the word."""
+
+LIMIT_WORDS: Final[Mapping[Verdict, str]] = {
+    "holds": "has this limit",
+    "fails": "is free of it",
+    "cannot be decided": "cannot be decided",
+    "not judged": "not judged",
+}
+"""The verdict on a limit that the paper admits: to have it is no success, to be free of it no failure."""
+
+NEAR: Final = 0.1
+"""Share of a threshold within which a number is marginal. Thresholds chosen here have one significant digit: another
+reader could as well have chosen one a tenth higher or lower."""
+
+
+DIGITS: Final = 3
+"""Digits of a number from which on its band is not worth a word."""
+
+
+def _signed(digits: str) -> str:
+    """Return digits with a true minus sign, and none before a zero."""
+    return digits.replace("-", "\N{MINUS SIGN}") if float(digits) else digits.lstrip("-")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading:
+    """One number that a statement stands or falls with.
+
+    Parameters
+    ----------
+    name : str - what it is, in words
+    value : float [unit]; NaN if it could not be read
+    unit : str - "" for a pure number
+    admissible : (low, high) - closed interval that holds the value if the statement is right
+    band : float - numerical uncertainty of the value, >= 0
+    note : str - where, when and the numbers beside it
+    """
+
+    name: str
+    value: float
+    unit: str
+    admissible: tuple[float, float]
+    band: float = 0.0
+    note: str = ""
+
+    @property
+    def verdict(self) -> Verdict:
+        """Return the verdict: undecided where a bound lies within the band of the value, or where there is none."""
+        low, high = self.admissible
+        if not math.isfinite(self.value) or not math.isfinite(self.band):
+            return "cannot be decided"
+        if low <= self.value - self.band and self.value + self.band <= high:
+            return "holds"
+        if self.value + self.band < low or self.value - self.band > high:
+            return "fails"
+        return "cannot be decided"
+
+    @property
+    def margin(self) -> float:
+        """Return the distance of the value from the nearest bound [unit]: positive inside, negative outside."""
+        low, high = self.admissible
+        return min(self.value - low, high - self.value)
+
+    @property
+    def marginal(self) -> bool:
+        """Return whether the band reaches a bound, or comes within ``NEAR`` of the threshold's own size to it.
+
+        The size of a single bound is its absolute value, that of an interval half its width; a bound at zero has none.
+        """
+        low, high = self.admissible
+        size = (high - low) / 2 if math.isfinite(high - low) else abs(high if math.isinf(low) else low)
+        reach = self.band + NEAR * size
+        return 0.0 < reach < math.inf and abs(self.margin) <= reach
+
+    @property
+    def sign(self) -> str:
+        """The verdict as a sign."""
+        return SIGNS[self.verdict]
+
+    @property
+    def colour(self) -> str:
+        """The verdict as the class of a page's style sheet."""
+        return CLASSES[self.verdict]
+
+    @property
+    def margin_number(self) -> str:
+        """The margin with its sign and without its unit; a dash if there is none."""
+        if not math.isfinite(self.margin):
+            return "–"
+        digits = f"{self.margin:+.0f}" if abs(self.margin) >= 10.0 else f"{self.margin:+.2g}"
+        return _signed(digits) if self.margin else "0"
+
+    @property
+    def margin_text(self) -> str:
+        """The margin with its sign and unit, and whether it is marginal."""
+        if not math.isfinite(self.margin):
+            return "no margin"
+        return f"margin {self.margin_number} {self.unit}".rstrip() + (", marginal" if self.marginal else "")
+
+    @property
+    def threshold_text(self) -> str:
+        """The admissible interval in words."""
+        low, high = self.admissible
+        if math.isinf(low):
+            return f"≤ {_signed(f'{high:.3g}')}"
+        if math.isinf(high):
+            return f"≥ {_signed(f'{low:.3g}')}"
+        if low == -high:
+            return f"0 ± {high:.3g}"
+        return f"{_signed(f'{low:.3g}')} to {_signed(f'{high:.3g}')}"
+
+    @property
+    def value_text(self) -> str:
+        """The value with its band and unit: no digit that the band drowns, no band that three digits do not show."""
+        if not math.isfinite(self.value):
+            return "–"
+        number, band = f"{self.value:.3g}", ""
+        if 0.0 < self.band < math.inf:
+            shown = -math.floor(math.log10(self.band))
+            size = math.floor(math.log10(abs(self.value))) if self.value else -math.inf
+            if size + shown < DIGITS:
+                places = max(0, shown)
+                number, band = f"{self.value:.{places}f}", f" ± {self.band:.{places}f}"
+        return f"{_signed(number)}{band} {self.unit}".rstrip()
+
+    @property
+    def words(self) -> str:
+        """Name, value, threshold, margin and note as a sentence without its full stop."""
+        note = f" ({self.note})" if self.note else ""
+        return f"{self.name}: {self.value_text}, needed {self.threshold_text}, {self.margin_text}{note}"
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the reading as JSON-ready data; numbers that are not finite become null."""
+        return {
+            "name": self.name,
+            "value": finite_or_none(self.value),
+            "unit": self.unit,
+            "band": finite_or_none(self.band),
+            "admissible": [finite_or_none(bound) for bound in self.admissible],
+            "margin": finite_or_none(self.margin),
+            "marginal": self.marginal,
+            "verdict": self.verdict,
+            "note": self.note,
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judgement:
+    """How one equation judges a statement.
+
+    Parameters
+    ----------
+    solver : str - name of the equation; "geometry" for a statement that no motion enters
+    readings : all must hold; see ``deciding`` for the one that speaks for them
+    aside : str - why there is no number
+    flown : str - slices, and steps where they are chosen, of the flights that were read
+    others : (words, judgement) of every other sense that the text allows
+    silent : str - why the statement says nothing about this equation; empty if it does
+    """
+
+    solver: str
+    readings: tuple[Reading, ...] = ()
+    aside: str = ""
+    flown: str = ""
+    others: tuple[tuple[str, Judgement], ...] = ()
+    silent: str = ""
+
+    @property
+    def verdict(self) -> Verdict:
+        """Return "fails" if a reading fails, "holds" if all hold, "not judged" if there is nothing to judge."""
+        if self.silent:
+            return "not judged"
+        verdicts = [reading.verdict for reading in self.readings]
+        if "fails" in verdicts:
+            return "fails"
+        return "holds" if verdicts and all(verdict == "holds" for verdict in verdicts) else "cannot be decided"
+
+    @property
+    def marginal(self) -> bool:
+        """Return whether a reading at the edge of its threshold carries the verdict."""
+        return self.deciding is not None and self.deciding.marginal
+
+    @property
+    def deciding(self) -> Reading | None:
+        """Return the reading that the verdict rests on; None if there is no number at all.
+
+        A statement fails by any reading that is clearly off, and holds only as clearly as its most marginal one.
+        """
+        found = [reading for reading in self.readings if reading.verdict == self.verdict]
+        wanted = self.verdict == "holds"
+        return next((reading for reading in found if reading.marginal == wanted), found[0] if found else None)
+
+    @property
+    def value(self) -> float:
+        """The deciding number; NaN if there is none."""
+        return self.deciding.value if self.deciding else math.nan
+
+    @property
+    def band(self) -> float:
+        """The band of the deciding number; NaN if there is none."""
+        return self.deciding.band if self.deciding else math.nan
+
+    @property
+    def threshold(self) -> str:
+        """The threshold of the deciding number; empty if there is none."""
+        return self.deciding.threshold_text if self.deciding else ""
+
+    @property
+    def words(self) -> str:
+        """All readings, the flights and the other senses of the text, as one line."""
+        parts = [reading.words for reading in self.readings]
+        parts += [words for words in (self.flown, self.silent, self.aside) if words]
+        for sense, judgement in self.others:
+            deciding = judgement.deciding
+            number = f", {deciding.name} {deciding.value_text}, {deciding.margin_text}" if deciding else ""
+            reason = f", {judgement.aside}" if judgement.aside else ""
+            parts.append(f"{sense}: {judgement.verdict}{number}{reason}")
+        return "; ".join(parts)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the judgement as JSON-ready data; numbers that are not finite become null."""
+        return {
+            "solver": self.solver,
+            "verdict": self.verdict,
+            "marginal": self.marginal,
+            "aside": self.silent or self.aside,
+            "flown": self.flown,
+            "readings": [reading.to_mapping() for reading in self.readings],
+            "others": [{"sense": sense, **judgement.to_mapping()} for sense, judgement in self.others],
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Statement:
+    """What the paper says about its results, and what becomes of it.
+
+    Parameters
+    ----------
+    id : str - stable name, an anchor of the page
+    place : str - section and figure
+    says : str - the statement in other words
+    means : str - what is measured, and what it must be
+    throw : str - on which throw
+    why : str - why the threshold is what it is
+    kind : "claim", or "admitted limit" for a shortcoming of the model that the paper itself names
+    judgements : one for each equation, or a single one of "geometry"
+    """
+
+    id: str
+    place: str
+    says: str
+    means: str
+    throw: str
+    why: str
+    kind: Kind
+    judgements: tuple[Judgement, ...]
+
+    def word(self, judgement: Judgement) -> str:
+        """Return a verdict on this statement in words, with "marginal" where it is."""
+        verdict = LIMIT_WORDS[judgement.verdict] if self.kind == "admitted limit" else judgement.verdict
+        return f"{verdict}, marginal" if judgement.marginal else verdict
+
+    def sign(self, judgement: Judgement) -> str:
+        """Return a verdict as a sign; one on an admitted limit is neither success nor failure."""
+        return "•" if self.kind == "admitted limit" and judgement.readings else SIGNS[judgement.verdict]
+
+    def colour(self, judgement: Judgement) -> str:
+        """Return a verdict as the class of a page's style sheet."""
+        return "soft" if self.kind == "admitted limit" else CLASSES[judgement.verdict]
+
+    def by(self, solver: str) -> Judgement:
+        """Return the judgement of one equation.
+
+        Raises
+        ------
+        KeyError
+            If that equation has not judged.
+        """
+        for judgement in self.judgements:
+            if judgement.solver == solver:
+                return judgement
+        raise KeyError(f"{solver} has not judged {self.id}")
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the statement as JSON-ready data."""
+        return {
+            "id": self.id,
+            "place": self.place,
+            "kind": self.kind,
+            "says": self.says,
+            "means": self.means,
+            "throw": self.throw,
+            "why": self.why,
+            "judgements": [judgement.to_mapping() for judgement in self.judgements],
+        }
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Return one finding for each judgement; observations, since what fails is the paper's and not this project."""
+        return tuple(
+            Finding(
+                id=f"paper-{self.id}-{judgement.solver}",
+                title=f"{self.place}: {self.says} By {judgement.solver}: {self.word(judgement)}",
+                value=None if math.isnan(judgement.value) else judgement.value,
+                unit=judgement.deciding.unit if judgement.deciding else "",
+                kind="observation",
+                band=None if math.isnan(judgement.band) else judgement.band,
+                note=judgement.words,
+            )
+            for judgement in self.judgements
+        )

@@ -1,0 +1,326 @@
+"""Where does which assumption matter? The ladder from the published program to free flight over maps of throws.
+
+The mapped error is the difference of the plateau, the mean of omega / omega_0 over the second half of the flight: it is
+what the paper reads off a flight, and an average forgives a rebound that comes a little early. The largest difference
+max |d omega| / omega_0 is kept beside it; a single impact that shifts in time saturates it.
+
+An assumption's number on a map is its fair share, the mean over all orders of mending (``waterfall.fair_share``), where
+every combination of assumptions was flown; else what it changes in the order of the ladder, and another order differs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipproof.frame.solvers import Made, Run
+from flipproof.studies.waterfall import NAMES, canonical, fair_share
+from ode_reference.models import LADDER as MODELS
+from ode_reference.models import MODELS as EQUATIONS
+from ode_reference.switches import Switches
+from slicemodel import Scenario
+from slicemodel.observables import plateau
+from slicemodel.scenario import shortened
+from slicemodel.trajectory import FloatArray
+
+Axis = Literal["gamma", "step", "restitution"]
+Measure = Literal["plateau", "largest"]
+
+LADDER: Final = ("published-python", *MODELS)
+"""From what was published to what is right; each differs from the next by one mistake."""
+
+RUNGS: Final = (
+    "step size",
+    "sign of Eq. 9d",
+    "roots of Eq. 9a",
+    "drag reference",
+    "gravity",
+    "moving origin",
+    "recoil",
+)
+"""The mistake between each entry of LADDER and the next."""
+
+SETS: Final = {
+    switches: next(
+        (name for name in MODELS if canonical(EQUATIONS[name].switches) == canonical(switches)),
+        canonical(switches).name,
+    )
+    for switches in Switches.every()
+}
+"""Every set of assumptions mended -> the model that flies it, a rung of the ladder where there is one."""
+
+EXTRA: Final = ("exact-step",)
+"""Held against its own equation, beside the ladder."""
+
+SCHEMES: Final = ("published-python", "exact-step")
+
+LABELS: Final[Mapping[Axis, str]] = {
+    "gamma": "damping rate γ / ω₀ [1]",
+    "step": "step ω₀ Δt [1]",
+    "restitution": "restitution e [1]",
+}
+
+POINTS = 201
+"""Output times of a model."""
+
+CURVE = 101
+"""Equal times at which two runs are compared."""
+
+FINE: Final = {"rtol": 1e-6, "atol": 1e-9, "rest_speed": 1e-3, "turn": 0.04}
+"""Tolerances of a model on a map; ``turn`` is its longest step in radians of the bottle at release, omega_0 dt."""
+
+COARSE: Final = {"rtol": 1e-6, "atol": 1e-9, "rest_speed": 1e-2, "turn": 0.1}
+"""The same at about half the cost; moves a plateau by up to 0.006 where flights are sensitive, by 1e-4 elsewhere."""
+
+
+MEDIUM: Final = {
+    "rtol": 1e-5,
+    "atol": 1e-8,
+    "rest_speed": 5e-3,
+    "rest_speed_with_origin": 1e-3,
+    "rest_speed_with_recoil": 1e-2,
+    "turn": 0.1,
+}
+"""Between FINE and COARSE: for a map of many cells at 50 slices, read at contours of 1 % and 10 %.
+
+Against the default tolerances, over 40 throws drawn from the 400 of the "gamma" map and all 7 models, the plateau
+moves by less than 1e-4 in 95 % of the runs and the dominant mistake of no cell changes. The equations without recoil
+and without an accelerating origin stay within 4e-5; free-flight within 3e-3, its own band at the default; and
+accelerating-origin within 6e-4 but for one cell (fill 0.3, gamma = 0.03 omega_0) with 7e-3, where the error is
+proportional to the rest speed and still 6e-5 at the default of 1e-5 m/s.
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """One throw of a map: row, column, scenario, and points of the grid for the schemes."""
+
+    row: int
+    column: int
+    scenario: Scenario
+    steps: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading:
+    """What a map needs of one run: plateau and omega at ``CURVE`` equal times [rad/s]; or, in a word, why not."""
+
+    level: float = np.nan
+    omega: FloatArray | None = None
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValidityMap:
+    """The ladder over a map of throws. Arrays over cells have shape (rows, columns) = (y, x).
+
+    Parameters
+    ----------
+    axis : {"gamma", "step", "restitution"} - the quantity along y
+    fills : (columns,) - fill fraction M_w / M_max, along x
+    values : (rows,) - the quantity along y
+    slices : int
+    level : name -> array - plateau of every entry of LADDER and EXTRA; NaN where it could not be computed
+    largest : name -> array - max |d omega| / omega_0 against free flight; of a scheme, against its own equation too
+    shares : array, shape (rungs, rows, columns), or None
+        Fair share of every rung in the plateau, signed; None if only the ladder was flown.
+    step_error : scheme -> array - error against the scheme's own equation, by plateau
+    reason : array of str - "" or why the cell, or a part of it, could not be computed
+    """
+
+    axis: Axis
+    fills: FloatArray
+    values: FloatArray
+    slices: int
+    level: Mapping[str, FloatArray]
+    largest: Mapping[str, FloatArray]
+    step_error: Mapping[str, FloatArray]
+    reason: NDArray[np.str_]
+    shares: FloatArray | None = None
+
+    def error(self, name: str, measure: Measure = "plateau") -> FloatArray:
+        """Return the error of an approximation against free flight as a fraction of omega_0."""
+        if measure == "largest":
+            return self.largest[name]
+        return np.abs(self.level[name] - self.level[LADDER[-1]])
+
+    @property
+    def differences(self) -> FloatArray:
+        """|plateau of a rung - plateau of the next|, shape (rungs, rows, columns)."""
+        stack = np.array([self.level[name] for name in LADDER])
+        return np.abs(np.diff(stack, axis=0))
+
+    @property
+    def dominant(self) -> NDArray[np.int64]:
+        """Index into RUNGS of the largest share, or of the largest step of the ladder; -1 where any is missing."""
+        differences = self.differences if self.shares is None else np.abs(self.shares)
+        missing = ~np.isfinite(differences).all(axis=0)
+        return np.where(missing, -1, np.nan_to_num(differences, nan=-1.0).argmax(axis=0))
+
+
+def vary(throw: Scenario, *, fill: float, damping: float | None = None, restitution: float | None = None) -> Scenario:
+    """Return the throw at another fill fraction, cut into as many slices.
+
+    ``damping`` is gamma / omega_0; None keeps the throw's own gamma, as the paper does when it fills the bottle.
+    """
+    gamma = throw.damping_rate if damping is None else damping * abs(throw.omega0)
+    water = fill * throw.bottle.capacity
+    return replace(
+        throw,
+        water_mass=water,
+        drag=2.0 * gamma * water / throw.n_slices,
+        restitution=throw.restitution if restitution is None else restitution,
+    )
+
+
+def cells(throw: Scenario, axis: Axis, fills: Sequence[float], values: Sequence[float], steps: int) -> list[Cell]:
+    """Return the throws of a map, row by row; ``steps`` is the grid where the map does not say another."""
+    found = []
+    for row, value in enumerate(values):
+        for column, fill in enumerate(fills):
+            scenario = vary(
+                throw,
+                fill=fill,
+                damping=value if axis == "gamma" else None,
+                restitution=value if axis == "restitution" else None,
+            )
+            turn = abs(throw.omega0) * throw.duration
+            points = max(2, round(turn / value) + 1) if axis == "step" else steps
+            found.append(Cell(row=row, column=column, scenario=scenario, steps=points))
+    return found
+
+
+def plan_map(
+    throw: Scenario,
+    axis: Axis,
+    fills: Sequence[float],
+    values: Sequence[float],
+    *,
+    steps: int = 1000,
+    tolerances: Mapping[str, float] = FINE,
+    points: int | None = POINTS,
+    shares: bool = False,
+) -> list[Run]:
+    """Return the runs of one map; tags are unique within and across maps of different axes.
+
+    A model does not know a step: along "step" it runs once per fill fraction. ``points`` are its output times; None:
+    its own. With ``shares`` every set of assumptions is flown, 40 models in place of 7.
+    """
+    names = _solvers(shares)
+    usual = {name: _settings(throw, name, tolerances, points) for name in names if name not in SCHEMES}
+    runs = []
+    for cell in cells(throw, axis, fills, values, steps):
+        for name in names:
+            if axis == "step" and cell.row > 0 and name not in SCHEMES:
+                continue
+            settings = {"steps": cell.steps, "store": "summary"} if name in SCHEMES else usual[name]
+            runs.append(Run(tag(axis, cell, name), name, cell.scenario, settings))
+    return runs
+
+
+def _solvers(shares: bool) -> tuple[str, ...]:
+    return tuple(dict.fromkeys((*LADDER, *EXTRA, *(SETS.values() if shares else ()))))
+
+
+def _settings(throw: Scenario, model: str, tolerances: Mapping[str, float], points: int | None) -> dict[str, Any]:
+    settings: dict[str, Any] = {name: tolerances[name] for name in ("rtol", "atol", "rest_speed")}
+    settings["method"] = "DOP853"
+    switches = EQUATIONS[model].switches if model in EQUATIONS else Switches.from_name(model)
+    # Without recoil a tube that accelerates is pushed by resting slices alone; with it the impacts push as well.
+    special = "rest_speed_with_recoil" if switches.recoil else "rest_speed_with_origin" if switches.origin else ""
+    settings["rest_speed"] = tolerances.get(special, tolerances["rest_speed"])
+    settings["max_step"] = min(tolerances["turn"] / abs(throw.omega0), throw.duration)
+    if points is not None:
+        settings["times"] = np.linspace(0.0, throw.duration, points)
+    return settings
+
+
+def tag(axis: Axis, cell: Cell, name: str) -> str:
+    """Return the tag of the run that a cell has of a solver; along "step" the rows share those of a model."""
+    row = 0 if axis == "step" and name not in SCHEMES else cell.row
+    return f"map {axis}, row {row}, column {cell.column}, {name}"
+
+
+def study_map(
+    throw: Scenario,
+    axis: Axis,
+    fills: Sequence[float],
+    values: Sequence[float],
+    made: Mapping[str, Made],
+    *,
+    steps: int = 1000,
+    shares: bool = False,
+) -> ValidityMap:
+    """Read the runs that ``plan_map`` planned with the same arguments; ``made`` maps tags to what became of them."""
+    wanted = {tag(axis, cell, n) for cell in cells(throw, axis, fills, values, steps) for n in _solvers(shares)}
+    readings = {name: _read(made[name]) for name in wanted if name in made}
+    return study_readings(throw, axis, fills, values, readings, steps=steps, shares=shares)
+
+
+def study_readings(
+    throw: Scenario,
+    axis: Axis,
+    fills: Sequence[float],
+    values: Sequence[float],
+    readings: Mapping[str, Reading],
+    *,
+    steps: int = 1000,
+    shares: bool = False,
+) -> ValidityMap:
+    """Make the map of what was read off the runs of ``plan_map``; ``readings`` maps their tags."""
+    shape = (len(values), len(fills))
+    names = _solvers(shares)
+    level = {name: np.full(shape, np.nan) for name in names}
+    largest = {name: np.full(shape, np.nan) for name in names}
+    step_error = {name: np.full(shape, np.nan) for name in SCHEMES}
+    reason = np.full(shape, "", dtype="<U80")
+    for cell in cells(throw, axis, fills, values, steps):
+        at = (cell.row, cell.column)
+        found = {name: readings.get(tag(axis, cell, name), Reading(problem="not run")) for name in names}
+        problems = [f"{name}: {reading.problem}" for name, reading in found.items() if reading.problem]
+        truth = found[LADDER[-1]].omega
+        for name, reading in found.items():
+            level[name][at] = reading.level
+            if truth is not None and reading.omega is not None:
+                largest[name][at] = np.abs(reading.omega - truth).max() / abs(throw.omega0)
+        for scheme, model in (("published-python", "published-limit"), ("exact-step", "eq8")):
+            step_error[scheme][at] = abs(level[scheme][at] - level[model][at])
+        reason[at] = shortened("; ".join(problems), 80)
+    return ValidityMap(
+        axis=axis,
+        fills=np.asarray(fills, dtype=np.float64),
+        values=np.asarray(values, dtype=np.float64),
+        slices=throw.n_slices,
+        level={name: level[name] for name in (*LADDER, *EXTRA)},
+        largest={name: largest[name] for name in (*LADDER, *EXTRA)},
+        step_error=step_error,
+        reason=reason,
+        shares=_shares(level) if shares else None,
+    )
+
+
+def _shares(level: Mapping[str, FloatArray]) -> FloatArray:
+    """Return the fair share of every rung, the step size first; together they lead from program to free flight."""
+    of_sets = {switches: level[name] for switches, name in SETS.items()}
+    return np.array([level[LADDER[1]] - level[LADDER[0]], *(fair_share(name, of_sets) for name in NAMES)])
+
+
+def _read(made: Made) -> Reading:
+    flight = made.trajectory
+    if flight is None:
+        return Reading(problem=word(made.reason))
+    if not flight.ok:
+        return Reading(problem=flight.status)
+    times = np.linspace(0.0, flight.scenario.duration, CURVE)
+    return Reading(
+        level=plateau(flight.t, flight.omega, flight.scenario.omega0), omega=np.interp(times, flight.t, flight.omega)
+    )
+
+
+def word(reason: str) -> str:
+    """Return the reason code that leads a failure's reason."""
+    return reason.partition(":")[0] or "failed"

@@ -1,0 +1,296 @@
+"""The difference from the published program to free flight, split over the assumptions that make it.
+
+    program --step size--> its limit --signs--> --roots--> --drag reference--> --gravity--> --origin--> --recoil--> free
+
+Mending the assumptions in this order gives one split (forward), in the reverse order another (backward); where the two
+differ, assumptions interact. The average over all orders (the Shapley value) is the only split that treats
+them alike: an assumption's fair share. Each of the three sums to the whole difference, which is asserted. A bar of one
+order, or the largest bar of any order, is no share: another order gives another number. The step size comes first in
+every order: only the program has one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from itertools import combinations
+from types import MappingProxyType
+from typing import Final, TypeVar
+
+from flipproof.frame.solvers import Run
+from flipproof.studies.slices import FINER, finer_tag
+from ode_reference.switches import Switches
+from slicemodel import Scenario, Trajectory, observables
+from slicemodel.trajectory import FloatArray
+
+PROGRAM: Final = "published-python"
+
+NAMES: Final = MappingProxyType(
+    {
+        "signs": "signs of Eq. 9d: no damping",
+        "roots": "roots of Eq. 9a: γ ≪ ω",
+        "drag_on_centre": "drag against C_M",
+        "weightless": "gravity in Eq. 8",
+        "origin": "origin at rest, drag on the tube",
+        "recoil": "no recoil in impacts",
+    }
+)
+"""Switch -> the assumption it mends, in the order of the ladder."""
+
+Value = TypeVar("Value", float, FloatArray)
+
+STEP: Final = "finite step of the program"
+PROGRAM_TAG: Final = "waterfall, program"
+
+LOOSER: Final = 10.0
+"""Tolerance and rest speed of the second set of runs, in units of the first: what they change is a value's band."""
+
+
+def tolerances(throw: Scenario, switches: Switches, *, loose: bool) -> dict[str, float | str]:
+    """Return the settings of a run; a rest speed ten times smaller with recoil would multiply the impacts by ten."""
+    factor = LOOSER if loose else 1.0
+    rest_speed = 1e-3 if switches.recoil else 1e-5
+    longest = min(0.04 * (2.0 if loose else 1.0) / abs(throw.omega0), throw.duration)
+    return {"method": "DOP853", "rtol": 1e-9 * factor, "rest_speed": rest_speed * factor, "max_step": longest}
+
+
+@dataclass(frozen=True, slots=True)
+class Observable:
+    """One number read off a trajectory."""
+
+    name: str
+    symbol: str
+    words: str
+    unit: str
+    of: Callable[[Trajectory], float]
+
+
+OBSERVABLES: Final = (
+    Observable(
+        "plateau",
+        "plateau",
+        "mean of ω/ω₀ over the second half",
+        "1",
+        lambda run: observables.plateau(run.t, run.omega, run.scenario.omega0),
+    ),
+    Observable("omega", "ω(T)/ω₀", "ω on landing / ω₀", "1", lambda run: float(run.omega[-1] / run.scenario.omega0)),
+    Observable("theta", "θ(T)", "θ on landing", "rad", lambda run: float(run.theta[-1])),
+    Observable(
+        "toppling",
+        "θ_c(T)",
+        "toppling angle on landing",
+        "rad",
+        lambda run: float(observables.toppling_angle(run.scenario, run.r_cm[-1])),
+    ),
+    Observable(
+        "v_cm",
+        "v_CM(T)",
+        "velocity of C_M in the bottle on landing",
+        "m/s",
+        lambda run: float(observables.centre_of_mass_velocity(run.scenario, run.v[-1])),
+    ),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bar:
+    """What mending one assumption changes, in the units of the observable; a band is numerical uncertainty.
+
+    ``forward`` in the order of the ladder, ``backward`` in reverse; ``average``, the fair share, is the mean over all
+    orders, between ``low`` and ``high`` in single ones; ``finer`` is the average at ``FINER`` times the slices, None if
+    that was not computed.
+    """
+
+    name: str
+    forward: float
+    backward: float
+    average: float
+    low: float
+    high: float
+    forward_band: float
+    average_band: float
+    finer: float | None = None
+
+    @property
+    def interaction(self) -> float:
+        """Largest difference between the three splits."""
+        return max(self.forward, self.backward, self.average) - min(self.forward, self.backward, self.average)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Waterfall:
+    """The split of one observable at ``slices``; ``residual`` is the largest |total - sum of bars| of the splits."""
+
+    observable: Observable
+    slices: int
+    start: float
+    end: float
+    end_band: float
+    bars: tuple[Bar, ...]
+    residual: float
+
+    @property
+    def total(self) -> float:
+        """Free flight minus published program."""
+        return self.end - self.start
+
+    @property
+    def largest(self) -> Bar:
+        """The bar whose average over orders is largest in size."""
+        return max(self.bars, key=lambda bar: abs(bar.average))
+
+    @property
+    def away(self) -> Bar | None:
+        """The bar that leads furthest away from free flight in the order of the ladder; None if none does."""
+        bars = [bar for bar in self.bars if bar.forward * self.total < 0.0]
+        return max(bars, key=lambda bar: abs(bar.forward), default=None)
+
+
+def canonical(switches: Switches) -> Switches:
+    """Return the one set that stands for all that make its equation: ``drag_on_centre`` off where it has no effect."""
+    idle = switches.origin or not switches.signs
+    return replace(switches, drag_on_centre=False) if idle else switches
+
+
+def plan_waterfall(throw: Scenario, steps: int) -> list[Run]:
+    """Return the program's run, and every equation at usual and at coarser tolerances (81 runs)."""
+    runs = [Run(PROGRAM_TAG, PROGRAM, throw, {"steps": steps})]
+    # Recoil costs most: those runs first keep the workers evenly busy.
+    sets = sorted({canonical(s) for s in Switches.every()}, key=lambda s: (not s.recoil, s.name))
+    for label in ("usual", "loose"):
+        for switches in sets:
+            settings = tolerances(throw, switches, loose=label == "loose")
+            runs.append(Run(_tag(label, switches), switches.name, throw, settings))
+    return runs
+
+
+def plan_finer(throw: Scenario, steps: int) -> list[Run]:
+    """Return the runs at the usual tolerances again, at ``FINER`` times the slices (41 runs)."""
+    fine = throw.with_slices(FINER * throw.n_slices)
+    planned = plan_waterfall(throw, steps)
+    runs = planned[: 1 + len(planned) // 2]
+    return [replace(run, tag=finer_tag(run.tag), scenario=fine) for run in runs]
+
+
+def _tag(label: str, switches: Switches) -> str:
+    return f"waterfall, {label}, {canonical(switches).name}"
+
+
+def study_waterfall(runs: Mapping[str, Trajectory]) -> tuple[Waterfall, ...]:
+    """Split every observable.
+
+    Parameters
+    ----------
+    runs : mapping from tag to trajectory
+        All runs of ``plan_waterfall``, and all of ``plan_finer`` or none.
+
+    Raises
+    ------
+    ArithmeticError
+        If a run is not whole, or a split does not sum to the whole difference within round-off.
+    """
+    for tag, run in runs.items():
+        if not run.ok:
+            raise ArithmeticError(f"{tag}: {run.status}: {run.message}")
+    slices = runs[PROGRAM_TAG].scenario.n_slices
+    return split_all({tag: {o.name: o.of(run) for o in OBSERVABLES} for tag, run in runs.items()}, slices)
+
+
+def split_all(observed: Mapping[str, Mapping[str, float]], slices: int) -> tuple[Waterfall, ...]:
+    """Split every observable; ``observed`` maps the tags of ``plan_waterfall`` to their values by name.
+
+    Raises
+    ------
+    ArithmeticError
+        If a split does not sum to the whole difference within round-off.
+    """
+    return tuple(_split(o, {tag: values[o.name] for tag, values in observed.items()}, slices) for o in OBSERVABLES)
+
+
+def _split(observable: Observable, observed: Mapping[str, float], slices: int) -> Waterfall:
+    values: dict[Switches, float] = {}
+    bands: dict[Switches, float] = {}
+    finer: dict[Switches, float] = {}
+    for switches in Switches.every():
+        usual = _tag("usual", switches)
+        values[switches] = observed[usual]
+        bands[switches] = abs(values[switches] - observed[_tag("loose", switches)])
+        if finer_tag(usual) in observed:
+            finer[switches] = observed[finer_tag(usual)]
+    start = observed[PROGRAM_TAG]
+    none, everything = Switches(), Switches(*[True] * len(NAMES))
+    step = values[none] - start
+    bars = [
+        Bar(
+            name=STEP,
+            forward=step,
+            backward=step,
+            average=step,
+            low=step,
+            high=step,
+            forward_band=bands[none],
+            average_band=bands[none],
+            finer=finer[none] - observed[finer_tag(PROGRAM_TAG)] if finer else None,
+        )
+    ]
+    order = [field.name for field in fields(Switches)]
+    for name in order:
+        before = order[: order.index(name)]
+        after = order[order.index(name) + 1 :]
+        changes = [_change(name, chosen, values) for chosen, _ in _others(name)]
+        bars.append(
+            Bar(
+                name=NAMES[name],
+                forward=_change(name, before, values),
+                backward=_change(name, after, values),
+                average=fair_share(name, values),
+                low=min(changes),
+                high=max(changes),
+                forward_band=bands[_with(before)] + bands[_with([*before, name])],
+                average_band=sum(
+                    weight * (bands[_with(chosen)] + bands[_with([*chosen, name])]) for chosen, weight in _others(name)
+                ),
+                finer=fair_share(name, finer) if finer else None,
+            )
+        )
+    total = values[everything] - start
+    residual = max(
+        abs(total - sum(getattr(bar, split) for bar in bars)) for split in ("forward", "backward", "average")
+    )
+    if not residual <= 1e-12 * (1.0 + abs(start) + sum(abs(bar.average) for bar in bars)):
+        raise ArithmeticError(f"{observable.name}: the bars miss the total by {residual:.3g} {observable.unit}")
+    return Waterfall(
+        observable=observable,
+        slices=slices,
+        start=start,
+        end=values[everything],
+        end_band=bands[everything],
+        bars=tuple(bars),
+        residual=residual,
+    )
+
+
+def _with(names: list[str] | tuple[str, ...]) -> Switches:
+    return Switches(**dict.fromkeys(names, True))
+
+
+def _change(name: str, others: list[str] | tuple[str, ...], values: Mapping[Switches, Value]) -> Value:
+    """Return what switching ``name`` on changes when ``others`` are on."""
+    return values[_with([*others, name])] - values[_with(others)]
+
+
+def _others(name: str) -> Iterator[tuple[tuple[str, ...], float]]:
+    """Yield every set of other assumptions with the share of all orders in which just these come before ``name``."""
+    others = [other for other in NAMES if other != name]
+    n = len(NAMES)
+    for size in range(n):
+        weight = math.factorial(size) * math.factorial(n - size - 1) / math.factorial(n)
+        for chosen in combinations(others, size):
+            yield chosen, weight
+
+
+def fair_share(name: str, values: Mapping[Switches, Value]) -> Value:
+    """Return what switching ``name`` on changes, as the mean over all orders (the Shapley value), of values by set."""
+    shares = [weight * _change(name, chosen, values) for chosen, weight in _others(name)]
+    return sum(shares[1:], shares[0])

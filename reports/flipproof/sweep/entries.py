@@ -1,0 +1,103 @@
+"""The solvers of a sweep, each with its settings, checked before the first point is made."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from flipproof.frame.solvers import Solver, find, solve
+from flipproof.sweep.errors import SweepError
+from slicemodel.scenario import Scenario, unknown_name
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One ``[[solvers]]`` table: the solver's name, the settings it is called with, and where it stands in the file."""
+
+    name: str
+    settings: Mapping[str, Any]
+    where: str
+
+
+def read_entries(tables: object, source: str) -> tuple[Entry, ...]:
+    """Read the list of ``[[solvers]]``.
+
+    A scheme's ``store`` is "summary" unless the file says "full": no observable needs the slices.
+
+    Raises
+    ------
+    SweepError
+        Naming the table by its number and solver, the key, and the nearest known one.
+    """
+    if not isinstance(tables, list) or not tables or not all(isinstance(table, Mapping) for table in tables):
+        raise SweepError(f'{source}: has no [[solvers]]; write one table for each, such as [[solvers]] name = "eq8"')
+    entries: list[Entry] = []
+    for number, table in enumerate(tables, start=1):
+        entry = _entry(dict(table), f"{source}: [[solvers]] {number}")
+        if any((entry.name, entry.settings) == (other.name, other.settings) for other in entries):
+            raise SweepError(f"{entry.where} is there twice with the same settings")
+        entries.append(entry)
+    return tuple(entries)
+
+
+def _entry(table: dict[str, Any], where: str) -> Entry:
+    name = table.pop("name", None)
+    if not isinstance(name, str):
+        raise SweepError(f"{where} name = {name!r} is not a solver's name; 'flipproof models' lists them")
+    try:
+        solver = find(name)
+    except ValueError as error:
+        raise SweepError(f"{where}: {error}") from None
+    where = f"{where} ({name})"
+    known, open_ended = _settings_of(solver)
+    for key, value in table.items():
+        if key not in known and not open_ended:
+            raise SweepError(unknown_name(f"{where} key", key, known))
+        if not _plain(value):
+            raise SweepError(f"{where} {key} = {value!r} is not a finite number, a word, true, false or a list of them")
+    if solver.package == "slicemodel":
+        table = {"store": "summary", **table}
+    return Entry(name, table, where)
+
+
+def _settings_of(solver: Solver) -> tuple[list[str], bool]:
+    """Return the names of a solver's settings, and whether it takes others that only it can check."""
+    parameters = inspect.signature(import_module(solver.package).solve).parameters.values()
+    named = [p.name for p in parameters if p.kind is not p.VAR_KEYWORD and p.name not in ("scenario", solver.keyword)]
+    return named, any(p.kind is p.VAR_KEYWORD for p in parameters)
+
+
+def _plain(value: object) -> bool:
+    if isinstance(value, list):
+        return all(_plain(item) and not isinstance(item, list) for item in value)
+    return isinstance(value, str | int) or (isinstance(value, float) and math.isfinite(value))
+
+
+def try_entries(entries: tuple[Entry, ...]) -> None:
+    """Throw one slice for a microsecond with every solver, so that a setting out of range is one line and not a sweep.
+
+    Raises
+    ------
+    SweepError
+        With the solver's own words.
+    """
+    for entry in entries:
+        # Output times belong to the duration of a throw; the grid is only counted here.
+        settings = {key: value for key, value in entry.settings.items() if key != "times"}
+        if isinstance(settings.get("steps"), int) and settings["steps"] > 2:
+            settings["steps"] = 2
+        try:
+            solve(entry.name, Scenario(n_slices=1, duration=1e-6), **settings)
+        except Exception as error:
+            kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
+            raise SweepError(f"{entry.where}: {kind}{error}") from None
+
+
+def settings_text(settings: Mapping[str, Any]) -> str:
+    """Return settings as JSON, keys in order; it reads back to the last bit."""
+    return json.dumps(settings, sort_keys=True)

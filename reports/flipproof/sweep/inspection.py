@@ -1,0 +1,169 @@
+"""What is wrong with a sweep's file, and what of it can be saved: asked before anything is written to it."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+from typing import Any, Final
+
+from flipproof.sweep.damaged import count
+from flipproof.sweep.design import Design
+from flipproof.sweep.errors import SweepError
+from flipproof.sweep.schema import APPLICATION, SCHEMA, columns, intact, kinds
+from slicemodel.scenario import shortened
+
+BEGINNING: Final = b"SQLite format 3\0"
+TABLES: Final = frozenset({"schema_version", "design", "versions", "points"})
+FACTS: Final = ("TEXT", "INTEGER", "TEXT", "TEXT", "TEXT")
+"""Types of the columns of the design."""
+
+WAITED: Final = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
+LONGEST: Final = 120
+"""Characters of what SQLite says."""
+
+
+def inspect(file: Path, design: Design, code: str, patience: float) -> None:
+    """Read a sweep's file through and refuse it unless every row is as it was written, of this design and this code.
+
+    Parameters
+    ----------
+    patience : seconds to wait for another program that holds the file
+
+    Raises
+    ------
+    SweepError
+        Naming the file, what is wrong with it, and how many points can be saved from it.
+    sqlite3.Error
+        If another program holds the file.
+    """
+    try:
+        if file.is_dir():
+            raise SweepError(f"{file} is a folder, where a sweep keeps its rows in a file; name another --out")
+        with file.open("rb") as opened:
+            beginning = opened.read(len(BEGINNING))
+    except OSError as error:
+        raise SweepError(
+            f"{file} cannot be read ({error.strerror or error}), so that it is not known what it holds; it is as it was"
+        ) from None
+    if not beginning:
+        wrong = "it is empty (0 bytes)"
+    elif beginning != BEGINNING:
+        wrong = "it does not begin as an SQLite file does"
+    else:
+        try:
+            # Read-only: closing the last connection that may write would change the file.
+            with closing(sqlite3.connect(f"{file.resolve().as_uri()}?mode=ro", uri=True, timeout=patience)) as rows:
+                wrong = _wrong(file, rows, design, code)
+        except sqlite3.Error as error:
+            if result_code(error) in WAITED:
+                raise
+            wrong = str(error)
+    if wrong:
+        raise damage(file, design, code, wrong)
+
+
+def damage(file: Path, design: Design, code: str, wrong: str) -> SweepError:
+    """Return the error that says what is wrong with a file and how many of its points can be saved."""
+    try:
+        whole = count(file, design, code)
+    except OSError:
+        whole = 0
+    saved = (
+        f"{whole} of {design.size} points can be saved: the same command with --salvage {file} and a new --out"
+        if whole
+        else "no point of this design can be saved from it; name another --out"
+    )
+    return SweepError(f"{file} is damaged ({shortened(wrong, LONGEST)}); {saved}")
+
+
+def is_damage(error: Exception) -> bool:
+    """Return whether SQLite says by an error that its file is damaged, and not that it cannot write there."""
+    return result_code(error) in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
+
+
+def result_code(error: Exception) -> int:
+    """Return SQLite's primary result code of an error."""
+    return int(getattr(error, "sqlite_errorcode", 0)) & 0xFF
+
+
+def _wrong(file: Path, connection: sqlite3.Connection, design: Design, code: str) -> str:
+    """Return what is damaged, or nothing; raise if the file is whole and something else than this sweep."""
+    connection.text_factory = lambda text: text.decode("utf-8", "surrogateescape")
+    (application,) = connection.execute("PRAGMA application_id").fetchone()
+    there = {name for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+    missing = sorted(TABLES - there)
+    if missing and application != APPLICATION and there:
+        raise SweepError(f"{file} is a database, but no sweep; name another --out")
+    if missing:
+        return f"its table {missing[0]} is missing"
+    (problem,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
+    if problem != "ok":
+        return f"SQLite finds: {problem.replace('*** in database main ***', '')}"
+    schemas = [version for (version,) in connection.execute("SELECT version FROM schema_version")]
+    if len(schemas) != 1:
+        return f"its table schema_version has {len(schemas)} rows instead of 1"
+    if schemas[0] != SCHEMA:
+        began = connection.execute("SELECT code FROM design").fetchone() or ("another version",)
+        raise SweepError(
+            f"{file} has schema {schemas[0]}; this flipproof reads schema {SCHEMA}: go on with the flipproof that "
+            f"began it ({began[0]}), or name another --out"
+        )
+    if application != APPLICATION:
+        return f"its application id is {application} instead of {APPLICATION}"
+    return _wrong_design(file, connection, design, code) or _wrong_rows(connection, design)
+
+
+def _wrong_design(file: Path, connection: sqlite3.Connection, design: Design, code: str) -> str:
+    found = connection.execute("SELECT code, size, facts, source, checksum FROM design").fetchall()
+    if len(found) != 1:
+        return f"its table design has {len(found)} rows instead of 1"
+    if not intact(found[0], FACTS):
+        return "its design does not match its checksum"
+    began, _, facts, *_ = found[0]
+    difference = _difference(json.loads(facts), json.loads(json.dumps(design.facts())))
+    if difference:
+        raise SweepError(f"{file.parent} holds another design ({difference}); name another --out")
+    if began != code:
+        raise SweepError(
+            f"{file.parent} was begun by flipproof {began}, this is {code}; go on with that one, or name another "
+            "--out: one sweep, one code"
+        )
+    return ""
+
+
+def _wrong_rows(connection: sqlite3.Connection, design: Design) -> str:
+    types, names = kinds(design), columns(design)
+    known = {number: (facts, sum_) for number, facts, sum_ in connection.execute("SELECT * FROM versions")}
+    for number, cells in known.items():
+        if not intact(cells, ("TEXT", "TEXT")):
+            return f"row {number} of its table versions does not match its checksum"
+    place, total, first, broken = names.index("versions"), 0, None, 0
+    for row in connection.execute(f"SELECT {', '.join(names)} FROM points"):
+        total += 1
+        if not 0 <= row[0] < design.size:
+            return f"it has a row with the number {row[0]}, outside [0, {design.size - 1}]"
+        if not intact(row, types):
+            first, broken = row[0] if first is None else first, broken + 1
+        elif row[place] not in known:
+            return f"row {row[0]} refers to row {row[place]} of its table versions, which is missing"
+    if broken:
+        return f"{broken} of its {total} rows do not match their checksums, the first has the number {first}"
+    # Versions are written with the rows that refer to them.
+    return "its table points is empty, though rows were written" if known and not total else ""
+
+
+def _difference(there: Any, here: Any, name: str = "") -> str:
+    """Return the first thing in which two designs differ, or nothing."""
+    if isinstance(there, dict) and isinstance(here, dict):
+        for key in {**there, **here}:
+            found = _difference(there.get(key), here.get(key), f"{name}.{key}" if name else key)
+            if found:
+                return found
+        return ""
+    return "" if there == here else f"{name} is {_short(there)} there and {_short(here)} here"
+
+
+def _short(value: object) -> str:
+    return shortened(json.dumps(value), 40)

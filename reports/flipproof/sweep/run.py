@@ -1,0 +1,201 @@
+"""The loop of a sweep: points out in batches, rows in, until every point has a row.
+
+The loop knows an ``Executor`` and nothing else of where points are made. It keeps a bounded number of batches in
+flight, so a sweep of a million points needs no more memory than they do, and it writes whatever has come back in one
+transaction: a killed sweep loses what was in flight.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import Final
+
+from flipproof.sweep.design import Design, Point
+from flipproof.sweep.errors import SweepError
+from flipproof.sweep.local import Workers
+from flipproof.sweep.store import Store
+from flipproof.sweep.work import Outcome, Returned, make_batch, versions
+
+TARGET: Final = 0.4
+"""Seconds that a batch should take: sending one costs up to some milliseconds, and a kill loses it."""
+
+MOST_IN_BATCH: Final = 5_000
+MOST_BYTES: Final = 32 * 2**20
+"""Bytes of flights in one batch."""
+
+GROWTH: Final = 8
+"""A batch is at most so many times as large as the one before: the first points tell little of the others."""
+
+LONE_DEATHS: Final = 2
+"""A point that was alone in its worker so many times when the worker died is given up."""
+
+DEATHS_IN_A_ROW: Final = 30
+"""Deaths without one batch between them after which it is not the points that kill the workers."""
+
+PATIENCE: Final = 60.0
+"""Seconds to wait for a worker when none is left."""
+
+TICK: Final = 0.5
+"""Seconds between two looks at the workers while nothing comes back."""
+
+Progress = Callable[[int, int], None]
+"""Called with the points just stored, and with how many of them have no whole flight."""
+
+
+@dataclass(slots=True)
+class Pace:
+    """How many points of one solver a batch may hold, by what the last batch took."""
+
+    size: int = 1
+
+    def learn(self, returned: Returned) -> None:
+        """Set the size of the next batch."""
+        count = len(returned.outcomes)
+        if count == 0:
+            return
+        bytes_each = sum(a.nbytes for o in returned.outcomes for a in (o.arrays or {}).values()) / count
+        wanted = min(TARGET * count / max(returned.seconds, 1e-6), MOST_BYTES / max(bytes_each, 1.0), MOST_IN_BATCH)
+        self.size = max(1, min(int(wanted), GROWTH * count))
+
+
+@dataclass(slots=True)
+class Line:
+    """The points of one solver that wait for a worker."""
+
+    points: Iterator[Point]
+    total: int
+    left: int
+    pace: Pace = field(default_factory=Pace)
+
+    def take(self, shares: int) -> Batch:
+        """Return the next batch; towards the end of the line smaller ones, so that no worker is left waiting."""
+        size = max(1, min(self.pace.size, -(-self.left // shares)))
+        points = tuple(islice(self.points, size))
+        self.left -= len(points)
+        return Batch(points, self.pace)
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """Points on their way through one worker, and how often its worker died with one point in it."""
+
+    points: tuple[Point, ...]
+    pace: Pace
+    deaths: int = 0
+
+
+def run_sweep(store: Store, workers: Workers, progress: Progress) -> None:
+    """Make every point that has no row, and store it.
+
+    Raises
+    ------
+    SweepError
+        If rows cannot be written, workers run other code, die whatever they are given, or are gone.
+    """
+    lines = _lines(store.design, store.done())
+    again: deque[Batch] = deque()
+    flying: dict[Future[Returned], Batch] = {}
+    deaths, heard = 0, time.monotonic()
+    while True:
+        capacity = workers.capacity()
+        while len(flying) < capacity and (batch := _next(lines, again, capacity)) is not None:
+            flying[_submit(workers, store, batch)] = batch
+        if not flying and not again and not any(line.left for line in lines):
+            return
+        if capacity > 0:
+            heard = time.monotonic()
+        elif time.monotonic() - heard > PATIENCE:
+            raise SweepError(f"no worker is left since {PATIENCE:.0f} s; the same command goes on from there")
+        if not flying:
+            time.sleep(TICK)
+            continue
+        came: list[Returned] = []
+        problem: SweepError | None = None
+        for future in wait(flying, timeout=TICK, return_when=FIRST_COMPLETED).done:
+            batch = flying.pop(future)
+            try:
+                returned = future.result()
+            except workers.died as error:
+                deaths += 1
+                if deaths > DEATHS_IN_A_ROW:
+                    problem = SweepError(f"workers die whatever they are given ({error}); none returned a point")
+                divided, given_up = _after_death(batch, error)
+                again.extend(divided)
+                came += given_up
+            except Exception as error:
+                problem = _no_workers(store.code, error)
+            else:
+                deaths = 0
+                problem = problem or _other_code(store.code, returned)
+                batch.pace.learn(returned)
+                came.append(returned)
+        # What came back is stored before anything is said of what did not.
+        if came:
+            store.add(came)
+            outcomes = [outcome for returned in came for outcome in returned.outcomes]
+            progress(len(outcomes), sum(outcome.omega_end is None for outcome in outcomes))
+        if problem:
+            raise problem
+
+
+def _lines(design: Design, done: bytearray) -> list[Line]:
+    """Return one line of waiting points for each solver: a worker that has compiled a solver gets more of it."""
+    lines = []
+    for which in range(len(design.entries)):
+        first = which * design.throws
+        left = design.throws - done.count(1, first, first + design.throws)
+        numbers = range(first, first + design.throws)
+        points = (design.point(number) for number in numbers if not done[number])
+        lines.append(Line(points, design.throws, left))
+    return lines
+
+
+def _next(lines: list[Line], again: deque[Batch], capacity: int) -> Batch | None:
+    """Return what to send next: what came back unmade, else of the solver that has the most before it.
+
+    So all solvers end together, the time left is told honestly, and a reader sees the same throws by all of them.
+    """
+    if again:
+        return again.popleft()
+    line = max(lines, key=lambda line: line.left / line.total)
+    return line.take(capacity) if line.left else None
+
+
+def _submit(workers: Workers, store: Store, batch: Batch) -> Future[Returned]:
+    design = store.design
+    try:
+        return workers.executor.submit(make_batch, store.code, batch.points, design.trajectories, design.curves)
+    except Exception as error:
+        raise _no_workers(store.code, error) from None
+
+
+def _no_workers(code: str, error: Exception) -> SweepError:
+    return SweepError(
+        f"the workers cannot go on ({str(error) or type(error).__name__}); they need flipproof {code} and a "
+        "connection; the points stored so far are safe, the same command goes on from there"
+    )
+
+
+def _after_death(batch: Batch, error: BaseException) -> tuple[list[Batch], list[Returned]]:
+    """Divide a batch whose worker died, until the point that kills is alone; give that up when it has done so again."""
+    points = batch.points
+    if len(points) > 1:
+        middle = len(points) // 2
+        return [Batch(half, batch.pace) for half in (points[:middle], points[middle:])], []
+    deaths = batch.deaths + 1
+    if deaths < LONE_DEATHS:
+        return [Batch(points, batch.pace, deaths)], []
+    reason = f"the worker died {deaths} times with this point alone in it ({error})"
+    lost = Outcome(number=points[0].number, status="worker-died", reason=reason)
+    return [], [Returned("", versions(), [lost], 0.0)]
+
+
+def _other_code(code: str, returned: Returned) -> SweepError | None:
+    if returned.code == code:
+        return None
+    return SweepError(f"a worker runs flipproof {returned.code}, this is {code}; install the same in both")

@@ -1,0 +1,77 @@
+"""A new sweep made of what is whole in a damaged one: its rows, their versions, and the flights that were kept."""
+
+from __future__ import annotations
+
+import shutil
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+from flipproof.sweep.damaged import count, rows, versions
+from flipproof.sweep.design import Design
+from flipproof.sweep.errors import SweepError
+from flipproof.sweep.files import whole_file
+from flipproof.sweep.schema import FILE, columns
+from flipproof.sweep.store import Store
+
+CHUNK: Final = 1000
+"""Rows written in one transaction."""
+
+Row = tuple[Any, ...]
+
+
+def salvage(damaged: Path, out: Path, design: Design, code: str) -> str:
+    """Begin the sweep of a design in ``out`` with the rows and flights that are whole in a damaged file; say how many.
+
+    The damaged file, or the folder that holds it, is left as it is.
+
+    Raises
+    ------
+    SweepError
+        If the file cannot be read or holds no whole row of this design and code, or if ``out`` holds a sweep.
+    """
+    file = damaged / FILE if (damaged / FILE).exists() else damaged
+    if (out / FILE).exists():
+        raise SweepError(f"--salvage begins a new sweep, and {out} holds one; name a new --out, or leave --salvage out")
+    try:
+        if not count(file, design, code):
+            raise SweepError(f"{file} holds no whole row of this design made by flipproof {code}")
+        with Store(out, design, code) as store:
+            known = versions(file)
+            for chunk in _chunks(rows(file, design, code)):
+                for row in chunk:
+                    _copy_flight(file.parent, out, row[columns(design).index("trajectory")])
+                store.restore(chunk, known)
+            saved = sum(store.done())
+    except OSError as error:
+        raise SweepError(f"{file} cannot be salvaged ({error.strerror or error}); it is as it was") from None
+    rest = f"the same command without --salvage makes the other {design.size - saved}"
+    return f"{saved} of {design.size} points of {file} are saved in {store.file}; " + (
+        rest if saved < design.size else "none is missing"
+    )
+
+
+def _chunks(found: Iterator[Row]) -> Iterator[list[Row]]:
+    chunk: list[Row] = []
+    for row in found:
+        chunk.append(row)
+        if len(chunk) == CHUNK:
+            yield chunk
+            chunk = []
+    yield chunk
+
+
+def _copy_flight(source: Path, out: Path, name: str | None) -> None:
+    """Copy the file of a flight if it is whole; without it the point is made again."""
+    if name is None or not (source / name).is_file():
+        return
+    try:
+        with zipfile.ZipFile(source / name) as archive:
+            if archive.testzip() is not None:
+                return
+    except (zipfile.BadZipFile, EOFError):
+        return
+    (out / name).parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(out / name) as part:
+        shutil.copyfile(source / name, part)

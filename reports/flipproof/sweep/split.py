@@ -1,0 +1,130 @@
+"""The waterfall made by a sweep: every combination of assumptions in one file, resumable, with figures and table.
+
+::
+
+    DIR/sweep.sqlite                     every run, one row each
+    DIR/waterfall-plateau.svg, .png ...  one figure per observable
+    DIR/waterfall.csv                    one row per observable and bar
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from flipproof.figures.style import draw
+from flipproof.figures.waterfall import figure_waterfall
+from flipproof.frame.solvers import Run
+from flipproof.studies.waterfall import PROGRAM, Waterfall, plan_waterfall, split_all
+from flipproof.sweep.command import Begin, completed
+from flipproof.sweep.errors import SweepError
+from flipproof.sweep.files import write_whole
+from flipproof.sweep.planned import Row, design_of_runs, read_runs
+from flipproof.sweep.salvage import salvage
+from flipproof.sweep.work import code_identity
+from slicemodel import Scenario
+from slicemodel.observables import toppling_angle
+
+STEPS: Final = 1000
+ENDS: Final = 2
+"""Points of a row's curves: release and landing. Only v_CM on landing is read there."""
+
+
+def plan_split(throw: Scenario) -> list[Run]:
+    """Return the runs of ``plan_waterfall``; the program keeps its slices, whose velocity on landing is split too."""
+    runs = plan_waterfall(throw, STEPS)
+    return [replace(r, settings={**r.settings, "store": "full"}) if r.solver == PROGRAM else r for r in runs]
+
+
+def make_split(
+    throw: Scenario,
+    out: Path,
+    begin: Begin,
+    *,
+    jobs: int | None = None,
+    dask: str | None = None,
+    export_to: Path | None = None,
+    damaged: Path | None = None,
+) -> str:
+    """Make every run of the waterfall that has no row in ``out``, draw it; return its table and what is there.
+
+    Raises
+    ------
+    SweepError
+        If a run is not whole: a split needs all of them; else as for ``flipproof.sweep.command.sweep``.
+    """
+    runs = plan_split(throw)
+    design = design_of_runs(runs, {"omega0": [throw.omega0]}, ENDS, "flipproof waterfall")
+    if damaged:
+        return salvage(damaged, out, design, code_identity())
+    with completed(design, out, begin, jobs=jobs, dask=dask, export_to=export_to) as (store, summary):
+        waterfalls = split_rows(throw, read_runs(store, runs))
+        for waterfall in waterfalls:
+            drawing = draw(figure_waterfall(waterfall))
+            write_whole(out / f"waterfall-{waterfall.observable.name}.svg", drawing.svg.encode())
+            write_whole(out / f"waterfall-{waterfall.observable.name}.png", drawing.png)
+        write_whole(out / "waterfall.csv", waterfall_csv(waterfalls).encode())
+    return f"{_table(waterfalls[0])}\n{summary}"
+
+
+def split_rows(throw: Scenario, rows: Mapping[str, Row]) -> tuple[Waterfall, ...]:
+    """Split every observable of the rows of ``plan_split``, given by tag.
+
+    Raises
+    ------
+    SweepError
+        If a run is not whole.
+    """
+    return split_all({tag: _observed(throw, tag, row) for tag, row in rows.items()}, throw.n_slices)
+
+
+def _observed(throw: Scenario, tag: str, row: Row) -> dict[str, float]:
+    if row.status != "ok":
+        raise SweepError(f"{tag}: {row.status}: {row.message or row.reason}; a waterfall needs every run whole")
+    assert row.plateau is not None
+    assert row.omega_end is not None
+    assert row.theta_end is not None
+    assert row.r_cm_end is not None
+    return {
+        "plateau": row.plateau,
+        "omega": row.omega_end / throw.omega0,
+        "theta": row.theta_end,
+        "toppling": float(toppling_angle(throw, row.r_cm_end)),
+        "v_cm": float(row.curves["v_cm"][-1]),
+    }
+
+
+def waterfall_csv(waterfalls: tuple[Waterfall, ...]) -> str:
+    """Return one row per observable and bar as CSV; numbers read back to the last bit."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(
+        ["observable", "unit", "bar", "forward", "backward", "mean of all orders", "forward band", "mean band"]
+    )
+    for waterfall in waterfalls:
+        what = (waterfall.observable.name, waterfall.observable.unit)
+        writer.writerow([*what, "published program", repr(waterfall.start), "", "", "", ""])
+        for bar in waterfall.bars:
+            numbers = (bar.forward, bar.backward, bar.average, bar.forward_band, bar.average_band)
+            writer.writerow([*what, bar.name, *map(repr, numbers)])
+        writer.writerow([*what, "free flight", repr(waterfall.end), "", "", repr(waterfall.end_band), ""])
+    return text.getvalue()
+
+
+def _table(waterfall: Waterfall) -> str:
+    observable = waterfall.observable
+    return "\n".join(
+        [
+            f"{observable.words} [{observable.unit}]: in the order shown, in reverse, mean of all orders",
+            f"  {waterfall.start:+8.4f}                      published program",
+            *(
+                f"  {bar.forward:+8.4f}  {bar.backward:+8.4f}  {bar.average:+8.4f}  {bar.name}"
+                for bar in waterfall.bars
+            ),
+            f"  {waterfall.end:+8.4f}                      free flight (+- {waterfall.end_band:.1g})",
+        ]
+    )

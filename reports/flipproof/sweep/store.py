@@ -1,0 +1,287 @@
+"""A sweep's rows in one SQLite file, and its flights in a folder beside it. One program writes; anyone may read.
+
+::
+
+    DIR/sweep.sqlite          schema_version, design, versions, points
+    DIR/trajectories/3f/...   one NPZ for each kept flight, named by its point's key
+    DIR/.flipproof            says that the folder is flipproof's own
+    DIR/sweep.lock            held by the program that writes; it ends with that program, however it dies
+
+A number that is not known is NULL, and the row's ``reason`` says why: SQLite has no NaN, and the schema refuses a row
+with a missing number and no reason. Floats come back to the last bit, but for the sign of a negative zero. A flight is
+in its place before its row is written. Every row carries a checksum, and the whole file is read through before a
+sweep goes on with it (``inspection``).
+
+- ``journal_mode = WAL``: readers see the last transaction while this program writes the next.
+- ``synchronous = NORMAL``: a killed program loses nothing that it committed; a power failure may lose the last
+  transactions, whose points are then made again, but never breaks the file. FULL would wait for the disk at each.
+- busy timeout 10 s: a reader or a backup that holds the file for a moment must not end a sweep.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sqlite3
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing, contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final
+
+import numpy as np
+
+from flipproof.output.ownership import MARKER, OutputError, check_own, marker_text, sole_writer
+from flipproof.sweep.design import Design
+from flipproof.sweep.entries import settings_text
+from flipproof.sweep.errors import SweepError
+from flipproof.sweep.files import TEMPORARY, sweep_away_parts, whole_file, write_whole
+from flipproof.sweep.inspection import damage, inspect, is_damage, result_code
+from flipproof.sweep.schema import (
+    APPLICATION,
+    FILE,
+    NUMBERS,
+    PAGE,
+    SCHEMA,
+    SHARED,
+    checksum,
+    columns,
+    kinds,
+    points_table,
+)
+from flipproof.sweep.work import CURVES, Outcome, Returned
+from slicemodel.trajectory import FloatArray
+
+LOCK: Final = "sweep.lock"
+KIND: Final = "sweep"
+FLIGHTS: Final = "trajectories"
+BUSY: Final = 10.0
+"""Seconds to wait for somebody who holds the file."""
+
+SAFE: Final = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM)
+"""What SQLite refuses before it has changed anything."""
+
+
+class Store:
+    """The rows of one design in a folder. Use as a context manager; the folder is locked until it ends."""
+
+    def __init__(self, folder: Path, design: Design, code: str) -> None:
+        """Open or begin the store.
+
+        Raises
+        ------
+        SweepError
+            If the folder holds something else, another design, rows of other code or another schema, if its file is
+            damaged, if another program is writing to it, or if it cannot be written.
+        """
+        self.folder, self.design, self.code = folder, design, code
+        self._lock = ExitStack()
+        self._rows: sqlite3.Connection | None = None
+        with self._plainly():
+            _check_folder(folder)
+            folder.mkdir(parents=True, exist_ok=True)
+        try:
+            with self._plainly():
+                self._lock.enter_context(sole_writer(folder / LOCK, folder))
+                if not (folder / MARKER).exists():
+                    write_whole(folder / MARKER, marker_text(KIND).encode())
+                self.fresh = not os.path.lexists(self.file)
+                if self.fresh:
+                    self._begin()
+                else:
+                    inspect(self.file, design, code, BUSY)
+                self._rows = sqlite3.connect(self.file, timeout=BUSY, isolation_level=None)
+                self._rows.execute("PRAGMA journal_mode = WAL").fetchall()
+                self._rows.execute("PRAGMA synchronous = NORMAL")
+                sweep_away_parts(folder)
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def file(self) -> Path:
+        """The SQLite file."""
+        return self.folder / FILE
+
+    @property
+    def connection(self) -> sqlite3.Connection:
+        """The connection that writes."""
+        assert self._rows is not None
+        return self._rows
+
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file and let go of the folder."""
+        if self._rows is not None:
+            self._rows.close()
+        self._rows = None
+        self._lock.close()
+
+    def done(self) -> bytearray:
+        """Return one byte for each point of the design: 1 if its row is there, and its flight if flights are kept."""
+        found = bytearray(self.design.size)
+        with self._plainly():
+            for number, trajectory in self.connection.execute("SELECT number, trajectory FROM points"):
+                found[number] = trajectory is None or (self.folder / trajectory).is_file()
+        return found
+
+    def counts(self) -> dict[str, int]:
+        """Return the number of rows by status, the most frequent first."""
+        query = "SELECT status, count(*) FROM points GROUP BY status ORDER BY count(*) DESC, status"
+        with self._plainly():
+            return dict(self.connection.execute(query).fetchall())
+
+    def add(self, returned: Sequence[Returned]) -> None:
+        """Write the points of some batches in one transaction, their flights first.
+
+        Raises
+        ------
+        SweepError
+            If the disk is full or the file cannot be written; what was there before is there still.
+        """
+        with self._plainly():
+            flights = {o.number: self._keep(o) for batch in returned for o in batch.outcomes if o.arrays is not None}
+            with _transaction(self.connection):
+                for batch in returned:
+                    versions = self._versions(json.dumps(dict(batch.versions), sort_keys=True))
+                    rows = (self._row(outcome, flights.get(outcome.number), versions) for outcome in batch.outcomes)
+                    # A row whose flight was deleted has been made again.
+                    gone = ((outcome.number,) for outcome in batch.outcomes)
+                    self.connection.executemany("DELETE FROM points WHERE number = ?", gone)
+                    marks = ", ".join("?" * len(columns(self.design)))
+                    self.connection.executemany(f"INSERT INTO points VALUES ({marks})", rows)
+
+    def restore(self, rows: Sequence[tuple[Any, ...]], versions: Mapping[int, str]) -> None:
+        """Write rows that were read from another file of this sweep; a point that has a row keeps it.
+
+        Parameters
+        ----------
+        rows : sequence of tuples - the cells of each, in the order of ``columns``
+        versions : mapping from the id that the rows refer to, to the versions there; one that is missing is lost
+        """
+        place = columns(self.design).index("versions")
+        marks = ", ".join("?" * len(columns(self.design)))
+        with self._plainly(), _transaction(self.connection):
+            ids = {row[place]: 0 for row in rows}
+            for old in ids:
+                ids[old] = self._versions(versions.get(old, json.dumps({"lost": f"versions {old} of a damaged file"})))
+            moved = (self._signed((*row[:place], ids[row[place]], *row[place + 1 : -1])) for row in rows)
+            self.connection.executemany(f"INSERT OR IGNORE INTO points VALUES ({marks})", moved)
+
+    def _begin(self) -> None:
+        """Make the file with its tables; it gets its name when it is whole, so that no kill leaves half of it."""
+        with whole_file(self.file) as part, closing(sqlite3.connect(part, isolation_level=None)) as connection:
+            connection.execute(f"PRAGMA page_size = {PAGE}")
+            connection.execute("PRAGMA journal_mode = MEMORY").fetchall()
+            with _transaction(connection):
+                connection.execute(f"PRAGMA application_id = {APPLICATION}")
+                for statement in (SHARED + points_table(self.design)).split(";\n"):
+                    connection.execute(statement)
+                connection.execute("INSERT INTO schema_version VALUES (?)", (SCHEMA,))
+                facts = (self.code, self.design.size, json.dumps(self.design.facts()), self.design.text)
+                row = (*facts, checksum(facts, ("TEXT", "INTEGER", "TEXT", "TEXT")))
+                connection.execute("INSERT INTO design VALUES (?, ?, ?, ?, ?)", row)
+
+    def _versions(self, facts: str) -> int:
+        row = (facts, checksum((facts,), ("TEXT",)))
+        self.connection.execute("INSERT OR IGNORE INTO versions (facts, checksum) VALUES (?, ?)", row)
+        (number,) = self.connection.execute("SELECT id FROM versions WHERE facts = ?", (facts,)).fetchone()
+        return int(number)
+
+    def _row(self, outcome: Outcome, flight: str | None, versions: int) -> tuple[Any, ...]:
+        point = self.design.point(outcome.number)
+        cells = (
+            outcome.number,
+            point.key(self.code),
+            *point.values,
+            point.solver,
+            settings_text(point.settings),
+            *(getattr(outcome, name) for name in NUMBERS),
+            outcome.impacts,
+            outcome.status,
+            outcome.message,
+            outcome.reason,
+            outcome.seconds,
+            flight,
+            *([_bytes(outcome.curves)] if self.design.curves else []),
+            versions,
+            json.dumps(point.parameters()),
+        )
+        return self._signed(cells)
+
+    def _signed(self, cells: Sequence[Any]) -> tuple[Any, ...]:
+        """Return cells with their checksum; cells that the tables refuse, and will say so, get none."""
+        try:
+            return (*cells, checksum(cells, kinds(self.design)[:-1]))
+        except (ValueError, TypeError, OverflowError):
+            return (*cells, "")
+
+    @contextmanager
+    def _plainly(self) -> Iterator[None]:
+        """Turn what a disk or SQLite refuses into one line."""
+        try:
+            yield
+        except OutputError as error:
+            raise SweepError(str(error)) from None
+        except sqlite3.IntegrityError as error:
+            words = "two points of the design are the same throw" if "points.key" in str(error) else "a row is refused"
+            raise SweepError(f"{self.folder}: {words} ({error})") from None
+        except (OSError, sqlite3.Error) as error:
+            if is_damage(error):
+                raise damage(self.file, self.design, self.code, str(error)) from None
+            words = getattr(error, "strerror", None) or str(error)
+            safe = isinstance(error, OSError) or result_code(error) in SAFE
+            kept = (
+                "the points stored so far are safe, the same command goes on from there"
+                if safe
+                else "what was stored is read through when the same command goes on from there"
+            )
+            raise SweepError(f"{self.folder} cannot be written ({words}); {kept}") from None
+
+    def _keep(self, outcome: Outcome) -> str:
+        """Write the flight of a point and return its file's name from the folder."""
+        key = self.design.point(outcome.number).key(self.code)
+        name = f"{FLIGHTS}/{key[:2]}/{key}.npz"
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(path) as part, part.open("wb") as file:
+            assert outcome.arrays is not None
+            np.savez(file, **dict(outcome.arrays))  # type: ignore[arg-type]
+        return name
+
+
+def read_curves(blob: bytes) -> dict[str, FloatArray]:
+    """Return the curves of a row by name, each of shape (P,)."""
+    return dict(zip(CURVES, np.frombuffer(blob, dtype="<f8").reshape(len(CURVES), -1), strict=True))
+
+
+def _bytes(curves: FloatArray | None) -> bytes | None:
+    return None if curves is None else curves.astype("<f8").tobytes()
+
+
+def _check_folder(folder: Path) -> None:
+    if folder.exists() and not folder.is_dir():
+        raise SweepError(f"{folder} is a file; --out names a folder")
+    if folder.exists():
+        parts = (entry.name for entry in folder.iterdir() if entry.name.endswith(TEMPORARY))
+        check_own(folder, KIND, ignored=(LOCK, *parts))
+
+
+@contextmanager
+def _transaction(connection: sqlite3.Connection) -> Iterator[None]:
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+        connection.execute("COMMIT")
+    except BaseException:
+        # SQLite has rolled back by itself after some errors, such as a full disk.
+        if connection.in_transaction:
+            connection.execute("ROLLBACK")
+        raise

@@ -1,0 +1,204 @@
+"""What a worker does: it makes points, and says by which code and under which versions.
+
+Nothing here knows which machine it runs on. A point is made by ``flipproof.frame.solvers.make``, as a run of a report
+is, and depends on nothing but its own parameters: batches, workers and resuming cannot change a bit of it.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipproof.frame.solvers import Run, make
+from flipproof.output.provenance import provenance
+from flipproof.sweep.design import Point
+from slicemodel.observables import centre_of_mass_velocity, plateau
+from slicemodel.scenario import ScenarioError
+from slicemodel.trajectory import STATUSES, FloatArray, Trajectory
+
+WHOLE: Final = ("ok", "escaped")
+"""Statuses of a trajectory that reached the end of the flight."""
+
+OUTCOMES: Final = {
+    **STATUSES,
+    "impossible": "no bottle can be thrown so; the solver was not called",
+    "failed": "the solver raised an error or returned nothing",
+    "worker-died": "the point was alone in its worker each time that the worker died",
+}
+"""Status of a row -> its meaning."""
+
+SOURCES: Final = ("slicemodel", "ode_reference", "engine_check", "flipproof.frame.solvers", "flipproof.sweep.work")
+"""What a point's numbers depend on."""
+
+CURVES: Final = ("omega", "theta", "r_cm", "v_cm")
+"""What a row's curves show, in their order [rad/s, rad, m, m/s]."""
+
+Arrays = Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What became of a point. A number that is not known is None, and ``reason`` says why.
+
+    Parameters
+    ----------
+    plateau, omega_end, theta_end, r_cm_end : float or None
+        Mean of omega / omega_0 over the second half [1]; omega [rad/s], theta [rad] and r_CM [m] at the end of the
+        flight. None unless the flight was whole.
+    t_end : float or None - last time reached [s]
+    impacts : int or None - None where a solver does not count them
+    status : a key of ``OUTCOMES``
+    message : the trajectory's own
+    reason : why a number is missing; empty if none is
+    seconds : what the point took
+    arrays : the flight, if it was asked for and there is one
+    curves : (4, P) - ``curves_of`` the flight, if they were asked for and it was whole
+    """
+
+    number: int
+    plateau: float | None = None
+    omega_end: float | None = None
+    theta_end: float | None = None
+    r_cm_end: float | None = None
+    t_end: float | None = None
+    impacts: int | None = None
+    status: str
+    message: str = ""
+    reason: str = ""
+    seconds: float = 0.0
+    arrays: Arrays | None = None
+    curves: FloatArray | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Returned:
+    """What a worker sends home: code and versions that it ran, the points, and the seconds they took together."""
+
+    code: str
+    versions: Mapping[str, str]
+    outcomes: Sequence[Outcome]
+    seconds: float
+
+
+@functools.cache
+def code_identity() -> str:
+    """Return version and fingerprint of the code that makes points, such as "0.1.0+3f2a9c41d0be".
+
+    Two checkouts have one version and different sources, so the sources count.
+    """
+    try:
+        version = metadata.version("flipproof")
+    except metadata.PackageNotFoundError:
+        version = "checkout"
+    sources = hashlib.sha256()
+    for name in SOURCES:
+        spec = find_spec(name)
+        assert spec is not None
+        assert spec.origin is not None
+        origin = Path(spec.origin)
+        package = spec.submodule_search_locations is not None
+        for file in sorted(origin.parent.rglob("*.py")) if package else [origin]:
+            sources.update(f"{name}/{file.relative_to(origin.parent).as_posix()}\0".encode())
+            sources.update(file.read_bytes())
+    return f"{version}+{sources.hexdigest()[:12]}"
+
+
+@functools.cache
+def versions() -> Mapping[str, str]:
+    """Return what else a point may depend on in its last bits: recorded with every row, not compared."""
+    return {name: fact for name, fact in provenance("").items() if name not in ("command", "made", "flipproof")}
+
+
+def make_batch(code: str, points: Sequence[Point], keep: bool, curves: int = 0) -> Returned:
+    """Make points one after the other; if the caller's ``code`` is not the code here, make none.
+
+    Parameters
+    ----------
+    code : str - ``code_identity()`` where the sweep is written
+    keep : bool - return the flights too
+    curves : int - points of the curves to return; 0: none
+    """
+    began = time.perf_counter()
+    here = code_identity()
+    outcomes = [make_point(point, keep, curves) for point in points] if here == code else []
+    return Returned(here, versions(), outcomes, time.perf_counter() - began)
+
+
+def make_point(point: Point, keep: bool = False, curves: int = 0) -> Outcome:
+    """Make one point; whatever goes wrong becomes its status and reason."""
+    try:
+        scenario = point.scenario()
+    except ScenarioError as error:
+        return Outcome(number=point.number, status="impossible", reason=str(error))
+    began = time.perf_counter()
+    try:
+        made = make(Run("", point.solver, scenario, point.settings))
+    except Exception as error:
+        # A sweep of days does not end because one point met a mistake in a solver.
+        seconds = time.perf_counter() - began
+        return Outcome(number=point.number, status="failed", reason=f"{type(error).__name__}: {error}", seconds=seconds)
+    if made.trajectory is None:
+        return Outcome(number=point.number, status="failed", reason=made.reason, seconds=made.seconds)
+    return _read(point.number, made.trajectory, made.seconds, keep, curves)
+
+
+def curves_of(flight: Trajectory, points: int) -> FloatArray:
+    """Return the ``CURVES`` of a whole flight at equal times from release to landing, shape (4, points).
+
+    Linear between output times. v_CM is NaN where the run kept no slices (a scheme's store "summary").
+    """
+    times = np.linspace(0.0, flight.scenario.duration, points)
+    kept = len(flight.v) == len(flight.t)
+    v_cm = centre_of_mass_velocity(flight.scenario, flight.v) if kept else np.full(len(flight.t), np.nan)
+    return np.array([np.interp(times, flight.t, curve) for curve in (flight.omega, flight.theta, flight.r_cm, v_cm)])
+
+
+def _read(number: int, flight: Trajectory, seconds: float, keep: bool, curves: int) -> Outcome:
+    values: dict[str, float | None] = dict.fromkeys(("plateau", "omega_end", "theta_end", "r_cm_end"))
+    reasons = []
+    if flight.status in WHOLE:
+        # A number out of range is missing with a reason here; it must not also appear as a warning.
+        with np.errstate(all="ignore"):
+            found = {
+                "plateau": plateau(flight.t, flight.omega, flight.scenario.omega0),
+                "omega_end": float(flight.omega[-1]),
+                "theta_end": float(flight.theta[-1]),
+                "r_cm_end": float(flight.r_cm[-1]),
+            }
+        values = {name: value if math.isfinite(value) else None for name, value in found.items()}
+        reasons += [f"{name} is not finite" for name, value in values.items() if value is None]
+    else:
+        reasons.append(f"{flight.status}: the flight ends at t = {flight.t[-1]:.6g} s")
+    if flight.impacts is None:
+        reasons.append(f"{flight.method} counts no impacts")
+    return Outcome(
+        number=number,
+        **values,
+        t_end=float(flight.t[-1]),
+        impacts=None if flight.impacts is None else len(flight.impacts),
+        status=flight.status,
+        message=flight.message,
+        reason="; ".join(reasons),
+        seconds=seconds,
+        arrays=_arrays(flight) if keep else None,
+        curves=curves_of(flight, curves) if curves and flight.status in WHOLE else None,
+    )
+
+
+def _arrays(flight: Trajectory) -> dict[str, NDArray[Any]]:
+    names = ("t", "theta", "omega", "r_cm", "inertia", "r", "v")
+    arrays: dict[str, NDArray[Any]] = {name: np.asarray(getattr(flight, name)) for name in names}
+    if flight.impacts is not None:
+        arrays |= {f"impact_{name}": getattr(flight.impacts, name) for name in flight.impacts.__slots__}
+    return arrays
