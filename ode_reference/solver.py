@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ode_reference import column
 from ode_reference.arguments import known_name, number_above, number_within
 from ode_reference.combinations import model_of
 from ode_reference.impacts import LAWS, immovable
@@ -46,7 +47,8 @@ def solve(
     model : str or Switches
         A name in ``ode_reference.MODELS``, from "published-limit" (what the published program solves as its time
         step goes to zero) by way of "eq8" (Eq. 8 exactly as printed) to "free-flight"; or any ``Switches``, or
-        their name, such as "switches:110000".
+        their name, such as "switches:110000"; or "column", water as one stretching column (``column``), to which only
+        the tolerances and ``times`` apply.
     rtol : float
         Relative tolerance of a step, in [1e-13, 1e-2].
     atol : float
@@ -95,6 +97,8 @@ def solve(
     """
     if not isinstance(scenario, Scenario):
         raise ValueError(f"scenario = {scenario!r} is not a slicemodel.Scenario")
+    if model == column.NAME:
+        return column.solve(scenario, rtol, atol, times)
     chosen = _model(model)
     with_recoil = LAWS[known_name("impact_law", impact_law, LAWS)]
     law = with_recoil if chosen.switches.recoil else immovable
