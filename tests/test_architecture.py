@@ -9,8 +9,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = ("slicemodel", "ode_reference", "engine_check", "reports")
-NOUNS = {"scenario", "trajectory", "observables"}
-NOUN_NAMES = {"Bottle", "Scenario", "ScenarioError", "Trajectory", "Impact", "Impacts"}
+NOUNS = {"scenario", "trajectory", "observables", "table"}
+NOUN_NAMES = {"Bottle", "Scenario", "ScenarioError", "Trajectory", "Impact", "Impacts", "Table", "Touch", "Outcome"}
 
 
 def imports_of(file: Path):
