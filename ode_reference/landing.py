@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
@@ -16,6 +17,7 @@ import numpy as np
 from ode_reference.arguments import known_name, number_within
 from slicemodel.scenario import Scenario
 from slicemodel.table import ENERGY_RISE, LAWS, LONGEST_LANDING, Outcome, Table, Touch
+from slicemodel.trajectory import FloatArray
 
 if TYPE_CHECKING:
     from ode_reference.landing_core import Landing, World
@@ -37,6 +39,31 @@ IMMOBILE: Final = 1e-12
 
 MISPLACED: Final = 1e-9
 """How far a slice of a touch may lie beyond its stops [L]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Path:
+    """The motion of a landing.
+
+    Parameters
+    ----------
+    t : (P,) - from the touch [s]
+    centre, velocity : (P, 2) - of the middle of the tube, x from the touch and y over the table [m], [m/s]
+    theta : (P,) [rad], omega : (P,) [rad/s]
+    r, v : (P, N) - slices from the cap [m] and their velocities in the bottle [m/s]
+    energy : (P,) - over the table [J]
+    saddle : float - E_s [J]
+    """
+
+    t: FloatArray
+    centre: FloatArray
+    theta: FloatArray
+    velocity: FloatArray
+    omega: FloatArray
+    r: FloatArray
+    v: FloatArray
+    energy: FloatArray
+    saddle: float
 
 
 def land(
@@ -149,7 +176,7 @@ def world_of(touch: Touch, table: Table, law: str, slices: str) -> World:
     )
 
 
-def _refuse_misplaced(touch: Touch, chain: bool, low: np.ndarray, high: np.ndarray) -> None:
+def _refuse_misplaced(touch: Touch, chain: bool, low: FloatArray, high: FloatArray) -> None:
     """Raise ValueError if a slice lies where no slice that keeps its room can be."""
     length, rod, r = touch.scenario.bottle.length, touch.scenario.slice_height, touch.r
     beyond = MISPLACED * length
@@ -166,7 +193,7 @@ def _refuse_misplaced(touch: Touch, chain: bool, low: np.ndarray, high: np.ndarr
         )
 
 
-def state_of(touch: Touch, world: World) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def state_of(touch: Touch, world: World) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return (q, s, w) of ``landing_core``: the lowest corner on the table, the tube's middle over x = 0."""
     sine, cosine = math.sin(touch.theta), math.cos(touch.theta)
     height = world.half * abs(cosine) + world.radius * abs(sine)
@@ -178,8 +205,49 @@ def _run(touch: Touch, world: World, dt: float) -> Landing:
     from ode_reference import landing_core
 
     q, s, w = state_of(touch, world)
-    run: Landing = landing_core.land(q, s, w, dt, LONGEST_LANDING, False, world)
+    none = np.empty((0, 7 + 2 * world.n))
+    run: Landing = landing_core.land(q, s, w, dt, LONGEST_LANDING, False, world, 1.0, none)
     return run
+
+
+def path(
+    touch: Touch,
+    table: Table,
+    law: str | None = None,
+    slices: str = "exclude",
+    *,
+    dt: float = DEFAULT_DT,
+    every: float = 1e-3,
+    duration: float = 0.5,
+    drop: float = 0.0,
+) -> Path:
+    """Return the motion of a landing, past its certificate; parameters as for ``land``.
+
+    ``every`` is the time between two instants, at most ``dt`` late, ``duration`` the whole [s]; the touch may be lifted
+    by ``drop`` [m] first.
+    """
+    from ode_reference import landing_core
+
+    # Without a saddle nothing ends the run before its time.
+    world = world_of(touch, table, _law(touch.scenario, law), slices)
+    q, s, w = state_of(touch, world)
+    q[1] += drop
+    record = np.full((math.ceil(duration / every), 7 + 2 * world.n), np.nan)
+    landing_core.land(q, s, w, dt, duration, False, world._replace(saddle=-math.inf), every, record)
+    record = record[np.isfinite(record[:, 0])]
+    n = world.n
+    energy = [landing_core.energy(row[1:7], row[7 : 7 + n], row[7 + n :], world) for row in record]
+    return Path(
+        t=record[:, 0],
+        centre=record[:, 1:3],
+        theta=record[:, 3],
+        velocity=record[:, 4:6],
+        omega=record[:, 6],
+        r=record[:, 7 : 7 + n] + world.half,
+        v=record[:, 7 + n :],
+        energy=np.array(energy),
+        saddle=world.saddle,
+    )
 
 
 def _outcome(coarse: Landing, fine: Landing, settings: dict[str, object]) -> Outcome:

@@ -17,14 +17,14 @@ across the axis and in rotation, in terms of A = dV/dt - g:
     m S_1 A_t + (J_b + m S_2) omega' = T - 2 m omega sum s_i w_i     J_b = M_b (R^2/2 + L^2/12)
 
 A step is the midpoint rule: places by half a step, velocities with the forces there, places by the other half. Contacts
-that are closed act in it by impulses that keep them closed or let them open. Gaps that are open and would be negative
+that are closed act in it by impulses that keep them closed at its end or let them open. Gaps that are open and would be negative
 at its end cut the step short at the first of them, where the impact happens; a rebound that would return within one
 step is a rest: its gap is closed.
 
 Impulses on the slices of one axial chain have a closed form. With z = v+ + e v- Newton's law, w+ + e w- >= 0, p >= 0,
 product 0 on every touching gap, says that z is the point nearest to (1 + e) v- (in the metric of the masses) at which
 no gap has z_gap < 0: a monotone regression, found by pooling neighbours that approach. In a step e = 0. The impulses of
-the table, Coulomb's cone included, are found by Gauss and Seidel's sweeps over the corners with the mass that is pooled
+the table, Coulomb's cone included, are those of one corner in closed form, swept over the corners with the mass that is pooled
 with the tube, until the pool no longer changes.
 
 All compiled functions live in this one file: numba's cache does not notice a change in a helper elsewhere.
@@ -242,12 +242,36 @@ def pool_stops(x, tube, closed, world, y):
 
 
 @numba.njit(error_model="numpy")
-def respond(x, tube, start, s1, s2, sine, cosine, closed, target, world, free, work, y, pn, pt):
+def coulomb(demand, slip, nn, nt, tt, friction):
+    """Return the normal and tangential impulse of one corner that would rise by ``-demand`` too little without them.
+
+    Sticking if that lies in Coulomb's cone; else slipping to that side on which friction opposes it.
+    """
+    if demand <= 0.0:
+        return 0.0, 0.0
+    det = nn * tt - nt * nt
+    normal, along = (demand * tt + slip * nt) / det, (-slip * nn - demand * nt) / det
+    if normal >= 0.0 and abs(along) <= friction * normal:
+        return normal, along
+    for side in (1.0, -1.0):
+        give = nn + side * friction * nt
+        if give > 0.0:
+            normal = demand / give
+            along = side * friction * normal
+            if side * (slip + nt * normal + tt * along) <= 0.0:
+                return normal, along
+    return demand / nn, 0.0
+
+
+@numba.njit(error_model="numpy")
+def respond(x, tube, start, s1, s2, sine, cosine, angle, closed, target, world, free, work, y, pn, pt):
     """Find all impulses of one instant, or of one step; return the tube's axial value, v_t, omega and whether solved.
 
     ``x``, ``tube``: what slices and tube would have without impulses, along the axis; ``start`` is added to it for the
     tube's velocity in the lab. ``free``: (v_t, omega) likewise. ``target``: least normal velocity of closed corners.
+    ``sine``, ``cosine`` are of the axes; the corners are where they are at ``angle``.
     """
+    at_sine, at_cosine = math.sin(angle), math.cos(angle)
     m_all = world.tube + world.m * world.n
     a12, a22 = world.m * s1, world.own + world.m * s2
     det = m_all * a22 - a12 * a12
@@ -277,31 +301,24 @@ def respond(x, tube, start, s1, s2, sine, cosine, closed, target, world, free, w
                     continue
                 a = world.half if c < 2 else -world.half
                 b = world.radius if c % 2 == 0 else -world.radius
-                for tangential in range(2):
-                    jr = sine if tangential else -cosine
-                    jt = cosine if tangential else sine
-                    arm = a * jt - b * jr
-                    d_r = jr / pooled
-                    d_t = (jt * a22 - a12 * arm) / det
-                    d_o = (m_all * arm - a12 * jt) / det
-                    give = jr * (d_r - b * d_o) + jt * (d_t + a * d_o)
-                    u = jr * (v_r - b * omega) + jt * (v_t + a * omega)
-                    if tangential:
-                        bound = world.friction * pn[c]
-                        new = min(max(pt[c] - u / give, -bound), bound)
-                        change = new - pt[c]
-                        pt[c] = new
-                    else:
-                        new = max(pn[c] + (target[c] - u) / give, 0.0)
-                        change = new - pn[c]
-                        pn[c] = new
-                    v_r += d_r * change
-                    v_t += d_t * change
-                    omega += d_o * change
-                    axial += jr * change
-                    across += jt * change
-                    torque += arm * change
-                    largest = max(largest, abs(change) * give)
+                # Row of the corner's velocity in (v_r, v_t, omega): (-cos, sin, up) upwards, (sin, cos, on) along x.
+                up, on = a * at_sine + b * at_cosine, a * at_cosine - b * at_sine
+                n_r, n_t, n_o = -cosine / pooled, (sine * a22 - a12 * up) / det, (m_all * up - a12 * sine) / det
+                t_r, t_t, t_o = sine / pooled, (cosine * a22 - a12 * on) / det, (m_all * on - a12 * cosine) / det
+                nn, tt = -cosine * n_r + sine * n_t + up * n_o, sine * t_r + cosine * t_t + on * t_o
+                nt = sine * n_r + cosine * n_t + on * n_o
+                rise = -cosine * v_r + sine * v_t + up * omega - nn * pn[c] - nt * pt[c]
+                slip = sine * v_r + cosine * v_t + on * omega - nt * pn[c] - tt * pt[c]
+                normal, along = coulomb(target[c] - rise, slip, nn, nt, tt, world.friction)
+                more_n, more_t = normal - pn[c], along - pt[c]
+                pn[c], pt[c] = normal, along
+                v_r += n_r * more_n + t_r * more_t
+                v_t += n_t * more_n + t_t * more_t
+                omega += n_o * more_n + t_o * more_t
+                axial += -cosine * more_n + sine * more_t
+                across += sine * more_n + cosine * more_t
+                torque += up * more_n + on * more_t
+                largest = max(largest, abs(more_n) * nn, abs(more_t) * tt)
             if largest < 1e-13:
                 break
         expected = v_r - start
@@ -345,7 +362,22 @@ def step(q, s, w, h, closed, world, free, target, work, x, y, pn, pt, q1, s1, w1
         free[0] = v_t + (side * a22 - a12 * turn) / det - world.gravity * sine * h
         free[1] = q[5] + (m_all * turn - a12 * side) / det
         at, new_t, omega, solved = respond(
-            x, push, start, sum1, sum2, sine, cosine, closed, target, world, free, work, y, pn, pt
+            x,
+            push,
+            start,
+            sum1,
+            sum2,
+            sine,
+            cosine,
+            theta + omega * h / 2,
+            closed,
+            target,
+            world,
+            free,
+            work,
+            y,
+            pn,
+            pt,
         )
         if not world.rigid:
             for i in range(n):
@@ -387,7 +419,7 @@ def strike(q, s, w, taking, closed, world, free, target, work, x, y, pn, pt, rat
         target[c] = 0.0 if closed[c] else max(-world.e_table * rate[c], 0.0)
     free[0], free[1] = v_t, q[5]
     at, new_t, omega, solved = respond(
-        x, 0.0, v_r, sum1, sum2, sine, cosine, taking, target, world, free, work, y, pn, pt
+        x, 0.0, v_r, sum1, sum2, sine, cosine, q[2], taking, target, world, free, work, y, pn, pt
     )
     if not world.rigid:
         for i in range(world.n):
@@ -431,12 +463,14 @@ def first_zero(begin, rate, end, h):
 
 
 @kept_on_disk
-def land(q, s, w, dt, longest, fly, world):
+def land(q, s, w, dt, longest, fly, world, every, record):
     """Land from the state (q, s, w), which is changed; stop at a certain outcome, or, to ``fly``, at the first touch.
 
-    q = (x, y, theta, v_x, v_y, omega) of the tube's middle over the table.
+    q = (x, y, theta, v_x, v_y, omega) of the tube's middle over the table. Row k of ``record`` becomes (t, q, s, w) at
+    the first instant from k ``every`` on.
     """
     n = world.n
+    rows = 0
     count = 4 if world.rigid else 4 + (n + 1 if world.chain else 2 * n)
     gap, late, rate, ahead = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
     closed, touching, taking = np.zeros(count, np.bool_), np.zeros(count, np.bool_), np.zeros(count, np.bool_)
@@ -457,7 +491,6 @@ def land(q, s, w, dt, longest, fly, world):
         lowest = gap[0]
         for k in range(count):
             touching[k] = closed[k] or gap[k] <= near
-            # A closed corner moves on a circle: its rate at the end of a step is not that in the middle, which is 0.
             strikes = strikes or (touching[k] and not closed[k] and rate[k] < -STILL)
             if k < 4:
                 lowest = min(lowest, gap[k])
@@ -479,6 +512,12 @@ def land(q, s, w, dt, longest, fly, world):
             rates(w, q, world, rate)
             for k in range(count):
                 closed[k] = touching[k] and rate[k] <= STILL
+        while rows < len(record) and t >= rows * every:
+            record[rows, 0] = t
+            record[rows, 1:7] = q
+            record[rows, 7 : 7 + n] = s
+            record[rows, 7 + n :] = w
+            rows += 1
         if not math.isfinite(before):
             return Landing(BROKEN, t, 0.0, bounces, 0.0, rise, steps, impacts, unresolved)
         if not fly and before < world.saddle:

@@ -1,11 +1,11 @@
 r"""What a landing is made of: the table, the touch that a solver is given, and the outcome that it returns.
 
-            \ u_r           The flight ends in the touch: the lowest rim of the bottle is at the height of the table.
-       cap   o              A landing solver is given the touch and the table and nothing else, so that two solvers
-              \             start from the same numbers. theta, omega, r and r' are those of a trajectory; the velocity
-               o  centre    is that of the middle of the tube, r = L/2.
-       rim  +--/
-    ===========*=========   table
+        \ u_r           The flight ends in the touch: the lowest rim of the bottle is at the height of the table.
+   cap   o              A landing solver is given the touch and the table and nothing else, so that two solvers
+          \             start from the same numbers. theta, omega, r and r' are those of a trajectory; the velocity
+           o  centre    is that of the middle of the tube, r = L/2.
+   rim  +--/
+===========*=========   table
 """
 
 from __future__ import annotations
