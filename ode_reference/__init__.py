@@ -12,12 +12,13 @@ if TYPE_CHECKING:
     from ode_reference.combinations import model_of
     from ode_reference.impacts import LAWS
     from ode_reference.landing import land
+    from ode_reference.landing_flight import fly
     from ode_reference.models import LADDER, MODELS
     from ode_reference.solver import solve
     from ode_reference.steppers import METHODS
     from ode_reference.switches import Switches
 
-__all__ = ["LADDER", "LAWS", "METHODS", "MODELS", "Switches", "land", "model_of", "solve"]
+__all__ = ["LADDER", "LAWS", "METHODS", "MODELS", "Switches", "fly", "land", "model_of", "solve"]
 
 _HOMES = {
     "LADDER": "ode_reference.models",
@@ -25,6 +26,7 @@ _HOMES = {
     "METHODS": "ode_reference.steppers",
     "MODELS": "ode_reference.models",
     "Switches": "ode_reference.switches",
+    "fly": "ode_reference.landing_flight",
     "land": "ode_reference.landing",
     "model_of": "ode_reference.combinations",
     "solve": "ode_reference.solver",
