@@ -1,13 +1,13 @@
 r"""The landing in pymunk: a box on a thick segment, masses in grooves inside it, the engine's own contacts.
 
-     cap wall  #########          slice i carries two circles: one meets the base wall only, one the cap wall only.
-               |  (i)  |          "staggered": their radii are the slice's distances from its two stops, so that one pair
-               |       |          of walls makes two stops of its own for every slice.
-     base wall #########          "exclude": both radii are h/2N, and a third circle meets the neighbours.
+     cap wall  #########       slice i carries two circles: one meets the base wall only, one the cap wall only.
+               |  (i)  |       "staggered": their radii are the slice's distances from its two stops, so that one
+               |       |       pair of walls makes two stops of its own for every slice.
+     base wall #########       "exclude": both radii are h/2N, and a third circle meets the neighbours.
     ===== table: a segment 1 m thick =====
 
-Elasticities multiply, so that walls and table carry 1, slices e and the bottle e_table; friction likewise. A body's angle
-is theta: its local axis from cap to base is (0, -1).
+Elasticities multiply, so that walls and table carry 1, slices e and the bottle e_table; friction likewise. A body's
+angle is theta: its local axis from cap to base is (0, -1).
 
 Contact needs depth: two shapes that touch to round-off may or may not count. Slices that rest in the touch are put
 ``DEPTH`` into what they rest on, less than the slop that is never pushed back; by it they are in contact at the first
@@ -49,7 +49,7 @@ LARGEST_DRIFT: Final = 1e-2
 """Distance of a slice from the axis [L] beyond which the world is given up."""
 
 
-def build(touch: Touch, table: Table, dt: float, law: str, slices: str) -> World:
+def build(touch: Touch, table: Table, dt: float, law: str | None, slices: str) -> World:
     """Return the world at the touch, read back."""
     del law  # the engine has one
     return World(touch, table, dt, slices)
@@ -57,6 +57,8 @@ def build(touch: Touch, table: Table, dt: float, law: str, slices: str) -> World
 
 class World:
     """One bottle over a table, and what ``landing.landed`` asks of it."""
+
+    ledger = None
 
     def __init__(self, touch: Touch, table: Table, dt: float, slices: str) -> None:
         scenario = touch.scenario
@@ -67,7 +69,9 @@ class World:
         self.sine, self.cosine = math.sin(touch.theta), math.cos(touch.theta)
         self.space = pymunk.Space()
         self.space.gravity = (0.0, -scenario.gravity)
-        self.space.iterations = max(120, math.ceil(scenario.water_mass / scenario.bottle.mass * math.sqrt(scenario.n_slices)))
+        self.space.iterations = max(
+            120, math.ceil(scenario.water_mass / scenario.bottle.mass * math.sqrt(scenario.n_slices))
+        )
         self.space.collision_slop, self.space.collision_bias, self.space.collision_persistence = SLOP, 1.0, 1
         self.space.damping = 1.0
         self.bodies: list[pymunk.Body] = []
@@ -177,7 +181,7 @@ class World:
     def _read_back(self, table: Table) -> dict[str, float]:
         """Return what the world holds, or raise SetupError where it is not what was meant."""
         scenario, touch = self.scenario, self.touch
-        x, y, theta = self.pose()
+        theta = self.pose()[2]
         meant = {
             "total_mass": scenario.total_mass,
             "angle": touch.theta,

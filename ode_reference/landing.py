@@ -28,7 +28,7 @@ DEFAULT_DT: Final = 2e-4
 SLICES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "exclude": "slices are rods of length h/N that meet each other",
-        "staggered": "each slice has two stops of its own, where the stack on the base and that on the cap would hold it",
+        "staggered": "each slice has two stops of its own, where the stacks on base and cap would hold it",
         "overlap": "refused: slices that overlap all sink to the base, and the centre of mass at rest is wrong",
     }
 )
@@ -143,7 +143,9 @@ def world_of(touch: Touch, table: Table, law: str, slices: str) -> World:
     half = bottle.length / 2
     rigid = scenario.frozen or bottle.length - n * rod <= IMMOBILE * bottle.length
     # Counted from the base: i rods lie below slice i and n - 1 - i above it.
-    i = np.arange(n)
+    i = np.arange(n, dtype=np.float64)
+    high: FloatArray
+    low: FloatArray
     high, low = half - (i + 0.5) * rod, -half + (n - i - 0.5) * rod
     if not rigid:
         _refuse_misplaced(touch, slices == "exclude", low + half, high + half)
@@ -188,8 +190,8 @@ def _refuse_misplaced(touch: Touch, chain: bool, low: FloatArray, high: FloatArr
     near = np.flatnonzero(r[:-1] - r[1:] < rod - beyond) if chain else np.empty(0, dtype=np.int64)
     for k in near[:1].tolist():
         raise ValueError(
-            f"touch.r[{k}] - touch.r[{k + 1}] = {r[k] - r[k + 1]:.9g} m is below the length {rod:.9g} m of a rod: take a "
-            "flight whose slices do not overlap, or slices = 'staggered'"
+            f"touch.r[{k}] - touch.r[{k + 1}] = {r[k] - r[k + 1]:.9g} m is below the length {rod:.9g} m of a rod: take "
+            "a flight whose slices do not overlap, or slices = 'staggered'"
         )
 
 
@@ -250,7 +252,7 @@ def path(
     )
 
 
-def _outcome(coarse: Landing, fine: Landing, settings: dict[str, object]) -> Outcome:
+def _outcome(coarse: Landing, fine: Landing, settings: Mapping[str, object]) -> Outcome:
     """Return the outcome of two runs from one touch, the second with half the step."""
     from ode_reference.landing_core import BROKEN, CAP, LYING, TIMEOUT, UPRIGHT
 

@@ -16,16 +16,16 @@ across the axis and in rotation, in terms of A = dV/dt - g:
     M A_t + m S_1 omega'      = F_t - 2 m omega sum w_i              S_1 = sum s_i,  S_2 = sum s_i^2
     m S_1 A_t + (J_b + m S_2) omega' = T - 2 m omega sum s_i w_i     J_b = M_b (R^2/2 + L^2/12)
 
-A step is the midpoint rule: places by half a step, velocities with the forces there, places by the other half. Contacts
-that are closed act in it by impulses that keep them closed at its end or let them open. Gaps that are open and would be negative
-at its end cut the step short at the first of them, where the impact happens; a rebound that would return within one
-step is a rest: its gap is closed.
+A step is the midpoint rule: places by half a step, velocities with the forces there, places by the other half.
+Contacts that are closed act in it by impulses that keep them closed at its end or let them open. Gaps that are open
+and would be negative at its end cut the step short at the first of them, where the impact happens; a rebound that
+would return within one step is a rest: its gap is closed.
 
 Impulses on the slices of one axial chain have a closed form. With z = v+ + e v- Newton's law, w+ + e w- >= 0, p >= 0,
 product 0 on every touching gap, says that z is the point nearest to (1 + e) v- (in the metric of the masses) at which
-no gap has z_gap < 0: a monotone regression, found by pooling neighbours that approach. In a step e = 0. The impulses of
-the table, Coulomb's cone included, are those of one corner in closed form, swept over the corners with the mass that is pooled
-with the tube, until the pool no longer changes.
+no gap has z_gap < 0: a monotone regression, found by pooling neighbours that approach. In a step e = 0. The impulses
+of the table, Coulomb's cone included, are those of one corner in closed form, swept over the corners with the mass
+that is pooled with the tube, until the pool no longer changes.
 
 All compiled functions live in this one file: numba's cache does not notice a change in a helper elsewhere.
 """
@@ -52,6 +52,9 @@ STILL = 1e-11
 
 MOST_TRIALS = 60
 MOST_SWEEPS = 500
+CREEPING = 1e-4
+"""Change of a velocity in the last sweep that is tolerated [m/s]: two corners can share their friction in many ways."""
+
 MOST_POOLS = 100
 MOST_ROUNDS = 100
 
@@ -212,7 +215,7 @@ def pool_chain(x, tube, closed, world, y, total, weight, count):
 
 @numba.njit(error_model="numpy")
 def pool_stops(x, tube, closed, world, y):
-    """The same where each slice has its own stops: each is pooled with the tube or with nothing."""
+    """Do the same where each slice has its own stops: it is pooled with the tube or with nothing."""
     n = world.n
     below, above = -np.inf, np.inf
     at, pooled = tube, world.tube
@@ -294,6 +297,7 @@ def respond(x, tube, start, s1, s2, sine, cosine, angle, closed, target, world, 
         if not touches or (outer > 0 and abs(at - expected) <= 1e-12 * (1.0 + abs(at))):
             return at, v_t, omega, True
         v_r = start + at
+        largest = 0.0
         for _ in range(MOST_SWEEPS):
             largest = 0.0
             for c in range(4):
@@ -321,6 +325,8 @@ def respond(x, tube, start, s1, s2, sine, cosine, angle, closed, target, world, 
                 largest = max(largest, abs(more_n) * nn, abs(more_t) * tt)
             if largest < 1e-13:
                 break
+        if not largest < CREEPING:
+            break
         expected = v_r - start
     return at, v_t, omega, False
 

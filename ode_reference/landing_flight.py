@@ -64,15 +64,13 @@ def fly(scenario: Scenario, table: Table, slices: str = "exclude", *, dt: float 
     q[0], q[1] = world.half * sine, -world.half * cosine - table.height
     if q[1] <= on_table:
         raise ValueError(
-            f"table.height = {table.height:g} m is outside (-inf, {table.height + q[1] - on_table:g}) m: the bottle has "
-            "to be over the table at release"
+            f"table.height = {table.height:g} m is outside (-inf, {table.height + q[1] - on_table:g}) m: "
+            "the bottle has to be over the table at release"
         )
     none = np.empty((0, 7 + 2 * world.n))
     run = landing_core.land(q, s, w, dt, scenario.duration, True, world, 1.0, none)
     if run.code != landing_core.TOUCHED:
-        raise ValueError(
-            f"table.height = {table.height:g} m is not reached within duration = {scenario.duration:g} s"
-        )
+        raise ValueError(f"table.height = {table.height:g} m is not reached within duration = {scenario.duration:g} s")
     return Touch(
         scenario=scenario,
         theta=float(q[2]),

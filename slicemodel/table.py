@@ -34,8 +34,8 @@ OUTCOMES: Final = MappingProxyType(
 LAWS: Final = MappingProxyType(
     {
         "together": "bottle and water that touch at one instant share one impact (Newton)",
-        "in-turn": "the bottle strikes the table first, without its water; then the water strikes the bottle, which the "
-        "table holds",
+        "in-turn": "the bottle strikes the table first, without its water; then the water strikes the bottle, which "
+        "the table holds",
     }
 )
 """Laws of an impact on the table while water rests in the bottle."""

@@ -123,7 +123,7 @@ def by_energy(scenario, tilt, omega, speed, sideways):
     y = z * math.cos(tilt) - radius * math.sin(tilt)
     spin = (inertia * omega - mass * (x * speed + y * sideways)) / about_rim
     down = spin**2 + 2 * mass * G * (y - z) / about_rim
-    # The rim stays down while M (g - omega^2 y - M g x^2 / I) > 0, which is least at the touch or as the base comes down.
+    # The rim is pressed by M (g - omega^2 y - M g x^2 / I), least at the touch or as the base comes down.
     held = spin**2 * y < G * (1 - mass * x * x / about_rim) and down * z < G * (1 - mass * radius**2 / about_rim)
     if not held or -speed + omega * x >= 0.0:
         return None
