@@ -49,6 +49,18 @@ LARGEST_DRIFT: Final = 1e-2
 """Distance of a slice from the axis [L] beyond which the world is given up."""
 
 
+def enough_iterations(n_slices: int, mass_ratio: float, slices: str) -> int:
+    """Return the iterations of the engine's solver in which an impact on the table is found.
+
+    An impact has no impulses of the step before to start from. Where slices meet each other it has to pass up a stack
+    of them, of which the light bottle is one end: at N = 6, M_w / M_b = 21 and a corner hit of 3.3 m/s, omega after it
+    is -3.218 rad/s with 100 iterations and -3.0941 with 1000, and with the impulses in closed form.
+    """
+    if slices == "exclude":
+        return max(200, math.ceil(8 * n_slices * mass_ratio))
+    return max(120, math.ceil(mass_ratio * math.sqrt(n_slices)))
+
+
 def build(touch: Touch, table: Table, dt: float, law: str | None, slices: str) -> World:
     """Return the world at the touch, read back."""
     del law  # the engine has one
@@ -69,9 +81,7 @@ class World:
         self.sine, self.cosine = math.sin(touch.theta), math.cos(touch.theta)
         self.space = pymunk.Space()
         self.space.gravity = (0.0, -scenario.gravity)
-        self.space.iterations = max(
-            120, math.ceil(scenario.water_mass / scenario.bottle.mass * math.sqrt(scenario.n_slices))
-        )
+        self.space.iterations = enough_iterations(scenario.n_slices, scenario.water_mass / scenario.bottle.mass, slices)
         self.space.collision_slop, self.space.collision_bias, self.space.collision_persistence = SLOP, 1.0, 1
         self.space.damping = 1.0
         self.bodies: list[pymunk.Body] = []
