@@ -148,7 +148,9 @@ def test_the_set_up_is_read_back(engine):
 
 def test_a_world_that_is_not_the_one_meant_is_refused(monkeypatch):
     place = landing_pymunk.World._velocity
-    monkeypatch.setattr(landing_pymunk.World, "_velocity", lambda self, r, v: tuple(1.01 * x for x in place(self, r, v)))
+    monkeypatch.setattr(
+        landing_pymunk.World, "_velocity", lambda self, r, v: tuple(1.01 * x for x in place(self, r, v))
+    )
     with pytest.raises(engine_check.SetupError, match="velocity_y"):
         engine_check.land(flown(1), FLAT)
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 
 import ode_reference
 from ode_reference import rods
 from ode_reference.landing import path, world_of
+from ode_reference.landing_forms import Block, corner_ratio, critical_share, ends_upright, quarter_period
 from slicemodel import Bottle, Outcome, Scenario, ScenarioError, Table, Touch, touch
 from slicemodel.observables import static_toppling_angle
 
@@ -43,6 +43,26 @@ def block(scenario):
 
 
 # ---------------------------------------------------------------------- closed forms
+
+
+@pytest.mark.parametrize("filling", [0.2, 0.5, 1.0])
+def test_the_block_is_the_one_counted_here(filling):
+    scenario = replace(ICE, water_mass=filling)
+    one = Block.of(scenario)
+    counted = (one.mass, one.inertia, one.height, one.rho, one.about_rim)
+    assert counted == pytest.approx(block(scenario), rel=1e-12, abs=0)
+    assert one.toppling == pytest.approx(static_toppling_angle(scenario), rel=1e-12, abs=0)
+
+
+def test_a_uniform_block_rocks_as_housner_says():
+    """J = M (z^2 + R^2)/3: the ratio is 1 - 1.5 sin^2 alpha."""
+    one = Block(mass=2.0, inertia=2.0 * (0.3**2 + 0.1**2) / 3, height=0.3, radius=0.1, gravity=G)
+    assert corner_ratio(one) == pytest.approx(1 - 1.5 * math.sin(one.toppling) ** 2, rel=1e-12, abs=0)
+    # Nearly upright the fall is that of a linear pendulum upside down.
+    lean = 1e-3
+    slim = Block(mass=2.0, inertia=0.06, height=0.3, radius=0.3 * lean, gravity=G)
+    rate = math.sqrt(slim.saddle / slim.about_rim)
+    assert quarter_period(slim, 0.3 * lean) == pytest.approx(math.acosh(1 / 0.7) / rate, rel=1e-5, abs=0)
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.3, 0.7])
@@ -86,18 +106,11 @@ def test_a_gap_of_a_tenth_of_a_micrometre_is_no_contact(gap):
 def test_rocking_from_corner_to_corner(filling, ratio, period):
     """Ice released on a rim at 0.3 alpha falls through the quarter period and loses (1 - ratio) of its spin."""
     scenario = replace(ICE, water_mass=filling)
-    mass, inertia, z, rho, about_rim = block(scenario)
+    mass, _, z, _, about_rim = block(scenario)
     radius = scenario.bottle.radius
     alpha = math.atan2(radius, z)
     start = 0.3 * alpha
-    scale = 2 * mass * G * rho / about_rim
-
-    def slowness(u):  # theta = start - u^2 takes out the root at the start
-        fallen = math.cos(alpha - start) - math.cos(alpha - start + u * u)
-        return 2 * u / math.sqrt(scale * fallen) if u else 2 / math.sqrt(scale * math.sin(alpha - start))
-
-    exact = quad(slowness, 0.0, math.sqrt(start))[0]
-    closed = (inertia + mass * (z * z - radius**2)) / about_rim
+    exact, closed = quarter_period(Block.of(scenario), start), corner_ratio(Block.of(scenario))
     assert exact == pytest.approx(period, abs=1e-6)
     assert closed == pytest.approx(ratio, abs=5e-5)
     table = Table(height=0.0, restitution=0.0, friction=ROUGH)
@@ -112,29 +125,6 @@ def test_rocking_from_corner_to_corner(filling, ratio, period):
     assert abs(after / before - closed) < 1e-3 * closed + drift / abs(before)
 
 
-def by_energy(scenario, tilt, omega, speed, sideways):
-    """Whether ice that lands on a rim without slip or rebound ends upright; None outside the domain.
-
-    ``tilt`` < 0: it lands on the rim at u_t = +R and must turn counter-clockwise to stand up.
-    """
-    mass, inertia, z, rho, about_rim = block(scenario)
-    radius = scenario.bottle.radius
-    x = -z * math.sin(tilt) - radius * math.cos(tilt)
-    y = z * math.cos(tilt) - radius * math.sin(tilt)
-    spin = (inertia * omega - mass * (x * speed + y * sideways)) / about_rim
-    down = spin**2 + 2 * mass * G * (y - z) / about_rim
-    # The rim is pressed by M (g - omega^2 y - M g x^2 / I), least at the touch or as the base comes down.
-    held = spin**2 * y < G * (1 - mass * x * x / about_rim) and down * z < G * (1 - mass * radius**2 / about_rim)
-    if not held or -speed + omega * x >= 0.0:
-        return None
-    if spin < 0.0 and (x >= 0.0 or about_rim * spin**2 / 2 >= mass * G * (rho - y)):
-        return False
-    if x >= 0.0 and spin <= 0.0:
-        return False
-    ratio = (inertia + mass * (z * z - radius**2)) / about_rim
-    return about_rim * ratio**2 * down / 2 < mass * G * (rho - z)
-
-
 def test_ice_on_a_rim_ends_as_its_energy_says():
     random = np.random.default_rng(3)
     table = Table(height=0.0, restitution=0.0, friction=ROUGH)
@@ -143,7 +133,7 @@ def test_ice_on_a_rim_ends_as_its_energy_says():
         scenario = replace(ICE, water_mass=random.choice([0.3, 0.6]))
         tilt, speed = -random.uniform(0.02, 0.45), random.uniform(0.5, 3.0)
         sideways, omega = random.uniform(-0.5, 0.5), random.uniform(-10.0, 25.0)
-        upright = by_energy(scenario, tilt, omega, speed, sideways)
+        upright = ends_upright(Block.of(scenario), tilt, omega, (sideways, -speed))
         if upright is None:
             continue
         _, _, z, _, _ = block(scenario)
@@ -173,7 +163,8 @@ def test_one_slice_aloft_takes_the_bounce_at_its_critical_share():
     while high - low > 1e-9:
         middle = (low + high) / 2
         low, high = (middle, high) if rise(middle) > 0.0 else (low, middle)
-    assert low == pytest.approx(e_table / ((1 + e_table) * (1 + e_water)), abs=1e-6)
+    assert critical_share(e_table, e_water) == pytest.approx(0.153846, abs=1e-6)
+    assert low == pytest.approx(critical_share(e_table, e_water), abs=1e-6)
     assert rise(0.1) / speed == pytest.approx(e_table - 0.1 * (1 + e_table) * (1 + e_water), abs=1e-5)
 
 

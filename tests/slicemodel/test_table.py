@@ -120,7 +120,9 @@ def test_the_touch_is_where_a_corner_meets_the_table():
 
 def test_a_table_that_is_never_reached_is_refused():
     flight = slicemodel.solve(THROW)
-    with pytest.raises(ScenarioError, match=r"table.height = -5 m is not reached from above within the flight of 0.5 s"):
+    with pytest.raises(
+        ScenarioError, match=r"table.height = -5 m is not reached from above within the flight of 0.5 s"
+    ):
         touch(flight, Table(height=-5.0))
 
 
