@@ -15,7 +15,7 @@ MOST_SWEEPS = 5_000
 CONVERGED = 1e-11
 """Change of a velocity in a sweep below which the sweeps end [m/s]."""
 
-TOLERATED = 1e-4
+TOLERATED = 1e-3
 """The same after the last sweep: on two corners at once friction can be shared in many ways, and the sweeps
 creep towards one of them."""
 

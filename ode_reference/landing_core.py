@@ -52,7 +52,7 @@ STILL = 1e-11
 
 MOST_TRIALS = 60
 MOST_SWEEPS = 500
-CREEPING = 1e-4
+CREEPING = 1e-3
 """Change of a velocity in the last sweep that is tolerated [m/s]: two corners can share their friction in many ways."""
 
 MOST_POOLS = 100
