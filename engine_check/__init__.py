@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from engine_check.certificate import Certificate, certify
+    from engine_check.landing import LANDERS, land
     from engine_check.pymunk_settings import PymunkKnobs
     from engine_check.restitution import measure_restitution
     from engine_check.solver import DEFAULT_DT, ENGINES, SetupError, solve
@@ -16,10 +17,12 @@ if TYPE_CHECKING:
 __all__ = [
     "DEFAULT_DT",
     "ENGINES",
+    "LANDERS",
     "Certificate",
     "PymunkKnobs",
     "SetupError",
     "certify",
+    "land",
     "measure_restitution",
     "solve",
 ]
@@ -28,9 +31,11 @@ _HOMES = {
     "Certificate": "engine_check.certificate",
     "DEFAULT_DT": "engine_check.solver",
     "ENGINES": "engine_check.solver",
+    "LANDERS": "engine_check.landing",
     "PymunkKnobs": "engine_check.pymunk_settings",
     "SetupError": "engine_check.solver",
     "certify": "engine_check.certificate",
+    "land": "engine_check.landing",
     "measure_restitution": "engine_check.restitution",
     "solve": "engine_check.solver",
 }

@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ode_reference.combinations import model_of
     from ode_reference.impacts import LAWS
+    from ode_reference.landing import land
+    from ode_reference.landing_flight import fly
     from ode_reference.models import LADDER, MODELS
     from ode_reference.solver import solve, solve_batch
     from ode_reference.switches import Switches
     from ode_reference.witness import METHODS
 
-__all__ = ["LADDER", "LAWS", "METHODS", "MODELS", "Switches", "model_of", "solve", "solve_batch"]
+__all__ = ["LADDER", "LAWS", "METHODS", "MODELS", "Switches", "fly", "land", "model_of", "solve", "solve_batch"]
 
 _HOMES = {
     "LADDER": "ode_reference.models",
@@ -25,6 +27,8 @@ _HOMES = {
     "METHODS": "ode_reference.witness",
     "MODELS": "ode_reference.models",
     "Switches": "ode_reference.switches",
+    "fly": "ode_reference.landing_flight",
+    "land": "ode_reference.landing",
     "model_of": "ode_reference.combinations",
     "solve": "ode_reference.solver",
     "solve_batch": "ode_reference.solver",

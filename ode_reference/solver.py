@@ -20,6 +20,9 @@ from slicemodel.trajectory import FloatArray, Trajectory, output_times
 if TYPE_CHECKING:
     from ode_reference.flow.api import Batch
 
+COLUMN: Final = "column"
+"""The name among the models of water as one stretching column."""
+
 TAYLOR: Final = "taylor"
 """The name of the reduced flow among the methods."""
 
@@ -54,7 +57,8 @@ def solve(
     model : str or Switches
         A name in ``ode_reference.MODELS``, from "published-limit" (what the published program solves as its time
         step goes to zero) by way of "eq8" (Eq. 8 exactly as printed) to "free-flight"; or any ``Switches``, or
-        their name, such as "switches:110000".
+        their name, such as "switches:110000"; or "column", water as one stretching column that cannot overlap
+        (``ode_reference.column``), to which only rtol, atol and ``times`` apply.
     times : array, shape (P,), optional
         Increasing output times in [0, duration] [s]; 1000 uniform ones by default. They do not change the
         solution. At the time of an impact the state just before it is returned.
@@ -108,6 +112,10 @@ def solve(
     """
     if not isinstance(scenario, Scenario):
         raise ValueError(f"scenario = {scenario!r} is not a slicemodel.Scenario")
+    if model == COLUMN:
+        from ode_reference import column
+
+        return column.solve(scenario, rtol, atol, times)
     chosen = _model(model)
     known_name("impact_law", impact_law, LAWS)
     known_name("method", method, (TAYLOR, *INTEGRATORS))

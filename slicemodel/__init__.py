@@ -11,8 +11,10 @@ from slicemodel.scenario import Bottle, Scenario, ScenarioError
 
 if TYPE_CHECKING:
     from slicemodel.batch import Batch, solve_batch
+    from slicemodel.landing import touch
     from slicemodel.solver import solve
     from slicemodel.step_advice import required_steps
+    from slicemodel.table import Outcome, Table, Touch
     from slicemodel.trajectory import Impact, Impacts, Trajectory
 
 __all__ = [
@@ -20,12 +22,16 @@ __all__ = [
     "Bottle",
     "Impact",
     "Impacts",
+    "Outcome",
     "Scenario",
     "ScenarioError",
+    "Table",
+    "Touch",
     "Trajectory",
     "required_steps",
     "solve",
     "solve_batch",
+    "touch",
 ]
 
 _HOMES = {
@@ -35,7 +41,11 @@ _HOMES = {
     "Batch": "slicemodel.batch",
     "Impact": "slicemodel.trajectory",
     "Impacts": "slicemodel.trajectory",
+    "Outcome": "slicemodel.table",
+    "Table": "slicemodel.table",
+    "Touch": "slicemodel.table",
     "Trajectory": "slicemodel.trajectory",
+    "touch": "slicemodel.landing",
 }
 
 

@@ -34,7 +34,7 @@ def test_the_test_command_of_the_readme_is_the_one_ci_runs():
     assert "<!-- test command -->" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/theory.md", "docs/howto.md"])
+@pytest.mark.parametrize("page", ["README.md", "docs/theory.md", "docs/howto.md", "docs/landing.md"])
 def test_the_code_of_the_page_runs(page, capsys):
     text = (ROOT / page).read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)

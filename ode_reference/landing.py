@@ -1,0 +1,289 @@
+"""The landing verb of this room: one touch and one table in, one certified outcome out.
+
+The motion is that of ``landing_core``: events located, impulses by Newton's law. Where the outcome is certified is
+decided by energy (``slicemodel.table.Outcome``), and whether by a second run with half the step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from ode_reference.arguments import known_name, number_within
+from slicemodel.scenario import Scenario
+from slicemodel.table import ENERGY_RISE, LAWS, LONGEST_LANDING, Outcome, Table, Touch
+from slicemodel.trajectory import FloatArray
+
+if TYPE_CHECKING:
+    from ode_reference.landing_core import Landing, World
+
+DEFAULT_DT: Final = 2e-4
+"""Longest step [s]; half of it certifies."""
+
+SLICES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "exclude": "slices are rods of length h/N that meet each other",
+        "staggered": "each slice has two stops of its own, where the stacks on base and cap would hold it",
+        "overlap": "refused: slices that overlap all sink to the base, and the centre of mass at rest is wrong",
+    }
+)
+"""How slices keep the room they need."""
+
+IMMOBILE: Final = 1e-12
+"""Room in the bottle below which water cannot move [L]."""
+
+MISPLACED: Final = 1e-9
+"""How far a slice of a touch may lie beyond its stops [L]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Path:
+    """The motion of a landing.
+
+    Parameters
+    ----------
+    t : (P,) - from the touch [s]
+    centre, velocity : (P, 2) - of the middle of the tube, x from the touch and y over the table [m], [m/s]
+    theta : (P,) [rad], omega : (P,) [rad/s]
+    r, v : (P, N) - slices from the cap [m] and their velocities in the bottle [m/s]
+    energy : (P,) - over the table [J]
+    saddle : float - E_s [J]
+    """
+
+    t: FloatArray
+    centre: FloatArray
+    theta: FloatArray
+    velocity: FloatArray
+    omega: FloatArray
+    r: FloatArray
+    v: FloatArray
+    energy: FloatArray
+    saddle: float
+
+
+def land(
+    touch: Touch,
+    table: Table,
+    law: str | None = None,
+    slices: str = "exclude",
+    *,
+    dt: float = DEFAULT_DT,
+) -> Outcome:
+    """Land a bottle on a table, impact by impact, until its outcome is certain (derived in ``landing_core``).
+
+    Parameters
+    ----------
+    touch : Touch
+    table : Table
+    law : str, optional
+        "together" (the default) or "in-turn" (``slicemodel.table.LAWS``): who takes part in an impact on the table
+        while water rests in the bottle. Ice has no law: there is nothing inside that could come after.
+    slices : str
+        "exclude", rods that meet each other, the reference; or "staggered", which gives each slice two stops of its
+        own and costs less. Without effect on ice.
+    dt : float
+        Longest step [s], in [1e-6, 1e-3].
+
+    Returns
+    -------
+    Outcome
+        Certified if the energy falls below the saddle, no impact raises it by more than 1e-6 of the saddle and a
+        second run with half the step ends alike. Its numbers are those of the second run.
+
+    Raises
+    ------
+    ValueError
+        Naming the argument, its value and the admissible values: an unknown law, a law for ice, slices that overlap
+        here or that lie beyond their stops in the touch.
+
+    Accuracy
+    --------
+    Impacts are located to 1e-12 L; between them the midpoint rule has order 2 in ``dt``.
+    """
+    chosen = _law(touch.scenario, law)
+    dt = number_within("dt", dt, 1e-6, 1e-3, unit=" s")
+    world = world_of(touch, table, chosen, slices)
+    coarse, fine = (_run(touch, world, step) for step in (dt, dt / 2))
+    settings = {
+        "law": None if world.rigid else chosen,
+        "slices": None if world.rigid else slices,
+        "dt": dt / 2,
+        "height": table.height,
+        "restitution": table.restitution,
+        "friction": table.friction,
+    }
+    return _outcome(coarse, fine, settings)
+
+
+def _law(scenario: Scenario, law: str | None) -> str:
+    if law is None:
+        return "together"
+    known_name("law", law, LAWS)
+    if scenario.frozen:
+        raise ValueError(f"law = {law!r} has no meaning for ice (scenario.frozen): leave it out")
+    return law
+
+
+def world_of(touch: Touch, table: Table, law: str, slices: str) -> World:
+    """Return the constants of a landing, or raise ValueError for slices that are not where they may be."""
+    from ode_reference.landing_core import World
+
+    if known_name("slices", slices, SLICES) == "overlap":
+        raise ValueError(
+            "slices = 'overlap' is refused: overlapping slices at rest all sink to the base, which puts the centre of "
+            "mass too low (admissible: 'exclude', 'staggered')"
+        )
+    scenario = touch.scenario
+    bottle, n, rod = scenario.bottle, scenario.n_slices, scenario.slice_height
+    half = bottle.length / 2
+    rigid = scenario.frozen or bottle.length - n * rod <= IMMOBILE * bottle.length
+    # Counted from the base: i rods lie below slice i and n - 1 - i above it.
+    i = np.arange(n, dtype=np.float64)
+    high: FloatArray
+    low: FloatArray
+    high, low = half - (i + 0.5) * rod, -half + (n - i - 0.5) * rod
+    if not rigid:
+        _refuse_misplaced(touch, slices == "exclude", low + half, high + half)
+    rest = bottle.mass * half + scenario.slice_mass * float((half - high).sum())
+    rest /= scenario.total_mass
+    saddle = scenario.total_mass * scenario.gravity * math.hypot(bottle.radius, rest)
+    # On the cap water rests as it does on the base; ice stays where it is.
+    upside_down = bottle.length - rest if scenario.frozen else rest
+    return World(
+        n=n,
+        chain=slices == "exclude",
+        rigid=rigid,
+        in_turn=law == "in-turn",
+        half=half,
+        radius=bottle.radius,
+        tube=bottle.mass,
+        own=bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12),
+        m=scenario.slice_mass,
+        rub=scenario.drag / scenario.slice_mass,
+        gravity=scenario.gravity,
+        e_water=scenario.restitution,
+        e_table=table.restitution,
+        friction=table.friction,
+        rod=rod,
+        low=low,
+        high=high,
+        saddle=saddle,
+        upright=math.atan2(bottle.radius, rest),
+        cap=math.pi - math.atan2(bottle.radius, upside_down),
+    )
+
+
+def _refuse_misplaced(touch: Touch, chain: bool, low: FloatArray, high: FloatArray) -> None:
+    """Raise ValueError if a slice lies where no slice that keeps its room can be."""
+    length, rod, r = touch.scenario.bottle.length, touch.scenario.slice_height, touch.r
+    beyond = MISPLACED * length
+    for k in np.flatnonzero((r < low - beyond) | (r > high + beyond))[:1].tolist():
+        raise ValueError(
+            f"touch.r[{k}] = {r[k]:.9g} m is outside [{low[k]:.9g}, {high[k]:.9g}] m, the room of slice {k} among "
+            f"{len(r)} that do not overlap: take a flight in which they do not (model 'column', or rods)"
+        )
+    near = np.flatnonzero(r[:-1] - r[1:] < rod - beyond) if chain else np.empty(0, dtype=np.int64)
+    for k in near[:1].tolist():
+        raise ValueError(
+            f"touch.r[{k}] - touch.r[{k + 1}] = {r[k] - r[k + 1]:.9g} m is below the length {rod:.9g} m of a rod: take "
+            "a flight whose slices do not overlap, or slices = 'staggered'"
+        )
+
+
+def state_of(touch: Touch, world: World) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return (q, s, w) of ``landing_core``: the lowest corner on the table, the tube's middle over x = 0."""
+    sine, cosine = math.sin(touch.theta), math.cos(touch.theta)
+    height = world.half * abs(cosine) + world.radius * abs(sine)
+    q = np.array([0.0, height, touch.theta, *touch.velocity, touch.omega])
+    return q, touch.r - world.half, touch.v.copy()
+
+
+def _run(touch: Touch, world: World, dt: float) -> Landing:
+    from ode_reference import landing_core
+
+    q, s, w = state_of(touch, world)
+    none = np.empty((0, 7 + 2 * world.n))
+    run: Landing = landing_core.land(q, s, w, dt, LONGEST_LANDING, False, world, 1.0, none)
+    return run
+
+
+def path(
+    touch: Touch,
+    table: Table,
+    law: str | None = None,
+    slices: str = "exclude",
+    *,
+    dt: float = DEFAULT_DT,
+    every: float = 1e-3,
+    duration: float = 0.5,
+    drop: float = 0.0,
+) -> Path:
+    """Return the motion of a landing, past its certificate; parameters as for ``land``.
+
+    ``every`` is the time between two instants, at most ``dt`` late, ``duration`` the whole [s]; the touch may be lifted
+    by ``drop`` [m] first.
+    """
+    from ode_reference import landing_core
+
+    # Without a saddle nothing ends the run before its time.
+    world = world_of(touch, table, _law(touch.scenario, law), slices)
+    q, s, w = state_of(touch, world)
+    q[1] += drop
+    record = np.full((math.ceil(duration / every), 7 + 2 * world.n), np.nan)
+    landing_core.land(q, s, w, dt, duration, False, world._replace(saddle=-math.inf), every, record)
+    record = record[np.isfinite(record[:, 0])]
+    n = world.n
+    energy = [landing_core.energy(row[1:7], row[7 : 7 + n], row[7 + n :], world) for row in record]
+    return Path(
+        t=record[:, 0],
+        centre=record[:, 1:3],
+        theta=record[:, 3],
+        velocity=record[:, 4:6],
+        omega=record[:, 6],
+        r=record[:, 7 : 7 + n] + world.half,
+        v=record[:, 7 + n :],
+        energy=np.array(energy),
+        saddle=world.saddle,
+    )
+
+
+def _outcome(coarse: Landing, fine: Landing, settings: Mapping[str, object]) -> Outcome:
+    """Return the outcome of two runs from one touch, the second with half the step."""
+    from ode_reference.landing_core import BROKEN, CAP, LYING, TIMEOUT, UPRIGHT
+
+    names = {UPRIGHT: "upright", LYING: "lying", CAP: "cap"}
+    rise = max(coarse.rise, fine.rise)
+    reason = ""
+    if BROKEN in (coarse.code, fine.code):
+        reason = "the motion left the floating-point range or stopped passing time"
+    elif TIMEOUT in (coarse.code, fine.code):
+        reason = f"the energy stays above the saddle for {LONGEST_LANDING:g} s"
+    elif coarse.unresolved or fine.unresolved:
+        reason = f"{coarse.unresolved + fine.unresolved} impacts have no impulses that fit the law"
+    elif not rise <= ENERGY_RISE:
+        reason = f"an impact raises the energy by {rise:.2g} of the saddle, more than {ENERGY_RISE:g}"
+    elif coarse.code != fine.code:
+        reason = f"half the step ends {names[fine.code]} instead of {names[coarse.code]}"
+    return Outcome(
+        outcome="undecided" if reason else names[fine.code],
+        certified=None if reason else fine.time,
+        margin=None if reason else fine.margin,
+        bounces=fine.bounces,
+        slid=None if reason else fine.slid,
+        reason=reason,
+        solver="ode_reference",
+        method="landing",
+        settings=settings,
+        diagnostics={
+            "energy_rise": rise,
+            "steps": coarse.steps + fine.steps,
+            "impacts": fine.impacts,
+            "coarse": names.get(coarse.code, ""),
+            "fine": names.get(fine.code, ""),
+        },
+    )

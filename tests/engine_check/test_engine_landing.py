@@ -1,0 +1,181 @@
+"""Landings in the engines: closed forms, one touch for all programs, set-up read back, bad input."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import engine_check
+import ode_reference
+from engine_check import landing_compliant, landing_mujoco, landing_pymunk
+from engine_check.landing import Watch
+from ode_reference.landing import world_of
+from slicemodel import Scenario, Table, Touch
+
+WATER = Scenario(n_slices=6, drag=0.0, water_mass=0.4)
+ICE = replace(WATER, frozen=True)
+FLAT = Table(height=0.0)
+ENGINES = ("pymunk", "mujoco", "mujoco-compliant")
+BUILDERS = {
+    "pymunk": landing_pymunk.build,
+    "mujoco": landing_mujoco.build,
+    "mujoco-compliant": landing_compliant.build,
+}
+
+
+def at_rest(scenario, tilt=0.0, omega=0.0, velocity=(0.0, 0.0), r=None):
+    return Touch(
+        scenario=scenario,
+        theta=tilt,
+        omega=omega,
+        velocity=velocity,
+        r=scenario.initial_positions() if r is None else r,
+        v=np.zeros(scenario.n_slices),
+    )
+
+
+def rebound(engine, touch, law=None, slices="staggered", dt=1e-5):
+    """Speed of the middle upwards, over that downwards, 1 ms after a flat touch at 2 m/s."""
+    world = BUILDERS[engine](touch, FLAT, dt, law or "together", slices)
+    heights = []
+    for _ in range(round(3e-3 / dt)):
+        assert not world.advance()
+        heights.append(world.pose()[1])
+    late = round(1e-3 / dt)
+    # Gravity has taken its share by the middle of the last millisecond.
+    return ((heights[-1] - heights[-1 - late]) / (late * dt) + WATER.gravity * 2.5e-3) / 2.0
+
+
+# ---------------------------------------------------------------------- closed forms
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_ice_rebounds_with_the_restitution_of_the_table(engine):
+    up = rebound(engine, at_rest(ICE, velocity=(0.0, -2.0)))
+    # Soft contacts on two corners are calibrated by one on four, and give way for half a millisecond.
+    assert up == pytest.approx(0.3, abs=0.02 if engine == "mujoco-compliant" else 3e-3)
+
+
+@pytest.mark.parametrize(("engine", "slices"), [("pymunk", "exclude"), ("pymunk", "staggered"), ("mujoco", "exclude")])
+def test_water_that_rests_on_the_base_rebounds_with_it(engine, slices):
+    """Bottle and water strike together: the restitution between them plays no part."""
+    for restitution in (0.0, 0.9):
+        start = at_rest(replace(WATER, restitution=restitution), velocity=(0.0, -2.0))
+        assert rebound(engine, start, slices=slices) == pytest.approx(0.3, abs=7e-3)
+
+
+def test_in_turn_the_bottle_stays_down():
+    assert rebound("mujoco", at_rest(WATER, velocity=(0.0, -2.0)), "in-turn") == pytest.approx(0.0, abs=0.02)
+
+
+@pytest.mark.parametrize("contact", [True, False])
+def test_soft_contacts_are_calibrated_by_a_drop(contact):
+    textbook = -math.log(0.3) / math.hypot(math.pi, math.log(0.3))
+    zeta = landing_compliant.damping_ratio(0.3, 2e-5, contact)
+    assert landing_compliant._rebound(zeta, 2e-5, contact) == pytest.approx(0.3, abs=1e-6)
+    assert landing_compliant._rebound(textbook, 2e-5, contact) == pytest.approx(0.4, abs=0.02)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("scenario", [WATER, ICE])
+def test_the_watch_has_the_saddle_of_water_at_rest(engine, scenario):
+    """A bottle put down just inside the toppling angle stands, just outside it lies (Eq. 13a)."""
+    watch = Watch(scenario)
+    for tilt, expected in ((watch.lean - 2e-3, "upright"), (watch.lean + 2e-3, "lying")):
+        outcome = engine_check.land(at_rest(scenario, tilt), FLAT, engine)
+        assert outcome.outcome == expected
+        assert outcome.margin > 0
+
+
+def test_the_watch_and_the_reference_find_one_saddle():
+    for scenario in (WATER, ICE):
+        watch = Watch(scenario)
+        world = world_of(at_rest(scenario), FLAT, "together", "exclude")
+        assert watch.saddle == pytest.approx(world.saddle, rel=1e-12, abs=0)
+        assert (watch.lean, math.pi - watch.lean_on_cap) == pytest.approx((world.upright, world.cap), rel=1e-12, abs=0)
+
+
+# ---------------------------------------------------------------------- one touch, several programs
+
+
+def flown(seed, **changes):
+    """A touch of a bottle that comes down within 35 degrees of upright, from the event-driven flight."""
+    random = np.random.default_rng(seed)
+    while True:
+        scenario = Scenario(
+            **({"n_slices": 6, "water_mass": 0.4, "drag": 10 * 0.4 / 6, "duration": 2.0} | changes),
+            omega0=random.uniform(10, 45),
+            theta0=math.pi / 2 + 0.087 * random.standard_normal(),
+            launch_velocity=(0.5, 1.94 + 0.1 * random.standard_normal()),
+        )
+        start = ode_reference.fly(scenario, Table(height=random.uniform(-0.5, -0.3)))
+        if abs(start.tilt) < math.radians(35):
+            return start
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "mujoco"])
+@pytest.mark.parametrize("frozen", [False, True])
+def test_one_touch_has_one_outcome(engine, frozen):
+    outcomes = []
+    for seed in range(5):
+        start = flown(seed, frozen=frozen)
+        one = ode_reference.land(start, FLAT)
+        other = engine_check.land(start, FLAT, engine, slices="exclude")
+        assert one.decided
+        outcomes.append((one.outcome, other.outcome if other.decided else one.outcome))
+    assert all(one == other for one, other in outcomes)
+
+
+def test_ice_in_the_engine_lies_as_in_the_reference():
+    start = flown(3, frozen=True)
+    one, other = ode_reference.land(start, FLAT), engine_check.land(start, FLAT, "pymunk")
+    assert other.certified == pytest.approx(one.certified, abs=2e-2)
+    assert other.slid == pytest.approx(one.slid, abs=1e-2)
+
+
+# ---------------------------------------------------------------------- set-up and input
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_set_up_is_read_back(engine):
+    outcome = engine_check.land(flown(1), Table(height=0.0, friction=0.7), engine)
+    setup = outcome.diagnostics["setup"]
+    assert setup["total_mass"] == pytest.approx(0.428, rel=1e-12, abs=0)
+    if engine != "mujoco":
+        assert setup["friction"] == pytest.approx(0.7, rel=1e-12, abs=0)
+
+
+def test_a_world_that_is_not_the_one_meant_is_refused(monkeypatch):
+    place = landing_pymunk.World._velocity
+    monkeypatch.setattr(
+        landing_pymunk.World, "_velocity", lambda self, r, v: tuple(1.01 * x for x in place(self, r, v))
+    )
+    with pytest.raises(engine_check.SetupError, match="velocity_y"):
+        engine_check.land(flown(1), FLAT)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"engine": "bullet"}, "engine = 'bullet' is unknown"),
+        ({"dt": 0.01}, r"dt = 0.01 s is outside \(0, 0.001\) s"),
+        ({"dt": math.nan}, "dt = nan"),
+        ({"law": "in-turn"}, r"engine = 'pymunk' has no law = 'in-turn' \(it has: together\)"),
+        ({"law": "after"}, "law = 'after' is unknown"),
+        ({"engine": "mujoco-compliant", "law": "together"}, r"has no law = 'together' \(it has: none\)"),
+        ({"engine": "mujoco-compliant", "slices": "exclude"}, r"has no slices = 'exclude' \(it has: staggered\)"),
+        ({"slices": "overlap"}, "slices = 'overlap' is refused: .* centre of mass"),
+    ],
+)
+def test_bad_arguments_are_refused_by_name_and_range(changes, words):
+    with pytest.raises(ValueError, match=words):
+        engine_check.land(at_rest(WATER), FLAT, **changes)
+
+
+def test_ice_has_no_law_and_overlapping_slices_no_room():
+    with pytest.raises(ValueError, match="has no meaning for ice"):
+        engine_check.land(at_rest(ICE), FLAT, law="together")
+    for engine in ENGINES:
+        with pytest.raises(ValueError, match=r"touch\.r\[1\] = .* is outside"):
+            engine_check.land(at_rest(WATER, r=np.full(6, WATER.r_max)), FLAT, engine)

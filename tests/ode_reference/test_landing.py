@@ -1,0 +1,314 @@
+"""The event-driven landing against closed forms; symbols as in docs/landing.md."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import ode_reference
+from ode_reference import rods
+from ode_reference.landing import path, world_of
+from ode_reference.landing_forms import Block, corner_ratio, critical_share, ends_upright, quarter_period
+from slicemodel import Bottle, Outcome, Scenario, ScenarioError, Table, Touch, touch
+from slicemodel.observables import static_toppling_angle
+
+G = 9.81
+ICE = Scenario(n_slices=10, frozen=True)
+WATER = Scenario(n_slices=10, drag=0.0)
+ROUGH = 50.0
+"""Friction at which nothing slips."""
+
+
+def at_rest(scenario, tilt=0.0, omega=0.0, velocity=(0.0, 0.0), r=None, v=None):
+    n = scenario.n_slices
+    return Touch(
+        scenario=scenario,
+        theta=tilt,
+        omega=omega,
+        velocity=velocity,
+        r=scenario.initial_positions() if r is None else r,
+        v=np.zeros(n) if v is None else v,
+    )
+
+
+def block(scenario):
+    """M, J about C_M, z of C_M over the base, rho, I about a rim, with the water at rest on the base."""
+    bottle, m, r = scenario.bottle, scenario.slice_mass, scenario.initial_positions()
+    mass = scenario.total_mass
+    z = (bottle.mass * bottle.length / 2 + m * (bottle.length - r).sum()) / mass
+    own = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12 + (bottle.length / 2 - z) ** 2)
+    inertia = own + m * ((bottle.length - r - z) ** 2).sum()
+    return mass, inertia, z, math.hypot(z, bottle.radius), inertia + mass * (z * z + bottle.radius**2)
+
+
+# ---------------------------------------------------------------------- closed forms
+
+
+@pytest.mark.parametrize("filling", [0.2, 0.5, 1.0])
+def test_the_block_is_the_one_counted_here(filling):
+    scenario = replace(ICE, water_mass=filling)
+    one = Block.of(scenario)
+    counted = (one.mass, one.inertia, one.height, one.rho, one.about_rim)
+    assert counted == pytest.approx(block(scenario), rel=1e-12, abs=0)
+    assert one.toppling == pytest.approx(static_toppling_angle(scenario), rel=1e-12, abs=0)
+
+
+def test_a_uniform_block_rocks_as_housner_says():
+    """J = M (z^2 + R^2)/3: the ratio is 1 - 1.5 sin^2 alpha."""
+    one = Block(mass=2.0, inertia=2.0 * (0.3**2 + 0.1**2) / 3, height=0.3, radius=0.1, gravity=G)
+    assert corner_ratio(one) == pytest.approx(1 - 1.5 * math.sin(one.toppling) ** 2, rel=1e-12, abs=0)
+    # Nearly upright the fall is that of a linear pendulum upside down.
+    lean = 1e-3
+    slim = Block(mass=2.0, inertia=0.06, height=0.3, radius=0.3 * lean, gravity=G)
+    rate = math.sqrt(slim.saddle / slim.about_rim)
+    assert quarter_period(slim, 0.3 * lean) == pytest.approx(math.acosh(1 / 0.7) / rate, rel=1e-5, abs=0)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.3, 0.7])
+@pytest.mark.parametrize("scenario", [ICE, WATER, replace(WATER, restitution=0.9)])
+@pytest.mark.parametrize("slices", ["exclude", "staggered"])
+def test_a_flat_drop_rebounds_to_e_squared_of_its_height(scenario, restitution, slices):
+    """Water that rests on the base counts, and its own restitution does not, if both strike together."""
+    run = path(at_rest(scenario), Table(height=0.0, restitution=restitution), slices=slices, drop=0.05, duration=0.25)
+    height = run.centre[:, 1] - scenario.bottle.length / 2
+    down = math.sqrt(2 * 0.05 / G)
+    assert height[run.t > down + 2e-3].max() / 0.05 == pytest.approx(restitution**2, abs=1e-3)
+
+
+def test_in_turn_the_bottle_stays_down_and_the_water_leaps():
+    """The water meets a bottle that rises at e_t v and throws it back on the table: it leaves at e (1 + e_t) v."""
+    scenario = replace(WATER, water_mass=0.3)
+    run = path(at_rest(scenario), Table(height=0.0), "in-turn", drop=0.05, duration=0.2)
+    after = run.t > math.sqrt(2 * 0.05 / G) + 1e-3
+    assert (run.centre[after, 1] - scenario.bottle.length / 2).max() < 1e-4
+    leap = scenario.initial_positions()[0] - run.r[after, 0].min()
+    assert leap / 0.05 == pytest.approx((0.5 * 1.3) ** 2, abs=3e-3)
+
+
+@pytest.mark.parametrize("gap", [1e-7, -1e-7])
+def test_a_gap_of_a_tenth_of_a_micrometre_is_no_contact(gap):
+    """Water that floats over the base strikes after the bottle; water in the base is refused."""
+    r = WATER.initial_positions() - gap
+    if gap < 0:
+        with pytest.raises(ValueError, match=r"touch\.r\[0\]"):
+            ode_reference.land(at_rest(WATER, r=r), Table(height=0.0))
+        return
+    run = path(at_rest(WATER, r=r), Table(height=0.0), drop=0.05, duration=0.2)
+    after = run.t > math.sqrt(2 * 0.05 / G) + 1e-3
+    rebound = (run.centre[after, 1] - WATER.bottle.length / 2).max() / 0.05
+    assert abs(rebound - 0.09) > 0.02
+
+
+@pytest.mark.parametrize(
+    ("filling", "ratio", "period"), [(0.2, 0.4504, 0.093300), (0.5, 0.6522, 0.095822), (1.0, 0.8844, 0.125157)]
+)
+def test_rocking_from_corner_to_corner(filling, ratio, period):
+    """Ice released on a rim at 0.3 alpha falls through the quarter period and loses (1 - ratio) of its spin."""
+    scenario = replace(ICE, water_mass=filling)
+    mass, _, z, _, about_rim = block(scenario)
+    radius = scenario.bottle.radius
+    alpha = math.atan2(radius, z)
+    start = 0.3 * alpha
+    exact, closed = quarter_period(Block.of(scenario), start), corner_ratio(Block.of(scenario))
+    assert exact == pytest.approx(period, abs=1e-6)
+    assert closed == pytest.approx(ratio, abs=5e-5)
+    table = Table(height=0.0, restitution=0.0, friction=ROUGH)
+    run = path(at_rest(scenario, start), table, dt=1e-4, every=1e-5, duration=period + 5e-3)
+    k = int(np.flatnonzero(run.theta <= 0.0)[0])
+    down = float(np.interp(0.0, -run.theta[k - 2 : k + 2], run.t[k - 2 : k + 2]))
+    assert down == pytest.approx(exact, abs=1e-4)
+    before = run.omega[run.t < exact - 1.5e-4][-1]
+    after = run.omega[run.t > exact + 1.5e-4][0]
+    # The spin still changes by (M g R / I) dt within the 0.3 ms between the two readings.
+    drift = mass * G * radius / about_rim * 3e-4
+    assert abs(after / before - closed) < 1e-3 * closed + drift / abs(before)
+
+
+def test_ice_on_a_rim_ends_as_its_energy_says():
+    random = np.random.default_rng(3)
+    table = Table(height=0.0, restitution=0.0, friction=ROUGH)
+    judged = []
+    while len(judged) < 40:
+        scenario = replace(ICE, water_mass=random.choice([0.3, 0.6]))
+        tilt, speed = -random.uniform(0.02, 0.45), random.uniform(0.5, 3.0)
+        sideways, omega = random.uniform(-0.5, 0.5), random.uniform(-10.0, 25.0)
+        upright = ends_upright(Block.of(scenario), tilt, omega, (sideways, -speed))
+        if upright is None:
+            continue
+        _, _, z, _, _ = block(scenario)
+        arm = scenario.bottle.length / 2 - z
+        velocity = (sideways - omega * arm * math.cos(tilt), -speed - omega * arm * math.sin(tilt))
+        outcome = ode_reference.land(at_rest(scenario, tilt, omega, velocity), table)
+        assert outcome.decided
+        judged.append((upright, outcome.outcome == "upright"))
+    assert {upright for upright, _ in judged} == {True, False}
+    assert all(a == b for a, b in judged)
+
+
+def test_one_slice_aloft_takes_the_bounce_at_its_critical_share():
+    """phi* = e_t / ((1 + e_t)(1 + e)): the bottle bounces, the slice strikes it, and the bottle stands still."""
+    e_table, e_water, speed = 0.3, 0.5, 2.0
+
+    def rise(share):
+        bottle = Bottle(mass=0.5 * (1 - share))
+        scenario = Scenario(bottle=bottle, water_mass=0.5 * share, n_slices=1, drag=0.0, restitution=e_water)
+        aloft = scenario.initial_positions() - 1e-8
+        fall = at_rest(scenario, velocity=(0.0, -speed), r=aloft)
+        # It strikes after 1e-8 m / (1.3 * 2 m/s) = 3.8 ns, while the bottle is 2.3 nm over the table.
+        run = path(fall, Table(height=0.0, restitution=e_table), every=1e-9, dt=1e-9, duration=7e-9)
+        return run.velocity[-1, 1]
+
+    low, high = 0.1, 0.2
+    while high - low > 1e-9:
+        middle = (low + high) / 2
+        low, high = (middle, high) if rise(middle) > 0.0 else (low, middle)
+    assert critical_share(e_table, e_water) == pytest.approx(0.153846, abs=1e-6)
+    assert low == pytest.approx(critical_share(e_table, e_water), abs=1e-6)
+    assert rise(0.1) / speed == pytest.approx(e_table - 0.1 * (1 + e_table) * (1 + e_water), abs=1e-5)
+
+
+@pytest.mark.parametrize("scenario", [ICE, WATER])
+@pytest.mark.parametrize("filling", [0.1, 0.4, 0.9])
+@pytest.mark.parametrize("turns", [0, 1, -2])
+def test_released_at_rest_it_falls_to_the_side_of_the_toppling_angle(scenario, filling, turns):
+    """Eq. 13a, for a bottle put down on its rim."""
+    scenario = replace(scenario, water_mass=filling)
+    critical = static_toppling_angle(scenario)
+    for tilt, expected in ((critical - 1e-3, "upright"), (critical + 1e-3, "lying")):
+        for sign in (1, -1):
+            outcome = ode_reference.land(at_rest(scenario, sign * tilt + turns * math.tau), Table(height=0.0))
+            assert (outcome.outcome, outcome.bounces) == (expected, 0)
+
+
+def test_it_slides_until_friction_has_taken_its_speed():
+    """Down at v^2 / (2 mu g), flat and without turning over; a wrong sign would drive it."""
+    scenario = replace(ICE, water_mass=0.2)
+    run = path(at_rest(scenario, velocity=(0.5, 0.0)), Table(height=0.0, friction=0.2), duration=0.6)
+    assert run.centre[-1, 0] == pytest.approx(0.5**2 / (2 * 0.2 * G), rel=2e-3, abs=0)
+    assert np.all(np.diff(run.energy) < 1e-9)
+
+
+# ---------------------------------------------------------------------- the motion
+
+
+@pytest.mark.parametrize("n", [1, 3, 6])
+def test_its_flight_is_that_of_the_rods(n):
+    """Over a table out of reach the landing's equations are another program for what ``rods`` solves."""
+    scenario = Scenario(n_slices=n, water_mass=0.4, drag=0.1, restitution=0.5, duration=0.12)
+    flight = rods.solve(scenario, times=[0.12])
+    axis = np.array([math.sin(scenario.theta0), -math.cos(scenario.theta0)])
+    arm = scenario.bottle.length / 2 - flight.scenario.bottle.length + block(scenario)[2]
+    across = arm * scenario.omega0 * np.array([-axis[1], axis[0]])
+    start = at_rest(scenario, scenario.theta0, scenario.omega0, tuple(across))
+    run = path(start, Table(height=0.0), drop=5.0, dt=5e-5, every=0.12 - 1e-12, duration=0.12 + 1e-4)
+    assert run.t[-1] == pytest.approx(0.12, abs=6e-5)
+    assert run.omega[-1] == pytest.approx(flight.omega[-1], abs=2e-2)
+    np.testing.assert_allclose(run.r[-1], flight.r[-1], atol=3e-4)
+
+
+@pytest.mark.parametrize("law", ["together", "in-turn"])
+@pytest.mark.parametrize("slices", ["exclude", "staggered"])
+def test_the_energy_never_rises(law, slices):
+    scenario = replace(WATER, water_mass=0.3, drag=0.2)
+    start = at_rest(scenario, 0.3, 9.0, (0.4, -2.0))
+    run = path(start, Table(height=0.0), law, slices, duration=0.4)
+    assert np.diff(run.energy).max() < 1e-5 * run.saddle
+    assert run.energy[-1] < run.saddle < run.energy[0]
+
+
+def test_the_saddle_is_that_of_water_at_rest_not_of_the_touch():
+    scenario = replace(WATER, water_mass=0.3)
+    spread = scenario.bottle.length - (np.arange(10) + 0.5) / 10 * scenario.bottle.length
+    low, high = (
+        world_of(at_rest(scenario, r=r), Table(height=0.0), "together", "exclude")
+        for r in (scenario.initial_positions(), spread)
+    )
+    assert low.saddle == high.saddle
+    mass, _, _, rho, _ = block(scenario)
+    assert low.saddle == pytest.approx(mass * G * rho, rel=1e-12, abs=0)
+
+
+def flown(seed, **changes):
+    """Touches of scattered throws of a column, which both kinds of slices can land."""
+    random = np.random.default_rng(seed)
+    throw = Scenario(**({"n_slices": 10, "water_mass": 0.4, "drag": 0.2, "duration": 1.0} | changes))
+    throw = replace(
+        throw,
+        omega0=random.uniform(15.0, 30.0),
+        theta0=math.pi / 2 + 0.1 * random.standard_normal(),
+        launch_velocity=(0.5, 1.94 + 0.1 * random.standard_normal()),
+    )
+    table = Table(height=random.uniform(-0.6, -0.3))
+    return touch(ode_reference.solve(throw, model="column"), table), table
+
+
+@pytest.mark.parametrize("slices", ["exclude", "staggered"])
+def test_a_full_bottle_lands_like_ice(slices):
+    for seed in range(15):
+        full, table = flown(seed, water_mass=1.0)
+        ice = replace(full, scenario=replace(full.scenario, frozen=True), v=np.zeros(10))
+        one, other = ode_reference.land(full, table, slices=slices), ode_reference.land(ice, table)
+        assert one.decided
+        assert (one.outcome, one.certified, one.margin) == (other.outcome, other.certified, other.margin)
+
+
+@pytest.mark.parametrize("law", ["together", "in-turn"])
+def test_outcomes_are_certain_and_the_same_at_a_quarter_of_the_step(law):
+    for seed in range(8):
+        start, table = flown(seed)
+        one = ode_reference.land(start, table, law)
+        other = ode_reference.land(start, table, law, dt=5e-5)
+        assert one.decided
+        assert one.outcome == other.outcome
+        assert one.diagnostics["energy_rise"] < 1e-6
+        assert one.margin > 0
+
+
+def test_a_mirrored_throw_lands_alike():
+    start, table = flown(3)
+    vx, vy = start.velocity
+    mirrored = replace(start, theta=-start.theta, omega=-start.omega, velocity=(-vx, vy))
+    one, other = ode_reference.land(start, table), ode_reference.land(mirrored, table)
+    assert one.outcome == other.outcome
+    assert one.certified == pytest.approx(other.certified, abs=1e-3)
+
+
+# ---------------------------------------------------------------------- bad input
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"law": "after"}, "law = 'after' is unknown"),
+        ({"slices": "overlap"}, "slices = 'overlap' is refused: .* centre of mass"),
+        ({"slices": "rods"}, "slices = 'rods' is unknown"),
+        ({"dt": 0.1}, r"dt = 0.1 s is outside \[1e-06, 0.001\] s"),
+        ({"dt": math.nan}, "dt = nan"),
+    ],
+)
+def test_bad_arguments_are_refused_by_name_and_range(changes, words):
+    with pytest.raises(ValueError, match=words):
+        ode_reference.land(at_rest(WATER), Table(height=0.0), **changes)
+
+
+def test_ice_has_no_law():
+    with pytest.raises(ValueError, match="law = 'together' has no meaning for ice"):
+        ode_reference.land(at_rest(ICE), Table(height=0.0), law="together")
+
+
+def test_overlapping_slices_are_refused_by_their_place():
+    sunk = np.full(10, WATER.r_max)
+    with pytest.raises(ValueError, match=r"touch\.r\[1\] = 0\.273 m is outside \[0\.119, 0\.259\] m"):
+        ode_reference.land(at_rest(WATER, r=sunk), Table(height=0.0))
+    close = WATER.initial_positions()
+    close[5:] -= 0.05
+    close[6] += 0.005
+    with pytest.raises(ValueError, match=r"touch\.r\[5\] - touch\.r\[6\]"):
+        ode_reference.land(at_rest(WATER, r=close), Table(height=0.0))
+    assert isinstance(ode_reference.land(at_rest(WATER, r=close), Table(height=0.0), slices="staggered"), Outcome)
+
+
+def test_nothing_lands_without_gravity():
+    with pytest.raises(ScenarioError, match=r"touch\.scenario\.gravity"):
+        at_rest(replace(WATER, gravity=0.0))
