@@ -256,7 +256,8 @@ def test_a_batch_equals_single_runs_to_the_last_digit(model, law):
 
 
 def test_a_batch_keeps_no_slices_unless_asked_and_marks_what_was_not_reached():
-    many = [HALF, replace(HALF, omega0=1e160), replace(HALF, duration=0.7)]
+    many = [HALF, replace(HALF), replace(HALF, duration=0.7)]
+    object.__setattr__(many[1], "omega0", 1e160)  # no scenario admits it
     batch = solve_batch(many, "eq8", [0.1, 0.5])
     assert batch.t.shape == batch.theta.shape == batch.omega.shape == (3, 2)
     assert batch.status == ("ok", "overflow", "ok")
