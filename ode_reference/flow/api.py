@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import logging
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache
-from hashlib import sha256
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -18,11 +14,9 @@ from numpy.typing import NDArray
 from ode_reference.flow import layout
 from ode_reference.flow.layout import ESCAPED, INERTIA, OVERFLOW, STALLED, WRONSKIAN
 from ode_reference.switches import Switches
+from slicemodel.observables import grazes, opposite_hits
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray, Impacts, Trajectory
-
-OPPOSITE: Final = 1e-9
-"""Time between strikes on opposite ends below which they may be one instant [s]."""
 
 _STATUSES: Final = {OVERFLOW: "overflow", STALLED: "stalled", WRONSKIAN: "diverged", INERTIA: "diverged"}
 
@@ -64,34 +58,6 @@ class Flown:
         return "ok" if self.now.status == layout.OK else _STATUSES.get(int(self.now.status), "diverged")
 
 
-def stamp() -> str:
-    """Return a hash of the sources of this folder.
-
-    numba's cache looks at the file of the function that is called alone. The loop is compiled as a closure over this
-    hash, which is part of the key under which numba keeps it: a change in any file compiles anew.
-    """
-    found = sha256()
-    for file in sorted(Path(__file__).parent.glob("*.py")):
-        found.update(file.name.encode() + file.read_bytes())
-    return found.hexdigest()
-
-
-@cache
-def compiled_loop() -> Callable[..., FloatArray]:
-    """Return the loop, compiled on its first call and kept on disk; without a writable place, in memory only."""
-    import numba
-
-    from ode_reference.flow.loop import under
-
-    options: dict[str, Any] = {"error_model": "numpy", "nogil": True}
-    try:
-        made: Callable[..., FloatArray] = numba.njit(cache=True, **options)(under(stamp()))
-    except RuntimeError as error:
-        logging.getLogger(__name__).warning("compiling in memory, once per process: %s", error)
-        made = numba.njit(**options)(under(stamp()))
-    return made
-
-
 def fly(scenario: Scenario, moments: FloatArray, ask: Ask) -> Flown:
     """Fly one scenario; ``moments`` are its output times, shape (P,) [s]."""
     points, n = len(moments), scenario.n_slices
@@ -104,7 +70,8 @@ def fly(scenario: Scenario, moments: FloatArray, ask: Ask) -> Flown:
     if frozen:
         impacts = _hold(record, y, moments, rows, r, v)
     else:
-        loop = compiled_loop()
+        from ode_reference.flow.loop import fly as loop
+
         # With NUMBA_DISABLE_JIT the fields of the record are attributes of a recarray alone.
         given = record if hasattr(loop, "signatures") else record.view(np.recarray)
         impacts = loop(given, *layout.points_at(y), moments, rows, r, v)
@@ -181,29 +148,6 @@ def diagnostics(flown: Flown, impacts: Impacts) -> dict[str, Any]:
     return found
 
 
-def grazes(impacts: Impacts, rest_speed: float) -> int:
-    """Return how many contacts were slower than the rest speed by slices that had left their last one twice as fast.
-
-    Such a contact might as well have been missed, and its time is uncertain as 1 / speed: where there is one, omega(t)
-    depends on the last digits. A rebound that comes back at the speed it left with is none.
-    """
-    order = np.lexsort((impacts.time, impacts.slice))
-    slices, before, after = impacts.slice[order], impacts.speed_before[order], impacts.speed_after[order]
-    same = slices[1:] == slices[:-1]
-    left = np.concatenate([[np.inf], np.where(same, after[:-1], np.inf)])[: len(before)]
-    return int(np.count_nonzero((before < rest_speed) & (left > 2 * rest_speed)))
-
-
-def opposite_hits(impacts: Impacts) -> int:
-    """Return how many pairs of successive impacts struck opposite ends within 1e-9 s, or at one instant.
-
-    Whether such a pair is one instant or two decides, with recoil, what follows: the impact laws of one instant and of
-    two in turn differ.
-    """
-    near = np.diff(impacts.time) <= OPPOSITE
-    return int(np.count_nonzero(near & (impacts.end[1:] != impacts.end[:-1])))
-
-
 def message(flown: Flown) -> str:
     """Return why a flight stopped, where and when; nothing for one that is complete."""
     now, ask, scenario = flown.now, flown.ask, flown.scenario
@@ -261,7 +205,6 @@ def fly_all(throws: Sequence[Scenario], moments: FloatArray, ask: Ask) -> Batch:
     workers = min(
         len(throws), len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     )
-    compiled_loop()
 
     def one(k: int) -> Flown:
         # NumPy's switch for warnings belongs to a thread.

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from ode_reference.flow.compiled import compiled
 from ode_reference.flow.contacts import meet, touch
 from ode_reference.flow.layout import HIT, NEAR, OVERFLOW, PLACE, SIDE, SPEED, STALLED, STILL, IntArray
 from ode_reference.flow.ledger import book_step, energy_of
 from ode_reference.flow.points import inertia_of, rebase, set_scales
 from ode_reference.flow.search import find, flock_is_clear, gather, guessed_step, sum_rests
 from ode_reference.flow.series import MOST, ROWS, THETA, A, B, Z, advance, expand, slope, value
+from slicemodel.compiled import inner, kept_on_disk
 from slicemodel.trajectory import FloatArray
 
 TURN = 0.2
@@ -23,26 +22,7 @@ LEAST_ADVANCE = 1e-7
 """Of the duration: what time must advance by in as many steps as ``watch`` says."""
 
 
-def under(key: str) -> Callable[..., FloatArray]:
-    """Return ``fly`` as a closure over ``key``: numba makes that part of the name under which it keeps the loop."""
-
-    def flight(
-        flight: Any,
-        points: FloatArray,
-        marks: IntArray,
-        moments: FloatArray,
-        rows: FloatArray,
-        r: FloatArray,
-        v: FloatArray,
-    ) -> FloatArray:
-        if len(key) == 0:
-            return rows
-        return fly(flight, points, marks, moments, rows, r, v)
-
-    return flight
-
-
-@compiled
+@kept_on_disk()
 def fly(
     flight: Any,
     points: FloatArray,
@@ -86,7 +66,7 @@ def fly(
     return impacts
 
 
-@compiled
+@inner
 def release_all(now: Any, points: FloatArray, marks: IntArray) -> None:
     """Take the slices as they are at release; who touches an end then is in contact, whatever its speed."""
     now.span, now.stale = 1e-3 * now.duration, 1
@@ -98,7 +78,7 @@ def release_all(now: Any, points: FloatArray, marks: IntArray) -> None:
     now.event = int(now.hits > 0)
 
 
-@compiled
+@inner
 def with_room(impacts: FloatArray, rows: int) -> FloatArray:
     """Return the list of impacts with room for so many."""
     if rows <= len(impacts):
@@ -110,7 +90,7 @@ def with_room(impacts: FloatArray, rows: int) -> FloatArray:
     return longer
 
 
-@compiled
+@inner
 def passes(now: Any) -> bool:
     """Count one more step; note the stall, and return False, if time has ceased to pass."""
     now.steps += 1
@@ -122,7 +102,7 @@ def passes(now: Any) -> bool:
     return True
 
 
-@compiled
+@inner
 def new_base(now: Any, points: FloatArray, marks: IntArray) -> None:
     """Start the map here and choose for how long, and so which, slices are watched.
 
@@ -139,7 +119,7 @@ def new_base(now: Any, points: FloatArray, marks: IntArray) -> None:
     now.since, now.stale, now.fresh = now.instants, 0, 1
 
 
-@compiled
+@inner
 def smooth_piece(
     now: Any,
     points: FloatArray,
@@ -185,7 +165,7 @@ def smooth_piece(
         now.event = 1
 
 
-@compiled
+@inner
 def record(
     now: Any,
     table: FloatArray,
