@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any, Final
 
 import numpy as np
@@ -71,6 +72,8 @@ WORKS: Final = {
 }
 """What changes the energy, and where the record of a flight keeps it."""
 
+FIELDS: Final = RECORD.names or ()
+
 IntArray = NDArray[np.int64]
 
 PLACE, SPEED, END, APPROACH, AFTER, CORNER = range(6)
@@ -88,13 +91,22 @@ def points_at(y: FloatArray) -> tuple[FloatArray, IntArray]:
     return points, np.zeros((6, len(y)), dtype=np.int64)
 
 
+def pack(now: SimpleNamespace) -> NDArray[Any]:
+    """Return the numbers of a flight as the record that the compiled loop takes, shape (1,)."""
+    return np.array([tuple(map(vars(now).__getitem__, FIELDS))], dtype=RECORD)
+
+
+def unpack(record: NDArray[Any]) -> SimpleNamespace:
+    """Return the numbers of a record as attributes: Python reads those many times faster than its fields."""
+    return SimpleNamespace(**dict(zip(FIELDS, record[0].item(), strict=True)))
+
+
 def prepare(
     scenario: Scenario, switches: Switches, rest_speed: float, *, sequential: bool, ledger: bool
-) -> tuple[NDArray[Any], FloatArray]:
-    """Return the record of a flight at its release, shape (1,), and the places y of its slices, shape (N,) [m]."""
+) -> tuple[SimpleNamespace, FloatArray]:
+    """Return the numbers of a flight at its release, and the places y of its slices, shape (N,) [m]."""
     throw, n = Throw.of(scenario), scenario.n_slices
-    flight: NDArray[Any] = np.zeros(1, dtype=RECORD)
-    now = flight.view(np.recarray)[0]
+    now = SimpleNamespace(**dict.fromkeys(FIELDS, 0))
     gamma = throw.drag_rate / 2
     now.slice_mass, now.bottle_mass, now.total_mass = throw.slice_mass, throw.bottle_mass, throw.total_mass
     now.bottle_inertia = throw.bottle_inertia
@@ -117,7 +129,7 @@ def prepare(
     inertia = now.body_inertia + now.slice_mass * now.U + now.reduced_mass * now.y_mean**2
     now.momentum = inertia * scenario.omega0
     now.step_limit, now.watch = STEP_LIMIT, WATCH
-    return flight, y
+    return now, y
 
 
 def set_body(now: Any) -> None:
