@@ -92,18 +92,18 @@ def fly(scenario: Scenario, moments: FloatArray, ask: Ask) -> Flown:
     now, y = layout.prepare(
         scenario, ask.switches, ask.rest_speed, sequential=ask.impact_law == "sequential", ledger=ask.energy
     )
-    rows = np.empty((3, points))
-    r, v = (np.empty((points if ask.states else 0, n)) for _ in range(2))
+    out = layout.Output(moments, np.empty((3, points)), *(np.empty((points * ask.states, n)) for _ in range(2)))
+    rows, r, v = out.rows, out.r, out.v
     frozen = scenario.frozen or 2 * (scenario.r_max - scenario.bottle.length / 2) <= layout.TOLERANCE
     if frozen:
-        impacts = _hold(now, y, moments, rows, r, v)
+        impacts = _hold(now, y, out)
     record = layout.pack(now)
     if not frozen:
         from ode_reference.flow.loop import fly as loop
 
         # With NUMBA_DISABLE_JIT the fields of the record are attributes of a recarray alone.
         given = record if hasattr(loop, "signatures") else record.view(np.recarray)
-        impacts = loop(given, *layout.points_at(y), moments, rows, r, v)
+        impacts = loop(given, *layout.points_at(y), out)
     reached = int(record["recorded"][0])
     impacts = impacts[: int(record["impacts"][0])]
     if ask.states:
@@ -114,10 +114,9 @@ def fly(scenario: Scenario, moments: FloatArray, ask: Ask) -> Flown:
     return Flown(scenario, ask, moments[:reached], rows[:, :reached], r[:reached], v[:reached], impacts, record, frozen)
 
 
-def _hold(
-    now: SimpleNamespace, y: FloatArray, moments: FloatArray, rows: FloatArray, r: FloatArray, v: FloatArray
-) -> FloatArray:
+def _hold(now: SimpleNamespace, y: FloatArray, out: layout.Output) -> FloatArray:
     """Write the flight of a bottle in which nothing moves: theta is linear; return its impacts, none."""
+    moments, rows, r, v = out
     inertia = now.body_inertia + now.slice_mass * now.U + now.reduced_mass * now.y_mean**2
     omega = now.momentum / inertia
     rows[0], rows[1], rows[2] = now.theta + omega * moments, inertia, now.slice_mass * y.sum() / now.total_mass

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,6 +82,22 @@ PLACE, SPEED, END, APPROACH, AFTER, CORNER = range(6)
 SIDE, NEAR, WATCHED, STILL, HIT, RANK = range(6)
 """Rows of ``marks``: the end a slice rests on, or 0; the list of watched slices, and who is on it; the end on which a
 free slice stands still; the list of slices that strike at one instant."""
+
+
+class Output(NamedTuple):
+    """What a flight writes into: states at its output times, up to the last that it reaches.
+
+    Parameters
+    ----------
+    moments : array, shape (P,) - output times [s]
+    rows : array, shape (3, P) - theta, J and y_CM
+    r, v : array, shape (P, N) - y, infinite at rest, and y' [m], [m/s]; of shape (0, N) if they are not asked for
+    """
+
+    moments: FloatArray
+    rows: FloatArray
+    r: FloatArray
+    v: FloatArray
 
 
 def points_at(y: FloatArray) -> tuple[FloatArray, IntArray]:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ode_reference.flow.contacts import meet, touch
-from ode_reference.flow.layout import HIT, NEAR, OVERFLOW, PLACE, SIDE, SPEED, STALLED, STILL, IntArray
+from ode_reference.flow.layout import HIT, NEAR, OVERFLOW, PLACE, SIDE, SPEED, STALLED, STILL, IntArray, Output
 from ode_reference.flow.ledger import book_step, energy_of
 from ode_reference.flow.points import inertia_of, rebase, set_scales
 from ode_reference.flow.search import find, flock_is_clear, gather, guessed_step, sum_rests
@@ -23,24 +23,14 @@ LEAST_ADVANCE = 1e-7
 
 
 @kept_on_disk()
-def fly(
-    flight: Any,
-    points: FloatArray,
-    marks: IntArray,
-    moments: FloatArray,
-    rows: FloatArray,
-    r: FloatArray,
-    v: FloatArray,
-) -> FloatArray:
+def fly(flight: Any, points: FloatArray, marks: IntArray, out: Output) -> FloatArray:
     """Advance a flight to its duration, or to where it must stop; return its impacts, more rows than there are.
 
     Parameters
     ----------
     flight : record, shape (1,) - as ``layout.prepare`` makes it
     points, marks : arrays, shape (6, N) - as ``layout.points_at`` makes them
-    moments : array, shape (P,) - output times [s]
-    rows : array, shape (3, P) - receives theta, J and y_CM
-    r, v : array, shape (P, N) - receive y, infinite at rest, and y' [m], [m/s]; of shape (0, N) nothing
+    out : Output
     """
     now = flight[0]
     impacts, table = np.empty((64, 5)), np.zeros((ROWS + 1, MOST + 1))
@@ -57,7 +47,7 @@ def fly(
         if now.duration - now.t <= 4.0 * 2.3e-16 * now.duration:
             break
         if passes(now):
-            smooth_piece(now, points, marks, table, moments, rows, r, v)
+            smooth_piece(now, points, marks, table, out)
     if now.status == 0:
         rebase(now, points, marks)
         now.t = now.duration
@@ -120,16 +110,7 @@ def new_base(now: Any, points: FloatArray, marks: IntArray) -> None:
 
 
 @inner
-def smooth_piece(
-    now: Any,
-    points: FloatArray,
-    marks: IntArray,
-    table: FloatArray,
-    moments: FloatArray,
-    rows: FloatArray,
-    r: FloatArray,
-    v: FloatArray,
-) -> None:
+def smooth_piece(now: Any, points: FloatArray, marks: IntArray, table: FloatArray, out: Output) -> None:
     """Advance to the next event, or as far as the map, the series or the duration let it."""
     if now.stale == 1 or now.t - now.base_time > 0.7 * now.span or 0.75 * now.A * now.span < now.B:
         new_base(now, points, marks)
@@ -152,7 +133,7 @@ def smooth_piece(
     find(now, table, points, marks)
     x = min(now.root, 1.0)
     end = now.duration if x == 1.0 and now.h >= left else now.t + x * now.h
-    record(now, table, points, marks, moments, end, rows, r, v)
+    record(now, table, points, marks, out, end)
     book_step(now, table, x)
     advance(now, table, x)
     now.t = end
@@ -166,19 +147,9 @@ def smooth_piece(
 
 
 @inner
-def record(
-    now: Any,
-    table: FloatArray,
-    points: FloatArray,
-    marks: IntArray,
-    moments: FloatArray,
-    until: float,
-    rows: FloatArray,
-    r: FloatArray,
-    v: FloatArray,
-) -> None:
+def record(now: Any, table: FloatArray, points: FloatArray, marks: IntArray, out: Output, until: float) -> None:
     """Write the states at the output times up to ``until``."""
-    p, h = now.order, now.h
+    p, h, moments, rows, r, v = now.order, now.h, out.moments, out.rows, out.r, out.v
     while now.recorded < len(moments) and moments[now.recorded] <= until:
         q = now.recorded
         x = (moments[q] - now.t) / h
