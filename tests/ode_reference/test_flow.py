@@ -23,8 +23,7 @@ FULL = replace(Scenario(water_mass=1.0).with_slices(20), drag=0.0)
 
 
 def record_of(scenario, switches, free, on_base, on_cap):
-    flight, _ = layout.prepare(scenario, switches, 1e-5, sequential=False, ledger=False)
-    now = flight.view(np.recarray)[0]
+    now, _ = layout.prepare(scenario, switches, 1e-5, sequential=False, ledger=False)
     now.free, now.on_base, now.on_cap = free, on_base, on_cap
     layout.set_body(now)
     return now

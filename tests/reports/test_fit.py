@@ -206,8 +206,9 @@ def test_ice_tells_neither_drag_nor_restitution():
 
 
 def test_what_intervals_are_worth_is_promised_only_where_it_was_measured():
-    assert promise("midpoint", fits=True) == "intervals that hold drag and restitution together in 95 %"
-    assert "not measured" in promise("free-flight", fits=True)
+    for solver in ("midpoint", "eq8", "free-flight"):
+        assert promise(solver, fits=True) == "intervals that hold drag and restitution together in 95 %"
+    assert "not measured" in promise("published-limit", fits=True)
     for solver in ("midpoint", "free-flight"):
         assert "95" not in promise(solver, fits=False)
 
