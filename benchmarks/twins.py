@@ -3,7 +3,8 @@
     python benchmarks/twins.py                           100 twins by midpoint (Eq. 8), omega_0 and theta_0 known
     python benchmarks/twins.py --also omega0 theta0      four parameters fitted
     python benchmarks/twins.py --measured omega          from omega as the paper makes it of theta
-    python benchmarks/twins.py --model eq8 --twins 4     by an equation integrated event by event
+    python benchmarks/twins.py --model eq8               Eq. 8 exactly, event by event
+    python benchmarks/twins.py --model free-flight       with the momentum of the tube
 
 Each twin has its own truth, drawn at random from the ranges printed, and its own camera noise: 1 mm in each coordinate
 of cap and base at 240 frames/s; theta by Eq. 1. The noise is not told to the fit. Prints how many intervals hold the
@@ -22,7 +23,7 @@ from statistics import median
 
 from tqdm import tqdm
 
-from flipproof.film.fit.problem import ALSO, EVENT_SLICES, SCHEME_SLICES, is_scheme
+from flipproof.film.fit.problem import ALSO, SLICES
 from flipproof.film.fit.twins import CAMERA_NOISE, RANGES, RATE, Twin, fit_twin
 
 NEEDED = 0.90
@@ -40,21 +41,20 @@ def main() -> int:
     parser.add_argument("--twins", type=int, default=100)
     parser.add_argument("--first", type=int, default=0, help="first seed")
     parser.add_argument("--model", default="midpoint")
-    parser.add_argument("--slices", type=int, default=None)
+    parser.add_argument("--slices", type=int, default=SLICES)
     parser.add_argument("--also", nargs="+", choices=ALSO, default=[])
     parser.add_argument("--measured", choices=("theta", "omega"), default="theta")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--out", type=Path, default=None, help="JSON file for every twin")
     options = parser.parse_args()
-    slices = options.slices or (SCHEME_SLICES if is_scheme(options.model) else EVENT_SLICES)
     seeds = range(options.first, options.first + options.twins)
-    tasks = [(seed, options.model, slices, tuple(options.also), options.measured) for seed in seeds]
+    tasks = [(seed, options.model, options.slices, tuple(options.also), options.measured) for seed in seeds]
     began = time.perf_counter()
     with ProcessPoolExecutor(options.jobs) as pool:
         twins = list(tqdm(pool.map(one, tasks), total=len(tasks), disable=None))
     seconds = time.perf_counter() - began
 
-    print(f"{len(twins)} twins by {options.model}, {slices} slices, fitted to {options.measured}; truths from")
+    print(f"{len(twins)} twins by {options.model}, {options.slices} slices, fitted to {options.measured}; truths from")
     for name, (low, high) in RANGES.items():
         print(f"    {name} in [{low:g}, {high:g}]")
     print(f"camera: {1e3 * CAMERA_NOISE:g} mm, {RATE:g} frames/s; not told to the fit")

@@ -14,7 +14,7 @@ from ode_reference.impacts import LAWS
 from ode_reference.models import MODELS
 from ode_reference.motion import Model
 from ode_reference.switches import PREFIX, Switches
-from slicemodel.scenario import Scenario
+from slicemodel.scenario import Scenario, not_whole
 from slicemodel.trajectory import FloatArray, Trajectory, output_times
 
 if TYPE_CHECKING:
@@ -151,6 +151,7 @@ def solve_batch(
     impact_law: str = "simultaneous",
     energy: bool = False,
     states: bool = False,
+    jobs: int | None = None,
 ) -> Batch:
     """Solve one equation for many throws by "taylor", on all cores; each equals its single run to the last digit.
 
@@ -160,6 +161,7 @@ def solve_batch(
     times : array, shape (P,) or (K, P), optional
         Output times of all throws, or of each [s]; 1000 uniform ones over each throw's duration by default.
     states : bool - whether r and v are kept; without, they have shape (0, N) in the trajectories
+    jobs : int, optional - threads, in [1, 1024]; one per core by default
     model, rest_speed, impact_law, energy - as of ``solve``
 
     Returns
@@ -176,6 +178,8 @@ def solve_batch(
     from ode_reference.flow import api
 
     throws = tuple(throws)
+    if jobs is not None and (problem := not_whole("jobs", jobs, 1, 1024)):
+        raise ValueError(problem)
     for k, throw in enumerate(throws):
         if not isinstance(throw, Scenario):
             raise ValueError(f"throws[{k}] = {throw!r} is not a slicemodel.Scenario")
@@ -199,7 +203,7 @@ def solve_batch(
         energy=energy,
         states=states,
     )
-    return api.fly_all(throws, moments, ask)
+    return api.fly_all(throws, moments, ask, jobs)
 
 
 def _rest_speed(given: float | None, model: Model) -> float:

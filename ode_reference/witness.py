@@ -32,6 +32,7 @@ from ode_reference.contact import FREE, TOUCH, Ends, SideArray, resolve
 from ode_reference.energy import Ledger, nodes
 from ode_reference.impacts import LAWS, immovable
 from ode_reference.motion import Model, Motion, Throw
+from slicemodel.observables import grazes, opposite_hits
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import BASE, CAP, FloatArray, Impacts, Trajectory
 
@@ -59,9 +60,6 @@ LEAST_ADVANCE: Final = 1e-7
 
 PARTS: Final = 4
 """Parts of one step between which a leg is looked through; a slice that turns twice within one part is not seen."""
-
-TOGETHER: Final = 1e-9
-"""Impacts on opposite ends that are no farther apart are counted in ``diagnostics["opposite_hits"]`` [s]."""
 
 
 def integrate(
@@ -406,24 +404,3 @@ class _Flight:
 def _root(function: Callable[[float], float], low: float, high: float) -> float:
     """Return the zero of ``function`` between two times at which it has opposite signs, to round-off [s]."""
     return float(brentq(function, low, high, xtol=float(np.spacing(high)), rtol=4 * float(np.finfo(np.float64).eps)))
-
-
-def grazes(impacts: Impacts, rest_speed: float) -> int:
-    """Return how many contacts were slower than the rest speed by slices that had left their last one twice as fast.
-
-    Such a contact might as well have been missed, and its time is uncertain as 1 / speed: where there is one, omega(t)
-    need not converge as fast as its settings promise. A rebound that comes back at the speed it left with is none.
-    """
-    order = np.lexsort((impacts.time, impacts.slice))
-    slices, before, after = impacts.slice[order], impacts.speed_before[order], impacts.speed_after[order]
-    same = slices[1:] == slices[:-1]
-    left = np.concatenate([[np.inf], np.where(same, after[:-1], np.inf)])[: len(before)]
-    return int(np.count_nonzero((before < rest_speed) & (left > 2 * rest_speed)))
-
-
-def opposite_hits(impacts: Impacts) -> int:
-    """Return how many instants saw both ends struck; impacts no more than ``TOGETHER`` apart share an instant."""
-    if len(impacts) == 0:
-        return 0
-    begins = np.concatenate([[0], np.flatnonzero(np.diff(impacts.time) > TOGETHER) + 1])
-    return int(np.count_nonzero(np.minimum.reduceat(impacts.end, begins) != np.maximum.reduceat(impacts.end, begins)))

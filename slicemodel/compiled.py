@@ -10,10 +10,12 @@ import hashlib
 import logging
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numba
 from numba.core.caching import FunctionCache
+
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 """Every operation is rounded as written (no fastmath), so that no result depends on the width of vector registers."""
@@ -22,6 +24,14 @@ OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 def compiled(function: Callable[..., Any]) -> Any:
     """Compile a function in strict arithmetic; it can be called from other compiled functions and from Python."""
     return numba.njit(function, **OPTIONS)
+
+
+def inner(function: Function) -> Function:
+    """Compile a function that compiled ones alone call: what Python needs to call it takes a third of the time."""
+    # The names of these options are missing from numba's types.
+    unwrapped: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    made: Function = numba.njit(function, **OPTIONS, **unwrapped)
+    return made
 
 
 def merged(function: Callable[..., Any]) -> Any:

@@ -14,13 +14,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from slicemodel.scenario import Scenario, ScenarioError, not_whole
-from slicemodel.trajectory import FloatArray
+from slicemodel.trajectory import FloatArray, Impacts
 
 PLATEAU_POINTS: Final = 21
 """Points of the paper's average: its "at least 20" around the minimum, the same number on either side of it."""
 
 PLATEAU_SHARE: Final = 0.02
 """The same window as a share of the flight: 20 of the paper's 1000 steps, 10 ms of its 0.5 s."""
+
+TOGETHER: Final = 1e-9
+"""Impacts that follow each other no later than this share an instant [s]."""
 
 
 def centre_of_mass(scenario: Scenario, r: ArrayLike) -> FloatArray:
@@ -225,3 +228,24 @@ def toppling_angle(scenario: Scenario, r_cm: ArrayLike) -> FloatArray:
 def static_toppling_angle(scenario: Scenario) -> float:
     """Angle beyond which the bottle topples while all water rests on its base [rad] (Eq. 13b with Eq. 4a)."""
     return float(toppling_angle(scenario, centre_of_mass_at_rest(scenario)))
+
+
+def grazes(impacts: Impacts, rest_speed: float) -> int:
+    """Return how many contacts were slower than the rest speed by slices that had left their last one twice as fast.
+
+    Such a contact might as well have been missed, and its time is uncertain as 1 / speed: where there is one, omega(t)
+    depends on the last digits. A rebound that comes back at the speed it left with is none.
+    """
+    order = np.lexsort((impacts.time, impacts.slice))
+    slices, before, after = impacts.slice[order], impacts.speed_before[order], impacts.speed_after[order]
+    same = slices[1:] == slices[:-1]
+    left = np.concatenate([[np.inf], np.where(same, after[:-1], np.inf)])[: len(before)]
+    return int(np.count_nonzero((before < rest_speed) & (left > 2 * rest_speed)))
+
+
+def opposite_hits(impacts: Impacts) -> int:
+    """Return how many instants saw both ends struck; impacts no more than ``TOGETHER`` apart share an instant."""
+    if len(impacts) == 0:
+        return 0
+    begins = np.concatenate([[0], np.flatnonzero(np.diff(impacts.time) > TOGETHER) + 1])
+    return int(np.count_nonzero(np.minimum.reduceat(impacts.end, begins) != np.maximum.reduceat(impacts.end, begins)))

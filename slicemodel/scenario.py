@@ -88,10 +88,9 @@ class _Checks:
         most: float,
     ) -> float | None:
         """Return ``value`` as float if it is a finite number in range, else note why not."""
-        admissible = f"[{least:g}, {most:g}]"
-        told = f"{self.where}{name} = {shown(value)}"
         if isinstance(value, bool) or not isinstance(value, numbers.Real):
-            self.problems.append(f"{told} is not a number (admissible: {admissible} {unit})".replace(" )", ")"))
+            admissible = f"[{least:g}, {most:g}] {unit}".rstrip()
+            self.problems.append(f"{self.where}{name} = {shown(value)} is not a number (admissible: {admissible})")
             return None
         try:
             number = float(value)
@@ -99,7 +98,8 @@ class _Checks:
             number = math.inf
         # Written as "not inside", because NaN passes every "outside" test.
         if not least <= number <= most:
-            self.problems.append(f"{self.where}{name} = {number!r} {unit} is outside {admissible}".replace("  ", " "))
+            told = f"{self.where}{name} = {number!r} {unit}".rstrip()
+            self.problems.append(f"{told} is outside [{least:g}, {most:g}]")
             return None
         return number
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
@@ -154,7 +153,7 @@ class Trajectory:
                 object.__setattr__(self, name, values)
             if values.shape not in shapes:
                 raise ValueError(f"{name} has shape {values.shape}, not {shapes[0]}")
-            if values.size and not _finite(values):
+            if not np.isfinite(values).all():
                 raise ValueError(f"{name} holds values that are not finite; return the run up to its last finite point")
         if np.count_nonzero(self.t[1:] > self.t[:-1]) < points - 1:
             raise ValueError("t does not increase")
@@ -177,11 +176,6 @@ class Trajectory:
 
 def _rebuild(state: dict[str, Any]) -> Trajectory:
     return Trajectory(**state)
-
-
-def _finite(values: FloatArray) -> bool:
-    """Return whether all values are finite; the sum of squares, unless huge, tells so in a third of the time."""
-    return math.isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())
 
 
 def _read_only(values: ArrayLike) -> FloatArray:

@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-import logging
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache
-from hashlib import sha256
-from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ode_reference.flow import layout
-from ode_reference.flow.layout import ESCAPED, INERTIA, OVERFLOW, STALLED, WRONSKIAN
+from ode_reference.flow.layout import ESCAPED, INERTIA, OK, OVERFLOW, STALLED, WRONSKIAN
 from ode_reference.switches import Switches
+from slicemodel.observables import grazes, opposite_hits
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray, Impacts, Trajectory
 
-OPPOSITE: Final = 1e-9
-"""Time between strikes on opposite ends below which they may be one instant [s]."""
-
-_STATUSES: Final = {OVERFLOW: "overflow", STALLED: "stalled", WRONSKIAN: "diverged", INERTIA: "diverged"}
+_STATUSES: Final = {
+    OK: "ok", OVERFLOW: "overflow", STALLED: "stalled", WRONSKIAN: "diverged", INERTIA: "diverged", ESCAPED: "diverged"
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,60 +51,59 @@ class Flown:
     frozen: bool
 
     @property
-    def now(self) -> Any:
-        """The record with its fields as attributes."""
-        return self.record.view(np.recarray)[0]
+    def now(self) -> SimpleNamespace:
+        """The numbers of the record as attributes."""
+        return layout.unpack(self.record)
 
     @property
     def status(self) -> str:
-        """As of ``Trajectory``."""
-        return "ok" if self.now.status == layout.OK else _STATUSES.get(int(self.now.status), "diverged")
+        """As of ``Trajectory``, and so ``theta``, ``omega`` and ``r_cm``."""
+        return _STATUSES[int(self.record["status"][0])]
 
+    @property
+    def message(self) -> str:
+        """Why the flight stopped, where and when; nothing for one that is complete."""
+        return message(self) if self.status != "ok" else ""
 
-def stamp() -> str:
-    """Return a hash of the sources of this folder.
+    @property
+    def theta(self) -> FloatArray:
+        """Angle [rad]."""
+        return np.asarray(self.rows[0])
 
-    numba's cache looks at the file of the function that is called alone. The loop is compiled as a closure over this
-    hash, which is part of the key under which numba keeps it: a change in any file compiles anew.
-    """
-    found = sha256()
-    for file in sorted(Path(__file__).parent.glob("*.py")):
-        found.update(file.name.encode() + file.read_bytes())
-    return found.hexdigest()
+    @property
+    def omega(self) -> FloatArray:
+        """Angular velocity [rad/s]."""
+        return np.asarray(float(self.record["momentum"][0]) / self.rows[1])
 
+    @property
+    def r_cm(self) -> FloatArray:
+        """Centre of mass from the cap [m]."""
+        return np.asarray(self.scenario.bottle.length / 2 + self.rows[2])
 
-@cache
-def compiled_loop() -> Callable[..., FloatArray]:
-    """Return the loop, compiled on its first call and kept on disk; without a writable place, in memory only."""
-    import numba
-
-    from ode_reference.flow.loop import under
-
-    options: dict[str, Any] = {"error_model": "numpy", "nogil": True}
-    try:
-        made: Callable[..., FloatArray] = numba.njit(cache=True, **options)(under(stamp()))
-    except RuntimeError as error:
-        logging.getLogger(__name__).warning("compiling in memory, once per process: %s", error)
-        made = numba.njit(**options)(under(stamp()))
-    return made
+    @property
+    def method(self) -> str:
+        """Name of the equation."""
+        return self.ask.model
 
 
 def fly(scenario: Scenario, moments: FloatArray, ask: Ask) -> Flown:
     """Fly one scenario; ``moments`` are its output times, shape (P,) [s]."""
     points, n = len(moments), scenario.n_slices
-    record, y = layout.prepare(
+    now, y = layout.prepare(
         scenario, ask.switches, ask.rest_speed, sequential=ask.impact_law == "sequential", ledger=ask.energy
     )
-    rows = np.empty((3, points))
-    r, v = (np.empty((points if ask.states else 0, n)) for _ in range(2))
+    out = layout.Output(moments, np.empty((3, points)), *(np.empty((points * ask.states, n)) for _ in range(2)))
+    rows, r, v = out.rows, out.r, out.v
     frozen = scenario.frozen or 2 * (scenario.r_max - scenario.bottle.length / 2) <= layout.TOLERANCE
     if frozen:
-        impacts = _hold(record, y, moments, rows, r, v)
-    else:
-        loop = compiled_loop()
+        impacts = _hold(now, y, out)
+    record = layout.pack(now)
+    if not frozen:
+        from ode_reference.flow.loop import fly as loop
+
         # With NUMBA_DISABLE_JIT the fields of the record are attributes of a recarray alone.
         given = record if hasattr(loop, "signatures") else record.view(np.recarray)
-        impacts = loop(given, *layout.points_at(y), moments, rows, r, v)
+        impacts = loop(given, *layout.points_at(y), out)
     reached = int(record["recorded"][0])
     impacts = impacts[: int(record["impacts"][0])]
     if ask.states:
@@ -118,11 +114,9 @@ def fly(scenario: Scenario, moments: FloatArray, ask: Ask) -> Flown:
     return Flown(scenario, ask, moments[:reached], rows[:, :reached], r[:reached], v[:reached], impacts, record, frozen)
 
 
-def _hold(
-    record: NDArray[Any], y: FloatArray, moments: FloatArray, rows: FloatArray, r: FloatArray, v: FloatArray
-) -> FloatArray:
+def _hold(now: SimpleNamespace, y: FloatArray, out: layout.Output) -> FloatArray:
     """Write the flight of a bottle in which nothing moves: theta is linear; return its impacts, none."""
-    now = record.view(np.recarray)[0]
+    moments, rows, r, v = out
     inertia = now.body_inertia + now.slice_mass * now.U + now.reduced_mass * now.y_mean**2
     omega = now.momentum / inertia
     rows[0], rows[1], rows[2] = now.theta + omega * moments, inertia, now.slice_mass * y.sum() / now.total_mass
@@ -130,29 +124,28 @@ def _hold(
         r[:], v[:] = y, 0.0
     now.initial = now.final = now.momentum * omega / 2
     finite = np.isfinite(now.momentum * omega) and np.isfinite(rows).all()
-    now.recorded, now.status = (len(moments), layout.OK) if finite else (0, OVERFLOW)
+    now.recorded, now.status = (len(moments), OK) if finite else (0, OVERFLOW)
     return np.empty((0, 5))
 
 
 def trajectory(flown: Flown) -> Trajectory:
     """Return the trajectory of a flight, with its settings and what it measured of itself."""
-    now, ask, hits = flown.now, flown.ask, flown.impacts
-    theta, inertia, centre = flown.rows
+    ask, hits = flown.ask, flown.impacts
     impacts = Impacts(hits[:, 0], hits[:, 1].astype(np.int64), hits[:, 2].astype(np.int64), hits[:, 3], hits[:, 4])
     return Trajectory(
         scenario=flown.scenario,
         solver="ode_reference",
         method=ask.model,
         t=flown.t,
-        theta=theta,
-        omega=now.momentum / inertia,
+        theta=flown.theta,
+        omega=flown.omega,
         r=flown.r,
         v=flown.v,
-        r_cm=flown.scenario.bottle.length / 2 + centre,
-        inertia=inertia,
+        r_cm=flown.r_cm,
+        inertia=flown.rows[1],
         impacts=impacts,
         status=flown.status,
-        message=message(flown),
+        message=flown.message,
         settings={
             "model": ask.model,
             "method": "taylor",
@@ -181,35 +174,10 @@ def diagnostics(flown: Flown, impacts: Impacts) -> dict[str, Any]:
     return found
 
 
-def grazes(impacts: Impacts, rest_speed: float) -> int:
-    """Return how many contacts were slower than the rest speed by slices that had left their last one twice as fast.
-
-    Such a contact might as well have been missed, and its time is uncertain as 1 / speed: where there is one, omega(t)
-    depends on the last digits. A rebound that comes back at the speed it left with is none.
-    """
-    order = np.lexsort((impacts.time, impacts.slice))
-    slices, before, after = impacts.slice[order], impacts.speed_before[order], impacts.speed_after[order]
-    same = slices[1:] == slices[:-1]
-    left = np.concatenate([[np.inf], np.where(same, after[:-1], np.inf)])[: len(before)]
-    return int(np.count_nonzero((before < rest_speed) & (left > 2 * rest_speed)))
-
-
-def opposite_hits(impacts: Impacts) -> int:
-    """Return how many pairs of successive impacts struck opposite ends within 1e-9 s, or at one instant.
-
-    Whether such a pair is one instant or two decides, with recoil, what follows: the impact laws of one instant and of
-    two in turn differ.
-    """
-    near = np.diff(impacts.time) <= OPPOSITE
-    return int(np.count_nonzero(near & (impacts.end[1:] != impacts.end[:-1])))
-
-
 def message(flown: Flown) -> str:
-    """Return why a flight stopped, where and when; nothing for one that is complete."""
+    """Return why a flight stopped, where and when."""
     now, ask, scenario = flown.now, flown.ask, flown.scenario
     status, at = int(now.status), f"t = {now.t:.9g} s"
-    if status == layout.OK:
-        return ""
     if status == OVERFLOW:
         return (
             f"{ask.model}: a number exceeded the floating-point range after {at}; omega0 = {scenario.omega0:g} rad/s, "
@@ -256,12 +224,10 @@ class Batch(Sequence[Trajectory]):
         return (trajectory(one) for one in self.flights)
 
 
-def fly_all(throws: Sequence[Scenario], moments: FloatArray, ask: Ask) -> Batch:
-    """Fly all throws on all cores; ``moments`` are their output times, shape (K, P) [s]."""
-    workers = min(
-        len(throws), len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    )
-    compiled_loop()
+def fly_all(throws: Sequence[Scenario], moments: FloatArray, ask: Ask, jobs: int | None = None) -> Batch:
+    """Fly all throws by so many threads, one per core if not said; ``moments`` are output times, shape (K, P) [s]."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    workers = min(len(throws), jobs or cores)
 
     def one(k: int) -> Flown:
         # NumPy's switch for warnings belongs to a thread.
@@ -276,5 +242,5 @@ def fly_all(throws: Sequence[Scenario], moments: FloatArray, ask: Ask) -> Batch:
     theta, omega = np.full(moments.shape, np.nan), np.full(moments.shape, np.nan)
     for k, flown in enumerate(flights):
         reached = len(flown.t)
-        theta[k, :reached], omega[k, :reached] = flown.rows[0], float(flown.record["momentum"][0]) / flown.rows[1]
+        theta[k, :reached], omega[k, :reached] = flown.theta, flown.omega
     return Batch(flights, moments, theta, omega, tuple(flown.status for flown in flights))

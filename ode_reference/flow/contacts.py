@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ode_reference.flow.compiled import compiled
 from ode_reference.flow.laws import sort, strike
 from ode_reference.flow.layout import (
     AFTER,
@@ -33,13 +32,14 @@ from ode_reference.flow.layout import (
 from ode_reference.flow.ledger import book_jump
 from ode_reference.flow.points import enter, leave, place_of, set_body, set_scales, speed_of
 from ode_reference.flow.search import ROUNDING, watch
+from slicemodel.compiled import inner
 from slicemodel.trajectory import FloatArray
 
 STANDING = 1e-14
 """Speed that rounding makes of none, in units of wall * |omega|."""
 
 
-@compiled
+@inner
 def touch(now: Any, points: FloatArray, marks: IntArray) -> None:
     """List the slices that strike at this instant: the one that was located, and who reaches an end with it.
 
@@ -58,7 +58,7 @@ def touch(now: Any, points: FloatArray, marks: IntArray) -> None:
     sort(marks[HIT], marks[RANK], now.hits)
 
 
-@compiled
+@inner
 def meet(now: Any, points: FloatArray, marks: IntArray, impacts: FloatArray) -> None:
     """Resolve all contacts of this instant together; impacts that have a speed are listed."""
     # Nothing moves in an instant: omega and the centre of mass belong to all that follows.
@@ -84,7 +84,7 @@ def meet(now: Any, points: FloatArray, marks: IntArray, impacts: FloatArray) -> 
     now.instants += 1
 
 
-@compiled
+@inner
 def wake(now: Any, points: FloatArray, marks: IntArray) -> None:
     """Let every resting slice take part as one that touches its end with no speed; ``side`` says where it rested."""
     for i in range(points.shape[1]):
@@ -96,7 +96,7 @@ def wake(now: Any, points: FloatArray, marks: IntArray) -> None:
     sort(marks[HIT], marks[RANK], now.hits)
 
 
-@compiled
+@inner
 def rebound(now: Any, points: FloatArray, marks: IntArray) -> None:
     """Apply the impact law: to the touching points, marks, to the groups at rest, and by V to every velocity."""
     gained = strike(now, points, marks) if now.hits > 0 else 0.0
@@ -108,7 +108,7 @@ def rebound(now: Any, points: FloatArray, marks: IntArray) -> None:
         enter(now, points, j, points[END, k] * now.wall, points[END, k] * points[AFTER, k])
 
 
-@compiled
+@inner
 def choose(now: Any, points: FloatArray) -> None:
     """Set ``stay_base``, ``stay_cap``: which ends keep their slow slices; and ``shift``, what all others then lose."""
     rest, ratio = now.rest_speed, now.recoil * now.slice_mass / now.bottle_mass
@@ -151,7 +151,7 @@ def choose(now: Any, points: FloatArray) -> None:
                 return
 
 
-@compiled
+@inner
 def is_pressed(now: Any, end: float, v: float, on_base: int, on_cap: int, moving: float) -> bool:
     """Return whether ``end`` presses on a slice that moves at v, with so many at rest and ``moving`` = sum of speeds.
 
@@ -171,7 +171,7 @@ def is_pressed(now: Any, end: float, v: float, on_base: int, on_cap: int, moving
     return end * (thrown + force - drag) >= -ROUNDING * now.thrust  # type: ignore[no-any-return]
 
 
-@compiled
+@inner
 def settle(now: Any, points: FloatArray, marks: IntArray, impacts: FloatArray) -> None:
     """Take over who stays and who leaves: speeds, moments, lists, counts, and the record of the impacts."""
     rest = now.rest_speed
@@ -214,7 +214,7 @@ def settle(now: Any, points: FloatArray, marks: IntArray, impacts: FloatArray) -
     forget_resting(now, marks)
 
 
-@compiled
+@inner
 def free_group(now: Any, points: FloatArray, marks: IntArray, side: int, v: float) -> None:
     """Let all slices that rest on one side go, at speed v."""
     for i in range(points.shape[1]):
@@ -224,14 +224,14 @@ def free_group(now: Any, points: FloatArray, marks: IntArray, side: int, v: floa
             set_off(now, marks, i, side, v)
 
 
-@compiled
+@inner
 def set_off(now: Any, marks: IntArray, i: int, side: int, v: float) -> None:
     """Watch a free slice on an end; note whether it stands still there."""
     watch(now, marks, i)
     marks[STILL, i] = side if abs(v) <= STANDING * now.wall * abs(now.omega) else 0
 
 
-@compiled
+@inner
 def forget_resting(now: Any, marks: IntArray) -> None:
     """Take slices at rest off the list of those that are watched; the others keep their order."""
     kept = 0

@@ -9,15 +9,20 @@ from __future__ import annotations
 
 from typing import Any
 
-from ode_reference.flow.compiled import compiled
+import numpy as np
+
 from ode_reference.flow.layout import AFTER, APPROACH, CORNER, END, RANK, IntArray
+from slicemodel.compiled import inner
 from slicemodel.trajectory import FloatArray
+
+TIE = 1e-9
+"""Approach speeds that differ by no more than this fraction are equal: the first slice strikes first."""
 
 PASSES = 1000
 """Most binary impacts per touching slice of one instant in the sequential law."""
 
 
-@compiled
+@inner
 def strike(now: Any, points: FloatArray, marks: IntArray) -> float:
     """Write ``after`` by the law of this flight; return V [m/s]."""
     ratio = now.slice_mass / now.bottle_mass
@@ -30,7 +35,7 @@ def strike(now: Any, points: FloatArray, marks: IntArray) -> float:
     return sequential(now, points, marks, ratio)
 
 
-@compiled
+@inner
 def simultaneous(now: Any, points: FloatArray, marks: IntArray, row: int, e: float, ratio: float) -> float:
     """Write ``AFTER`` from the approach speeds in ``row`` by the law of Newton and Moreau; return V.
 
@@ -48,7 +53,7 @@ def simultaneous(now: Any, points: FloatArray, marks: IntArray, row: int, e: flo
     return gained
 
 
-@compiled
+@inner
 def tube_velocity(now: Any, points: FloatArray, marks: IntArray, row: int, factor: float, ratio: float) -> float:
     """Return the zero V of f. The slices at rest have their corners at 0."""
     hits = now.hits
@@ -79,7 +84,7 @@ def tube_velocity(now: Any, points: FloatArray, marks: IntArray, row: int, facto
     return candidate  # type: ignore[no-any-return]
 
 
-@compiled
+@inner
 def sort(values: Any, companions: Any, n: int) -> None:
     """Sort the first n values, and their companions with them, in place (Shell)."""
     gap = n // 2
@@ -93,9 +98,11 @@ def sort(values: Any, companions: Any, n: int) -> None:
         gap //= 2
 
 
-@compiled
+@inner
 def sequential(now: Any, points: FloatArray, marks: IntArray, ratio: float) -> float:
     """Return V after binary impacts, the fastest approach first, until nothing approaches.
+
+    Between mirror images rounding must not choose: of slices that approach equally fast the first one comes first.
 
     An exchange between slices on opposite ends may go on for ever at speeds that fall geometrically: it ends below the
     rest speed, and what still approaches is resolved by the simultaneous law with e = 0.
@@ -105,13 +112,13 @@ def sequential(now: Any, points: FloatArray, marks: IntArray, ratio: float) -> f
         points[AFTER, k] = points[APPROACH, k]
     gained, approaching = 0.0, False
     for _ in range(PASSES * hits):
-        fastest = 0
-        for k in range(1, hits):
-            if points[AFTER, k] > points[AFTER, fastest]:
-                fastest = k
-        speed = points[AFTER, fastest]
-        if speed < now.rest_speed:
+        highest = np.max(points[AFTER, :hits])
+        if highest < now.rest_speed:
             break
+        fastest = 0
+        while points[AFTER, fastest] < (1.0 - TIE) * highest:
+            fastest += 1
+        speed = points[AFTER, fastest]
         step = points[END, fastest] * (1.0 + e) * speed * ratio / (1.0 + ratio)
         for k in range(hits):
             points[AFTER, k] -= points[END, k] * step

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from types import SimpleNamespace
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +72,8 @@ WORKS: Final = {
 }
 """What changes the energy, and where the record of a flight keeps it."""
 
+FIELDS: Final = RECORD.names or ()
+
 IntArray = NDArray[np.int64]
 
 PLACE, SPEED, END, APPROACH, AFTER, CORNER = range(6)
@@ -81,6 +84,22 @@ SIDE, NEAR, WATCHED, STILL, HIT, RANK = range(6)
 free slice stands still; the list of slices that strike at one instant."""
 
 
+class Output(NamedTuple):
+    """What a flight writes into: states at its output times, up to the last that it reaches.
+
+    Parameters
+    ----------
+    moments : array, shape (P,) - output times [s]
+    rows : array, shape (3, P) - theta, J and y_CM
+    r, v : array, shape (P, N) - y, infinite at rest, and y' [m], [m/s]; of shape (0, N) if they are not asked for
+    """
+
+    moments: FloatArray
+    rows: FloatArray
+    r: FloatArray
+    v: FloatArray
+
+
 def points_at(y: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return ``points`` and ``marks``, shape (6, N), of free slices at rest at ``y`` [m]."""
     points = np.zeros((6, len(y)))
@@ -88,13 +107,22 @@ def points_at(y: FloatArray) -> tuple[FloatArray, IntArray]:
     return points, np.zeros((6, len(y)), dtype=np.int64)
 
 
+def pack(now: SimpleNamespace) -> NDArray[Any]:
+    """Return the numbers of a flight as the record that the compiled loop takes, shape (1,)."""
+    return np.array([tuple(map(vars(now).__getitem__, FIELDS))], dtype=RECORD)
+
+
+def unpack(record: NDArray[Any]) -> SimpleNamespace:
+    """Return the numbers of a record as attributes: Python reads those many times faster than its fields."""
+    return SimpleNamespace(**dict(zip(FIELDS, record[0].item(), strict=True)))
+
+
 def prepare(
     scenario: Scenario, switches: Switches, rest_speed: float, *, sequential: bool, ledger: bool
-) -> tuple[NDArray[Any], FloatArray]:
-    """Return the record of a flight at its release, shape (1,), and the places y of its slices, shape (N,) [m]."""
+) -> tuple[SimpleNamespace, FloatArray]:
+    """Return the numbers of a flight at its release, and the places y of its slices, shape (N,) [m]."""
     throw, n = Throw.of(scenario), scenario.n_slices
-    flight: NDArray[Any] = np.zeros(1, dtype=RECORD)
-    now = flight.view(np.recarray)[0]
+    now = SimpleNamespace(**dict.fromkeys(FIELDS, 0))
     gamma = throw.drag_rate / 2
     now.slice_mass, now.bottle_mass, now.total_mass = throw.slice_mass, throw.bottle_mass, throw.total_mass
     now.bottle_inertia = throw.bottle_inertia
@@ -117,7 +145,7 @@ def prepare(
     inertia = now.body_inertia + now.slice_mass * now.U + now.reduced_mass * now.y_mean**2
     now.momentum = inertia * scenario.omega0
     now.step_limit, now.watch = STEP_LIMIT, WATCH
-    return flight, y
+    return now, y
 
 
 def set_body(now: Any) -> None:

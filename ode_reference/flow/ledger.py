@@ -24,15 +24,15 @@ from typing import Any
 
 import numpy as np
 
-from ode_reference.flow.compiled import compiled
 from ode_reference.flow.points import inertia_of
 from ode_reference.flow.series import THETA, A, B, Z, slope, value
+from slicemodel.compiled import inner
 from slicemodel.trajectory import FloatArray
 
 _NODES, _WEIGHTS = (0.5 * numbers for numbers in np.polynomial.legendre.leggauss(6))
 
 
-@compiled
+@inner
 def squares_of(now: Any) -> float:
     """Return the sum of the squared velocities [m^2/s^2]."""
     groups = now.on_base * now.base_speed * now.base_speed + now.on_cap * now.cap_speed * now.cap_speed
@@ -40,7 +40,7 @@ def squares_of(now: Any) -> float:
     return groups + now.free * now.dy_mean * now.dy_mean + inner  # type: ignore[no-any-return]
 
 
-@compiled
+@inner
 def energy_of(now: Any) -> float:
     """Return E [J]; no slice at rest may have a speed."""
     m, drift = now.slice_mass, now.slice_mass * now.free * now.dy_mean / now.total_mass
@@ -48,7 +48,7 @@ def energy_of(now: Any) -> float:
     return (axial + now.momentum * now.momentum / inertia_of(now)) / 2.0  # type: ignore[no-any-return]
 
 
-@compiled
+@inner
 def book_jump(now: Any, stage: int) -> None:
     """Book the change of energy since the last call: 0 nothing, 1 the impacts, 2 the slices that came to rest."""
     if now.ledger == 0:
@@ -69,7 +69,7 @@ def book_jump(now: Any, stage: int) -> None:
     now.squares, now.speeds = squares, total
 
 
-@compiled
+@inner
 def book_step(now: Any, table: FloatArray, x: float) -> None:
     """Book the works of the terms from the start of the step to its fraction ``x``, by Gauss's rule of order 12."""
     if now.ledger == 0 or x == 0.0:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from ode_reference.flow.compiled import compiled
 from ode_reference.flow.contacts import meet, touch
-from ode_reference.flow.layout import HIT, NEAR, OVERFLOW, PLACE, SIDE, SPEED, STALLED, STILL, IntArray
+from ode_reference.flow.layout import HIT, NEAR, OVERFLOW, PLACE, SIDE, SPEED, STALLED, STILL, IntArray, Output
 from ode_reference.flow.ledger import book_step, energy_of
 from ode_reference.flow.points import inertia_of, rebase, set_scales
 from ode_reference.flow.search import find, flock_is_clear, gather, guessed_step, sum_rests
 from ode_reference.flow.series import MOST, ROWS, THETA, A, B, Z, advance, expand, slope, value
+from slicemodel.compiled import inner, kept_on_disk
 from slicemodel.trajectory import FloatArray
 
 TURN = 0.2
@@ -23,44 +22,15 @@ LEAST_ADVANCE = 1e-7
 """Of the duration: what time must advance by in as many steps as ``watch`` says."""
 
 
-def under(key: str) -> Callable[..., FloatArray]:
-    """Return ``fly`` as a closure over ``key``: numba makes that part of the name under which it keeps the loop."""
-
-    def flight(
-        flight: Any,
-        points: FloatArray,
-        marks: IntArray,
-        moments: FloatArray,
-        rows: FloatArray,
-        r: FloatArray,
-        v: FloatArray,
-    ) -> FloatArray:
-        if len(key) == 0:
-            return rows
-        return fly(flight, points, marks, moments, rows, r, v)
-
-    return flight
-
-
-@compiled
-def fly(
-    flight: Any,
-    points: FloatArray,
-    marks: IntArray,
-    moments: FloatArray,
-    rows: FloatArray,
-    r: FloatArray,
-    v: FloatArray,
-) -> FloatArray:
+@kept_on_disk()
+def fly(flight: Any, points: FloatArray, marks: IntArray, out: Output) -> FloatArray:
     """Advance a flight to its duration, or to where it must stop; return its impacts, more rows than there are.
 
     Parameters
     ----------
     flight : record, shape (1,) - as ``layout.prepare`` makes it
     points, marks : arrays, shape (6, N) - as ``layout.points_at`` makes them
-    moments : array, shape (P,) - output times [s]
-    rows : array, shape (3, P) - receives theta, J and y_CM
-    r, v : array, shape (P, N) - receive y, infinite at rest, and y' [m], [m/s]; of shape (0, N) nothing
+    out : Output
     """
     now = flight[0]
     impacts, table = np.empty((64, 5)), np.zeros((ROWS + 1, MOST + 1))
@@ -77,7 +47,7 @@ def fly(
         if now.duration - now.t <= 4.0 * 2.3e-16 * now.duration:
             break
         if passes(now):
-            smooth_piece(now, points, marks, table, moments, rows, r, v)
+            smooth_piece(now, points, marks, table, out)
     if now.status == 0:
         rebase(now, points, marks)
         now.t = now.duration
@@ -86,7 +56,7 @@ def fly(
     return impacts
 
 
-@compiled
+@inner
 def release_all(now: Any, points: FloatArray, marks: IntArray) -> None:
     """Take the slices as they are at release; who touches an end then is in contact, whatever its speed."""
     now.span, now.stale = 1e-3 * now.duration, 1
@@ -98,7 +68,7 @@ def release_all(now: Any, points: FloatArray, marks: IntArray) -> None:
     now.event = int(now.hits > 0)
 
 
-@compiled
+@inner
 def with_room(impacts: FloatArray, rows: int) -> FloatArray:
     """Return the list of impacts with room for so many."""
     if rows <= len(impacts):
@@ -110,7 +80,7 @@ def with_room(impacts: FloatArray, rows: int) -> FloatArray:
     return longer
 
 
-@compiled
+@inner
 def passes(now: Any) -> bool:
     """Count one more step; note the stall, and return False, if time has ceased to pass."""
     now.steps += 1
@@ -122,7 +92,7 @@ def passes(now: Any) -> bool:
     return True
 
 
-@compiled
+@inner
 def new_base(now: Any, points: FloatArray, marks: IntArray) -> None:
     """Start the map here and choose for how long, and so which, slices are watched.
 
@@ -139,17 +109,8 @@ def new_base(now: Any, points: FloatArray, marks: IntArray) -> None:
     now.since, now.stale, now.fresh = now.instants, 0, 1
 
 
-@compiled
-def smooth_piece(
-    now: Any,
-    points: FloatArray,
-    marks: IntArray,
-    table: FloatArray,
-    moments: FloatArray,
-    rows: FloatArray,
-    r: FloatArray,
-    v: FloatArray,
-) -> None:
+@inner
+def smooth_piece(now: Any, points: FloatArray, marks: IntArray, table: FloatArray, out: Output) -> None:
     """Advance to the next event, or as far as the map, the series or the duration let it."""
     if now.stale == 1 or now.t - now.base_time > 0.7 * now.span or 0.75 * now.A * now.span < now.B:
         new_base(now, points, marks)
@@ -172,7 +133,7 @@ def smooth_piece(
     find(now, table, points, marks)
     x = min(now.root, 1.0)
     end = now.duration if x == 1.0 and now.h >= left else now.t + x * now.h
-    record(now, table, points, marks, moments, end, rows, r, v)
+    record(now, table, points, marks, out, end)
     book_step(now, table, x)
     advance(now, table, x)
     now.t = end
@@ -185,20 +146,10 @@ def smooth_piece(
         now.event = 1
 
 
-@compiled
-def record(
-    now: Any,
-    table: FloatArray,
-    points: FloatArray,
-    marks: IntArray,
-    moments: FloatArray,
-    until: float,
-    rows: FloatArray,
-    r: FloatArray,
-    v: FloatArray,
-) -> None:
+@inner
+def record(now: Any, table: FloatArray, points: FloatArray, marks: IntArray, out: Output, until: float) -> None:
     """Write the states at the output times up to ``until``."""
-    p, h = now.order, now.h
+    p, h, moments, rows, r, v = now.order, now.h, out.moments, out.rows, out.r, out.v
     while now.recorded < len(moments) and moments[now.recorded] <= until:
         q = now.recorded
         x = (moments[q] - now.t) / h

@@ -6,29 +6,29 @@ import math
 from typing import Any
 
 from ode_reference.flow import layout
-from ode_reference.flow.compiled import compiled
 from ode_reference.flow.layout import ESCAPED, INERTIA, PLACE, SIDE, SPEED, WRONSKIAN, IntArray
+from slicemodel.compiled import inner
 from slicemodel.trajectory import FloatArray
 
-set_body = compiled(layout.set_body)
+set_body = inner(layout.set_body)
 
 ADMISSIBLE = 1e-9
 """Relative error of the Wronskian and of J beyond which a flight is given up; both are some 1e-15."""
 
 
-@compiled
+@inner
 def place_of(now: Any, u: float, w: float) -> float:
     """Return y = mean y + A (u - mean u) + B (w - mean w) [m]."""
     return now.y_mean + now.A * (u - now.mu) + now.B * (w - now.mw)  # type: ignore[no-any-return]
 
 
-@compiled
+@inner
 def speed_of(now: Any, u: float, w: float) -> float:
     """Return y' [m/s]."""
     return now.dy_mean + now.dA * (u - now.mu) + now.dB * (w - now.mw)  # type: ignore[no-any-return]
 
 
-@compiled
+@inner
 def inertia_of(now: Any) -> float:
     """Return J = J_c + m (A^2 U + 2 A B P + B^2 V) + (a M_c / M) z^2 [kg m^2]: a sum of squares."""
     spread = now.A * now.A * now.U + 2.0 * now.A * now.B * now.P + now.B * now.B * now.V
@@ -36,7 +36,7 @@ def inertia_of(now: Any) -> float:
     return now.body_inertia + now.slice_mass * spread + now.reduced_mass * z * z  # type: ignore[no-any-return]
 
 
-@compiled
+@inner
 def set_scales(now: Any) -> None:
     """Set omega, the fastest rate of the equations [1/s] and the magnitude of what their terms add up to [m/s^2]."""
     now.omega = now.momentum / inertia_of(now)
@@ -45,14 +45,14 @@ def set_scales(now: Any) -> None:
     now.thrust = 2.0 * now.wall * spring + now.gravity * (1.0 + now.kappa / now.omega / now.omega)
 
 
-@compiled
+@inner
 def start_map(now: Any) -> None:
     """Let the map start here: A = 1, A' = 0, B = 0, B' = 1."""
     now.A, now.dA, now.B, now.dB = 1.0, 0.0, 0.0, 1.0
     now.base_time = now.t
 
 
-@compiled
+@inner
 def rebase(now: Any, points: FloatArray, marks: IntArray) -> None:
     """Move every free slice to where it is, make the moments anew and start the map here.
 
@@ -96,7 +96,7 @@ def rebase(now: Any, points: FloatArray, marks: IntArray) -> None:
         now.status = ESCAPED
 
 
-@compiled
+@inner
 def leave(now: Any, u: float, w: float) -> None:
     """Take a slice at (u, w) out of the moments of the free ones."""
     n = now.free
@@ -115,7 +115,7 @@ def leave(now: Any, u: float, w: float) -> None:
     now.mw -= b / (n - 1.0)
 
 
-@compiled
+@inner
 def enter(now: Any, points: FloatArray, j: int, y: float, v: float) -> None:
     """Give slice j the point (u, w) that the map takes to place y and speed v now, and add it to the moments."""
     n = now.free

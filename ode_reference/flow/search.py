@@ -14,9 +14,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ode_reference.flow.compiled import compiled
 from ode_reference.flow.layout import NEAR, PLACE, SIDE, SPEED, STILL, WATCHED, IntArray
 from ode_reference.flow.series import FORCE, PULL, ROWS, SQUARE, A, B, Z, slope, value
+from slicemodel.compiled import inner
 from slicemodel.trajectory import FloatArray
 
 POLYNOMIAL = ROWS
@@ -35,7 +35,7 @@ ROUNDING = 1e-13
 """Magnitude, against that of its summands, below which a first coefficient is zero: the sign of the next decides."""
 
 
-@compiled
+@inner
 def first_zero(table: FloatArray, order: int, x: float) -> tuple[float, bool]:
     """Return the first zero in [x, 1] of the polynomial, positive or zero at x, and whether it is one; NONE if none.
 
@@ -64,7 +64,7 @@ def first_zero(table: FloatArray, order: int, x: float) -> tuple[float, bool]:
     return x, False
 
 
-@compiled
+@inner
 def without_leading_zeros(now: Any, table: FloatArray, order: int, unit: float) -> int:
     """Divide the polynomial by the power of x that it has as a factor, but for rounding; return the order of the rest.
 
@@ -80,7 +80,7 @@ def without_leading_zeros(now: Any, table: FloatArray, order: int, unit: float) 
     return order - lead
 
 
-@compiled
+@inner
 def sum_rests(now: Any, table: FloatArray) -> None:
     """Sum the magnitudes of the terms beyond the straight line: what A, B and z can add in this step."""
     rest_A = rest_B = rest_z = 0.0
@@ -91,7 +91,7 @@ def sum_rests(now: Any, table: FloatArray) -> None:
     now.rest_A, now.rest_B, now.rest_z = rest_A, rest_B, rest_z
 
 
-@compiled
+@inner
 def gather(now: Any, points: FloatArray, marks: IntArray) -> None:
     """List the slices that may come near an end within the span; take the extremes of the others, the flock."""
     wall, span = now.wall, now.span
@@ -113,7 +113,7 @@ def gather(now: Any, points: FloatArray, marks: IntArray) -> None:
                 now.fastest = max(now.fastest, abs(w))
 
 
-@compiled
+@inner
 def watch(now: Any, marks: IntArray, i: int) -> None:
     """Put slice i on the list of those that are looked at one by one."""
     if marks[WATCHED, i] == 0:
@@ -122,7 +122,7 @@ def watch(now: Any, marks: IntArray, i: int) -> None:
         now.near += 1
 
 
-@compiled
+@inner
 def flock_is_clear(now: Any, table: FloatArray) -> bool:
     """Return whether no slice of the flock can meet an end in this step."""
     if now.low_u > now.high_u:
@@ -142,7 +142,7 @@ def flock_is_clear(now: Any, table: FloatArray) -> bool:
     return True
 
 
-@compiled
+@inner
 def contact(now: Any, table: FloatArray, points: FloatArray, marks: IntArray, j: int, end: float) -> tuple[float, bool]:
     """Return when in the step slice j meets ``end`` (+1 base, -1 cap), and whether it does or may.
 
@@ -167,7 +167,7 @@ def contact(now: Any, table: FloatArray, points: FloatArray, marks: IntArray, j:
     return first_zero(table, p, 0.0)
 
 
-@compiled
+@inner
 def release(now: Any, table: FloatArray, end: float) -> tuple[float, bool]:
     """Return when in the step ``end`` ceases to press on the slices that rest on it, and whether it does or may."""
     p, arm = now.order - 2, end * now.wall - now.centre
@@ -183,7 +183,7 @@ def release(now: Any, table: FloatArray, end: float) -> tuple[float, bool]:
     return first_zero(table, p, 0.0)
 
 
-@compiled
+@inner
 def find(now: Any, table: FloatArray, points: FloatArray, marks: IntArray) -> None:
     """Set ``root`` to the first event of the step, or NONE; ``struck`` or ``released`` say which, if any is certain."""
     now.root, now.struck, now.released = NONE, -1, 0
@@ -203,7 +203,7 @@ def find(now: Any, table: FloatArray, points: FloatArray, marks: IntArray) -> No
         note_release(now, table, -1.0)
 
 
-@compiled
+@inner
 def note_contact(now: Any, table: FloatArray, points: FloatArray, marks: IntArray, j: int, end: float) -> None:
     """Keep the contact of slice j with ``end`` if it comes first."""
     x, certain = contact(now, table, points, marks, j, end)
@@ -211,7 +211,7 @@ def note_contact(now: Any, table: FloatArray, points: FloatArray, marks: IntArra
         now.root, now.struck, now.struck_end = x, j if certain else -1, int(end)
 
 
-@compiled
+@inner
 def note_release(now: Any, table: FloatArray, end: float) -> None:
     """Keep the release from ``end`` if it comes first."""
     x, certain = release(now, table, end)
@@ -219,7 +219,7 @@ def note_release(now: Any, table: FloatArray, end: float) -> None:
         now.root, now.struck, now.released = x, -1, int(end) if certain else 0
 
 
-@compiled
+@inner
 def guessed_step(now: Any, points: FloatArray, marks: IntArray, longest: float) -> float:
     """Return about how long it takes until a watched slice meets an end, at most ``longest`` [s]."""
     h = longest

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ode_reference.flow.compiled import compiled
+from slicemodel.compiled import inner
 from slicemodel.trajectory import FloatArray
 
 MOST = 30
@@ -19,7 +19,7 @@ A, B, Z, THETA, OMEGA, SQUARE, J, FORCE, PULL, U_A, V_B, COS, SIN, SHARE = range
 """Rows of the table: k^2 is SQUARE, f is FORCE, k^2 z is PULL, 1 - kappa J^2/L^2 is SHARE."""
 
 
-@compiled
+@inner
 def product(table: FloatArray, first: int, second: int, k: int) -> float:
     """Return the coefficient k of the product of two rows."""
     found = 0.0
@@ -28,7 +28,7 @@ def product(table: FloatArray, first: int, second: int, k: int) -> float:
     return found
 
 
-@compiled
+@inner
 def inertia_term(now: Any, table: FloatArray, k: int) -> None:
     """Write the coefficient k of J, omega = L/J and k^2 = omega^2 - kappa."""
     table[U_A, k] = now.U * table[A, k] + now.P * table[B, k]
@@ -44,7 +44,7 @@ def inertia_term(now: Any, table: FloatArray, k: int) -> None:
     table[SQUARE, k] = product(table, OMEGA, OMEGA, k) - (now.kappa if k == 0 else 0.0)
 
 
-@compiled
+@inner
 def force_term(now: Any, table: FloatArray, k: int) -> None:
     """Write the coefficient k of f = (1 - kappa J^2/L^2) g cos(theta)."""
     if k == 0:
@@ -64,7 +64,7 @@ def force_term(now: Any, table: FloatArray, k: int) -> None:
         table[FORCE, k] = now.gravity * product(table, SHARE, COS, k)
 
 
-@compiled
+@inner
 def expand(now: Any, table: FloatArray, h: float) -> None:
     """Fill the table with Taylor coefficients times h^k; sets ``order`` and the step ``h`` for which they hold."""
     table[A, 0], table[A, 1] = now.A, h * now.dA
@@ -97,14 +97,14 @@ def expand(now: Any, table: FloatArray, h: float) -> None:
     shorten(now, table, 0.9 / worst)
 
 
-@compiled
+@inner
 def size(now: Any, table: FloatArray, k: int) -> float:
     """Return how large the terms of order k are, without dimension."""
     turned = max(abs(table[A, k]), now.rate * abs(table[B, k]))
     return max(turned, abs(table[Z, k]) / now.wall, abs(table[THETA, k - 1]))  # type: ignore[no-any-return]
 
 
-@compiled
+@inner
 def shorten(now: Any, table: FloatArray, factor: float) -> None:
     """Let the coefficients serve a step that is shorter by ``factor``."""
     power = 1.0
@@ -115,7 +115,7 @@ def shorten(now: Any, table: FloatArray, factor: float) -> None:
     now.h *= factor
 
 
-@compiled
+@inner
 def value(table: FloatArray, row: int, order: int, x: float) -> float:
     """Return the polynomial in a row at ``x``, a fraction of the step."""
     found = table[row, order]
@@ -124,7 +124,7 @@ def value(table: FloatArray, row: int, order: int, x: float) -> float:
     return found  # type: ignore[no-any-return]
 
 
-@compiled
+@inner
 def slope(table: FloatArray, row: int, order: int, x: float) -> float:
     """Return its derivative with respect to ``x``."""
     found = order * table[row, order]
@@ -133,7 +133,7 @@ def slope(table: FloatArray, row: int, order: int, x: float) -> float:
     return found  # type: ignore[no-any-return]
 
 
-@compiled
+@inner
 def advance(now: Any, table: FloatArray, x: float) -> None:
     """Move the state to the fraction ``x`` of the step."""
     p, h = now.order, now.h

@@ -23,8 +23,7 @@ FULL = replace(Scenario(water_mass=1.0).with_slices(20), drag=0.0)
 
 
 def record_of(scenario, switches, free, on_base, on_cap):
-    flight, _ = layout.prepare(scenario, switches, 1e-5, sequential=False, ledger=False)
-    now = flight.view(np.recarray)[0]
+    now, _ = layout.prepare(scenario, switches, 1e-5, sequential=False, ledger=False)
     now.free, now.on_base, now.on_cap = free, on_base, on_cap
     layout.set_body(now)
     return now
@@ -279,6 +278,8 @@ def test_a_batch_names_the_throw_that_cannot_be():
         solve_batch([HALF, replace(HALF, duration=0.2)], times=[0.1, 0.4])
     with pytest.raises(ValueError, match=r"throws\[0\] = 3 is not a slicemodel.Scenario"):
         solve_batch([3])
+    with pytest.raises(ValueError, match=r"jobs = 0 is not a whole number in \[1, 1024\]"):
+        solve_batch([HALF], jobs=0)
     with pytest.raises(ValueError, match=r"times has shape \(1, 2\); 2 throws need"):
         solve_batch([HALF, HALF], times=[[0.1, 0.2]])
     assert len(solve_batch([])) == 0

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import logging
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-import numba.core.caching
 import pytest
-
-from ode_reference.flow import api
 
 ROOT = Path(__file__).resolve().parents[2]
 CODE = (
@@ -24,26 +20,6 @@ CODE = (
 def test_asking_for_the_verb_does_not_load_numba():
     code = "from ode_reference import solve, solve_batch; import sys; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
-def test_the_stamp_is_that_of_every_file_of_the_folder(monkeypatch, tmp_path):
-    for file in Path(api.__file__).parent.glob("*.py"):
-        shutil.copy(file, tmp_path)
-    right = api.stamp()
-    monkeypatch.setattr(api, "__file__", str(tmp_path / "api.py"))
-    assert api.stamp() == right
-    for file in sorted(tmp_path.glob("*.py")):
-        before = file.read_text()
-        file.write_text(before + "\n")
-        assert api.stamp() != right, file.name
-        file.write_text(before)
-
-
-def test_without_a_writable_place_it_is_compiled_in_memory(monkeypatch, caplog):
-    monkeypatch.setattr(numba.core.caching.CacheImpl, "_locator_classes", [])
-    with caplog.at_level(logging.WARNING):
-        api.compiled_loop.__wrapped__()
-    assert "compiling in memory" in caplog.text
 
 
 @pytest.mark.slow

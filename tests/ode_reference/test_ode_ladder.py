@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ode_reference import LAWS, MODELS, solve, solve_batch
-from ode_reference.witness import grazes
 from slicemodel import observables
+from slicemodel.observables import grazes
 from slicemodel.scenario import Bottle, Scenario
 from slicemodel.trajectory import Impacts
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ode_reference import solve
-from ode_reference.witness import TOGETHER, opposite_hits
+from slicemodel.observables import TOGETHER, opposite_hits
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import Impacts
 

@@ -11,11 +11,11 @@ import pytest
 import ode_reference
 from flipproof.cli.fit import add_fit
 from flipproof.film.fit.compare import compare, promise, told, verdict
-from flipproof.film.fit.estimate import THOROUGH, estimate, scan
+from flipproof.film.fit.estimate import estimate, scan
 from flipproof.film.fit.landscape import HUBER, Landscape, loss
 from flipproof.film.fit.problem import ALWAYS, FAR, Measurement, Problem, first_frames, noise_of, pose, predict
 from flipproof.film.fit.reading import Averaged, read_flight
-from flipproof.film.fit.sampling import Points, cool, roughness
+from flipproof.film.fit.sampling import Effort, Points, cool, roughness
 from flipproof.film.fit.temperature import autocovariance, temperature
 from flipproof.film.fit.twins import film
 from flipproof.film.fit.uncertainty import correlation, intervals
@@ -23,7 +23,7 @@ from flipproof.film.tracker.kinematics import angle
 from slicemodel import Scenario
 
 CUT = Scenario().with_slices(20)
-LIGHT = replace(THOROUGH, drags=6, restitutions=4, starts=2, points=60, moves=1, keep=6)
+LIGHT = Effort(drags=6, restitutions=4, starts=2, points=60, moves=1, keep=6)
 SIGMA = 1e-3 * math.sqrt(2) / CUT.bottle.length
 
 
@@ -135,7 +135,7 @@ def test_on_a_plane_estimate_and_intervals_are_those_of_the_textbook(seed):
     problem = plane(seed=seed)
     exact = np.linalg.lstsq(problem.slopes, problem.measured.values, rcond=None)[0]
     covariance = np.linalg.inv(problem.slopes.T @ problem.slopes)
-    found = estimate(problem, replace(THOROUGH, points=200))
+    found = estimate(problem, Effort(points=200))
     # A few residuals lie beyond Huber's three deviations.
     assert found.x == pytest.approx(exact, abs=0.15 * np.sqrt(covariance.diagonal()).min())
     assert found.roughness == pytest.approx(1.0, abs=0.05)
@@ -151,10 +151,10 @@ def test_on_a_plane_estimate_and_intervals_are_those_of_the_textbook(seed):
 def test_a_population_has_the_spread_of_its_temperature():
     problem = plane()
     land = Landscape(problem)
-    seeds = Points.flown(land, scan(land, THOROUGH))
+    seeds = Points.flown(land, scan(land, Effort()))
     spread = np.sqrt(np.linalg.inv(problem.slopes.T @ problem.slopes).diagonal())
     for temperature_ in (1.0, 9.0):
-        cloud = cool(land, seeds, temperature_, replace(THOROUGH, points=200, keep=12), seed=1)
+        cloud = cool(land, seeds, temperature_, Effort(points=200, keep=12), seed=1)
         assert cloud.likely.x.std(axis=0) == pytest.approx(math.sqrt(temperature_) * spread, rel=0.15, abs=0.0)
         assert 0.1 < cloud.accepted < 0.7
 
@@ -163,7 +163,7 @@ def test_folds_in_a_landscape_are_noticed():
     clouds = []
     for folds in (0.0, 0.25):
         land = Landscape(plane(folds))
-        clouds.append(cool(land, Points.flown(land, scan(land, THOROUGH)), 1.0, THOROUGH, seed=1))
+        clouds.append(cool(land, Points.flown(land, scan(land, Effort())), 1.0, Effort(), seed=1))
     assert roughness(clouds[0], 1.0, seed=0) < 1.02
     assert roughness(clouds[1], 1.0, seed=0) > 1.05
 
@@ -206,8 +206,9 @@ def test_ice_tells_neither_drag_nor_restitution():
 
 
 def test_what_intervals_are_worth_is_promised_only_where_it_was_measured():
-    assert promise("midpoint", fits=True) == "intervals that hold drag and restitution together in 95 %"
-    assert "not measured" in promise("free-flight", fits=True)
+    for solver in ("midpoint", "eq8", "free-flight"):
+        assert promise(solver, fits=True) == "intervals that hold drag and restitution together in 95 %"
+    assert "not measured" in promise("published-limit", fits=True)
     for solver in ("midpoint", "free-flight"):
         assert "95" not in promise(solver, fits=False)
 

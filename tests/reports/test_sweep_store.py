@@ -6,6 +6,7 @@ import os
 import sqlite3
 import tomllib
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from flipproof.sweep.export import LEFT_OUT, check_export, export
 from flipproof.sweep.files import whole_file
 from flipproof.sweep.schema import columns
 from flipproof.sweep.store import Store
-from flipproof.sweep.work import OUTCOMES, Outcome, Returned, code_identity, make_batch, make_point
+from flipproof.sweep.work import OUTCOMES, Outcome, Returned, code_identity, make_batch, make_point, make_together
 
 TEXT = """
 [scenario]
@@ -111,6 +112,48 @@ def test_what_is_not_known_is_null_with_a_reason():
     assert [outcome.status for outcome in points[:6]] == ["ok"] * 4 + ["impossible"] * 2
     assert "water_mass = 1.25 kg exceeds the bottle's capacity" in points[4].reason
     assert points[4].seconds == 0.0
+
+
+@pytest.mark.parametrize("settings", ["", "rest_speed = 1e-4\ntimes = [0.01, 0.02]", 'impact_law = "sequential"'])
+@pytest.mark.parametrize("model", ["eq8", "free-flight", "switches:110000"])
+def test_points_solved_together_are_those_solved_alone(monkeypatch, model, settings):
+    fields = "omega0 = {from = -20.0, to = 25.0, count = 7}\nn_slices = [3, 8]\nfill_fraction = [0.25, 1.0, 1.25]"
+    text = f"""
+[scenario]
+duration = 0.2
+drag = 0.3
+[sweep]
+design = "grid"
+[sweep.fields]
+{fields}
+[[solvers]]
+name = "{model}"
+{settings.replace("[0.01, 0.02]", "[0.1, 0.2]")}
+"""
+    points = [design(text).point(number) for number in range(42)]
+    alone = [make_point(point) for point in points]
+    together = make_together(points)
+    assert [without_seconds(one) for one in together] == [without_seconds(one) for one in alone]
+    assert {one.status for one in alone} == {"ok", "impossible"}
+    monkeypatch.setattr("flipproof.sweep.work.TOGETHER", 5)
+    batch = make_batch(code_identity(), points, False)
+    assert [without_seconds(one) for one in batch.outcomes] == [without_seconds(one) for one in alone]
+
+
+def without_seconds(outcome):
+    """Return an outcome but for what it cost, its numbers to the last bit."""
+    return repr(replace(outcome, seconds=0.0))
+
+
+def test_points_that_cannot_be_solved_together_are_made_one_by_one():
+    by_method = [design().point(number) for number in range(4)]
+    assert make_together(by_method) is None  # method and max_step are of the integration
+    refused = design(TEXT.replace('method = "DOP853"\nmax_step = 0.01', "times = [3.0]"))
+    points = [refused.point(number) for number in range(4)]
+    assert make_together(points) is None
+    assert [one.status for one in make_batch(code_identity(), points, False).outcomes] == ["failed"] * 4
+    mixed = [design().point(0), design().point(6)]
+    assert make_together(mixed) is None
 
 
 def test_an_unfinished_flight_has_no_numbers_of_its_end():

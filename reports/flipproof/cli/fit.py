@@ -7,7 +7,6 @@ import math
 import shlex
 import sys
 from collections.abc import Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,7 @@ def add_fit(commands: Any) -> None:
     fit.add_argument("--scenario", metavar="THROW.toml", help=f"what is known: bottle, water, release; {SCENARIO_HELP}")
     fit.add_argument(
         "--model", nargs="+", default=list(MODELS), metavar="NAME", help="equations to fit and compare, see 'flipproof "
-        "models'; midpoint solves eq8, several hundred times faster (default midpoint)",
+        "models'; midpoint solves eq8 in steps of 0.5 ms (default midpoint)",
     )  # fmt: skip
     fit.add_argument(
         "--also", nargs="+", default=[], choices=("omega0", "theta0"), help="fit these too, instead of trusting the "
@@ -34,8 +33,7 @@ def add_fit(commands: Any) -> None:
     )  # fmt: skip
     fit.add_argument("--starts", type=count, metavar="K", help="descents from different starts (default 4)")
     fit.add_argument(
-        "--slices", type=count, metavar="N", help="slices of every throw, alpha/2m unchanged (50; 20 when an equation "
-        "is integrated event by event)",
+        "--slices", type=count, metavar="N", help="slices of every throw, alpha/2m unchanged (50)",
     )  # fmt: skip
     fit.add_argument("--quantity", choices=("theta", "omega"), help="column to fit (theta if there is one)")
     fit.add_argument(
@@ -51,7 +49,6 @@ def add_fit(commands: Any) -> None:
     fit.add_argument("--base", metavar="NAME", help="track of the base in a Tracker export")
     fit.add_argument("--length-unit", default="", metavar="UNIT", help="of a Tracker export: m, cm, mm")
     fit.add_argument("--out", type=Path, metavar="DIR", help="folder for figures, residuals and summary.json")
-    fit.add_argument("--jobs", type=count, metavar="N", help="worker processes for costly equations (one per core)")
 
 
 def command_fit(options: argparse.Namespace) -> int:
@@ -72,11 +69,10 @@ def command_fit(options: argparse.Namespace) -> int:
     from flipproof.film.fit.compare import compare
     from flipproof.film.fit.problem import pose
 
-    slices = options.slices or _common_slices(options.model, throw.n_slices)
     also = tuple(options.also)
-    problems = [pose(measured, throw, name, also=also, slices=slices) for name in options.model]
+    problems = [pose(measured, throw, name, also=also, slices=options.slices) for name in options.model]
     remarks += _disagreements(problems[0], throw, also)
-    contenders = compare(_estimates(problems, options.starts, options.jobs))
+    contenders = compare(_estimates(problems, options.starts))
     text = _report(contenders, remarks)
     if options.out is not None:
         from flipproof.film.fit.folder import write
@@ -111,14 +107,6 @@ def _read(options: argparse.Namespace) -> tuple[Any, list[str]]:
     return measured, [words]
 
 
-def _common_slices(models: Sequence[str], most: int) -> int:
-    """Return the slices that all equations are compared at."""
-    from flipproof.film.fit.problem import EVENT_SLICES, SCHEME_SLICES, is_scheme
-
-    schemes = [is_scheme(name) for name in models]
-    return min(most, SCHEME_SLICES if all(schemes) else EVENT_SLICES)
-
-
 def _disagreements(problem: Any, throw: Any, also: tuple[str, ...]) -> list[str]:
     """Return what of the scenario the first frames contradict although it is not fitted."""
     from flipproof.film.fit.problem import first_frames
@@ -133,28 +121,21 @@ def _disagreements(problem: Any, throw: Any, also: tuple[str, ...]) -> list[str]
     ]
 
 
-def _estimates(problems: Sequence[Any], starts: int | None, jobs: int | None) -> list[Any]:
+def _estimates(problems: Sequence[Any], starts: int | None) -> list[Any]:
     """Fit one problem after the other under a bar that counts flights."""
     from dataclasses import replace
 
     from tqdm import tqdm
 
-    from flipproof.film.fit.estimate import effort_for, estimate
-    from flipproof.film.fit.problem import is_scheme
+    from flipproof.film.fit.estimate import estimate
+    from flipproof.film.fit.sampling import USUAL
 
-    with ExitStack() as stack:
-        pool = None
-        if not all(is_scheme(problem.solver) for problem in problems):
-            from flipproof.frame.pool import workers
-
-            pool = stack.enter_context(workers(jobs))
-        bar = stack.enter_context(tqdm(unit="flight", disable=None, leave=False))
+    effort = replace(USUAL, starts=starts) if starts else USUAL
+    with tqdm(unit="flight", disable=None, leave=False) as bar:
         estimates = []
         for problem in problems:
             bar.set_description(problem.solver)
-            effort = effort_for(problem.solver)
-            effort = replace(effort, starts=starts) if starts else effort
-            estimates.append(estimate(problem, effort, tick=bar.update, pool=pool))
+            estimates.append(estimate(problem, effort, tick=bar.update))
         return estimates
 
 

@@ -102,7 +102,7 @@ class Point:
 
     def key(self, code: str) -> str:
         """Return the SHA-256 of the parameters, floats bit by bit, and of the code that makes the point."""
-        text = json.dumps(_exact({**self.parameters(), "code": code}), sort_keys=True, separators=(",", ":"))
+        text = _dumps(_exact({**self.parameters(), "code": code}))
         return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -113,12 +113,17 @@ def from_parameters(text: str) -> Point:
     return Point(0, (), throw, stated["solver"], stated["settings"])
 
 
+_dumps = json.JSONEncoder(sort_keys=True, separators=(",", ":")).encode
+
+
 def _exact(value: Any) -> Any:
+    if isinstance(value, float):
+        return value.hex()
+    if isinstance(value, str | int):
+        return value
     if isinstance(value, Mapping):
         return {key: _exact(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_exact(item) for item in value]
-    return value.hex() if isinstance(value, float) else value
+    return [_exact(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

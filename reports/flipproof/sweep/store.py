@@ -75,6 +75,7 @@ class Store:
             damaged, if another program is writing to it, or if it cannot be written.
         """
         self.folder, self.design, self.code = folder, design, code
+        self._kinds = kinds(design)[:-1]
         self._lock = ExitStack()
         self._rows: sqlite3.Connection | None = None
         with self._plainly():
@@ -219,7 +220,7 @@ class Store:
     def _signed(self, cells: Sequence[Any]) -> tuple[Any, ...]:
         """Return cells with their checksum; cells that the tables refuse, and will say so, get none."""
         try:
-            return (*cells, checksum(cells, kinds(self.design)[:-1]))
+            return (*cells, checksum(cells, self._kinds))
         except (ValueError, TypeError, OverflowError):
             return (*cells, "")
 

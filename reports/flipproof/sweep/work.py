@@ -1,7 +1,8 @@
 """What a worker does: it makes points, and says by which code and under which versions.
 
 Nothing here knows which machine it runs on. A point is made by ``flipproof.frame.solvers.make``, as a run of a report
-is, and depends on nothing but its own parameters: batches, workers and resuming cannot change a bit of it.
+is, or with others by ``ode_reference.solve_batch``, which gives the same to the last bit; it depends on nothing but its
+own parameters: batches, workers and resuming cannot change a bit of it.
 """
 
 from __future__ import annotations
@@ -15,17 +16,20 @@ from dataclasses import dataclass
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.frame.solvers import Run, make
+from flipproof.frame.solvers import Run, find, make
 from flipproof.output.provenance import provenance
 from flipproof.sweep.design import Point
 from slicemodel.observables import centre_of_mass_velocity, plateau
-from slicemodel.scenario import ScenarioError
+from slicemodel.scenario import Scenario, ScenarioError
 from slicemodel.trajectory import STATUSES, FloatArray, Trajectory
+
+if TYPE_CHECKING:
+    from ode_reference.flow.api import Flown
 
 WHOLE: Final = ("ok", "escaped")
 """Statuses of a trajectory that reached the end of the flight."""
@@ -40,6 +44,12 @@ OUTCOMES: Final = {
 
 SOURCES: Final = ("slicemodel", "ode_reference", "engine_check", "flipproof.frame.solvers", "flipproof.sweep.work")
 """What a point's numbers depend on."""
+
+TOGETHER: Final = 64
+"""Points of the reference that are solved by one call: enough to share what a call costs, 5 MB of output."""
+
+SHARED: Final = {"times", "rest_speed", "impact_law", "energy"}
+"""Settings of the reference that ``solve_batch`` takes; others are of its slower methods."""
 
 CURVES: Final = ("omega", "theta", "r_cm", "v_cm")
 """What a row's curves show, in their order [rad/s, rad, m, m/s]."""
@@ -121,7 +131,7 @@ def versions() -> Mapping[str, str]:
 
 
 def make_batch(code: str, points: Sequence[Point], keep: bool, curves: int = 0) -> Returned:
-    """Make points one after the other; if the caller's ``code`` is not the code here, make none.
+    """Make points by one process; if the caller's ``code`` is not the code here, make none.
 
     Parameters
     ----------
@@ -131,8 +141,40 @@ def make_batch(code: str, points: Sequence[Point], keep: bool, curves: int = 0) 
     """
     began = time.perf_counter()
     here = code_identity()
-    outcomes = [make_point(point, keep, curves) for point in points] if here == code else []
+    outcomes: list[Outcome] = []
+    for begin in range(0, len(points) if here == code else 0, TOGETHER):
+        some = points[begin : begin + TOGETHER]
+        made = None if keep or curves else make_together(some)
+        outcomes += made or [make_point(point, keep, curves) for point in some]
     return Returned(here, versions(), outcomes, time.perf_counter() - began)
+
+
+def make_together(points: Sequence[Point]) -> list[Outcome] | None:
+    """Make points of one equation of the reference by one call; None where they must be made one by one."""
+    solver, settings = points[0].solver, points[0].settings
+    if any(point.solver != solver or point.settings != settings for point in points):
+        return None
+    if find(solver).package != "ode_reference" or not settings.keys() <= SHARED:
+        return None
+    from ode_reference import solve_batch
+
+    throws: list[Scenario] = []
+    outcomes: dict[int, Outcome] = {}
+    began = time.perf_counter()
+    for point in points:
+        try:
+            throws.append(point.scenario())
+        except ScenarioError as error:
+            outcomes[point.number] = Outcome(number=point.number, status="impossible", reason=str(error))
+    try:
+        flights = solve_batch(throws, solver, jobs=1, **settings).flights
+    except Exception:
+        # One of them cannot be solved: alone each says what is wrong with it.
+        return None
+    seconds = (time.perf_counter() - began) / len(points)
+    possible = (point.number for point in points if point.number not in outcomes)
+    outcomes |= {number: _read(number, flight, seconds) for number, flight in zip(possible, flights, strict=True)}
+    return [outcomes[point.number] for point in points]
 
 
 def make_point(point: Point, keep: bool = False, curves: int = 0) -> Outcome:
@@ -150,7 +192,10 @@ def make_point(point: Point, keep: bool = False, curves: int = 0) -> Outcome:
         return Outcome(number=point.number, status="failed", reason=f"{type(error).__name__}: {error}", seconds=seconds)
     if made.trajectory is None:
         return Outcome(number=point.number, status="failed", reason=made.reason, seconds=made.seconds)
-    return _read(point.number, made.trajectory, made.seconds, keep, curves)
+    kept = _arrays(made.trajectory) if keep else None
+    whole = made.trajectory.status in WHOLE
+    shown = curves_of(made.trajectory, curves) if curves and whole else None
+    return _read(point.number, made.trajectory, made.seconds, kept, shown)
 
 
 def curves_of(flight: Trajectory, points: int) -> FloatArray:
@@ -164,7 +209,15 @@ def curves_of(flight: Trajectory, points: int) -> FloatArray:
     return np.array([np.interp(times, flight.t, curve) for curve in (flight.omega, flight.theta, flight.r_cm, v_cm)])
 
 
-def _read(number: int, flight: Trajectory, seconds: float, keep: bool, curves: int) -> Outcome:
+def _read(
+    number: int,
+    flight: Trajectory | Flown,
+    seconds: float,
+    arrays: Arrays | None = None,
+    curves: FloatArray | None = None,
+) -> Outcome:
+    if len(flight.t) == 0:
+        return Outcome(number=number, status="failed", reason=f"{flight.status}: {flight.message}", seconds=seconds)
     values: dict[str, float | None] = dict.fromkeys(("plateau", "omega_end", "theta_end", "r_cm_end"))
     reasons = []
     if flight.status in WHOLE:
@@ -191,8 +244,8 @@ def _read(number: int, flight: Trajectory, seconds: float, keep: bool, curves: i
         message=flight.message,
         reason="; ".join(reasons),
         seconds=seconds,
-        arrays=_arrays(flight) if keep else None,
-        curves=curves_of(flight, curves) if curves and flight.status in WHOLE else None,
+        arrays=arrays,
+        curves=curves,
     )
 
 

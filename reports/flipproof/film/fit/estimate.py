@@ -9,16 +9,15 @@ descended from once more.
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from flipproof.film.fit.landscape import Landscape, Tick, loss
-from flipproof.film.fit.problem import Problem, is_scheme
+from flipproof.film.fit.problem import Problem
 from flipproof.film.fit.profile import profile
-from flipproof.film.fit.sampling import Cloud, Effort, Points, cool, roughness
+from flipproof.film.fit.sampling import USUAL, Cloud, Effort, Points, cool, roughness
 from flipproof.film.fit.temperature import fits, temperature
 from slicemodel.trajectory import FloatArray
 
@@ -30,17 +29,6 @@ LIKELY: Final = 5.024
 
 NEARLY: Final = 30.0
 """chi^2 above the lowest up to which a descent's end seeds the population with its neighbourhood."""
-
-THOROUGH: Final = Effort()
-"""For schemes, whose flights cost less than a millisecond."""
-
-SPARING: Final = Effort(drags=7, restitutions=5, starts=4, points=40, moves=1, keep=6, pushes=3)
-"""For equations integrated event by event, whose flights cost a tenth of a second."""
-
-
-def effort_for(solver: str) -> Effort:
-    """Return ``THOROUGH`` for a scheme and ``SPARING`` for others."""
-    return THOROUGH if is_scheme(solver) else SPARING
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,10 +79,9 @@ class Estimate:
 
 def estimate(
     problem: Problem,
-    effort: Effort | None = None,
+    effort: Effort = USUAL,
     *,
     tick: Tick = lambda _: None,
-    pool: Executor | None = None,
     seed: int = 0,
 ) -> Estimate:
     """Return the least-squares estimate and the cloud of what else the data allow.
@@ -102,13 +89,11 @@ def estimate(
     Parameters
     ----------
     problem : Problem
-    effort : Effort or None - None: ``effort_for`` the solver
+    effort : Effort
     tick : callable - called with the number of flights made
-    pool : Executor or None - makes flights of costly equations side by side; the result does not depend on it
     seed : int - of the population's random numbers
     """
-    effort = effort or effort_for(problem.solver)
-    land = Landscape(problem, tick=tick, pool=pool)
+    land = Landscape(problem, tick=tick)
     scanned, ends, residuals = _descents(land, effort)
     if effort.again and not _explained(residuals, problem):
         # Either the equation is wrong, or every descent ended in a side minimum: look between the starts.

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Executor
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.film.fit.problem import Problem, is_scheme
+from flipproof.film.fit.problem import Problem
 from slicemodel.trajectory import FloatArray
 
 HUBER: Final = 3.0
 """Residuals beyond this many standard deviations count linearly (Huber's loss), so that a slipped marker does not
 decide; within it nothing changes."""
-
-PARTS: Final = 16
-"""Jobs that many flights are dealt out in."""
 
 Index = NDArray[np.intp]
 Tick = Callable[[int], object]
@@ -31,29 +27,22 @@ class Landscape:
     problem : Problem
     scale : float - residuals are divided by ``problem.noise * scale`` before the loss
     tick : callable - called with the number of flights that were made
-    pool : Executor or None - makes flights of costly equations side by side
     """
 
-    def __init__(
-        self, problem: Problem, *, scale: float = 1.0, tick: Tick = lambda _: None, pool: Executor | None = None
-    ) -> None:
-        self.problem, self.scale, self.tick, self.pool = problem, scale, tick, pool
+    def __init__(self, problem: Problem, *, scale: float = 1.0, tick: Tick = lambda _: None) -> None:
+        self.problem, self.scale, self.tick = problem, scale, tick
         self.low, self.high = problem.bounds()
         self.flights = 0
 
     def rescaled(self, scale: float) -> Landscape:
         """Return the same landscape in other units of residuals; flights are counted on."""
-        other = Landscape(self.problem, scale=scale, tick=self.tick, pool=self.pool)
+        other = Landscape(self.problem, scale=scale, tick=self.tick)
         other.flights = self.flights
         return other
 
     def residuals(self, points: FloatArray) -> FloatArray:
         """Return the residuals at many points (M, K) in standard deviations, shape (M, P)."""
-        if self.pool is None or len(points) < 2 or is_scheme(self.problem.solver):
-            rows = self.problem.residuals(points)
-        else:
-            parts = np.array_split(points, min(len(points), PARTS))
-            rows = np.concatenate(list(self.pool.map(self.problem.residuals, parts)))
+        rows = self.problem.residuals(points)
         self.flights += len(points)
         self.tick(len(points))
         return np.asarray(rows / self.scale)

@@ -33,9 +33,8 @@ MOST_DAMPING: Final = 5.0
 """Largest damping rate that is searched, in units of |omega0|: there a slice creeps less than a fifth of its distance
 from the centre in the time the bottle turns by 2 rad."""
 
-SCHEME_SLICES: Final = 50
-EVENT_SLICES: Final = 20
-"""Slices of a throw by an equation that is integrated event by event, where a rebound costs a millisecond."""
+SLICES: Final = 50
+"""Slices that a throw is cut into, unless it is cut into fewer."""
 
 FAR: Final = 1e6
 """Residual, in standard deviations, of a flight that the solver could not finish."""
@@ -232,14 +231,10 @@ def flights(throws: Sequence[Scenario], solver: str, times: FloatArray) -> tuple
         steps = math.ceil(throws[0].duration / STEP) + 1
         batch = solve_batch(throws, solver, steps)
         return sampled(np.linspace(0.0, throws[0].duration, steps), batch.theta, batch.omega, times)
-    from ode_reference.solver import solve as integrate
+    from ode_reference import solve_batch as solve_exactly
 
-    theta, omega = (np.full((len(throws), len(times)), np.nan) for _ in range(2))
-    for row, throw in enumerate(throws):
-        loosest = max(min(0.04 / abs(throw.omega0), throw.duration), 1e-5 * throw.duration)
-        run = integrate(throw, model=solver, method="DOP853", rtol=1e-8, max_step=loosest, times=times)
-        theta[row, : len(run.t)], omega[row, : len(run.t)] = run.theta, run.omega
-    return theta, omega
+    flown = solve_exactly(throws, solver, times)
+    return flown.theta, flown.omega
 
 
 def sampled(grid: FloatArray, theta: FloatArray, omega: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -257,7 +252,7 @@ def sampled(grid: FloatArray, theta: FloatArray, omega: FloatArray, times: Float
 
 
 def is_scheme(solver: str) -> bool:
-    """Return whether a solver is a scheme of the slice model, whose runs cost less than a millisecond.
+    """Return whether a solver is a scheme of the slice model; if not it is a model of the reference.
 
     Raises
     ------
@@ -289,7 +284,7 @@ def pose(
     throw : Scenario - what is known of the throw; its duration gives way to the measured one
     solver : str
     also : names from ``ALSO`` - fitted too; they start from the measurement's first frames
-    slices : int or None - None: ``SCHEME_SLICES`` or ``EVENT_SLICES``, or the throw's if fewer
+    slices : int or None - None: ``SLICES``, or the throw's if fewer
 
     Raises
     ------
@@ -299,9 +294,8 @@ def pose(
     for name in also:
         if name not in ALSO:
             raise ValueError(unknown_name("also =", name, ALSO))
-    if slices is None:
-        slices = min(throw.n_slices, SCHEME_SLICES if is_scheme(solver) else EVENT_SLICES)
-    known = replace(throw.with_slices(slices), duration=float(measured.t[-1]))
+    is_scheme(solver)  # an engine is refused here
+    known = replace(throw.with_slices(slices or min(throw.n_slices, SLICES)), duration=float(measured.t[-1]))
     guess = first_frames(measured)
     first = {name: guess[name] for name in also if name in guess}
     if first.get("omega0") == 0.0:

@@ -61,6 +61,10 @@ class Effort:
     pushes: int = 10
 
 
+USUAL: Final = Effort()
+"""What a fit may cost unless another effort is asked for."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Points:
     """Points of the landscape that were flown.

@@ -14,7 +14,7 @@ from flipproof.film.fit.estimate import Estimate, estimate
 from flipproof.film.fit.landscape import loss
 from flipproof.film.fit.problem import Measurement, Quantity, flights, pose
 from flipproof.film.fit.reading import Averaged
-from flipproof.film.fit.sampling import Effort
+from flipproof.film.fit.sampling import USUAL, Effort
 from flipproof.film.fit.uncertainty import Interval, intervals
 from flipproof.film.tracker.kinematics import angle
 from slicemodel import Scenario
@@ -145,7 +145,7 @@ def fit_twin(
     slices: int,
     also: tuple[str, ...] = (),
     quantity: Quantity = "theta",
-    effort: Effort | None = None,
+    effort: Effort = USUAL,
 ) -> Twin:
     """Draw a truth, film it, forget it, and fit the film with the equation that made it.
 
@@ -156,7 +156,7 @@ def fit_twin(
     slices : int
     also : names from ``ALSO`` that are fitted; others are known exactly
     quantity : "theta" from Eq. 1, or "omega" as the paper makes it of theta
-    effort : Effort or None - as ``estimate``
+    effort : Effort - as ``estimate``
     """
     truth = draw_truth(seed, slices)
     t, cap, base = film(truth, solver, seed)

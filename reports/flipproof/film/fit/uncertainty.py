@@ -48,8 +48,8 @@ class Interval:
 def intervals(estimate: Estimate) -> tuple[Interval, ...]:
     """Return the interval of every free parameter; those of drag and restitution are to hold together in 95 % of cases.
 
-    Counted on flights that the fitted equation had made (``benchmarks/twins.py``): schemes hold it, for equations
-    integrated event by event too few were tried to tell.
+    Counted on flights that the fitted equation had made (``benchmarks/twins.py``): "midpoint", "eq8" and "free-flight"
+    hold it.
 
     Its ends are the farther of two: the quantiles of the cloud (1.25 % on either side, their distance from the median
     widened for roughness), and those of the profile likelihood (``Estimate.reach``). On a smooth landscape the two are
