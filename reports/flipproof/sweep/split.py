@@ -58,7 +58,8 @@ def make_split(
         If a run is not whole: a split needs all of them; else as for ``flipproof.sweep.command.sweep``.
     """
     runs = plan_split(throw)
-    design = design_of_runs(runs, {"omega0": [throw.omega0]}, ENDS, "flipproof waterfall")
+    releases = list(dict.fromkeys(run.scenario.omega0 for run in runs))
+    design = design_of_runs(runs, {"omega0": releases}, ENDS, "flipproof waterfall")
     if damaged:
         return salvage(damaged, out, design, code_identity())
     with completed(design, out, begin, jobs=jobs, dask=dask, export_to=export_to) as (store, summary):
