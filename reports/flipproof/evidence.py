@@ -24,7 +24,7 @@ from flipproof.frame.solvers import Made, Run, make, without_gravity
 from flipproof.frame.stages import Stages
 from flipproof.frame.twins import CUT, KINDS, twin_tag, twins, usual_rest_speed
 from flipproof.instruments import Bench, Instruments, plan_instruments, plan_witnesses, study_instruments
-from flipproof.paper.runs import REPORT, PaperRuns, PaperSize, gather_paper
+from flipproof.paper.runs import PaperRuns, gather_paper
 from flipproof.paper.verdicts import PaperVerdicts, gather_verdicts
 from flipproof.studies import contenders
 from flipproof.studies.contenders import Effort
@@ -118,7 +118,7 @@ class Size:
     scope: Scope
     bench: Bench
     precision: Effort | None
-    paper: PaperSize | None
+    paper: bool
 
 
 FULL = Size(
@@ -129,7 +129,7 @@ FULL = Size(
     scope=Scope(waterfall_slices=50, map_slices=50, map_cells=20),
     bench=instruments.FULL,
     precision=contenders.FULL,
-    paper=REPORT,
+    paper=True,
 )
 QUICK = Size(
     name="quick",
@@ -146,7 +146,7 @@ QUICK = Size(
     ),
     bench=instruments.QUICK,
     precision=None,
-    paper=None,
+    paper=False,
 )
 
 
@@ -271,7 +271,7 @@ def gather(
             check_starts = _study_starts(pool, REFERENCE, f"{CHECK}, ", made, 4)
             attribution = study_attribution(throw, size.scope, size.steps, made, pool, audit, charts)
         with stages.lap("the paper"):
-            paper = _gather_paper(pool, size.paper, progress) if size.paper is not None else None
+            paper = _gather_paper(pool, progress) if size.paper else None
 
     differences = tuple(_differences(made))
     return Evidence(
@@ -307,8 +307,8 @@ def gather(
     )
 
 
-def _gather_paper(pool: Executor, size: PaperSize, progress: Progress) -> Paper:
-    runs = gather_paper(pool, size, progress, costs=False)
+def _gather_paper(pool: Executor, progress: Progress) -> Paper:
+    runs = gather_paper(pool, progress, costs=False)
     return Paper(runs=runs, verdicts=gather_verdicts(pool, runs, progress))
 
 

@@ -23,7 +23,7 @@ from flipproof.paper.figures_panels import (
     stretched,
     table_grid,
 )
-from flipproof.paper.figures_words import SECTION, listed, same_slices_words, settings_words
+from flipproof.paper.figures_words import SECTION, listed, settings_words
 from flipproof.paper.parameters import number, numbers
 from flipproof.paper.runs import PUBLISHED, SOLVERS, PaperRuns
 from slicemodel import Trajectory
@@ -94,7 +94,7 @@ def turns(runs: PaperRuns, name: str, label: Label) -> str:
 
 
 def _exhibit(runs: PaperRuns, name: str, title: str, caption: str, alt: str, grid: Grid) -> Exhibit:
-    settings = same_slices_words() if name.startswith("5") else settings_words(runs)
+    settings = settings_words()
     return Exhibit(
         name=f"paper-{name}",
         section=SECTION,
@@ -162,8 +162,7 @@ def exhibits_5d(runs: PaperRuns) -> Iterator[Exhibit]:
         runs, "5d", "what the number of slices N does to ω(t)",
         "In the upper rows the damping rate α/2m is kept and the curves close up with N. With α itself kept (bottom "
         "row, another scale) the published program stands still at N = 20, where α/2m equals ω₀, and spins up beyond "
-        "ω₀ with more, so that the paper cannot have meant that. Event-driven runs go up to "
-        f"N = {runs.size.most_slices}.",
+        "ω₀ with more, so that the paper cannot have meant that.",
         "Line plots of omega against time, three rows by three solvers. Mean omega over omega_0 of the second half at "
         f"10 per second: {plateaus(runs, 'slices', SLICES)}. At 5 per second: "
         f"{plateaus(runs, 'slices at 5 /s', SLICES)}. With alpha 1: {plateaus(runs, 'slices at alpha 1', SLICES)}.",

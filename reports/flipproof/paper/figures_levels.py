@@ -251,7 +251,7 @@ def _exhibit(runs: PaperRuns, name: str, title: str, caption: str, alt: str, gri
         name=f"paper-{name}",
         section=SECTION,
         title=f"Fig. {name}: {title}",
-        caption=f"{caption} {settings_words(runs)}",
+        caption=f"{caption} {settings_words()}",
         alt=alt,
         maker=figure_grid,
         data=(grid,),
