@@ -227,11 +227,11 @@ def test_an_unknown_figure_is_answered_in_one_line_with_the_list(name, tmp_path)
 
 def test_a_folder_with_other_files_is_refused_before_anything_flies(tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
-    with pytest.raises(OutputError, match="holds files that are not a flipproof report"):
+    with pytest.raises(OutputError, match="and not flipproof"):
         command("--figure", "2b", "--out", tmp_path)
 
 
-def test_the_command_writes_figures_numbers_and_a_page(tmp_path, monkeypatch, capsys, read_page):
+def test_the_command_writes_figures_numbers_and_a_page(tmp_path, capsys, read_page):
     out = tmp_path / "figures"
     for _ in range(2):  # the second takes the place of the first
         assert command("--figure", "2b", "--out", out, "--jobs", "1") == 0

@@ -28,7 +28,7 @@ CUT: Final = 10.0
 
 RELEASE, REST = "twin in release", "twin in rest speed"
 KINDS: Final = (RELEASE, REST)
-WORDS: Final = f"the larger change when ω₀ is {CHANGE:g} faster and when the rest speed is cut {CUT:g}-fold"
+BAND_WORDS: Final = f"the larger change when ω₀ is {CHANGE:g} faster and when the rest speed is cut {CUT:g}-fold"
 
 
 def twin_tag(tag: str, kind: str) -> str:

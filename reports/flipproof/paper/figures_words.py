@@ -14,7 +14,10 @@ SECTION: Final = "paper"
 def settings_words() -> str:
     """Return how the runs were made: slices and bands."""
     own = ", ".join(f"{_plain(BANDS[solver])} ({NAMES[solver]})" for solver in BANDS)
-    return f"Every solver has the paper's own slices, the published program its steps; Eq. 8 and free flight are solved exactly between impacts. As fractions of ω₀ the event-driven ω is certain to {own}."
+    return (
+        f"Every solver has the paper's own slices, and the published program its steps; Eq. 8 and free flight are "
+        f"solved exactly between impacts. As fractions of ω₀ the event-driven ω is certain to {own}."
+    )
 
 
 def listed(values: Mapping[str, Mapping[str, float]], digits: int = 3) -> str:

@@ -123,7 +123,7 @@ def gather_paper(
     """
     planned = list(_planned(keys))
     thinned = [pool.submit(_make_group, planned[k : k + GROUP]) for k in range(0, len(planned), GROUP)]
-    made = {}
+    made: dict[tuple[str, str], Made] = {}
     for future in thinned:
         made |= future.result()
         progress(len(made), len(planned), next(reversed(made))[1])
