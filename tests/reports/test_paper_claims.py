@@ -618,7 +618,7 @@ def runs():
     planned = plan_further()
     further = {pair: make(run) for pair, run in planned.items() if pair[0] in (PUBLISHED, "eq8-weightless")}
     tenth = paper_throw(0.1).with_slices(50)
-    made["free-flight", "filling 0.1"] = make(Run("tenth", "free-flight", tenth, {}))
+    made["free-flight", "filling 0.1"] = make(Run("tenth", "free-flight", tenth))
     everything = [*made.values(), *further.values(), *halves["slices"].values(), *halves["steps"].values()]
     assert not [each.reason for each in everything if each.trajectory is None]
     return ClaimRuns(
@@ -699,9 +699,7 @@ def test_weight_is_what_slows_the_bottle_filled_to_a_tenth(runs):
 
 def test_free_flight_does_not_know_where_down_is():
     made = {
-        ("free-flight", case.key): make(
-            Run(case.key, "free-flight", case.scenario.with_slices(5), {"method": "DOP853", "rtol": 1e-6})
-        )
+        ("free-flight", case.key): make(Run(case.key, "free-flight", case.scenario.with_slices(5)))
         for case in family("angle")
     }
     runs = ClaimRuns(paper=PaperRuns(made=made, costs=()), further={}, halved={})
