@@ -10,6 +10,7 @@ every combination of assumptions was flown; else what it changes in the order of
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -18,6 +19,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from flipproof.frame.processes import WorkerDiedError
 from flipproof.frame.solvers import Made, Run, make
 from flipproof.frame.twins import KINDS, band, twin_tag, twins
 from flipproof.studies.waterfall import NAMES, canonical, fair_share
@@ -256,7 +258,11 @@ def gather_map(
     pending = [pool.submit(make_readings, runs[k : k + CHUNK]) for k in range(0, len(runs), CHUNK)]
 
     def gathered() -> ValidityMap:
-        readings = {name: reading for chunk in pending for name, reading in chunk.result().items()}
+        readings: dict[str, Reading] = {}
+        for chunk in pending:
+            # Cells of a chunk whose worker died stay "not run".
+            with contextlib.suppress(WorkerDiedError):
+                readings |= chunk.result()
         return study_readings(throw, axis, fills, values, readings, steps=steps, shares=True)
 
     return gathered
