@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field
-from typing import Any, Final, TypeVar
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from flipproof.studies.model_form import ModelForm, Richardson, richardson, stud
 from flipproof.studies.predictability import Predictability, plan_predictability, study_predictability
 from flipproof.studies.step_size import plan_step_size
 from flipproof.studies.tube import Tube, study_tube
-from flipproof.studies.validity import COARSE, ValidityMap, plan_map, study_map
+from flipproof.studies.validity import Axis, ValidityMap, gather_map, map_axes
 from flipproof.studies.waterfall import Waterfall, plan_finer, plan_waterfall, study_waterfall
 from ode_reference.models import LADDER
 from slicemodel import Scenario, Trajectory
@@ -50,25 +50,21 @@ COMMON: Final = 37
 
 LEDGER_SLICES: Final = 20
 FROZEN_SCHEME: Final = "exact-step"
-GAMMAS: Final = (0.05, 0.15, 0.25, 0.35, 0.5)
-RESTITUTIONS: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
-TURNS: Final = (0.005, 0.01, 0.02, 0.05, 0.1)
-FILLS: Final = (0.1, 0.25, 0.4, 0.55, 0.75, 1.0)
+MAPPED: Final[tuple[Axis, ...]] = ("gamma", "step", "restitution")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scope:
     """How much of it.
 
-    Slices of the waterfall (those of the throw, if they are fewer) and of the maps; columns and rows of the maps (none:
-    no maps); sizes of the changed releases; models held against exact solutions; pairs of scheme and equation whose
+    Slices of the waterfall (those of the throw, if they are fewer) and of the maps; rows, and columns, of a map (0: no
+    maps); sizes of the changed releases; models held against exact solutions; pairs of scheme and equation whose
     error is fitted.
     """
 
     waterfall_slices: int
     map_slices: int
-    fills: tuple[float, ...]
-    rows: int
+    map_cells: int
     perturbations: tuple[float, ...] = PERTURBATIONS
     exact: tuple[str, ...] = EXACT
     forms: tuple[tuple[str, str], ...] = FORMS
@@ -92,11 +88,15 @@ class Attribution:
     problems: Mapping[str, str] = field(default_factory=dict)
 
 
-def axes_of(scope: Scope) -> Iterator[tuple[Any, tuple[float, ...]]]:
-    """Yield axis and values of every map."""
-    if scope.fills:
-        for axis, values in (("gamma", GAMMAS), ("step", TURNS), ("restitution", RESTITUTIONS)):
-            yield axis, values[:: max(1, len(values) // scope.rows)][: scope.rows]
+def begin_maps(
+    pool: Executor, throw: Scenario, scope: Scope, steps: int
+) -> list[tuple[str, Callable[[], ValidityMap]]]:
+    """Have workers make every map; return axes, and what waits for the map of each."""
+    if not scope.map_cells:
+        return []
+    cut = throw.with_slices(scope.map_slices)
+    ends = [(axis, map_axes(axis, scope.map_cells, scope.map_cells)) for axis in MAPPED]
+    return [(axis, gather_map(pool, cut, axis, fills, values, steps=steps)) for axis, (fills, values) in ends]
 
 
 def plan_attribution(throw: Scenario, scope: Scope, steps: int) -> list[Run]:
@@ -112,9 +112,6 @@ def plan_attribution(throw: Scenario, scope: Scope, steps: int) -> list[Run]:
     runs += plan_frozen(throw, FROZEN_SCHEME, steps)
     few = throw.with_slices(LEDGER_SLICES)
     runs += [Run(f"ledger, {model}", model, few, {"energy": True}) for model in LADDER]
-    small = throw.with_slices(scope.map_slices)
-    for axis, values in axes_of(scope):
-        runs += plan_map(small, axis, scope.fills, values, steps=steps, tolerances=COARSE, shares=True)
     return list({run.tag: run for run in runs}.values())
 
 
@@ -147,10 +144,12 @@ def study_attribution(
     made: Mapping[str, Made],
     pool: Executor,
     audit: Future[tuple[Erratum, ...]],
+    charts: Sequence[tuple[str, Callable[[], ValidityMap]]] = (),
 ) -> Attribution:
     """Study what ``plan_attribution`` planned.
 
-    ``made`` maps its tags to what became of them; ``audit`` is the errata study, already under way in ``pool``.
+    ``made`` maps its tags to what became of them; ``audit`` is the errata study and ``charts`` are the maps of
+    ``begin_maps``, already under way in ``pool``.
     """
     problems: dict[str, str] = {}
     fits = {pair: _submit_form(pool, throw, pair, made) for pair in scope.forms}
@@ -179,7 +178,6 @@ def study_attribution(
         steps = [float(np.mean([r.settings["dt"] for r in level])) for level in members]
         return richardson(steps, [float(np.mean([r.omega[-1] for r in level])) / throw.omega0 for level in members])
 
-    small = throw.with_slices(scope.map_slices)
     exact = {model: pool.submit(study_digits, model) for model in scope.exact}
     falls = attempt(
         "waterfall",
@@ -197,12 +195,7 @@ def study_attribution(
         pair: attempt(f"{pair[0]} against {pair[1]}", fit.result) if fit is not None else None
         for pair, fit in fits.items()
     }
-    maps = [
-        attempt(f"map over {axis}", lambda axis=axis, values=values: study_map(  # type: ignore[misc]
-            small, axis, scope.fills, values, made, steps=steps, shares=True
-        ))
-        for axis, values in axes_of(scope)
-    ]  # fmt: skip
+    maps = [attempt(f"map over {axis}", gathered) for axis, gathered in charts]
     frozen = attempt(
         "frozen coefficients",
         lambda: study_frozen(run(plan_frozen(throw, FROZEN_SCHEME, steps)[0].tag), run("attribution, eq8")),

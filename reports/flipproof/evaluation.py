@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from flipproof import claims, claims_engines
 from flipproof.claims_work_precision import claim_work_precision
-from flipproof.evidence import CHECK, CROSS_CHECKED, ENGINE, ICED, LIMITS, Evidence
+from flipproof.evidence import CHECK, CROSS_CHECKED, ENGINE, ICED, LIMITS, WITNESS, Evidence
 from flipproof.frame.findings import Finding
 from flipproof.vectors import load_all
 from ode_reference.models import LADDER
@@ -113,11 +113,11 @@ def _order_findings(evidence: Evidence) -> Iterator[Finding]:
 def _reference_findings(evidence: Evidence) -> Iterator[Finding]:
     for model in LADDER:
         tag = f"{CHECK}, {model}"
-        usual, tight = evidence.trajectory(tag), evidence.trajectory(f"{tag}, tighter")
-        if usual is None or tight is None:
-            yield _missing(evidence, f"reference-{model}", f"{model} is converged", tag, f"{tag}, tighter")
+        usual, witness = evidence.trajectory(tag), evidence.trajectory(f"{tag}, {WITNESS}")
+        if usual is None or witness is None:
+            yield _missing(evidence, f"reference-{model}", f"{model} is converged", tag, f"{tag}, {WITNESS}")
         else:
-            yield claims.claim_reference_converged(usual, tight)
+            yield claims.claim_reference_converged(usual, witness)
         ledger = evidence.trajectory(f"{CHECK}, ledger, {model}")
         if ledger is None:
             yield _missing(

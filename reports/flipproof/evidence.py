@@ -10,12 +10,21 @@ from typing import Any
 import numpy as np
 
 from flipproof import instruments, vectors
-from flipproof.attribution import FILLS, FORMS, LEDGER_SLICES, Attribution, Scope, plan_attribution, study_attribution
+from flipproof.attribution import (
+    FORMS,
+    LEDGER_SLICES,
+    Attribution,
+    Scope,
+    begin_maps,
+    plan_attribution,
+    study_attribution,
+)
 from flipproof.frame.pool import Progress, make_all, workers
 from flipproof.frame.solvers import Made, Run, make, without_gravity
 from flipproof.frame.stages import Stages
+from flipproof.frame.twins import CUT, KINDS, twin_tag, twins, usual_rest_speed
 from flipproof.instruments import Bench, Instruments, plan_instruments, plan_witnesses, study_instruments
-from flipproof.paper.runs import REPORT, PaperRuns, PaperSize, gather_paper
+from flipproof.paper.runs import PaperRuns, gather_paper
 from flipproof.paper.verdicts import PaperVerdicts, gather_verdicts
 from flipproof.studies import contenders
 from flipproof.studies.contenders import Effort
@@ -42,6 +51,9 @@ OTHERS = (
     *(tag for tag in instruments.WITNESSES if tag not in FLIGHTS),
 )
 ICED = ("published-limit", "eq8", FREE)
+WITNESS = "solve_ivp DOP853"
+"""Leads no run of its own: the tag of an equation's run by the witness ends with it."""
+
 CROSS_CHECKED = ("published-limit", "eq8")
 """Models that a second integration method is held against."""
 
@@ -106,7 +118,7 @@ class Size:
     scope: Scope
     bench: Bench
     precision: Effort | None
-    paper: PaperSize | None
+    paper: bool
 
 
 FULL = Size(
@@ -114,10 +126,10 @@ FULL = Size(
     levels=7,
     counts=(5, 10, 20, 50, 100, 200, 500),
     second_method="Radau",
-    scope=Scope(waterfall_slices=50, map_slices=12, fills=FILLS, rows=5),
+    scope=Scope(waterfall_slices=50, map_slices=50, map_cells=20),
     bench=instruments.FULL,
     precision=contenders.FULL,
-    paper=REPORT,
+    paper=True,
 )
 QUICK = Size(
     name="quick",
@@ -125,17 +137,16 @@ QUICK = Size(
     counts=(5, 20, 50, 200),
     second_method=None,
     scope=Scope(
-        waterfall_slices=10,
-        map_slices=10,
-        fills=(),
-        rows=0,
+        waterfall_slices=50,
+        map_slices=50,
+        map_cells=0,
         perturbations=(1e-9,),
         exact=("free-flight",),
         forms=FORMS[:2],
     ),
     bench=instruments.QUICK,
     precision=None,
-    paper=None,
+    paper=False,
 )
 
 
@@ -185,17 +196,14 @@ def plan(throw: Scenario, size: Size) -> list[Run]:
         Run(f"{CHECK}, {ENGINE}, no gravity", ENGINE, without_gravity(REFERENCE), {"dt": CHECK_DT}),
         Run(f"{CHECK}, {ENGINE}", ENGINE, REFERENCE, {"dt": CHECK_DT}),
     ]
+    if size.second_method:
+        other = {"method": size.second_method}
+        runs += [Run(f"{CHECK}, {m}, {size.second_method}", m, REFERENCE, other) for m in CROSS_CHECKED]
+    runs += [Run(f"{CHECK}, {m}, {WITNESS}", m, REFERENCE, witnessed(REFERENCE, m)) for m in reversed(LADDER)]
     for prefix, scenario in ((f"{CHECK}, ", REFERENCE), ("", throw)):
-        if size.second_method:
-            other = {"method": size.second_method}
-            runs += [
-                Run(f"{prefix}{m}, {size.second_method}", m, scenario, other, confirms=f"{prefix}{m}")
-                for m in CROSS_CHECKED
-            ]
         for model in reversed(LADDER):
-            tag = f"{prefix}{model}"
-            runs.append(Run(f"{tag}, tighter", model, scenario, _tighter(scenario, model), confirms=tag))
-            runs.append(Run(tag, model, scenario))
+            usual = Run(f"{prefix}{model}", model, scenario)
+            runs += [usual, *twins(usual)]
     runs += [Run(f"{CHECK}, ledger, {m}", m, REFERENCE.with_slices(LEDGER_SLICES), {"energy": True}) for m in LADDER]
     runs += plan_welded(REFERENCE.with_slices(WELDED_SLICES), ENGINE)
     runs.append(Run(f"{ENGINE}, 10 iterations", ENGINE, throw, {"iterations": 10}))
@@ -216,10 +224,9 @@ def plan(throw: Scenario, size: Size) -> list[Run]:
     return runs
 
 
-def _tighter(scenario: Scenario, model: str) -> dict[str, Any]:
-    """Return a tenth of the usual rest speed of the reference, and an integration with short steps."""
-    rest_speed = 1e-4 if model == FREE else 1e-6
-    longest = 0.01 / abs(scenario.omega0)
+def witnessed(scenario: Scenario, model: str) -> dict[str, Any]:
+    """Return the settings of the witness: short steps, tight tolerances and a tenth of the usual rest speed."""
+    longest, rest_speed = 0.01 / abs(scenario.omega0), usual_rest_speed(model) / CUT
     return {"method": "DOP853", "rtol": 1e-11, "atol": 1e-14, "rest_speed": rest_speed, "max_step": longest}
 
 
@@ -257,12 +264,14 @@ def gather(
         with stages.lap("work and precision"):
             # After the other runs, so that the compiled loop is there and its compiling is not counted.
             precision = gather_work_precision(pool, size.precision) if size.precision is not None else ()
+        with stages.lap("validity maps"):
+            charts = begin_maps(pool, throw, size.scope, size.steps)
         with stages.lap("studies"):
             starts = _study_starts(pool, throw, "", made, size.levels)
             check_starts = _study_starts(pool, REFERENCE, f"{CHECK}, ", made, 4)
-            attribution = study_attribution(throw, size.scope, size.steps, made, pool, audit)
+            attribution = study_attribution(throw, size.scope, size.steps, made, pool, audit, charts)
         with stages.lap("the paper"):
-            paper = _gather_paper(pool, size.paper, progress) if size.paper is not None else None
+            paper = _gather_paper(pool, progress) if size.paper else None
 
     differences = tuple(_differences(made))
     return Evidence(
@@ -298,8 +307,8 @@ def gather(
     )
 
 
-def _gather_paper(pool: Executor, size: PaperSize, progress: Progress) -> Paper:
-    runs = gather_paper(pool, size, progress, costs=False)
+def _gather_paper(pool: Executor, progress: Progress) -> Paper:
+    runs = gather_paper(pool, progress, costs=False)
     return Paper(runs=runs, verdicts=gather_verdicts(pool, runs, progress))
 
 
@@ -307,9 +316,8 @@ def run_bands(made: Mapping[str, Made]) -> dict[str, float]:
     """Return each flight's numerical band as a fraction of omega_0.
 
     A scheme at its number of steps is a definite program: its step error is a difference with a bar of its own, so its
-    band is zero. For a model it is the largest change of omega in a run that was planned to confirm it
-    (``Run.confirms``: tolerances and rest speed a tenth, longest step a half; another method), and never less than
-    MODEL_FLOOR; for an engine that of its certificate.
+    band is zero. For a model it is the largest change of omega in its twins (``Run.confirms``: another release in the
+    eleventh digit, a tenth of the rest speed), and never less than MODEL_FLOOR; for an engine that of its certificate.
     """
     bands = dict.fromkeys(LIMITS, 0.0)
     for better in made.values():
@@ -328,12 +336,12 @@ def run_bands(made: Mapping[str, Made]) -> dict[str, float]:
 
 
 def _band_over_time(made: Mapping[str, Made]) -> FloatArray | None:
-    """Return up to when free flight has moved by how much under tenfold tighter tolerances, fraction of omega_0."""
-    usual, tight = made[FREE].trajectory, made[f"{FREE}, tighter"].trajectory
-    if usual is None or tight is None or len(usual.t) != len(tight.t):
+    """Return up to when the twins of free flight have moved by how much, fraction of omega_0."""
+    usual, *others = (made[tag].trajectory for tag in (FREE, *(twin_tag(FREE, kind) for kind in KINDS)))
+    if usual is None or any(other is None or len(usual.t) != len(other.t) for other in others):
         return None
-    moved = np.abs(tight.omega - usual.omega) / abs(usual.scenario.omega0)
-    return np.asarray(np.maximum.accumulate(np.maximum(moved, MODEL_FLOOR)))
+    moved = [np.abs(other.omega - usual.omega) / abs(usual.scenario.omega0) for other in others if other is not None]
+    return np.asarray(np.maximum.accumulate(np.max([*moved, np.full(len(usual.t), MODEL_FLOOR)], axis=0)))
 
 
 def _differences(made: Mapping[str, Made]) -> Iterator[Difference]:

@@ -14,6 +14,7 @@ from flipproof.figures.frozen import figure_frozen
 from flipproof.figures.validity import CONTOURS, errors, figure_map
 from flipproof.figures.waterfall import figure_waterfall
 from flipproof.frame.exhibit import Exhibit
+from flipproof.frame.twins import BAND_WORDS
 from flipproof.studies.frozen import QUANTITIES
 from flipproof.studies.validity import RUNGS, ValidityMap
 from flipproof.studies.waterfall import Waterfall
@@ -134,7 +135,7 @@ def _draw_predictability(found: Attribution) -> Exhibit:
 def _draw_maps(found: Attribution) -> Iterator[Exhibit]:
     for study in found.maps:
         dominant = study.dominant
-        which = "step down the ladder" if study.shares is None else "fair share (mean over all orders of mending)"
+        which = "fair share (mean over all orders of mending)"
         contours = (
             "the contours are where a scheme is 1 % and 10 % of ω₀ off its own equation."
             if study.axis == "step"
@@ -148,7 +149,8 @@ def _draw_maps(found: Attribution) -> Iterator[Exhibit]:
             section="maps",
             title=f"Validity over filling and {AXES[study.axis]}",
             caption=f"Every cell is a throw. Its colour names the assumption with the largest {which} in the plateau, "
-            f"the mean of ω/ω₀ over the second half; {contours} Hatched cells could not be computed.",
+            f"the mean of ω/ω₀ over the second half; {contours} Hatched cells could not be computed."
+            f"{_band_words(study)}",
             alt=f"Map of {dominant.size} throws of {study.slices} slices, fill fraction {study.fills[0]:g} to "
             f"{study.fills[-1]:g} by {AXES[study.axis]} {study.values[0]:g} to {study.values[-1]:g}. Cells by "
             f"largest {which}: {counts or 'none could be computed'}. {_within(study)}",
@@ -156,6 +158,17 @@ def _draw_maps(found: Attribution) -> Iterator[Exhibit]:
             data=(study,),
             table=tables.table_map(study),
         )
+
+
+def _band_words(study: ValidityMap) -> str:
+    """Return how certain free flight, the most sensitive equation, is in the cells."""
+    known = np.array([]) if study.band is None else study.band[np.isfinite(study.band)]
+    if not len(known):
+        return ""
+    return (
+        f" The plateau of free flight is certain to {np.median(known):.1g} in the median cell and {known.max():.1g} in "
+        f"the worst: {BAND_WORDS}."
+    )
 
 
 def _within(study: ValidityMap) -> str:

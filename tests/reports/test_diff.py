@@ -37,7 +37,7 @@ SIZE = dataclasses.replace(
     with_slices(QUICK, THROW.n_slices),
     levels=4,
     counts=(3, 6),
-    scope=Scope(waterfall_slices=2, map_slices=4, fills=(), rows=0, perturbations=(1e-9,), exact=(), forms=()),
+    scope=Scope(waterfall_slices=2, map_slices=4, map_cells=0, perturbations=(1e-9,), exact=(), forms=()),
     bench=Bench(
         layout=Layout(panels=((18.0, 10),), dt=(2e-3, 2e-4), iterations=(10, 90), duration=0.1, budget=2e6),
         reach=Reach(solvers=("pymunk",), sizes=(1e-9,), seeds=(1,), slices=3),

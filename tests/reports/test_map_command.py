@@ -22,7 +22,7 @@ from flipproof.sweep.design import design_of
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.local import Workers
 from flipproof.sweep.planned import design_of_runs, read_runs
-from flipproof.sweep.split import ENDS, plan_split, split_rows, waterfall_csv
+from flipproof.sweep.split import ENDS, plan_split, releases, split_rows, waterfall_csv
 from flipproof.sweep.store import Store
 from flipproof.sweep.validity_map import Plan, map_csv, map_facts
 from flipproof.sweep.work import code_identity, make_batch
@@ -223,7 +223,7 @@ def split(tmp_path_factory):
     """Return the throw of a waterfall, its runs, and a folder in which half of them were made twice over."""
     throw = Scenario(duration=0.1).with_slices(2)
     runs = plan_split(throw)
-    design = design_of_runs(runs, {"omega0": [throw.omega0]}, ENDS, "test")
+    design = design_of_runs(runs, releases(runs), ENDS, "test")
     out = tmp_path_factory.mktemp("split") / "out"
     for part in (range(0, design.size, 2), range(1, design.size, 2)):
         with Store(out, design, code_identity()) as store:
@@ -260,11 +260,11 @@ def test_the_waterfall_command_draws_every_observable(capsys, tmp_path, monkeypa
     status, out, err = run(capsys, *options, "--quiet")
     assert (status, err) == (0, "")
     assert "published program" in out
-    assert "81 points" in out
+    assert "162 points" in out
     for observable in OBSERVABLES:
         assert (tmp_path / "out" / f"waterfall-{observable.name}.png").stat().st_size > 10_000
     status, out, _ = run(capsys, *options)
-    assert "; 81 were there" in out
+    assert "; 162 were there" in out
 
 
 @pytest.mark.parametrize(

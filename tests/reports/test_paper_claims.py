@@ -19,7 +19,7 @@ from flipproof.paper.claims_cost import many_steps_key, same_steps_key
 from flipproof.paper.claims_model import finest_key
 from flipproof.paper.observe import Flights, MissingFlightError
 from flipproof.paper.parameters import numbers, paper_throw
-from flipproof.paper.runs import BANDS, FULL, PUBLISHED, REPORT, SOLVERS, PaperRuns, plan_paper, scenario_of
+from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS, PaperRuns, plan_paper, scenario_of
 from flipproof.paper.statements import OMEGA, Reading
 from flipproof.paper.verdicts import judge_paper
 from slicemodel import Trajectory
@@ -535,16 +535,15 @@ def test_statements_stand_once_each_with_all_their_words():
     assert all(claim.place and claim.says.endswith(".") and claim.means.endswith(".") for claim in CLAIMS)
 
 
-@pytest.mark.parametrize("size", [FULL, REPORT])
-def test_further_runs_repeat_none_of_the_figures(size):
-    figures = {run.tag for run in plan_paper(size)}
-    further, halved = plan_further(size), plan_halved(size)
+def test_further_runs_repeat_none_of_the_figures():
+    figures = {run.tag for run in plan_paper()}
+    further, halved = plan_further(), plan_halved()
     tags = [run.tag for run in (*further.values(), *halved.values())]
     assert len(set(tags)) == len(tags)
     assert not figures & set(tags)
     for (solver, key), run in halved.items():
         if key in all_cases():
-            usual = scenario_of(solver, all_cases()[key], size)
+            usual = scenario_of(solver, all_cases()[key])
             assert run.scenario.n_slices == usual.n_slices // 2
             assert run.scenario.damping_rate == pytest.approx(usual.damping_rate)
     for damping in ("", " at 5 /s"):
@@ -574,13 +573,13 @@ def test_gathering_keeps_what_belongs_together(monkeypatch):
     scenario = replace(THROW, duration=0.01)
     one = Run("one", PUBLISHED, scenario, {"steps": 5, "store": "summary"})
     two = Run("two", PUBLISHED, replace(scenario, omega0=10.0), {"steps": 5, "store": "summary"})
-    monkeypatch.setattr(claim_runs, "plan_further", lambda _: {(PUBLISHED, "a"): one})
-    monkeypatch.setattr(claim_runs, "plan_halved", lambda _: {("eq8", "a"): two})
+    monkeypatch.setattr(claim_runs, "plan_further", lambda: {(PUBLISHED, "a"): one})
+    monkeypatch.setattr(claim_runs, "plan_halved", lambda: {("eq8", "a"): two})
     three = replace(two, tag="three", scenario=replace(scenario, omega0=15.0))
     four = replace(two, tag="four", scenario=replace(scenario, omega0=16.0))
     half = {"slices": three, "steps": four}
     monkeypatch.setattr(claim_runs, "plan_published", lambda of: {(PUBLISHED, "a"): (half[of], 1)})
-    paper = PaperRuns(size=REPORT, made={}, costs=())
+    paper = PaperRuns(made={}, costs=())
     with ThreadPoolExecutor(1) as pool:
         runs = gather_claims(pool, paper, lambda *_: None)
     assert runs.trajectory(PUBLISHED, "a").scenario.omega0 == 20.0
@@ -616,14 +615,14 @@ def runs():
     }
     for key, case in cases.items():
         made[PUBLISHED, key] = make(Run(key, PUBLISHED, case.scenario, {"steps": case.steps, "store": store(key)}))
-    planned = plan_further(REPORT)
+    planned = plan_further()
     further = {pair: make(run) for pair, run in planned.items() if pair[0] in (PUBLISHED, "eq8-weightless")}
     tenth = paper_throw(0.1).with_slices(50)
-    made["free-flight", "filling 0.1"] = make(Run("tenth", "free-flight", tenth, {"method": "DOP853", "rtol": 1e-7}))
+    made["free-flight", "filling 0.1"] = make(Run("tenth", "free-flight", tenth))
     everything = [*made.values(), *further.values(), *halves["slices"].values(), *halves["steps"].values()]
     assert not [each.reason for each in everything if each.trajectory is None]
     return ClaimRuns(
-        paper=PaperRuns(size=REPORT, made=made, costs=()), further=further, halved=halves["slices"],
+        paper=PaperRuns(made=made, costs=()), further=further, halved=halves["slices"],
         half_steps=halves["steps"],
     )  # fmt: skip
 
@@ -700,12 +699,10 @@ def test_weight_is_what_slows_the_bottle_filled_to_a_tenth(runs):
 
 def test_free_flight_does_not_know_where_down_is():
     made = {
-        ("free-flight", case.key): make(
-            Run(case.key, "free-flight", case.scenario.with_slices(5), {"method": "DOP853", "rtol": 1e-6})
-        )
+        ("free-flight", case.key): make(Run(case.key, "free-flight", case.scenario.with_slices(5)))
         for case in family("angle")
     }
-    runs = ClaimRuns(paper=PaperRuns(size=REPORT, made=made, costs=()), further={}, halved={})
+    runs = ClaimRuns(paper=PaperRuns(made=made, costs=()), further={}, halved={})
     flights = runs.flights("free-flight")
     angle, drop = judge(BY_ID["release-angle"], flights), judge(BY_ID["drop-later"], flights)
     assert (angle.verdict, drop.verdict) == ("holds", "fails")

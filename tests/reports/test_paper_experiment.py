@@ -13,7 +13,7 @@ from flipproof.paper.claim_runs import ClaimRuns
 from flipproof.paper.experiment import OBSERVATIONS, Comparison, Observation, agreement, closest_overall, compare
 from flipproof.paper.observe import Flights
 from flipproof.paper.parameters import paper_throw
-from flipproof.paper.runs import PUBLISHED, REPORT, SOLVERS, PaperRuns
+from flipproof.paper.runs import PUBLISHED, SOLVERS, PaperRuns
 from flipproof.paper.statements import Reading
 from slicemodel import Trajectory
 
@@ -153,7 +153,7 @@ def test_all_statements_are_compared_for_all_equations():
     for solver in SOLVERS:
         for key, run in flights(experimental).runs.items():
             made[solver, key] = Made(Run(key, solver, run.scenario), run, 0.0)
-    runs = ClaimRuns(paper=PaperRuns(size=REPORT, made=made, costs=()), further={}, halved={})
+    runs = ClaimRuns(paper=PaperRuns(made=made, costs=()), further={}, halved={})
     compared = experiment.compare_all(runs)
     assert [each.observation.id for each in compared] == list(BY_ID)
     assert all(set(each.readings) == set(SOLVERS) for each in compared)

@@ -8,7 +8,6 @@ import math
 import re
 from concurrent.futures import Executor, Future
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -21,12 +20,10 @@ from flipproof.paper.costs import Cost
 from flipproof.paper.figures import FIGURES, ORDER, check_figures, exhibits_paper, keys_of
 from flipproof.paper.figures_bottle import tipping
 from flipproof.paper.figures_panels import Axis, Grid, Line, Panel, figure_grid, ranked, stretched, table_grid
-from flipproof.paper.runs import PUBLISHED, SOLVERS, PaperSize, gather_paper
+from flipproof.paper.runs import PUBLISHED, SOLVERS, gather_paper
 from slicemodel.observables import plateau_of_points, static_toppling_angle, toppling_angle
 
 pytestmark = pytest.mark.xdist_group("paper-figures")
-
-TINY = PaperSize(name="tiny", slices=3, most_slices=10, slice_error={"eq8": 1.0, "free-flight": 1.0})
 
 COSTS = tuple(
     Cost(solver=solver, slices=slices, steps=steps, work=slices * steps, seconds=1e-6 * slices * steps)
@@ -47,7 +44,7 @@ class Here(Executor):
 
 @pytest.fixture(scope="module")
 def runs():
-    return replace(gather_paper(Here(), TINY, lambda *_: None, costs=False), costs=COSTS)
+    return replace(gather_paper(Here(), lambda *_: None, costs=False), costs=COSTS)
 
 
 @pytest.fixture(scope="module")
@@ -230,12 +227,11 @@ def test_an_unknown_figure_is_answered_in_one_line_with_the_list(name, tmp_path)
 
 def test_a_folder_with_other_files_is_refused_before_anything_flies(tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
-    with pytest.raises(OutputError, match="holds files that are not a flipproof report"):
+    with pytest.raises(OutputError, match="and not flipproof"):
         command("--figure", "2b", "--out", tmp_path)
 
 
-def test_the_command_writes_figures_numbers_and_a_page(tmp_path, monkeypatch, capsys, read_page):
-    monkeypatch.setattr(gallery, "make_gallery", partial(gallery.make_gallery, size=TINY))
+def test_the_command_writes_figures_numbers_and_a_page(tmp_path, capsys, read_page):
     out = tmp_path / "figures"
     for _ in range(2):  # the second takes the place of the first
         assert command("--figure", "2b", "--out", out, "--jobs", "1") == 0

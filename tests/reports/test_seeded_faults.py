@@ -10,8 +10,8 @@ import pytest
 
 import slicemodel
 from flipproof.frame.solvers import make
-from flipproof.studies.waterfall import NAMES, STEP, plan_waterfall, study_waterfall
-from ode_reference import combinations, motion, run, solver
+from flipproof.studies.waterfall import NAMES, PROGRAM, STEP, plan_waterfall, study_waterfall
+from ode_reference import combinations, contact, motion, witness
 from slicemodel import Scenario
 
 TESTS = Path(__file__).resolve().parents[1]
@@ -26,15 +26,15 @@ def drop_the_origin(monkeypatch):
 
 def make_recoil_elastic(monkeypatch):
     """The law with recoil is elastic whatever e is; impacts on an immovable tube are sound."""
-    law = solver.LAWS["simultaneous"]
-    wrong = {**solver.LAWS, "simultaneous": lambda x, side, _e, ratio, rest: law(x, side, 1.0, ratio, rest)}
-    monkeypatch.setattr(solver, "LAWS", wrong)
+    law = witness.LAWS["simultaneous"]
+    wrong = {**witness.LAWS, "simultaneous": lambda x, side, _e, ratio, rest: law(x, side, 1.0, ratio, rest)}
+    monkeypatch.setattr(witness, "LAWS", wrong)
 
 
 def flip_the_sign_of_restitution(monkeypatch):
     """A slice goes on into an immovable end with e times its speed, again and again, until it may rest."""
-    law = solver.immovable
-    monkeypatch.setattr(solver, "immovable", lambda x, side, e, ratio, rest: law(x, side, -e, ratio, rest))
+    law = witness.immovable
+    monkeypatch.setattr(witness, "immovable", lambda x, side, e, ratio, rest: law(x, side, -e, ratio, rest))
 
 
 def forget_the_bottle_in_the_inertia(monkeypatch):
@@ -50,24 +50,25 @@ def forget_the_bottle_in_the_inertia(monkeypatch):
 
 def swallow_one_impact_of_free_flight(monkeypatch):
     """The third impact of a run with recoil is missed; as for an event that changed sign unseen, its slice is lost."""
-    find = run.event_wall
+    hit, beyond = witness._Flight._struck, contact.Ends.beyond
     seen, lost = {}, {}
 
-    def forgetful(start, end, path, free, walls):
-        if not path.motion.model.switches.recoil:
-            return find(start, end, path, free, walls)
-        watched = free.copy()
-        watched[lost.get(path.motion, [])] = False
-        found = find(start, end, path, watched, walls)
-        if found is None:
-            return None
-        seen[path.motion] = seen.get(path.motion, 0) + 1
-        if seen[path.motion] != 3:
-            return found
-        lost[path.motion] = [found[1]]
-        return forgetful(start, end, path, free, walls)
+    def forgetful(flight, found):
+        struck = hit(flight, found)
+        if flight.motion.model.switches.recoil and struck.any():
+            seen[flight] = seen.get(flight, 0) + 1
+            if seen[flight] == 3:
+                lost[id(flight.ends)] = np.flatnonzero(struck)
+                struck[:] = 0
+        return struck
 
-    monkeypatch.setattr(run, "event_wall", forgetful)
+    def blind(ends, side, r):
+        found = beyond(ends, side, r)
+        found[lost.get(id(ends), [])] = -1.0
+        return found
+
+    monkeypatch.setattr(witness._Flight, "_struck", forgetful)
+    monkeypatch.setattr(contact.Ends, "beyond", blind)
 
 
 def shift_the_program_by_half_a_step(monkeypatch):
@@ -125,10 +126,11 @@ each_fault = pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.pl
 
 
 def bars():
-    """Return the plateau's bars in the order of the ladder, with every run made in this process."""
+    """Return the plateau's bars in the order of the ladder, every run made here by the method that faults spoil."""
     runs = {}
     for planned in plan_waterfall(THROW, STEPS):
-        trajectory = make(planned).trajectory
+        how = {} if planned.solver == PROGRAM else {"method": "DOP853", "rtol": 1e-9}
+        trajectory = make(dataclasses.replace(planned, settings={**planned.settings, **how})).trajectory
         assert trajectory is not None, planned.tag
         runs[planned.tag] = trajectory
     plateau = study_waterfall(runs)[0]

@@ -12,6 +12,7 @@ from flipproof.attribution import plan_attribution
 from flipproof.evidence import FULL, LADDER, plan, run_bands
 from flipproof.frame.findings import Finding
 from flipproof.frame.solvers import Made, Run
+from flipproof.frame.twins import twins
 from flipproof.studies.differences import first_crossing, study_difference
 from flipproof.studies.ice import study_ice
 from flipproof.studies.slices import study_slices
@@ -191,18 +192,20 @@ def test_largest_change_of_incomparable_runs_is_nan():
 
 
 def reference_run(omega, **settings):
-    usual = {"rtol": 1e-10, "rest_speed": 1e-5, "max_step": 5e-4, "method": "DOP853"}
+    usual = {"rest_speed": 1e-5, "method": "taylor"}
     return dataclasses.replace(curve(omega, method="eq8", solver="ode_reference"), settings=usual | settings)
 
 
 def test_a_run_compared_with_itself_proves_nothing():
     run = reference_run([20, 20, 20])
-    tight = reference_run([20, 20, 20], rtol=1e-11, rest_speed=1e-6, max_step=2.5e-4)
+    integrated = {"method": "DOP853", "rtol": 1e-11, "max_step": 2.5e-4}
+    tight = reference_run([20, 20, 20], rest_speed=1e-6, **integrated)
     assert claims.claim_reference_converged(run, tight).verdict == "pass"
-    assert claims.claim_reference_converged(run, run).failed
-    assert claims.claim_reference_converged(run, reference_run([20, 20, 20], rtol=1e-11, rest_speed=1e-6)).failed
+    assert claims.claim_reference_converged(run, reference_run([20, 20, 20], **integrated)).failed
+    same = reference_run([20, 20, 20], **integrated | {"rest_speed": 1e-6, "method": "taylor"})
+    assert claims.claim_reference_converged(run, same).failed
     assert claims.claim_second_method(run, reference_run([20, 20, 20], method="Radau")).verdict == "pass"
-    assert claims.claim_second_method(run, tight).failed
+    assert claims.claim_second_method(run, run).failed
     floating = dataclasses.replace(run, scenario=dataclasses.replace(SCENARIO, gravity=0.0))
     assert claims.claim_gravity_cancels(run, floating).verdict == "pass"
     assert claims.claim_gravity_cancels(run, run).failed
@@ -223,16 +226,16 @@ def test_bands_of_runs():
 
     runs = {
         "published-limit": made([20, 20], "published-limit"),
-        "published-limit, tighter": made([20, 20], "published-limit", "published-limit"),
+        "published-limit, twin in release": made([20, 20], "published-limit", "published-limit"),
         "eq8": made([20, 20], "eq8"),
-        "eq8, tighter": made([20, 20 + 2e-6], "eq8", "eq8"),
-        "eq8, Radau": made([20, 20 + 4e-6], "eq8", "eq8"),
+        "eq8, twin in release": made([20, 20 + 2e-6], "eq8", "eq8"),
+        "eq8, twin in rest speed": made([20, 20 + 4e-6], "eq8", "eq8"),
         "pymunk": made([20, 20], "pymunk"),
         "mujoco": made([20, 20], "mujoco"),
         # Tags that begin like those above, of throws that are other throws on purpose.
         "eq8, release changed by 1e-06 (+θ₀, +ω₀)": made([20, 20 + 2e-3], "eq8"),
         "eq8, 100 slices": made([20, 21], "eq8"),
-        "check, eq8, tighter": made([20, 22], "eq8", "check, eq8"),
+        "check, eq8, twin in release": made([20, 22], "eq8", "check, eq8"),
     }
     witness = runs["pymunk"].trajectory
     certified = dataclasses.replace(witness, diagnostics={"certificate": {"band": 2e-3}})
@@ -245,7 +248,7 @@ def test_bands_of_runs():
     assert bands["published-python"] == 0.0
 
 
-def test_only_tighter_runs_of_the_same_throw_are_planned_to_confirm_a_run():
+def test_only_twins_are_planned_to_confirm_a_run():
     """A disturbed throw whose tag begins with a model's name once set that model's band: 1.3e-6 where 1e-9 holds."""
     throw = Scenario().with_slices(6)
     runs = [*plan(throw, FULL), *plan_attribution(throw, FULL.scope, FULL.steps)]
@@ -255,6 +258,4 @@ def test_only_tighter_runs_of_the_same_throw_are_planned_to_confirm_a_run():
     assert {run.confirms for run in confirming if run.confirms in LADDER} == set(LADDER)
     for run in confirming:
         confirmed = of[run.confirms]
-        assert (run.solver, run.scenario) == (confirmed.solver, confirmed.scenario)
-        tighter = run.settings.get("rtol", 1.0) <= 1e-11 and run.settings.get("rest_speed", 1.0) <= 1e-4
-        assert tighter or "method" in run.settings
+        assert run in twins(confirmed)

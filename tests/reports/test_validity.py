@@ -1,15 +1,30 @@
 """Maps of validity on made-up plateaus, and a small real one."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import ode_reference
 from flipproof.figures.style import draw
 from flipproof.figures.validity import figure_map
 from flipproof.frame.solvers import Made, Run, make
-from flipproof.studies.validity import COARSE, EXTRA, LADDER, RUNGS, SCHEMES, SETS, cells, plan_map, study_map, vary
+from flipproof.studies.validity import (
+    EXTRA,
+    LADDER,
+    POINTS,
+    RUNGS,
+    SCHEMES,
+    SETS,
+    cells,
+    gather_map,
+    plan_map,
+    study_map,
+    vary,
+)
 from slicemodel import Scenario, Trajectory
+from slicemodel.observables import plateau
 
 THROW = Scenario().with_slices(6)
 FILLS = (0.3, 0.6)
@@ -167,27 +182,45 @@ def test_figures_name_their_axes_with_units_and_their_levels(axis):
     assert draw(figure).svg.startswith("<?xml")
 
 
-def test_a_real_map_agrees_with_the_reference_at_its_usual_tolerances():
-    from ode_reference import solve
-    from slicemodel.observables import plateau
-
+def test_a_real_map_agrees_with_the_reference_and_has_a_band():
     values = (0.25,)
-    for tolerances, band in ((None, 1e-4), (COARSE, 1e-2)):
-        options = {} if tolerances is None else {"tolerances": tolerances}
-        made = {run.tag: make(run) for run in plan_map(THROW, "gamma", FILLS, values, **options)}
-        study = study_map(THROW, "gamma", FILLS, values, made)
-        assert (study.reason == "").all()
-        for column, fill in enumerate(FILLS):
-            for name in ("eq8", "free-flight"):
-                run = solve(vary(THROW, fill=fill), name)
-                usual = plateau(run.t, run.omega, THROW.omega0)
-                assert study.level[name][0, column] == pytest.approx(usual, abs=band)
+    made = {run.tag: make(run) for run in plan_map(THROW, "gamma", FILLS, values, banded=True)}
+    study = study_map(THROW, "gamma", FILLS, values, made)
+    assert (study.reason == "").all()
+    for column, fill in enumerate(FILLS):
+        for name in ("eq8", "free-flight"):
+            run = ode_reference.solve(vary(THROW, fill=fill), name)
+            assert study.level[name][0, column] == pytest.approx(plateau(run.t, run.omega, THROW.omega0), abs=1e-4)
     assert set(study.level) == {*LADDER, *EXTRA}
+    moved = [abs(study.level["free-flight"][0, 0] - level) for level in twin_levels(FILLS[0], values[0])]
+    assert study.band.shape == (1, 2)
+    assert study.band[0, 0] == pytest.approx(max(moved), rel=1e-6, abs=0.0)
+    assert study.band[0, 0] > 0.0
+
+
+def twin_levels(fill, damping):
+    """Plateaus of free flight in a cell, released a little faster and with a tenth of the rest speed."""
+    throw, times = vary(THROW, fill=fill, damping=damping), np.linspace(0.0, THROW.duration, POINTS)
+    faster = replace(throw, omega0=throw.omega0 * (1 + 3e-11))
+    for scenario, how in ((faster, {}), (throw, {"rest_speed": 1e-4})):
+        run = ode_reference.solve(scenario, "free-flight", times=times, **how)
+        yield plateau(run.t, run.omega, scenario.omega0)
+
+
+def test_workers_make_the_map_that_the_runs_make():
+    values = (0.1, 0.4)
+    runs = plan_map(THROW, "step", FILLS, values, shares=True, banded=True)
+    alone = study_map(THROW, "step", FILLS, values, {run.tag: make(run) for run in runs}, shares=True)
+    with ThreadPoolExecutor(2) as pool:
+        gathered = gather_map(pool, THROW, "step", FILLS, values)()
+    np.testing.assert_array_equal(gathered.shares, alone.shares)
+    np.testing.assert_array_equal(gathered.band, alone.band)
+    assert (gathered.reason == "").all()
 
 
 def test_without_gravity_the_weight_is_no_mistake():
     far = replace(THROW, gravity=0.0)
-    made = {run.tag: make(run) for run in plan_map(far, "gamma", (0.5,), (0.25,), tolerances=COARSE)}
+    made = {run.tag: make(run) for run in plan_map(far, "gamma", (0.5,), (0.25,))}
     study = study_map(far, "gamma", (0.5,), (0.25,), made)
     assert study.differences[RUNGS.index("gravity")] == pytest.approx(0.0, abs=1e-3)
     assert study.dominant[0, 0] != RUNGS.index("gravity")

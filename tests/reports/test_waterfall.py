@@ -5,6 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
+import ode_reference
+from flipproof.frame import twins
 from flipproof.studies import waterfall
 from flipproof.studies.waterfall import NAMES, OBSERVABLES, canonical, plan_waterfall, study_waterfall
 from ode_reference.switches import Switches
@@ -31,14 +33,14 @@ def made_up(value: float) -> Trajectory:
     )
 
 
-def split(value_of, *, program=0.0, loosened=0.0):
+def split(value_of, *, program=0.0, moved=0.0, kind=twins.RELEASE):
     runs = {}
     for run in plan_waterfall(THROW, 1000):
         if run.solver == waterfall.PROGRAM:
             runs[run.tag] = made_up(program)
             continue
         value = value_of(Switches.from_name(run.solver))
-        runs[run.tag] = made_up(value + (loosened if ", loose, " in run.tag else 0.0))
+        runs[run.tag] = made_up(value + (moved if run.tag.endswith(kind) else 0.0))
     return study_waterfall(runs)
 
 
@@ -47,14 +49,17 @@ def plateau_bars(result):
     return {bar.name: bar for bar in result[0].bars}
 
 
-def test_the_plan_names_every_equation_once_at_two_tolerances():
+def test_the_plan_names_every_equation_once_and_gives_it_two_twins():
     runs = plan_waterfall(THROW, 1000)
-    assert len({run.tag for run in runs}) == len(runs) == 81
-    for usual, loose in zip(runs[1:41], runs[41:], strict=True):
-        assert usual.solver == loose.solver
-        assert loose.settings["rtol"] == pytest.approx(10 * usual.settings["rtol"])
-        assert loose.settings["rest_speed"] == pytest.approx(10 * usual.settings["rest_speed"])
-        assert loose.settings["max_step"] > usual.settings["max_step"]
+    assert len({run.tag for run in runs}) == len(runs) == 121
+    for usual, release, rest in zip(runs[1:41], runs[41::2], runs[42::2], strict=True):
+        assert usual.solver == release.solver == rest.solver
+        assert release.confirms == rest.confirms == usual.tag
+        assert usual.settings == release.settings == {}
+        assert usual.scenario == rest.scenario
+        assert release.scenario.omega0 / THROW.omega0 - 1 == pytest.approx(twins.CHANGE, rel=1e-4)
+        own = ode_reference.solve(THROW, usual.solver).settings["rest_speed"]
+        assert rest.settings == {"rest_speed": pytest.approx(own / twins.CUT)}
     assert all(canonical(Switches.from_name(run.solver)).name == run.solver for run in runs[1:])
 
 
@@ -89,8 +94,9 @@ def test_every_split_of_every_observable_sums_to_the_whole():
         assert part.largest.name in {bar.name for bar in part.bars}
 
 
-def test_bands_come_from_the_looser_runs():
-    bars = plateau_bars(split(lambda s: 1.0 if s.signs else 0.0, loosened=1e-3))
+@pytest.mark.parametrize("kind", twins.KINDS)
+def test_bands_come_from_the_twins(kind):
+    bars = plateau_bars(split(lambda s: 1.0 if s.signs else 0.0, moved=1e-3, kind=kind))
     for words in NAME_OF.values():
         assert bars[words].forward_band == pytest.approx(2e-3)
         assert bars[words].average_band == pytest.approx(2e-3)
@@ -98,7 +104,7 @@ def test_bands_come_from_the_looser_runs():
 
 def test_a_run_that_is_not_whole_is_named():
     runs = {run.tag: made_up(1.0) for run in plan_waterfall(THROW, 1000)}
-    tag = next(tag for tag in runs if "111111" in tag or "recoil" in tag or "usual" in tag)
+    tag = next(tag for tag in runs if tag != waterfall.PROGRAM_TAG)
     runs[tag] = dataclasses.replace(runs[tag], status="stalled", message="time hardly passes")
     with pytest.raises(ArithmeticError, match="stalled: time hardly passes") as refusal:
         study_waterfall(runs)
@@ -107,8 +113,6 @@ def test_a_run_that_is_not_whole_is_named():
 
 def test_canonical_sets_make_the_same_equation():
     """What ``canonical`` calls idle has no effect: the trajectories are the same to the last bit."""
-    import ode_reference
-
     throw = Scenario(n_slices=4, drag=1.0, duration=0.1)
     for switches in (Switches(drag_on_centre=True, roots=True), Switches(signs=True, drag_on_centre=True, origin=True)):
         assert canonical(switches) != switches

@@ -58,8 +58,8 @@ def find(name: str) -> Solver:
 class Run:
     """One run to make: solver, scenario and settings. ``tag`` tells runs of one solver apart; it must be unique.
 
-    ``confirms`` is the tag of the run whose numerical error this one shows: the same solver on the same throw, by
-    tighter tolerances or another method. "" if it confirms none.
+    ``confirms`` is the tag of the run whose band this one shows, as its twin (``flipproof.frame.twins``). "" if it
+    confirms none.
     """
 
     tag: str

@@ -33,7 +33,7 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.frame.solvers import Run
-from flipproof.studies.validity import LADDER, MEDIUM, RUNGS, Reading, plan_map, study_readings, word
+from flipproof.studies.validity import LADDER, RUNGS, Reading, plan_map, study_readings, word
 from flipproof.sweep.axes import DAMPING, FILL
 from flipproof.sweep.command import Begin, completed
 from flipproof.sweep.files import write_whole
@@ -97,7 +97,7 @@ def plan(throw: Scenario, grid: Grid) -> list[list[Run]]:
     """
     dampings = _dampings(throw, grid)
     throws = [replace(throw, restitution=restitution) for restitution in grid.restitutions]
-    how: dict[str, Any] = {"steps": STEPS, "tolerances": MEDIUM, "points": None, "shares": True}
+    how: dict[str, Any] = {"steps": STEPS, "points": None, "shares": True}
     return [plan_map(t, "gamma", grid.fills, dampings, **how) for t in throws]
 
 
@@ -159,7 +159,7 @@ def pack(
         "version": VERSION,
         "code": code_identity(),
         "throw": throw.to_mapping(),
-        "settings": {"slices": throw.n_slices, "steps": STEPS, "tolerances": dict(MEDIUM)},
+        "settings": {"slices": throw.n_slices, "steps": STEPS},
         "fills": list(grid.fills),
         "gammas": list(grid.gammas),
         "restitutions": list(grid.restitutions),

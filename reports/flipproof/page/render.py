@@ -14,6 +14,7 @@ from flipproof.evidence import FLIGHTS, Evidence
 from flipproof.exhibits_work_precision import tabulate_work_precision
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding
+from flipproof.frame.twins import BAND_WORDS
 from flipproof.instruments import witnesses
 from flipproof.page.headlines import headlines
 from flipproof.page.inline import data_uri, shape
@@ -202,5 +203,6 @@ def render(
         paper=paper,
         assets=read_assets(),
         provenance=provenance,
+        twin_words=BAND_WORDS,
         settings=evidence.scenario.to_toml(),
     )

@@ -17,11 +17,8 @@ from flipproof.paper.parameters import numbers, paper_steps, paper_throw
 from flipproof.paper.runs import (
     GROUP,
     PUBLISHED,
-    RTOL,
     SOLVERS,
-    STEP_ANGLE,
     PaperRuns,
-    PaperSize,
     make_thinned,
     scenario_of,
 )
@@ -50,8 +47,6 @@ WEIGHTLESS_KEY: Final = f"filling {STEADY_FILLING:g}"
 
 EXACT_STEP: Final = "exact-step"
 """The scheme that solves Eq. 8 as printed at the paper's number of time steps."""
-
-ATOL: Final = 1e-10
 
 HALF_WORDS: Final = ", half the slices"
 HALF_STEPS_WORDS: Final = ", half the steps"
@@ -96,7 +91,7 @@ def _flights(solver: str, made: Mapping[str, Made]) -> Flights:
     )
 
 
-def plan_further(size: PaperSize) -> dict[Pair, Run]:
+def plan_further() -> dict[Pair, Run]:
     """Return the runs that no figure needs: finer in slices and in time, and without weight."""
     runs: dict[Pair, Run] = {}
     for name in SLICES:
@@ -104,42 +99,33 @@ def plan_further(size: PaperSize) -> dict[Pair, Run]:
         for solver in EVENT_DRIVEN:
             finest = finest_key(name.removeprefix("slices"))
             runs[solver, finest] = _run(solver, finest, many.scenario.with_slices(FINEST))
-            if scenario_of(solver, many, size) is None:
-                runs[solver, many.key] = _run(solver, many.key, many.scenario)
     for filling in numbers("figure-S1-filling"):
         throw, key, same = paper_throw(filling), many_steps_key(filling), same_steps_key(filling)
         runs[PUBLISHED, key] = _run(PUBLISHED, key, throw, steps=MANY_STEPS)
-        runs["eq8", same] = _run(EXACT_STEP, same, _cut(throw, size), steps=paper_steps())
+        runs["eq8", same] = _run(EXACT_STEP, same, throw, steps=paper_steps())
     light = paper_throw(STEADY_FILLING)
-    runs[WEIGHTLESS, WEIGHTLESS_KEY] = _run(WEIGHTLESS, WEIGHTLESS_KEY, _cut(light, size))
+    runs[WEIGHTLESS, WEIGHTLESS_KEY] = _run(WEIGHTLESS, WEIGHTLESS_KEY, light)
     return runs
 
 
 def _run(solver: str, key: str, scenario: Scenario, steps: int | None = None, words: str = "") -> Run:
-    """Return one run: of a scheme with its steps, of an equation with the tolerances of the figures."""
-    settings: dict[str, Any] = {"steps": steps, "store": "summary"}
-    if steps is None:
-        longest = min(STEP_ANGLE / abs(scenario.omega0), scenario.duration)
-        settings = {"method": "DOP853", "rtol": RTOL, "atol": ATOL, "max_step": longest}
+    """Return one run: of a scheme with its steps, or of an equation."""
+    settings: dict[str, Any] = {} if steps is None else {"steps": steps, "store": "summary"}
     return Run(f"claims, {solver}, {key}{words}", solver, scenario, settings)
 
 
-def _cut(throw: Scenario, size: PaperSize) -> Scenario:
-    return throw.with_slices(min(size.slices, throw.n_slices))
-
-
-def plan_halved(size: PaperSize) -> dict[Pair, Run]:
+def plan_halved() -> dict[Pair, Run]:
     """Return the event-driven flights with half the slices of the figures'."""
     cases: dict[str, Case] = {case.key: case for name in HALVED for case in family(name)}
     runs: dict[Pair, Run] = {}
     for solver in EVENT_DRIVEN:
         for key, case in cases.items():
-            usual = scenario_of(solver, case, size)
+            usual = scenario_of(solver, case)
             if usual is not None and usual.n_slices > 1:
                 half = usual.with_slices(usual.n_slices // 2)
                 runs[solver, key] = _run(solver, key, half, words=HALF_WORDS)
     for filling in numbers("figure-S1-filling"):
-        same, usual = same_steps_key(filling), _cut(paper_throw(filling), size)
+        same, usual = same_steps_key(filling), paper_throw(filling)
         half = usual.with_slices(usual.n_slices // 2)
         runs["eq8", same] = _run(EXACT_STEP, same, half, steps=paper_steps(), words=HALF_WORDS)
     return runs
@@ -170,8 +156,8 @@ def plan_published(half: str) -> dict[Pair, tuple[Run, int]]:
 
 
 def gather_claims(pool: Executor, paper: PaperRuns, progress: Progress) -> ClaimRuns:
-    """Make what the statements need beside the runs of the figures, at the size of those, in the same pool."""
-    further, halved = plan_further(paper.size), plan_halved(paper.size)
+    """Make what the statements need beside the runs of the figures, in the same pool."""
+    further, halved = plan_further(), plan_halved()
     half_slices, half_steps = plan_published("slices"), plan_published("steps")
     jobs = [*half_slices.values(), *half_steps.values()]
     thinned = [pool.submit(make_thinned, jobs[k : k + GROUP]) for k in range(0, len(jobs), GROUP)]

@@ -247,7 +247,7 @@ def exhibits_3b(runs: PaperRuns) -> Iterator[Exhibit]:
         "3b", "the flight as vectors from cap to base",
         "An arrow every 20 ms, its tail the cap. The centre of mass (red) flies the same parabola whatever the solver; "
         "how often the bottle turns while it does so is what they differ in. The launch speed is the paper's 2 m/s, "
-        f"its direction chosen. {settings_words(runs)}",
+        f"its direction chosen. {settings_words()}",
         f"Vector plots of flights, four bottles by three solvers. Angle at 0.5 s, modulo 360 degrees: {words}.",
         figure_vectors, (tuple(rows),), rows_csv(header, cells),
     )  # fmt: skip
@@ -306,7 +306,7 @@ def exhibits_9a(runs: PaperRuns) -> Iterator[Exhibit]:
         "9a", "what the critical toppling angle θ_c is",
         "The half-full bottle on the rim of its base, tilted until its centre of mass (red) stands right above the "
         "rim: tilted further, it topples. The higher the water, the smaller the angle; water where each solver has it "
-        f"at T = 0.5 s. {settings_words(runs)}",
+        f"at T = 0.5 s. {settings_words()}",
         f"Sketches of tilted bottles. Critical toppling angle in degrees: {words}.",
         figure_tipping, (tuple(panels),), rows_csv(("water", "r_CM [m]", "theta_c [degrees]"), rows),
     )  # fmt: skip

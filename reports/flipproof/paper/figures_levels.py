@@ -80,7 +80,7 @@ def exhibits_7b(runs: PaperRuns) -> Iterator[Exhibit]:
         bands=(Band(along="x", low=0.2, high=0.5, label="best filling as the paper has it"),),
     )  # fmt: skip
     yield _exhibit(
-        runs, "7b", "the level ω falls to, over the filling",
+        "7b", "the level ω falls to, over the filling",
         "Filled: mean of the 21 points around the minimum. Open: mean of the second half of the flight; where the two "
         "part there is no plateau. Shaded: the paper's best filling.",
         "Points of omega_f over omega_0 against filling by three solvers. Around the minimum: "
@@ -107,7 +107,7 @@ def exhibits_9b(runs: PaperRuns) -> Iterator[Exhibit]:
     row = _row(readings, at_rest)
     grid = Grid(rows=(row,), x=FILLING, y=(stretched(ANGLE, row),), height=3.2)
     yield _exhibit(
-        runs, "9b", "critical toppling angle θ_c over the filling",
+        "9b", "critical toppling angle θ_c over the filling",
         f"Red: water at rest, highest ({rest[best]:.1f}°) at M̃ = {fine[best]:.2f}. Points: water where the solver has "
         "it, filled where the bottle stands upright again (θ = 2π, as the text says), open at T = 0.5 s (as the "
         "caption says, on landing). A point below the red line is a bottle that topples sooner than the same at rest; "
@@ -132,7 +132,7 @@ def exhibits_9c(runs: PaperRuns) -> Iterator[Exhibit]:
         ),
     )  # fmt: skip
     yield _exhibit(
-        runs, "9c", "velocity of the centre of mass on landing",
+        "9c", "velocity of the centre of mass on landing",
         "Velocity dr_CM/dt along the bottle, positive towards the base as in the table of statements; the paper has it "
         "negative and does not say which way it counts, nor whether "
         "it means θ = 2π (filled) or T = 0.5 s (open). Where the shaded ranges cross, its statement needs points "
@@ -203,7 +203,7 @@ def _cost_exhibit(runs: PaperRuns, name: str, title: str, x: Axis, *, over: str)
     grid = Grid(rows=rows, x=x, y=(WORK, SECONDS), height=2.5)
     exponent = _exponent(runs.costs, over)
     return _exhibit(
-        runs, name, title,
+        name, title,
         "Counted work above, processor time of this machine below. The published program's work is N P by "
         "construction, straight and of slope 1; its time is this program's compiled loop and bends where the fixed "
         "cost of a run dominates. The others evaluate their right-hand side as often as the impacts ask; their output "
@@ -246,12 +246,12 @@ def _longest(costs: Sequence[Cost]) -> float:
     return max((cost.seconds for cost in costs if cost.solver == PUBLISHED), default=math.nan)
 
 
-def _exhibit(runs: PaperRuns, name: str, title: str, caption: str, alt: str, grid: Grid) -> Exhibit:
+def _exhibit(name: str, title: str, caption: str, alt: str, grid: Grid) -> Exhibit:
     return Exhibit(
         name=f"paper-{name}",
         section=SECTION,
         title=f"Fig. {name}: {title}",
-        caption=f"{caption} {settings_words(runs)}",
+        caption=f"{caption} {settings_words()}",
         alt=alt,
         maker=figure_grid,
         data=(grid,),

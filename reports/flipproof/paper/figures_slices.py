@@ -8,7 +8,7 @@ from typing import Final
 from flipproof.frame.exhibit import Exhibit
 from flipproof.paper.cases import Case, family
 from flipproof.paper.figures_panels import DASHED, Axis, Grid, Line, Panel, every_third, figure_grid, ranked, table_grid
-from flipproof.paper.figures_words import SECTION, listed, same_slices_words, settings_words
+from flipproof.paper.figures_words import SECTION, listed, settings_words
 from flipproof.paper.parameters import number
 from flipproof.paper.runs import SOLVERS, PaperRuns
 from slicemodel import Trajectory
@@ -80,7 +80,7 @@ def _exhibit(
             for solver in SOLVERS
         }
     )
-    settings = same_slices_words() if family(family_name)[0].slices_vary else settings_words(runs)
+    settings = settings_words()
     symbol = "alpha" if family_name == "drag" else "beta"
     return Exhibit(
         name=f"paper-{name}",

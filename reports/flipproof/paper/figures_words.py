@@ -6,27 +6,18 @@ from collections.abc import Mapping
 from typing import Final
 
 from flipproof.paper.figures_panels import NAMES
-from flipproof.paper.runs import BANDS, PaperRuns
+from flipproof.paper.runs import BANDS
 
 SECTION: Final = "paper"
 
 
-def settings_words(runs: PaperRuns) -> str:
+def settings_words() -> str:
     """Return how the runs were made: slices and bands."""
-    size = runs.size
     own = ", ".join(f"{_plain(BANDS[solver])} ({NAMES[solver]})" for solver in BANDS)
-    cut = ", ".join(f"{error:g} ({NAMES[solver]})" for solver, error in size.slice_error.items())
     return (
-        f"The published program has the paper's own slices and steps. Eq. 8 and free flight are event-driven, with at "
-        f"most {size.slices} slices at the same damping rate; as fractions of ω₀ their ω is certain to {own} for that "
-        f"number of slices, and at most {cut} from that of 200."
+        f"Every solver has the paper's own slices, and the published program its steps; Eq. 8 and free flight are "
+        f"solved exactly between impacts. As fractions of ω₀ the event-driven ω is certain to {own}."
     )
-
-
-def same_slices_words() -> str:
-    """Return how runs were made that have the same slices by every solver."""
-    own = ", ".join(f"{_plain(BANDS[solver])} ({NAMES[solver]})" for solver in BANDS)
-    return f"Every solver has the same slices; as fractions of ω₀ the event-driven ω is certain to {own}."
 
 
 def listed(values: Mapping[str, Mapping[str, float]], digits: int = 3) -> str:

@@ -12,7 +12,7 @@ from flipproof.frame.pool import Progress, workers
 from flipproof.output.folder import check_replaceable, replaced_folder
 from flipproof.page.templating import environment
 from flipproof.paper.figures import ORDER, TIMED, check_figures, exhibits_paper, keys_of
-from flipproof.paper.runs import FULL, PaperRuns, PaperSize, gather_paper
+from flipproof.paper.runs import PaperRuns, gather_paper
 from flipproof.paper.tables import HEADER, parameter_rows, parameters_csv
 
 PAGE = "index.html"
@@ -25,7 +25,6 @@ def make_gallery(
     provenance: Mapping[str, str],
     *,
     jobs: int | None = None,
-    size: PaperSize = FULL,
 ) -> str:
     """Make the figures and write them to ``out``; return one line that tells what is there.
 
@@ -39,7 +38,6 @@ def make_gallery(
     provenance : mapping
     jobs : int or None
         Worker processes; None: one per core.
-    size : PaperSize
 
     Raises
     ------
@@ -52,7 +50,7 @@ def make_gallery(
     with replaced_folder(out, "paper") as folder:
         with workers(jobs) as pool:
             costs = any(name in TIMED for name in wanted)
-            runs = gather_paper(pool, size, progress, keys_of(wanted), costs=costs)
+            runs = gather_paper(pool, progress, keys_of(wanted), costs=costs)
         exhibits = drawn(list(exhibits_paper(runs, wanted)), jobs)
         write_gallery(exhibits, runs, folder, provenance)
     failed = f", {len(runs.failures())} flights failed" if runs.failures() else ""
@@ -86,8 +84,6 @@ def render_gallery(exhibits: Sequence[Exhibit], runs: PaperRuns, provenance: Map
 
 def _summary(exhibits: Sequence[Exhibit], runs: PaperRuns, provenance: Mapping[str, str]) -> dict[str, object]:
     return {
-        "size": runs.size.name,
-        "slices": runs.size.slices,
         "figures": {exhibit.name: exhibit.title for exhibit in exhibits},
         "flights": len(runs.made),
         "failed": runs.failures(),

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from flipproof.frame.pool import Progress, make_all
+from flipproof.frame.pool import Progress
 from flipproof.frame.solvers import Made, Run, make
 from flipproof.paper.cases import Case, all_cases, family
 from flipproof.paper.costs import Cost, measure_event_driven, measure_published
@@ -20,44 +20,12 @@ from slicemodel import Scenario, Trajectory
 PUBLISHED: Final = "published-python"
 SOLVERS: Final = (PUBLISHED, "eq8", "free-flight")
 
-RTOL: Final = 1e-7
-"""Relative tolerance of the event-driven runs; nowhere near the longest step, which is what limits them."""
-
-STEP_ANGLE: Final = 0.04
-"""Longest step times omega_0 [rad]: twice the reference's own, at a fifth less cost."""
-
 BANDS: Final[Mapping[str, float]] = MappingProxyType({"eq8": 1e-7, "free-flight": 3e-3})
-"""How far omega / omega_0 may move when tolerance, longest step or rest speed are cut, by event-driven solver; with
-recoil the order of the impacts decides it. What more slices would change comes on top (``PaperSize.slices``)."""
-
+"""How far omega / omega_0 may move when the rest speed is cut tenfold, or the release changed in the eleventh digit, by
+event-driven solver; with recoil the order of the impacts decides it."""
 
 GROUP: Final = 12
-"""Runs of the published program that a worker holds at a time: all of them would take it 800 MB."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PaperSize:
-    """How finely the event-driven solvers cut the water; the published program always has the paper's own slices.
-
-    Parameters
-    ----------
-    name : str
-    slices : int
-        Slices of an event-driven run at the most, where their number is not the subject.
-    most_slices : int
-        The same where it is; throws with more are flown by the published program only.
-    slice_error : mapping solver -> float
-        Largest distance of omega / omega_0 from that of 200 slices, measured on ten of the throws.
-    """
-
-    name: str
-    slices: int
-    most_slices: int
-    slice_error: Mapping[str, float]
-
-
-FULL: Final = PaperSize(name="full", slices=100, most_slices=100, slice_error={"eq8": 0.02, "free-flight": 0.01})
-REPORT: Final = PaperSize(name="report", slices=30, most_slices=100, slice_error={"eq8": 0.07, "free-flight": 0.02})
+"""Runs that a worker holds at a time: all of them would take it gigabytes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,14 +34,12 @@ class PaperRuns:
 
     Parameters
     ----------
-    size : PaperSize
     made : mapping (solver, key of a case) -> Made
-        Without the pairs that are not planned at this size.
+        Without the pairs that are not planned.
     costs : tuple of Cost
         Of every solver over numbers of slices and steps; empty if they were not asked for.
     """
 
-    size: PaperSize
     made: Mapping[tuple[str, str], Made]
     costs: tuple[Cost, ...]
 
@@ -94,28 +60,22 @@ class PaperRuns:
         ]
 
 
-def scenario_of(solver: str, case: Case, size: PaperSize) -> Scenario | None:
-    """Return the throw of a case as this solver flies it, the damping rate unchanged; None if it is not flown."""
-    own = case.scenario
-    if solver == PUBLISHED:
-        return own
-    if case.slices_vary:
-        return own if own.n_slices <= size.most_slices else None
-    if case.steps < paper_steps() and own != paper_throw():
-        return None  # output times do not change the steps of these solvers: one throw shows that
-    return own.with_slices(min(size.slices, own.n_slices))
+def scenario_of(solver: str, case: Case) -> Scenario | None:
+    """Return the throw of a case as this solver flies it; None if it is not flown."""
+    if solver != PUBLISHED and not case.slices_vary and case.steps < paper_steps() and case.scenario != paper_throw():
+        return None  # output times do not change these solvers: one throw shows that
+    return case.scenario
 
 
-def plan_paper(size: PaperSize, keys: Iterable[str] | None = None) -> list[Run]:
+def plan_paper(keys: Iterable[str] | None = None) -> list[Run]:
     """Return every run that the figures need, one for each case and solver, the slowest solver first.
 
     Parameters
     ----------
-    size : PaperSize
     keys : keys of cases, optional
         Only these.
     """
-    return [planned.run for planned in _planned(size, keys)]
+    return [planned.run for planned in _planned(keys)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,12 +89,12 @@ class _Planned:
         return self.solver, self.case.key
 
 
-def _planned(size: PaperSize, keys: Iterable[str] | None) -> Iterator[_Planned]:
+def _planned(keys: Iterable[str] | None) -> Iterator[_Planned]:
     cases = all_cases()
     wanted = set(cases if keys is None else keys)
     for solver in reversed(SOLVERS):
         for key, case in cases.items():
-            scenario = scenario_of(solver, case, size) if key in wanted else None
+            scenario = scenario_of(solver, case) if key in wanted else None
             if scenario is not None:
                 run = Run(f"paper, {solver}, {key}", solver, scenario, _settings(solver, case))
                 yield _Planned(solver, case, run)
@@ -144,47 +104,43 @@ def _settings(solver: str, case: Case) -> dict[str, Any]:
     if solver == PUBLISHED:
         return {"steps": case.steps, "store": "full" if case.whole else "summary"}
     points = 1 + (case.steps - 1) // case.thin
-    times = {} if points == paper_steps() else {"times": np.linspace(0.0, case.scenario.duration, points)}
-    step = min(STEP_ANGLE / abs(case.scenario.omega0), case.scenario.duration)
-    return {"method": "DOP853", "rtol": RTOL, "atol": 1e-10, "max_step": step, **times}
+    return {} if points == paper_steps() else {"times": np.linspace(0.0, case.scenario.duration, points)}
 
 
 def gather_paper(
-    pool: Executor, size: PaperSize, progress: Progress, keys: Iterable[str] | None = None, *, costs: bool = True
+    pool: Executor, progress: Progress, keys: Iterable[str] | None = None, *, costs: bool = True
 ) -> PaperRuns:
     """Make the runs in a pool.
 
     Parameters
     ----------
     pool : executor of worker processes
-    size : PaperSize
     progress : callable (made, planned, tag)
     keys : keys of cases, optional
         Only these.
     costs : bool
         Whether to measure what runs cost too, after everything else.
     """
-    planned = list(_planned(size, keys))
-    published = [each for each in planned if each.solver == PUBLISHED]
-    others = [each.run for each in planned if each.solver != PUBLISHED]
-    jobs = [(each.run, each.case.thin) for each in published]
-    thinned = [pool.submit(make_thinned, jobs[k : k + GROUP]) for k in range(0, len(jobs), GROUP)]
-    made = make_all(pool, others, lambda done, _, tag: progress(done, len(planned), tag))
-    made |= {each.run.tag: each for group in thinned for each in group.result()}
-    progress(len(planned), len(planned), PUBLISHED)
-    return PaperRuns(
-        size=size,
-        made={
-            each.pair: made[each.run.tag] if each.case.whole else _without_slices(made[each.run.tag])
-            for each in planned
-        },
-        costs=_measure_costs(pool) if costs else (),
-    )
+    planned = list(_planned(keys))
+    thinned = [pool.submit(_make_group, planned[k : k + GROUP]) for k in range(0, len(planned), GROUP)]
+    made: dict[tuple[str, str], Made] = {}
+    for future in thinned:
+        made |= future.result()
+        progress(len(made), len(planned), next(reversed(made))[1])
+    return PaperRuns(made={each.pair: made[each.pair] for each in planned}, costs=_measure_costs(pool) if costs else ())
+
+
+def _make_group(group: Iterable[_Planned]) -> dict[tuple[str, str], Made]:
+    """Make runs one after the other and keep of each what is looked at."""
+    found = {}
+    for each in group:
+        made = _thinned(make(each.run), each.case.thin if each.solver == PUBLISHED else 1)
+        found[each.pair] = made if each.case.whole else _without_slices(made)
+    return found
 
 
 def _measure_costs(pool: Executor) -> tuple[Cost, ...]:
-    settings = _settings(SOLVERS[-1], family("filling")[0])
-    pending = [pool.submit(measure_event_driven, solver, settings) for solver in SOLVERS if solver != PUBLISHED]
+    pending = [pool.submit(measure_event_driven, solver) for solver in SOLVERS if solver != PUBLISHED]
     pending.insert(0, pool.submit(measure_published, PUBLISHED))
     return tuple(cost for future in pending for cost in future.result())
 

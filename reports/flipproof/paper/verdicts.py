@@ -39,7 +39,6 @@ class PaperVerdicts:
     statements: tuple[Statement, ...]
     comparisons: tuple[Comparison, ...]
     weights: tuple[Finding, ...]
-    slices: int
 
     @property
     def solvers(self) -> tuple[str, ...]:
@@ -103,7 +102,6 @@ class PaperVerdicts:
     def to_mapping(self) -> dict[str, Any]:
         """Return everything as JSON-ready data."""
         return {
-            "slices": self.slices,
             "statements": [statement.to_mapping() for statement in self.statements],
             "experiment": [comparison.to_mapping() for comparison in self.comparisons],
             "weights": [finding.to_mapping() for finding in self.weights],
@@ -116,7 +114,6 @@ def judge_paper(runs: ClaimRuns) -> PaperVerdicts:
         statements=judge_all(runs),
         comparisons=compare_all(runs),
         weights=(*(claim_weight_slows_the_tenth(runs, solver) for solver in STEADY), claim_filling_of_change()),
-        slices=runs.paper.size.slices,
     )
 
 

@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flipproof.frame.solvers import Made, Run
+from flipproof.frame.twins import KINDS, twin_tag, twins
 from flipproof.studies.validity import vary
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import plateau
@@ -37,10 +38,6 @@ RULE_DT: Final = 2e-4
 
 GRADES: Final = ("excellent", "good", "wrong", "sinks in", "explodes", "not run")
 """Best first. "sinks in": the watch asks for a shorter step; "explodes": it asks for more iterations."""
-
-USUAL: Final[Mapping[str, Any]] = {}
-TIGHTER: Final[Mapping[str, Any]] = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-14, "rest_speed": 1e-4}
-"""Settings of the reference whose difference is its band; ``max_step`` is halved as well."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,7 +99,7 @@ class StabilityPanel:
     held_until : array - last output time before the watch stopped a run [s]; NaN where it did not
     reason : array of str - why a run stopped or was not made; "" where it is whole
     enough : int - iterations that the rule asks for
-    band : float - by how much the reference moves under tighter tolerances, fraction of omega_0; NaN if unknown
+    band : float - by how much twins of the reference differ from it, fraction of omega_0; NaN if unknown
     """
 
     mass_ratio: float
@@ -150,14 +147,12 @@ def panel_throw(throw: Scenario, mass_ratio: float, slices: int, duration: float
 
 
 def plan_stability(throw: Scenario, layout: Layout) -> list[Run]:
-    """Return the runs of a chart, the slowest first: the reference twice for each panel, and every cell in budget."""
+    """Return the runs of a chart: each panel's reference with its twins, and the cells in budget, slowest first."""
     runs, cells = [], []
     for mass_ratio, slices in layout.panels:
         scenario = panel_throw(throw, mass_ratio, slices, layout.duration)
-        longest = 0.005 / abs(throw.omega0)
-        for words, settings in (("", USUAL), (", tighter", {**TIGHTER, "max_step": longest})):
-            tag = f"{_tag(mass_ratio, slices)}, {REFERENCE}{words}"
-            runs.append(Run(tag, REFERENCE, scenario, {**settings, "times": layout.times}))
+        reference = Run(f"{_tag(mass_ratio, slices)}, {REFERENCE}", REFERENCE, scenario, {"times": layout.times})
+        runs += [reference, *twins(reference)]
         for dt, iterations in _grid(layout):
             cost = _cost(layout, slices, dt, iterations)
             if cost <= layout.budget:
@@ -196,8 +191,8 @@ def _panel(throw: Scenario, layout: Layout, mass_ratio: float, slices: int, made
     error, level, held = (np.full(shape, np.nan) for _ in range(3))
     grade, reason = np.full(shape, "not run", dtype="<U12"), np.full(shape, "", dtype="<U160")
     tag = f"{_tag(mass_ratio, slices)}, {REFERENCE}"
-    truth, tighter = _whole(made.get(tag)), _whole(made.get(f"{tag}, tighter"))
-    best = tighter or truth
+    truth = _whole(made.get(tag))
+    others = [run for kind in KINDS if (run := _whole(made.get(twin_tag(tag, kind)))) is not None]
     for k, (dt, iterations) in enumerate(_grid(layout)):
         at = np.unravel_index(k, shape)
         cost = _cost(layout, slices, dt, iterations)
@@ -210,11 +205,11 @@ def _panel(throw: Scenario, layout: Layout, mass_ratio: float, slices: int, made
         elif not flight.ok:
             grade[at] = "sinks in" if flight.message.endswith("reduce dt") else "explodes"
             reason[at], held[at] = shortened(flight.message, 160), flight.t[-1]
-        elif best is None:
+        elif truth is None:
             reason[at] = f"{REFERENCE} has no result to hold it against"
         else:
-            error[at] = _apart(flight, best)
-            level[at] = abs(_plateau(flight) - _plateau(best))
+            error[at] = _apart(flight, truth)
+            level[at] = abs(_plateau(flight) - _plateau(truth))
             grade[at] = grade_of(error[at])
     return StabilityPanel(
         mass_ratio=mass_ratio,
@@ -228,7 +223,7 @@ def _panel(throw: Scenario, layout: Layout, mass_ratio: float, slices: int, made
         held_until=held,
         reason=reason,
         enough=enough_iterations(panel_throw(throw, mass_ratio, slices, layout.duration)),
-        band=math.nan if truth is None or tighter is None else _apart(truth, tighter),
+        band=math.nan if truth is None or len(others) < len(KINDS) else max(_apart(run, truth) for run in others),
     )
 
 

@@ -10,14 +10,18 @@ every combination of assumptions was flown; else what it changes in the order of
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import contextlib
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.frame.solvers import Made, Run
+from flipproof.frame.processes import WorkerDiedError
+from flipproof.frame.solvers import Made, Run, make
+from flipproof.frame.twins import KINDS, band, twin_tag, twins
 from flipproof.studies.waterfall import NAMES, canonical, fair_share
 from ode_reference.models import LADDER as MODELS
 from ode_reference.models import MODELS as EQUATIONS
@@ -70,29 +74,17 @@ POINTS = 201
 CURVE = 101
 """Equal times at which two runs are compared."""
 
-FINE: Final = {"rtol": 1e-6, "atol": 1e-9, "rest_speed": 1e-3, "turn": 0.04}
-"""Tolerances of a model on a map; ``turn`` is its longest step in radians of the bottle at release, omega_0 dt."""
+FILLS: Final = (0.05, 1.0)
 
-COARSE: Final = {"rtol": 1e-6, "atol": 1e-9, "rest_speed": 1e-2, "turn": 0.1}
-"""The same at about half the cost; moves a plateau by up to 0.006 where flights are sensitive, by 1e-4 elsewhere."""
-
-
-MEDIUM: Final = {
-    "rtol": 1e-5,
-    "atol": 1e-8,
-    "rest_speed": 5e-3,
-    "rest_speed_with_origin": 1e-3,
-    "rest_speed_with_recoil": 1e-2,
-    "turn": 0.1,
+RANGES: Final[Mapping[Axis, tuple[float, float]]] = {
+    "gamma": (0.02, 1.0),
+    "step": (0.002, 0.2),
+    "restitution": (0.0, 1.0),
 }
-"""Between FINE and COARSE: for a map of many cells at 50 slices, read at contours of 1 % and 10 %.
+"""Ends of a map's axes; "gamma" and "step" are spaced in equal ratios."""
 
-Against the default tolerances, over 40 throws drawn from the 400 of the "gamma" map and all 7 models, the plateau
-moves by less than 1e-4 in 95 % of the runs and the dominant mistake of no cell changes. The equations without recoil
-and without an accelerating origin stay within 4e-5; free-flight within 3e-3, its own band at the default; and
-accelerating-origin within 6e-4 but for one cell (fill 0.3, gamma = 0.03 omega_0) with 7e-3, where the error is
-proportional to the rest speed and still 6e-5 at the default of 1e-5 m/s.
-"""
+CHUNK: Final = 200
+"""Runs of a map that a worker makes at a time; it returns their readings alone."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,6 +120,8 @@ class ValidityMap:
     largest : name -> array - max |d omega| / omega_0 against free flight; of a scheme, against its own equation too
     shares : array, shape (rungs, rows, columns), or None
         Fair share of every rung in the plateau, signed; None if only the ladder was flown.
+    band : array or None
+        By how much twins move the plateau of free flight, the most sensitive equation; None if they were not flown.
     step_error : scheme -> array - error against the scheme's own equation, by plateau
     reason : array of str - "" or why the cell, or a part of it, could not be computed
     """
@@ -141,6 +135,7 @@ class ValidityMap:
     step_error: Mapping[str, FloatArray]
     reason: NDArray[np.str_]
     shares: FloatArray | None = None
+    band: FloatArray | None = None
 
     def error(self, name: str, measure: Measure = "plateau") -> FloatArray:
         """Return the error of an approximation against free flight as a fraction of omega_0."""
@@ -177,6 +172,12 @@ def vary(throw: Scenario, *, fill: float, damping: float | None = None, restitut
     )
 
 
+def map_axes(axis: Axis, columns: int, rows: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return fill fractions and values of a map of that many cells over the whole of its axes."""
+    spaced: Callable[..., Any] = np.linspace if axis == "restitution" else np.geomspace
+    return tuple(np.linspace(*FILLS, columns).tolist()), tuple(spaced(*RANGES[axis], rows).tolist())
+
+
 def cells(throw: Scenario, axis: Axis, fills: Sequence[float], values: Sequence[float], steps: int) -> list[Cell]:
     """Return the throws of a map, row by row; ``steps`` is the grid where the map does not say another."""
     found = []
@@ -201,42 +202,31 @@ def plan_map(
     values: Sequence[float],
     *,
     steps: int = 1000,
-    tolerances: Mapping[str, float] = FINE,
     points: int | None = POINTS,
     shares: bool = False,
+    banded: bool = False,
 ) -> list[Run]:
     """Return the runs of one map; tags are unique within and across maps of different axes.
 
     A model does not know a step: along "step" it runs once per fill fraction. ``points`` are its output times; None:
-    its own. With ``shares`` every set of assumptions is flown, 40 models in place of 7.
+    its own. With ``shares`` every set of assumptions is flown, 40 models in place of 7; ``banded`` gives free flight
+    its twins.
     """
     names = _solvers(shares)
-    usual = {name: _settings(throw, name, tolerances, points) for name in names if name not in SCHEMES}
+    usual: dict[str, Any] = {} if points is None else {"times": np.linspace(0.0, throw.duration, points)}
     runs = []
     for cell in cells(throw, axis, fills, values, steps):
         for name in names:
             if axis == "step" and cell.row > 0 and name not in SCHEMES:
                 continue
-            settings = {"steps": cell.steps, "store": "summary"} if name in SCHEMES else usual[name]
-            runs.append(Run(tag(axis, cell, name), name, cell.scenario, settings))
+            settings = {"steps": cell.steps, "store": "summary"} if name in SCHEMES else usual
+            run = Run(tag(axis, cell, name), name, cell.scenario, settings)
+            runs += [run, *(twins(run) if banded and name == LADDER[-1] else ())]
     return runs
 
 
 def _solvers(shares: bool) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*LADDER, *EXTRA, *(SETS.values() if shares else ()))))
-
-
-def _settings(throw: Scenario, model: str, tolerances: Mapping[str, float], points: int | None) -> dict[str, Any]:
-    settings: dict[str, Any] = {name: tolerances[name] for name in ("rtol", "atol", "rest_speed")}
-    settings["method"] = "DOP853"
-    switches = EQUATIONS[model].switches if model in EQUATIONS else Switches.from_name(model)
-    # Without recoil a tube that accelerates is pushed by resting slices alone; with it the impacts push as well.
-    special = "rest_speed_with_recoil" if switches.recoil else "rest_speed_with_origin" if switches.origin else ""
-    settings["rest_speed"] = tolerances.get(special, tolerances["rest_speed"])
-    settings["max_step"] = min(tolerances["turn"] / abs(throw.omega0), throw.duration)
-    if points is not None:
-        settings["times"] = np.linspace(0.0, throw.duration, points)
-    return settings
 
 
 def tag(axis: Axis, cell: Cell, name: str) -> str:
@@ -256,9 +246,31 @@ def study_map(
     shares: bool = False,
 ) -> ValidityMap:
     """Read the runs that ``plan_map`` planned with the same arguments; ``made`` maps tags to what became of them."""
-    wanted = {tag(axis, cell, n) for cell in cells(throw, axis, fills, values, steps) for n in _solvers(shares)}
-    readings = {name: _read(made[name]) for name in wanted if name in made}
+    readings = {name: _read(one) for name, one in made.items()}
     return study_readings(throw, axis, fills, values, readings, steps=steps, shares=shares)
+
+
+def gather_map(
+    pool: Executor, throw: Scenario, axis: Axis, fills: Sequence[float], values: Sequence[float], *, steps: int = 1000
+) -> Callable[[], ValidityMap]:
+    """Have workers fly every set of assumptions on every cell; return what waits for them and makes the map."""
+    runs = plan_map(throw, axis, fills, values, steps=steps, shares=True, banded=True)
+    pending = [pool.submit(make_readings, runs[k : k + CHUNK]) for k in range(0, len(runs), CHUNK)]
+
+    def gathered() -> ValidityMap:
+        readings: dict[str, Reading] = {}
+        for chunk in pending:
+            # Cells of a chunk whose worker died stay "not run".
+            with contextlib.suppress(WorkerDiedError):
+                readings |= chunk.result()
+        return study_readings(throw, axis, fills, values, readings, steps=steps, shares=True)
+
+    return gathered
+
+
+def make_readings(runs: Sequence[Run]) -> dict[str, Reading]:
+    """Make runs one after the other and return what a map needs of each, by its tag."""
+    return {run.tag: _read(make(run)) for run in runs}
 
 
 def study_readings(
@@ -278,7 +290,8 @@ def study_readings(
     largest = {name: np.full(shape, np.nan) for name in names}
     step_error = {name: np.full(shape, np.nan) for name in SCHEMES}
     reason = np.full(shape, "", dtype="<U80")
-    for cell in cells(throw, axis, fills, values, steps):
+    planned = cells(throw, axis, fills, values, steps)
+    for cell in planned:
         at = (cell.row, cell.column)
         found = {name: readings.get(tag(axis, cell, name), Reading(problem="not run")) for name in names}
         problems = [f"{name}: {reading.problem}" for name, reading in found.items() if reading.problem]
@@ -300,7 +313,19 @@ def study_readings(
         step_error=step_error,
         reason=reason,
         shares=_shares(level) if shares else None,
+        band=_band(axis, planned, readings),
     )
+
+
+def _band(axis: Axis, planned: Sequence[Cell], readings: Mapping[str, Reading]) -> FloatArray | None:
+    tags = {(cell.row, cell.column): tag(axis, cell, LADDER[-1]) for cell in planned}
+    levels = {name: reading.level for name, reading in readings.items()}
+    if not all(twin_tag(name, kind) in levels for name in tags.values() for kind in KINDS):
+        return None
+    found = np.full((1 + max(row for row, _ in tags), 1 + max(column for _, column in tags)), np.nan)
+    for at, name in tags.items():
+        found[at] = band(name, levels)
+    return found
 
 
 def _shares(level: Mapping[str, FloatArray]) -> FloatArray:

@@ -19,6 +19,7 @@ from types import MappingProxyType
 from typing import Final, TypeVar
 
 from flipproof.frame.solvers import Run
+from flipproof.frame.twins import band, twins
 from flipproof.studies.slices import FINER, finer_tag
 from ode_reference.switches import Switches
 from slicemodel import Scenario, Trajectory, observables
@@ -42,17 +43,6 @@ Value = TypeVar("Value", float, FloatArray)
 
 STEP: Final = "finite step of the program"
 PROGRAM_TAG: Final = "waterfall, program"
-
-LOOSER: Final = 10.0
-"""Tolerance and rest speed of the second set of runs, in units of the first: what they change is a value's band."""
-
-
-def tolerances(throw: Scenario, switches: Switches, *, loose: bool) -> dict[str, float | str]:
-    """Return the settings of a run; a rest speed ten times smaller with recoil would multiply the impacts by ten."""
-    factor = LOOSER if loose else 1.0
-    rest_speed = 1e-3 if switches.recoil else 1e-5
-    longest = min(0.04 * (2.0 if loose else 1.0) / abs(throw.omega0), throw.duration)
-    return {"method": "DOP853", "rtol": 1e-9 * factor, "rest_speed": rest_speed * factor, "max_step": longest}
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +85,7 @@ OBSERVABLES: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bar:
-    """What mending one assumption changes, in the units of the observable; a band is numerical uncertainty.
+    """What mending one assumption changes, in the units of the observable; a band is what twins of the runs change.
 
     ``forward`` in the order of the ladder, ``backward`` in reverse; ``average``, the fair share, is the mean over all
     orders, between ``low`` and ``high`` in single ones; ``finer`` is the average at ``FINER`` times the slices, None if
@@ -154,27 +144,30 @@ def canonical(switches: Switches) -> Switches:
 
 
 def plan_waterfall(throw: Scenario, steps: int) -> list[Run]:
-    """Return the program's run, and every equation at usual and at coarser tolerances (81 runs)."""
-    runs = [Run(PROGRAM_TAG, PROGRAM, throw, {"steps": steps})]
+    """Return the program's run, and every equation with its twins (121 runs)."""
+    equations = _plan_equations(throw)
+    return [
+        Run(PROGRAM_TAG, PROGRAM, throw, {"steps": steps}),
+        *equations,
+        *(t for run in equations for t in twins(run)),
+    ]
+
+
+def _plan_equations(throw: Scenario) -> list[Run]:
     # Recoil costs most: those runs first keep the workers evenly busy.
     sets = sorted({canonical(s) for s in Switches.every()}, key=lambda s: (not s.recoil, s.name))
-    for label in ("usual", "loose"):
-        for switches in sets:
-            settings = tolerances(throw, switches, loose=label == "loose")
-            runs.append(Run(_tag(label, switches), switches.name, throw, settings))
-    return runs
+    return [Run(_tag(switches), switches.name, throw) for switches in sets]
 
 
 def plan_finer(throw: Scenario, steps: int) -> list[Run]:
-    """Return the runs at the usual tolerances again, at ``FINER`` times the slices (41 runs)."""
+    """Return the runs without their twins again, at ``FINER`` times the slices (41 runs)."""
     fine = throw.with_slices(FINER * throw.n_slices)
-    planned = plan_waterfall(throw, steps)
-    runs = planned[: 1 + len(planned) // 2]
+    runs = [Run(PROGRAM_TAG, PROGRAM, throw, {"steps": steps}), *_plan_equations(throw)]
     return [replace(run, tag=finer_tag(run.tag), scenario=fine) for run in runs]
 
 
-def _tag(label: str, switches: Switches) -> str:
-    return f"waterfall, {label}, {canonical(switches).name}"
+def _tag(switches: Switches) -> str:
+    return f"waterfall, {canonical(switches).name}"
 
 
 def study_waterfall(runs: Mapping[str, Trajectory]) -> tuple[Waterfall, ...]:
@@ -213,11 +206,11 @@ def _split(observable: Observable, observed: Mapping[str, float], slices: int) -
     bands: dict[Switches, float] = {}
     finer: dict[Switches, float] = {}
     for switches in Switches.every():
-        usual = _tag("usual", switches)
-        values[switches] = observed[usual]
-        bands[switches] = abs(values[switches] - observed[_tag("loose", switches)])
-        if finer_tag(usual) in observed:
-            finer[switches] = observed[finer_tag(usual)]
+        tag = _tag(switches)
+        values[switches] = observed[tag]
+        bands[switches] = band(tag, observed)
+        if finer_tag(tag) in observed:
+            finer[switches] = observed[finer_tag(tag)]
     start = observed[PROGRAM_TAG]
     none, everything = Switches(), Switches(*[True] * len(NAMES))
     step = values[none] - start

@@ -20,6 +20,7 @@ from flipproof.figures.style import draw
 from flipproof.figures.waterfall import figure_waterfall
 from flipproof.frame.solvers import Run
 from flipproof.studies.waterfall import PROGRAM, Waterfall, plan_waterfall, split_all
+from flipproof.sweep.axes import Value
 from flipproof.sweep.command import Begin, completed
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import write_whole
@@ -40,6 +41,11 @@ def plan_split(throw: Scenario) -> list[Run]:
     return [replace(r, settings={**r.settings, "store": "full"}) if r.solver == PROGRAM else r for r in runs]
 
 
+def releases(runs: list[Run]) -> dict[str, list[Value]]:
+    """Return the fields of a scenario in which the runs differ: twins are released a little faster."""
+    return {"omega0": list(dict.fromkeys(run.scenario.omega0 for run in runs))}
+
+
 def make_split(
     throw: Scenario,
     out: Path,
@@ -58,7 +64,7 @@ def make_split(
         If a run is not whole: a split needs all of them; else as for ``flipproof.sweep.command.sweep``.
     """
     runs = plan_split(throw)
-    design = design_of_runs(runs, {"omega0": [throw.omega0]}, ENDS, "flipproof waterfall")
+    design = design_of_runs(runs, releases(runs), ENDS, "flipproof waterfall")
     if damaged:
         return salvage(damaged, out, design, code_identity())
     with completed(design, out, begin, jobs=jobs, dask=dask, export_to=export_to) as (store, summary):
@@ -79,7 +85,8 @@ def split_rows(throw: Scenario, rows: Mapping[str, Row]) -> tuple[Waterfall, ...
     SweepError
         If a run is not whole.
     """
-    return split_all({tag: _observed(throw, tag, row) for tag, row in rows.items()}, throw.n_slices)
+    throws = {run.tag: run.scenario for run in plan_split(throw)}
+    return split_all({tag: _observed(throws[tag], tag, row) for tag, row in rows.items()}, throw.n_slices)
 
 
 def _observed(throw: Scenario, tag: str, row: Row) -> dict[str, float]:

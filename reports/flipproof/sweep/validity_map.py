@@ -13,7 +13,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -27,12 +27,12 @@ from flipproof.studies.validity import (
     CURVE,
     EXTRA,
     LADDER,
-    MEDIUM,
     RUNGS,
     SCHEMES,
     Axis,
     Reading,
     ValidityMap,
+    map_axes,
     plan_map,
     study_readings,
     word,
@@ -44,15 +44,6 @@ from flipproof.sweep.planned import Row, design_of_runs, read_runs
 from flipproof.sweep.salvage import salvage
 from flipproof.sweep.work import code_identity
 from slicemodel import Scenario
-
-FILLS: Final = (0.05, 1.0)
-
-RANGES: Final[Mapping[Axis, tuple[float, float]]] = {
-    "gamma": (0.02, 1.0),
-    "step": (0.002, 0.2),
-    "restitution": (0.0, 1.0),
-}
-"""Ends of a map's axes; "gamma" and "step" are spaced in equal ratios."""
 
 STEPS: Final = 1000
 """Points of a scheme's grid where the map does not say another: the published program's."""
@@ -72,17 +63,12 @@ class Plan:
     @classmethod
     def of_size(cls, throw: Scenario, axis: Axis, columns: int, rows: int) -> Plan:
         """Return the map of that many cells over the whole of its axes."""
-        spaced: Callable[..., Any] = np.linspace if axis == "restitution" else np.geomspace
-        return cls(
-            throw=throw,
-            axis=axis,
-            fills=tuple(np.linspace(*FILLS, columns).tolist()),
-            values=tuple(spaced(*RANGES[axis], rows).tolist()),
-        )
+        fills, values = map_axes(axis, columns, rows)
+        return cls(throw=throw, axis=axis, fills=fills, values=values)
 
     def runs(self) -> list[Run]:
         """Return every run; the output times are the solvers' own, so that a row repeats a run of the command line."""
-        return plan_map(self.throw, self.axis, self.fills, self.values, steps=STEPS, tolerances=MEDIUM, points=None)
+        return plan_map(self.throw, self.axis, self.fills, self.values, steps=STEPS, points=None)
 
     def varied(self) -> dict[str, Sequence[Value]]:
         """Return the fields of a scenario that the cells vary."""
@@ -156,7 +142,6 @@ def map_facts(study: ValidityMap, throw: Scenario) -> dict[str, Any]:
         "throw": throw.to_mapping(),
         "x": FILL,
         "y": _value_name(study.axis),
-        "tolerances": dict(MEDIUM),
         "ladder": list(LADDER),
         "cells by largest step down the ladder": _dominating(study),
         "cells without": int((study.dominant < 0).sum()),
