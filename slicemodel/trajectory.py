@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
+from html import escape
+from importlib import import_module
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -88,7 +90,7 @@ class Impacts:
         return (self[k] for k in range(len(self)))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Trajectory:
     """The motion of one throw as one solver sees it. Time is axis 0; arrays are read-only.
 
@@ -172,6 +174,74 @@ class Trajectory:
     def label(self) -> str:
         """The method's name, as figures and tables print it."""
         return self.method
+
+    def __repr__(self) -> str:
+        points, status = len(self.t), "" if self.ok else f", {self.status}"
+        span = f"t = {self.t[0]:g} to {self.t[-1]:g} s" if points else "empty"
+        end = f", omega = {self.omega[0]:.4g} to {self.omega[-1]:.4g} rad/s" if points else ""
+        return f"<Trajectory {self.label}: {points} points, N = {self.scenario.n_slices}, {span}{end}{status}>"
+
+    def _repr_html_(self) -> str:
+        """Return the line of ``repr`` and the first, middle and last row, for a notebook."""
+        names = ("t", "theta", "omega", "r_cm", "inertia")
+        units = ("s", "rad", "rad/s", "m", "kg m<sup>2</sup>")
+        head = "".join(f"<th>{name} [{unit}]</th>" for name, unit in zip(names, units, strict=True))
+        rows = sorted({0, len(self.t) // 2, len(self.t) - 1}) if len(self.t) else []
+        body = "".join(
+            "<tr>" + "".join(f"<td>{getattr(self, name)[k]:.6g}</td>" for name in names) + "</tr>" for k in rows
+        )
+        return f"<p>{escape(repr(self))}</p><table><tr>{head}</tr>{body}</table>"
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw omega(t) into matplotlib axes, new ones by default, and return them."""
+        if axes is None:
+            from matplotlib.figure import Figure
+
+            axes = Figure(layout="constrained").subplots()
+        axes.plot(self.t, self.omega, label=self.label)
+        axes.set_xlabel("t [s]")
+        axes.set_ylabel("omega [rad/s]")
+        return axes
+
+    def to_pandas(self) -> Any:
+        """Return t, theta, omega, r_cm, inertia and, if stored, r_i and v_i as a pandas DataFrame, one row a time.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        """
+        columns = {name: getattr(self, name) for name in ("t", "theta", "omega", "r_cm", "inertia")}
+        if len(self.r) == len(self.t):
+            columns |= {f"{name}_{i}": column for name in ("r", "v") for i, column in enumerate(getattr(self, name).T)}
+        frame = _extra("pandas").DataFrame(columns)
+        frame.attrs |= {"solver": self.solver, "method": self.method, "status": self.status}
+        return frame
+
+    def to_xarray(self) -> Any:
+        """Return the run as an xarray Dataset over time and, if stored, slice; every variable carries its unit.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+        """
+        units = {"theta": "rad", "omega": "rad/s", "r_cm": "m", "inertia": "kg m^2", "r": "m", "v": "m/s"}
+        stored = [name for name in units if len(getattr(self, name)) == len(self.t)]
+        variables = {
+            name: (("t", "slice")[: getattr(self, name).ndim], getattr(self, name), {"units": units[name]})
+            for name in stored
+        }
+        attributes = {"solver": self.solver, "method": self.method, "status": self.status}
+        return _extra("xarray").Dataset(variables, coords={"t": ("t", self.t, {"units": "s"})}, attrs=attributes)
+
+
+def _extra(name: str) -> Any:
+    """Import a package that only some users need."""
+    try:
+        return import_module(name)
+    except ModuleNotFoundError:
+        raise ImportError(f"{name} is not installed; pip install 'flipproof[{name}]'") from None
 
 
 def _rebuild(state: dict[str, Any]) -> Trajectory:

@@ -14,7 +14,7 @@ def add_compare(commands: Any) -> None:
     """Add the command."""
     compare = add_command(commands, "compare", "Compare two solvers, or two CSV files, in numbers.", command_compare)
     compare.add_argument(
-        "first", metavar="A", help="a solver's name, or a CSV file with a column t and at least one of omega, theta "
+        "first", metavar="A", help="a solver's name or spec, or a CSV file with a column t and at least one of omega, theta "
         "and r_cm; empty cells are left out, and of a track.csv the flight is taken",
     )  # fmt: skip
     compare.add_argument("second", metavar="B", help="the same; differences are B minus A")
@@ -43,7 +43,7 @@ def command_compare(options: argparse.Namespace) -> int:
 
     def load(name: str) -> Curve:
         path = Path(name)
-        if path.suffix or path.is_file():
+        if path.is_file() or (path.suffix and ":" not in name):
             return read_curve(path)
         run = solve(find(name).name, scenario)
         if len(run.t) < 2:

@@ -27,6 +27,7 @@ from flipproof.cli.check import add_checks
 from flipproof.cli.compare import add_compare
 from flipproof.cli.console import readable, speak_plainly
 from flipproof.cli.fit import add_fit
+from flipproof.cli.foreign import add_foreign, print_offered
 from flipproof.cli.paper import add_paper
 from flipproof.cli.start import INTERRUPTED, INTERRUPTED_WORDS, SIGNALS
 from flipproof.cli.sweeps import add_sweeps
@@ -63,6 +64,7 @@ examples:
   flipproof track video.txt --cap cap --base base --length-unit m
   flipproof fit flight.csv --model midpoint free-flight
   flipproof animate --out flips.gif             the flights side by side, 9.6 times slower
+  flipproof certify mine.py:solve               anybody's solver: a line a check; place, explain and kit go on from here
 
 exit status:
   0  done; for a report: every claim was evaluated and no regression claim failed
@@ -164,7 +166,12 @@ def parser() -> argparse.ArgumentParser:
 
     simulate = add_command(commands, "simulate", "Run one solver and write its trajectory as CSV.", command_simulate)
     simulate.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
-    simulate.add_argument("--solver", default="exact-step", metavar="NAME", help="see 'flipproof models' (%(default)s)")
+    simulate.add_argument(
+        "--solver",
+        default="exact-step",
+        metavar="NAME",
+        help="see 'flipproof models'; or a spec such as mine.py:solve (%(default)s)",
+    )
     simulate.add_argument("--steps", type=count, metavar="P", help="points of a scheme's grid (default 1000)")
     simulate.add_argument("--slices", type=count, metavar="N", help="cut the throw into N slices, alpha/2m unchanged")
     simulate.add_argument("--out", type=Path, metavar="FILE.csv", help="file to write (default: standard output)")
@@ -176,6 +183,7 @@ def parser() -> argparse.ArgumentParser:
     add_tracker(commands)
     add_fit(commands)
     add_animate(commands)
+    add_foreign(commands)
     add_command(commands, "models", "List every scheme, model and engine.", command_models)
     return top
 
@@ -288,6 +296,7 @@ def command_models(options: argparse.Namespace) -> int:
         print(f"  {solver.name}")
         for text in (solver.equation, solver.reason):
             print(textwrap.fill(text, width=100, initial_indent="      ", subsequent_indent="      "))
+    print_offered()
     return 0
 
 

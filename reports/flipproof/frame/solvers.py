@@ -10,6 +10,9 @@ from typing import Any
 from slicemodel import Scenario, Trajectory
 from slicemodel.scenario import unknown_name
 
+FOREIGN = "flipproof.foreign.solving"
+"""The module whose ``solve`` takes the spec of somebody else's solver."""
+
 
 @dataclass(frozen=True, slots=True)
 class Solver:
@@ -37,6 +40,8 @@ def catalogue() -> dict[str, Solver]:
 def find(name: str) -> Solver:
     """Return the solver of that name; "switches:110000" and its like are combinations of the ladder's rungs.
 
+    Other names with a colon, and entry points, are specs of somebody else's solver (``flipproof.foreign.specs``).
+
     Raises
     ------
     ValueError
@@ -50,7 +55,12 @@ def find(name: str) -> Solver:
         model = model_of(Switches.from_name(name))
         return Solver(name, "ode_reference", "model", model.equation, model.reason)
     if name not in solvers:
-        raise ValueError(unknown_name("solver", name, solvers))
+        from flipproof.foreign.specs import check_spec, is_spec
+
+        if not is_spec(name):
+            raise ValueError(unknown_name("solver", name, solvers))
+        check_spec(name)
+        return Solver(name, FOREIGN, "spec", "", "somebody else's solver")
     return solvers[name]
 
 
@@ -95,6 +105,10 @@ def solve(name: str, scenario: Scenario, **settings: Any) -> Trajectory:
     """Run the named solver with its package's own ``solve``."""
     solver = find(name)
     settings = {solver.keyword: name, **settings}
+    if solver.package == FOREIGN:
+        from flipproof.foreign.solving import solve as solve_foreign
+
+        return solve_foreign(scenario, **settings)
     if solver.package == "slicemodel":
         import slicemodel
 

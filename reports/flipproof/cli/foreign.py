@@ -1,0 +1,195 @@
+"""The commands of ``flipproof`` for anybody's solver: certify, place, explain, kit, grade, power."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, read_scenario
+
+SPEC_HELP = (
+    "a name that flipproof models lists, package.module:name, file.py:name, csv:file.csv or "
+    "cmd:'program {scenario} {times} {out}'; it runs with your rights"
+)
+
+
+def add_foreign(commands: Any) -> None:
+    """Add the commands."""
+    certify = add_command(
+        commands, "certify", "Hold a solver to the conformance suite, a line a check.", command_certify
+    )
+    _add_spec(certify)
+    certify.add_argument("--equation", metavar="E", help="hold it to this equation, whatever it declares")
+    certify.add_argument("--json", type=Path, metavar="FILE", help="write the passport: traits, results, versions")
+    certify.add_argument("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML")
+
+    place = add_command(commands, "place", "Find out which equation a solver solves, and how well.", command_place)
+    _add_spec(place)
+    place.add_argument("--json", action="store_true", help="print JSON")
+
+    explain = add_command(commands, "explain", "Split the difference of two solvers over assumptions.", command_explain)
+    explain.add_argument("first", metavar="A", help=SPEC_HELP)
+    explain.add_argument("second", metavar="B", help="the same")
+    explain.add_argument("--scenario", metavar="SCENARIO.toml", help=SCENARIO_HELP)
+    explain.add_argument("--slices", type=count, default=10, metavar="N", help="slices of the throw (default 10)")
+
+    kit = add_command(commands, "kit", "Write the conformance suite as files, for any language.", command_kit)
+    kit.add_argument("--out", type=Path, required=True, metavar="DIR", help="a new folder")
+    kit.add_argument("--name", default="my solver", help="name of the solver (default: my solver)")
+    kit.add_argument("--equation", metavar="E", help="the equation it solves, if you know")
+    kit.add_argument("--refined-by", choices=("dt", "steps", "rtol"), help="what effort.txt means to it")
+    kit.add_argument("--precision", choices=("float64", "float32"), default="float64", help="of its arithmetic")
+    kit.add_argument("--order", type=float, metavar="P", help="order of its error before impacts")
+
+    grade = add_command(commands, "grade", "Judge the answers in a kit.", command_grade)
+    grade.add_argument("folder", type=Path, metavar="DIR", help="the folder that flipproof kit made")
+    grade.add_argument("--json", type=Path, metavar="FILE", help="write the passport")
+
+    power = add_command(
+        commands, "power", "Plant known mistakes in a good solver; which checks see them?", command_power
+    )
+    power.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
+    power.add_argument("--out", type=Path, metavar="DIR", help="also write power.csv, power.svg and power.png there")
+
+
+def print_offered() -> None:
+    """List the solvers that installed packages offer; none of them is imported."""
+    from flipproof.foreign.specs import offered
+
+    points = offered()
+    if points:
+        print("\nsolvers that installed packages offer, imported when they are named\n")
+    for name, point in sorted(points.items()):
+        owner = f"{point.dist.name} {point.dist.version}" if point.dist else "an unnamed package"
+        print(f"  {name}\n      {point.value}, from {owner}")
+
+
+def _add_spec(command: argparse.ArgumentParser) -> None:
+    command.add_argument("spec", metavar="SPEC", help=SPEC_HELP)
+    command.add_argument(
+        "--timeout", type=count, metavar="S", help="seconds one run may take (default: as it declares)"
+    )
+
+
+def command_certify(options: argparse.Namespace) -> int:
+    """Print one line a check; return 1 if one failed."""
+    from flipproof.foreign.certify import certify
+    from flipproof.foreign.contract import check_equation
+    from flipproof.foreign.specs import opened
+
+    if options.equation is not None:
+        check_equation(options.equation)
+    for path in (options.json, options.junit):
+        if path is not None and (path.is_dir() or not path.parent.is_dir()):
+            raise ValueError(f"{path} cannot be written: {'it is a folder' if path.is_dir() else 'no such folder'}")
+    with closing(opened(options.spec, options.timeout)) as runner:
+        found = certify(runner, equation=options.equation, say=lambda result: print(result.line, flush=True))
+    _write_passport(found, options.json)
+    if options.junit is not None:
+        from flipproof.foreign.verdicts import junit_of
+        from flipproof.output.folder import write_text
+
+        write_text(options.junit, junit_of(found))
+    print(found.conclusion)
+    return 1 if found.failed else 0
+
+
+def _write_passport(found: Any, path: Path | None) -> None:
+    if path is not None:
+        from flipproof.output.folder import write_text
+
+        write_text(path, json.dumps(found.to_mapping(), indent=1, ensure_ascii=False) + "\n")
+
+
+def command_place(options: argparse.Namespace) -> int:
+    """Print where a solver stands; return 1 if it is off the lattice."""
+    from flipproof.foreign.place import place
+    from flipproof.foreign.specs import ForeignError, opened
+
+    with closing(opened(options.spec, options.timeout)) as runner:
+        try:
+            found = place(runner)
+        except ForeignError as error:
+            print(f"{options.spec} cannot be placed; it does not answer the throws that tell equations apart: {error}")
+            return 1
+    print(json.dumps(found.to_mapping(), indent=1) if options.json else found.text)
+    return 0 if found.on_lattice else 1
+
+
+def command_explain(options: argparse.Namespace) -> int:
+    """Print why two solvers differ."""
+    from flipproof.foreign.explain import explain
+    from flipproof.foreign.specs import opened
+
+    throw = read_scenario(options.scenario, options.slices)
+    with closing(opened(options.first)) as one, closing(opened(options.second)) as other:
+        print(explain(one, other, throw).text)
+    return 0
+
+
+def command_kit(options: argparse.Namespace) -> int:
+    """Write the asks into a new folder."""
+    from flipproof.foreign.contract import Traits
+    from flipproof.foreign.kit import Kit
+
+    traits = Traits(
+        name=options.name,
+        equation=options.equation,
+        refined_by=options.refined_by,
+        precision=options.precision,
+        order=options.order,
+    )
+    kit = Kit.made(options.out, traits)
+    print(
+        f"{len(kit.asks)} asks in {options.out / 'asks'}: write answer.csv beside each scenario.toml (columns t, theta,"
+    )
+    print(f"omega; r_0 to r_(N-1) if you have them), then run: flipproof grade {options.out}")
+    return 0
+
+
+def command_grade(options: argparse.Namespace) -> int:
+    """Print one line a check; return 1 if one failed or answers are missing."""
+    from flipproof.foreign.kit import Kit
+
+    found, waiting = Kit(options.folder).grade()
+    for result in found.results:
+        print(result.line)
+    _write_passport(found, options.json)
+    print(found.conclusion)
+    if waiting:
+        print(f"{waiting} checks wait for answers in {options.folder / 'asks'}; grade again when they are there")
+    return 1 if found.failed or waiting else 0
+
+
+def command_power(options: argparse.Namespace) -> int:
+    """Print a line a mistake; return 1 if one is caught by no check, or the clean solver by any."""
+    from flipproof.foreign.power import CLEAN, detect_all
+    from flipproof.frame.pool import workers
+
+    def say(caught: Any) -> None:
+        seen = ", ".join(caught.checks) or "no check"
+        print(f"{caught.mistake:22} {caught.words} Seen by: {seen}", flush=True)
+
+    with workers(options.jobs) as pool:
+        found = detect_all(pool, say)
+    if options.out is not None:
+        from flipproof.figures.power import figure_power
+        from flipproof.figures.style import draw
+        from flipproof.foreign.power import matrix_csv
+        from flipproof.output.folder import write_text
+
+        options.out.mkdir(parents=True, exist_ok=True)
+        drawing = draw(figure_power(found))
+        write_text(options.out / "power.csv", matrix_csv(found))
+        write_text(options.out / "power.svg", drawing.svg)
+        (options.out / "power.png").write_bytes(drawing.png)
+    missed = [c.mistake for c in found if c.mistake != CLEAN and not c.checks]
+    wrong = [c for c in found if c.mistake == CLEAN and c.checks]
+    print(f"{len(found) - 1} mistakes planted, {len(found) - 1 - len(missed)} caught; the clean solver: "
+          f"{'accused' if wrong else 'passed by all'}")  # fmt: skip
+    sys.stdout.flush()
+    return 1 if missed or wrong else 0

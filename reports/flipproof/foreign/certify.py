@@ -1,0 +1,210 @@
+"""The conformance suite: every check of a solver, with what was expected, what came, where and what to do."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+
+from flipproof.foreign import checks_basic, checks_equation, checks_impacts, checks_order
+from flipproof.foreign.answers import Answer
+from flipproof.foreign.checking import Check, Found, NotApplicableError
+from flipproof.foreign.contract import Ask, Traits
+from flipproof.foreign.specs import ForeignError, Runner, WaitingError
+
+PASSED: Final = "passed"
+FAILED: Final = "failed"
+EXPECTED: Final = "expected failure"
+IDLE: Final = "not applicable"
+
+CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
+    {
+        "shape": checks_basic.check_shape,
+        "start": checks_basic.check_start,
+        "determinism": checks_basic.check_determinism,
+        "ice": checks_basic.check_ice,
+        "angle": checks_basic.check_angle,
+        "angular-momentum": checks_basic.check_momentum,
+        "restitution": checks_impacts.check_restitution,
+        "gravity": checks_basic.check_gravity,
+        "mirror": checks_basic.check_mirror,
+        "moving-frame": checks_basic.check_moving_frame,
+        "order-before-impacts": checks_order.check_order_before,
+        "order-across-impacts": checks_order.check_order_across,
+        "precision-floor": checks_order.check_floor,
+        "published-vectors": checks_equation.check_vectors,
+        "equation": checks_equation.check_equation,
+    }
+)
+"""Every check by name, in the order in which they are made. A new check is one generator and one line here."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """What became of one check; ``found`` is None where it gave no numbers, and ``reason`` says why."""
+
+    check: str
+    verdict: str
+    title: str
+    found: Found | None = None
+    reason: str = ""
+
+    @property
+    def line(self) -> str:
+        """One line: verdict, check, what came against what was expected, where, and what to do if it failed."""
+        head = f"{self.verdict:17} {self.check:21}"
+        if self.found is None:
+            return f"{head} {self.reason}"
+        said = f"{self.found.came} (expected: {self.found.expected})"
+        place = f"; {self.found.where}" if self.found.where else ""
+        advice = f"; {self.found.advice}" if self.verdict == FAILED and self.found.advice else ""
+        known = f"; known: {self.reason}" if self.reason else ""
+        return f"{head} {said}{place}{advice}{known}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Certificate:
+    """All results of one solver."""
+
+    traits: Traits
+    results: tuple[Result, ...]
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def failed(self) -> tuple[Result, ...]:
+        """The checks that failed and were not expected to."""
+        return tuple(result for result in self.results if result.verdict == FAILED)
+
+    @property
+    def conclusion(self) -> str:
+        """The last line: how many checks there were and what became of them."""
+        counts = {verdict: [r for r in self.results if r.verdict == verdict] for verdict in (PASSED, FAILED, EXPECTED)}
+        parts = [f"{len(found)} {verdict}" for verdict, found in counts.items() if found or verdict != EXPECTED]
+        idle = [f"{r.check}: {r.reason}" for r in self.results if r.verdict == IDLE]
+        if idle:
+            parts.append(f"{len(idle)} not applicable ({'; '.join(idle)})")
+        return f"{len(self.results)} checks: {', '.join(parts)}"
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the passport: what the solver says of itself, what was found, and under which versions."""
+        facts: dict[str, Any] = {}
+        for result in self.results:
+            facts |= dict(result.found.facts) if result.found else {}
+        traits = asdict(self.traits)
+        return {
+            "passport": 1,
+            "solver": traits,
+            "versions": dict(self.versions),
+            "checks": [
+                {
+                    "check": r.check,
+                    "verdict": r.verdict,
+                    "title": r.title,
+                    "reason": r.reason,
+                    **(
+                        {}
+                        if r.found is None
+                        else {name: getattr(r.found, name) for name in ("expected", "came", "where", "advice")}
+                    ),
+                }
+                for r in self.results
+            ],
+            "facts": _plain(facts),
+            "conclusion": self.conclusion,
+        }
+
+
+def _plain(value: Any) -> Any:
+    """Return ``value`` as JSON can hold it."""
+    if isinstance(value, Mapping):
+        return {str(name): _plain(one) for name, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(one) for one in value]
+    if isinstance(value, (float, np.floating)):
+        return float(value) if np.isfinite(value) else None
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def certify(
+    runner: Runner,
+    checks: Iterable[str] = tuple(CHECKS),
+    *,
+    equation: str | None = None,
+    say: Callable[[Result], object] = lambda _: None,
+) -> Certificate:
+    """Make the checks of a solver, one after the other.
+
+    Parameters
+    ----------
+    runner : Runner
+    checks : iterable of str - names in ``CHECKS``
+    equation : str, optional - the equation to hold it to, instead of the one that it declares
+    say : callable - is given each result as it comes
+
+    Raises
+    ------
+    ForeignError
+        If the solver cannot be loaded.
+    """
+    traits = runner.traits if equation is None else replace(runner.traits, equation=equation)
+    results = []
+    for name in checks:
+        results.append(_result(name, traits, runner))
+        say(results[-1])
+    return Certificate(traits=traits, results=tuple(results), versions=versions())
+
+
+def _result(name: str, traits: Traits, runner: Runner) -> Result:
+    check = CHECKS[name]
+    title = (check.__doc__ or "").partition("\n")[0]
+    known = traits.expected_failures.get(name)
+    try:
+        found = drive(check(traits), runner)
+    except (NotApplicableError, WaitingError) as why:
+        return Result(check=name, verdict=IDLE, title=title, reason=str(why))
+    except ForeignError as error:
+        verdict = FAILED if known is None else EXPECTED
+        return Result(
+            check=name, verdict=verdict, title=title, reason=str(error) + (f"; known: {known}" if known else "")
+        )
+    if found.holds:
+        unexpected = f"declared as a failure ({known}), but holds" if known else ""
+        return Result(check=name, verdict=PASSED, title=title, found=found, reason=unexpected)
+    return Result(check=name, verdict=EXPECTED if known else FAILED, title=title, found=found, reason=known or "")
+
+
+def drive(making: Iterator[Any], runner: Callable[[Ask], Answer]) -> Found:
+    """Drive a check to its end, asking ``runner`` whatever it yields."""
+    try:
+        asks: Sequence[Ask] = next(making)
+        while True:
+            asks = making.send(_answers(asks, runner))  # type: ignore[attr-defined]
+    except StopIteration as end:
+        found: Found = end.value
+        return found
+
+
+def _answers(asks: Sequence[Ask], runner: Callable[[Ask], Answer]) -> list[Answer]:
+    """Return an answer to each ask; where answers are written by hand, all asks are put before any is waited for."""
+    answers, waiting = [], None
+    for ask in asks:
+        try:
+            answers.append(runner(ask))
+        except WaitingError as why:
+            waiting = waiting or why
+    if waiting is not None:
+        raise waiting
+    return answers
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what judged: flipproof, Python, numpy, scipy, numba."""
+    from importlib.metadata import version
+
+    return {"python": platform.python_version()} | {
+        name: version(name) for name in ("flipproof", "numpy", "scipy", "numba")
+    }

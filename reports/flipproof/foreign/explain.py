@@ -1,0 +1,105 @@
+"""Why two solvers differ: their difference split over the switches in which their equations differ.
+
+Each switch gets the mean of what it changes over all orders of turning the differing switches (the Shapley value);
+what no switch explains is the rest: the solvers' own errors, and what is no choice of the ladder.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, replace
+from itertools import combinations
+
+from flipproof.foreign.checking import ask_of, times_of
+from flipproof.foreign.place import Place, curve, place
+from flipproof.foreign.specs import Runner
+from flipproof.studies.waterfall import NAMES, canonical
+from ode_reference.switches import Switches
+from slicemodel import Scenario
+from slicemodel.observables import plateau
+
+POINTS = 1000
+LEVEL = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Explanation:
+    """The difference of two solvers in the plateau, mean of omega/omega_0 over the second half of the flight.
+
+    ``first`` and ``second`` are the places of the two; ``values`` their plateaus; ``bars`` maps a switch to its share
+    of ``difference``; ``rest`` is what no switch explains. Bars and rest sum to the difference.
+    """
+
+    first: Place
+    second: Place
+    values: tuple[float, float]
+    bars: dict[str, float]
+    rest: float
+
+    @property
+    def difference(self) -> float:
+        """Plateau of the second solver minus that of the first."""
+        return self.values[1] - self.values[0]
+
+    @property
+    def text(self) -> str:
+        """The explanation, a line each."""
+        one, other = self.first, self.second
+        lines = [
+            one.text,
+            other.text,
+            f"mean of omega/omega_0 over the second half: {one.solver} {self.values[0]:.6f}, {other.solver} "
+            f"{self.values[1]:.6f}, difference {self.difference:+.6f}",
+        ]
+        for name, share in self.bars.items():
+            part = f" ({share / self.difference:.1%} of it)" if self.difference else ""
+            lines.append(f"  {share:+.6f}  {NAMES[name]}{part}")
+        lines.append(f"  {self.rest:+.6f}  the rest, which no switch explains: errors of the two solvers")
+        return "\n".join(lines)
+
+
+def explain(one: Runner, other: Runner, throw: Scenario) -> Explanation:
+    """Place two solvers, throw the bottle with both, and split their difference.
+
+    Raises
+    ------
+    ForeignError
+        If one of them gives no answer.
+    """
+    places = place(one), place(other)
+    asks = [ask_of(runner.traits, throw, LEVEL, POINTS) for runner in (one, other)]
+    answers = [runner(ask) for runner, ask in zip((one, other), asks, strict=True)]
+    values = tuple(plateau(answer.t, answer.omega, throw.omega0) for answer in answers)
+    bars = shares(places[0].switches, places[1].switches, throw)
+    return Explanation(
+        first=places[0],
+        second=places[1],
+        values=(values[0], values[1]),
+        bars=bars,
+        rest=values[1] - values[0] - sum(bars.values()),
+    )
+
+
+def shares(start: Switches, end: Switches, throw: Scenario) -> dict[str, float]:
+    """Return the mean change of the plateau over all orders of turning the switches from ``start`` to ``end``."""
+    differing = [f.name for f in fields(Switches) if getattr(start, f.name) != getattr(end, f.name)]
+    known: dict[Switches, float] = {}
+
+    def value(turned: tuple[str, ...]) -> float:
+        switches = canonical(replace(start, **{name: getattr(end, name) for name in turned}))
+        if switches not in known:
+            found = curve(switches.name, throw, times_of(throw, POINTS))
+            known[switches] = plateau(found.t, found.omega, throw.omega0)
+        return known[switches]
+
+    n = len(differing)
+    bars = {}
+    for name in differing:
+        others = [other for other in differing if other != name]
+        bars[name] = math.fsum(
+            math.factorial(size) * math.factorial(n - size - 1) / math.factorial(n)
+            * (value((*chosen, name)) - value(chosen))
+            for size in range(n)
+            for chosen in combinations(others, size)
+        )  # fmt: skip
+    return bars

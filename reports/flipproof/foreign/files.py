@@ -1,0 +1,151 @@
+"""Solvers that answer by files: a curve that is there already, and any program that reads and writes CSV."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import os
+import shlex
+import signal
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from flipproof.foreign.answers import PER_SLICE, Answer, AnswerError, answer_of
+from flipproof.foreign.contract import TIMEOUT, Ask, Traits
+from flipproof.foreign.specs import COMMAND, CSV, ForeignError
+
+FIELDS: Final = ("scenario", "times", "start", "effort", "out")
+"""What a command line may hold in braces: paths of files, and the effort as a number."""
+
+MOST_BYTES: Final = 1 << 30
+"""Size of an answer's file at the most."""
+
+
+def read_answer(path: Path, n_slices: int) -> dict[str, Any]:
+    """Read an answer: a header with t, theta, omega and, if known, r_cm, inertia, r_0 ... and v_0 ...; then numbers.
+
+    Raises
+    ------
+    AnswerError
+        Naming file, line and column.
+    """
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise AnswerError(f"{path} is larger than {MOST_BYTES} bytes")
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            rows = csv.reader(file)
+            header = [name.strip() for name in next(rows, [])]
+            body = [row for row in rows if row]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise AnswerError(f"{path} cannot be read ({error})") from None
+    if not header or not body:
+        raise AnswerError(f"{path} has no {'rows' if header else 'header'}; columns t, theta, omega are needed")
+    for k, row in enumerate(body):
+        if len(row) != len(header):
+            raise AnswerError(f"{path}: line {k + 2} has {len(row)} cells, the header {len(header)}")
+    columns: dict[str, Any] = {}
+    for j, name in enumerate(header):
+        try:
+            columns[name] = np.array([float(row[j]) for row in body])
+        except ValueError as error:
+            raise AnswerError(f"{path}: column {name}: {error}") from None
+    for name in PER_SLICE:
+        parts = [columns.get(f"{name}_{i}") for i in range(n_slices)]
+        if parts[0] is not None and all(part is not None for part in parts):
+            columns[name] = np.column_stack(parts)  # type: ignore[arg-type]
+    return columns
+
+
+def write_ask(ask: Ask, folder: Path) -> dict[str, str]:
+    """Write what a program is asked into a folder; return the words that stand for ``FIELDS`` on its command line."""
+    paths = {name: folder / f"{name}.{'toml' if name == 'scenario' else 'csv'}" for name in FIELDS if name != "effort"}
+    paths["scenario"].write_text(ask.scenario.to_toml(), encoding="utf-8")
+    paths["times"].write_text("t\n" + "".join(f"{t!r}\n" for t in ask.times.tolist()), encoding="utf-8")
+    paths["start"].write_text("r\n" + "".join(f"{r!r}\n" for r in ask.start.tolist()), encoding="utf-8")
+    return {name: str(path) for name, path in paths.items()} | {
+        "effort": "" if ask.effort is None else repr(ask.effort)
+    }
+
+
+class File:
+    """A curve in a CSV file. It answers at its own times, for whatever throw it is taken to be of."""
+
+    def __init__(self, spec: str) -> None:
+        self.path = Path(spec.removeprefix(CSV))
+        if not self.path.is_file():
+            raise ValueError(f"solver {spec!r}: there is no file {self.path}")
+        self.traits = Traits(name=self.path.name)
+
+    def __call__(self, ask: Ask) -> Answer:
+        """Return the curve, at its own times."""
+        try:
+            return answer_of(ask, read_answer(self.path, ask.scenario.n_slices), own_times=True)
+        except AnswerError as error:
+            raise ForeignError(str(error)) from None
+
+    def close(self) -> None:
+        """Nothing runs."""
+
+
+class Command:
+    """A program: flipproof writes scenario, times and start as files, calls it, and reads the CSV that it wrote."""
+
+    def __init__(self, spec: str, timeout: float | None = None) -> None:
+        try:
+            self.words = shlex.split(spec.removeprefix(COMMAND))
+        except ValueError as error:
+            raise ValueError(f"solver {spec!r}: {error}") from None
+        if not self.words or not any("{out}" in word for word in self.words):
+            raise ValueError(f"solver {spec!r}: a command must hold {{out}}, the CSV file that it is to write")
+        effort = any("{effort" in word for word in self.words)
+        self.timeout = timeout or TIMEOUT
+        name = next((Path(w).name for w in self.words[1:] if not w.startswith(("-", "{"))), Path(self.words[0]).name)
+        self.traits = Traits(name=name, refined_by="dt" if effort else None, timeout=self.timeout)
+
+    def __call__(self, ask: Ask) -> Answer:
+        """Return the checked answer."""
+        with tempfile.TemporaryDirectory(prefix="flipproof-") as scratch:
+            values = write_ask(ask, Path(scratch))
+            words = self.words
+            for name, value in values.items():
+                words = [word.replace(f"{{{name}}}", value) for word in words]
+            self._run(words)
+            out = Path(values["out"])
+            if not out.is_file():
+                raise ForeignError(f"{self.words[0]} ended without writing {{out}}")
+            try:
+                return answer_of(ask, read_answer(out, ask.scenario.n_slices))
+            except AnswerError as error:
+                raise ForeignError(str(error).replace(str(out), "{out}")) from None
+
+    def _run(self, words: list[str]) -> None:
+        with tempfile.TemporaryFile() as said:
+            try:
+                process = subprocess.Popen(
+                    words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=said, start_new_session=True
+                )
+            except OSError as error:
+                raise ForeignError(f"{words[0]} cannot be started ({error.strerror or error})") from None
+            try:
+                status = process.wait(timeout=self.timeout)
+            except subprocess.TimeoutExpired:
+                raise ForeignError(f"no answer within {self.timeout:g} s; the program was ended") from None
+            finally:
+                if process.poll() is None:
+                    if os.name == "posix":
+                        with contextlib.suppress(ProcessLookupError, PermissionError):
+                            os.killpg(process.pid, signal.SIGKILL)
+                    process.kill()
+                    process.wait()
+            if status:
+                said.seek(max(0, said.seek(0, os.SEEK_END) - 4096))
+                lines = [line for line in said.read().decode(errors="replace").splitlines() if line.strip()]
+                last = f": {' '.join(lines[-1].split())}" if lines else ""
+                raise ForeignError(f"{words[0]} ended with status {status}{last}")
+
+    def close(self) -> None:
+        """Nothing runs between asks."""

@@ -1,0 +1,165 @@
+"""A foreign solver in a process of its own: a crash, a hang or a flood of text costs one run and nothing else."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from typing import Any, Final
+
+from flipproof.foreign.answers import PER_TIME, REQUIRED, Answer, AnswerError, answer_of
+from flipproof.foreign.contract import Ask, Traits
+from flipproof.foreign.specs import ForeignError
+from flipproof.foreign.wire import BrokenFrameError, receive, send
+from slicemodel.trajectory import IMPACT_FIELDS
+
+LOADING: Final = 60.0
+"""Seconds that a solver's module may take to be imported."""
+
+KEPT: Final = 4096
+"""Bytes of what a solver prints that are kept, from the end."""
+
+MOST_IMPACTS: Final = 10_000_000
+"""Impacts of one answer at the most."""
+
+
+class Isolated:
+    """The solver that a spec names, in a process that is started when it is first needed and again after a crash.
+
+    Parameters
+    ----------
+    spec : str
+    timeout : float, optional - seconds one run may take, instead of what the solver says
+    """
+
+    def __init__(self, spec: str, timeout: float | None = None) -> None:
+        self.spec, self.timeout = spec, timeout
+        self._process: subprocess.Popen[bytes] | None = None
+        self._traits: Traits | None = None
+
+    @property
+    def traits(self) -> Traits:
+        """What the solver says of itself; loads it."""
+        if self._traits is None:
+            self._start()
+        assert self._traits is not None
+        return self._traits
+
+    def __call__(self, ask: Ask) -> Answer:
+        """Return the checked answer.
+
+        Raises
+        ------
+        ForeignError
+            One line: what the solver raised or returned, how its process ended, or that its time was up.
+        """
+        traits = self.traits
+        if self._process is None:
+            self._start()
+        header = {"scenario": ask.scenario.to_mapping(), "effort": ask.effort, "options": dict(ask.options)}
+        limit = self.timeout or traits.timeout
+        points = len(ask.times)
+        most = 8 * (points * (len(REQUIRED) + len(PER_TIME) + 2 * ask.scenario.n_slices) + 5 * MOST_IMPACTS)
+        header, arrays = self._exchange(header, {"times": ask.times, "start": ask.start}, limit, most)
+        if "reason" in header:
+            raise ForeignError(str(header["reason"]))
+        fields: dict[str, Any] = {name: array for name, array in arrays.items() if "." not in name}
+        if "impacts.time" in arrays:
+            fields["impacts"] = {name: arrays.get(f"impacts.{name}") for name, _ in IMPACT_FIELDS}
+        try:
+            return answer_of(ask, fields)
+        except AnswerError as error:
+            raise ForeignError(f"answer: {error}") from None
+
+    def close(self) -> None:
+        """End the process and whatever it started."""
+        process, self._process = self._process, None
+        if process is None:
+            return
+        if os.name == "posix":
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.killpg(process.pid, signal.SIGKILL)
+        process.kill()
+        process.wait()
+        for stream in (process.stdin, process.stdout, process.stderr):
+            if stream is not None:
+                with contextlib.suppress(OSError):
+                    stream.close()
+
+    def _start(self) -> None:
+        code = "from flipproof.foreign import child; child.main(); import os; os._exit(0)"
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", code],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+        )
+        self._printed = bytearray()
+        self._reader = threading.Thread(target=self._drain, args=(self._process.stderr,), daemon=True)
+        self._reader.start()
+        header, _ = self._exchange({"spec": self.spec}, {}, LOADING, 0)
+        if "reason" in header:
+            self.close()
+            raise ForeignError(f"{self.spec} cannot be loaded: {header['reason']}")
+        try:
+            self._traits = Traits(**header["traits"])
+        except (TypeError, ValueError, KeyError) as error:
+            self.close()
+            raise ForeignError(f"{self.spec}: {error}") from None
+
+    def _drain(self, stream: Any) -> None:
+        with contextlib.suppress(OSError, ValueError):
+            while part := stream.read1(65536):
+                self._printed = (self._printed + part)[-KEPT:]
+
+    def _exchange(
+        self, header: dict[str, Any], arrays: dict[str, Any], limit: float, most: int
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Send one frame and return the one that comes back within ``limit`` seconds."""
+        process = self._process
+        assert process is not None
+        replies: queue.Queue[Any] = queue.Queue()
+
+        def read() -> None:
+            try:
+                send(process.stdin, header, arrays)  # type: ignore[arg-type]
+                replies.put(receive(process.stdout, most))  # type: ignore[arg-type]
+            except (BrokenFrameError, OSError, ValueError, MemoryError) as error:
+                replies.put(error)
+
+        threading.Thread(target=read, daemon=True).start()
+        try:
+            reply = replies.get(timeout=limit)
+        except queue.Empty:
+            self.close()
+            raise ForeignError(f"no answer within {limit:g} s; the process was ended") from None
+        if isinstance(reply, Exception):
+            how = self._ending(reply)
+            self.close()
+            raise ForeignError(how)
+        found: tuple[dict[str, Any], dict[str, Any]] = reply
+        return found
+
+    def _ending(self, error: Exception) -> str:
+        """Return how the process ended, and the last line it printed."""
+        assert self._process is not None
+        try:
+            status = self._process.wait(timeout=2.0)
+        except subprocess.TimeoutExpired:
+            return str(error)
+        self._reader.join(timeout=1.0)
+        said = [line for line in self._printed.decode(errors="replace").splitlines() if line.strip()]
+        last = f"; last line printed: {' '.join(said[-1].split())}" if said else ""
+        if status < 0:
+            try:
+                how = f"was ended by {signal.Signals(-status).name}"
+            except ValueError:
+                how = f"was ended by signal {-status}"
+        else:
+            how = f"ended with status {status}"
+        return f"the process {how} before it answered{last}"

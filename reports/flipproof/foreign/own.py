@@ -1,0 +1,77 @@
+"""flipproof's own solvers behind the contract of a foreign one, so that every command takes both."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from flipproof.foreign.answers import Answer, AnswerError, answer_of
+from flipproof.foreign.contract import Ask, Traits
+from flipproof.foreign.specs import ForeignError
+from flipproof.frame.solvers import Solver, solve
+
+GRID: float = 1e-9
+"""How far asked times may lie from a uniform grid, as a fraction of their distance."""
+
+
+class Own:
+    """A scheme, model or engine of flipproof as a runner."""
+
+    def __init__(self, solver: Solver) -> None:
+        self.solver = solver
+        refined = {"slicemodel": "steps", "ode_reference": None, "engine_check": "dt"}[solver.package]
+        equations = {"ode_reference": solver.name, "engine_check": "free-flight"}
+        orders = {"midpoint": 2.0} if solver.package == "slicemodel" else {}
+        self.traits = Traits(
+            name=solver.name,
+            equation=solver.name if solver.package == "slicemodel" else equations[solver.package],
+            refined_by=refined,
+            order=orders.get(solver.name, 1.0) if solver.package == "slicemodel" else None,
+            distribution="flipproof",
+            timeout=600.0,
+        )
+
+    def __call__(self, ask: Ask) -> Answer:
+        """Return the checked answer; the slice model computes on a uniform grid that holds the asked times."""
+        settings: dict[str, Any] = dict(ask.options)
+        stride = 1
+        if self.solver.package == "slicemodel":
+            stride, settings["steps"] = _grid_of(ask)
+        else:
+            settings["times"] = ask.times
+            if self.solver.package == "engine_check" and ask.effort is not None:
+                settings["dt"] = ask.effort
+        try:
+            found = solve(self.solver.name, ask.scenario, **settings)
+            if not found.ok:
+                raise ForeignError(f"status = {found.status!r}: {found.message}")
+            if stride > 1:
+                names = ("t", "theta", "omega", "r", "v", "r_cm", "inertia")
+                given: Any = {name: getattr(found, name)[::stride] for name in names} | {"impacts": found.impacts}
+                return answer_of(ask, given)
+            return answer_of(ask, found)
+        except ForeignError:
+            raise
+        except (ValueError, ArithmeticError, MemoryError, RuntimeError) as error:
+            raise ForeignError(f"{type(error).__name__}: {error}") from None
+
+    def close(self) -> None:
+        """Nothing runs."""
+
+
+def _grid_of(ask: Ask) -> tuple[int, int]:
+    """Return how many steps lie between asked times, and the points of the grid, for at least ``effort`` steps.
+
+    Raises
+    ------
+    AnswerError
+        If the times are not uniform over [0, duration].
+    """
+    points, duration = len(ask.times), ask.scenario.duration
+    uniform = np.linspace(0.0, duration, points)
+    if points < 2 or float(np.max(np.abs(ask.times - uniform))) > GRID * duration:
+        raise AnswerError(f"times are not a uniform grid over [0, {duration:g}] s, which the slice model computes on")
+    stride = max(1, math.ceil((ask.effort or 1000.0) / (points - 1) - 1e-9))
+    return stride, stride * (points - 1) + 1

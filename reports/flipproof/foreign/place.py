@@ -1,0 +1,224 @@
+"""Which equation a solver solves: the nearest of the 64 of the ladder, how near, and what else it might be.
+
+Two short throws are asked for, chosen so that all equations that differ at all differ by 0.007 of omega_0 or more in
+omega(t) on at least one of them. Of the 64 sets of switches 40 are different equations: without signs nothing drags,
+and where the tube moves the drag acts on it, so that "drag_on_centre" has no effect there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from itertools import pairwise
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from flipproof.foreign.answers import Answer
+from flipproof.foreign.checking import ask_of, times_of
+from flipproof.foreign.specs import Runner
+from flipproof.frame.solvers import solve
+from flipproof.studies.waterfall import canonical
+from ode_reference.models import MODELS
+from ode_reference.switches import PREFIX, Switches
+from slicemodel import Scenario
+from slicemodel.trajectory import FloatArray
+
+
+def _throw(n_slices: int, water_mass: float, rate: float) -> Scenario:
+    """Return a throw of 0.2 s with damping rate ``rate`` [1/s]; otherwise the paper's own."""
+    throw = Scenario(water_mass=water_mass, n_slices=n_slices, duration=0.2)
+    return replace(throw, drag=2 * rate * throw.slice_mass)
+
+
+THROWS: Final = (_throw(3, 0.35, 6.0), _throw(4, 0.45, 4.0))
+"""The throws that tell equations apart: drag, gravity, and impacts on both ends."""
+
+LEVEL: Final = 3
+"""Refinement at which a solver is placed; its own change is the larger one of the two refinements before it."""
+
+SURE: Final = 4.0
+"""A solver is off the lattice if its distance to every equation exceeds ``FLOOR`` and this many times its change."""
+
+FLOOR: Final = 2e-4
+"""Distance that is no other equation, fraction of omega_0: what a rest speed of 1e-3 m/s instead of 1e-5 m/s may do."""
+
+LIMITS: Final = MappingProxyType(
+    {
+        "published-python": "published-limit",
+        "signs-corrected": "signs-limit",
+        "roots-corrected": "eq8-wall",
+        "exact-step": "eq8",
+        "midpoint": "eq8",
+    }
+)
+"""Scheme of the slice model -> the equation that it converges to; the other two converge to none of the ladder."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Where a solver stands.
+
+    Parameters
+    ----------
+    solver : str
+    equation : str - the nearest equation, by its name on the ladder if it has one
+    switches : Switches - of it
+    distance : float - largest difference of omega(t) to it, fraction of omega_0
+    change : float or None - the same between two refinements of the solver; None if it cannot be refined
+    following : str, and following_distance : float - the next equation that is a different one
+    inert : tuple of str - switches without effect in the nearest equation
+    epsilon : float - spacing of the solver's numbers
+    still : bool - omega never changes: nothing moves inside the bottle
+    """
+
+    solver: str
+    equation: str
+    switches: Switches
+    distance: float
+    change: float | None
+    following: str
+    following_distance: float
+    inert: tuple[str, ...]
+    epsilon: float
+    still: bool
+
+    @property
+    def room(self) -> float:
+        """Distance that the solver's own error explains, fraction of omega_0."""
+        floor = max(FLOOR, 64 * self.epsilon)
+        return floor + (SURE * self.change if self.change is not None else self.following_distance / 5)
+
+    @property
+    def on_lattice(self) -> bool:
+        """True if the solver's own error explains its distance from the nearest equation."""
+        return not self.still and self.distance <= self.room
+
+    @property
+    def text(self) -> str:
+        """What was found, in sentences."""
+        if self.still:
+            return (
+                f"{self.solver}: omega stays constant within {self.distance_from_still:.1g}: nothing moves inside the "
+                "bottle, which no equation of the ladder says"
+            )
+        own = "it cannot be refined" if self.change is None else f"its own change under refinement is {self.change:.2g}"
+        nearest = f"{self.equation} at {self.distance:.2g} of omega_0 ({own})"
+        following = f"the next different equation is {self.following} at {self.following_distance:.2g}"
+        inert = f"; without effect there: {', '.join(self.inert)}" if self.inert else ""
+        if self.on_lattice:
+            return f"{self.solver} solves {nearest}; {following}{inert}"
+        return (
+            f"{self.solver} is off the lattice: the nearest equation is {nearest}, farther than its own error "
+            f"explains ({self.room:.2g}); {following}. Look for another restitution, drag or mass than the throw's"
+        )
+
+    distance_from_still: float = 0.0
+
+    def to_mapping(self) -> dict[str, object]:
+        """Return the place as JSON-ready data."""
+        return {
+            "equation": self.equation,
+            "switches": self.switches.name,
+            "distance": self.distance,
+            "own_change": self.change,
+            "next": self.following,
+            "next_distance": self.following_distance,
+            "inert": list(self.inert),
+            "on_lattice": self.on_lattice,
+        }
+
+
+def name_of(switches: Switches) -> str:
+    """Return the name on the ladder of an equation, or that of its switches."""
+    wanted = canonical(switches)
+    return next((m.name for m in MODELS.values() if canonical(m.switches) == wanted), wanted.name)
+
+
+def switches_of(equation: str) -> Switches:
+    """Return the switches of an equation, or of the one a scheme converges to.
+
+    Raises
+    ------
+    ValueError
+        If a scheme converges to no equation of the ladder.
+    """
+    equation = LIMITS.get(equation, equation)
+    if equation.startswith(PREFIX):
+        return Switches.from_name(equation)
+    if equation not in MODELS:
+        raise ValueError(f"{equation} converges to no equation of the ladder")
+    return MODELS[equation].switches
+
+
+def curve(equation: str, scenario: Scenario, times: FloatArray) -> Answer:
+    """Return theta(t) and omega(t) of an equation of the ladder, by the reference."""
+    found = solve(switches_of(equation).name, scenario, times=times)
+    return Answer(t=found.t, theta=found.theta, omega=found.omega)
+
+
+@cache
+def lattice() -> Mapping[Switches, tuple[FloatArray, ...]]:
+    """Return omega/omega_0 of each of the 40 different equations on ``THROWS``, by switches."""
+    return {s: curves_of(s, [times_of(throw) for throw in THROWS]) for s in {canonical(s) for s in Switches.every()}}
+
+
+def curves_of(switches: Switches, times: list[FloatArray]) -> tuple[FloatArray, ...]:
+    """Return omega/omega_0 of one equation on ``THROWS`` at the given times."""
+    return tuple(curve(switches.name, throw, t).omega / throw.omega0 for throw, t in zip(THROWS, times, strict=True))
+
+
+def place(runner: Runner) -> Place:
+    """Find the equation that a solver solves.
+
+    Raises
+    ------
+    ForeignError
+        If the solver gives no answer.
+    """
+    traits = runner.traits
+    answers = [runner(ask_of(traits, throw, LEVEL)) for throw in THROWS]
+    curves = tuple(answer.omega / throw.omega0 for answer, throw in zip(answers, THROWS, strict=True))
+    levels = (LEVEL - 1, LEVEL - 2) if traits.refined_by is not None else ()
+    coarser = [tuple(runner(ask_of(traits, throw, level)).omega / throw.omega0 for throw in THROWS) for level in levels]
+    references: Mapping[Switches, tuple[FloatArray, ...]] = lattice()
+    return located(traits.name, curves, coarser, references, traits.epsilon)
+
+
+def located(
+    solver: str,
+    curves: tuple[FloatArray, ...],
+    coarser: list[tuple[FloatArray, ...]],
+    references: Mapping[Switches, tuple[FloatArray, ...]],
+    epsilon: float,
+) -> Place:
+    """Return the place of curves among references; all are omega/omega_0 on the same throws and times."""
+    distances = {s: _distance(curves, reference) for s, reference in references.items()}
+    nearest = min(distances, key=lambda s: (distances[s], s.name))
+    following = min((s for s in distances if s != nearest), key=lambda s: (distances[s], s.name))
+    still = max(float(np.max(np.abs(c - 1.0))) for c in curves)
+    refined = [curves, *coarser]
+    change = max((_distance(a, b) for a, b in pairwise(refined)), default=None)
+    return Place(
+        solver=solver,
+        equation=name_of(nearest),
+        switches=nearest,
+        distance=distances[nearest],
+        change=change,
+        following=name_of(following),
+        following_distance=distances[following],
+        inert=tuple(
+            field.name
+            for field in fields(Switches)
+            if canonical(replace(nearest, **{field.name: not getattr(nearest, field.name)})) == nearest
+        ),
+        epsilon=epsilon,
+        still=still <= max(1e-9, 64 * epsilon, SURE * (change or 0.0)),
+        distance_from_still=still,
+    )
+
+
+def _distance(one: tuple[FloatArray, ...], other: tuple[FloatArray, ...]) -> float:
+    return max(float(np.max(np.abs(a - b))) for a, b in zip(one, other, strict=True))

@@ -1,0 +1,72 @@
+"""The testbed's own detection rate: which check sees which of the mistakes planted in a good solver."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import Any, Final
+
+from flipproof.foreign.answers import Answer, AnswerError, answer_of
+from flipproof.foreign.certify import CHECKS, FAILED, certify
+from flipproof.foreign.contract import Ask, Traits, traits_of
+from flipproof.foreign.mistakes import MISTAKES
+from flipproof.foreign.specs import ForeignError
+from flipproof.foreign.subject import Subject
+
+CLEAN: Final = "none"
+
+
+class InProcess:
+    """A solver object as a runner, in this process: for code of our own only."""
+
+    def __init__(self, solver: Any, name: str) -> None:
+        self.solver = solver
+        self.traits: Traits = traits_of(solver, name)
+
+    def __call__(self, ask: Ask) -> Answer:
+        """Return the checked answer."""
+        try:
+            return answer_of(ask, self.solver.solve(ask))
+        except AnswerError as error:
+            raise ForeignError(f"answer: {error}") from None
+        except (ArithmeticError, ValueError, LookupError) as error:
+            raise ForeignError(f"{type(error).__name__}: {error}") from None
+
+    def close(self) -> None:
+        """Nothing runs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Caught:
+    """One mistake, in words, and the checks that failed because of it."""
+
+    mistake: str
+    words: str
+    checks: tuple[str, ...]
+
+
+def detect(name: str, checks: Sequence[str] = tuple(CHECKS)) -> Caught:
+    """Plant one mistake and make the checks; ``CLEAN`` plants none."""
+    kind = Subject if name == CLEAN else MISTAKES[name]
+    found = certify(InProcess(kind(), name), checks)
+    words = "no mistake" if name == CLEAN else (kind.__doc__ or "").partition("\n")[0]
+    return Caught(name, words, tuple(r.check for r in found.results if r.verdict == FAILED))
+
+
+def matrix_csv(found: Sequence[Caught]) -> str:
+    """Return the matrix mistake x check as CSV: 1 where the check fails because of the mistake."""
+    rows = [",".join(["mistake", *CHECKS])]
+    rows += [",".join([caught.mistake, *(str(int(name in caught.checks)) for name in CHECKS)]) for caught in found]
+    return "\n".join(rows) + "\n"
+
+
+def detect_all(pool: Executor | None = None, say: Callable[[Caught], None] = lambda _: None) -> tuple[Caught, ...]:
+    """Plant every mistake, the clean solver first."""
+    names = [CLEAN, *MISTAKES]
+    made: Iterator[Caught] = map(detect, names) if pool is None else pool.map(detect, names)
+    found = []
+    for caught in made:
+        found.append(caught)
+        say(caught)
+    return tuple(found)

@@ -1,0 +1,234 @@
+r"""A good solver of free flight, written so that mistakes can be planted in it one at a time.
+
+    cap r = 0 |  o  o    o  | base r = L       state y = (theta, r_1 ... r_N, v_1 ... v_N); omega = L / J
+
+Slices and the body of tube and resting slices (mass M_c, centre r_c), from Newton's equations in the frame of C_M:
+
+    r_i'' = omega^2 (r_i - r_c) - (alpha / m) v_i - (alpha / M_c) sum_free v_j
+
+Runge-Kutta steps of order 4, every rebound located inside its step, impacts by Newton and Moreau: impulses p_i with
+v_i+ = v_i- - s_i p_i / m - (sum_j s_j p_j) / M_b and p_i >= 0, -s_i (v_i+ + e v_i-) >= 0, product 0 (s = +1 base, -1
+cap). It shares no code with ``ode_reference``; for few slices only, since impulses are found by trying all choices.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipproof.foreign.contract import Ask
+from slicemodel.trajectory import FloatArray
+
+IntArray = NDArray[np.int64]
+
+
+STALLED = 4
+"""Impacts without time between them after which a step goes on; a mistake may cause them without end."""
+
+
+class Subject:
+    """The solver as it should be. Each part that a mistake may spoil is a method of its own."""
+
+    name = "planted: none"
+    equation = "free-flight"
+    refined_by = "dt"
+    precision = "float64"
+    order: ClassVar[float] = 4.0
+    rest_speed = 1e-3
+    kind: type = np.float64
+
+    # ------------------------------------------------------------------ the parts
+
+    def begin(self, ask: Ask) -> None:
+        """Take over the constants of a throw."""
+        s, bottle = ask.scenario, ask.scenario.bottle
+        self.n, self.m, self.mb = s.n_slices, self.slice_mass(ask), bottle.mass
+        self.length, self.low, self.high = bottle.length, s.r_min, s.r_max
+        self.drag, self.e, self.g = s.drag, s.restitution, s.gravity
+        self.own_inertia = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
+        self.frozen = s.frozen
+        self.ask = ask
+        self.side: IntArray = np.zeros(self.n, dtype=np.int64)
+        self.momentum = self.inertia(np.array(ask.start)) * s.omega0
+
+    def slice_mass(self, ask: Ask) -> float:
+        """Return m [kg]."""
+        return ask.scenario.slice_mass
+
+    def start(self, ask: Ask) -> FloatArray:
+        """Return the state at release."""
+        return np.concatenate([[ask.scenario.theta0], ask.start, np.zeros(self.n)]).astype(self.kind)
+
+    def centre(self, r: FloatArray) -> float:
+        """Return r_CM [m] (Eq. 10)."""
+        return float((self.m * r.sum() + self.mb * self.length / 2) / (self.m * self.n + self.mb))
+
+    def inertia(self, r: FloatArray) -> float:
+        """Return J about C_M [kg m^2] (Eq. 11b, 11c)."""
+        c = self.centre(r)
+        return float(self.m * ((r - c) ** 2).sum() + self.own_inertia + self.mb * (self.length / 2 - c) ** 2)
+
+    def spin(self, y: FloatArray) -> float:
+        """Return omega [rad/s]."""
+        return self.momentum / self.inertia(y[1 : self.n + 1])
+
+    def turning(self, omega: float) -> float:
+        """Return theta' [rad/s]."""
+        return omega
+
+    def body(self, r: FloatArray) -> tuple[float, float]:
+        """Return mass [kg] and centre [m] of the tube and what rests in it."""
+        held = self.side != 0
+        mass = self.mb + self.m * int(held.sum())
+        return mass, float((self.mb * self.length / 2 + self.m * r[held].sum()) / mass)
+
+    def drag_on(self, v: FloatArray) -> FloatArray:
+        """Return the acceleration of each slice by its own drag [m/s^2]."""
+        return -(self.drag / self.m) * v
+
+    def drag_of_body(self, v: FloatArray, mass: float) -> float:
+        """Return the acceleration of the slices against the body by what drags on it [m/s^2]."""
+        return float(-(self.drag / mass) * v[self.side == 0].sum())
+
+    def weight(self, y: FloatArray, omega: float) -> float:
+        """Return the acceleration by weight in the bottle's frame; in free flight there is none [m/s^2]."""
+        del y, omega
+        return 0.0
+
+    def acceleration(self, y: FloatArray) -> FloatArray:
+        """Return r'' of all slices as if they were free [m/s^2]."""
+        r, v, omega = y[1 : self.n + 1], y[self.n + 1 :], self.spin(y)
+        mass, centre = self.body(r)
+        return omega * omega * (r - centre) + self.drag_on(v) + self.drag_of_body(v, mass) + self.weight(y, omega)
+
+    def slope(self, y: FloatArray) -> FloatArray:
+        """Return y'."""
+        free = (self.side == 0) & (not self.frozen)
+        v = np.where(free, y[self.n + 1 :], 0.0)
+        a = np.where(free, self.acceleration(y), 0.0)
+        return np.concatenate([[self.turning(self.spin(y))], v, a]).astype(self.kind)
+
+    def advance(self, y: FloatArray, h: float) -> FloatArray:
+        """Return the state after one smooth step."""
+        k1 = self.slope(y)
+        k2 = self.slope(y + h / 2 * k1)
+        k3 = self.slope(y + h / 2 * k2)
+        k4 = self.slope(y + h * k3)
+        return np.asarray(y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4), dtype=self.kind)
+
+    def restitution(self, speed: float, side: int) -> float:
+        """Return e of an impact at ``speed`` [m/s] on one end."""
+        del speed, side
+        return self.e
+
+    def recoil(self) -> float:
+        """Return 1 / M_b, what an impulse does to the tube [1/kg]."""
+        return 1.0 / self.mb
+
+    def impulses(self, v: FloatArray, touching: IntArray, sides: IntArray) -> FloatArray:
+        """Return the velocities after an impact [m/s], by trying which impulses act."""
+        rates = np.array([self.restitution(abs(v[i]), int(s)) for i, s in zip(touching, sides, strict=True)])
+        wanted = -rates * v[touching]
+        for active in product((True, False), repeat=len(touching)):
+            after, admissible = self.after(v, touching, sides, wanted, np.array(active))
+            if admissible:
+                return after
+        return self.after(v, touching, sides, wanted, np.ones(len(touching), dtype=bool))[0]
+
+    def after(
+        self, v: FloatArray, touching: IntArray, sides: IntArray, wanted: FloatArray, on: NDArray[np.bool_]
+    ) -> tuple[FloatArray, bool]:
+        """Return the velocities if exactly the impulses ``on`` act [m/s], and whether the law of impact admits them."""
+        s = sides[on]
+        matrix = np.diag(s / self.m) + self.recoil() * np.ones((len(s), len(s))) * s
+        p = np.linalg.solve(matrix, (v[touching] - wanted)[on]) if len(s) else np.zeros(0)
+        new = v - self.recoil() * float((s * p).sum())
+        new[touching[on]] -= s * p / self.m
+        short = -(sides * (new[touching] - wanted))[~on]
+        return new, bool((p >= -1e-15).all() and (short >= -1e-12).all())
+
+    def meet(self, y: FloatArray, striking: IntArray) -> FloatArray:
+        """Return the state after the slices ``striking`` (-1, 0, 1 each) have met their ends."""
+        contact = striking + self.side
+        touching = np.flatnonzero(contact)
+        sides = contact[touching]
+        y = y.copy()
+        y[1 + touching] = np.where(sides > 0, self.high, self.low)
+        v = self.impulses(y[self.n + 1 :].astype(float), touching, sides)
+        slow = touching[np.abs(v[touching]) < self.rest_speed]
+        self.side = np.zeros(self.n, dtype=np.int64)
+        self.side[slow] = contact[slow]
+        y[self.n + 1 :] = self.stuck(v, slow)
+        return self.let_go(y)
+
+    def stuck(self, v: FloatArray, slow: IntArray) -> FloatArray:
+        """Return the velocities after the slow slices have stopped against the tube."""
+        ratio = self.m * self.recoil()
+        v = v - ratio * float(v[slow].sum()) / (1 + ratio * len(slow))
+        v[slow] = 0.0
+        return v
+
+    def let_go(self, y: FloatArray) -> FloatArray:
+        """Release the slices that their end no longer presses."""
+        if self.side.any():
+            push = self.side * self.acceleration(y)
+            self.side[(self.side != 0) & (push < 0)] = 0
+        return y
+
+    def struck(self, y: FloatArray) -> IntArray:
+        """Return which end each free slice has passed: 1 base, -1 cap, 0 none."""
+        r = y[1 : self.n + 1]
+        return np.where(self.side != 0, 0, np.where(r > self.high, 1, np.where(r < self.low, -1, 0)))
+
+    def step(self, y: FloatArray, h: float) -> FloatArray:
+        """Return the state after a step with all its rebounds, each at its own time."""
+        stalled = 0
+        while stalled < STALLED:
+            new = self.advance(y, h)
+            if self.frozen or not self.struck(new).any():
+                return self.let_go(new)
+            low, high = 0.0, h
+            for _ in range(60):
+                if high <= 1e-12 * h:
+                    break
+                middle = (low + high) / 2
+                low, high = (low, middle) if self.struck(self.advance(y, middle)).any() else (middle, high)
+            at = self.advance(y, high)
+            stalled = stalled + 1 if high <= 1e-9 * h else 0
+            y, h = self.meet(at, self.struck(at)), h - high
+        return self.advance(y, h)
+
+    # ------------------------------------------------------------------ the loop
+
+    def steps(self, span: float, dt: float) -> int:
+        """Return the steps that lead over ``span`` [s]."""
+        return max(1, int(np.ceil(span / dt * (1 - 1e-9))))
+
+    def solve(self, ask: Ask) -> dict[str, FloatArray]:
+        """Answer at the times asked."""
+        self.begin(ask)
+        y = self.start(ask)
+        if not self.frozen:
+            r = y[1 : self.n + 1]
+            self.side = np.where(r >= self.high - 1e-12, 1, np.where(r <= self.low + 1e-12, -1, 0))
+            y = self.let_go(y)
+        t, rows, spins = 0.0, [], []
+        for when in ask.times:
+            if when > t:
+                count = self.steps(when - t, float(ask.effort or 1e-4))
+                for _ in range(count):
+                    y = self.step(y, (when - t) / count)
+                t = float(when)
+            rows.append(y.copy())
+            spins.append(self.spin(y))
+        states = np.array(rows)
+        return {
+            "t": ask.times,
+            "theta": states[:, 0],
+            "omega": np.array(spins),
+            "r": states[:, 1 : self.n + 1],
+            "v": states[:, self.n + 1 :],
+        }

@@ -1,0 +1,31 @@
+"""A certificate as findings, so that JUnit, page and summary show it as they show everything else."""
+
+from __future__ import annotations
+
+from flipproof.foreign.certify import EXPECTED, FAILED, IDLE, Certificate
+from flipproof.frame.findings import Finding
+from flipproof.output.junit import junit_text
+
+
+def findings_of(certificate: Certificate) -> tuple[Finding, ...]:
+    """Return one finding a check: 1 if it holds, 0 if not; expected failures and idle checks are observations."""
+    found = []
+    for result in certificate.results:
+        idle = result.verdict in (IDLE, EXPECTED)
+        found.append(
+            Finding(
+                id=f"certify-{result.check}",
+                title=result.title,
+                value=None if result.verdict == IDLE else float(result.verdict != FAILED),
+                unit="",
+                kind="observation" if idle else "regression",
+                admissible=(1.0, 1.0),
+                note=result.line if result.found else result.reason,
+            )
+        )
+    return tuple(found)
+
+
+def junit_of(certificate: Certificate) -> str:
+    """Return the certificate as JUnit XML."""
+    return junit_text(findings_of(certificate), f"flipproof certify {certificate.traits.name}")

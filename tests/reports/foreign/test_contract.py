@@ -1,0 +1,146 @@
+"""What a solver is asked, what it says of itself, and what counts as an answer."""
+
+import math
+
+import numpy as np
+import pytest
+
+from flipproof.foreign.answers import AnswerError, answer_of, trajectory_of
+from flipproof.foreign.checking import THROW, effort_of, times_of
+from flipproof.foreign.contract import Ask, Traits, solve_of, traits_of
+from slicemodel import Scenario, Trajectory, solve
+from slicemodel.observables import centre_of_mass, moment_of_inertia
+
+ASK = Ask.of(THROW, times_of(THROW, 5), 0.01, colour="blue")
+CURVE = {"t": ASK.times, "theta": ASK.times, "omega": 1.0 + ASK.times}
+R = np.tile(ASK.start, (5, 1))
+
+
+def test_an_ask_starts_at_rest_in_the_water_and_cannot_be_written():
+    np.testing.assert_array_equal(ASK.start, THROW.initial_positions())
+    assert (ASK.effort, ASK.options["colour"]) == (0.01, "blue")
+    with pytest.raises(ValueError, match="read-only"):
+        ASK.times[0] = 1.0
+    with pytest.raises(TypeError):
+        ASK.options["colour"] = "red"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"name": ""}, "name = '' is not a line of text"),
+        ({"name": "a\nb"}, "is not a line of text"),
+        ({"name": 5}, "name = 5"),
+        ({"equation": "eq9"}, "equation = 'eq9'"),
+        ({"equation": "switches:12"}, "switches"),
+        ({"refined_by": "patience"}, "refined_by = 'patience'"),
+        ({"precision": "float16"}, "precision = 'float16'"),
+        ({"order": 0}, r"order = 0 is not a number in \(0, 40\]"),
+        ({"order": math.nan}, "order = nan"),
+        ({"order": True}, "order = True"),
+        ({"order": "4"}, "order = '4'"),
+        ({"timeout": -1.0}, r"timeout = -1.0 is not a number of seconds in \(0, 86400\]"),
+        ({"expected_failures": ["ice"]}, r"expected_failures = \['ice'\]"),
+        ({"expected_failures": {"ice": 1}}, "expected_failures = "),
+    ],
+)
+def test_what_a_solver_says_wrongly_of_itself_is_refused(wrong, said):
+    with pytest.raises(ValueError, match=said):
+        Traits(**{"name": "mine", **wrong})
+
+
+def test_a_function_and_an_object_have_traits():
+    def plain(ask):
+        return ask
+
+    class Thing:
+        name, equation, refined_by, order, precision = "thing", "eq8", "steps", 2, "float32"
+
+        def solve(self, ask):
+            return ask
+
+    assert traits_of(plain, "file.py:plain") == Traits(name="file.py:plain")
+    found = traits_of(Thing(), "x")
+    assert (found.name, found.equation, found.order, found.epsilon) == ("thing", "eq8", 2, 2.0**-23)
+    assert solve_of(plain)(3) == solve_of(Thing())(3) == 3
+    with pytest.raises(ValueError, match="neither callable nor has a method solve"):
+        traits_of(object(), "x")
+
+
+def test_effort_follows_what_refines():
+    def of(refined_by, level):
+        return effort_of(Traits(name="x", refined_by=refined_by), THROW, level)
+
+    assert of("dt", 1) == pytest.approx(of("dt", 0) / 2, abs=1e-18)
+    assert of("steps", 1) == 2 * of("steps", 0) == 1920
+    assert of("rtol", 1) == pytest.approx(1e-7, abs=1e-20)
+    assert of("rtol", 20) == 1e-13
+    assert of(None, 3) is None
+
+
+def test_mappings_objects_and_trajectories_are_answers():
+    class Given:
+        t, theta, omega = ASK.times, ASK.times, 1.0 + ASK.times
+
+    assert answer_of(ASK, CURVE).given == answer_of(ASK, Given()).given == ("t", "theta", "omega")
+    run = solve(THROW, scheme="midpoint", steps=5)
+    found = answer_of(ASK, run)
+    np.testing.assert_array_equal(found.r, run.r)
+    np.testing.assert_allclose(found.inertia, run.inertia, rtol=1e-14)
+
+
+def test_centre_and_inertia_follow_from_positions():
+    found = answer_of(ASK, CURVE | {"r": R})
+    np.testing.assert_array_equal(found.r_cm, centre_of_mass(THROW, R))
+    np.testing.assert_array_equal(found.inertia, moment_of_inertia(THROW, R))
+
+
+def test_impacts_come_as_rows_columns_or_mappings():
+    row = {"time": 0.1, "slice": 0, "end": -1, "speed_before": 1.0, "speed_after": 0.5}
+    forms = [[tuple(row.values())], [row], {name: [value] for name, value in row.items()}]
+    for form in forms:
+        (impact,) = answer_of(ASK, CURVE | {"impacts": form}).impacts
+        assert (impact.end, impact.speed_after) == ("cap", 0.5)
+    assert len(answer_of(ASK, CURVE | {"impacts": []}).impacts) == 0
+
+
+@pytest.mark.parametrize(
+    ("impacts", "said"),
+    [
+        (5, "impacts are no rows"),
+        ([(0.1, 0, 1)], "impacts are no rows"),
+        ([(0.1, 0, 2, 1.0, 0.5)], "impacts.end holds other numbers"),
+        ([(0.1, -1, 1, 1.0, 0.5)], "impacts.slice leaves"),
+        ([(math.nan, 0, 1, 1.0, 0.5)], r"impacts.time\[0\] = nan is not finite"),
+    ],
+)
+def test_impacts_that_are_none_are_refused(impacts, said):
+    with pytest.raises(AnswerError, match=said):
+        answer_of(ASK, CURVE | {"impacts": impacts})
+
+
+def test_a_run_that_broke_off_is_no_answer():
+    broken = solve(Scenario(), scheme="published-matlab", steps=1000)
+    with pytest.raises(AnswerError, match="status = 'overflow': slice 5 left the bottle"):
+        answer_of(Ask.of(Scenario(), broken.t), broken)
+
+
+def test_own_times_must_increase():
+    own = {"t": [0.0, 0.1, 0.1], "theta": [0.0] * 3, "omega": [1.0] * 3}
+    with pytest.raises(AnswerError, match="t does not increase"):
+        answer_of(ASK, own, own_times=True)
+    assert len(answer_of(ASK, own | {"t": [0.0, 0.1, 0.2]}, own_times=True).t) == 3
+
+
+def test_a_trajectory_of_an_answer():
+    traits = Traits(name="mine")
+    made = trajectory_of(ASK, answer_of(ASK, CURVE | {"r": R, "v": 0 * R}), traits)
+    assert isinstance(made, Trajectory)
+    assert (made.label, made.diagnostics["implied"]) == ("mine", [])
+    implied = trajectory_of(ASK, answer_of(ASK, CURVE | {"r_cm": ASK.times}), traits)
+    assert implied.diagnostics["implied"] == ["inertia"]
+    np.testing.assert_allclose(implied.inertia * implied.omega, implied.inertia[0] * implied.omega[0], rtol=1e-14)
+    with pytest.raises(AnswerError, match="neither r nor r_cm was given"):
+        trajectory_of(ASK, answer_of(ASK, CURVE), traits)
+    with pytest.raises(AnswerError, match="omega = 0 rad/s somewhere"):
+        trajectory_of(ASK, answer_of(ASK, CURVE | {"r_cm": ASK.times, "omega": 0 * ASK.times}), traits)

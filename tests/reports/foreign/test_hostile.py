@@ -1,0 +1,127 @@
+"""Whatever a solver raises, hangs on, prints or returns becomes one line in place, and costs its own run alone."""
+
+import os
+import re
+import shutil
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flipproof.foreign.certify import FAILED, certify
+from flipproof.foreign.checking import THROW, times_of
+from flipproof.foreign.contract import Ask
+from flipproof.foreign.isolated import Isolated
+from flipproof.foreign.specs import ForeignError, load
+
+HERE = Path(__file__).resolve().parent
+WRONG = load(f"{HERE / 'hostile.py'}:WRONG")
+HARMLESS = load(f"{HERE / 'hostile.py'}:HARMLESS")
+ASK = Ask.of(THROW, times_of(THROW))
+
+
+@pytest.fixture
+def runner(tmp_path):
+    """A function that gives a solver of a copy of the file, since one of them deletes it."""
+    shutil.copy(HERE / "hostile.py", tmp_path)
+    opened = []
+
+    def of(name, timeout=2.0):
+        opened.append(Isolated(f"{tmp_path / 'hostile.py'}:{name}", timeout))
+        return opened[-1]
+
+    yield of
+    for one in opened:
+        one.close()
+
+
+def test_there_are_at_least_thirty():
+    assert len(WRONG) + len(HARMLESS) >= 30
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_answer_is_a_reason_in_one_line(runner, name):
+    solver = runner(name)
+    with pytest.raises(ForeignError) as caught:
+        solver(ASK)
+    said = str(caught.value)
+    assert re.search(WRONG[name], said)
+    assert "\n" not in said
+    assert len(said) < 400
+
+
+@pytest.mark.parametrize("name", HARMLESS)
+def test_an_odd_solver_that_answers_is_answered(runner, name):
+    answer = runner(name, 20.0)(ASK)
+    np.testing.assert_array_equal(answer.omega, np.full(len(ASK.times), THROW.omega0))
+    assert answer.t.dtype == np.float64
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("not_a_solver", "5 is neither callable nor has a method solve"),
+        ("badly_named", "is not a line of text"),
+        ("of_no_equation", "equation = 'eq9'"),
+        ("of_no_time", "timeout = nan is not a number of seconds"),
+        ("absent", "has no attribute 'absent'"),
+    ],
+)
+def test_a_solver_that_cannot_be_loaded_says_why(runner, name, said):
+    with pytest.raises(ForeignError, match=said):
+        runner(name)(ASK)
+
+
+def test_the_next_run_after_a_crash_is_answered(tmp_path):
+    file = tmp_path / "once.py"
+    file.write_text(
+        "import os, pathlib\nfrom numpy import full\n"
+        "def solve(ask):\n"
+        "    mark = pathlib.Path(__file__).with_suffix('.mark')\n"
+        "    if not mark.exists():\n        mark.touch(); os.abort()\n"
+        "    return {'t': ask.times, 'theta': ask.times, 'omega': full(len(ask.times), 2.0)}\n"
+    )
+    solver = Isolated(f"{file}:solve")
+    with pytest.raises(ForeignError, match="SIGABRT"):
+        solver(ASK)
+    assert solver(ASK).omega[0] == 2.0
+    solver.close()
+
+
+def test_nothing_outlives_a_closed_solver(tmp_path):
+    file = tmp_path / "fork.py"
+    file.write_text(
+        "import os, time, pathlib\n"
+        "def solve(ask):\n"
+        "    child = os.fork()\n"
+        "    if child == 0:\n        time.sleep(600); os._exit(0)\n"
+        "    pathlib.Path(__file__).with_suffix('.pid').write_text(str(child))\n"
+    )
+    solver = Isolated(f"{file}:solve")
+    with pytest.raises(ForeignError):
+        solver(ASK)
+    child = int(file.with_suffix(".pid").read_text())
+    solver.close()
+    for _ in range(100):
+        if not _runs(child):
+            return
+        time.sleep(0.05)
+    pytest.fail("what the solver started still runs")
+
+
+def _runs(number):
+    try:
+        os.kill(number, 0)
+    except ProcessLookupError:
+        return False
+    status = Path(f"/proc/{number}/stat")
+    return not status.exists() or status.read_text().rpartition(")")[2].split()[0] != "Z"
+
+
+@pytest.mark.parametrize("name", ["raises", "segfaults", "not_a_number", "changes_the_times", "exits_as_if_well"])
+def test_certify_finishes_and_names_each(runner, name):
+    found = certify(runner(name), ["shape", "ice", "mirror"])
+    assert [result.verdict for result in found.results] == [FAILED] * 3
+    assert all(re.search(WRONG[name], result.reason) for result in found.results)
+    assert "3 checks: 0 passed, 3 failed" in found.conclusion

@@ -1,0 +1,95 @@
+"""The suite as files, and the worked examples in other languages."""
+
+import csv
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flipproof.foreign.certify import IDLE, PASSED, certify
+from flipproof.foreign.contract import Ask, Traits
+from flipproof.foreign.kit import Kit
+from flipproof.foreign.specs import opened
+from slicemodel import Scenario
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "foreign"
+GOOD = Traits(name="by hand", equation="eq8", refined_by="steps", order=2.0)
+
+
+def answer_all(folder, solver):
+    """Answer every ask of a kit that has no answer, from its files alone."""
+    for place in sorted((folder / "asks").iterdir()):
+        if (place / "answer.csv").is_file():
+            continue
+        throw = Scenario.from_toml(place / "scenario.toml")
+        assert Scenario.from_mapping(json.loads((place / "scenario.json").read_text())) == throw
+        times = [float(x) for x in (place / "times.csv").read_text().split()[1:]]
+        ask = Ask.of(throw, np.array(times), float((place / "effort.txt").read_text()))
+        assert [float(x) for x in (place / "start.csv").read_text().split()[1:]] == list(ask.start)
+        found = solver(ask)
+        n = throw.n_slices
+        with (place / "answer.csv").open("w", newline="") as file:
+            rows = csv.writer(file)
+            rows.writerow(["t", "theta", "omega", *(f"r_{i}" for i in range(n)), *(f"v_{i}" for i in range(n))])
+            for k, t in enumerate(times):
+                row = [t, found.theta[k], found.omega[k], *found.r[k], *found.v[k]]
+                rows.writerow([repr(float(x)) for x in row])
+
+
+def test_answers_by_files_get_the_same_verdicts(tmp_path):
+    kit = Kit.made(tmp_path / "kit", GOOD)
+    first, waiting = Kit(kit.folder).grade()
+    assert waiting
+    assert "is not there yet" in first.conclusion
+    asked = len(list((kit.folder / "asks").iterdir()))
+    for _ in range(5):  # the search for a floor asks again, depending on the answers
+        answer_all(kit.folder, opened("midpoint"))
+        found, waiting = Kit(kit.folder).grade()
+        if not waiting:
+            break
+    assert not waiting
+    assert len(list((kit.folder / "asks").iterdir())) - asked <= 5
+    assert not found.failed
+    assert {r.verdict for r in found.results} == {PASSED, IDLE}
+
+
+def test_a_wrong_answer_names_its_file(tmp_path):
+    kit = Kit.made(tmp_path / "kit", GOOD)
+    (kit.folder / "asks" / "0001" / "answer.csv").write_text("t,theta,omega\n0,0,nan\n")
+    found, _ = kit.grade()
+    assert "shape" in [result.check for result in found.failed]
+
+
+@pytest.mark.parametrize(
+    ("index", "said"),
+    [
+        ("", "is not readable"),
+        ("[]", "is not readable"),
+        ('{"kit": 9, "solver": {"name": "x"}, "asks": []}', "format 9, must be 1"),
+    ],
+)
+def test_a_folder_that_is_no_kit_is_refused(tmp_path, index, said):
+    with pytest.raises(ValueError, match="is no kit"):
+        Kit(tmp_path)
+    (tmp_path / "kit.json").write_text(index)
+    with pytest.raises(ValueError, match=said):
+        Kit(tmp_path)
+    with pytest.raises(ValueError, match="is not empty; name a new folder"):
+        Kit.made(tmp_path, GOOD)
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node")
+def test_the_example_in_javascript_passes_by_its_command_and_by_a_kit(tmp_path):
+    script = EXAMPLES / "eq8.mjs"
+    runner = opened(f"cmd:node {script} {{scenario}} {{times}} {{start}} {{effort}} {{out}}")
+    found = certify(runner, ["shape", "start", "ice", "angular-momentum", "mirror", "equation"], equation="eq8")
+    assert [r.verdict for r in found.results] == [PASSED] * 6
+    kit = Kit.made(tmp_path / "kit", Traits(name="eq8.mjs", equation="eq8", refined_by="dt"))
+    waiting = 1
+    while waiting:
+        subprocess.run(["node", str(script), str(kit.folder)], check=True, timeout=300)
+        graded, waiting = Kit(kit.folder).grade()
+    assert not graded.failed, graded.failed[0].line

@@ -1,0 +1,165 @@
+"""The page for people with a solver of their own works as it stands; the commands; the plugin; Box2D."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from flipproof.cli import main as cli
+
+ROOT = Path(__file__).resolve().parents[3]
+PAGE = (ROOT / "docs" / "own-solver.md").read_text(encoding="utf-8")
+RK4 = ROOT / "examples" / "foreign" / "rk4.py"
+BOX2D = ROOT / "examples" / "foreign" / "box2d"
+
+
+def run(capsys, *arguments):
+    try:
+        status = cli.main([str(argument) for argument in arguments])
+    except SystemExit as end:
+        status = end.code
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with the files of the page."""
+    for name, code in re.findall(r"```python file=(\S+)\n(.*?)```", PAGE, re.DOTALL):
+        (tmp_path / name).write_text(code)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.usefixtures("folder")
+def test_the_page_places_its_solver(capsys):
+    status, out, _ = run(capsys, "place", "mine.py:solve", "--json")
+    found = json.loads(out)
+    assert (status, found["equation"], found["on_lattice"]) == (0, "eq8", True)
+
+
+def test_the_tests_of_the_page_pass(folder):
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_mine.py"],
+        cwd=folder, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "5 passed" in done.stdout
+
+
+def test_certify_writes_passport_and_verdicts_and_says_so(folder, capsys, monkeypatch):
+    from flipproof.foreign import certify as suite
+
+    monkeypatch.setattr(suite.certify, "__defaults__", (("shape", "start", "ice", "mirror"),))
+    status, out, _ = run(capsys, "certify", "mine.py:solve", "--json", "p.json", "--junit", "v.xml")
+    assert status == 0
+    assert out.splitlines()[-1] == "4 checks: 4 passed, 0 failed"
+    assert json.loads((folder / "p.json").read_text())["conclusion"] == out.splitlines()[-1]
+    assert "<testsuite" in (folder / "v.xml").read_text()
+    (folder / "mine.py").write_text("def solve(ask):\n    return 5\n")
+    assert run(capsys, "certify", "mine.py:solve")[0] == 1
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("certify", "nowhere.py:solve"), "there is no file nowhere.py"),
+        (("certify", "eq8", "--equation", "eq9"), "equation = 'eq9'"),
+        (("certify", "eq8", "--json", "no/such/p.json"), "no/such/p.json cannot be written: no such folder"),
+        (("certify", "math:no_such"), "cannot be loaded: AttributeError"),
+        (("place", "eq9"), "'eq9'"),
+        (("explain", "eq8", "csv:x.csv"), "a curve cannot be asked"),
+        (("grade", "."), "is no kit"),
+        (("simulate", "--solver", "mine.py:solve", "--steps", "5"), "is not a scheme"),
+        (("simulate", "--solver", "nowhere.py:solve"), "there is no file nowhere.py"),
+    ],
+)
+def test_bad_input_is_one_line(capsys, arguments, said):
+    status, out, err = run(capsys, *arguments)
+    assert (status, out) == (2, "")
+    assert said in err
+    assert len(err.splitlines()) == 1
+
+
+def test_a_solver_that_does_not_answer_the_throws_is_said_so(capsys):
+    status, out, _ = run(capsys, "place", "published-matlab")
+    assert status == 1
+    assert "published-matlab cannot be placed; it does not answer the throws that tell equations apart" in out
+    assert "left the bottle" in out
+
+
+def test_explain_simulate_and_compare_take_a_solver_of_ones_own(capsys, tmp_path):
+    throw = tmp_path / "short.toml"
+    throw.write_text("[scenario]\nduration = 0.1\nn_slices = 3\n")
+    status, out, _ = run(capsys, "simulate", throw, "--solver", f"{RK4}:Eq8")
+    assert status == 0
+    assert out.splitlines()[0] == "t,theta,omega,r_cm,inertia,r_0,r_1,r_2,v_0,v_1,v_2"
+    assert len(out.splitlines()) == 1001
+    status, out, _ = run(capsys, "compare", f"{RK4}:Eq8", "eq8", "--scenario", throw)
+    assert status == 0
+    assert "naive RK4" in out
+    assert "apart: never" in out
+    status, out, _ = run(capsys, "explain", "exact-step", "eq8-weightless", "--scenario", throw)
+    assert status == 0
+    assert "gravity in Eq. 8" in out
+
+
+def test_kit_and_grade(capsys, tmp_path):
+    status, out, _ = run(capsys, "kit", "--out", tmp_path / "kit", "--refined-by", "dt", "--equation", "eq8")
+    assert status == 0
+    assert "then run: flipproof grade" in out
+    status, out, _ = run(capsys, "grade", tmp_path / "kit")
+    assert status == 1
+    assert "wait for answers" in out
+
+
+def test_help_names_the_commands(capsys):
+    out = run(capsys, "--help")[1]
+    for command in ("certify", "place", "explain", "kit", "grade", "power"):
+        assert re.search(rf"^ +{command} ", out, re.MULTILINE)
+        assert "usage: flipproof" in run(capsys, command, "--help")[1]
+
+
+def test_models_lists_what_packages_offer(capsys, monkeypatch, tmp_path):
+    (tmp_path / "boom-1.0.dist-info").mkdir()
+    (tmp_path / "boom-1.0.dist-info" / "METADATA").write_text("Metadata-Version: 2.1\nName: boom\nVersion: 1.0\n")
+    (tmp_path / "boom-1.0.dist-info" / "entry_points.txt").write_text("[flipproof.engines]\nboom-engine = boom:E\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    out = run(capsys, "models")[1]
+    assert "boom-engine\n      boom:E, from boom 1.0" in out
+    assert "boom" not in sys.modules
+
+
+def test_a_plugin_that_is_not_used_costs_nothing():
+    code = (
+        "import sys, flipproof.pytest_plugin; sys.exit(any(m in sys.modules for m in ('numpy', 'flipproof.foreign')))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_the_passports_of_box2d_say_what_was_found():
+    """No rebound below 1 m/s at 1 unit a metre, the restitution asked for at 100, and float32 in both."""
+    facts = {name: json.loads((BOX2D / f"passport-{name}.json").read_text()) for name in ("box2d", "box2d-si")}
+    low, high = facts["box2d-si"]["facts"]["threshold"]
+    assert 0.95 <= low <= high <= 1.05
+    assert all(abs(e - 0.5) <= 5e-3 for _, _, e in facts["box2d"]["facts"]["restitution"])
+    for passport in facts.values():
+        assert passport["facts"]["arithmetic"] == "float32 arithmetic"
+        assert passport["facts"]["place"]["equation"] == "free-flight"
+
+
+def test_box2d_has_the_threshold_its_passport_names():
+    pytest.importorskip("Box2D")
+    from flipproof.foreign.certify import certify
+    from flipproof.foreign.power import InProcess
+    from flipproof.foreign.specs import load
+
+    found = {name: certify(InProcess(load(f"{BOX2D / 'flipproof_box2d.py'}:{name}"), name), ["restitution"]).results[0]
+             for name in ("Box2D", "Box2DSI")}  # fmt: skip
+    low, high = found["Box2DSI"].found.facts["threshold"]
+    assert 0.95 <= low <= high <= 1.05
+    assert all(abs(e - 0.5) <= 5e-3 for _, _, e in found["Box2D"].found.facts["restitution"])

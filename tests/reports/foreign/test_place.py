@@ -1,0 +1,110 @@
+"""Which equation a solver solves: every built-in on its own, others where they belong, wrong constants nowhere."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flipproof.foreign.explain import explain, shares
+from flipproof.foreign.place import LIMITS, lattice, name_of, place, switches_of
+from flipproof.foreign.specs import ForeignError, opened
+from flipproof.frame.solvers import catalogue
+from ode_reference.switches import Switches
+from slicemodel import Scenario
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "foreign"
+VARIANTS = Path(__file__).with_name("rk4_variants.py")
+PLACED = {name: LIMITS.get(name, "free-flight" if solver.package == "engine_check" else name)
+          for name, solver in catalogue().items() if name not in ("published-matlab", "paper-typeset")}  # fmt: skip
+
+
+def placed(spec):
+    runner = opened(str(spec))
+    try:
+        return place(runner)
+    finally:
+        runner.close()
+
+
+def test_forty_different_equations_and_every_name_among_them():
+    assert len(lattice()) == 40
+    assert {name_of(s) for s in lattice()} >= {"eq8", "free-flight", "published-limit"}
+    for name in ("eq8", "switches:101000"):
+        assert name_of(switches_of(name)) == name
+
+
+@pytest.mark.parametrize("name", PLACED)
+def test_every_built_in_is_on_its_equation(name):
+    found = placed(name)
+    assert found.equation == PLACED[name]
+    assert found.on_lattice
+    assert found.following_distance >= 5 * found.distance
+    assert found.text.startswith(f"{name} solves {PLACED[name]} at ")
+
+
+def test_typeset_paper_lets_nothing_move():
+    found = placed("paper-typeset")
+    assert found.still
+    assert not found.on_lattice
+    assert "omega stays constant" in found.text
+
+
+def test_published_matlab_does_not_answer():
+    with pytest.raises(ForeignError, match="left the bottle at t = "):
+        placed("published-matlab")
+
+
+@pytest.mark.parametrize(
+    ("spec", "equation"),
+    [(f"{EXAMPLES / 'rk4.py'}:Weightless", "eq8-weightless"), (f"{VARIANTS}:Undeclared", "eq8")],
+)
+def test_a_naive_runge_kutta_lands_on_its_equation(spec, equation):
+    found = placed(spec)
+    assert (found.equation, found.on_lattice) == (equation, True)
+    assert found.following_distance >= 5 * found.distance
+
+
+@pytest.mark.parametrize("name", ["RestitutionLow", "DragHigh"])
+def test_wrong_constants_are_off_the_lattice(name):
+    found = placed(f"{VARIANTS}:{name}")
+    assert not found.on_lattice
+    assert found.distance > 5 * found.room
+    assert "off the lattice" in found.text
+
+
+def test_gravity_explains_what_gravity_does():
+    with_it, without = (opened(f"{EXAMPLES / 'rk4.py'}:{name}") for name in ("Eq8", "Weightless"))
+    try:
+        found = explain(with_it, without, Scenario(n_slices=4, duration=0.3))
+    finally:
+        with_it.close()
+        without.close()
+    assert list(found.bars) == ["weightless"]
+    assert found.bars["weightless"] / found.difference >= 0.95
+    assert sum(found.bars.values()) + found.rest == pytest.approx(found.difference, abs=1e-12)
+    assert "gravity in Eq. 8" in found.text
+
+
+def test_a_solver_does_not_differ_from_itself():
+    found = explain(opened("eq8"), opened("eq8"), Scenario(n_slices=4, duration=0.3))
+    assert (found.bars, found.rest, found.difference) == ({}, 0.0, 0.0)
+
+
+def test_shares_sum_to_the_whole_way():
+    throw = Scenario(n_slices=4, duration=0.3)
+    start, end = (switches_of(name) for name in ("eq8", "free-flight"))
+    bars = shares(start, end, throw)
+    one, other = explain(opened("eq8"), opened("free-flight"), throw).values
+    assert sum(bars.values()) == pytest.approx(other - one, abs=1e-12)
+    assert len(bars) == sum(a != b for a, b in zip(vars_of(start), vars_of(end), strict=True))
+
+
+def vars_of(switches: Switches):
+    return [getattr(switches, name) for name in switches.__slots__]
+
+
+def test_the_lattice_tells_different_equations_apart():
+    curves = list(lattice().values())
+    apart = [max(float(np.max(np.abs(a - b))) for a, b in zip(one, other, strict=True))
+             for k, one in enumerate(curves) for other in curves[:k]]  # fmt: skip
+    assert min(apart) > 0.005

@@ -1,0 +1,157 @@
+"""How a solver is named; programs and files that answer; frames between processes."""
+
+import io
+import shutil
+import sys
+
+import numpy as np
+import pytest
+
+from flipproof.foreign import specs
+from flipproof.foreign.checking import THROW, times_of
+from flipproof.foreign.contract import Ask
+from flipproof.foreign.specs import ForeignError, is_foreign, is_spec, load, locate, opened
+from flipproof.foreign.wire import BrokenFrameError, receive, send
+from flipproof.frame.solvers import FOREIGN, Run, find, make, solve
+
+ASK = Ask.of(THROW, times_of(THROW, 5), 0.25)
+PROGRAM = """
+import csv, sys
+times = [float(line) for line in open(sys.argv[1]).read().split()[1:]]
+start = [float(line) for line in open(sys.argv[2]).read().split()[1:]]
+with open(sys.argv[4], "w", newline="") as file:
+    rows = csv.writer(file)
+    rows.writerow(["t", "theta", "omega", *(f"r_{i}" for i in range(len(start)))])
+    rows.writerows([t, 1.0, float(sys.argv[3]), *start] for t in times)
+"""
+
+
+def test_names_of_our_own_are_not_foreign():
+    for name in ("eq8", "exact-step", "pymunk", "switches:110000"):
+        assert not is_foreign(name)
+        assert not is_spec(name)
+    assert is_foreign("eq9")
+    assert not is_spec("eq9")
+    assert is_spec("mine.py:solve")
+
+
+@pytest.mark.parametrize(
+    ("spec", "said"),
+    [
+        ("eq9", "did you mean|unknown"),
+        ("nowhere.py:solve", "there is no file nowhere.py"),
+        ("a-b:solve", "'a-b' is neither a module nor a .py file"),
+        ("package.module:1x", "'1x' is no name"),
+        ("mine.py", "name the object in the file, too: mine.py:solve"),
+        ("cmd:program {times}", "must hold {out}"),
+        ("cmd:'open", "No closing quotation"),
+        ("csv:nowhere.csv", "a curve cannot be asked"),
+    ],
+)
+def test_a_spec_that_names_nothing_says_how_specs_are_written(spec, said):
+    with pytest.raises(ValueError, match=said) as caught:
+        opened(spec)
+    assert "\n" not in str(caught.value)
+
+
+def test_nothing_is_imported_to_find_or_list_a_solver(monkeypatch, tmp_path):
+    (tmp_path / "boom.py").write_text("raise SystemExit('imported')\n")
+    folder = tmp_path / "boom-1.0.dist-info"
+    folder.mkdir()
+    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: boom\nVersion: 1.0\n")
+    (folder / "entry_points.txt").write_text("[flipproof.solvers]\nboom-solver = boom:solve\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert "boom-solver" in specs.offered()
+    assert find("boom-solver").package == FOREIGN
+    assert specs.distribution_of("boom-solver") == "boom 1.0"
+    assert locate("boom-solver").value == "boom:solve"
+    assert "boom" not in sys.modules
+
+
+def test_objects_functions_and_classes_load(tmp_path):
+    file = tmp_path / "mine.py"
+    file.write_text("class Mine:\n    def solve(self, ask):\n        return 7\n\ndef solve(ask):\n    return 8\n")
+    assert load(f"{file}:Mine").solve(None) == 7
+    assert load(f"{file}:solve")(None) == 8
+    assert load("math:sqrt")(9.0) == 3.0
+
+
+def test_a_program_answers_by_files(tmp_path):
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM)
+    spec = f"cmd:{sys.executable} {program} {{times}} {{start}} {{effort}} {{out}}"
+    runner = opened(spec)
+    assert (runner.traits.name, runner.traits.refined_by) == ("program.py", "dt")
+    answer = runner(ASK)
+    np.testing.assert_array_equal(answer.omega, np.full(5, 0.25))
+    np.testing.assert_array_equal(answer.r[3], ASK.start)
+    run = solve(spec, THROW)
+    assert (run.method, len(run.t)) == ("program.py", 1000)
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("import sys; sys.exit('no licence')", "ended with status 1: no licence"),
+        ("pass", "ended without writing {out}"),
+        ("import time; time.sleep(100)", "no answer within 1 s; the program was ended"),
+        ("import os; os.abort()", "ended with status -6"),
+        ("import sys; open(sys.argv[1], 'w').write('')", "has no header"),
+        ("import sys; open(sys.argv[1], 'w').write('t,theta\\n0,1\\n')", "omega missing"),
+        ("import sys; open(sys.argv[1], 'w').write('t,theta,omega\\n0,1\\n')", "line 2 has 2 cells, the header 3"),
+        ("import sys; open(sys.argv[1], 'w').write('t,theta,omega\\n0,1,x\\n')", "column omega: could not convert"),
+        ("import sys; open(sys.argv[1], 'wb').write(bytes(range(256)))", "cannot be read"),
+    ],
+)
+def test_a_program_that_fails_says_how(tmp_path, body, said):
+    program = tmp_path / "program.py"
+    program.write_text(body)
+    with pytest.raises(ForeignError, match=said) as caught:
+        opened(f"cmd:{sys.executable} {program} {{out}}", timeout=1.0)(ASK)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_program_that_is_not_there_says_so():
+    with pytest.raises(ForeignError, match="no-such-program cannot be started"):
+        opened("cmd:no-such-program {out}")(ASK)
+
+
+def test_a_curve_answers_at_its_own_times(tmp_path):
+    file = tmp_path / "curve.csv"
+    file.write_text("t,theta,omega,r_cm\n0,1.5,20,0.2\n0.1,3,15,0.19\n")
+    run = solve(f"csv:{file}", THROW)
+    assert list(run.t) == [0.0, 0.1]
+    assert list(run.omega) == [20.0, 15.0]
+
+
+def test_a_run_of_a_foreign_solver_is_a_run(tmp_path):
+    file = tmp_path / "mine.py"
+    file.write_text("def solve(ask):\n    raise ValueError('not today')\n")
+    made = make(Run("tag", f"{file}:solve", THROW))
+    assert made.trajectory is None
+    assert made.reason.endswith("ValueError: not today")
+
+
+@pytest.mark.skipif(shutil.which("sh") is None, reason="no shell")
+def test_a_program_gets_no_input_and_its_output_is_dropped():
+    runner = opened("cmd:sh -c 'cat; echo t,theta,omega > {out}; echo 0,1,2 >> {out}; echo noise'")
+    one = Ask.of(THROW, np.array([0.0]))
+    assert runner(one).omega[0] == 2.0
+
+
+def test_frames_come_back_and_what_is_none_is_refused():
+    stream = io.BytesIO()
+    send(stream, {"a": 1}, {"x": np.arange(6.0).reshape(2, 3)})
+    stream.seek(0)
+    header, arrays = receive(stream, 48)
+    assert header == {"a": 1}
+    np.testing.assert_array_equal(arrays["x"], np.arange(6.0).reshape(2, 3))
+    whole = stream.getvalue()
+    with pytest.raises(BrokenFrameError, match="larger than 47 bytes"):
+        receive(io.BytesIO(whole), 47)
+    for cut in (0, 5, 12, len(whole) - 1):
+        with pytest.raises(BrokenFrameError, match="the stream ended"):
+            receive(io.BytesIO(whole[:cut]), 48)
+    for noise in (b"\xff" * 64, (4).to_bytes(8, "little") + b"nope", (2).to_bytes(8, "little") + b"[]"):
+        with pytest.raises(BrokenFrameError, match="no frame"):
+            receive(io.BytesIO(noise), 48)
