@@ -44,7 +44,7 @@ def test_unusual_throws_have_a_report_too(name, read_page, monkeypatch):
     throw = Scenario(**values)
     size = dataclasses.replace(
         with_slices(QUICK, throw.n_slices),
-        scope=Scope(waterfall_slices=min(4, throw.n_slices), map_slices=4, fills=(), rows=0),
+        scope=Scope(waterfall_slices=min(4, throw.n_slices), map_slices=4, map_cells=0),
         bench=SMALL_BENCH,
     )
     evidence = evidence_module.gather(throw, size, lambda *_: None)

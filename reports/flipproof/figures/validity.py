@@ -15,6 +15,7 @@ from matplotlib.patches import Patch, Rectangle
 
 from flipproof.figures.style import new_figure, styled
 from flipproof.studies.validity import LABELS, RUNGS, SCHEMES, Measure, ValidityMap
+from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
 
 COLOURS = ("#D9D9D9", "#F4B183", "#F7E08A", "#BFA6D9", "#9CC9EA", "#98D3BC", "#E8A9C4")
@@ -25,6 +26,9 @@ CONTOURS: tuple[tuple[float, Literal["--", "-"]], ...] = ((0.01, "--"), (0.1, "-
 
 LINES = ("#000000", "#0050A0")
 HATCH = "////"
+
+WIDE = 80
+"""Characters of the reasons that a legend has room for."""
 
 
 @styled
@@ -116,4 +120,4 @@ def _reasons(study: ValidityMap) -> str:
     """Return every reason once, with the number of cells it holds for."""
     found, counts = np.unique(study.reason[study.reason != ""], return_counts=True)
     words = [f"{reason} ({count})" for reason, count in zip(found, counts, strict=True)]
-    return ", ".join(words[:3]) + (f" and {len(words) - 3} more" if len(words) > 3 else "")
+    return shortened(", ".join(words[:3]), WIDE) + (f" and {len(words) - 3} more" if len(words) > 3 else "")
