@@ -14,8 +14,8 @@ def add_compare(commands: Any) -> None:
     """Add the command."""
     compare = add_command(commands, "compare", "Compare two solvers, or two CSV files, in numbers.", command_compare)
     compare.add_argument(
-        "first", metavar="A", help="a solver's name or spec, or a CSV file with a column t and at least one of omega, theta "
-        "and r_cm; empty cells are left out, and of a track.csv the flight is taken",
+        "first", metavar="A", help="a solver's name or spec, or a CSV file with a column t and at least one of omega, "
+        "theta and r_cm; empty cells are left out, and of a track.csv the flight is taken",
     )  # fmt: skip
     compare.add_argument("second", metavar="B", help="the same; differences are B minus A")
     compare.add_argument("--scenario", metavar="SCENARIO.toml", help=SCENARIO_HELP)
