@@ -346,7 +346,7 @@ def test_the_real_command_from_a_cold_start(tmp_path):
     )
     told = [re.fullmatch(r"flipproof: \d+ s: (.+)", line) for line in result.stderr.splitlines()]
     assert [line and line[1] for line in told] == [
-        "runs", "work and precision", "studies", "the paper", "figures", "page",
+        "runs", "work and precision", "validity maps", "studies", "the paper", "figures", "page",
     ]  # fmt: skip
     assert result.returncode == 0, result.stdout
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))

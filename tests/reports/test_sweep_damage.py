@@ -428,10 +428,11 @@ def test_a_record_that_claims_an_absurd_size_is_not_followed(tmp_path):
         assert list(_records(tmp_path / "sweep.sqlite", POINT, 3)) == []
 
 
-def test_a_lock_that_is_no_lock_is_named(tmp_path):
-    (tmp_path / "sweep.lock").write_bytes(b"not a lock " * 500)
-    with pytest.raises(SweepError, match=r"sweep\.lock cannot be locked \(file is not a database\); it holds no rows"):
-        Store(tmp_path, design(), CODE)
+def test_what_stands_in_a_lock_that_nobody_holds_is_no_obstacle(tmp_path):
+    (tmp_path / "sweep.lock").write_bytes(b"left by another version " * 500)
+    Store(tmp_path, design(), CODE).close()
+    assert (tmp_path / "sweep.sqlite").is_file()
+    assert not (tmp_path / "sweep.lock").exists()
 
 
 def test_a_program_killed_while_it_begins_leaves_nothing_that_must_be_removed(tmp_path):

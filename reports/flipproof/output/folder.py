@@ -91,16 +91,19 @@ def _held(beside: Path, target: Path) -> Iterator[None]:
     with ExitStack() as held:
         while True:
             beside.parent.mkdir(parents=True, exist_ok=True)
-            beside.mkdir(exist_ok=True)
-            held.callback(_remove_empty, beside)
-            strangers = sorted(entry.name for entry in beside.iterdir() if entry.name not in (LOCK, NEW, OLD))
-            if strangers:
-                raise OutputError(f"{beside} holds {strangers[0]}, which flipproof did not write; move it away")
             try:
+                beside.mkdir(exist_ok=True)
+                held.callback(_remove_empty, beside)
+                strangers = sorted(entry.name for entry in beside.iterdir() if entry.name not in (LOCK, NEW, OLD))
+                if strangers:
+                    raise OutputError(f"{beside} holds {strangers[0]}, which flipproof did not write; move it away")
                 held.enter_context(sole_writer(beside / LOCK, target))
                 break
             except FileNotFoundError:
                 continue  # the program before has removed the folder just now
+            except FileExistsError:
+                if beside.exists() and not beside.is_dir():
+                    raise  # else the program before has removed it while it was looked at
         yield
 
 
