@@ -59,6 +59,17 @@ def row(n: int, model: str, scenario: Scenario, *, against: bool) -> dict[str, A
     }
 
 
+def runs(*slices: int) -> list[dict[str, Any]]:
+    """Return the lines for the paper's throw at these numbers of slices, and print them."""
+    ode_reference.solve(Scenario(n_slices=5))
+    found = []
+    for n in slices:
+        for model in ("eq8", "free-flight"):
+            found.append(row(n, model, Scenario().with_slices(n), against=20 <= n <= 100))
+            print(found[-1], flush=True)
+    return found
+
+
 def growth() -> dict[str, Any]:
     """Return the exponent of cost in the number of impacts, to a million, and the drift of energy there."""
     scenario = replace(Scenario(water_mass=1.0).with_slices(1000), drag=0.0, restitution=1.0)
@@ -117,12 +128,7 @@ def main() -> None:
     asked = parser.parse_args()
     found: dict[str, Any] = {"first_calls": first_calls()}
     print(found["first_calls"], flush=True)
-    ode_reference.solve(Scenario(n_slices=5))
-    found["runs"] = []
-    for n in (10, 20, 50, 100, 1000, 10_000):
-        for model in ("eq8", "free-flight"):
-            found["runs"].append(row(n, model, Scenario().with_slices(n), against=20 <= n <= 100))
-            print(found["runs"][-1], flush=True)
+    found["runs"] = runs(10, 20, 50, 100, 1000, 10_000)
     found["growth"] = growth()
     print(found["growth"], flush=True)
     found["batch"] = batch(asked.batch)

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import engine_share
-import impacts
+import flow
 import kernel
 import report_time
 
@@ -60,8 +60,16 @@ def rows(facts: dict[str, Any]) -> list[tuple[str, str, str]]:
     loop, limits = facts["kernel"]["measured"], facts["kernel"]["limits"]
     table = [(name, f"{value:.0f}" if value >= 100 else f"{value:.3g}", limits[name]) for name, value in loop.items()]
     table += [
-        (f"{run['case']}, N = 100: impacts per second", str(run["per_second"]), "at least 2000")
-        for run in facts["impacts"]["runs"][-4:]
+        (f"{run['model']}, half full, N = 100: impacts per second", f"{run['impacts_per_second']}", "at least 100000")
+        for run in facts["flow"]
+    ]
+    table += [
+        (
+            f"{run['model']}, half full, N = 100: solve_ivp (DOP853) / taylor",
+            f"{run['times_DOP853']:.0f}",
+            "at least 150",
+        )
+        for run in facts["flow"]
     ]
     table += engine_share.rows(facts["engines"])
     for size, result in facts.get("report", {}).items():
@@ -96,7 +104,7 @@ def main() -> int:
     arguments = parser.parse_args()
     facts: dict[str, Any] = {"machine": machine(), "kernel": kernel.measure(arguments.throws)}
     kernel.report(facts["kernel"])
-    facts["impacts"] = impacts.measure_all()
+    facts["flow"] = flow.runs(100)
     facts["engines"] = engine_share.measure_all()
     if not arguments.no_report:
         facts["report"] = {"quick": report_time.measure(["--quick"]), "full": report_time.measure([])}

@@ -142,7 +142,7 @@ def test_the_sign_fault_of_eq_9d_is_named_by_the_findings_it_moves(sound, made, 
     assert changes["difference-exact-step-eq8"].kind == "moved"
     assert changes["order-exact-step-before-the-first-impact"].words.startswith("pass → fail")
     assert "order-exact-step-across-impacts" in changes
-    # The audit measures the drag of the paper by a flight of the exact step; parts of the cost of a finite step are its.
+    # The audit measures the drag of the paper by the exact step; parts of the cost of a finite step are its own.
     others = {name for name in changes if "exact-step" not in name}
     assert others == {"erratum-eq8-drag", "finite-step-exact", "finite-step-held-located"}
 
