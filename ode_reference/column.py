@@ -40,6 +40,9 @@ from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray, Impacts, Trajectory, output_times
 
 NAME: Final = "column"
+
+RTOL: Final = 1e-12
+ATOL: Final = 1e-14
 """The model of this module, as ``ode_reference.solve`` knows it."""
 
 LONGEST_TURN: Final = 0.02
@@ -113,8 +116,8 @@ def solve(
     --------
     omega to 1e-11 omega_0 and the energy to 1e-11 of itself at the default tolerances.
     """
-    rtol = number_within("rtol", rtol, 1e-13, 1e-2)
-    atol = number_above("atol", atol, 0.0, 1e-2)
+    rtol = number_within("rtol", RTOL if rtol is None else rtol, 1e-13, 1e-2)
+    atol = number_above("atol", ATOL if atol is None else atol, 0.0, 1e-2)
     moments = output_times(scenario, times)
     column = Column(scenario)
     states, diagnostics = _states(scenario, column, moments, rtol, atol)

@@ -16,6 +16,7 @@ from flipproof.foreign.contract import Ask, solve_of, traits_of
 from flipproof.foreign.specs import distribution_of, load
 from flipproof.foreign.wire import BrokenFrameError, receive, send
 from slicemodel import Scenario
+from slicemodel.scenario import shortened
 from slicemodel.trajectory import IMPACT_FIELDS
 
 MEMORY: Final = 8 * 2**30
@@ -81,7 +82,7 @@ def _reason(error: BaseException) -> str:
     except Exception:
         words = "a message that cannot be shown"
     text = f"answer: {words}" if isinstance(error, AnswerError) else f"{type(error).__name__}: {words}"
-    return text if len(text) <= 300 else f"{text[:297]}..."
+    return shortened(text, 300)
 
 
 def _limit_memory() -> None:

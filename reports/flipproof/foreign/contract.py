@@ -16,7 +16,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from slicemodel import Scenario
-from slicemodel.scenario import unknown_name
+from slicemodel.scenario import shown, unknown_name
 from slicemodel.trajectory import FloatArray
 
 PRECISIONS: Final = MappingProxyType({"float64": 2.0**-52, "float32": 2.0**-23})
@@ -91,7 +91,7 @@ class Traits:
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip() or not self.name.isprintable():
-            raise ValueError(f"name = {_shown(self.name)} is not a line of text")
+            raise ValueError(f"name = {shown(self.name)} is not a line of text")
         if self.equation is not None:
             check_equation(self.equation)
         if self.refined_by is not None and self.refined_by not in REFINERS:
@@ -99,12 +99,12 @@ class Traits:
         if self.precision not in PRECISIONS:
             raise ValueError(unknown_name("precision =", self.precision, PRECISIONS))
         if self.order is not None and not _inside(self.order, 0.0, 40.0):
-            raise ValueError(f"order = {_shown(self.order)} is not a number in (0, 40]")
+            raise ValueError(f"order = {shown(self.order)} is not a number in (0, 40]")
         if not _inside(self.timeout, 0.0, 86_400.0):
-            raise ValueError(f"timeout = {_shown(self.timeout)} is not a number of seconds in (0, 86400]")
+            raise ValueError(f"timeout = {shown(self.timeout)} is not a number of seconds in (0, 86400]")
         failures = self.expected_failures
         if not isinstance(failures, Mapping) or not all(isinstance(x, str) for pair in failures.items() for x in pair):
-            raise ValueError(f"expected_failures = {_shown(failures)} is not a mapping of checks to reasons")
+            raise ValueError(f"expected_failures = {shown(failures)} is not a mapping of checks to reasons")
         object.__setattr__(self, "expected_failures", dict(failures))
 
     @property
@@ -157,16 +157,10 @@ def solve_of(solver: object) -> Callable[[Ask], object]:
     """
     solve = getattr(solver, "solve", solver)
     if not callable(solve):
-        raise ValueError(f"{_shown(solver)} is neither callable nor has a method solve(ask)")
+        raise ValueError(f"{shown(solver)} is neither callable nor has a method solve(ask)")
     return solve
 
 
 def _inside(value: object, above: float, most: float) -> bool:
     number = isinstance(value, numbers.Real) and not isinstance(value, bool)
     return number and math.isfinite(float(value)) and above < float(value) <= most  # type: ignore[arg-type]
-
-
-def _shown(value: object) -> str:
-    """Return a value's repr on one line of at most 80 characters."""
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 80 else f"{text[:77]}..."

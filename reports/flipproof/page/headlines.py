@@ -2,6 +2,7 @@
 
     largest   max |omega_b - omega_a| / omega_0 of one pair of solvers during the flight
     start     the same before the first impact
+    landing   |omega_b - omega_a| / omega_0 of one pair of solvers at the last time both have
     share     mean over all orders of mending of what an assumption changes: the only fair share, since it sums
     order     what mending an assumption changes in the order of the ladder: no share, since another order differs
 
@@ -21,11 +22,12 @@ from flipproof.studies.finite_step import EVERYTHING, HELD, LOCATED
 from flipproof.studies.slices import FINER
 from flipproof.studies.waterfall import NAMES, STEP, Bar, Waterfall
 
-Measure = Literal["largest", "start", "share", "order"]
+Measure = Literal["largest", "start", "landing", "share", "order"]
 
 MEASURES: Final[Mapping[Measure, str]] = {
     "largest": "largest difference of one pair of solvers during the flight",
     "start": "largest difference of one pair of solvers before the first impact",
+    "landing": "difference of one pair of solvers on landing",
     "share": "fair share: mean over all orders of mending the assumptions",
     "order": "change in the order of the ladder, which is no share",
 }
@@ -107,6 +109,13 @@ def _pairs(differences: Sequence[Difference], ended: str) -> Iterator[Headline]:
             finer_slices=finer_slices, band=d.band, time=d.largest_time,
             note=ended if FREE in (d.first, d.second) else "",
         )  # fmt: skip
+    for id_ in ("whole", "program-eq8"):
+        if id_ in chosen and not ended:
+            d = chosen[id_]
+            yield Headline(
+                id=f"{id_}-landing", what=d.name, measure="landing", value=abs(d.final), slices=d.slices,
+                time=float(d.t[-1]), band=d.band,
+            )  # fmt: skip
 
 
 def _shares(waterfall: Waterfall) -> Iterator[Headline]:

@@ -29,13 +29,16 @@ def answers(headlines: Sequence[Headline]) -> Iterator[tuple[str, list[str]]]:
     yield f"Are {steps} enough? {_verdict(step)}", list(_step(found))
     yield f"Is Eq. 8 free flight? {_verdict(free)}", list(_equations(found))
     if "share" in found:
-        yield "Which assumption matters most?", list(_shares(found))
+        yield "Which change matters most for the mean omega of the second half?", list(_shares(found))
     if "engine" in found:
+        engine = found["engine"]
+        band = "" if engine.band is None else f"; the numerical band of this difference is {percent(engine.band)} of ω₀"
         yield (
-            "Does a physics engine agree?",
+            f"Does a physics engine agree? {_verdict([engine.value])}",
             [
                 "Free flight by event-driven integration and by pymunk, with its hits on the step's grid, differ in ω "
-                f"by up to {amount(found['engine'])}."
+                f"by up to {amount(engine)}{band}. This tests the solution of free flight, not whether slices describe "
+                "water."
             ],
         )
 
@@ -78,7 +81,9 @@ def sentences(headlines: Sequence[Headline]) -> Iterator[str]:
 
 
 def _equations(found: Mapping[str, Headline]) -> Iterator[str]:
-    whole, eq8 = found.get("whole"), found.get("program-eq8")
+    whole, eq8, free = found.get("whole"), found.get("program-eq8"), found.get("eq8-free")
+    if free is not None:
+        yield f"Eq. 8 and free flight differ in ω by up to {amount(free)}."
     if whole is None:
         yield "Free flight could not be computed; the reason stands below."
     else:
@@ -88,10 +93,15 @@ def _equations(found: Mapping[str, Headline]) -> Iterator[str]:
         yield f"The published program and Eq. 8 differ in ω by up to {amount(eq8)}."
         if whole is not None and whole.value > 0.0:
             times = f"{eq8.value / whole.value:.2g}"
-            yield f"By these two numbers the program is {times} times as far from Eq. 8 as from free flight."
-    free = found.get("eq8-free")
-    if free is not None:
-        yield f"Eq. 8 and free flight differ in ω by up to {amount(free)}."
+            yield (
+                f"By these two largest differences the program is {times} times as far from Eq. 8 as from free flight."
+            )
+    ends = [found[id_] for id_ in ("program-eq8-landing", "whole-landing") if id_ in found]
+    if len(ends) == 2:
+        yield (
+            f"In ω on landing the program differs from Eq. 8 by {amount(ends[0])} and from free flight by "
+            f"{amount(ends[1])}."
+        )
 
 
 def _shares(found: Mapping[str, Headline]) -> Iterator[str]:
@@ -102,20 +112,23 @@ def _shares(found: Mapping[str, Headline]) -> Iterator[str]:
         low = min(share.low for share in shares if share.low is not None)
         high = max(share.high for share in shares if share.high is not None)
         yield (
-            "Of the six assumptions between the program and free flight, these have the largest fair shares of the "
-            f"change of the mean ω in the second half, as the mean over all orders of mending them: {listed}."
+            "Six changes lead from the program's equation to free flight. These have the largest fair shares in the "
+            f"change of the mean ω of the second half, as the mean over all orders of making them: {listed}."
         )
-        yield f"In single orders the same assumptions change that mean by {signed(low)} to {signed(high)} of ω₀."
+        yield (
+            f"In single orders the same changes move that mean by {signed(low)} to {signed(high)} of ω₀ "
+            f"(N = {shares[0].slices}). For ω, θ and v_CM on landing the shares are others; the report has a table."
+        )
     if len(shares) > 1 and tied(shares[0], shares[1]):
         yield (
             f"Which of “{shares[0].what}” and “{shares[1].what}” has the larger share is not settled: the number of "
-            "slices moves them by more than they differ."
+            "slices moves at least one of them by more than they differ."
         )
     if away is not None:
         mean = found["away-share"]
         yield (
-            f"Mended in the order of the ladder, “{away.what}” moves the mean ω of the second half away from free "
-            f"flight, by {amount(away)}; its fair share is {amount(mean)}."
+            f"Made in the order of the ladder, the change “{away.what}” moves the mean ω of the second half away from "
+            f"free flight, by {amount(away)}; its fair share is {amount(mean)}."
         )
     if pair is not None:
         yield (
@@ -126,15 +139,17 @@ def _shares(found: Mapping[str, Headline]) -> Iterator[str]:
 
 def _held(found: Mapping[str, Headline]) -> Iterator[str]:
     held, through = found.get("held"), found.get("held-through")
-    if held is not None:
-        yield (
-            "Before the first impact, holding ω, θ and the centre of mass constant over a step costs the published "
-            f"program, without its lag, {amount(held)} at {held.note}."
-        )
     if through is not None:
         yield (
-            "Through all impacts, holding them and the velocity of the centre of mass costs the exact step, with its "
-            f"rebounds located inside the step, {amount(through)} at {through.note}."
+            "Through all impacts, holding ω, θ, the centre of mass and its velocity constant over a step costs the "
+            f"exact step of Eq. 8, with its rebounds located inside the step, {amount(through)} at {through.note}."
+        )
+    if held is not None:
+        until = "" if held.time is None else f", which is {1e3 * held.time:.0f} ms after release"
+        yield (
+            f"Before the first impact{until}, holding ω, θ and the centre of mass constant costs the published program "
+            f"{amount(held)} at {held.note}, if J and the centre of mass are taken at the same instant and not, as "
+            "published, a step behind."
         )
 
 
