@@ -76,13 +76,12 @@ def _answer(outbox: Any, solve: Any, ask: Ask) -> None:
 
 
 def _reason(error: BaseException) -> str:
-    """Return an exception on one line of at most 300 characters."""
+    """Return an exception on one line: its kind, and at most 300 characters of what it says."""
     try:
-        words = " ".join(str(error).split()) or "no message"
+        words = shortened(str(error), 300) or "no message"
     except Exception:
         words = "a message that cannot be shown"
-    text = f"answer: {words}" if isinstance(error, AnswerError) else f"{type(error).__name__}: {words}"
-    return shortened(text, 300)
+    return f"answer: {words}" if isinstance(error, AnswerError) else f"{type(error).__name__}: {words}"
 
 
 def _limit_memory() -> None:
