@@ -98,7 +98,7 @@ DIFFERENCES = (
 """Name, first, second: down the ladder one assumption at a time, then the engine, then several together."""
 
 REFINED = (*LIMITS, *LADDER)
-"""Solvers that fly the throw again at ``FINER`` times the slices."""
+"""Solvers that fly the throw again at ``FINER`` times the slices; a full report adds the engine, its slowest run."""
 
 
 MODEL_FLOOR = 1e-9
@@ -115,6 +115,7 @@ class Size:
     levels: int
     counts: tuple[int, ...]
     second_method: str | None
+    refined: tuple[str, ...] = REFINED
     scope: Scope
     bench: Bench
     precision: Effort | None
@@ -126,6 +127,7 @@ FULL = Size(
     levels=7,
     counts=(5, 10, 20, 50, 100, 200, 500),
     second_method="Radau",
+    refined=(ENGINE, *REFINED),
     scope=Scope(waterfall_slices=50, map_slices=50, map_cells=20),
     bench=instruments.FULL,
     precision=contenders.FULL,
@@ -191,7 +193,13 @@ class Evidence:
 
 def plan(throw: Scenario, size: Size) -> list[Run]:
     """Return the runs of the report but for the step sizes, the slowest first."""
+    fine = throw.with_slices(FINER * throw.n_slices)
+    once_more = [
+        Run(finer_tag(tag), tag, fine, {"steps": size.steps, "store": "summary"} if tag in LIMITS else {})
+        for tag in size.refined
+    ]
     runs = [
+        *once_more,
         *plan_witnesses(throw, size.bench),
         Run(f"{CHECK}, {ENGINE}, no gravity", ENGINE, without_gravity(REFERENCE), {"dt": CHECK_DT}),
         Run(f"{CHECK}, {ENGINE}", ENGINE, REFERENCE, {"dt": CHECK_DT}),
@@ -212,9 +220,6 @@ def plan(throw: Scenario, size: Size) -> list[Run]:
         runs.append(Run(scheme, scheme, throw, {"steps": size.steps}))
     for scheme in LIMITS:
         runs += plan_slices(throw, scheme, size.counts)
-    fine = throw.with_slices(FINER * throw.n_slices)
-    for tag in REFINED:
-        runs.append(Run(finer_tag(tag), tag, fine, {"steps": size.steps, "store": "summary"} if tag in LIMITS else {}))
     runs += plan_finite_step(throw, size.steps)
     runs += [replace(run, tag=finer_tag(run.tag), scenario=fine) for run in plan_finite_step(throw, size.steps)]
     runs += [

@@ -180,13 +180,13 @@ def table_waterfall(waterfall: Waterfall) -> str:
 
 
 def table_map(study: ValidityMap) -> str:
-    """Every cell of a map: the plateau of each solver, and the assumption with the largest fair share or step."""
+    """Every cell of a map: the plateau of each solver, and the assumption with the largest fair share."""
     solvers = (*LADDER, *EXTRA)
     dominant = study.dominant
     return rows_csv(
         ("fill fraction [1]", LABELS[study.axis].translate({ord("γ"): "gamma", ord("ω"): "omega", ord("₀"): "_0",
                                                             ord("Δ"): "d"}),
-         "largest step down the ladder" if study.shares is None else "largest fair share",
+         "largest fair share",
          *(f"plateau of omega/omega_0 {name} [1]" for name in solvers), "not computed because"),
         (
             (study.fills[column], study.values[row], RUNGS[k] if k >= 0 else None,

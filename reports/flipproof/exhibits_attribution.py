@@ -136,10 +136,13 @@ def _draw_maps(found: Attribution) -> Iterator[Exhibit]:
     for study in found.maps:
         dominant = study.dominant
         which = "fair share (mean over all orders of mending)"
-        contours = (
-            "the contours are where a scheme is 1 % and 10 % of ω₀ off its own equation."
+        shade, contours = (
+            ("the step error of the published program", "a scheme is 1 % and 10 % of ω₀ off its own equation")
             if study.axis == "step"
-            else "the contours are where the published program is 1 % and 10 % of ω₀ off free flight."
+            else (
+                "the difference between the published program and free flight",
+                "the published program is 1 % and 10 % of ω₀ off free flight",
+            )
         )
         counts = ", ".join(
             f"{name} {int((dominant == k).sum())}" for k, name in enumerate(RUNGS) if (dominant == k).any()
@@ -148,8 +151,9 @@ def _draw_maps(found: Attribution) -> Iterator[Exhibit]:
             name=f"map-{study.axis}",
             section="maps",
             title=f"Validity over filling and {AXES[study.axis]}",
-            caption=f"Every cell is a throw. Its colour names the assumption with the largest {which} in the plateau, "
-            f"the mean of ω/ω₀ over the second half; {contours} Hatched cells could not be computed."
+            caption=f"Every cell is a throw. Its shade is {shade} in the plateau, the mean of ω/ω₀ over the second half. "
+            f"The outline around cells names the assumption with the largest {which} in the plateau. The contours are "
+            f"where {contours}. Hatched cells could not be computed."
             f"{_band_words(study)}",
             alt=f"Map of {dominant.size} throws of {study.slices} slices, fill fraction {study.fills[0]:g} to "
             f"{study.fills[-1]:g} by {AXES[study.axis]} {study.values[0]:g} to {study.values[-1]:g}. Cells by "

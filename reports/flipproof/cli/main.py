@@ -59,7 +59,7 @@ examples:
   flipproof check throw.toml --baseline summary.json
   flipproof diff old-report new-report          what changed beyond its band
   flipproof sweep sweep.toml --out my-sweep     many throws and solvers; run it again to go on
-  flipproof map --axis gamma --out my-map       which step down the ladder is largest where; run it again to go on
+  flipproof map --axis gamma --out my-map       which assumption has the largest fair share where; again: go on
   flipproof waterfall --out my-waterfall        from the published program to free flight, one bar per assumption
   flipproof track video.txt --cap cap --base base --length-unit m
   flipproof fit flight.csv --model midpoint free-flight

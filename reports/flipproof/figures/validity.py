@@ -1,4 +1,4 @@
-"""Maps of validity: which mistake is the largest, and where an approximation is good enough."""
+"""Maps of validity: how far an approximation is off, and which assumption has the largest fair share in it."""
 
 from __future__ import annotations
 
@@ -6,26 +6,38 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
+from matplotlib.collections import LineCollection
+from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
+from numpy.typing import NDArray
 
 from flipproof.figures.style import new_figure, styled
 from flipproof.studies.validity import LABELS, RUNGS, SCHEMES, Measure, ValidityMap
 from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
 
-COLOURS = ("#D9D9D9", "#F4B183", "#F7E08A", "#BFA6D9", "#9CC9EA", "#98D3BC", "#E8A9C4")
-"""One per rung, light enough for lines on top; their order follows RUNGS."""
+COLOURS = ("#606060", "#D95F02", "#C2A500", "#7B3FB5", "#1F78B4", "#128A63", "#C2247F")
+"""One per rung, dark enough for an outline on every shade; their order follows RUNGS."""
+
+SHADES = ListedColormap(colormaps["Greys"](np.linspace(0.0, 0.6, 256)))
+"""Light enough for black lines on top."""
+
+RANGE = (1e-3, 1.0)
+"""Errors of the lightest and of the darkest shade, as fractions of omega_0."""
 
 CONTOURS: tuple[tuple[float, Literal["--", "-"]], ...] = ((0.01, "--"), (0.1, "-"))
 """Error of the approximation as a fraction of omega_0, and the line that shows it."""
 
-LINES = ("#000000", "#0050A0")
+LINES = ("#000000", "#D00000")
 HATCH = "////"
+
+INSET = 0.12
+"""Distance of an outline from its cell's border, as a fraction of the cell."""
 
 WIDE = 80
 """Characters of the reasons that a legend has room for."""
@@ -33,21 +45,33 @@ WIDE = 80
 
 @styled
 def figure_map(study: ValidityMap, approximation: str = "published-python", measure: Measure = "plateau") -> Figure:
-    """Dominant mistake as colour, error of an approximation as contours, failed cells hatched with their reasons.
+    """Size of an approximation's error as shade, the largest fair share as outline, failed cells hatched with reasons.
 
-    Along "step" the contours are those of the two schemes against their own equations, since only schemes have a step.
+    Along "step" shade and contours are those of the schemes against their own equations, since only schemes have a
+    step; the shade is the first scheme's.
     """
-    figure, axes = new_figure(size=(8.0, 5.6))
+    figure, axes = new_figure(size=(8.0, 6.0))
     logarithmic = study.axis != "restitution"
     x, y = _edges(study.fills, logarithmic=False), _edges(study.values, logarithmic=logarithmic)
-    dominant = np.ma.masked_less(study.dominant, 0)
-    axes.pcolormesh(x, y, dominant, cmap=ListedColormap(COLOURS), vmin=-0.5, vmax=len(RUNGS) - 0.5, edgecolor="white")
+    shown = errors(study, approximation, measure)
+    words, error = shown[0]
+    shade = axes.pcolormesh(
+        x, y, np.ma.masked_invalid(np.clip(error, *RANGE)), cmap=SHADES, norm=LogNorm(*RANGE), rasterized=False
+    )
+    bar = figure.colorbar(shade, ax=axes, label=f"{words} [of ω₀]", extend="min", ticks=[1e-3, 1e-2, 1e-1, 1.0])
+    bar.ax.set_yticklabels(["0.1%", "1%", "10%", "100%"])
+    for k, colour in enumerate(COLOURS):
+        outline = _outline(study.dominant == k, x, y, logarithmic=logarithmic)
+        axes.add_collection(LineCollection(outline, colors=colour, linewidths=2.2, capstyle="projecting"))
     for row, column in zip(*np.nonzero(study.dominant < 0), strict=True):
         corner = (x[column], y[row])
         size = (x[column + 1] - x[column], y[row + 1] - y[row])
         axes.add_patch(Rectangle(corner, *size, facecolor="none", edgecolor="#555555", hatch=HATCH, linewidth=0))
-    handles: list[Artist] = [Patch(facecolor=colour, label=name) for colour, name in zip(COLOURS, RUNGS, strict=True)]
-    for (words, error), colour in zip(errors(study, approximation, measure), LINES, strict=False):
+    handles: list[Artist] = [
+        Patch(facecolor="none", edgecolor=colour, linewidth=2.2, label=name)
+        for colour, name in zip(COLOURS, RUNGS, strict=True)
+    ]
+    for (words, error), colour in zip(shown, LINES, strict=False):
         handles += _contours(axes, study, error, words, colour)
     if logarithmic:
         axes.set_yscale("log")
@@ -56,8 +80,11 @@ def figure_map(study: ValidityMap, approximation: str = "published-python", meas
     axes.grid(visible=False)
     axes.set_xlabel("fill fraction M_w / M_max [1]")
     axes.set_ylabel(LABELS[study.axis])
-    which = "step down the ladder" if study.shares is None else "fair share"
-    axes.set_title(f"largest {which} in the plateau of ω / ω₀, {study.slices} slices", fontsize=10, loc="left")
+    axes.set_title(
+        f"Plateau of ω / ω₀ at N = {study.slices}: {words} (shade), largest fair share (outline)",
+        fontsize=10,
+        loc="left",
+    )
     reasons = _reasons(study)
     if reasons:
         handles.append(Patch(facecolor="none", edgecolor="#555555", hatch=HATCH, label=f"not computed: {reasons}"))
@@ -114,6 +141,31 @@ def _edges(centres: FloatArray, *, logarithmic: bool) -> FloatArray:
         middle = 0.5 * (at[:-1] + at[1:])
         inner = np.concatenate(([2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]))
     return np.exp(inner) if logarithmic else np.asarray(inner)
+
+
+def _outline(
+    inside: NDArray[np.bool_], x: FloatArray, y: FloatArray, *, logarithmic: bool
+) -> list[list[tuple[float, float]]]:
+    """Return the border of the cells ``inside`` as segments, moved inwards so that neighbours' borders stay apart."""
+    at = np.log(y) if logarithmic else y
+    around = np.pad(inside, 1)
+    segments = []
+    for row, column in zip(*np.nonzero(inside), strict=True):
+        below, above = not around[row, column + 1], not around[row + 2, column + 1]
+        before, behind = not around[row + 1, column], not around[row + 1, column + 2]
+        dx, dy = INSET * (x[column + 1] - x[column]), INSET * (at[row + 1] - at[row])
+        left, right = x[column] + before * dx, x[column + 1] - behind * dx
+        low, high = at[row] + below * dy, at[row + 1] - above * dy
+        sides = (
+            (before, ((left, low), (left, high))),
+            (behind, ((right, low), (right, high))),
+            (below, ((left, low), (right, low))),
+            (above, ((left, high), (right, high))),
+        )
+        segments += [
+            [(float(a), float(np.exp(b) if logarithmic else b)) for a, b in side] for there, side in sides if there
+        ]
+    return segments
 
 
 def _reasons(study: ValidityMap) -> str:

@@ -97,7 +97,7 @@ def plan(throw: Scenario, grid: Grid) -> list[list[Run]]:
     """
     dampings = _dampings(throw, grid)
     throws = [replace(throw, restitution=restitution) for restitution in grid.restitutions]
-    how: dict[str, Any] = {"steps": STEPS, "points": None, "shares": True}
+    how: dict[str, Any] = {"steps": STEPS, "points": None}
     return [plan_map(t, "gamma", grid.fills, dampings, **how) for t in throws]
 
 
@@ -142,8 +142,7 @@ def pack(
     problems: dict[str, str] = {}
     for at, (runs, rows) in enumerate(zip(planned, read, strict=True)):
         readings = {tag: _reading(row) for tag, row in rows.items()}
-        study = study_readings(throw, "gamma", grid.fills, _dampings(throw, grid), readings, steps=STEPS, shares=True)
-        assert study.shares is not None
+        study = study_readings(throw, "gamma", grid.fills, _dampings(throw, grid), readings, steps=STEPS)
         for name, share in zip(RUNGS, study.shares, strict=True):
             shares[name][at] = share
         dominant[at] = np.where(study.dominant < 0, MISSING_RUNG, study.dominant)

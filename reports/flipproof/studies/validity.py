@@ -4,8 +4,8 @@ The mapped error is the difference of the plateau, the mean of omega / omega_0 o
 what the paper reads off a flight, and an average forgives a rebound that comes a little early. The largest difference
 max |d omega| / omega_0 is kept beside it; a single impact that shifts in time saturates it.
 
-An assumption's number on a map is its fair share, the mean over all orders of mending (``waterfall.fair_share``), where
-every combination of assumptions was flown; else what it changes in the order of the ladder, and another order differs.
+An assumption's number on a map is its fair share, the mean over all orders of mending (``waterfall.fair_share``): every
+combination of assumptions is flown in every cell.
 """
 
 from __future__ import annotations
@@ -61,6 +61,9 @@ EXTRA: Final = ("exact-step",)
 """Held against its own equation, beside the ladder."""
 
 SCHEMES: Final = ("published-python", "exact-step")
+
+SOLVERS: Final = tuple(dict.fromkeys((*LADDER, *EXTRA, *SETS.values())))
+"""What flies every cell: two schemes and 40 models."""
 
 LABELS: Final[Mapping[Axis, str]] = {
     "gamma": "damping rate γ / ω₀ [1]",
@@ -118,8 +121,8 @@ class ValidityMap:
     slices : int
     level : name -> array - plateau of every entry of LADDER and EXTRA; NaN where it could not be computed
     largest : name -> array - max |d omega| / omega_0 against free flight; of a scheme, against its own equation too
-    shares : array, shape (rungs, rows, columns), or None
-        Fair share of every rung in the plateau, signed; None if only the ladder was flown.
+    shares : array, shape (rungs, rows, columns)
+        Fair share of every rung in the plateau, signed; they add up from the published program to free flight.
     band : array or None
         By how much twins move the plateau of free flight, the most sensitive equation; None if they were not flown.
     step_error : scheme -> array - error against the scheme's own equation, by plateau
@@ -134,7 +137,7 @@ class ValidityMap:
     largest: Mapping[str, FloatArray]
     step_error: Mapping[str, FloatArray]
     reason: NDArray[np.str_]
-    shares: FloatArray | None = None
+    shares: FloatArray
     band: FloatArray | None = None
 
     def error(self, name: str, measure: Measure = "plateau") -> FloatArray:
@@ -144,17 +147,10 @@ class ValidityMap:
         return np.abs(self.level[name] - self.level[LADDER[-1]])
 
     @property
-    def differences(self) -> FloatArray:
-        """|plateau of a rung - plateau of the next|, shape (rungs, rows, columns)."""
-        stack = np.array([self.level[name] for name in LADDER])
-        return np.abs(np.diff(stack, axis=0))
-
-    @property
     def dominant(self) -> NDArray[np.int64]:
-        """Index into RUNGS of the largest share, or of the largest step of the ladder; -1 where any is missing."""
-        differences = self.differences if self.shares is None else np.abs(self.shares)
-        missing = ~np.isfinite(differences).all(axis=0)
-        return np.where(missing, -1, np.nan_to_num(differences, nan=-1.0).argmax(axis=0))
+        """Index into RUNGS of the largest fair share; -1 where any is missing."""
+        missing = ~np.isfinite(self.shares).all(axis=0)
+        return np.where(missing, -1, np.nan_to_num(np.abs(self.shares), nan=-1.0).argmax(axis=0))
 
 
 def vary(throw: Scenario, *, fill: float, damping: float | None = None, restitution: float | None = None) -> Scenario:
@@ -203,30 +199,23 @@ def plan_map(
     *,
     steps: int = 1000,
     points: int | None = POINTS,
-    shares: bool = False,
     banded: bool = False,
 ) -> list[Run]:
     """Return the runs of one map; tags are unique within and across maps of different axes.
 
     A model does not know a step: along "step" it runs once per fill fraction. ``points`` are its output times; None:
-    its own. With ``shares`` every set of assumptions is flown, 40 models in place of 7; ``banded`` gives free flight
-    its twins.
+    its own. ``banded`` gives free flight its twins.
     """
-    names = _solvers(shares)
     usual: dict[str, Any] = {} if points is None else {"times": np.linspace(0.0, throw.duration, points)}
     runs = []
     for cell in cells(throw, axis, fills, values, steps):
-        for name in names:
+        for name in SOLVERS:
             if axis == "step" and cell.row > 0 and name not in SCHEMES:
                 continue
             settings = {"steps": cell.steps, "store": "summary"} if name in SCHEMES else usual
             run = Run(tag(axis, cell, name), name, cell.scenario, settings)
             runs += [run, *(twins(run) if banded and name == LADDER[-1] else ())]
     return runs
-
-
-def _solvers(shares: bool) -> tuple[str, ...]:
-    return tuple(dict.fromkeys((*LADDER, *EXTRA, *(SETS.values() if shares else ()))))
 
 
 def tag(axis: Axis, cell: Cell, name: str) -> str:
@@ -243,18 +232,17 @@ def study_map(
     made: Mapping[str, Made],
     *,
     steps: int = 1000,
-    shares: bool = False,
 ) -> ValidityMap:
     """Read the runs that ``plan_map`` planned with the same arguments; ``made`` maps tags to what became of them."""
     readings = {name: _read(one) for name, one in made.items()}
-    return study_readings(throw, axis, fills, values, readings, steps=steps, shares=shares)
+    return study_readings(throw, axis, fills, values, readings, steps=steps)
 
 
 def gather_map(
     pool: Executor, throw: Scenario, axis: Axis, fills: Sequence[float], values: Sequence[float], *, steps: int = 1000
 ) -> Callable[[], ValidityMap]:
     """Have workers fly every set of assumptions on every cell; return what waits for them and makes the map."""
-    runs = plan_map(throw, axis, fills, values, steps=steps, shares=True, banded=True)
+    runs = plan_map(throw, axis, fills, values, steps=steps, banded=True)
     pending = [pool.submit(make_readings, runs[k : k + CHUNK]) for k in range(0, len(runs), CHUNK)]
 
     def gathered() -> ValidityMap:
@@ -263,7 +251,7 @@ def gather_map(
             # Cells of a chunk whose worker died stay "not run".
             with contextlib.suppress(WorkerDiedError):
                 readings |= chunk.result()
-        return study_readings(throw, axis, fills, values, readings, steps=steps, shares=True)
+        return study_readings(throw, axis, fills, values, readings, steps=steps)
 
     return gathered
 
@@ -281,19 +269,17 @@ def study_readings(
     readings: Mapping[str, Reading],
     *,
     steps: int = 1000,
-    shares: bool = False,
 ) -> ValidityMap:
     """Make the map of what was read off the runs of ``plan_map``; ``readings`` maps their tags."""
     shape = (len(values), len(fills))
-    names = _solvers(shares)
-    level = {name: np.full(shape, np.nan) for name in names}
-    largest = {name: np.full(shape, np.nan) for name in names}
+    level = {name: np.full(shape, np.nan) for name in SOLVERS}
+    largest = {name: np.full(shape, np.nan) for name in SOLVERS}
     step_error = {name: np.full(shape, np.nan) for name in SCHEMES}
     reason = np.full(shape, "", dtype="<U80")
     planned = cells(throw, axis, fills, values, steps)
     for cell in planned:
         at = (cell.row, cell.column)
-        found = {name: readings.get(tag(axis, cell, name), Reading(problem="not run")) for name in names}
+        found = {name: readings.get(tag(axis, cell, name), Reading(problem="not run")) for name in SOLVERS}
         problems = [f"{name}: {reading.problem}" for name, reading in found.items() if reading.problem]
         truth = found[LADDER[-1]].omega
         for name, reading in found.items():
@@ -312,7 +298,7 @@ def study_readings(
         largest={name: largest[name] for name in (*LADDER, *EXTRA)},
         step_error=step_error,
         reason=reason,
-        shares=_shares(level) if shares else None,
+        shares=_shares(level),
         band=_band(axis, planned, readings),
     )
 

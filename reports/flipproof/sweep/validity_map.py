@@ -4,8 +4,8 @@
 
     DIR/sweep.sqlite            every run of the map, one row each
     DIR/map.svg, DIR/map.png    the figure
-    DIR/map.csv                 one row per cell: plateaus, differences, the mistake that dominates, reasons
-    DIR/map.json                contours as lines, and how many cells each mistake dominates
+    DIR/map.csv                 one row per cell: plateaus, differences, fair shares, reasons
+    DIR/map.json                contours as lines, and in how many cells each assumption has the largest fair share
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def make_map(
         write_whole(out / "map.csv", map_csv(study).encode())
         write_whole(out / "map.json", json.dumps(map_facts(study, plan.throw), indent=1, allow_nan=False).encode())
     shares = ", ".join(f"{name} {count}" for name, count in _dominating(study).items() if count)
-    return f"{summary}\ncells by largest step down the ladder: {shares or 'none'}; see {out / 'map.png'}"
+    return f"{summary}\ncells by largest fair share: {shares or 'none'}; see {out / 'map.png'}"
 
 
 def map_csv(study: ValidityMap) -> str:
@@ -120,14 +120,14 @@ def map_csv(study: ValidityMap) -> str:
     writer.writerow(
         [FILL, _value_name(study.axis)]
         + [f"plateau {name}" for name in NAMES]
-        + [f"mistake {name}" for name in RUNGS]
+        + [f"fair share of {name}" for name in RUNGS]
         + [f"largest difference of {name} from {LADDER[-1]}" for name in NAMES]
         + [f"step error of {name}" for name in SCHEMES]
-        + ["dominating", "reason"]
+        + ["largest fair share", "reason"]
     )
-    differences, dominant = study.differences, study.dominant
+    dominant = study.dominant
     for at in np.ndindex(dominant.shape):
-        numbers = [study.level[name][at] for name in NAMES] + differences[(slice(None), *at)].tolist()
+        numbers = [study.level[name][at] for name in NAMES] + study.shares[(slice(None), *at)].tolist()
         numbers += [study.largest[name][at] for name in NAMES] + [study.step_error[name][at] for name in SCHEMES]
         shown = [repr(float(number)) if np.isfinite(number) else "" for number in numbers]
         largest = RUNGS[dominant[at]] if dominant[at] >= 0 else ""
@@ -143,7 +143,7 @@ def map_facts(study: ValidityMap, throw: Scenario) -> dict[str, Any]:
         "x": FILL,
         "y": _value_name(study.axis),
         "ladder": list(LADDER),
-        "cells by largest step down the ladder": _dominating(study),
+        "cells by largest fair share": _dominating(study),
         "cells without": int((study.dominant < 0).sum()),
         "contours": [
             {
