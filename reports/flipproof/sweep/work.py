@@ -57,9 +57,11 @@ CURVES: Final = ("omega", "theta", "r_cm", "v_cm")
 Arrays = Mapping[str, NDArray[Any]]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Outcome:
     """What became of a point. A number that is not known is None, and ``reason`` says why.
+
+    Without slots, as ``Point`` is.
 
     Parameters
     ----------
