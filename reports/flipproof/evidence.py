@@ -22,6 +22,7 @@ from flipproof.attribution import (
 from flipproof.frame.pool import Progress, make_all, workers
 from flipproof.frame.solvers import Made, Run, make, without_gravity
 from flipproof.frame.stages import Stages
+from flipproof.frame.store import RunStore
 from flipproof.frame.twins import CUT, KINDS, twin_tag, twins, usual_rest_speed
 from flipproof.instruments import Bench, Instruments, plan_instruments, plan_witnesses, study_instruments
 from flipproof.paper.runs import PaperRuns, gather_paper
@@ -231,7 +232,12 @@ def witnessed(scenario: Scenario, model: str) -> dict[str, Any]:
 
 
 def gather(
-    scenario: Scenario, size: Size, progress: Progress, jobs: int | None = None, stages: Stages | None = None
+    scenario: Scenario,
+    size: Size,
+    progress: Progress,
+    jobs: int | None = None,
+    stages: Stages | None = None,
+    store: RunStore | None = None,
 ) -> Evidence:
     """Make every run of a report and study them.
 
@@ -245,6 +251,8 @@ def gather(
         Worker processes for the reference and the engine; None: one per core.
     stages : Stages or None
         The stopwatch of the report, if somebody watches it.
+    store : RunStore or None
+        Slow runs are looked for and kept there.
     """
     throw = scenario.with_slices(size.slices)
     runs = plan(throw, size)
@@ -260,7 +268,7 @@ def gather(
     with workers(jobs) as pool:
         audit = pool.submit(study_errata, throw)
         with stages.lap("runs"):
-            made = make_all(pool, flat, progress)
+            made = make_all(pool, flat, progress, store)
         with stages.lap("work and precision"):
             # After the other runs, so that the compiled loop is there and its compiling is not counted.
             precision = gather_work_precision(pool, size.precision) if size.precision is not None else ()

@@ -45,6 +45,8 @@ LEVELS: Final = 4
 CHEAP: Final = ("slicemodel", "ode_reference")
 """Packages whose runs take well below a second."""
 
+Make = Callable[[Run], Made]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Checked:
@@ -76,6 +78,7 @@ def check(
     baseline: Path | None = None,
     tolerance: float = TOLERANCE,
     say: Callable[[str], None] = lambda _: None,
+    make: Make = make,
 ) -> Checked:
     """Check a throw.
 
@@ -90,6 +93,8 @@ def check(
         What a finding may move beyond its bands, in its own unit.
     say : callable (line)
         Called with a line for each claim, as soon as it is known.
+    make : callable (run)
+        How a run is made; ``RunStore.make`` finds slow ones that were kept.
 
     Raises
     ------
@@ -108,7 +113,7 @@ def check(
     throw = scenario.with_slices(slices)
     found = []
     for group in groups:
-        for finding in CHECKS[group](throw):
+        for finding in CHECKS[group](throw, make):
             was = known.get(finding.id)
             if was is None and group == "thresholds":
                 continue
@@ -166,7 +171,7 @@ def _held_to(finding: Finding, was: Mapping[str, Any], tolerance: float, *, move
 # ---------------------------------------------------------------------- the groups
 
 
-def check_ice(throw: Scenario) -> Iterator[Finding]:
+def check_ice(throw: Scenario, make: Make = make) -> Iterator[Finding]:
     """Yield that a frozen bottle keeps its angular velocity in schemes, equations and engine."""
     for run in plan_ice(throw, tuple(LIMITS), ICED, ENGINE):
         label = run.tag.removeprefix("ice, ")
@@ -177,7 +182,7 @@ def check_ice(throw: Scenario) -> Iterator[Finding]:
             yield claims.claim_ice(study_ice(label, made.trajectory))
 
 
-def check_vectors(throw: Scenario) -> Iterator[Finding]:
+def check_vectors(throw: Scenario, make: Make = make) -> Iterator[Finding]:
     """Yield that the published programs' printed numbers are reproduced; they are runs of the paper's throws."""
     del throw
     for vector in vectors.load_all():
@@ -188,7 +193,7 @@ def check_vectors(throw: Scenario) -> Iterator[Finding]:
             yield claims.claim_vectors(vector.name, vector.scheme, vectors.deviations(vector, made.trajectory))
 
 
-def check_convergence(throw: Scenario) -> Iterator[Finding]:
+def check_convergence(throw: Scenario, make: Make = make) -> Iterator[Finding]:
     """Yield that both schemes converge to their equations at first order, on the paper's own throw."""
     del throw
     for scheme, model in LIMITS.items():
@@ -199,10 +204,12 @@ def check_convergence(throw: Scenario) -> Iterator[Finding]:
             ("across impacts", REFERENCE, COMMON, 108),
         )
         for where, scenario, common, multiple in parts:
-            yield _order(scheme, model, where, scenario, common, multiple)
+            yield _order(scheme, model, where, scenario, common, multiple, make)
 
 
-def _order(scheme: str, model: str, where: str, scenario: Scenario | None, common: int, multiple: int) -> Finding:
+def _order(
+    scheme: str, model: str, where: str, scenario: Scenario | None, common: int, multiple: int, make: Make
+) -> Finding:
     id_, title = f"order-{scheme}-{where.replace(' ', '-')}", f"{scheme} converges to {model}, {where}"
     if scenario is None:
         return claims.not_evaluated(id_, title, f"{model} was not computed or strikes no end")
@@ -217,7 +224,7 @@ def _order(scheme: str, model: str, where: str, scenario: Scenario | None, commo
     return claims.claim_order(study_step_size(reference.trajectory, runs), where)
 
 
-def check_thresholds(throw: Scenario) -> Iterator[Finding]:
+def check_thresholds(throw: Scenario, make: Make = make) -> Iterator[Finding]:
     """Yield the findings of a report on this throw that take no engine and no ensemble of flights."""
     cheap = {name for name, solver in catalogue().items() if solver.package in CHEAP}
     made: dict[str, Made] = {}
@@ -245,7 +252,7 @@ def _first_problem(made: Iterable[Made]) -> str:
     return next((f"{one.run.tag}: {one.reason}" for one in made if one.trajectory is None), "")
 
 
-CHECKS: Final[Mapping[str, Callable[[Scenario], Iterator[Finding]]]] = {
+CHECKS: Final[Mapping[str, Callable[[Scenario, Make], Iterator[Finding]]]] = {
     "ice": check_ice,
     "vectors": check_vectors,
     "convergence": check_convergence,

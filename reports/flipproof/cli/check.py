@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.cli.arguments import add_command, check_writable
+from flipproof.cli.arguments import add_command, add_no_cache, check_writable
 
 GROUPS: Final = ("ice", "vectors", "convergence", "thresholds")
 """What ``check`` can check; the last needs a baseline."""
@@ -39,6 +39,7 @@ def add_checks(commands: Any) -> None:
         "--only", type=_groups, metavar="LIST", help=f"some of {','.join(GROUPS)} (default: all; thresholds only "
         "with --baseline)",
     )  # fmt: skip
+    add_no_cache(check)
     check.add_argument("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML, too")
 
 
@@ -71,13 +72,15 @@ def command_check(options: argparse.Namespace) -> int:
         check_writable("--junit", options.junit)
     from flipproof.check.diff import TOLERANCE
     from flipproof.check.throw import check
+    from flipproof.frame.store import RunStore, default_place
 
     allowed = TOLERANCE if options.tolerance is None else options.tolerance
 
     def say(line: str) -> None:
         print(line, flush=True)
 
-    found = check(scenario, groups, baseline=options.baseline, tolerance=allowed, say=say)
+    with RunStore(None if options.no_cache else default_place()) as store:
+        found = check(scenario, groups, baseline=options.baseline, tolerance=allowed, say=say, make=store.make)
     if options.junit:
         from flipproof.output.folder import write_text
         from flipproof.output.junit import junit_text

@@ -22,7 +22,14 @@ from pathlib import Path
 from typing import Any, Final, NoReturn
 
 from flipproof.cli.animate import add_animate
-from flipproof.cli.arguments import SCENARIO_HELP, OneLineParser, add_command, count, read_scenario
+from flipproof.cli.arguments import (
+    SCENARIO_HELP,
+    OneLineParser,
+    add_command,
+    add_no_cache,
+    count,
+    read_scenario,
+)
 from flipproof.cli.check import add_checks
 from flipproof.cli.compare import add_compare
 from flipproof.cli.console import readable, speak_plainly
@@ -160,6 +167,7 @@ def parser() -> argparse.ArgumentParser:
         "number if smaller)",
     )  # fmt: skip
     report.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
+    add_no_cache(report)
     report.add_argument(
         "--pdf", action="store_true", help="also print the page to report.pdf (needs Chromium, Chrome or Edge)"
     )
@@ -212,6 +220,7 @@ def command_report(options: argparse.Namespace) -> int:
     from flipproof.build import build, write
     from flipproof.evidence import FULL, QUICK, gather, with_slices
     from flipproof.frame.stages import Stages
+    from flipproof.frame.store import RunStore, default_place
     from flipproof.output.provenance import provenance
 
     began = time.perf_counter()
@@ -225,15 +234,19 @@ def command_report(options: argparse.Namespace) -> int:
     size = with_slices(size, options.slices or min(size.slices, scenario.n_slices))
     command = shlex.join(["flipproof", *sys.argv[1:]])
     with replaced_folder(options.out, "report") as folder:
-        with tqdm(desc="runs", unit="run", disable=None, leave=False) as bar:
+        with (
+            RunStore(None if options.no_cache else default_place()) as store,
+            tqdm(desc="runs", unit="run", disable=None, leave=False) as bar,
+        ):
 
             def progress(made: int, planned: int, tag: str) -> None:
                 bar.total = planned
                 bar.set_postfix_str(tag, refresh=False)
                 bar.update(made - bar.n)
 
-            evidence = gather(scenario, size, progress, options.jobs, Stages(say))
-        report = build(evidence, provenance(command), options.jobs)
+            evidence = gather(scenario, size, progress, options.jobs, Stages(say), store)
+            facts = provenance(command) | store.facts()
+        report = build(evidence, facts, options.jobs)
         write(report, folder)
         if options.pdf:
             print_page(folder / "index.html", folder / "report.pdf")

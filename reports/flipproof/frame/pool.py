@@ -10,40 +10,42 @@ from typing import Any
 
 from flipproof.frame.processes import WorkerDiedError, processes
 from flipproof.frame.solvers import Made, Run, find, make
+from flipproof.frame.store import RunStore
 
 Progress = Callable[[int, int, str], None]
 """Called with runs made, runs planned and the last run's tag."""
 
-SMALL = 8.0
-"""Slices times seconds of flight below which runs are made in groups."""
-
 GROUP = 8
-"""Runs of a group."""
+"""Runs of a group: sending a quick one away alone would cost as much as making it."""
 
 TRIES = 2
 """Times that a call is made when its worker dies: what killed one worker may have had nothing to do with the call."""
 
 
-def make_all(pool: Executor, runs: Iterable[Run], progress: Progress) -> dict[str, Made]:
-    """Make runs in worker processes: one job for each slow run, one for all of the slice model's.
+def make_all(pool: Executor, runs: Iterable[Run], progress: Progress, store: RunStore | None = None) -> dict[str, Made]:
+    """Make runs in worker processes, but for those that the store has from an earlier time; keep slow ones there.
 
-    This process only waits, so that it can be interrupted at any time; the slice model compiles in one worker only.
+    One job for each run of an engine and of a witness, one for all of the slice model's, so that it is compiled in one
+    worker only, and groups of the others. This process only waits, so that it can be interrupted at any time.
     """
     runs = list(runs)
     # Runs that differ in their tag only are made once.
     same: dict[tuple[Any, ...], list[Run]] = {}
     for run in runs:
         same.setdefault((run.solver, run.scenario, repr(sorted(run.settings.items()))), []).append(run)
-    different = [group[0] for group in same.values()]
     others = {group[0].tag: group for group in same.values()}
-    quick = [run for run in different if find(run.solver).package == "slicemodel"]
-    slow = [run for run in different if find(run.solver).package != "slicemodel"]
-    # Small runs go in groups: sending each away alone would cost as much as making it.
-    small = [run for run in slow if run.scenario.n_slices * run.scenario.duration < SMALL]
-    jobs = [[run] for run in slow if run.scenario.n_slices * run.scenario.duration >= SMALL]
-    jobs += [small[k : k + GROUP] for k in range(0, len(small), GROUP)]
+    store = store or RunStore(None)
+    kept = {group[0].tag: found for group in same.values() if (found := store.find(group[0])) is not None}
+    jobs = _jobs([group[0] for group in same.values() if group[0].tag not in kept])
     made: dict[str, Made] = {}
-    jobs = ([quick] if quick else []) + jobs
+
+    def take(result: Made) -> None:
+        for run in others[result.run.tag]:
+            made[run.tag] = replace(result, run=run)
+        progress(len(made), len(runs), result.run.tag)
+
+    for found in kept.values():
+        take(found)
     while jobs:
         pending = {pool.submit(make_each, job): job for job in jobs}
         jobs = []
@@ -58,11 +60,23 @@ def make_all(pool: Executor, runs: Iterable[Run], progress: Progress) -> dict[st
                     continue
                 results = [Made(job[0], None, 0.0, f"the worker process died {TRIES} times with this run ({error})")]
             for result in results:
-                for run in others[result.run.tag]:
-                    made[run.tag] = replace(result, run=run)
-                progress(len(made), len(runs), result.run.tag)
+                store.keep(result)
+                take(result)
     # In the order asked, whichever worker was faster: what is read off this table must not depend on load.
     return {run.tag: made[run.tag] for run in runs}
+
+
+def _jobs(runs: list[Run]) -> list[list[Run]]:
+    """Return the runs by jobs, those that may be slow first and each alone."""
+    quick: list[Run] = []
+    small: list[Run] = []
+    slow: list[Run] = []
+    for run in runs:
+        package = find(run.solver).package
+        reduced = package == "ode_reference" and "method" not in run.settings
+        (quick if package == "slicemodel" else small if reduced else slow).append(run)
+    groups = [small[k : k + GROUP] for k in range(0, len(small), GROUP)]
+    return [*([quick] if quick else []), *([run] for run in slow), *groups]
 
 
 def make_each(runs: Iterable[Run]) -> list[Made]:
