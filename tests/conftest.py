@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import matplotlib
 import pytest
 
 from flipproof.build import Report, build
@@ -10,6 +11,15 @@ from flipproof.instruments import WITNESSES
 from flipproof.output.provenance import provenance
 from flipproof.studies import contenders
 from slicemodel import Scenario
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cache_of_these_tests(tmp_path_factory):
+    """Keep tests away from the runs that the user has kept, and theirs from the user's reports."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("MPLCONFIGDIR", matplotlib.get_cachedir())  # else fonts would be looked for anew
+        patched.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
 
 
 @pytest.fixture(scope="session")
@@ -23,4 +33,4 @@ def evidence() -> Evidence:
 @pytest.fixture(scope="session")
 def report(evidence) -> Report:
     """Built once per process, of the same evidence."""
-    return build(evidence, provenance("flipproof report"), jobs=1)
+    return build(evidence, provenance("flipproof report"), jobs=1, png=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,7 +38,14 @@ class Report:
         return tuple(finding for finding in self.findings if finding.failed)
 
 
-def build(evidence: Evidence, provenance: Mapping[str, str], jobs: int | None = None) -> Report:
+def build(
+    evidence: Evidence,
+    provenance: Mapping[str, str],
+    jobs: int | None = None,
+    *,
+    pool: Executor | None = None,
+    png: bool = False,
+) -> Report:
     """Evaluate every claim, draw every figure and write the page, all in memory.
 
     Parameters
@@ -46,11 +54,17 @@ def build(evidence: Evidence, provenance: Mapping[str, str], jobs: int | None = 
     provenance : mapping
     jobs : int or None
         Worker processes that draw; None: one per core, 1: this process.
+    pool : Executor or None
+        Workers that are there already and draw instead.
+    png : bool
+        Whether figures are made as PNG, too.
     """
     paper = evidence.paper
     findings = (*evaluate(evidence), *(paper.verdicts.findings() if paper else ()))
     with evidence.stages.lap("figures"):
-        exhibits = drawn((*draw_all(evidence), *(exhibits_paper(paper.runs) if paper else ())), jobs)
+        exhibits = drawn(
+            (*draw_all(evidence), *(exhibits_paper(paper.runs) if paper else ())), jobs, pool=pool, png=png
+        )
     solvers = solver_rows(evidence)
     with evidence.stages.lap("page"):
         html = render(
@@ -86,7 +100,8 @@ def write(report: Report, folder: Path) -> None:
         place = folder / "figures"
         place.mkdir(exist_ok=True)
         (place / f"{exhibit.name}.svg").write_text(exhibit.drawing.svg, encoding="utf-8")
-        (place / f"{exhibit.name}.png").write_bytes(exhibit.drawing.png)
+        if exhibit.drawing.png:
+            (place / f"{exhibit.name}.png").write_bytes(exhibit.drawing.png)
         if exhibit.table is not None:
             (place / f"{exhibit.name}.csv").write_text(exhibit.table, encoding="utf-8")
     for tag, table in report.tables.items():

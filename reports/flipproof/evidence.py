@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,7 +20,7 @@ from flipproof.attribution import (
     plan_attribution,
     study_attribution,
 )
-from flipproof.frame.pool import Progress, make_all, workers
+from flipproof.frame.pool import Progress, compile_kernels, make_all, workers
 from flipproof.frame.solvers import Made, Run, make, without_gravity
 from flipproof.frame.stages import Stages
 from flipproof.frame.store import RunStore
@@ -238,6 +239,7 @@ def gather(
     jobs: int | None = None,
     stages: Stages | None = None,
     store: RunStore | None = None,
+    pool: Executor | None = None,
 ) -> Evidence:
     """Make every run of a report and study them.
 
@@ -252,7 +254,9 @@ def gather(
     stages : Stages or None
         The stopwatch of the report, if somebody watches it.
     store : RunStore or None
-        Slow runs are looked for and kept there.
+        Slow runs, maps and audits are looked for and kept there.
+    pool : Executor or None
+        Workers that are there already; then ``jobs`` does not count.
     """
     throw = scenario.with_slices(size.slices)
     runs = plan(throw, size)
@@ -265,13 +269,16 @@ def gather(
         + [run for plans in (steps, checks) for levels in plans.values() for level in levels for run in level]
     )
     stages = stages or Stages()
-    with workers(jobs) as pool:
+    store = store or RunStore(None)
+    with workers(jobs) if pool is None else nullcontext(pool) as bare:
+        compile_kernels(bare)
+        pool = store.remembering(bare)
         audit = pool.submit(study_errata, throw)
         with stages.lap("runs"):
-            made = make_all(pool, flat, progress, store)
+            made = make_all(bare, flat, progress, store)
         with stages.lap("work and precision"):
             # After the other runs, so that the compiled loop is there and its compiling is not counted.
-            precision = gather_work_precision(pool, size.precision) if size.precision is not None else ()
+            precision = gather_work_precision(bare, size.precision) if size.precision is not None else ()
         with stages.lap("validity maps"):
             charts = begin_maps(pool, throw, size.scope, size.steps)
         with stages.lap("studies"):

@@ -180,9 +180,10 @@ def test_the_same_data_draw_the_same_bytes(evidence):
     assert first.svg == second.svg
 
 
-def with_a_stand_in(exhibits, jobs=None):
-    del jobs
-    return tuple(dataclasses.replace(exhibit, drawn=Drawing("<?xml?><svg/>", b"\x89PNG")) for exhibit in exhibits)
+def with_a_stand_in(exhibits, jobs=None, *, pool=None, png=False):
+    del jobs, pool
+    drawing = Drawing("<?xml?><svg/>", b"\x89PNG" if png else b"")
+    return tuple(dataclasses.replace(exhibit, drawn=drawing) for exhibit in exhibits)
 
 
 def run_report(monkeypatch, evidence, folder, *arguments):
@@ -192,9 +193,10 @@ def run_report(monkeypatch, evidence, folder, *arguments):
     return cli.main(["report", "--out", str(folder), *arguments])
 
 
-def test_the_folder_holds_everything(monkeypatch, capsys, tmp_path, evidence, read_page):
+@pytest.mark.parametrize("png", [False, True])
+def test_the_folder_holds_everything(monkeypatch, capsys, tmp_path, evidence, read_page, png):
     folder = tmp_path / "latest"
-    assert run_report(monkeypatch, evidence, folder) == 0
+    assert run_report(monkeypatch, evidence, folder, *(["--png"] if png else [])) == 0
     out = capsys.readouterr().out
     assert "regression claims hold." in out
     assert str(folder / "index.html") in out
@@ -206,11 +208,13 @@ def test_the_folder_holds_everything(monkeypatch, capsys, tmp_path, evidence, re
         header = (folder / "trajectories" / tag / "data.csv").read_text().splitlines()[0]
         assert header.startswith("t,theta,omega,r_cm,inertia,r_0")
     names = {path.stem for path in (folder / "figures").iterdir()}
-    assert {path.suffix for path in (folder / "figures").iterdir()} == {".svg", ".png", ".csv"}
+    kinds = ["svg", "table", *(["png"] if png else [])]
+    assert {path.suffix for path in (folder / "figures").iterdir()} == {".svg", ".csv", *([".png"] if png else [])}
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert {figure["name"] for figure in summary["figures"]} == names
     for figure in summary["figures"]:
-        assert all((folder / figure[kind]).is_file() for kind in ("svg", "png", "table"))
+        assert all((folder / figure[kind]).is_file() for kind in kinds)
+        assert png or figure["png"] is None
     assert (folder / summary["$schema"]).is_file()
     assert (folder / "junit.xml").is_file()
     assert Scenario.from_mapping(summary["scenario"]) == evidence.scenario
@@ -322,7 +326,7 @@ class LastFirst(Executor):
 
 def test_results_stand_in_the_order_asked_whichever_worker_is_faster(monkeypatch):
     """A step must never be paired with the drift of another: what is read off this table is read in order."""
-    monkeypatch.setattr(pool, "SMALL", 0.0)
+    monkeypatch.setattr(pool, "GROUP", 1)
     runs = [Run(f"{n}", "eq8", Scenario(n_slices=n, duration=0.02)) for n in (1, 2, 3)]
     made = make_all(LastFirst(3), runs, lambda *_: None)
     assert list(made) == ["1", "2", "3"]

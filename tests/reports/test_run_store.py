@@ -70,7 +70,7 @@ def test_a_second_report_makes_nothing_again(place):
     runs = [RUN, replace(RUN, tag="2", scenario=replace(RUN.scenario, omega0=11.0)), ENGINE]
     with workers(1) as pool, RunStore(place, slow=0.0) as kept_runs:
         first = make_all(pool, runs, lambda *_: None, kept_runs)
-        assert kept_runs.facts() == {"runs from the store": "none of 3"}
+        assert kept_runs.facts() == {"from the store": "0 of 3 runs"}
 
     class Idle:
         def submit(self, *_):
@@ -79,11 +79,11 @@ def test_a_second_report_makes_nothing_again(place):
     seen = []
     with RunStore(place) as kept_runs:
         again = make_all(Idle(), [*runs, replace(RUN, tag="3")], lambda *call: seen.append(call), kept_runs)
-        words = kept_runs.facts()["runs from the store"]
+        words = kept_runs.facts()["from the store"]
     assert all(same(first[run.tag], again[run.tag]) for run in runs)
     assert same(first["eq8"], again["3"])
     assert seen[-1][:2] == (4, 4)
-    assert words.startswith("3 of 3, made 2")
+    assert words.startswith("3 of 3 runs, made 2")
     assert " UTC" in words
 
 
@@ -111,7 +111,7 @@ def test_whatever_decides_a_run_is_in_its_key(monkeypatch):
     keys = [key_of(run) for run in (RUN, *changed)]
     assert len(set(keys)) == len(keys)
     assert key_of(replace(RUN, tag="other", confirms="it")) == keys[0]
-    for package in store.PACKAGES:
+    for package in store.COMPUTING:
         with monkeypatch.context() as patched:
             patched.setattr(store, "version_of", lambda name, new=package: "9.9" if name == new else "1.0")
             other = key_of(RUN)
@@ -154,12 +154,12 @@ def test_every_package_counts_its_own_sources_and_those_of_the_nouns():
 def test_a_flipped_byte_makes_the_run_again(place, column):
     (made,) = kept(place, RUN)
     with sqlite3.connect(place) as rows:
-        (cell,) = rows.execute(f"SELECT {column} FROM runs").fetchone()
+        (cell,) = rows.execute(f"SELECT {column} FROM kept").fetchone()
         cell = cell.encode() if isinstance(cell, str) else cell
         for at in {0, len(cell) // 3, len(cell) - 1}:
             damaged = cell[:at] + bytes([cell[at] ^ 1]) + cell[at + 1 :]
             value = damaged if column == "content" else damaged.decode()
-            rows.execute(f"UPDATE runs SET {column} = ?", (value,))
+            rows.execute(f"UPDATE kept SET {column} = ?", (value,))
             rows.commit()
             assert found(place) is None
             kept(place, RUN)
@@ -171,7 +171,7 @@ def test_an_entry_of_another_run_is_not_taken_for_it(place):
     other = replace(RUN, scenario=replace(RUN.scenario, omega0=11.0))
     kept(place, RUN)
     with sqlite3.connect(place) as rows:
-        rows.execute("UPDATE runs SET key = ?", (key_of(other),))
+        rows.execute("UPDATE kept SET key = ?", (key_of(other),))
     assert found(place, other) is None
 
 
@@ -212,7 +212,6 @@ place, first = Path(sys.argv[1]), int(sys.argv[2])
 with RunStore(place, slow=0.0) as store:
     for k in range(first, first + 40):
         store.make(Run("", "eq8", Scenario(n_slices=2, duration=0.05, omega0=5.0 + k)))
-    assert store.facts()["runs from the store"].startswith(("none of", "20 of", "1"))
 """
 
 
@@ -220,7 +219,7 @@ def test_two_programs_write_at_once(place):
     programs = [subprocess.Popen([sys.executable, "-c", WRITER, str(place), first]) for first in ("0", "20")]
     assert [program.wait(timeout=120) for program in programs] == [0, 0]
     with sqlite3.connect(place) as rows:
-        assert rows.execute("SELECT count(*) FROM runs").fetchone() == (60,)
+        assert rows.execute("SELECT count(*) FROM kept").fetchone() == (60,)
         assert rows.execute("PRAGMA integrity_check").fetchone() == ("ok",)
     with RunStore(place) as runs_kept:
         for k in range(60):
@@ -245,14 +244,14 @@ def test_the_entries_stay_within_the_limit_and_the_last_used_stay(place):
     runs = [replace(RUN, scenario=replace(RUN.scenario, omega0=10.0 + k)) for k in range(6)]
     kept(place, runs[0])
     with sqlite3.connect(place) as rows:
-        (size,) = rows.execute("SELECT size FROM runs").fetchone()
+        (size,) = rows.execute("SELECT size FROM kept").fetchone()
     limit = int(3.5 * size)
     for run in runs[1:3]:
         kept(place, run, limit=limit)
     assert found(place, runs[0]) is not None  # used last
     kept(place, *runs[3:5], limit=limit)
     with sqlite3.connect(place) as rows:
-        (together,) = rows.execute("SELECT sum(size) FROM runs").fetchone()
+        (together,) = rows.execute("SELECT sum(size) FROM kept").fetchone()
     assert together <= limit
     assert [found(place, run) is not None for run in runs[:5]] == [True, False, False, True, True]
     kept(place, runs[5], limit=size // 2)  # too large for itself: it drives nothing out
@@ -264,7 +263,7 @@ def test_without_a_place_everything_works():
     with RunStore(None) as runs_kept:
         assert runs_kept.make(RUN).trajectory is not None
         assert runs_kept.find(RUN) is None
-        assert runs_kept.facts() == {"runs from the store": "none: not asked for"}
+        assert runs_kept.facts() == {"from the store": "none: not asked for"}
 
 
 @pytest.mark.parametrize("obstacle", ["a file in place of the folder", "a folder that cannot be written"])
@@ -280,7 +279,7 @@ def test_a_cache_folder_that_cannot_be_used_is_done_without(tmp_path, obstacle):
             home = Path("/proc/self")  # for whom no folder is closed (root): one where nothing can be made
     with RunStore(home / "flipproof" / "runs.sqlite", slow=0.0) as runs_kept:
         assert runs_kept.make(RUN).trajectory is not None
-        assert "cannot be used" in runs_kept.facts()["runs from the store"]
+        assert "cannot be used" in runs_kept.facts()["from the store"]
 
 
 def test_a_file_that_can_only_be_read_is_read(place):
@@ -310,3 +309,56 @@ def test_a_run_made_in_another_thread_is_kept_by_this_one(place):
     with RunStore(place, slow=0.0) as runs_kept:
         runs_kept.keep(made[0])
     assert same(made[0], found(place))
+
+
+def doubled(numbers, mark):
+    """Return twice the numbers, and leave a trace of the call."""
+    with mark.open("a") as trace:
+        trace.write("called\n")
+    if numbers is None:
+        raise ArithmeticError("nothing to double")
+    return [2 * number for number in numbers]
+
+
+def test_a_call_is_kept_by_function_and_arguments(place, tmp_path):
+    mark = tmp_path / "mark"
+    for expected in (1, 1, 2):
+        with RunStore(place) as kept_calls, workers(1) as pool:
+            keeping = kept_calls.remembering(pool)
+            assert keeping.submit(doubled, [1.0, 2.0], mark).result(timeout=60) == [2.0, 4.0]
+            if expected == 2:
+                assert keeping.submit(doubled, [1.0, np.nextafter(2.0, 3.0)], mark).result(timeout=60)[1] > 4.0
+        assert len(mark.read_text().split()) == expected
+    assert "1 of 2 maps and audits, made 2" in kept_calls.facts()["from the store"]
+
+
+def test_a_call_that_fails_is_made_again_and_without_a_place_the_pool_is_itself(place, tmp_path):
+    mark = tmp_path / "mark"
+    for _ in range(2):
+        with RunStore(place) as kept_calls, workers(1) as pool, pytest.raises(ArithmeticError, match="nothing"):
+            kept_calls.remembering(pool).submit(doubled, None, mark).result(timeout=60)
+    assert len(mark.read_text().split()) == 2
+    assert RunStore(None).remembering(pool) is pool
+
+
+def test_a_call_is_made_again_after_any_change_of_a_source_or_a_version(monkeypatch):
+    keys = {store.key_of_call(doubled, (1,), {})}
+    monkeypatch.setattr(store, "fingerprint", lambda *names: f"other {names}")
+    keys.add(store.key_of_call(doubled, (1,), {}))
+    for package in store.PACKAGES:
+        monkeypatch.setattr(store, "version_of", lambda name, new=package: "9.9" if name == new else "1.0")
+        keys.add(store.key_of_call(doubled, (1,), {}))
+    assert len(keys) == 2 + len(store.PACKAGES)
+    assert store.key_of_call(doubled, (threading.Lock(),), {}) is None
+
+
+def test_a_fingerprint_is_of_all_files_but_compiled_and_hidden_ones(tmp_path, monkeypatch):
+    room = tmp_path / "another_room"
+    (room / "__pycache__").mkdir(parents=True)
+    monkeypatch.syspath_prepend(tmp_path)
+    seen = set()
+    for name in ("__init__.py", "data.json", "__pycache__/kernel.nbi", ".hidden"):
+        (room / name).write_text("1")
+        sources.fingerprint.cache_clear()
+        seen.add(sources.fingerprint("another_room"))
+    assert len(seen) == 2

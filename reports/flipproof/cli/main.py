@@ -168,6 +168,7 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     report.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
     add_no_cache(report)
+    report.add_argument("--png", action="store_true", help="also write every figure as PNG, beside the SVG")
     report.add_argument(
         "--pdf", action="store_true", help="also print the page to report.pdf (needs Chromium, Chrome or Edge)"
     )
@@ -219,6 +220,7 @@ def command_report(options: argparse.Namespace) -> int:
 
     from flipproof.build import build, write
     from flipproof.evidence import FULL, QUICK, gather, with_slices
+    from flipproof.frame.pool import workers
     from flipproof.frame.stages import Stages
     from flipproof.frame.store import RunStore, default_place
     from flipproof.output.provenance import provenance
@@ -236,6 +238,7 @@ def command_report(options: argparse.Namespace) -> int:
     with replaced_folder(options.out, "report") as folder:
         with (
             RunStore(None if options.no_cache else default_place()) as store,
+            workers(options.jobs) as pool,
             tqdm(desc="runs", unit="run", disable=None, leave=False) as bar,
         ):
 
@@ -244,9 +247,9 @@ def command_report(options: argparse.Namespace) -> int:
                 bar.set_postfix_str(tag, refresh=False)
                 bar.update(made - bar.n)
 
-            evidence = gather(scenario, size, progress, options.jobs, Stages(say), store)
+            evidence = gather(scenario, size, progress, options.jobs, Stages(say), store, pool)
             facts = provenance(command) | store.facts()
-        report = build(evidence, facts, options.jobs)
+            report = build(evidence, facts, pool=store.remembering(pool), png=options.png)
         write(report, folder)
         if options.pdf:
             print_page(folder / "index.html", folder / "report.pdf")

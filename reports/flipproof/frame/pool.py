@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import Executor, as_completed, wait
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Any
@@ -11,12 +11,19 @@ from typing import Any
 from flipproof.frame.processes import WorkerDiedError, processes
 from flipproof.frame.solvers import Made, Run, find, make
 from flipproof.frame.store import RunStore
+from slicemodel import Scenario
 
 Progress = Callable[[int, int, str], None]
 """Called with runs made, runs planned and the last run's tag."""
 
 GROUP = 8
 """Runs of a group: sending a quick one away alone would cost as much as making it."""
+
+QUICK = ("slicemodel", "ode_reference")
+"""Packages whose runs take milliseconds, but for those by a ``method`` of SciPy's."""
+
+COMPILED = ("exact-step", "eq8")
+"""A solver of each compiled loop."""
 
 TRIES = 2
 """Times that a call is made when its worker dies: what killed one worker may have had nothing to do with the call."""
@@ -25,8 +32,8 @@ TRIES = 2
 def make_all(pool: Executor, runs: Iterable[Run], progress: Progress, store: RunStore | None = None) -> dict[str, Made]:
     """Make runs in worker processes, but for those that the store has from an earlier time; keep slow ones there.
 
-    One job for each run of an engine and of a witness, one for all of the slice model's, so that it is compiled in one
-    worker only, and groups of the others. This process only waits, so that it can be interrupted at any time.
+    One job for each run of an engine and of a witness, and groups of the others. This process only waits, so that it
+    can be interrupted at any time.
     """
     runs = list(runs)
     # Runs that differ in their tag only are made once.
@@ -66,17 +73,22 @@ def make_all(pool: Executor, runs: Iterable[Run], progress: Progress, store: Run
     return {run.tag: made[run.tag] for run in runs}
 
 
+def compile_kernels(pool: Executor) -> None:
+    """Wait until two workers have compiled the loops of schemes and of equations, or read them from numba's cache.
+
+    Runs that are sent away after that find them there, whichever worker makes them.
+    """
+    short = Scenario(n_slices=2, duration=1e-3)
+    wait([pool.submit(make_each, [Run("", name, short)]) for name in COMPILED])
+
+
 def _jobs(runs: list[Run]) -> list[list[Run]]:
-    """Return the runs by jobs, those that may be slow first and each alone."""
+    """Return runs by jobs: each that may be slow alone, and these first; the others in groups."""
     quick: list[Run] = []
-    small: list[Run] = []
     slow: list[Run] = []
     for run in runs:
-        package = find(run.solver).package
-        reduced = package == "ode_reference" and "method" not in run.settings
-        (quick if package == "slicemodel" else small if reduced else slow).append(run)
-    groups = [small[k : k + GROUP] for k in range(0, len(small), GROUP)]
-    return [*([quick] if quick else []), *([run] for run in slow), *groups]
+        (quick if find(run.solver).package in QUICK and "method" not in run.settings else slow).append(run)
+    return [*([run] for run in slow), *(quick[k : k + GROUP] for k in range(0, len(quick), GROUP))]
 
 
 def make_each(runs: Iterable[Run]) -> list[Made]:

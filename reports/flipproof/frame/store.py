@@ -1,8 +1,10 @@
-"""Slow runs kept from one report to the next, in one SQLite file in the user's cache folder.
+"""Slow runs and calls kept from one report to the next, in one SQLite file in the user's cache folder.
 
 A run is looked up by all that decides its numbers: solver, scenario and settings, the versions of Python and of the
-packages that compute, and the sources of the package that makes it and of what that imports. Whatever of these changes,
-the run is made again. The processor is not among them: another one changes last digits, which no verdict rests on.
+packages that compute, and the sources of the package that makes it and of what that imports. A call of a worker, such
+as the flights of a map or the drawing of a figure, is looked up by function, arguments, versions and all sources.
+Whatever of these changes, it is made again. The processor is not among them: another one changes last digits, which no
+verdict rests on.
 
 An entry carries a checksum over key and content; one that does not agree with it is made again and replaced. Several
 programs may read and write at once. Where the file cannot be used, runs are made as if there were none.
@@ -17,6 +19,9 @@ import pickle
 import platform
 import sqlite3
 import sys
+import threading
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, Future
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
@@ -27,8 +32,10 @@ import numpy as np
 
 from flipproof.frame.solvers import Made, Run, find, make
 from flipproof.frame.sources import fingerprint
-from flipproof.output.provenance import version_of
-from slicemodel import Trajectory
+from flipproof.output.provenance import PACKAGES, version_of
+
+WORDS: Final = "from the store"
+"""Name of the store's line in the provenance."""
 
 FILE: Final = "runs-1.sqlite"
 """Its number rises with every change of the table."""
@@ -42,7 +49,8 @@ SOURCES: Final = MappingProxyType(
 )
 """Package -> the sources that its runs are made by. Somebody else's solver is not among them and never kept."""
 
-PACKAGES: Final = ("flipproof", "numpy", "scipy", "numba", "pymunk", "mujoco-core")
+COMPUTING: Final = ("flipproof", "numpy", "scipy", "numba", "pymunk", "mujoco-core")
+"""Packages whose versions a run depends on; a call depends on those that draw, too."""
 
 SLOW: Final = 0.05
 """Seconds of a run from which it is kept: a faster one is as soon made as read."""
@@ -54,17 +62,17 @@ BUSY: Final = 10.0
 """Seconds to wait for another program that writes."""
 
 TABLE: Final = """
-CREATE TABLE IF NOT EXISTS runs (
-    key TEXT PRIMARY KEY,    -- SHA-256 of all that decides the numbers of the run
+CREATE TABLE IF NOT EXISTS kept (
+    key TEXT PRIMARY KEY,    -- SHA-256 of all that decides what is kept
     checksum TEXT NOT NULL,  -- SHA-256 of key and content
     used TEXT NOT NULL,      -- when it was made or last read
     size INTEGER NOT NULL,   -- bytes of the content
-    content BLOB NOT NULL    -- the trajectory, the seconds that it took, and when it was made
+    content BLOB NOT NULL    -- what was kept, and when it was made
 )
 """
 EVICT: Final = """
-DELETE FROM runs WHERE key IN (
-    SELECT key FROM (SELECT key, sum(size) OVER (ORDER BY used DESC, key) AS together FROM runs) WHERE together > ?
+DELETE FROM kept WHERE key IN (
+    SELECT key FROM (SELECT key, sum(size) OVER (ORDER BY used DESC, key) AS together FROM kept) WHERE together > ?
 )
 """
 
@@ -82,8 +90,10 @@ class RunStore:
 
     def __init__(self, place: Path | None, *, slow: float = SLOW, limit: int = LIMIT) -> None:
         self.place, self.slow, self.limit = place, slow, limit
-        self.asked = 0
+        self.asked, self.calls = 0, 0
         self.found: list[str] = []
+        self.found_calls: list[str] = []
+        self._lock = threading.RLock()
         self._rows: sqlite3.Connection | None = None
         self._writable = True
         self._problem = "not asked for"
@@ -100,9 +110,10 @@ class RunStore:
 
     def close(self) -> None:
         """Close the file."""
-        if self._rows is not None:
-            self._rows.close()
-        self._rows = None
+        with self._lock:
+            if self._rows is not None:
+                self._rows.close()
+            self._rows = None
 
     def make(self, run: Run) -> Made:
         """Return the run as it was kept; else make it, and keep it if it was slow."""
@@ -115,58 +126,76 @@ class RunStore:
     def find(self, run: Run) -> Made | None:
         """Return the run as it was kept; None if it was not, or not by this code, or what was kept is damaged."""
         self.asked += 1
-        if self._rows is None or (key := key_of(run)) is None:
-            return None
-        try:
-            row = self._rows.execute("SELECT checksum, content FROM runs WHERE key = ?", (key,)).fetchone()
-            entry = None if row is None else _read(key, *row)
-        except sqlite3.Error as error:
-            self._give_up(error)
-            return None
-        if row is None:
-            return None
+        entry = self._get(key_of(run)) if self._rows is not None else None
         if entry is None:
-            self._write("DELETE FROM runs WHERE key = ?", (key,))
             return None
-        self._write("UPDATE runs SET used = ? WHERE key = ?", (_now(), key))
-        trajectory, seconds, made = entry
+        (trajectory, seconds), made = entry
         self.found.append(made)
         return Made(run, trajectory, seconds)
 
     def keep(self, made: Made) -> None:
         """Keep a run that was slow and ended in a trajectory."""
-        if self._rows is None or made.trajectory is None or made.seconds < self.slow:
-            return
-        key = key_of(made.run)
-        content = pickle.dumps((made.trajectory, made.seconds, _now()), protocol=pickle.HIGHEST_PROTOCOL)
-        if key is None or len(content) > self.limit:
-            return
-        row = (key, _checksum(key, content), _now(), len(content), content)
-        self._write("INSERT OR REPLACE INTO runs VALUES (?, ?, ?, ?, ?)", row)
-        self._write(EVICT, (self.limit,))
+        if self._rows is not None and made.trajectory is not None and made.seconds >= self.slow:
+            self._put(key_of(made.run), (made.trajectory, made.seconds))
+
+    def remembering(self, pool: Executor) -> Executor:
+        """Return the pool as one that finds the answers of its calls in this store, and keeps them there."""
+        return _Remembering(pool, self) if self._rows is not None else pool
+
+    def find_call(self, key: str | None) -> tuple[Any] | None:
+        """Return the answer of a call as it was kept, alone in a tuple, or None."""
+        self.calls += 1
+        entry = self._get(key)
+        if entry is None:
+            return None
+        answer, made = entry
+        self.found_calls.append(made)
+        return (answer,)
+
+    def keep_call(self, key: str | None, answer: object) -> None:
+        """Keep the answer of a call."""
+        self._put(key, answer)
 
     def facts(self) -> dict[str, str]:
-        """Return how many of the runs asked for came from the store and when they were made, for the provenance."""
-        if not self.found:
-            words = f"none of {self.asked}" if self._rows is not None else f"none: {self._problem}"
-        else:
-            first, last = min(self.found)[:16], max(self.found)[:16]
-            words = f"{len(self.found)} of {self.asked}, made {first} UTC"
-            words += f" to {last} UTC" if last != first else ""
-        return {"runs from the store": words}
+        """Return how much of what was asked for came from the store and when it was made, for the provenance."""
+        if self._rows is None and not self.found + self.found_calls:
+            return {WORDS: f"none: {self._problem}"}
+        runs = f"{len(self.found)} of {self.asked} runs"
+        calls = f"{len(self.found_calls)} of {self.calls} maps and audits" if self.calls else ""
+        when = sorted(made[:16] for made in self.found + self.found_calls)
+        made = f"made {when[0]} UTC" + (f" to {when[-1]} UTC" if when[-1] != when[0] else "") if when else ""
+        return {WORDS: ", ".join(part for part in (runs, calls, made) if part)}
 
-    def _open(self, place: Path) -> None:
+    def _get(self, key: str | None) -> tuple[Any, str] | None:
+        """Return what was kept under a key and when it was made."""
+        with self._lock:
+            if self._rows is None or key is None:
+                return None
+            try:
+                row = self._rows.execute("SELECT checksum, content FROM kept WHERE key = ?", (key,)).fetchone()
+            except sqlite3.Error as error:
+                self._give_up(error)
+                return None
+            entry = None if row is None else _read(key, *row)
+            if entry is not None:
+                self._write("UPDATE kept SET used = ? WHERE key = ?", (_now(), key))
+            elif row is not None:
+                self._write("DELETE FROM kept WHERE key = ?", (key,))
+            return entry
+
+    def _put(self, key: str | None, value: object) -> None:
+        """Keep a value; what cannot be pickled, or is larger than all may be together, is not kept."""
+        if key is None:
+            return
         try:
-            place.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-            self._rows = _connect(place)
-        except sqlite3.DatabaseError as error:
-            self._give_up(error)
-            if _is_damage(error):
-                # What is damaged was thrown away just now: begin anew.
-                with suppress(OSError, sqlite3.Error):
-                    self._rows = _connect(place)
-        except (OSError, sqlite3.Error) as error:
-            self._give_up(error)
+            content = pickle.dumps((value, _now()), protocol=pickle.HIGHEST_PROTOCOL)
+        except Exception:  # whatever a class raises that cannot be pickled
+            return
+        if len(content) <= self.limit:
+            with self._lock:
+                row = (key, _checksum(key, content), _now(), len(content), content)
+                self._write("INSERT OR REPLACE INTO kept VALUES (?, ?, ?, ?, ?)", row)
+                self._write(EVICT, (self.limit,))
 
     def _write(self, statement: str, values: tuple[Any, ...]) -> None:
         """Change the file; after a change that it does not take, such as on a full disk, it is only read."""
@@ -179,6 +208,17 @@ class RunStore:
             if _is_damage(error):
                 self._give_up(error)
 
+    def _open(self, place: Path) -> None:
+        try:
+            place.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+            self._rows = _connect(place)
+        except (OSError, sqlite3.Error) as error:
+            self._give_up(error)
+            if _is_damage(error):
+                # What is damaged was thrown away just now: begin anew.
+                with suppress(OSError, sqlite3.Error):
+                    self._rows = _connect(place)
+
     def _give_up(self, error: Exception) -> None:
         """Go on without the file; throw it away if it is damaged."""
         self.close()
@@ -188,6 +228,30 @@ class RunStore:
             with suppress(OSError):
                 for end in ("", "-wal", "-shm"):
                     self.place.with_name(self.place.name + end).unlink(missing_ok=True)
+
+
+class _Remembering(Executor):
+    """A pool whose calls are looked for in a store first; what an exception ends is not kept."""
+
+    def __init__(self, pool: Executor, store: RunStore) -> None:
+        self._pool, self._store = pool, store
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Return the answer as it was kept, or call ``fn`` in a worker and keep it."""
+        key = key_of_call(fn, args, kwargs)
+        known = self._store.find_call(key)
+        if known is not None:
+            future: Future[Any] = Future()
+            future.set_result(known[0])
+            return future
+
+        def keep(done: Future[Any]) -> None:
+            if not done.cancelled() and done.exception() is None:
+                self._store.keep_call(key, done.result())
+
+        future = self._pool.submit(fn, *args, **kwargs)
+        future.add_done_callback(keep)
+        return future
 
 
 def default_place() -> Path | None:
@@ -210,18 +274,29 @@ def key_of(run: Run) -> str | None:
     sources = SOURCES.get(find(run.solver).package)
     if sources is None:
         return None
-    facts = {
-        "solver": run.solver,
-        "scenario": run.scenario.to_mapping(),
-        "settings": dict(run.settings),
-        "versions": {"Python": platform.python_version(), **{name: version_of(name) for name in PACKAGES}},
-        "code": fingerprint(*sources),
-    }
+    facts = {"solver": run.solver, "scenario": run.scenario.to_mapping(), "settings": dict(run.settings)}
     try:
         text = json.dumps(facts, sort_keys=True, default=_plain)
     except (TypeError, ValueError):
         return None
-    return hashlib.sha256(text.encode()).hexdigest()
+    return _key(text.encode(), COMPUTING, sources)
+
+
+def key_of_call(fn: Callable[..., Any], args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> str | None:
+    """Return the SHA-256 of all that decides what a call returns; None for arguments that cannot be pickled.
+
+    Equal arguments may be pickled in two ways, and are then made twice; different ones never are in one.
+    """
+    try:
+        given = pickle.dumps((fn, args, kwargs), protocol=pickle.HIGHEST_PROTOCOL)
+    except Exception:  # whatever a class raises that cannot be pickled
+        return None
+    return _key(given, PACKAGES, (*SOURCES, "flipproof"))
+
+
+def _key(given: bytes, packages: tuple[str, ...], sources: tuple[str, ...]) -> str:
+    versions = {"Python": platform.python_version(), **{name: version_of(name) for name in packages}}
+    return hashlib.sha256(f"{versions}\n{fingerprint(*sources)}\n".encode() + given).hexdigest()
 
 
 def _plain(value: object) -> Any:
@@ -232,7 +307,7 @@ def _plain(value: object) -> Any:
 
 
 def _connect(place: Path) -> sqlite3.Connection:
-    rows = sqlite3.connect(place, timeout=BUSY, isolation_level=None)
+    rows = sqlite3.connect(place, timeout=BUSY, isolation_level=None, check_same_thread=False)
     try:
         rows.execute("PRAGMA journal_mode = WAL").fetchall()
         rows.execute("PRAGMA synchronous = NORMAL")
@@ -243,15 +318,15 @@ def _connect(place: Path) -> sqlite3.Connection:
     return rows
 
 
-def _read(key: str, checksum: object, content: object) -> tuple[Trajectory, float, str] | None:
-    """Return what an entry holds: trajectory, seconds, and when it was made; None if it is damaged."""
+def _read(key: str, checksum: object, content: object) -> tuple[Any, str] | None:
+    """Return what an entry holds and when it was made; None if it is damaged."""
     if not isinstance(content, bytes) or checksum != _checksum(key, content):
         return None
     try:
-        trajectory, seconds, made = pickle.loads(content)
+        value, made = pickle.loads(content)
     except Exception:  # a class of another form: anything may come of it
         return None
-    return trajectory, seconds, made
+    return value, made
 
 
 def _checksum(key: str, content: bytes) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import platform
 from datetime import UTC, datetime
@@ -24,6 +25,7 @@ def provenance(command: str) -> dict[str, str]:
     return facts
 
 
+@functools.cache
 def version_of(package: str) -> str:
     """Return the version of an installed package; "not installed", and of flipproof itself "checkout", without one."""
     try:

@@ -155,7 +155,7 @@ def _figure_mapping(exhibit: Exhibit) -> dict[str, Any]:
         "caption": exhibit.caption,
         "alt": exhibit.alt,
         "svg": f"{place}.svg",
-        "png": f"{place}.png",
+        "png": f"{place}.png" if exhibit.drawing.png else None,
         "table": None if exhibit.table is None else f"{place}.csv",
     }
 
