@@ -352,6 +352,15 @@ def test_a_call_is_made_again_after_any_change_of_a_source_or_a_version(monkeypa
     assert store.key_of_call(doubled, (threading.Lock(),), {}) is None
 
 
+def test_equal_arguments_have_one_key_whichever_objects_are_one():
+    one, other = Scenario(omega0=11.0), Scenario(omega0=11.0)
+    keys = {store.key_of_call(doubled, given, {}) for given in ((one, one), (one, other))}
+    assert len(keys) == 1
+    endless: list[object] = []
+    endless.append(endless)
+    assert store.key_of_call(doubled, (endless,), {}) is None
+
+
 def test_a_fingerprint_is_of_all_files_but_compiled_and_hidden_ones(tmp_path, monkeypatch):
     room = tmp_path / "another_room"
     (room / "__pycache__").mkdir(parents=True)

@@ -13,6 +13,7 @@ programs may read and write at once. Where the file cannot be used, runs are mad
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 import pickle
@@ -287,11 +288,14 @@ def key_of_call(fn: Callable[..., Any], args: tuple[Any, ...], kwargs: Mapping[s
 
     Equal arguments may be pickled in two ways, and are then made twice; different ones never are in one.
     """
+    given = io.BytesIO()
+    pickler = pickle.Pickler(given, protocol=pickle.HIGHEST_PROTOCOL)
+    pickler.fast = True  # without it what is pickled depends on which of two equal objects are one
     try:
-        given = pickle.dumps((fn, args, kwargs), protocol=pickle.HIGHEST_PROTOCOL)
+        pickler.dump((fn, args, kwargs))
     except Exception:  # whatever a class raises that cannot be pickled
         return None
-    return _key(given, PACKAGES, (*SOURCES, "flipproof"))
+    return _key(given.getvalue(), PACKAGES, (*SOURCES, "flipproof"))
 
 
 def _key(given: bytes, packages: tuple[str, ...], sources: tuple[str, ...]) -> str:

@@ -268,9 +268,18 @@ class _Fit:
             with np.errstate(over="ignore"):
                 return np.asarray(np.log(np.exp(whole[0] + whole[1] * self.log_dt) + whole[2]) - self.log_error)
 
+        def slopes(part: FloatArray) -> FloatArray:
+            whole = start.copy()
+            whole[moving] = part * scale[moving]
+            with np.errstate(over="ignore", divide="ignore"):
+                step_error = np.exp(whole[0] + whole[1] * self.log_dt)
+                share = 1.0 / (1.0 + whole[2] / step_error)
+                columns = np.array([share, share * self.log_dt, scale[2] / (step_error + whole[2])])
+            return np.asarray(columns[moving].T)
+
         bounds = (low[moving] / scale[moving], high[moving] / scale[moving])
         inside = np.clip(start[moving] / scale[moving], bounds[0], bounds[1])
-        found = least_squares(residuals, inside, bounds=bounds, x_scale="jac", max_nfev=400)
+        found = least_squares(residuals, inside, slopes, bounds=bounds, x_scale="jac", max_nfev=400)
         whole = start.copy()
         whole[moving] = found.x * scale[moving]
         return whole, float(2.0 * found.cost)
