@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flipproof.frame import sources, store
+from flipproof.frame import keys, sources, store
+from flipproof.frame.keys import key_of, key_of_call
 from flipproof.frame.pool import make_all, workers
 from flipproof.frame.solvers import Made, Run, make
-from flipproof.frame.store import RunStore, default_place, key_of
+from flipproof.frame.store import RunStore, default_place
 from slicemodel import Scenario
 
 RUN = Run("eq8", "eq8", Scenario(n_slices=3, duration=0.1))
@@ -97,6 +98,18 @@ def test_only_slow_runs_that_ended_in_a_trajectory_are_kept(place):
     assert found(place, refused) is None
 
 
+def test_what_is_as_soon_made_as_read_is_not_kept(place):
+    with RunStore(place) as runs_kept:
+        made = make(replace(RUN, scenario=RUN.scenario.with_slices(100)))
+        runs_kept.keep(replace(made, seconds=0.05))  # 1.6 MB: at the speed of reading that is soon made
+        assert runs_kept.find(made.run) is None
+        runs_kept.keep(replace(made, seconds=0.06))
+        assert runs_kept.find(made.run) is not None
+        runs_kept.keep_call("quick", "answer", 0.04)
+        runs_kept.keep_call("slow", "answer", 0.06)
+        assert (runs_kept.find_call("quick"), runs_kept.find_call("slow")) == (None, ("answer",))
+
+
 def test_whatever_decides_a_run_is_in_its_key(monkeypatch):
     changed = [
         replace(RUN, solver="eq8-wall"),
@@ -108,17 +121,17 @@ def test_whatever_decides_a_run_is_in_its_key(monkeypatch):
         replace(RUN, settings={"times": np.array([0.0, np.nextafter(0.1, 0.0)])}),
         replace(RUN, settings={"energy": True}),
     ]
-    keys = [key_of(run) for run in (RUN, *changed)]
-    assert len(set(keys)) == len(keys)
-    assert key_of(replace(RUN, tag="other", confirms="it")) == keys[0]
-    for package in store.COMPUTING:
+    found_keys = [key_of(run) for run in (RUN, *changed)]
+    assert len(set(found_keys)) == len(found_keys)
+    assert key_of(replace(RUN, tag="other", confirms="it")) == found_keys[0]
+    for package in keys.COMPUTING:
         with monkeypatch.context() as patched:
-            patched.setattr(store, "version_of", lambda name, new=package: "9.9" if name == new else "1.0")
+            patched.setattr(keys, "version_of", lambda name, new=package: "9.9" if name == new else "1.0")
             other = key_of(RUN)
-            patched.setattr(store, "version_of", lambda _: "1.0")
+            patched.setattr(keys, "version_of", lambda _: "1.0")
             assert key_of(RUN) != other
-    monkeypatch.setattr(store.platform, "python_version", lambda: "9.9")
-    assert key_of(RUN) != keys[0]
+    monkeypatch.setattr(keys.platform, "python_version", lambda: "9.9")
+    assert key_of(RUN) != found_keys[0]
 
 
 def test_a_setting_without_words_for_it_and_a_foreign_solver_are_not_kept(tmp_path):
@@ -134,7 +147,7 @@ def test_a_changed_source_makes_runs_again(place, tmp_path, monkeypatch):
     (room / "__init__.py").write_text("")
     (room / "motion.py").write_text("G = 9.81\n")
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(store, "SOURCES", {"ode_reference": ("room_of_sources",)})
+    monkeypatch.setattr(keys, "SOURCES", {"ode_reference": ("room_of_sources",)})
     kept(place, RUN)
     assert found(place) is not None
     (room / "motion.py").write_text("G = 9.82\n")
@@ -146,7 +159,7 @@ def test_a_changed_source_makes_runs_again(place, tmp_path, monkeypatch):
 
 
 def test_every_package_counts_its_own_sources_and_those_of_the_nouns():
-    for package, names in store.SOURCES.items():
+    for package, names in keys.SOURCES.items():
         assert {package, "slicemodel", "flipproof.frame.solvers"} == set(names)
 
 
@@ -323,7 +336,7 @@ def doubled(numbers, mark):
 def test_a_call_is_kept_by_function_and_arguments(place, tmp_path):
     mark = tmp_path / "mark"
     for expected in (1, 1, 2):
-        with RunStore(place) as kept_calls, workers(1) as pool:
+        with RunStore(place, slow=0.0) as kept_calls, workers(1) as pool:
             keeping = kept_calls.remembering(pool)
             assert keeping.submit(doubled, [1.0, 2.0], mark).result(timeout=60) == [2.0, 4.0]
             if expected == 2:
@@ -335,30 +348,33 @@ def test_a_call_is_kept_by_function_and_arguments(place, tmp_path):
 def test_a_call_that_fails_is_made_again_and_without_a_place_the_pool_is_itself(place, tmp_path):
     mark = tmp_path / "mark"
     for _ in range(2):
-        with RunStore(place) as kept_calls, workers(1) as pool, pytest.raises(ArithmeticError, match="nothing"):
+        with (
+            RunStore(place, slow=0.0) as kept_calls,
+            workers(1) as pool,
+            pytest.raises(ArithmeticError, match="nothing"),
+        ):
             kept_calls.remembering(pool).submit(doubled, None, mark).result(timeout=60)
     assert len(mark.read_text().split()) == 2
     assert RunStore(None).remembering(pool) is pool
 
 
 def test_a_call_is_made_again_after_any_change_of_a_source_or_a_version(monkeypatch):
-    keys = {store.key_of_call(doubled, (1,), {})}
-    monkeypatch.setattr(store, "fingerprint", lambda *names: f"other {names}")
-    keys.add(store.key_of_call(doubled, (1,), {}))
-    for package in store.PACKAGES:
-        monkeypatch.setattr(store, "version_of", lambda name, new=package: "9.9" if name == new else "1.0")
-        keys.add(store.key_of_call(doubled, (1,), {}))
-    assert len(keys) == 2 + len(store.PACKAGES)
-    assert store.key_of_call(doubled, (threading.Lock(),), {}) is None
+    seen = {key_of_call(doubled, (1,), {})}
+    monkeypatch.setattr(keys, "fingerprint", lambda *names: f"other {names}")
+    seen.add(key_of_call(doubled, (1,), {}))
+    for package in keys.PACKAGES:
+        monkeypatch.setattr(keys, "version_of", lambda name, new=package: "9.9" if name == new else "1.0")
+        seen.add(key_of_call(doubled, (1,), {}))
+    assert len(seen) == 2 + len(keys.PACKAGES)
+    assert key_of_call(doubled, (threading.Lock(),), {}) is None
 
 
 def test_equal_arguments_have_one_key_whichever_objects_are_one():
     one, other = Scenario(omega0=11.0), Scenario(omega0=11.0)
-    keys = {store.key_of_call(doubled, given, {}) for given in ((one, one), (one, other))}
-    assert len(keys) == 1
+    assert len({key_of_call(doubled, given, {}) for given in ((one, one), (one, other))}) == 1
     endless: list[object] = []
     endless.append(endless)
-    assert store.key_of_call(doubled, (endless,), {}) is None
+    assert key_of_call(doubled, (endless,), {}) is None
 
 
 def test_a_fingerprint_is_of_all_files_but_compiled_and_hidden_ones(tmp_path, monkeypatch):

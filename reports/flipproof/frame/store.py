@@ -13,27 +13,22 @@ programs may read and write at once. Where the file cannot be used, runs are mad
 from __future__ import annotations
 
 import hashlib
-import io
-import json
 import os
 import pickle
-import platform
 import sqlite3
 import sys
 import threading
+import time
 from collections.abc import Callable, Mapping
-from concurrent.futures import Executor, Future
+from concurrent.futures import CancelledError, Executor, Future
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from types import MappingProxyType, TracebackType
+from types import TracebackType
 from typing import Any, Final
 
-import numpy as np
-
-from flipproof.frame.solvers import Made, Run, find, make
-from flipproof.frame.sources import fingerprint
-from flipproof.output.provenance import PACKAGES, version_of
+from flipproof.frame.keys import key_of, key_of_call
+from flipproof.frame.solvers import Made, Run, make
 
 WORDS: Final = "from the store"
 """Name of the store's line in the provenance."""
@@ -41,20 +36,11 @@ WORDS: Final = "from the store"
 FILE: Final = "runs-1.sqlite"
 """Its number rises with every change of the table."""
 
-SOURCES: Final = MappingProxyType(
-    {
-        "slicemodel": ("slicemodel", "flipproof.frame.solvers"),
-        "ode_reference": ("ode_reference", "slicemodel", "flipproof.frame.solvers"),
-        "engine_check": ("engine_check", "slicemodel", "flipproof.frame.solvers"),
-    }
-)
-"""Package -> the sources that its runs are made by. Somebody else's solver is not among them and never kept."""
-
-COMPUTING: Final = ("flipproof", "numpy", "scipy", "numba", "pymunk", "mujoco-core")
-"""Packages whose versions a run depends on; a call depends on those that draw, too."""
-
 SLOW: Final = 0.05
 """Seconds of a run from which it is kept: a faster one is as soon made as read."""
+
+WORTH: Final = 3e7
+"""Bytes at the most for each second that it took: what is kept is read some ten times as fast as that."""
 
 LIMIT: Final = 2**30
 """Bytes of all entries together; those used longest ago go first."""
@@ -85,7 +71,7 @@ class RunStore:
     ----------
     place : Path or None
         The file; ``default_place()`` unless somebody wants another.
-    slow : float - seconds of a run from which it is kept
+    slow : float - seconds of a run from which it is kept; 0: all of any size
     limit : int - bytes of all entries together
     """
 
@@ -137,7 +123,7 @@ class RunStore:
     def keep(self, made: Made) -> None:
         """Keep a run that was slow and ended in a trajectory."""
         if self._rows is not None and made.trajectory is not None and made.seconds >= self.slow:
-            self._put(key_of(made.run), (made.trajectory, made.seconds))
+            self._put(key_of(made.run), (made.trajectory, made.seconds), made.seconds)
 
     def remembering(self, pool: Executor) -> Executor:
         """Return the pool as one that finds the answers of its calls in this store, and keeps them there."""
@@ -153,9 +139,10 @@ class RunStore:
         self.found_calls.append(made)
         return (answer,)
 
-    def keep_call(self, key: str | None, answer: object) -> None:
-        """Keep the answer of a call."""
-        self._put(key, answer)
+    def keep_call(self, key: str | None, answer: object, seconds: float) -> None:
+        """Keep the answer of a call that was slow."""
+        if seconds >= self.slow:
+            self._put(key, answer, seconds)
 
     def facts(self) -> dict[str, str]:
         """Return how much of what was asked for came from the store and when it was made, for the provenance."""
@@ -184,15 +171,16 @@ class RunStore:
                 self._write("DELETE FROM kept WHERE key = ?", (key,))
             return entry
 
-    def _put(self, key: str | None, value: object) -> None:
-        """Keep a value; what cannot be pickled, or is larger than all may be together, is not kept."""
+    def _put(self, key: str | None, value: object, seconds: float) -> None:
+        """Keep a value that took so long; not what cannot be pickled, or is made about as fast as it would be read."""
         if key is None:
             return
         try:
             content = pickle.dumps((value, _now()), protocol=pickle.HIGHEST_PROTOCOL)
         except Exception:  # whatever a class raises that cannot be pickled
             return
-        if len(content) <= self.limit:
+        worth = self.slow == 0.0 or len(content) <= WORTH * seconds
+        if worth and len(content) <= self.limit:
             with self._lock:
                 row = (key, _checksum(key, content), _now(), len(content), content)
                 self._write("INSERT OR REPLACE INTO kept VALUES (?, ?, ?, ?, ?)", row)
@@ -241,18 +229,30 @@ class _Remembering(Executor):
         """Return the answer as it was kept, or call ``fn`` in a worker and keep it."""
         key = key_of_call(fn, args, kwargs)
         known = self._store.find_call(key)
+        answer: Future[Any] = Future()
         if known is not None:
-            future: Future[Any] = Future()
-            future.set_result(known[0])
-            return future
+            answer.set_result(known[0])
+            return answer
+        answer.set_running_or_notify_cancel()
 
         def keep(done: Future[Any]) -> None:
-            if not done.cancelled() and done.exception() is None:
-                self._store.keep_call(key, done.result())
+            error = CancelledError() if done.cancelled() else done.exception()
+            if error is not None:
+                answer.set_exception(error)
+            else:
+                found, seconds = done.result()
+                answer.set_result(found)
+                self._store.keep_call(key, found, seconds)
 
-        future = self._pool.submit(fn, *args, **kwargs)
-        future.add_done_callback(keep)
-        return future
+        self._pool.submit(_timed, fn, args, kwargs).add_done_callback(keep)
+        return answer
+
+
+def _timed(fn: Callable[..., Any], args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> tuple[Any, float]:
+    """Return the answer of a call, and the seconds that it took."""
+    began = time.perf_counter()
+    answer = fn(*args, **kwargs)
+    return answer, time.perf_counter() - began
 
 
 def default_place() -> Path | None:
@@ -268,46 +268,6 @@ def default_place() -> Path | None:
     except RuntimeError:
         return None
     return home / "flipproof" / FILE
-
-
-def key_of(run: Run) -> str | None:
-    """Return the SHA-256 of all that decides a run; None for a run that cannot be kept."""
-    sources = SOURCES.get(find(run.solver).package)
-    if sources is None:
-        return None
-    facts = {"solver": run.solver, "scenario": run.scenario.to_mapping(), "settings": dict(run.settings)}
-    try:
-        text = json.dumps(facts, sort_keys=True, default=_plain)
-    except (TypeError, ValueError):
-        return None
-    return _key(text.encode(), COMPUTING, sources)
-
-
-def key_of_call(fn: Callable[..., Any], args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> str | None:
-    """Return the SHA-256 of all that decides what a call returns; None for arguments that cannot be pickled.
-
-    Equal arguments may be pickled in two ways, and are then made twice; different ones never are in one.
-    """
-    given = io.BytesIO()
-    pickler = pickle.Pickler(given, protocol=pickle.HIGHEST_PROTOCOL)
-    pickler.fast = True  # without it what is pickled depends on which of two equal objects are one
-    try:
-        pickler.dump((fn, args, kwargs))
-    except Exception:  # whatever a class raises that cannot be pickled
-        return None
-    return _key(given.getvalue(), PACKAGES, (*SOURCES, "flipproof"))
-
-
-def _key(given: bytes, packages: tuple[str, ...], sources: tuple[str, ...]) -> str:
-    versions = {"Python": platform.python_version(), **{name: version_of(name) for name in packages}}
-    return hashlib.sha256(f"{versions}\n{fingerprint(*sources)}\n".encode() + given).hexdigest()
-
-
-def _plain(value: object) -> Any:
-    """Return a setting that JSON has no word for as one that it has, floats to the last bit."""
-    if isinstance(value, np.ndarray | np.generic):
-        return [str(value.dtype), value.tolist()]
-    raise TypeError(f"{type(value).__name__} has no key")
 
 
 def _connect(place: Path) -> sqlite3.Connection:
