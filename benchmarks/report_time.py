@@ -5,8 +5,8 @@
     python benchmarks/report_time.py --cold          numba's cache is empty, too, at the first of them
 
 Wall time says what a user waits on this machine now; processor time, of all processes together, says what the report
-costs whatever else the machine does. The published program (N = 100, P = 1000) is timed before and after each report, in
-processor time: its ratio to half the report's processor time is that of a machine with two idle cores, if both cores
+costs whatever else the machine does. The published program (N = 100, P = 1000) is timed before and after each report,
+in processor time: its ratio to half the report's processor time is that of a machine with two idle cores, if both
 are busy all the time. Prints a table and writes ``benchmarks/results/report_time.json``.
 """
 
@@ -43,7 +43,7 @@ def published_seconds() -> float:
 
 
 def measure(arguments: list[str], environment: dict[str, str]) -> dict[str, Any]:
-    """Return wall and processor seconds of one report, what it says of its stages and its store, and its exit status."""
+    """Return wall and processor seconds of one report, what it says of stages and store, and its exit status."""
     with tempfile.TemporaryDirectory() as scratch:
         command = [sys.executable, "-m", "flipproof", "report", *arguments, "--out", f"{scratch}/report"]
         before, used, began = published_seconds(), resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
@@ -87,8 +87,8 @@ def main() -> int:
                 print(", ".join(f"{name} {seconds:.1f} s" for name, seconds in found["stages"].items()))
                 print(
                     f"{size}, {store} store: {found['seconds']:.1f} s, {found['processor_seconds']:.1f} s of processor "
-                    f"time, half of it {found['ratio']} times the published program's {found['published_seconds']:.3f} s "
-                    f"(at most {limit}); from the store {found['from_the_store']}; exit status {found['exit_status']}",
+                    f"time, half of it {found['ratio']} times the {found['published_seconds']:.3f} s of the published "
+                    f"program (at most {limit}); from the store {found['from_the_store']}; exit status {found['exit_status']}",
                     flush=True,
                 )
     place = ROOT / "benchmarks" / "results"
