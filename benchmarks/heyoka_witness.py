@@ -20,9 +20,9 @@ from typing import Any
 
 import heyoka as hy
 import numpy as np
+from flow_agreement import Case, first_parting, flow
 
 import ode_reference
-from flow_agreement import Case, first_parting, flow
 from ode_reference.contact import Ends, resolve
 from ode_reference.impacts import LAWS, immovable
 from ode_reference.models import MODELS

@@ -88,7 +88,8 @@ def main() -> int:
                 print(
                     f"{size}, {store} store: {found['seconds']:.1f} s, {found['processor_seconds']:.1f} s of processor "
                     f"time, half of it {found['ratio']} times the {found['published_seconds']:.3f} s of the published "
-                    f"program (at most {limit}); from the store {found['from_the_store']}; exit status {found['exit_status']}",
+                    f"program (at most {limit}); from the store {found['from_the_store']}; "
+                    f"exit status {found['exit_status']}",
                     flush=True,
                 )
     place = ROOT / "benchmarks" / "results"
