@@ -150,7 +150,7 @@ class RunStore:
             return {WORDS: f"none: {self._problem}"}
         runs = f"{len(self.found)} of {self.asked} runs"
         calls = f"{len(self.found_calls)} of {self.calls} maps and audits" if self.calls else ""
-        when = sorted(made[:16] for made in self.found + self.found_calls)
+        when = sorted(self.found + self.found_calls)
         made = f"made {when[0]} UTC" + (f" to {when[-1]} UTC" if when[-1] != when[0] else "") if when else ""
         return {WORDS: ", ".join(part for part in (runs, calls, made) if part)}
 
@@ -176,7 +176,7 @@ class RunStore:
         if key is None:
             return
         try:
-            content = pickle.dumps((value, _now()), protocol=pickle.HIGHEST_PROTOCOL)
+            content = pickle.dumps((value, _now("%Y-%m-%d %H:%M")), protocol=pickle.HIGHEST_PROTOCOL)
         except Exception:  # whatever a class raises that cannot be pickled
             return
         worth = self.slow == 0.0 or len(content) <= WORTH * seconds
@@ -297,8 +297,8 @@ def _checksum(key: str, content: bytes) -> str:
     return hashlib.sha256(key.encode() + content).hexdigest()
 
 
-def _now() -> str:
-    return datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S.%f")
+def _now(form: str = "%Y-%m-%d %H:%M:%S.%f") -> str:
+    return datetime.now(UTC).strftime(form)
 
 
 def _is_damage(error: Exception) -> bool:
