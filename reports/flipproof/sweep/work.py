@@ -108,7 +108,7 @@ def code_identity() -> str:
         version = metadata.version("flipproof")
     except metadata.PackageNotFoundError:
         version = "checkout"
-    return f"{version}+{fingerprint(*SOURCES)[:12]}"
+    return f"{version}+{fingerprint(*SOURCES):.12}"
 
 
 @functools.cache
