@@ -17,11 +17,11 @@ import sys
 import time
 from pathlib import Path
 
+from flipproof.chapters.work_precision.contenders import COMPLETE, FULL, QUICK
+from flipproof.chapters.work_precision.study import gather_work_precision
 from flipproof.claims_work_precision import claim_work_precision
 from flipproof.exhibits_work_precision import draw_work_precision, summarise_work_precision, tabulate_work_precision
 from flipproof.frame.pool import workers
-from flipproof.studies.contenders import COMPLETE, FULL, QUICK
-from flipproof.studies.work_precision import gather_work_precision
 
 RESULTS = Path(__file__).resolve().parent / "results"
 SIZES = {effort.name: effort for effort in (COMPLETE, FULL, QUICK)}

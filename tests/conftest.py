@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 
 from flipproof.build import Report, build
+from flipproof.chapters.work_precision import contenders
 from flipproof.evidence import QUICK, Evidence, gather, with_slices
 from flipproof.instruments import WITNESSES
 from flipproof.output.provenance import provenance
-from flipproof.studies import contenders
 from slicemodel import Scenario
 
 

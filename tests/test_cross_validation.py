@@ -7,8 +7,8 @@ import engine_check
 import ode_reference
 import slicemodel
 from flipproof import claims
+from flipproof.chapters.step_size.study import before_first_impact, plan_step_size, study_step_size
 from flipproof.evidence import LIMITS
-from flipproof.studies.step_size import before_first_impact, plan_step_size, study_step_size
 from slicemodel import Bottle, Scenario, observables
 
 # Other bottles, fillings, angles, spins and restitutions; each shifts the phase of every impact.

@@ -15,6 +15,8 @@ import pytest
 from flipproof import evidence as evidence_module
 from flipproof import instruments
 from flipproof.attribution import Scope
+from flipproof.chapters.horizon.study import Reach
+from flipproof.chapters.stability.study import Layout
 from flipproof.check.diff import Change, change_of, compare_summaries, read_summary, scenario_changes, within
 from flipproof.check.diff_page import read_curves
 from flipproof.cli.check import add_checks
@@ -27,8 +29,6 @@ from flipproof.instruments import Bench
 from flipproof.output.columns import curves_csv
 from flipproof.output.provenance import provenance
 from flipproof.output.summary import solver_rows, summarise, summary_text
-from flipproof.studies.horizon import Reach
-from flipproof.studies.stability import Layout
 from slicemodel import Scenario, schemes
 from slicemodel import solver as slice_solver
 

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import pytest
 
+from flipproof.chapters.engine_facts import worlds
+from flipproof.chapters.engine_facts.figures_old import figure_gallery
+from flipproof.chapters.engine_facts.study import plan_engine_facts, study_engine_facts
 from flipproof.claims_engines import claim_engine_fact
 from flipproof.exhibits_engines import draw_gallery
-from flipproof.figures.engines import figure_gallery
 from flipproof.frame.solvers import Made, make
-from flipproof.studies import engine_worlds as worlds
-from flipproof.studies.engine_facts import plan_engine_facts, study_engine_facts
 from slicemodel import Scenario
 
 PYMUNK = (
@@ -23,7 +23,7 @@ MUJOCO = ("mujoco-limit", "mujoco-contact")
 
 @pytest.fixture(scope="module")
 def made():
-    return {run.tag: make(run) for run in plan_engine_facts(Scenario())}
+    return {run.label: make(run) for run in plan_engine_facts(Scenario())}
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +33,7 @@ def facts(made):
 
 def test_the_plan_has_unique_tags_and_explicit_steps():
     runs = plan_engine_facts(Scenario(duration=0.1))
-    assert len({run.tag for run in runs}) == len(runs)
+    assert len({run.label for run in runs}) == len(runs)
     assert all({"dt", "iterations"} <= set(run.settings) for run in runs)
     assert all(run.settings["times"][-1] == run.scenario.duration == 0.1 for run in runs)
 

@@ -9,16 +9,16 @@ from pathlib import Path
 
 import pytest
 
+from flipproof.chapters.differences.study import percent
+from flipproof.chapters.finite_step.study import EVERYTHING, HELD, LOCATED, WAYS
+from flipproof.chapters.slices.chapter import FINER
+from flipproof.chapters.waterfall.study import STEP
 from flipproof.claims import claim_finite_step
 from flipproof.evidence import BY_ENGINE, EQ8_FREE, PROGRAM_EQ8, TOTAL
 from flipproof.output.snapshot import BEGIN, END, PLACE, README, front_page, write_front_page
 from flipproof.page.headlines import MEASURES, Headline, headlines
 from flipproof.page.lead import amount, lead_words, sentences, signed
 from flipproof.page.verdict import LABELS, answer, tiles
-from flipproof.studies.differences import percent
-from flipproof.studies.finite_step import EVERYTHING, HELD, LOCATED, WAYS
-from flipproof.studies.slices import FINER
-from flipproof.studies.waterfall import STEP
 
 pytestmark = pytest.mark.xdist_group("evidence")
 

@@ -25,7 +25,7 @@ def without(evidence, tag, reason="RuntimeError: not installed"):
 
 def test_a_report_certifies_to_what_solve_asks_by_itself():
     assert instruments.TOLERANCE == DEFAULT_TOLERANCE
-    assert [run.tag for run in plan_witnesses(REFERENCE, instruments.FULL)] == list(witnesses(REFERENCE))
+    assert [run.label for run in plan_witnesses(REFERENCE, instruments.FULL)] == list(witnesses(REFERENCE))
     assert all(run.settings["tolerance"] == DEFAULT_TOLERANCE for run in plan_witnesses(REFERENCE, instruments.FULL))
 
 
@@ -35,7 +35,7 @@ def test_the_hybrid_stands_beside_the_grid_where_there_is_no_drag_and_nowhere_el
     assert list(witnesses(dry)) == ["pymunk", "pymunk located", "mujoco", "pymunk rotating"]
     assert list(witnesses(dataclasses.replace(dry, frozen=True))) == ["pymunk", "mujoco", "pymunk rotating"]
     short = dataclasses.replace(dry.with_slices(3), duration=0.02)
-    runs = {run.tag: make(run).trajectory for run in plan_witnesses(short, instruments.QUICK)}
+    runs = {run.label: make(run).trajectory for run in plan_witnesses(short, instruments.QUICK)}
     assert {tag: run.settings["hits"] for tag, run in runs.items()} == {
         "pymunk": "grid", "pymunk located": "located", "mujoco": "located", "pymunk rotating": "grid",
     }  # fmt: skip
@@ -43,7 +43,7 @@ def test_the_hybrid_stands_beside_the_grid_where_there_is_no_drag_and_nowhere_el
 
 def test_a_quick_report_says_what_it_does_not_certify(evidence):
     size = dataclasses.replace(evidence.size, bench=instruments.QUICK)
-    planned = {run.tag: run.settings for run in plan_witnesses(REFERENCE, instruments.QUICK)}
+    planned = {run.label: run.settings for run in plan_witnesses(REFERENCE, instruments.QUICK)}
     assert planned["pymunk"] == {"dt": instruments.UNCERTIFIED_DT}
     quick = dataclasses.replace(evidence, size=size)
     assert "pymunk and mujoco: not certified in a quick report" in build(quick, provenance("flipproof report")).html

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flipproof.chapters.maps.study import CURVE, LADDER, RUNGS, study_map
+from flipproof.chapters.waterfall.study import OBSERVABLES, study_waterfall
 from flipproof.cli import main as cli
 from flipproof.frame.solvers import make
-from flipproof.studies.validity import CURVE, LADDER, RUNGS, study_map
-from flipproof.studies.waterfall import OBSERVABLES, study_waterfall
 from flipproof.sweep.design import design_of
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.local import Workers
@@ -87,7 +87,7 @@ def same(one, other):
 @pytest.mark.parametrize("axis", AXES)
 def test_a_map_from_rows_is_that_of_direct_runs_to_the_last_bit(axis, tmp_path):
     plan = Plan.of_size(THROW, axis, 3, 2)
-    made = {r.tag: make(r) for r in plan.runs()}
+    made = {r.label: make(r) for r in plan.runs()}
     direct = study_map(THROW, axis, plan.fills, plan.values, made)
     assert direct.dominant.shape == (2, 3)
     assert all(np.isfinite(values).all() for values in direct.level.values())
@@ -98,7 +98,7 @@ def test_a_map_from_rows_is_that_of_direct_runs_to_the_last_bit(axis, tmp_path):
 def test_a_throw_of_its_own_keeps_all_its_fields(tmp_path):
     throw = Scenario(omega0=-15.0, theta0=0.7, drag=0.3, gravity=3.0, duration=0.2, restitution=0.8).with_slices(2)
     plan = Plan.of_size(throw, "gamma", 2, 2)
-    made = {r.tag: make(r) for r in plan.runs()}
+    made = {r.label: make(r) for r in plan.runs()}
     same(by_hand(plan, tmp_path / "out"), study_map(throw, "gamma", plan.fills, plan.values, made))
 
 
@@ -236,7 +236,7 @@ def test_a_waterfall_from_rows_is_that_of_direct_runs_to_the_last_bit(split):
     throw, runs, design, out = split
     with Store(out, design, code_identity()) as store:
         rows = read_runs(store, runs)
-    made = {r.tag: make(r).trajectory for r in runs}
+    made = {r.label: make(r).trajectory for r in runs}
     direct = study_waterfall(made)
     assert [part.observable.name for part in direct] == [observable.name for observable in OBSERVABLES]
     assert split_rows(throw, rows) == direct
@@ -247,7 +247,7 @@ def test_a_waterfall_s_run_that_is_not_whole_is_named(split):
     throw, runs, design, out = split
     with Store(out, design, code_identity()) as store:
         rows = read_runs(store, runs)
-    tag = runs[5].tag
+    tag = runs[5].label
     rows[tag] = replace(rows[tag], status="stalled", message="time hardly passes")
     with pytest.raises(SweepError, match=f"{tag}: stalled: time hardly passes"):
         split_rows(throw, rows)

@@ -409,7 +409,7 @@ def test_a_wrong_filling_of_change_fails(monkeypatch):
 def test_free_flight_throws_water_to_the_cap_from_that_filling_on(filling, over):
     """Slices may overlap and sink to the base first, which puts the centre of mass lower: 0.13 to 0.14."""
     throw = paper_throw(filling).with_slices(20)
-    run = make(Run("around", "free-flight", throw)).trajectory
+    run = make(Run("free-flight", throw, label="around")).trajectory
     assert int((run.r < throw.bottle.length / 2).any(axis=0).sum()) == over
     steady = plateau(run.t, run.omega, throw.omega0)
     assert steady > 0.85 if over == 0 else steady < 0.75
@@ -536,9 +536,9 @@ def test_statements_stand_once_each_with_all_their_words():
 
 
 def test_further_runs_repeat_none_of_the_figures():
-    figures = {run.tag for run in plan_paper()}
+    figures = {run.label for run in plan_paper()}
     further, halved = plan_further(), plan_halved()
-    tags = [run.tag for run in (*further.values(), *halved.values())]
+    tags = [run.label for run in (*further.values(), *halved.values())]
     assert len(set(tags)) == len(tags)
     assert not figures & set(tags)
     for (solver, key), run in halved.items():
@@ -555,7 +555,7 @@ def test_further_runs_repeat_none_of_the_figures():
 def test_the_published_program_is_flown_with_half_its_slices_and_with_half_its_steps():
     slices, steps = plan_published("slices"), plan_published("steps")
     assert set(slices) < set(steps)
-    tags = [run.tag for run, _ in (*slices.values(), *steps.values())]
+    tags = [run.label for run, _ in (*slices.values(), *steps.values())]
     assert len(set(tags)) == len(tags)
     for (solver, key), (run, thin) in slices.items():
         usual = all_cases()[key]
@@ -571,12 +571,12 @@ def test_the_published_program_is_flown_with_half_its_slices_and_with_half_its_s
 
 def test_gathering_keeps_what_belongs_together(monkeypatch):
     scenario = replace(THROW, duration=0.01)
-    one = Run("one", PUBLISHED, scenario, {"steps": 5, "store": "summary"})
-    two = Run("two", PUBLISHED, replace(scenario, omega0=10.0), {"steps": 5, "store": "summary"})
+    one = Run(PUBLISHED, scenario, {"steps": 5, "store": "summary"}, label="one")
+    two = Run(PUBLISHED, replace(scenario, omega0=10.0), {"steps": 5, "store": "summary"}, label="two")
     monkeypatch.setattr(claim_runs, "plan_further", lambda: {(PUBLISHED, "a"): one})
     monkeypatch.setattr(claim_runs, "plan_halved", lambda: {("eq8", "a"): two})
-    three = replace(two, tag="three", scenario=replace(scenario, omega0=15.0))
-    four = replace(two, tag="four", scenario=replace(scenario, omega0=16.0))
+    three = replace(two, label="three", scenario=replace(scenario, omega0=15.0))
+    four = replace(two, label="four", scenario=replace(scenario, omega0=16.0))
     half = {"slices": three, "steps": four}
     monkeypatch.setattr(claim_runs, "plan_published", lambda of: {(PUBLISHED, "a"): (half[of], 1)})
     paper = PaperRuns(made={}, costs=())
@@ -614,11 +614,13 @@ def runs():
         for half in ("slices", "steps")
     }
     for key, case in cases.items():
-        made[PUBLISHED, key] = make(Run(key, PUBLISHED, case.scenario, {"steps": case.steps, "store": store(key)}))
+        made[PUBLISHED, key] = make(
+            Run(PUBLISHED, case.scenario, {"steps": case.steps, "store": store(key)}, label=key)
+        )
     planned = plan_further()
     further = {pair: make(run) for pair, run in planned.items() if pair[0] in (PUBLISHED, "eq8-weightless")}
     tenth = paper_throw(0.1).with_slices(50)
-    made["free-flight", "filling 0.1"] = make(Run("tenth", "free-flight", tenth))
+    made["free-flight", "filling 0.1"] = make(Run("free-flight", tenth, label="tenth"))
     everything = [*made.values(), *further.values(), *halves["slices"].values(), *halves["steps"].values()]
     assert not [each.reason for each in everything if each.trajectory is None]
     return ClaimRuns(
@@ -699,7 +701,7 @@ def test_weight_is_what_slows_the_bottle_filled_to_a_tenth(runs):
 
 def test_free_flight_does_not_know_where_down_is():
     made = {
-        ("free-flight", case.key): make(Run(case.key, "free-flight", case.scenario.with_slices(5)))
+        ("free-flight", case.key): make(Run("free-flight", case.scenario.with_slices(5), label=case.key))
         for case in family("angle")
     }
     runs = ClaimRuns(paper=PaperRuns(made=made, costs=()), further={}, halved={})

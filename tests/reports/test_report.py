@@ -172,7 +172,7 @@ def test_axes_carry_units(evidence):
 
 
 def test_the_same_data_draw_the_same_bytes(evidence):
-    from flipproof.figures.flights import figure_omega
+    from flipproof.chapters.flights.figures import figure_omega
     from flipproof.figures.style import draw
 
     flights = [evidence.trajectory(tag) for tag in FLIGHTS]
@@ -283,7 +283,7 @@ def test_the_snapshot_has_every_claim_that_the_code_makes(evidence):
 
 
 def test_a_run_that_raises_becomes_its_reason():
-    run = Run("bad", "eq8", Scenario(n_slices=1), {"rtol": -1.0})
+    run = Run("eq8", Scenario(n_slices=1), {"rtol": -1.0}, label="bad")
     result = make(run)
     assert result.trajectory is None
     assert result.reason.startswith("ValueError: ")
@@ -291,7 +291,7 @@ def test_a_run_that_raises_becomes_its_reason():
 
 
 def test_workers_bring_home_the_same_trajectory():
-    run = Run("eq8", "eq8", Scenario(n_slices=2, duration=0.05))
+    run = Run("eq8", Scenario(n_slices=2, duration=0.05), label="eq8")
     seen = []
     with workers(1) as processes:
         away = make_all(processes, [run], lambda *call: seen.append(call))["eq8"].trajectory
@@ -323,10 +323,10 @@ class LastFirst(Executor):
 def test_results_stand_in_the_order_asked_whichever_worker_is_faster(monkeypatch):
     """A step must never be paired with the drift of another: what is read off this table is read in order."""
     monkeypatch.setattr(pool, "SMALL", 0.0)
-    runs = [Run(f"{n}", "eq8", Scenario(n_slices=n, duration=0.02)) for n in (1, 2, 3)]
+    runs = [Run("eq8", Scenario(n_slices=n, duration=0.02), label=f"{n}") for n in (1, 2, 3)]
     made = make_all(LastFirst(3), runs, lambda *_: None)
     assert list(made) == ["1", "2", "3"]
-    assert [result.run.tag for result in made.values()] == ["1", "2", "3"]
+    assert [result.run.label for result in made.values()] == ["1", "2", "3"]
 
 
 def test_typeset():

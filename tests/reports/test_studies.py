@@ -9,14 +9,14 @@ import pytest
 
 from flipproof import claims
 from flipproof.attribution import plan_attribution
+from flipproof.chapters.differences.study import first_crossing, study_difference
+from flipproof.chapters.ice.chapter import study_ice
+from flipproof.chapters.slices.chapter import study_slices
+from flipproof.chapters.step_size.study import PHASES, levels, observed_order, study_step_size
 from flipproof.evidence import FULL, LADDER, plan, run_bands
 from flipproof.frame.findings import Finding
 from flipproof.frame.solvers import Made, Run
 from flipproof.frame.twins import twins
-from flipproof.studies.differences import first_crossing, study_difference
-from flipproof.studies.ice import study_ice
-from flipproof.studies.slices import study_slices
-from flipproof.studies.step_size import PHASES, levels, observed_order, study_step_size
 from slicemodel import Impacts, Scenario, Trajectory
 
 SCENARIO = Scenario(n_slices=1)
@@ -222,7 +222,7 @@ def test_a_run_that_is_not_whole_is_not_evaluated_and_says_why():
 
 def test_bands_of_runs():
     def made(omega, solver, confirms=""):
-        return Made(Run(solver, solver, SCENARIO, confirms=confirms), curve(omega, method=solver), 0.0)
+        return Made(Run(solver, SCENARIO, confirms=confirms, label=solver), curve(omega, method=solver), 0.0)
 
     runs = {
         "published-limit": made([20, 20], "published-limit"),
@@ -252,8 +252,8 @@ def test_only_twins_are_planned_to_confirm_a_run():
     """A disturbed throw whose tag begins with a model's name once set that model's band: 1.3e-6 where 1e-9 holds."""
     throw = Scenario().with_slices(6)
     runs = [*plan(throw, FULL), *plan_attribution(throw, FULL.scope, FULL.steps)]
-    assert any(run.tag.startswith("eq8, release changed") and not run.confirms for run in runs)
-    of = {run.tag: run for run in runs}
+    assert any(run.label.startswith("eq8, release changed") and not run.confirms for run in runs)
+    of = {run.label: run for run in runs}
     confirming = [run for run in runs if run.confirms]
     assert {run.confirms for run in confirming if run.confirms in LADDER} == set(LADDER)
     for run in confirming:

@@ -8,11 +8,11 @@ import pytest
 from flipproof import evidence as evidence_module
 from flipproof.attribution import Scope
 from flipproof.build import build
+from flipproof.chapters.horizon.study import Reach
+from flipproof.chapters.stability.study import Layout
 from flipproof.evidence import QUICK, with_slices
 from flipproof.instruments import Bench
 from flipproof.output.provenance import provenance
-from flipproof.studies.horizon import Reach
-from flipproof.studies.stability import Layout
 from slicemodel import Scenario
 
 SMALL_BENCH = Bench(

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import ode_reference
+from flipproof.chapters.waterfall.study import NAMES, OBSERVABLES, canonical, plan_waterfall, study_waterfall
 from flipproof.frame import twins
 from flipproof.studies import waterfall
-from flipproof.studies.waterfall import NAMES, OBSERVABLES, canonical, plan_waterfall, study_waterfall
 from ode_reference.switches import Switches
 from slicemodel import Scenario, Trajectory
 
@@ -37,10 +37,10 @@ def split(value_of, *, program=0.0, moved=0.0, kind=twins.RELEASE):
     runs = {}
     for run in plan_waterfall(THROW, 1000):
         if run.solver == waterfall.PROGRAM:
-            runs[run.tag] = made_up(program)
+            runs[run.label] = made_up(program)
             continue
         value = value_of(Switches.from_name(run.solver))
-        runs[run.tag] = made_up(value + (moved if run.tag.endswith(kind) else 0.0))
+        runs[run.label] = made_up(value + (moved if run.label.endswith(kind) else 0.0))
     return study_waterfall(runs)
 
 
@@ -51,10 +51,10 @@ def plateau_bars(result):
 
 def test_the_plan_names_every_equation_once_and_gives_it_two_twins():
     runs = plan_waterfall(THROW, 1000)
-    assert len({run.tag for run in runs}) == len(runs) == 121
+    assert len({run.label for run in runs}) == len(runs) == 121
     for usual, release, rest in zip(runs[1:41], runs[41::2], runs[42::2], strict=True):
         assert usual.solver == release.solver == rest.solver
-        assert release.confirms == rest.confirms == usual.tag
+        assert release.confirms == rest.confirms == usual.label
         assert usual.settings == release.settings == {}
         assert usual.scenario == rest.scenario
         assert release.scenario.omega0 / THROW.omega0 - 1 == pytest.approx(twins.CHANGE, rel=1e-4, abs=0.0)
@@ -103,7 +103,7 @@ def test_bands_come_from_the_twins(kind):
 
 
 def test_a_run_that_is_not_whole_is_named():
-    runs = {run.tag: made_up(1.0) for run in plan_waterfall(THROW, 1000)}
+    runs = {run.label: made_up(1.0) for run in plan_waterfall(THROW, 1000)}
     tag = next(tag for tag in runs if tag != waterfall.PROGRAM_TAG)
     runs[tag] = dataclasses.replace(runs[tag], status="stalled", message="time hardly passes")
     with pytest.raises(ArithmeticError, match="stalled: time hardly passes") as refusal:

@@ -23,14 +23,14 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof import claims, vectors
+from flipproof.chapters.differences.study import study_difference
+from flipproof.chapters.errata.study import study_errata
+from flipproof.chapters.ice.chapter import plan_ice, study_ice
+from flipproof.chapters.step_size.study import before_first_impact, plan_step_size, study_step_size
 from flipproof.check.diff import LEAST, ROUND_OFF, TOLERANCE, bands, number, read_summary, scenario_changes
 from flipproof.evidence import CHECK, COMMON, COMMON_START, DIFFERENCES, ENGINE, ICED, LIMITS, REFERENCE
 from flipproof.frame.findings import Finding
 from flipproof.frame.solvers import Made, Run, catalogue, make
-from flipproof.studies.differences import study_difference
-from flipproof.studies.errata import study_errata
-from flipproof.studies.ice import plan_ice, study_ice
-from flipproof.studies.step_size import before_first_impact, plan_step_size, study_step_size
 from slicemodel import Scenario, Trajectory
 
 SLICES: Final = 50
@@ -169,7 +169,7 @@ def _held_to(finding: Finding, was: Mapping[str, Any], tolerance: float, *, move
 def check_ice(throw: Scenario) -> Iterator[Finding]:
     """Yield that a frozen bottle keeps its angular velocity in schemes, equations and engine."""
     for run in plan_ice(throw, tuple(LIMITS), ICED, ENGINE):
-        label = run.tag.removeprefix("ice, ")
+        label = run.label.removeprefix("ice, ")
         made = make(run)
         if made.trajectory is None:
             yield claims.not_evaluated(f"ice-{label.replace(' ', '-')}", f"ice: {label} keeps ω constant", made.reason)
@@ -181,7 +181,7 @@ def check_vectors(throw: Scenario) -> Iterator[Finding]:
     """Yield that the published programs' printed numbers are reproduced; they are runs of the paper's throws."""
     del throw
     for vector in vectors.load_all():
-        made = make(Run(f"vector {vector.name}", vector.scheme, vector.scenario, {"steps": vector.steps}))
+        made = make(Run(vector.scheme, vector.scenario, {"steps": vector.steps}, label=f"vector {vector.name}"))
         if made.trajectory is None:
             yield claims.not_evaluated(f"vectors-{vector.name}", f"published run {vector.name}", made.reason)
         else:
@@ -192,7 +192,7 @@ def check_convergence(throw: Scenario) -> Iterator[Finding]:
     """Yield that both schemes converge to their equations at first order, on the paper's own throw."""
     del throw
     for scheme, model in LIMITS.items():
-        reference = make(Run(f"{CHECK}, {model}", model, REFERENCE)).trajectory
+        reference = make(Run(model, REFERENCE, label=f"{CHECK}, {model}")).trajectory
         start = None if reference is None else before_first_impact(REFERENCE, reference)
         parts: tuple[tuple[str, Scenario | None, int, int], ...] = (
             ("before the first impact", start, COMMON_START, 14),
@@ -208,7 +208,7 @@ def _order(scheme: str, model: str, where: str, scenario: Scenario | None, commo
         return claims.not_evaluated(id_, title, f"{model} was not computed or strikes no end")
     times = np.linspace(0.0, scenario.duration, common + 1)
     settings = {"times": times} if scenario is not REFERENCE else {}
-    reference = make(Run("reference", model, scenario, settings))
+    reference = make(Run(model, scenario, settings, label="reference"))
     levels = [[make(run) for run in level] for level in plan_step_size(scenario, scheme, common, multiple, LEVELS)]
     problem = _first_problem([reference, *(made for level in levels for made in level)])
     if reference.trajectory is None or problem:
@@ -226,7 +226,7 @@ def check_thresholds(throw: Scenario) -> Iterator[Finding]:
             continue
         for solver in (first, second):
             settings = {"steps": STEPS} if catalogue()[solver].package == CHEAP[0] else {}
-            made.setdefault(solver, make(Run(solver, solver, throw, settings)))
+            made.setdefault(solver, make(Run(solver, throw, settings, label=solver)))
         yield _difference(name, made[first], made[second])
     for erratum in study_errata(throw):
         yield claims.claim_erratum(erratum)
@@ -235,14 +235,14 @@ def check_thresholds(throw: Scenario) -> Iterator[Finding]:
 def _difference(name: str, first: Made, second: Made) -> Finding:
     runs: list[Trajectory] = [made.trajectory for made in (first, second) if made.trajectory is not None]
     if len(runs) < 2:
-        id_ = f"difference-{first.run.tag}-{second.run.tag}"
+        id_ = f"difference-{first.run.label}-{second.run.label}"
         return claims.not_evaluated(id_, name, _first_problem((first, second)))
     return claims.claim_difference(study_difference(name, *runs))
 
 
 def _first_problem(made: Iterable[Made]) -> str:
     """Return why the first of the runs that failed did; nothing if all are there."""
-    return next((f"{one.run.tag}: {one.reason}" for one in made if one.trajectory is None), "")
+    return next((f"{one.run.label}: {one.reason}" for one in made if one.trajectory is None), "")
 
 
 CHECKS: Final[Mapping[str, Callable[[Scenario], Iterator[Finding]]]] = {

@@ -209,8 +209,7 @@ def command_report(options: argparse.Namespace) -> int:
 
     from tqdm import tqdm
 
-    from flipproof.build import build, write
-    from flipproof.evidence import FULL, QUICK, gather, with_slices
+    from flipproof.build import ask_of, build, gather_report, write
     from flipproof.frame.stages import Stages
     from flipproof.output.provenance import provenance
 
@@ -221,8 +220,7 @@ def command_report(options: argparse.Namespace) -> int:
         if not sys.stderr.isatty():
             print(f"flipproof: {time.perf_counter() - began:.0f} s: {stage}", file=sys.stderr, flush=True)
 
-    size = QUICK if options.quick else FULL
-    size = with_slices(size, options.slices or min(size.slices, scenario.n_slices))
+    ask = ask_of(scenario, "quick" if options.quick else "full", options.slices)
     command = shlex.join(["flipproof", *sys.argv[1:]])
     with replaced_folder(options.out, "report") as folder:
         with tqdm(desc="runs", unit="run", disable=None, leave=False) as bar:
@@ -232,8 +230,8 @@ def command_report(options: argparse.Namespace) -> int:
                 bar.set_postfix_str(tag, refresh=False)
                 bar.update(made - bar.n)
 
-            evidence = gather(scenario, size, progress, options.jobs, Stages(say))
-        report = build(evidence, provenance(command), options.jobs)
+            gathered = gather_report(ask, progress, options.jobs, Stages(say))
+        report = build(gathered, provenance(command), options.jobs)
         write(report, folder)
         if options.pdf:
             print_page(folder / "index.html", folder / "report.pdf")

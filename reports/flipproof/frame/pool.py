@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import Executor, Future, as_completed
 from contextlib import AbstractContextManager
-from dataclasses import replace
 from typing import Any
 
+from flipproof.frame.flights import Call, Outcome, attempt
 from flipproof.frame.processes import WorkerDiedError, processes
 from flipproof.frame.solvers import Made, Run, find, make
 
 Progress = Callable[[int, int, str], None]
-"""Called with runs made, runs planned and the last run's tag."""
+"""Called with runs made, runs planned and the last run's name."""
 
 SMALL = 8.0
 """Slices times seconds of flight below which runs are made in groups."""
@@ -24,25 +24,23 @@ TRIES = 2
 """Times that a call is made when its worker dies: what killed one worker may have had nothing to do with the call."""
 
 
-def make_all(pool: Executor, runs: Iterable[Run], progress: Progress) -> dict[str, Made]:
-    """Make runs in worker processes: one job for each slow run, one for all of the slice model's.
+def make_all(
+    pool: Executor, runs: Iterable[Run], progress: Progress, calls: Iterable[Call] = ()
+) -> tuple[dict[Run, Made], dict[Call, Outcome[Any]]]:
+    """Make runs in worker processes, equal ones once: a job for each slow run, one for all of the slice model's.
 
-    This process only waits, so that it can be interrupted at any time; the slice model compiles in one worker only.
+    Calls are made beside them, each a job. This process only waits, so that it can be interrupted at any time; the
+    slice model compiles in one worker only. Both results are in the order asked.
     """
-    runs = list(runs)
-    # Runs that differ in their tag only are made once.
-    same: dict[tuple[Any, ...], list[Run]] = {}
-    for run in runs:
-        same.setdefault((run.solver, run.scenario, repr(sorted(run.settings.items()))), []).append(run)
-    different = [group[0] for group in same.values()]
-    others = {group[0].tag: group for group in same.values()}
-    quick = [run for run in different if find(run.solver).package == "slicemodel"]
-    slow = [run for run in different if find(run.solver).package != "slicemodel"]
+    runs = list(dict.fromkeys(runs))
+    pending_calls = {call: pool.submit(call.function, *call.arguments) for call in calls}
+    quick = [run for run in runs if find(run.solver).package == "slicemodel"]
+    slow = [run for run in runs if find(run.solver).package != "slicemodel"]
     # Small runs go in groups: sending each away alone would cost as much as making it.
     small = [run for run in slow if run.scenario.n_slices * run.scenario.duration < SMALL]
     jobs = [[run] for run in slow if run.scenario.n_slices * run.scenario.duration >= SMALL]
     jobs += [small[k : k + GROUP] for k in range(0, len(small), GROUP)]
-    made: dict[str, Made] = {}
+    made: dict[Run, Made] = {}
     jobs = ([quick] if quick else []) + jobs
     while jobs:
         pending = {pool.submit(make_each, job): job for job in jobs}
@@ -58,11 +56,21 @@ def make_all(pool: Executor, runs: Iterable[Run], progress: Progress) -> dict[st
                     continue
                 results = [Made(job[0], None, 0.0, f"the worker process died {TRIES} times with this run ({error})")]
             for result in results:
-                for run in others[result.run.tag]:
-                    made[run.tag] = replace(result, run=run)
-                progress(len(made), len(runs), result.run.tag)
+                made[result.run] = result
+                progress(len(made), len(runs), result.run.name)
+    called: dict[Call, Outcome[Any]] = {}
+    for call, answer in pending_calls.items():
+        progress(len(made), len(runs), call.label)
+        called[call] = _answered(call, answer)
     # In the order asked, whichever worker was faster: what is read off this table must not depend on load.
-    return {run.tag: made[run.tag] for run in runs}
+    return {run: made[run] for run in runs}, called
+
+
+def _answered(call: Call, answer: Future[Any]) -> Outcome[Any]:
+    try:
+        return attempt(answer.result)
+    except WorkerDiedError as error:
+        return Outcome(None, f"{call.label}: the worker process died {TRIES} times with this call ({error})")
 
 
 def make_each(runs: Iterable[Run]) -> list[Made]:
