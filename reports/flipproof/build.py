@@ -1,4 +1,4 @@
-"""From a scenario to a report folder: what is asked, findings, figures, page, summary, verdicts for CI systems, tables."""
+"""From a scenario to a report folder: findings, figures, page, summary, verdicts for CI systems, and tables."""
 
 from __future__ import annotations
 

@@ -117,7 +117,9 @@ class Part:
     chapters: tuple[Chapter[Any], ...]
 
 
-def judged(claim: Callable[[], Finding], *, id: str, title: str, kind: Kind = "regression") -> Finding | Absent:
-    """Return the finding of a claim; if its evidence is missing, what says so under the same id."""
-    outcome = attempt(claim)
+def judged(
+    claim: Callable[..., Finding], *about: Any, id: str, title: str, kind: Kind = "regression"
+) -> Finding | Absent:
+    """Return the finding of a claim of these arguments; if its evidence is missing, what says so under the same id."""
+    outcome = attempt(claim, *about)
     return outcome.found if outcome.found is not None else Absent(id, title, outcome.reason, kind)

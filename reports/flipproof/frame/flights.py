@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Generic, TypeVar, overload
+from typing import Any, Generic, TypeVar
 
 from flipproof.frame.solvers import Made, Missing, Run
 from slicemodel import Trajectory
@@ -43,16 +43,14 @@ class Flights(Mapping[Run, Made]):
     def __init__(self, made: Mapping[Run, Made], called: Mapping[Call, Outcome[Any]] = MappingProxyType({})) -> None:
         self._made, self._called = dict(made), dict(called)
 
-    @overload
-    def __getitem__(self, asked: Run) -> Made: ...
-    @overload
-    def __getitem__(self, asked: Call) -> Any: ...
-    def __getitem__(self, asked: Run | Call) -> Any:
-        if isinstance(asked, Call):
-            return self._called[asked].value
-        if asked not in self._made:
-            raise Missing(f"{asked.name}: it was not run")
-        return self._made[asked]
+    def __getitem__(self, run: Run) -> Made:
+        if run not in self._made:
+            raise Missing(f"{run.name}: it was not run")
+        return self._made[run]
+
+    def answer(self, call: Call) -> Any:
+        """Return what a call returned; raises Missing if it failed."""
+        return self._called[call].value
 
     def __iter__(self) -> Iterator[Run]:
         return iter(self._made)
@@ -70,10 +68,10 @@ class Flights(Mapping[Run, Made]):
         self._called |= called
 
 
-def attempt(study: Callable[[], T]) -> Outcome[T]:
-    """Return what a study found, or the reason why it found nothing."""
+def attempt(study: Callable[..., T], *about: Any) -> Outcome[T]:
+    """Return what a study of these arguments found, or the reason why it found nothing."""
     try:
-        return Outcome(study())
+        return Outcome(study(*about))
     except Missing as why:
         return Outcome(None, str(why))
     except (ArithmeticError, ValueError, LookupError) as error:

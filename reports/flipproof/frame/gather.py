@@ -123,7 +123,7 @@ def _told(chapter: Chapter[Any], outcome: Outcome[Any]) -> Told:
         lambda: said.extend(chapter.claims(outcome.value)),
         lambda: drawn.extend(chapter.figures(outcome.value)),
     ):
-        failure = attempt(lambda what=what: what() or True)  # type: ignore[misc]
+        failure = attempt(lambda what: what() or True, what)
         if failure.reason and not any(each.id == f"chapter-{chapter.name}" for each in said):
             said.append(Absent(f"chapter-{chapter.name}", chapter.title, failure.reason, "observation"))
     return Told(

@@ -19,7 +19,8 @@ MACROS: Final = '{% from "macros.html.j2" import anchor, draw, minus, missing, s
 PLAIN: Final = """{{ draw(figures) }}
 {% if not figures and findings %}
 <ul>
-{% for finding in findings %}<li><a href="#{{ finding.id }}">{{ finding.title }}</a>: {{ minus(finding.value_text) }}, {{ finding.verdict }}.</li>
+{% for finding in findings %}<li><a href="#{{ finding.id }}">{{ finding.title }}</a>:
+{{ minus(finding.value_text) }}, {{ finding.verdict }}.</li>
 {% endfor %}
 </ul>
 {% endif %}

@@ -48,8 +48,8 @@ def study(ask: Ask) -> Study[Events]:
         return (flights[ask.solvers[name]].flight for name in pair)
 
     return Events(
-        {pair: attempt(lambda pair=pair: study_alignment(*both(pair))) for pair in PAIRS},  # type: ignore[misc]
-        {pair: attempt(lambda pair=pair: study_tube(*both(pair), dt=TUBE_TIME, dy=dy)) for pair in PAIRS},  # type: ignore[misc]
+        {pair: attempt(lambda pair: study_alignment(*both(pair)), pair) for pair in PAIRS},
+        {pair: attempt(lambda pair: study_tube(*both(pair), dt=TUBE_TIME, dy=dy), pair) for pair in PAIRS},
     )
 
 
@@ -57,7 +57,10 @@ def claims(found: Events) -> Claims:
     """Yield the share of the time that each second curve spends in the tube around the first."""
     for (first, second), tube in found.tubes.items():
         yield judged(
-            lambda first=first, second=second, tube=tube: claim_tube(first, second, tube.value),  # type: ignore[misc]
+            lambda first, second, tube: claim_tube(first, second, tube.value),
+            first,
+            second,
+            tube,
             id=f"tube-{first}-{second}",
             title=f"tube of {first} and {second}",
             kind="observation",

@@ -90,7 +90,7 @@ def study(ask: Ask) -> Study[Differences]:
             finer=_refined(first, second, more, flights),
         )
 
-    tried = {pair: attempt(lambda pair=pair: compared(*pair)) for pair in PAIRS if set(pair[1:]) <= set(runs)}  # type: ignore[misc]
+    tried = {pair: attempt(lambda pair: compared(*pair), pair) for pair in PAIRS if set(pair[1:]) <= set(runs)}
     pairs = tuple(outcome.found for outcome in tried.values() if outcome.found is not None)
     growths = []
     for difference in pairs:

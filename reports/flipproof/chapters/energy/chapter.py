@@ -42,7 +42,7 @@ def study(ask: Ask) -> Study[Energy]:
     return Energy(
         {model: flights[run] for model, run in checks.items()},
         {
-            model: attempt(lambda run=run: flights[run].flight.diagnostics["energy"])  # type: ignore[misc]
+            model: attempt(lambda run: flights[run].flight.diagnostics["energy"], run)
             for model, run in throws_runs.items()
         },
     )
@@ -52,7 +52,7 @@ def claims(found: Energy) -> Claims:
     """Yield that every ledger closes on the paper's own throw."""
     for model, made in found.checks.items():
         title = f"{model}: the energy ledger closes"
-        yield judged(lambda made=made: claim_energy(made.flight), id=f"energy-{model}", title=title)  # type: ignore[misc]
+        yield judged(lambda made: claim_energy(made.flight), made, id=f"energy-{model}", title=title)
     for model, each in found.ledgers.items():
         if each.found is None:
             yield Absent(f"ledger-{model}", f"ledger of {model}", each.reason, "observation")

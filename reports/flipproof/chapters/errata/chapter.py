@@ -16,7 +16,7 @@ def study(ask: Ask) -> Study[tuple[Erratum, ...]]:
     """Have a worker audit the paper on the throw."""
     audit = Call(study_errata, (ask.throw,), "errata")
     flights = yield [audit]
-    errata: tuple[Erratum, ...] = flights[audit]
+    errata: tuple[Erratum, ...] = flights.answer(audit)
     return errata
 
 

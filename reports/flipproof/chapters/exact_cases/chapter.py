@@ -21,14 +21,16 @@ def study(ask: Ask) -> Study[Found]:
     """Have workers hold each model of ``ask.work`` against the exact cases."""
     calls = {model: Call(study_digits, (model,), f"exact cases of {model}") for model in ask.work}
     flights = yield list(calls.values())
-    return {model: attempt(lambda call=call: flights[call]) for model, call in calls.items()}  # type: ignore[misc]
+    return {model: attempt(flights.answer, call) for model, call in calls.items()}
 
 
 def claims(found: Found) -> Claims:
     """Yield the largest error of every model."""
     for model, each in found.items():
         yield judged(
-            lambda model=model, each=each: claim_exact_cases(model, each.value),  # type: ignore[misc]
+            lambda model, each: claim_exact_cases(model, each.value),
+            model,
+            each,
             id=f"exact-cases-{model}",
             title=f"exact cases of {model}",
         )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from flipproof.chapters.finite_step.study import WAYS, StepCost, study_finite_step, way_run
+from flipproof.chapters.finite_step.study import WAYS, StepCost, Way, study_finite_step, way_run
 from flipproof.frame.chapter import Ask, Chapter, Claims, Study
 from flipproof.frame.findings import Finding
 from flipproof.frame.flights import attempt
@@ -38,11 +38,11 @@ def study(ask: Ask) -> Study[StepCosts]:
     pairs = {way: (way_run(way, ask.throw, ask.steps), Run(way.model, ask.throw, {}, way.model)) for way in WAYS}
     more = {way: (finer(run), finer(truth)) for way, (run, truth) in pairs.items()}
     flights = yield [run for both in (*pairs.values(), *more.values()) for run in both]
-    costs, finer_costs = (
-        attempt(lambda of=of: study_finite_step({way: tuple(flights[run].whole for run in both) for way, both in of.items()}))  # type: ignore[misc]
-        for of in (pairs, more)
-    )  # fmt: skip
-    return StepCosts(costs.value, finer_costs.found or (), ask.throw.n_slices, FINER * ask.throw.n_slices)
+
+    def cost(of: dict[Way, tuple[Run, Run]]) -> tuple[StepCost, ...]:
+        return study_finite_step({way: (flights[run].whole, flights[truth].whole) for way, (run, truth) in of.items()})
+
+    return StepCosts(cost(pairs), attempt(cost, more).found or (), ask.throw.n_slices, FINER * ask.throw.n_slices)
 
 
 def claims(found: StepCosts) -> Claims:

@@ -89,7 +89,9 @@ def claims(found: Ice) -> Claims:
     """Yield that every solver keeps omega, and that welded masses drift at the engine's printed order."""
     for label, made in found.rigid.items():
         yield judged(
-            lambda label=label, made=made: claim_ice(measure(label, made.flight)),  # type: ignore[misc]
+            lambda label, made: claim_ice(measure(label, made.flight)),
+            label,
+            made,
             id=f"ice-{label.replace(' ', '-')}",
             title=f"ice: {label} keeps ω constant",
         )
@@ -151,7 +153,7 @@ def figures(found: Ice) -> Iterator[Exhibit]:
 
 @styled
 def draw(drifts: Sequence[Drift]) -> Figure:
-    """Draw the drifts on a logarithmic scale with a floor; those that are zero each get a line of their own above it."""
+    """Draw the drifts on a logarithmic scale with a floor; each that is zero gets a line of its own above it."""
     figure, axes = new_figure(size=(8.0, 4.3))
     others = iter(("#882255", "#CC79A7", "#E69F00"))
     exact = 0

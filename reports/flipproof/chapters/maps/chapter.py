@@ -61,11 +61,11 @@ def study(ask: Ask) -> Study[Maps]:
         readings: dict[Run, Reading] = {}
         for k, call in enumerate(calls[axis]):
             # Cells of a chunk whose worker died stay "not run".
-            answer = attempt(lambda call=call: flights[call])  # type: ignore[misc]
+            answer = attempt(flights.answer, call)
             readings |= zip(runs[axis][k * CHUNK : (k + 1) * CHUNK], answer.found or (), strict=False)
         return study_readings(cut, axis, *ends[axis], readings, steps=ask.steps, shares=True)
 
-    return Maps({axis: attempt(lambda axis=axis: mapped(axis)) for axis in AXES}, cut.n_slices)  # type: ignore[misc]
+    return Maps({axis: attempt(lambda axis: mapped(axis), axis) for axis in AXES}, cut.n_slices)
 
 
 def claims(found: Maps) -> Claims:

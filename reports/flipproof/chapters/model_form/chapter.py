@@ -55,19 +55,15 @@ def study(ask: Ask) -> Study[Forms]:
     def grids(scheme: str) -> list[list[Trajectory]]:
         return [[flights[run].flight for run in level] for level in levels[scheme]]
 
-    calls = {
-        pair: attempt(
-            lambda pair=pair, truth=truth: Call(study_signals, (flights[truth].flight, grids(pair[0])), " against ".join(pair))  # type: ignore[misc]
-        )
-        for pair, truth in truths.items()
-    }  # fmt: skip
+    def fit(scheme: str, model: str) -> Call:
+        truth = flights[truths[scheme, model]].flight
+        return Call(study_signals, (truth, grids(scheme)), f"{scheme} against {model}")
+
+    calls = {pair: attempt(fit, *pair) for pair in truths}
     flights = yield [call.found for call in calls.values() if call.found is not None]
     return Forms(
-        {pair: attempt(lambda call=call: flights[call.value]) for pair, call in calls.items()},  # type: ignore[misc]
-        {
-            scheme: attempt(lambda scheme=scheme: _limit(grids(scheme), ask.throw.omega0))  # type: ignore[misc]
-            for scheme in levels
-        },
+        {pair: attempt(lambda call: flights.answer(call.value), call) for pair, call in calls.items()},
+        {scheme: attempt(lambda scheme: _limit(grids(scheme), ask.throw.omega0), scheme) for scheme in levels},
     )
 
 
@@ -81,7 +77,9 @@ def claims(found: Forms) -> Claims:
     """Yield where every scheme goes, and what stays of its error against an equation."""
     for scheme, limit in found.limits.items():
         yield judged(
-            lambda scheme=scheme, limit=limit: claim_limit(scheme, limit.value),  # type: ignore[misc]
+            lambda scheme, limit: claim_limit(scheme, limit.value),
+            scheme,
+            limit,
             id=f"limit-{scheme}",
             title=f"limit of {scheme}",
             kind="observation",

@@ -31,8 +31,10 @@ def study(ask: Ask) -> Study[Paper]:
     plan = plan_claims()
     halved = [Call(make_thinned, (group,), "the paper's statements") for group in plan.groups]
     flights = yield [*figures, *halved, *plan.runs]
-    runs = PaperRuns.of([flights[call] for call in figures])
-    made = {each.run: each for call in halved for each in flights[call]} | {run: flights[run] for run in plan.runs}
+    runs = PaperRuns.of([flights.answer(call) for call in figures])
+    made = {each.run: each for call in halved for each in flights.answer(call)} | {
+        run: flights[run] for run in plan.runs
+    }
     return Paper(runs, judge_paper(ClaimRuns.of(runs, plan, made)))
 
 

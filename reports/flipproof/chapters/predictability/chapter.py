@@ -29,9 +29,11 @@ def study(ask: Ask) -> Study[Found]:
     ]
     return {
         name: attempt(
-            lambda name=name, changed=changed: study_predictability(  # type: ignore[misc]
+            lambda name, changed: study_predictability(
                 flights[ask.solvers[name]].flight, [[flights[run].flight for run in level] for level in changed]
-            )
+            ),
+            name,
+            changed,
         )
         for name, changed in levels.items()
     }
@@ -41,7 +43,9 @@ def claims(found: Found) -> Claims:
     """Yield the amplification of the smallest change."""
     for solver, each in found.items():
         yield judged(
-            lambda solver=solver, each=each: claim_predictability(solver, each.value),  # type: ignore[misc]
+            lambda solver, each: claim_predictability(solver, each.value),
+            solver,
+            each,
             id=f"predictability-{solver}",
             title=f"predictability of {solver}",
             kind="observation",

@@ -55,13 +55,17 @@ def claims(found: References) -> Claims:
     """Yield that every model is confirmed."""
     for model, made in found.usual.items():
         yield judged(
-            lambda made=made, model=model: claim_reference_converged(made.flight, found.witness[model].flight),  # type: ignore[misc]
+            lambda made, model: claim_reference_converged(made.flight, found.witness[model].flight),
+            made,
+            model,
             id=f"reference-{model}",
             title=f"{model} is converged",
         )
         if model in found.second:
             yield judged(
-                lambda made=made, model=model: claim_second_method(made.flight, found.second[model].flight),  # type: ignore[misc]
+                lambda made, model: claim_second_method(made.flight, found.second[model].flight),
+                made,
+                model,
                 id=f"second-method-{model}",
                 title=f"{model} by a second method",
             )

@@ -54,7 +54,7 @@ def study(ask: Ask) -> Study[Slices]:
     }
     flights = yield [run for cuts in runs.values() for run in cuts]
     counted = {
-        scheme: attempt(lambda cuts=cuts: compare([flights[run].flight for run in cuts]))  # type: ignore[misc]
+        scheme: attempt(lambda cuts: compare([flights[run].flight for run in cuts]), cuts)
         for scheme, cuts in runs.items()
     }
     schemes = {scheme: each.found for scheme, each in counted.items() if each.found is not None}

@@ -85,7 +85,7 @@ def study(ask: Ask) -> Study[Orders]:
     }
     flights = yield [run for grids in whole.values() for run in grids.runs]
     starts = {
-        (where, scheme): attempt(lambda grids=grids, n=levels[where], s=scheme: _start(grids, flights, s, n))  # type: ignore[misc]
+        (where, scheme): attempt(lambda grids, n, s: _start(grids, flights, s, n), grids, levels[where], scheme)
         for (where, scheme), grids in whole.items()
     }
     flights = yield [run for grids in starts.values() if grids.found is not None for run in grids.found.runs]
@@ -93,7 +93,7 @@ def study(ask: Ask) -> Study[Orders]:
     def over(what: Mapping[tuple[str, str], Grids | Outcome[Grids]], where: str) -> dict[str, Outcome[StepSize]]:
         return {
             scheme: attempt(
-                lambda grids=grids: (grids.value if isinstance(grids, Outcome) else grids).measured(flights)  # type: ignore[misc]
+                lambda grids: (grids.value if isinstance(grids, Outcome) else grids).measured(flights), grids
             )
             for (place, scheme), grids in what.items()
             if place == where
@@ -121,7 +121,9 @@ def claims(found: Orders) -> Claims:
             (found.check_flights, "across impacts"),
         ):
             yield judged(
-                lambda studies=studies, where=where: claim_order(studies[scheme].value, where),  # type: ignore[misc]  # noqa: B023
+                lambda each, where: claim_order(each.value, where),
+                studies[scheme],
+                where,
                 id=f"order-{scheme}-{where.replace(' ', '-')}",
                 title=f"{scheme} converges to {model}, {where}",
             )

@@ -39,7 +39,8 @@ def claims(found: tuple[Repeated, ...]) -> Claims:
     """Yield the largest deviation of each run from what was printed."""
     for one in found:
         yield judged(
-            lambda one=one: claim_vectors(one.vector.name, one.vector.scheme, deviations(one.vector, one.made.flight)),  # type: ignore[misc]
+            lambda one: claim_vectors(one.vector.name, one.vector.scheme, deviations(one.vector, one.made.flight)),
+            one,
             id=f"vectors-{one.vector.name}",
             title=f"published run {one.vector.name}",
         )

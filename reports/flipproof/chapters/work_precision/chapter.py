@@ -26,7 +26,7 @@ def study(ask: Ask) -> Study[tuple[WorkPrecision, ...]]:
     # After the other runs, so that the compiled loop is there and its compiling is not counted.
     yield ()
     flights = yield calls
-    made: Mapping[Run, Made] = {each.run: each for call in calls for each in flights[call]}
+    made: Mapping[Run, Made] = {each.run: each for call in calls for each in flights.answer(call)}
     return tuple(study_work_precision(case, ask.work, made) for case in cases)
 
 
