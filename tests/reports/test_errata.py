@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flipproof.studies import errata
+from flipproof.chapters.errata import study as errata
 from slicemodel import Bottle, Scenario
 
 THROW = Scenario()

@@ -167,7 +167,7 @@ def made_up_rows(spoiled=None):
         for run in runs:
             level = 0.1 * LADDER.index(run.solver) if run.solver in LADDER else 0.0
             level += 0.01 * run.scenario.fill_fraction + 0.001 * run.scenario.damping_rate / 5 + 0.2 * e
-            rows[run.label] = row(level, np.full(3, level * FEW.omega0))
+            rows[run] = row(level, np.full(3, level * FEW.omega0))
         read.append(rows)
     if spoiled:
         e, tag_part = spoiled

@@ -9,12 +9,10 @@ import pytest
 from engine_check import PymunkKnobs
 from engine_check.pymunk_settings import insertion_order
 from engine_check.pymunk_world import build
-from flipproof.chapters.engine_facts.figures_old import figure_horizon
+from flipproof.chapters.horizon.chapter import claim_angle, claim_horizon, claim_order_of_bodies, draw_horizon
+from flipproof.chapters.horizon.figure import figure_horizon
 from flipproof.chapters.horizon.study import FULL, QUICK, Reach, plan_horizon, study_ensemble, study_horizon
-from flipproof.claims_engines import claim_angle, claim_horizon, claim_order_of_bodies
-from flipproof.exhibits_engines import draw_horizon, draw_instruments
 from flipproof.frame.solvers import Made, make, solve
-from flipproof.instruments import Instruments
 from slicemodel import Scenario, Trajectory
 
 THROW = Scenario(duration=0.1)
@@ -47,7 +45,7 @@ def ensemble(*members):
 
 def made_up(change_of, spoil=None):
     """Study flights whose change is ``change_of(tag)``; ``spoil`` maps tags to what became of them instead."""
-    made = {run.label: Made(run, flight(change_of(run.label)), 0.0) for run in plan_horizon(THROW, SMALL)}
+    made = {run: Made(run, flight(change_of(run.label)), 0.0) for run in plan_horizon(THROW, SMALL)}
     return study_horizon(THROW, SMALL, made | (spoil or {}))
 
 
@@ -95,7 +93,7 @@ def test_what_is_no_ensemble_is_refused():
 @pytest.mark.parametrize("reach", [FULL, QUICK, SMALL])
 def test_the_plan_changes_one_thing_at_a_time(reach):
     runs = plan_horizon(THROW, reach)
-    assert len({run.label for run in runs}) == len(runs)
+    assert len(set(runs)) == len(runs)
     base = {run.solver: run for run in runs if run.label.endswith("as it is")}
     assert tuple(base) == reach.solvers
     for run in runs:
@@ -214,7 +212,7 @@ def test_an_impossible_seed_is_refused(seed):
 
 
 def test_free_flight_does_not_feel_the_angle_and_the_engine_only_by_arithmetic():
-    made = {run.label: make(run) for run in plan_horizon(THROW, SMALL)}
+    made = {run: make(run) for run in plan_horizon(THROW, SMALL)}
     engine, equation = study_horizon(THROW, SMALL, made)
     assert not engine.problems
     assert not equation.problems

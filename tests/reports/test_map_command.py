@@ -87,7 +87,7 @@ def same(one, other):
 @pytest.mark.parametrize("axis", AXES)
 def test_a_map_from_rows_is_that_of_direct_runs_to_the_last_bit(axis, tmp_path):
     plan = Plan.of_size(THROW, axis, 3, 2)
-    made = {r.label: make(r) for r in plan.runs()}
+    made = {r: make(r) for r in plan.runs()}
     direct = study_map(THROW, axis, plan.fills, plan.values, made)
     assert direct.dominant.shape == (2, 3)
     assert all(np.isfinite(values).all() for values in direct.level.values())
@@ -98,7 +98,7 @@ def test_a_map_from_rows_is_that_of_direct_runs_to_the_last_bit(axis, tmp_path):
 def test_a_throw_of_its_own_keeps_all_its_fields(tmp_path):
     throw = Scenario(omega0=-15.0, theta0=0.7, drag=0.3, gravity=3.0, duration=0.2, restitution=0.8).with_slices(2)
     plan = Plan.of_size(throw, "gamma", 2, 2)
-    made = {r.label: make(r) for r in plan.runs()}
+    made = {r: make(r) for r in plan.runs()}
     same(by_hand(plan, tmp_path / "out"), study_map(throw, "gamma", plan.fills, plan.values, made))
 
 
@@ -236,7 +236,7 @@ def test_a_waterfall_from_rows_is_that_of_direct_runs_to_the_last_bit(split):
     throw, runs, design, out = split
     with Store(out, design, code_identity()) as store:
         rows = read_runs(store, runs)
-    made = {r.label: make(r).trajectory for r in runs}
+    made = {r: make(r).trajectory for r in runs}
     direct = study_waterfall(made)
     assert [part.observable.name for part in direct] == [observable.name for observable in OBSERVABLES]
     assert split_rows(throw, rows) == direct

@@ -132,7 +132,7 @@ def bars():
         how = {} if planned.solver == PROGRAM else {"method": "DOP853", "rtol": 1e-9}
         trajectory = make(dataclasses.replace(planned, settings={**planned.settings, **how})).trajectory
         assert trajectory is not None, planned.label
-        runs[planned.label] = trajectory
+        runs[planned] = trajectory
     plateau = study_waterfall(runs)[0]
     assert plateau.observable.name == "plateau"
     return {bar.name: bar.forward for bar in plateau.bars}

@@ -5,7 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flipproof.chapters.engine_facts.figures_old import COLOURS, SIGNS, figure_stability
+from flipproof.chapters.stability.chapter import (
+    claim_default_iterations_explode,
+    claim_rule_of_iterations,
+    claim_whole_and_wrong,
+    draw_stability,
+)
+from flipproof.chapters.stability.figure import COLOURS, SIGNS, figure_stability
 from flipproof.chapters.stability.study import (
     FULL,
     GRADES,
@@ -16,8 +22,6 @@ from flipproof.chapters.stability.study import (
     plan_stability,
     study_stability,
 )
-from flipproof.claims_engines import claim_default_iterations_explode, claim_rule_of_iterations, claim_whole_and_wrong
-from flipproof.exhibits_engines import draw_stability
 from flipproof.frame.solvers import Made, make
 from slicemodel import Scenario, Trajectory
 
@@ -47,15 +51,15 @@ def flight(run, error=0.0, message="", points=None) -> Made:
 
 
 def chart(spoil, layout=SMALL):
-    """Study a chart whose runs are perfect but for those that ``spoil`` makes, by words in their tags."""
+    """Study a chart whose runs are perfect but for those that ``spoil`` makes, by words in their labels."""
     made = {}
     for run in plan_stability(THROW, layout):
         found = [change for words, change in spoil.items() if words in run.label]
-        made[run.label] = found[0](run) if found else flight(run)
+        made[run] = found[0](run) if found else flight(run)
     return study_stability(THROW, layout, made)
 
 
-def test_the_plan_has_unique_tags_explicit_settings_and_references_with_twins():
+def test_the_plan_has_different_runs_explicit_settings_and_references_with_twins():
     runs = plan_stability(THROW, FULL)
     assert len({run.label for run in runs}) == len(runs)
     engine = [run for run in runs if run.solver == "pymunk"]
@@ -168,7 +172,7 @@ def test_the_figure_signs_every_cell_and_draws_rule_and_default():
 
 def test_pymunk_explodes_at_its_default_and_follows_free_flight_by_the_rule():
     layout = replace(SMALL, budget=1e6)
-    panels = study_stability(THROW, layout, {run.label: make(run) for run in plan_stability(THROW, layout)})
+    panels = study_stability(THROW, layout, {run: make(run) for run in plan_stability(THROW, layout)})
     (panel,) = panels
     assert panel.grade[:2].tolist() == [["explodes"] * 2] * 2
     # A finer step explodes sooner.

@@ -10,6 +10,7 @@ import pytest
 
 import slicemodel
 from engine_check.solver import ENGINES
+from flipproof.chapters.work_precision.claims import claim_work_precision
 from flipproof.chapters.work_precision.contenders import (
     AT_REST,
     CASES,
@@ -35,7 +36,6 @@ from flipproof.chapters.work_precision.study import (
     study_work_precision,
     work_of,
 )
-from flipproof.claims_work_precision import claim_work_precision
 from flipproof.exhibits_work_precision import (
     draw_work_precision,
     summarise_work_precision,
@@ -185,7 +185,7 @@ CASE = Case(name="made-up", title="made up", scenario=Scenario(n_slices=2))
 
 def studied(monkeypatch, errors, floor=1e-9, spoiled=None):
     """Return the curve that the study makes of a scheme with these errors at 40, 80, 160 ... steps."""
-    from flipproof.studies import work_precision
+    from flipproof.chapters.work_precision import study as work_precision
 
     rival = Contender(
         name="exact-step",
@@ -199,10 +199,10 @@ def studied(monkeypatch, errors, floor=1e-9, spoiled=None):
     for planned in plan_work_precision(CASE, QUICK):
         if planned.solver == "eq8":
             error = 0.0 if "reference" in planned.label else floor
-            made[planned.label] = Made(planned, curve(CASE, error), 1.0)
+            made[planned] = Made(planned, curve(CASE, error), 1.0)
         else:
             k = round(math.log2((planned.settings["steps"] - 1) / COMMON))
-            made[planned.label] = Made(planned, curve(CASE, errors[k], **planned.settings), 0.1 * 2**k)
+            made[planned] = Made(planned, curve(CASE, errors[k], **planned.settings), 0.1 * 2**k)
     for tag, outcome in (spoiled or {}).items():
         at = next(name for name in made if name.endswith(tag))
         made[at] = replace(made[at], **outcome)

@@ -19,6 +19,7 @@ from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding, Kind
 from flipproof.frame.flights import Call, Flights, attempt
 from flipproof.frame.solvers import Run
+from flipproof.frame.throws import REFERENCE
 from slicemodel import Scenario
 
 F = TypeVar("F")
@@ -34,6 +35,7 @@ class Ask:
     ----------
     scenario : Scenario - the throw as given
     throw : Scenario - the same, cut into the slices at which solvers are compared
+    reference : Scenario - the throw of the regression claims, which what is observed on the user's cannot fail
     size : {"check", "quick", "full"} - how much work is done
     work : the chapter's own amount of work at this size
     steps : int - points of a scheme's grid
@@ -45,6 +47,7 @@ class Ask:
     size: Size
     work: Any = None
     steps: int = 1000
+    reference: Scenario = REFERENCE
     solvers: Mapping[str, Run] = field(default_factory=dict)
 
 

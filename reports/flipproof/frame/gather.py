@@ -42,9 +42,14 @@ class Told:
     notes: tuple[tuple[str, str], ...]
 
 
-def chapters_of(parts: Iterable[Part], ask: Ask) -> list[Chapter[Any]]:
-    """Return the chapters that a report of this size has, in order."""
-    return [chapter for part in parts for chapter in part.chapters if ask.size in chapter.work]
+def _asked(parts: Iterable[Part], ask: Ask, work: Mapping[str, Any]) -> list[tuple[Chapter[Any], Any]]:
+    """Return the chapters that a report of this size has, in order, each with its amount of work."""
+    return [
+        (chapter, work.get(chapter.name, chapter.work.get(ask.size)))
+        for part in parts
+        for chapter in part.chapters
+        if ask.size in chapter.work or chapter.name in work
+    ]
 
 
 def gather(
@@ -64,22 +69,21 @@ def gather(
     ask : Ask
     pool : executor of worker processes
     progress : callable (made, planned, label)
-    work : chapter -> amount of work in place of that of the size
+    work : chapter -> amount of work in place of that of the size, or although the size has none
     stages : the stopwatch of the report, if somebody watches it
     """
     parts, stages, work = tuple(parts), stages or Stages(), work or {}
     flights = Flights({})
     outcomes: dict[str, Outcome[Any]] = {}
     waiting: dict[str, tuple[Any, tuple[Run | Call, ...]]] = {}
-    for chapter in chapters_of(parts, ask):
-        amount = work.get(chapter.name, chapter.work[ask.size])
+    for chapter, amount in _asked(parts, ask, work):
         _advance(chapter.name, chapter.study(replace(ask, work=amount)), None, waiting, outcomes)
     wave = 0
     while waiting:
         wave += 1
         asked = dict.fromkeys(each for _, requests in waiting.values() for each in requests)
         runs = [each for each in asked if isinstance(each, Run) and each not in flights]
-        with stages.lap(f"wave {wave}"):
+        with stages.lap(f"runs, wave {wave}"):
             flights.add(*make_all(pool, runs, progress, [each for each in asked if isinstance(each, Call)]))
         with stages.lap("studies"):
             resumed, waiting = waiting, {}
@@ -112,7 +116,9 @@ def tell(gathered: Gathered) -> dict[str, Told]:
     """Return what every chapter tells, by its name; no figure is drawn yet."""
     return {
         chapter.name: _told(chapter, gathered.outcomes[chapter.name])
-        for chapter in chapters_of(gathered.parts, gathered.ask)
+        for part in gathered.parts
+        for chapter in part.chapters
+        if chapter.name in gathered.outcomes
     }
 
 

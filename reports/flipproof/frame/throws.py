@@ -9,7 +9,7 @@ from flipproof.frame.solvers import Run
 from slicemodel import Scenario
 
 REFERENCE: Final = Scenario().with_slices(50)
-"""The throw of the regression claims: the paper's own. What is observed on the user's throw cannot fail them."""
+"""The paper's own throw, on which the regression claims are made."""
 
 FINER: Final = 2
 """Multiple of the slices at which every number of the verdict is computed again, to show how far it moves with N."""

@@ -11,7 +11,6 @@ from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Study, judged
 from flipproof.frame.findings import Finding
 from flipproof.frame.flights import Outcome, attempt
 from flipproof.frame.solvers import Made, Run
-from flipproof.frame.throws import REFERENCE
 from ode_reference.models import LADDER
 from slicemodel import Trajectory
 
@@ -36,7 +35,7 @@ class Energy:
 
 def study(ask: Ask) -> Study[Energy]:
     """Keep the ledger of every model, on both throws."""
-    throws = (REFERENCE.with_slices(SLICES), ask.throw.with_slices(SLICES))
+    throws = (ask.reference.with_slices(SLICES), ask.throw.with_slices(SLICES))
     checks, throws_runs = ({m: Run(m, throw, {"energy": True}, f"ledger, {m}") for m in LADDER} for throw in throws)
     flights = yield [*checks.values(), *throws_runs.values()]
     return Energy(

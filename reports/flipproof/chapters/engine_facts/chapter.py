@@ -14,7 +14,6 @@ from flipproof.frame.chapter import Ask, Chapter, Claims, Study, judged
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding, finite_or_none
 from flipproof.frame.solvers import Made, Run, without_gravity
-from flipproof.frame.throws import REFERENCE
 from flipproof.output.columns import rows_csv
 from slicemodel import Trajectory
 
@@ -36,11 +35,10 @@ class EngineFacts:
 
 def study(ask: Ask) -> Study[EngineFacts]:
     """Measure every fact."""
-    del ask
-    runs = plan_engine_facts(REFERENCE)
+    runs = plan_engine_facts(ask.reference)
     usual, weightless = (
         Run(ENGINE, throw, {"dt": CHECK_DT}, f"{ENGINE}, g = {throw.gravity:g} m/s²")
-        for throw in (REFERENCE, without_gravity(REFERENCE))
+        for throw in (ask.reference, without_gravity(ask.reference))
     )
     flights = yield [*runs.values(), usual, weightless]
     facts = study_engine_facts({words: flights[run] for words, run in runs.items()})

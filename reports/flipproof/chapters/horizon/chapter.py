@@ -12,7 +12,6 @@ from flipproof.chapters.predictability.study import HORIZON_BAND
 from flipproof.frame.chapter import Ask, Chapter, Claims, Study
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding
-from flipproof.frame.throws import REFERENCE
 from flipproof.output.columns import curves_csv
 from slicemodel.trajectory import FloatArray
 
@@ -22,8 +21,8 @@ ANGLE_BAND: Final = HORIZON_BAND / 1000
 
 def study(ask: Ask) -> Study[tuple[Horizon, ...]]:
     """Fly the ensembles of ``ask.work``."""
-    flights = yield plan_horizon(REFERENCE, ask.work)
-    return study_horizon(REFERENCE, ask.work, flights)
+    flights = yield plan_horizon(ask.reference, ask.work)
+    return study_horizon(ask.reference, ask.work, flights)
 
 
 def claims(found: tuple[Horizon, ...]) -> Claims:

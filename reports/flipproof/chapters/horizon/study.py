@@ -198,7 +198,7 @@ def _label(solver: str) -> str:
 
 
 def _base(throw: Scenario, solver: str, reach: Reach) -> Run:
-    return Run(solver, throw, _settings(throw, solver, reach), _label(solver))
+    return Run(solver, throw, _settings(throw, solver, reach), f"{_label(solver)}, as it is")
 
 
 def study_horizon(

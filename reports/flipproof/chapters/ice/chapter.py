@@ -14,7 +14,6 @@ from flipproof.frame.chapter import Ask, Chapter, Claims, Study, judged
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding
 from flipproof.frame.solvers import Made, Run
-from flipproof.frame.throws import REFERENCE
 from flipproof.output.columns import curves_csv
 from slicemodel import Scenario, Trajectory
 from slicemodel.trajectory import FloatArray
@@ -63,7 +62,7 @@ def study(ask: Ask) -> Study[Ice]:
     ice = replace(ask.throw, frozen=True)
     rigid = {name: Run(name, ice, label=f"ice, {name}") for name in SOLVERS}
     rigid[f"{ENGINE} rigid"] = Run(ENGINE, ice, {"ice": "rigid"}, f"ice, {ENGINE} rigid")
-    welded = _welded(replace(REFERENCE.with_slices(WELDED_SLICES), frozen=True)) if ask.work else {}
+    welded = _welded(replace(ask.reference.with_slices(WELDED_SLICES), frozen=True)) if ask.work else {}
     flights = yield [*rigid.values(), *welded.values()]
     return Ice(*({label: flights[run] for label, run in runs.items()} for runs in (rigid, welded)))
 

@@ -24,7 +24,6 @@ from flipproof.frame.chapter import Ask, Chapter, Claims, Study
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding
 from flipproof.frame.solvers import Run
-from flipproof.frame.throws import REFERENCE
 from flipproof.output.columns import columns_csv
 from slicemodel import Trajectory
 
@@ -55,7 +54,7 @@ class Overlaps:
 def study(ask: Ask) -> Study[Overlaps]:
     """Let slices overlap, and not."""
     fills, slices, dt = ask.work
-    full = vary(REFERENCE.with_slices(FULL_SLICES), fill=1.0)
+    full = vary(ask.reference.with_slices(FULL_SLICES), fill=1.0)
     settings = {"slices": "exclude", "dt": FULL_DT, "times": np.linspace(0.0, full.duration, 101)}
     brim = Run("pymunk", full, settings, "full bottle, slices exclude each other")
     flights = yield [*plan_overlap(ask.throw, fills, slices=slices, dt=dt), brim]

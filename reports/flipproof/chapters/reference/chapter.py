@@ -10,7 +10,6 @@ from flipproof.chapters.differences.study import claim_change
 from flipproof.frame.chapter import Ask, Chapter, Claims, Study, judged
 from flipproof.frame.findings import Finding
 from flipproof.frame.solvers import Made, Run
-from flipproof.frame.throws import REFERENCE
 from flipproof.frame.twins import CUT, usual_rest_speed
 from ode_reference.models import LADDER
 from slicemodel import Scenario, Trajectory
@@ -36,9 +35,9 @@ class References:
 
 def study(ask: Ask) -> Study[References]:
     """Fly every model twice; those of CROSS_CHECKED a third time if ``ask.work`` names a method."""
-    usual = {model: Run(model, REFERENCE, {}, model) for model in reversed(LADDER)}
-    witness = {m: Run(m, REFERENCE, witnessed(REFERENCE, m), f"{m}, solve_ivp DOP853") for m in reversed(LADDER)}
-    second = {m: Run(m, REFERENCE, {"method": ask.work}, f"{m}, {ask.work}") for m in CROSS_CHECKED if ask.work}
+    usual = {model: Run(model, ask.reference, {}, model) for model in reversed(LADDER)}
+    witness = {m: Run(m, ask.reference, witnessed(ask.reference, m), f"{m}, solve_ivp DOP853") for m in reversed(LADDER)}
+    second = {m: Run(m, ask.reference, {"method": ask.work}, f"{m}, {ask.work}") for m in CROSS_CHECKED if ask.work}
     flights = yield [*second.values(), *witness.values(), *usual.values()]
     return References(
         *({model: flights[runs[model]] for model in LADDER if model in runs} for runs in (usual, witness, second))

@@ -25,7 +25,6 @@ from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Study
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding
 from flipproof.frame.solvers import Made, Run
-from flipproof.frame.throws import REFERENCE
 from flipproof.output.columns import rows_csv
 from slicemodel import Trajectory
 
@@ -41,8 +40,8 @@ class Stability:
 def study(ask: Ask) -> Study[Stability]:
     """Fly every cell of the layout ``ask.work``."""
     default = Run(ENGINE, ask.throw, {"iterations": DEFAULT_ITERATIONS}, f"{ENGINE}, {DEFAULT_ITERATIONS} iterations")
-    flights = yield [*plan_stability(REFERENCE, ask.work), default]
-    return Stability(study_stability(REFERENCE, ask.work, flights), flights[default])
+    flights = yield [*plan_stability(ask.reference, ask.work), default]
+    return Stability(study_stability(ask.reference, ask.work, flights), flights[default])
 
 
 def claims(found: Stability) -> Claims:

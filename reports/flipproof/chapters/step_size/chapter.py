@@ -18,7 +18,6 @@ from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding, Kind
 from flipproof.frame.flights import Flights, Outcome, attempt
 from flipproof.frame.solvers import Missing, Run
-from flipproof.frame.throws import REFERENCE
 from flipproof.output.columns import rows_csv
 from slicemodel import Scenario
 
@@ -72,7 +71,7 @@ def study(ask: Ask) -> Study[Orders]:
 
     ``ask.work`` is the number of steps on the report's throw; 0: only the paper's own throw is studied.
     """
-    throws = {"check": REFERENCE, **({"throw": ask.throw} if ask.work else {})}
+    throws = {"check": ask.reference, **({"throw": ask.throw} if ask.work else {})}
     levels = {"check": CHECK_LEVELS, "throw": ask.work}
     multiple = {"check": 108, "throw": 27}
     whole = {
