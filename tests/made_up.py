@@ -5,6 +5,7 @@ from concurrent.futures import Executor, Future
 from dataclasses import replace
 
 from flipproof.chapters import chapters_named
+from flipproof.chapters.maps.study import read_flight, study_readings
 from flipproof.frame.flights import Flights
 from flipproof.frame.gather import Gathered, gather
 from flipproof.frame.pool import Here, make_each
@@ -31,3 +32,9 @@ def spoiled(gathered: Gathered, broken: Iterable[Run], reason: str, chapters: It
     made = {run: Made(run, None, 0.1, reason) if run in lost else each for run, each in gathered.flights.items()}
     again = gather(chapters_named(*chapters), gathered.ask, Answers(made.__getitem__))
     return replace(gathered, flights=Flights(made), outcomes={**gathered.outcomes, **again.outcomes})
+
+
+def study_map(throw, axis, fills, values, made, **how):
+    """Make a map of runs that were made; the keywords are those of ``plan_map``."""
+    readings = {run: read_flight(each) for run, each in made.items()}
+    return study_readings(throw, axis, fills, values, readings, **how)

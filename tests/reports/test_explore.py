@@ -170,9 +170,9 @@ def made_up_rows(spoiled=None):
             rows[run] = row(level, np.full(3, level * FEW.omega0))
         read.append(rows)
     if spoiled:
-        e, tag_part = spoiled
-        tag = next(run.label for run in planned[e] if tag_part in run.label)
-        read[e][tag] = row(None, None, "failed", "RuntimeError: no")
+        e, words = spoiled
+        lost = next(run for run in planned[e] if words in run.label)
+        read[e][lost] = row(None, None, "failed", "RuntimeError: no")
     return planned, read
 
 

@@ -9,7 +9,7 @@ import pytest
 from engine_check import PymunkKnobs
 from engine_check.pymunk_settings import insertion_order
 from engine_check.pymunk_world import build
-from flipproof.chapters.horizon.chapter import claim_angle, claim_horizon, claim_order_of_bodies, draw_horizon
+from flipproof.chapters.horizon.chapter import claim_angle, claim_horizon, claim_order_of_bodies, draw_horizon, figures
 from flipproof.chapters.horizon.figure import figure_horizon
 from flipproof.chapters.horizon.study import FULL, QUICK, Reach, plan_horizon, study_ensemble, study_horizon
 from flipproof.frame.solvers import Made, make, solve
@@ -137,9 +137,9 @@ def test_every_ensemble_is_read_from_its_own_runs():
 
 
 def test_a_solver_that_did_not_run_stays_with_its_reason():
-    tag = "horizon, pymunk, as it is"
-    run = plan_horizon(THROW, SMALL)[0]
-    engine, equation = made_up(lambda _: 0.0, {tag: Made(run, None, 0.0, "RuntimeError: not installed")})
+    planned = {run.label: run for run in plan_horizon(THROW, SMALL)}
+    run, member = planned["horizon, pymunk, as it is"], planned["horizon, pymunk, angle +1e-06"]
+    engine, equation = made_up(lambda _: 0.0, {run: Made(run, None, 0.0, "RuntimeError: not installed")})
     assert (engine.ensembles, engine.largest, engine.horizon) == ((), None, None)
     assert "not installed" in engine.words
     assert claim_horizon(engine).verdict == claim_angle(engine).verdict == "not evaluated"
@@ -147,11 +147,10 @@ def test_a_solver_that_did_not_run_stays_with_its_reason():
     assert "pymunk was not run" in draw_horizon([engine, equation]).caption
     legend = [text.get_text() for text in figure_horizon([engine, equation]).legends[0].get_texts()]
     assert "pymunk: not run" in legend
-    member = "horizon, pymunk, angle +1e-06"
-    engine, _ = made_up(lambda _: 0.0, {member: Made(run, None, 0.0, "MemoryError: too much")})
+    engine, _ = made_up(lambda _: 0.0, {member: Made(member, None, 0.0, "MemoryError: too much")})
     assert [(e.kind, e.size) for e in engine.ensembles if e.kind == "angle"] == [("angle", 1e-9)]
     assert "MemoryError" in engine.problems[0]
-    assert list(draw_instruments(Instruments(horizons=(replace(engine, ensembles=()),)))) == []
+    assert list(figures((replace(engine, ensembles=()),))) == []
 
 
 def test_the_figure_labels_band_sizes_and_horizons():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import slicemodel
-from flipproof.chapters.waterfall.study import NAMES, PROGRAM, STEP, plan_waterfall, study_waterfall
+from flipproof.chapters.waterfall.study import NAMES, PROGRAM, STEP, plan_waterfall, program_run, study_waterfall
 from flipproof.frame.solvers import make
 from ode_reference import combinations, contact, motion, witness
 from slicemodel import Scenario
@@ -133,7 +133,7 @@ def bars():
         trajectory = make(dataclasses.replace(planned, settings={**planned.settings, **how})).trajectory
         assert trajectory is not None, planned.label
         runs[planned] = trajectory
-    plateau = study_waterfall(runs)[0]
+    plateau = study_waterfall(program_run(THROW, STEPS), runs)[0]
     assert plateau.observable.name == "plateau"
     return {bar.name: bar.forward for bar in plateau.bars}
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_up import study_map
 
 import ode_reference
 from flipproof.chapters.maps.figure import figure_map
@@ -17,7 +18,6 @@ from flipproof.chapters.maps.study import (
     cells,
     make_readings,
     plan_map,
-    study_map,
     study_readings,
     vary,
 )

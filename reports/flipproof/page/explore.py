@@ -141,7 +141,8 @@ def pack(
     problems: dict[str, str] = {}
     for at, (runs, rows) in enumerate(zip(planned, read, strict=True)):
         readings = {run: _reading(row) for run, row in rows.items()}
-        study = study_readings(throw, "gamma", grid.fills, _dampings(throw, grid), readings, **HOW)
+        bouncing = replace(throw, restitution=grid.restitutions[at])
+        study = study_readings(bouncing, "gamma", grid.fills, _dampings(throw, grid), readings, **HOW)
         assert study.shares is not None
         for name, share in zip(RUNGS, study.shares, strict=True):
             shares[name][at] = share

@@ -234,24 +234,9 @@ def _solvers(shares: bool) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*LADDER, *EXTRA, *(SETS.values() if shares else ()))))
 
 
-def study_map(
-    throw: Scenario,
-    axis: Axis,
-    fills: Sequence[float],
-    values: Sequence[float],
-    made: Mapping[Run, Made],
-    *,
-    steps: int = 1000,
-    shares: bool = False,
-) -> ValidityMap:
-    """Read the runs that ``plan_map`` planned with the same arguments."""
-    readings = {run: _read(one) for run, one in made.items()}
-    return study_readings(throw, axis, fills, values, readings, steps=steps, shares=shares)
-
-
 def make_readings(runs: Sequence[Run]) -> list[Reading]:
     """Make runs one after the other and return what a map needs of each."""
-    return [_read(make(run)) for run in runs]
+    return [read_flight(make(run)) for run in runs]
 
 
 def study_readings(
@@ -317,7 +302,8 @@ def _shares(level: Mapping[str, FloatArray]) -> FloatArray:
     return np.array([level[LADDER[1]] - level[LADDER[0]], *(fair_share(name, of_sets) for name in NAMES)])
 
 
-def _read(made: Made) -> Reading:
+def read_flight(made: Made) -> Reading:
+    """Return what a map needs of one run."""
     flight = made.trajectory
     if flight is None:
         return Reading(problem=word(made.reason))

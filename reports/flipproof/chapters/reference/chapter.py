@@ -36,7 +36,9 @@ class References:
 def study(ask: Ask) -> Study[References]:
     """Fly every model twice; those of CROSS_CHECKED a third time if ``ask.work`` names a method."""
     usual = {model: Run(model, ask.reference, {}, model) for model in reversed(LADDER)}
-    witness = {m: Run(m, ask.reference, witnessed(ask.reference, m), f"{m}, solve_ivp DOP853") for m in reversed(LADDER)}
+    witness = {
+        m: Run(m, ask.reference, witnessed(ask.reference, m), f"{m}, solve_ivp DOP853") for m in reversed(LADDER)
+    }
     second = {m: Run(m, ask.reference, {"method": ask.work}, f"{m}, {ask.work}") for m in CROSS_CHECKED if ask.work}
     flights = yield [*second.values(), *witness.values(), *usual.values()]
     return References(
