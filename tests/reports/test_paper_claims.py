@@ -2,7 +2,6 @@
 
 import json
 import math
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -13,13 +12,13 @@ from flipproof.page.templating import environment
 from flipproof.paper import claim, claim_runs, claims_landing, claims_throw, observe
 from flipproof.paper.cases import FAMILIES, all_cases, family
 from flipproof.paper.claim import Claim, judge
-from flipproof.paper.claim_runs import ClaimRuns, gather_claims, plan_further, plan_halved, plan_published
+from flipproof.paper.claim_runs import ClaimRuns, plan_claims, plan_further, plan_halved, plan_published
 from flipproof.paper.claims import CLAIMS, STEADY, claim_weight_slows_the_tenth, judge_all
 from flipproof.paper.claims_cost import many_steps_key, same_steps_key
 from flipproof.paper.claims_model import finest_key
 from flipproof.paper.observe import Flights, MissingFlightError
 from flipproof.paper.parameters import numbers, paper_throw
-from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS, PaperRuns, plan_paper, scenario_of
+from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS, PaperRuns, make_thinned, plan_paper, scenario_of
 from flipproof.paper.statements import OMEGA, Reading
 from flipproof.paper.verdicts import judge_paper
 from slicemodel import Trajectory
@@ -536,11 +535,9 @@ def test_statements_stand_once_each_with_all_their_words():
 
 
 def test_further_runs_repeat_none_of_the_figures():
-    figures = {run.label for run in plan_paper()}
+    figures = set(plan_paper())
     further, halved = plan_further(), plan_halved()
-    tags = [run.label for run in (*further.values(), *halved.values())]
-    assert len(set(tags)) == len(tags)
-    assert not figures & set(tags)
+    assert not figures & {*further.values(), *halved.values()}
     for (solver, key), run in halved.items():
         if key in all_cases():
             usual = scenario_of(solver, all_cases()[key])
@@ -555,8 +552,8 @@ def test_further_runs_repeat_none_of_the_figures():
 def test_the_published_program_is_flown_with_half_its_slices_and_with_half_its_steps():
     slices, steps = plan_published("slices"), plan_published("steps")
     assert set(slices) < set(steps)
-    tags = [run.label for run, _ in (*slices.values(), *steps.values())]
-    assert len(set(tags)) == len(tags)
+    planned = [run for run, _ in (*slices.values(), *steps.values())]
+    assert len(set(planned)) == len(planned)
     for (solver, key), (run, thin) in slices.items():
         usual = all_cases()[key]
         assert (solver, run.settings["steps"], thin) == (PUBLISHED, usual.steps, usual.thin)
@@ -580,8 +577,9 @@ def test_gathering_keeps_what_belongs_together(monkeypatch):
     half = {"slices": three, "steps": four}
     monkeypatch.setattr(claim_runs, "plan_published", lambda of: {(PUBLISHED, "a"): (half[of], 1)})
     paper = PaperRuns(made={}, costs=())
-    with ThreadPoolExecutor(1) as pool:
-        runs = gather_claims(pool, paper, lambda *_: None)
+    plan = plan_claims()
+    made = {each.run: each for group in plan.groups for each in make_thinned(group)} | {r: make(r) for r in plan.runs}
+    runs = ClaimRuns.of(paper, plan, made)
     assert runs.trajectory(PUBLISHED, "a").scenario.omega0 == 20.0
     assert runs.flights("eq8").halved.runs["a"].scenario.omega0 == 10.0
     assert runs.flights("eq8").half_steps is None

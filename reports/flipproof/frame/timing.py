@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, as_completed
 from dataclasses import replace
 from typing import Any, Final
 
@@ -42,15 +41,6 @@ def make_timed(runs: Sequence[tuple[Run, FloatArray]]) -> list[Made]:
     for run in _one_of_each(run for run, _ in runs):
         make(_short(run))
     return [_made_timed(run, times) for run, times in runs]
-
-
-def make_all_timed(pool: Executor, runs: Iterable[tuple[Run, FloatArray]], batch: int = 12) -> dict[Run, Made]:
-    """Make runs in the workers of ``pool``, those of one solver together; return them by run, in the order asked."""
-    runs = list(runs)
-    made: dict[Run, Made] = {}
-    for future in as_completed([pool.submit(make_timed, job) for job in batches(runs, batch)]):
-        made |= {result.run: result for result in future.result()}
-    return {run: made[run] for run, _ in runs}
 
 
 def at_times(t: FloatArray, times: FloatArray) -> NDArray[np.int64]:

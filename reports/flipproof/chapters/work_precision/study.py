@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
@@ -30,7 +29,6 @@ import numpy as np
 from flipproof.chapters.step_size.study import ROUND_OFF, observed_order
 from flipproof.chapters.work_precision.contenders import (
     AT_REST,
-    CASES,
     FINEST_OWN,
     OWN_LIMIT,
     Case,
@@ -41,7 +39,7 @@ from flipproof.chapters.work_precision.contenders import (
     rest_speed,
 )
 from flipproof.frame.solvers import Made, Run
-from flipproof.frame.timing import at_times, make_all_timed
+from flipproof.frame.timing import at_times
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import plateau
 from slicemodel.schemes import SCHEMES
@@ -169,13 +167,6 @@ def plan_work_precision(case: Case, effort: Effort) -> list[Run]:
 def _rival_run(case: Case, rival: Contender, settings: Mapping[str, Any], words: str = "") -> Run:
     label = f"work, {case.name}, {rival.key}, {words}"
     return Run(rival.solver, case.scenario, {**rival.fixed, **settings}, label)
-
-
-def gather_work_precision(pool: Executor, effort: Effort) -> tuple[WorkPrecision, ...]:
-    """Make and study the runs of every throw of that effort."""
-    cases = [CASES[name] for name in effort.cases]
-    made = make_all_timed(pool, [(run, case.times) for case in cases for run in plan_work_precision(case, effort)])
-    return tuple(study_work_precision(case, effort, made) for case in cases)
 
 
 def _plan_reference(case: Case, equation: str, rivals: Iterable[Contender]) -> list[Run]:
