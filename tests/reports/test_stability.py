@@ -29,7 +29,7 @@ THROW = Scenario()
 SMALL = Layout(panels=((6.0, 10),), dt=(2e-3, 2e-4), iterations=(5, 10, 60), duration=0.1, budget=2e5)
 
 
-def flight(run, error=0.0, message="", points=None) -> Made:
+def flight(run, error=0.0, message="", points=None, reason="") -> Made:
     """A run whose omega is off by a fraction of omega_0 from the middle on; stopped if there is a message."""
     t = run.settings["times"][:points]
     zero = np.zeros(len(t))
@@ -46,6 +46,7 @@ def flight(run, error=0.0, message="", points=None) -> Made:
         inertia=zero + 1.0,
         status="diverged" if message else "ok",
         message=message,
+        reason=reason,
     )
     return Made(run, trajectory, 0.0)
 
@@ -89,7 +90,7 @@ def test_a_panel_is_the_throw_with_other_water():
 def test_every_grade_is_given_for_its_reason_and_no_other():
     spoil = {
         "dt 0.002 s, 5 iterations": lambda run: flight(run, message="diverged: joints; raise iterations", points=3),
-        "dt 0.002 s, 10 iterations": lambda run: flight(run, message="diverged: depth; reduce dt", points=5),
+        "dt 0.002 s, 10 iterations": lambda run: flight(run, message="diverged: depth", reason="penetration", points=5),
         "dt 0.002 s, 60 iterations": lambda run: flight(run, 0.011),
         "dt 0.0002 s, 5 iterations": lambda run: flight(run, 0.009),
         "dt 0.0002 s, 10 iterations": lambda run: flight(run, 0.0009),

@@ -37,7 +37,7 @@ RULE_DT: Final = 2e-4
 """The rule of ``enough_iterations`` is held against steps up to this one, twice the engine's default [s]."""
 
 GRADES: Final = ("excellent", "good", "wrong", "sinks in", "explodes", "not run")
-"""Best first. "sinks in": the watch asks for a shorter step; "explodes": it asks for more iterations."""
+"""Best first. "sinks in": slices lie too deep in an end; "explodes": another invariant broke."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -208,7 +208,7 @@ def _panel(throw: Scenario, layout: Layout, mass_ratio: float, slices: int, made
         elif outcome is None or flight is None:
             reason[at] = "not made" if outcome is None else shortened(outcome.reason, 160)
         elif not flight.ok:
-            grade[at] = "sinks in" if flight.message.endswith("reduce dt") else "explodes"
+            grade[at] = "sinks in" if flight.reason == "penetration" else "explodes"
             reason[at], held[at] = shortened(flight.message, 160), flight.t[-1]
         elif truth is None:
             reason[at] = f"{REFERENCE} has no result to hold it against"
