@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from flipproof.build import ask_of
-from flipproof.chapters import chapters_named
+from flipproof.chapters import chapters_named, parts
 from flipproof.check.diff import LEAST, ROUND_OFF, TOLERANCE, bands, number, read_summary, scenario_changes
 from flipproof.frame.findings import Finding
 from flipproof.frame.gather import gather, tell
@@ -161,8 +161,20 @@ CHECKS: Final[Mapping[str, tuple[str, ...]]] = {
 """Group -> the chapters whose claims it checks, at the size "check"."""
 
 
+def groups() -> dict[str, tuple[str, ...]]:
+    """Return ``CHECKS``, and before the last a group for every other chapter that has the size "check"."""
+    known = {name for names in CHECKS.values() for name in names}
+    quick = [chapter.name for part in parts() for chapter in part.chapters if "check" in chapter.work]
+    *first, last = CHECKS
+    return (
+        {group: CHECKS[group] for group in first}
+        | {name: (name,) for name in quick if name not in known}
+        | {last: CHECKS[last]}
+    )
+
+
 def findings_of(group: str, throw: Scenario) -> Iterator[Finding]:
     """Yield the findings of a group's chapters on a throw; runs are made in this process."""
-    told = tell(gather(chapters_named(*CHECKS[group]), ask_of(throw, "check", throw.n_slices), Here()))
+    told = tell(gather(chapters_named(*groups()[group]), ask_of(throw, "check", throw.n_slices), Here()))
     for each in told.values():
         yield from each.findings

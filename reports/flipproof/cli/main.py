@@ -243,7 +243,8 @@ def _print_report(report: Any, out: Path, seconds: float) -> None:
     print("Largest |difference in omega| / omega_0:")
     for finding in report.findings:
         if finding.id.startswith("difference-"):
-            print(f"  {finding.value:8.3%}  {finding.title}")
+            size = "       –" if finding.value is None else f"{finding.value:8.3%}"
+            print(f"  {size}  {finding.title}")
     regressions = [finding for finding in report.findings if finding.kind == "regression"]
     for finding in report.failed:
         print(f"FAIL  {finding.title}: {finding.value_text} (threshold {finding.threshold_text}) {finding.note}")
