@@ -17,10 +17,16 @@ from typing import Any, Generic, Literal, TypeVar
 
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding, Kind
-from flipproof.frame.flights import Call, Flights, attempt
-from flipproof.frame.solvers import Run
+from flipproof.frame.flights import Call, Flights, Outcome, attempt
+from flipproof.frame.solvers import Made, Missing, Run
 from flipproof.frame.throws import REFERENCE
 from slicemodel import Scenario
+
+__all__ = [
+    "Absent", "Ask", "Call", "Chapter", "Claims", "Exhibit", "Finding", "Flights", "Kind", "Made", "Missing", "Outcome",
+    "Part", "Run", "Size", "Study", "attempt", "judged",
+]  # fmt: skip
+"""All that a chapter is written with."""
 
 F = TypeVar("F")
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from flipproof.chapters.errata.study import SQUARE, exponents_of_cost
+from flipproof.chapters.errata.erratum import SQUARE
+from flipproof.chapters.errata.programs import exponents_of_cost
 from flipproof.paper.observe import Flights, distance, level, level_by_points
 from flipproof.paper.parameters import numbers, paper_steps
 from flipproof.paper.runs import PUBLISHED

@@ -11,10 +11,7 @@ import numpy as np
 from flipproof.chapters.agreement.study import Agreement, study_agreement
 from flipproof.chapters.differences.chapter import MODEL_FLOOR
 from flipproof.chapters.solvers import FREE, LOCATED
-from flipproof.frame.chapter import Ask, Chapter, Claims, Study
-from flipproof.frame.findings import Finding
-from flipproof.frame.flights import Flights
-from flipproof.frame.solvers import Missing, Run
+from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Flights, Missing, Run, Study
 from flipproof.frame.twins import twins
 from slicemodel.trajectory import FloatArray
 

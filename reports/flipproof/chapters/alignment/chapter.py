@@ -10,12 +10,10 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.chapters.alignment.figures import figure_gantt
-from flipproof.chapters.alignment.study import Alignment, Keyed, Rests, end_name, study_alignment
+from flipproof.chapters.alignment.found import Alignment, Keyed, Rests, end_name
+from flipproof.chapters.alignment.study import study_alignment
 from flipproof.chapters.alignment.tube import Tube, study_tube
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Study, judged
-from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.findings import Finding
-from flipproof.frame.flights import Outcome, attempt
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Outcome, Study, attempt, judged
 from flipproof.output.columns import rows_csv
 
 PAIRS: Final = (("eq8", "midpoint"), ("eq8", "free-flight"))

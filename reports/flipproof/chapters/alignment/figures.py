@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from flipproof.chapters.alignment.study import Alignment, Keyed, Rests
+from flipproof.chapters.alignment.found import Alignment, Keyed, Rests
 from flipproof.chapters.alignment.tube import Tube
 from flipproof.chapters.predictability.study import Predictability
 from flipproof.figures.style import new_figure, shared_legend, solver_style, styled

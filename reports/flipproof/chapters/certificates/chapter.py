@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from flipproof.chapters.solvers import WITNESSES
-from flipproof.frame.chapter import Ask, Chapter, Claims, Study
-from flipproof.frame.findings import Finding
+from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Study
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,11 +12,8 @@ from flipproof.chapters.differences.study import PARTING_BAND, Difference, study
 from flipproof.chapters.predictability.study import PartingGrowth, study_parting_growth
 from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, WITNESSES
 from flipproof.chapters.waterfall.study import NAMES
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Study
-from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.findings import Finding
-from flipproof.frame.flights import Flights, attempt
-from flipproof.frame.solvers import Run, find
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Flights, Run, Study, attempt
+from flipproof.frame.solvers import find
 from flipproof.frame.throws import finer
 from flipproof.frame.twins import BAND_WORDS, twins
 from flipproof.output.columns import curves_csv

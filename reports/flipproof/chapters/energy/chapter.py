@@ -7,10 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Study, judged
-from flipproof.frame.findings import Finding
-from flipproof.frame.flights import Outcome, attempt
-from flipproof.frame.solvers import Made, Run
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Finding, Made, Outcome, Run, Study, attempt, judged
 from ode_reference.models import LADDER
 from slicemodel import Trajectory
 

@@ -10,10 +10,9 @@ from flipproof.chapters.differences.study import claim_change
 from flipproof.chapters.engine_facts.figure import figure_gallery
 from flipproof.chapters.engine_facts.study import EngineFact, plan_engine_facts, study_engine_facts
 from flipproof.chapters.solvers import ENGINE
-from flipproof.frame.chapter import Ask, Chapter, Claims, Study, judged
-from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.findings import Finding, finite_or_none
-from flipproof.frame.solvers import Made, Run, without_gravity
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged
+from flipproof.frame.findings import finite_or_none
+from flipproof.frame.solvers import without_gravity
 from flipproof.output.columns import rows_csv
 from slicemodel import Trajectory
 

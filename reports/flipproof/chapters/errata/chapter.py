@@ -6,10 +6,9 @@ import math
 from pathlib import Path
 from typing import Final
 
-from flipproof.chapters.errata.study import ROUND_OFF, Erratum, study_errata
-from flipproof.frame.chapter import Ask, Chapter, Claims, Study
-from flipproof.frame.findings import Finding
-from flipproof.frame.flights import Call
+from flipproof.chapters.errata.erratum import ROUND_OFF, Erratum
+from flipproof.chapters.errata.study import study_errata
+from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Finding, Study
 
 
 def study(ask: Ask) -> Study[tuple[Erratum, ...]]:

@@ -7,9 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from flipproof.chapters.exact_cases.study import SharedDigits, study_digits
-from flipproof.frame.chapter import Ask, Chapter, Claims, Study, judged
-from flipproof.frame.findings import Finding
-from flipproof.frame.flights import Call, Outcome, attempt
+from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Finding, Outcome, Study, attempt, judged
 
 ERROR: Final = 1e-9
 """Error of the reference against exact solutions, relative to omega_0 and to the length."""

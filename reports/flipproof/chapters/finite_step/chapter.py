@@ -8,10 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from flipproof.chapters.finite_step.study import WAYS, StepCost, Way, study_finite_step, way_run
-from flipproof.frame.chapter import Ask, Chapter, Claims, Study
-from flipproof.frame.findings import Finding
-from flipproof.frame.flights import attempt
-from flipproof.frame.solvers import Run
+from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Run, Study, attempt
 from flipproof.frame.throws import FINER, finer
 
 MODEL_BAND: Final = 1e-9

@@ -14,9 +14,8 @@ import numpy as np
 from engine_check.witness import witness_of
 from flipproof.chapters.flights import figures as pictures
 from flipproof.chapters.solvers import FLIGHTS, LIMITS, OTHERS
-from flipproof.frame.chapter import Ask, Chapter, Study
-from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.solvers import Made, find
+from flipproof.frame.chapter import Ask, Chapter, Exhibit, Made, Study
+from flipproof.frame.solvers import find
 from flipproof.output.columns import curves_csv, json_ready
 from flipproof.output.tables import trajectory_csv
 from flipproof.page.motion import motion_data

@@ -7,9 +7,7 @@ from typing import Final
 
 from flipproof.chapters.frozen.figure import figure_frozen
 from flipproof.chapters.frozen.study import LIMITS, QUANTITIES, Frozen, plan_frozen, study_frozen
-from flipproof.frame.chapter import Ask, Chapter, Study
-from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.solvers import Run
+from flipproof.frame.chapter import Ask, Chapter, Exhibit, Run, Study
 from flipproof.output.columns import TIME, columns_csv
 
 SCHEME: Final = "exact-step"

@@ -9,9 +9,7 @@ from typing import Final
 from flipproof.chapters.horizon.figure import figure_horizon
 from flipproof.chapters.horizon.study import FULL, Horizon, Reach, plan_horizon, study_horizon
 from flipproof.chapters.predictability.study import HORIZON_BAND
-from flipproof.frame.chapter import Ask, Chapter, Claims, Study
-from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.findings import Finding
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study
 from flipproof.output.columns import curves_csv
 from slicemodel.trajectory import FloatArray
 

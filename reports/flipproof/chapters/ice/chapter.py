@@ -10,10 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from flipproof.figures.style import ICE_FLOOR, STYLES, new_figure, shared_legend, styled
-from flipproof.frame.chapter import Ask, Chapter, Claims, Study, judged
-from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.findings import Finding
-from flipproof.frame.solvers import Made, Run
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged
 from flipproof.output.columns import curves_csv
 from slicemodel import Scenario, Trajectory
 from slicemodel.trajectory import FloatArray

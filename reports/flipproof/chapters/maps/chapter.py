@@ -24,10 +24,7 @@ from flipproof.chapters.maps.study import (
     plan_map,
     study_readings,
 )
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Study
-from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.flights import Call, Outcome, attempt
-from flipproof.frame.solvers import Run
+from flipproof.frame.chapter import Absent, Ask, Call, Chapter, Claims, Exhibit, Outcome, Run, Study, attempt
 from flipproof.frame.twins import BAND_WORDS
 from flipproof.output.columns import rows_csv
 

@@ -9,12 +9,10 @@ from typing import Final
 
 import numpy as np
 
-from flipproof.chapters.model_form.study import ModelForm, Richardson, richardson, study_signals
+from flipproof.chapters.model_form.richardson import Richardson, richardson
+from flipproof.chapters.model_form.study import ModelForm, study_signals
 from flipproof.chapters.step_size.study import plan_step_size
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Study, judged
-from flipproof.frame.findings import Finding
-from flipproof.frame.flights import Call, Outcome, attempt
-from flipproof.frame.solvers import Run
+from flipproof.frame.chapter import Absent, Ask, Call, Chapter, Claims, Finding, Outcome, Run, Study, attempt, judged
 from slicemodel import Trajectory
 
 FORMS: Final = (

@@ -20,10 +20,7 @@ from flipproof.chapters.overlap.study import (
     plan_overlap,
     study_overlap,
 )
-from flipproof.frame.chapter import Ask, Chapter, Claims, Study
-from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.findings import Finding
-from flipproof.frame.solvers import Run
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Run, Study
 from flipproof.output.columns import columns_csv
 from slicemodel import Trajectory
 

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from flipproof.frame.chapter import Ask, Chapter, Claims, Study
-from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.flights import Call
+from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Exhibit, Study
 from flipproof.paper.claim_runs import ClaimRuns, plan_claims
 from flipproof.paper.figures import exhibits_paper
 from flipproof.paper.runs import PaperRuns, make_group, make_thinned, plan_groups

@@ -8,10 +8,7 @@ from typing import Final
 
 from flipproof.chapters.alignment.figures import figure_predictability
 from flipproof.chapters.predictability.study import Predictability, plan_predictability, study_predictability
-from flipproof.frame.chapter import Ask, Chapter, Claims, Study, judged
-from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.findings import Finding
-from flipproof.frame.flights import Outcome, attempt
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Outcome, Study, attempt, judged
 from flipproof.output.columns import curves_csv
 
 SOLVERS: Final = ("eq8", "free-flight")

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from flipproof.chapters.differences.study import claim_change
-from flipproof.frame.chapter import Ask, Chapter, Claims, Study, judged
-from flipproof.frame.findings import Finding
-from flipproof.frame.solvers import Made, Run
+from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Made, Run, Study, judged
 from flipproof.frame.twins import CUT, usual_rest_speed
 from ode_reference.models import LADDER
 from slicemodel import Scenario, Trajectory

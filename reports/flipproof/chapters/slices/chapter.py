@@ -12,10 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from flipproof.figures.style import new_figure, shared_legend, styled
-from flipproof.frame.chapter import Ask, Chapter, Study
-from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.flights import attempt
-from flipproof.frame.solvers import Run
+from flipproof.frame.chapter import Ask, Chapter, Exhibit, Run, Study, attempt
 from flipproof.frame.throws import FINER
 from flipproof.output.columns import curves_csv
 from slicemodel import Trajectory

@@ -21,10 +21,7 @@ from flipproof.chapters.stability.study import (
     plan_stability,
     study_stability,
 )
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Study
-from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.findings import Finding
-from flipproof.frame.solvers import Made, Run
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study
 from flipproof.output.columns import rows_csv
 from slicemodel import Trajectory
 

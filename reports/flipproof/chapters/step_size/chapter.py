@@ -13,11 +13,21 @@ import numpy as np
 from flipproof.chapters.solvers import LIMITS
 from flipproof.chapters.step_size.figure import figure_step_size
 from flipproof.chapters.step_size.study import PHASES, StepSize, before_first_impact, plan_step_size, study_step_size
-from flipproof.frame.chapter import Ask, Chapter, Claims, Study, judged
-from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.findings import Finding, Kind
-from flipproof.frame.flights import Flights, Outcome, attempt
-from flipproof.frame.solvers import Missing, Run
+from flipproof.frame.chapter import (
+    Ask,
+    Chapter,
+    Claims,
+    Exhibit,
+    Finding,
+    Flights,
+    Kind,
+    Missing,
+    Outcome,
+    Run,
+    Study,
+    attempt,
+    judged,
+)
 from flipproof.output.columns import rows_csv
 from slicemodel import Scenario
 

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from flipproof.chapters.vectors.published import Vector, deviations, load_all
-from flipproof.frame.chapter import Ask, Chapter, Claims, Study, judged
-from flipproof.frame.findings import Finding
-from flipproof.frame.solvers import Made, Run
+from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Made, Run, Study, judged
 
 TOLERANCE: Final = {"published-python": 1e-10, "published-matlab": 1e-8}
 """Relative; the two sides differ by the order of additions and, for MATLAB, by amplified round-off."""

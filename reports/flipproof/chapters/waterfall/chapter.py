@@ -9,9 +9,7 @@ from typing import Final
 
 from flipproof.chapters.waterfall.figure import figure_waterfall
 from flipproof.chapters.waterfall.study import Waterfall, plan_finer, plan_waterfall, program_run, study_waterfall
-from flipproof.frame.chapter import Ask, Chapter, Claims, Study
-from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.findings import Finding
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study
 from flipproof.frame.throws import FINER
 from flipproof.output.columns import rows_csv
 from slicemodel import Trajectory

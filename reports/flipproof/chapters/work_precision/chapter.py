@@ -12,9 +12,7 @@ from flipproof.chapters.work_precision.contenders import CASES
 from flipproof.chapters.work_precision.exhibits import draw_work_precision
 from flipproof.chapters.work_precision.study import WorkPrecision, plan_work_precision, study_work_precision
 from flipproof.chapters.work_precision.tables import summarise_work_precision, tabulate_work_precision
-from flipproof.frame.chapter import Ask, Chapter, Study
-from flipproof.frame.flights import Call
-from flipproof.frame.solvers import Made, Run
+from flipproof.frame.chapter import Ask, Call, Chapter, Made, Run, Study
 from flipproof.frame.timing import batches, make_timed
 
 
