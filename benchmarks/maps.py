@@ -8,9 +8,9 @@ from __future__ import annotations
 import argparse
 import time
 
+from flipproof.chapters.maps.study import make_readings, map_axes, plan_map
+from flipproof.chapters.waterfall.study import plan_waterfall
 from flipproof.frame.solvers import Run, make
-from flipproof.studies.validity import make_readings, map_axes, plan_map
-from flipproof.studies.waterfall import plan_waterfall
 from slicemodel import Scenario
 
 THROW = Scenario().with_slices(50)
@@ -20,7 +20,7 @@ def main() -> None:
     """Measure and print."""
     argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     for solver in ("exact-step", "eq8"):
-        make(Run("", solver, THROW.with_slices(2)))
+        make(Run(solver, THROW.with_slices(2)))
     fills, values = map_axes("gamma", 20, 20)
     for words, runs in {
         "map 20 x 20 over gamma, seven rungs and two schemes": plan_map(THROW, "gamma", fills, values),
@@ -30,7 +30,7 @@ def main() -> None:
     }.items():
         began = time.process_time()
         made = make_readings(runs)
-        spent, missing = time.process_time() - began, sum(reading.omega is None for reading in made.values())
+        spent, missing = time.process_time() - began, sum(reading.omega is None for reading in made)
         print(f"{words}: {len(runs)} runs, {spent:.1f} s, {1e3 * spent / len(runs):.2f} ms each; {missing} missing")
     runs = plan_waterfall(THROW, 1000)
     began = time.process_time()

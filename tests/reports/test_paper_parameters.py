@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import slicemodel
-from flipproof import vectors
+from flipproof.chapters.vectors import published as vectors
 from flipproof.paper import cases, parameters, runs, tables
 from flipproof.paper.cases import FAMILIES, HALF_FULL, all_cases, bottle_of_aspect, family
 from flipproof.paper.examples import EXAMPLES
@@ -166,8 +166,8 @@ def test_four_throws_are_those_of_the_published_vectors():
 
 def test_the_plan_flies_every_case_with_its_own_slices():
     plan = plan_paper()
-    assert len({run.tag for run in plan}) == len(plan)
-    by_tag = {run.tag: run for run in plan}
+    assert len({run.label for run in plan}) == len(plan)
+    by_tag = {run.label: run for run in plan}
     for solver in SOLVERS:
         for key, case in all_cases().items():
             run = by_tag.get(f"paper, {solver}, {key}")
@@ -180,7 +180,7 @@ def test_the_plan_flies_every_case_with_its_own_slices():
 
 
 def test_a_plan_for_some_cases_has_no_others():
-    assert {run.tag for run in plan_paper(keys={cases.ICE})} == {f"paper, {solver}, ice" for solver in SOLVERS}
+    assert {run.label for run in plan_paper(keys={cases.ICE})} == {f"paper, {solver}, ice" for solver in SOLVERS}
 
 
 def test_thinning_keeps_both_ends():

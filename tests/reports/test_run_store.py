@@ -19,8 +19,8 @@ from flipproof.frame.solvers import Made, Run, make
 from flipproof.frame.store import RunStore, default_place
 from slicemodel import Scenario
 
-RUN = Run("eq8", "eq8", Scenario(n_slices=3, duration=0.1))
-ENGINE = Run("pymunk", "pymunk", Scenario(n_slices=2, duration=0.02), {"dt": 1e-3, "iterations": 20})
+RUN = Run("eq8", Scenario(n_slices=3, duration=0.1))
+ENGINE = Run("pymunk", Scenario(n_slices=2, duration=0.02), {"dt": 1e-3, "iterations": 20})
 
 
 @pytest.fixture
@@ -28,10 +28,18 @@ def place(tmp_path):
     return tmp_path / "cache" / "runs.sqlite"
 
 
+def made_by(runs_kept, run):
+    """Return the run from the store, or make and keep it."""
+    found_there = runs_kept.find(run)
+    if found_there is None:
+        runs_kept.keep(found_there := make(run))
+    return found_there
+
+
 def kept(place, *runs, **options):
     """Keep runs, and return what was made."""
     with RunStore(place, slow=0.0, **options) as runs_kept:
-        return [runs_kept.make(run) for run in runs]
+        return [made_by(runs_kept, run) for run in runs]
 
 
 def found(place, run=RUN):
@@ -62,37 +70,35 @@ def same(one: Made, other: Made) -> bool:
 @pytest.mark.parametrize("run", [RUN, ENGINE, replace(RUN, settings={"times": np.linspace(0.0, 0.1, 7)})])
 def test_a_kept_run_is_the_run(place, run):
     (made,) = kept(place, run)
-    again = found(place, replace(run, tag="another tag"))
+    again = found(place, replace(run, label="another label"))
     assert same(made, again)
-    assert again.run.tag == "another tag"
+    assert again.run.label == "another label"
 
 
 def test_a_second_report_makes_nothing_again(place):
-    runs = [RUN, replace(RUN, tag="2", scenario=replace(RUN.scenario, omega0=11.0)), ENGINE]
+    runs = [RUN, replace(RUN, scenario=replace(RUN.scenario, omega0=11.0)), ENGINE]
     with workers(1) as pool, RunStore(place, slow=0.0) as kept_runs:
-        first = make_all(pool, runs, lambda *_: None, kept_runs)
+        first, _ = make_all(pool, runs, lambda *_: None, store=kept_runs)
         assert kept_runs.facts() == {"from the store": "0 of 3 runs"}
 
     class Idle:
         def submit(self, *_):
             raise AssertionError("a run was made again")
 
-    seen = []
     with RunStore(place) as kept_runs:
-        again = make_all(Idle(), [*runs, replace(RUN, tag="3")], lambda *call: seen.append(call), kept_runs)
+        again, _ = make_all(Idle(), [*runs, replace(RUN, label="again")], lambda *_: None, store=kept_runs)
         words = kept_runs.facts()["from the store"]
-    assert all(same(first[run.tag], again[run.tag]) for run in runs)
-    assert same(first["eq8"], again["3"])
-    assert seen[-1][:2] == (4, 4)
+    assert all(same(first[run], again[run]) for run in runs)
+    assert len(again) == len(runs)
     assert words.startswith("3 of 3 runs, made 2")
     assert " UTC" in words
 
 
 def test_only_slow_runs_that_ended_in_a_trajectory_are_kept(place):
     with RunStore(place, slow=1e9) as runs_kept:
-        runs_kept.make(RUN)
+        made_by(runs_kept, RUN)
         assert runs_kept.find(RUN) is None
-    refused = Run("bad", "eq8", RUN.scenario, {"rest_speed": -1.0})
+    refused = Run("eq8", RUN.scenario, {"rest_speed": -1.0})
     (made,) = kept(place, refused)
     assert made.trajectory is None
     assert found(place, refused) is None
@@ -123,7 +129,7 @@ def test_whatever_decides_a_run_is_in_its_key(monkeypatch):
     ]
     found_keys = [key_of(run) for run in (RUN, *changed)]
     assert len(set(found_keys)) == len(found_keys)
-    assert key_of(replace(RUN, tag="other", confirms="it")) == found_keys[0]
+    assert key_of(replace(RUN, label="other")) == found_keys[0]
     for package in keys.COMPUTING:
         with monkeypatch.context() as patched:
             patched.setattr(keys, "version_of", lambda name, new=package: "9.9" if name == new else "1.0")
@@ -217,14 +223,16 @@ WRITER = """\
 import sys
 from pathlib import Path
 from dataclasses import replace
-from flipproof.frame.solvers import Run
+from flipproof.frame.solvers import Run, make
 from flipproof.frame.store import RunStore
 from slicemodel import Scenario
 
 place, first = Path(sys.argv[1]), int(sys.argv[2])
 with RunStore(place, slow=0.0) as store:
     for k in range(first, first + 40):
-        store.make(Run("", "eq8", Scenario(n_slices=2, duration=0.05, omega0=5.0 + k)))
+        run = Run("eq8", Scenario(n_slices=2, duration=0.05, omega0=5.0 + k))
+        if store.find(run) is None:
+            store.keep(make(run))
 """
 
 
@@ -236,7 +244,7 @@ def test_two_programs_write_at_once(place):
         assert rows.execute("PRAGMA integrity_check").fetchone() == ("ok",)
     with RunStore(place) as runs_kept:
         for k in range(60):
-            assert runs_kept.find(Run("", "eq8", Scenario(n_slices=2, duration=0.05, omega0=5.0 + k))) is not None
+            assert runs_kept.find(Run("eq8", Scenario(n_slices=2, duration=0.05, omega0=5.0 + k))) is not None
 
 
 def test_a_program_that_holds_the_file_does_not_end_the_other(place, monkeypatch):
@@ -246,7 +254,7 @@ def test_a_program_that_holds_the_file_does_not_end_the_other(place, monkeypatch
     with sqlite3.connect(place, isolation_level=None) as rows:
         rows.execute("BEGIN IMMEDIATE")
         with RunStore(place, slow=0.0) as runs_kept:
-            assert runs_kept.make(other).trajectory is not None
+            assert made_by(runs_kept, other).trajectory is not None
             assert runs_kept.find(RUN) is not None
         rows.execute("ROLLBACK")
     assert found(place, other) is None
@@ -274,7 +282,7 @@ def test_the_entries_stay_within_the_limit_and_the_last_used_stay(place):
 
 def test_without_a_place_everything_works():
     with RunStore(None) as runs_kept:
-        assert runs_kept.make(RUN).trajectory is not None
+        assert made_by(runs_kept, RUN).trajectory is not None
         assert runs_kept.find(RUN) is None
         assert runs_kept.facts() == {"from the store": "none: not asked for"}
 
@@ -291,7 +299,7 @@ def test_a_cache_folder_that_cannot_be_used_is_done_without(tmp_path, obstacle):
             home.rmdir()
             home = Path("/proc/self")  # for whom no folder is closed (root): one where nothing can be made
     with RunStore(home / "flipproof" / "runs.sqlite", slow=0.0) as runs_kept:
-        assert runs_kept.make(RUN).trajectory is not None
+        assert made_by(runs_kept, RUN).trajectory is not None
         assert "cannot be used" in runs_kept.facts()["from the store"]
 
 
@@ -301,7 +309,7 @@ def test_a_file_that_can_only_be_read_is_read(place):
     with RunStore(place, slow=0.0) as runs_kept:
         runs_kept._rows.execute("PRAGMA query_only = ON")
         assert same(made, runs_kept.find(RUN))
-        assert runs_kept.make(other).trajectory is not None
+        assert made_by(runs_kept, other).trajectory is not None
 
 
 def test_the_place_is_in_the_users_cache(monkeypatch, tmp_path):

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flipproof.figures.events import figure_tube
+from flipproof.chapters.alignment.figures import figure_tube
+from flipproof.chapters.alignment.tube import hold_against_tube, study_tube, tube_around
 from flipproof.figures.style import draw
-from flipproof.studies.tube import hold_against_tube, study_tube, tube_around
 from slicemodel import Scenario, Trajectory
 
 T = np.linspace(0.0, 0.5, 501)

@@ -218,8 +218,7 @@ def command_report(options: argparse.Namespace) -> int:
 
     from tqdm import tqdm
 
-    from flipproof.build import build, write
-    from flipproof.evidence import FULL, QUICK, gather, with_slices
+    from flipproof.build import ask_of, build, gather_report, write
     from flipproof.frame.pool import workers
     from flipproof.frame.stages import Stages
     from flipproof.frame.store import RunStore, default_place
@@ -232,8 +231,7 @@ def command_report(options: argparse.Namespace) -> int:
         if not sys.stderr.isatty():
             print(f"flipproof: {time.perf_counter() - began:.0f} s: {stage}", file=sys.stderr, flush=True)
 
-    size = QUICK if options.quick else FULL
-    size = with_slices(size, options.slices or min(size.slices, scenario.n_slices))
+    ask = ask_of(scenario, "quick" if options.quick else "full", options.slices)
     command = shlex.join(["flipproof", *sys.argv[1:]])
     with replaced_folder(options.out, "report") as folder:
         with (
@@ -247,9 +245,9 @@ def command_report(options: argparse.Namespace) -> int:
                 bar.set_postfix_str(tag, refresh=False)
                 bar.update(made - bar.n)
 
-            evidence = gather(scenario, size, progress, options.jobs, Stages(say), store, pool)
+            gathered = gather_report(ask, progress, options.jobs, Stages(say), store, pool)
             facts = provenance(command) | store.facts()
-            report = build(evidence, facts, pool=store.remembering(pool), png=options.png)
+            report = build(gathered, facts, pool=store.remembering(pool), png=options.png)
         write(report, folder)
         if options.pdf:
             print_page(folder / "index.html", folder / "report.pdf")
@@ -261,7 +259,8 @@ def _print_report(report: Any, out: Path, seconds: float) -> None:
     print("Largest |difference in omega| / omega_0:")
     for finding in report.findings:
         if finding.id.startswith("difference-"):
-            print(f"  {finding.value:8.3%}  {finding.title}")
+            size = "       –" if finding.value is None else f"{finding.value:8.3%}"
+            print(f"  {size}  {finding.title}")
     regressions = [finding for finding in report.findings if finding.kind == "regression"]
     for finding in report.failed:
         print(f"FAIL  {finding.title}: {finding.value_text} (threshold {finding.threshold_text}) {finding.note}")

@@ -19,11 +19,11 @@ FEW = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exhibit:
-    """A figure with its words, and the section of the page it belongs to.
+    """A figure with its words.
 
     Parameters
     ----------
-    name, section, title, caption, alt : str
+    name, title, caption, alt : str
         ``caption`` says how to read the figure, ``alt`` what this throw shows, with its numbers.
     maker : callable
         A function of a module that makes the figure of ``data``: both must reach a worker process.
@@ -36,7 +36,6 @@ class Exhibit:
     """
 
     name: str
-    section: str
     title: str
     caption: str
     alt: str

@@ -28,7 +28,7 @@ from types import TracebackType
 from typing import Any, Final
 
 from flipproof.frame.keys import key_of, key_of_call
-from flipproof.frame.solvers import Made, Run, make
+from flipproof.frame.solvers import Made, Run
 
 WORDS: Final = "from the store"
 """Name of the store's line in the provenance."""
@@ -101,14 +101,6 @@ class RunStore:
             if self._rows is not None:
                 self._rows.close()
             self._rows = None
-
-    def make(self, run: Run) -> Made:
-        """Return the run as it was kept; else make it, and keep it if it was slow."""
-        made = self.find(run)
-        if made is None:
-            made = make(run)
-            self.keep(made)
-        return made
 
     def find(self, run: Run) -> Made | None:
         """Return the run as it was kept; None if it was not, or not by this code, or what was kept is damaged."""

@@ -172,7 +172,7 @@ def make_point(point: Point, keep: bool = False, curves: int = 0) -> Outcome:
         return Outcome(number=point.number, status="impossible", reason=str(error))
     began = time.perf_counter()
     try:
-        made = make(Run("", point.solver, scenario, point.settings))
+        made = make(Run(point.solver, scenario, point.settings, label=""))
     except Exception as error:
         # A sweep of days does not end because one point met a mistake in a solver.
         seconds = time.perf_counter() - began
