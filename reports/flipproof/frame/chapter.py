@@ -99,6 +99,7 @@ class Chapter(Generic[F]):
     figures : callable (found) -> exhibits
     template : file of the chapter's part of the page; None: its figures alone
     work : size of a report -> amount of work that the study is asked for; a size that is missing leaves the chapter out
+    kind : {"regression", "observation"} - what it is if the study cannot be made at all; a regression fails the report
     summary : callable (found) -> entries of ``summary.json``
     tables : callable (found) -> path in the report folder -> text of a file
     page : callable (found) -> what the template is given beside what was found
@@ -111,6 +112,7 @@ class Chapter(Generic[F]):
     figures: Callable[[F], Iterable[Exhibit]] = _nothing
     template: Path | None = None
     work: Mapping[Size, Any] = field(default_factory=lambda: {"quick": None, "full": None})
+    kind: Kind = "observation"
     summary: Callable[[F], Mapping[str, Any]] = _no_part
     tables: Callable[[F], Mapping[str, str]] = _no_part
     page: Callable[[F], Mapping[str, Any]] = _no_part

@@ -135,7 +135,7 @@ def _told(chapter: Chapter[Any], outcome: Outcome[Any]) -> Told:
     ):
         failure = attempt(lambda what: what() or True, what)
         if failure.reason and not any(each.id == f"chapter-{chapter.name}" for each in said):
-            said.append(Absent(f"chapter-{chapter.name}", chapter.title, failure.reason, "observation"))
+            said.append(Absent(f"chapter-{chapter.name}", chapter.title, failure.reason, chapter.kind))
     return Told(
         chapter=chapter,
         found=outcome.found,

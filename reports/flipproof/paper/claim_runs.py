@@ -20,8 +20,8 @@ EVENT_DRIVEN: Final = SOLVERS[1:]
 HALVED: Final = ("filling", "long", "drag", "spin", "angle", "aspect")
 """Families flown with half the slices too; in the others their number is the subject."""
 
-SLICES: Final = ("slices", "slices at 5 /s")
-"""Families in which the number of slices is the subject."""
+SLICES: Final = {"slices": "", "slices at 5 /s": " at 5 /s"}
+"""Families in which the number of slices is the subject, and the words for their damping."""
 
 REBOUNDS: Final = ("beta", "beta at 5 /s")
 
@@ -96,10 +96,10 @@ def _flights(solver: str, made: Mapping[str, Made]) -> Flights:
 def plan_further() -> dict[Pair, Run]:
     """Return the runs that no figure needs: finer in slices and in time, and without weight."""
     runs: dict[Pair, Run] = {}
-    for name in SLICES:
+    for name, damping in SLICES.items():
         many = next(case for case in family(name) if case.value == MANY_SLICES)
         for solver in EVENT_DRIVEN:
-            finest = finest_key(name.removeprefix("slices"))
+            finest = finest_key(damping)
             runs[solver, finest] = _run(solver, finest, many.scenario.with_slices(FINEST))
     for filling in numbers("figure-S1-filling"):
         throw, key, same = paper_throw(filling), many_steps_key(filling), same_steps_key(filling)

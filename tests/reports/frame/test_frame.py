@@ -115,6 +115,12 @@ def test_a_study_that_breaks_is_a_note_and_an_observation_and_stops_no_other(gat
     assert [finding.value for finding in told["waves"].findings] == [10.0, 7.0]
 
 
+def test_a_study_of_regressions_that_breaks_fails_the_report():
+    must = dataclasses.replace(CHAPTERS[2], kind="regression")
+    (told,) = tell(gather((Part("one", "One", "", (must,)),), ASK, Answers(fly))).values()
+    assert told.findings[0].failed
+
+
 def test_a_size_that_a_chapter_does_not_name_leaves_it_out_and_order_is_that_of_the_parts(gathered):
     assert list(tell(gathered[1])) == ["waves", "lost", "broken"]
 

@@ -72,5 +72,6 @@ CHAPTER: Final = Chapter(
     title="Where the energy goes",
     study=study,
     claims=claims,
+    kind="regression",
     template=Path(__file__).with_name("part.html.j2"),
 )

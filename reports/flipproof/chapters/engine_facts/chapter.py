@@ -126,5 +126,6 @@ CHAPTER: Final = Chapter(
     title="Engine behaviour that a user may not expect",
     study=study,
     claims=claims,
+    kind="regression",
     figures=figures,
 )

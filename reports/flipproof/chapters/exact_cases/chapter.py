@@ -53,5 +53,6 @@ CHAPTER: Final = Chapter(
     title="Exact cases",
     study=study,
     claims=claims,
+    kind="regression",
     work={"quick": ("free-flight",), "full": ("eq8", "free-flight")},
 )

@@ -129,6 +129,7 @@ CHAPTER: Final = Chapter(
     title="Up to when an engine's ω(t) means anything",
     study=study,
     claims=claims,
+    kind="regression",
     figures=figures,
     work={"quick": Reach(solvers=("pymunk", "free-flight"), sizes=(1e-6,), seeds=(1,), slices=6), "full": FULL},
 )

@@ -175,6 +175,7 @@ CHAPTER: Final = Chapter(
     title="Ice",
     study=study,
     claims=claims,
+    kind="regression",
     figures=figures,
     work={"check": False, "quick": True, "full": True},
 )

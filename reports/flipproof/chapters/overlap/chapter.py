@@ -135,6 +135,7 @@ CHAPTER: Final = Chapter(
     title="How far ω falls because slices may overlap",
     study=study,
     claims=claims,
+    kind="regression",
     figures=figures,
     work={"quick": Amount((0.5, 1.0), 6, 2e-4), "full": Amount()},
 )

@@ -102,5 +102,6 @@ CHAPTER: Final = Chapter(
     title="Whether the equations are solved right",
     study=study,
     claims=claims,
+    kind="regression",
     work={"quick": None, "full": "Radau"},
 )

@@ -167,6 +167,7 @@ CHAPTER: Final = Chapter(
     title="Where pymunk is stable, and where it is right",
     study=study,
     claims=claims,
+    kind="regression",
     figures=figures,
     work={"quick": QUICK, "full": FULL},
 )

@@ -216,6 +216,7 @@ CHAPTER: Final = Chapter(
     title="Error against step size",
     study=study,
     claims=claims,
+    kind="regression",
     figures=figures,
     template=Path(__file__).with_name("part.html.j2"),
     work={"check": 0, "quick": 6, "full": 7},

@@ -63,5 +63,6 @@ CHAPTER: Final = Chapter(
     title="Published vectors",
     study=study,
     claims=claims,
+    kind="regression",
     work={"check": None, "quick": None, "full": None},
 )

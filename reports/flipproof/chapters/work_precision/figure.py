@@ -15,9 +15,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
-from flipproof.chapters.work_precision.contenders import AT_REST, OWN_LIMIT
 from flipproof.chapters.work_precision.study import Cost, Curve, WorkPrecision
 from flipproof.figures.style import OTHERS, STYLES, new_figure, styled
+from ode_reference.models import MODELS
 
 LABELS: Final[Mapping[Cost, str]] = {
     "work": "updates of one slice [1]",
@@ -101,7 +101,7 @@ def _panel(
     axes.yaxis.set_major_locator(LogLocator(100.0, numticks=12))
     axes.yaxis.set_minor_locator(NullLocator())
     floor = reference.floor
-    words = equation if equation.startswith((AT_REST, OWN_LIMIT)) else f"equation {equation}"
+    words = f"equation {equation}" if equation in MODELS else equation
     if math.isfinite(floor):
         axes.axhspan(limits[1][0], floor, color=FLOOR_COLOUR, linewidth=0, zorder=0)
         words += f", floor {floor:.0e}"

@@ -30,7 +30,6 @@ from flipproof.chapters.step_size.study import ROUND_OFF, observed_order
 from flipproof.chapters.work_precision.contenders import (
     AT_REST,
     FINEST_OWN,
-    OWN_LIMIT,
     Case,
     Contender,
     Effort,
@@ -40,6 +39,7 @@ from flipproof.chapters.work_precision.contenders import (
 )
 from flipproof.frame.solvers import Made, Run
 from flipproof.frame.timing import at_times
+from ode_reference.models import MODELS
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import plateau
 from slicemodel.schemes import SCHEMES
@@ -171,7 +171,7 @@ def _rival_run(case: Case, rival: Contender, settings: Mapping[str, Any], words:
 
 def _plan_reference(case: Case, equation: str, rivals: Iterable[Contender]) -> list[Run]:
     """Return the reference of an equation and its witnesses."""
-    if equation.startswith(OWN_LIMIT):
+    if equation not in (*MODELS, AT_REST):  # the scheme's own limit
         rival = next(rival for rival in rivals if rival.equation == equation)
         finest = FINEST_OWN * (rival.levels[-1][0]["steps"] - 1)
         grids = [{**rival.fixed, "steps": finest // coarser + 1} for coarser in (1, 2)]
