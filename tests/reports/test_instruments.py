@@ -59,7 +59,10 @@ def test_every_witness_has_its_certificate(gathered, report, read_page):
     found = gathered.found("certificates")
     assert tuple(found.certificates) == witnesses(gathered.ask.throw)
     assert all(certificate["status"] == "certified" for certificate in found.certificates.values())
-    assert set(gathered.found("agreement").agreement.names) == {"free-flight", "pymunk", "mujoco"}
+    agreements = gathered.found("agreement").agreements
+    assert set(agreements["free-flight"].names) == {"free-flight", "solve_ivp", "pymunk", "mujoco"}
+    assert set(agreements["eq8"].names) == {"eq8", "solve_ivp", "pymunk rotating"}
+    assert all(agreement.odd is None for agreement in agreements.values())
     page = read_page(report.html)
     assert {"engines", "work-precision", "figure-stability", "figure-horizon", "figure-overlap"} <= set(page.ids)
 
@@ -67,15 +70,19 @@ def test_every_witness_has_its_certificate(gathered, report, read_page):
 def test_an_engine_that_is_not_installed_is_named_with_its_reason(gathered):
     poorer = without(gathered, "mujoco")
     assert "mujoco" not in poorer.found("certificates").certificates
-    assert set(poorer.found("agreement").agreement.names) == {"free-flight", "pymunk"}
+    assert set(poorer.found("agreement").agreements["free-flight"].names) == {"free-flight", "solve_ivp", "pymunk"}
     told = tell(poorer)
     assert "RuntimeError: not installed" in poorer.found("flights").made["mujoco"].reason
     assert not [finding.id for each in told.values() for finding in each.findings if finding.failed]
 
 
-def test_without_any_engine_there_is_no_agreement_but_a_reason(gathered):
-    poorest = without(gathered, "mujoco", "pymunk")
-    assert poorest.found("agreement") is None
-    told = tell(poorest)
-    assert "at least two" in told["agreement"].notes[0][1]
-    assert "agreement" not in {finding.id for each in told.values() for finding in each.findings}
+def test_without_any_engine_the_equations_are_held_against_the_witness(gathered):
+    poorest = without(gathered, "mujoco", "pymunk", "pymunk rotating")
+    agreements = poorest.found("agreement").agreements
+    assert {name: agreement.names for name, agreement in agreements.items()} == {
+        "free-flight": ("free-flight", "solve_ivp"),
+        "eq8": ("eq8", "solve_ivp"),
+    }
+    findings = {finding.id: finding for each in tell(poorest).values() for finding in each.findings}
+    assert findings["agreement-eq8"].value < 1e-9
+    assert findings["agreement"].value < 3e-3

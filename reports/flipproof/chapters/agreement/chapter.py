@@ -1,7 +1,8 @@
-"""Free flight by several solvers: who agrees with whom, each within its own band."""
+"""Free flight and Eq. 8 by several solvers: who agrees with whom, each within its own band."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -10,43 +11,69 @@ import numpy as np
 
 from flipproof.chapters.agreement.study import Agreement, study_agreement
 from flipproof.chapters.differences.chapter import MODEL_FLOOR
+from flipproof.chapters.reference.chapter import witnessed
 from flipproof.chapters.solvers import FREE, LOCATED
 from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Flights, Missing, Run, Study
-from flipproof.frame.twins import twins
+from flipproof.frame.flights import attempt
+from flipproof.frame.twins import twins, usual_rest_speed
 from slicemodel.trajectory import FloatArray
 
-SOLVERS: Final = (FREE, "pymunk", LOCATED, "mujoco")
-"""What solves the same equation on the same throw in different ways."""
+SOLVE_IVP: Final = "solve_ivp"
+"""Name of the witness: ``scipy.integrate.solve_ivp`` over all 2N + 1 equations (``ode_reference.witness``)."""
+
+COARSER: Final = {"rtol": 1e-9, "atol": 1e-12}
+"""Tolerances of a second run of the witness, at the usual rest speed: by how much that differs is its own band."""
+
+SOLVERS: Final = {FREE: ("pymunk", LOCATED, "mujoco"), "eq8": ("pymunk rotating",)}
+"""Equation -> the engine runs that solve it, beside the equation itself and the witness, on the same throw."""
 
 
 @dataclass(frozen=True, slots=True)
 class Agreed:
-    """The comparison, at a number of slices; None where no engine was certified."""
+    """Equation -> the comparison of those who solve it, at a number of slices."""
 
-    agreement: Agreement | None
+    agreements: Mapping[str, Agreement]
     slices: int
 
 
 def study(ask: Ask) -> Study[Agreed]:
-    """Compare the solvers of free flight that reached the end."""
-    runs = {name: ask.solvers[name] for name in SOLVERS if name in ask.solvers}
-    flights = yield [*runs.values(), *twins(runs[FREE])]
-    if not any("tolerance" in run.settings for run in runs.values()):
-        return Agreed(None, ask.throw.n_slices)
+    """Compare, for free flight and for Eq. 8, the solvers that reached the end and know their band."""
+    runs: dict[str, dict[str, Run]] = {}
+    coarser: dict[str, Run] = {}
+    for equation, engines in SOLVERS.items():
+        settings = witnessed(ask.throw, equation)
+        coarse = {**settings, **COARSER, "rest_speed": usual_rest_speed(equation)}
+        runs[equation] = {
+            equation: ask.solvers[equation],
+            SOLVE_IVP: Run(equation, ask.throw, settings, f"{equation}, {SOLVE_IVP}"),
+            **{name: ask.solvers[name] for name in engines if name in ask.solvers},
+        }
+        coarser[equation] = Run(equation, ask.throw, coarse, f"{equation}, {SOLVE_IVP}, coarser")
+    every = [run for each in runs.values() for run in each.values()]
+    flights = yield [*every, *coarser.values(), *(twin for name in runs for twin in twins(runs[name][name]))]
+    agreements = {name: agreement_on(name, each, coarser[name], flights) for name, each in runs.items()}
+    return Agreed(agreements, ask.throw.n_slices)
+
+
+def agreement_on(equation: str, runs: Mapping[str, Run], coarser: Run, flights: Flights) -> Agreement:
+    """Compare the solvers of one equation, each within its own band, up to the horizon of the engines."""
     made = {name: run for name, each in runs.items() if (run := flights.trajectory(each)) is not None and run.ok}
-    whole = {name: run for name, run in made.items() if name == FREE or "omega_band" in run.diagnostics}
-    bands = {
-        name: band_over_time(runs[FREE], flights) if name == FREE else run.diagnostics["omega_band"]
-        for name, run in whole.items()
+    bands: dict[str, FloatArray] = {
+        name: run.diagnostics["omega_band"] for name, run in made.items() if "omega_band" in run.diagnostics
     }
-    horizons = [run.diagnostics["certificate"]["horizon"] for name, run in whole.items() if name != FREE]
-    until = min((h for h in horizons if h is not None), default=np.inf)
-    return Agreed(study_agreement(whole, bands, until=until), ask.throw.n_slices)
+    if equation in made:
+        bands[equation] = band_over_time(runs[equation], twins(runs[equation]), flights)
+    witness = attempt(band_over_time, runs[SOLVE_IVP], (coarser,), flights)
+    if SOLVE_IVP in made and witness.found is not None:
+        bands[SOLVE_IVP] = witness.found
+    certificates = [made[name].diagnostics["certificate"] for name in bands if name not in (equation, SOLVE_IVP)]
+    until = min((each["horizon"] for each in certificates if each["horizon"] is not None), default=np.inf)
+    return study_agreement({name: run for name, run in made.items() if name in bands}, bands, until=until)
 
 
-def band_over_time(run: Run, flights: Flights) -> FloatArray:
-    """Return up to when the twins of a run have moved by how much, fraction of omega_0."""
-    usual, *others = (flights[each].flight for each in (run, *twins(run)))
+def band_over_time(run: Run, others_of: Iterable[Run], flights: Flights) -> FloatArray:
+    """Return up to when other runs of the same flight differ from it by how much, fraction of omega_0."""
+    usual, *others = (flights[each].flight for each in (run, *others_of))
     if any(len(usual.t) != len(other.t) for other in others):
         raise Missing(f"{run.name} and its twins end at different times: its band is not known")
     moved = [np.abs(other.omega - usual.omega) / abs(usual.scenario.omega0) for other in others]
@@ -54,16 +81,16 @@ def band_over_time(run: Run, flights: Flights) -> FloatArray:
 
 
 def claims(found: Agreed) -> Claims:
-    """Yield the largest difference of a pair."""
-    if found.agreement is not None:
-        yield claim_agreement(found.agreement)
+    """Yield the largest difference of a pair for each equation."""
+    for equation, agreement in found.agreements.items():
+        yield claim_agreement(equation, agreement)
 
 
-def claim_agreement(agreement: Agreement) -> Finding:
-    """Free flight by several solvers: the largest difference of a pair, and which solver differs from all others."""
+def claim_agreement(equation: str, agreement: Agreement) -> Finding:
+    """Several solvers of one equation: the largest difference of a pair, and which solver differs from all others."""
     widest = max(agreement.pairs, key=lambda pair: pair.largest)
     return Finding(
-        id="agreement",
+        id="agreement" if equation == FREE else f"agreement-{equation}",
         title=f"{', '.join(agreement.names)}: {agreement.words}",
         value=widest.largest,
         unit="of ω₀",
@@ -78,7 +105,7 @@ def claim_agreement(agreement: Agreement) -> Finding:
 
 CHAPTER: Final = Chapter(
     name="agreement",
-    title="Free flight by several solvers",
+    title="One equation by several solvers",
     study=study,
     claims=claims,
     template=Path(__file__).with_name("part.html.j2"),
