@@ -105,7 +105,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             with tempfile.TemporaryDirectory() as scratch:
                 from flipproof.cli.main import main as flipproof
 
-                status = flipproof(["report", "--png", "--out", f"{scratch}/report"])
+                status = flipproof(["report", "--out", f"{scratch}/report", "--png"])
                 if status:
                     return status
                 take(Path(scratch, "report"), options.to)
