@@ -1,4 +1,4 @@
-"""The runs that a study plans, as a sweep: a design made of them, and their rows read back by tag.
+"""The runs that a study plans, as a sweep: a design made of them, and their rows read back by run.
 
 A study in ``flipproof.studies`` plans runs and reads what became of them; who makes them, and whether the program died
 in between, is not its business. Here a sweep makes them. A run finds its row by what was computed, solver, scenario
