@@ -143,7 +143,7 @@ def test_a_relative_tolerance_says_what_holds_near_zero():
 
 
 def test_the_frame_knows_no_subject_and_chapters_are_named_once():
-    """Whoever drives chapters imports none; each chapter of the contents is a folder of its own, and each folder one."""
+    """What drives chapters imports none; each chapter of the contents is a folder of its own, and each folder one."""
     for file in sorted((folder_of("flipproof") / "frame").glob("*.py")):
         for module, _ in imports_of(file):
             assert not module.startswith("flipproof.chapters"), f"{file} imports {module}"
