@@ -350,9 +350,10 @@ def test_against_another_equation_no_scheme_converges(smooth):
     """The published program goes to its own limit; held against Eq. 8 its error would stand still."""
     made, study = smooth
     case = CASES["smooth"]
+    of = {run.label: outcome for run, outcome in made.items()}
     swapped = {
-        tag: made[tag.replace("published-limit", "eq8")] if tag.endswith(", published-limit") else outcome
-        for tag, outcome in made.items()
+        run: of[run.label.replace("published-limit", "eq8")] if run.label.endswith(", published-limit") else outcome
+        for run, outcome in made.items()
     }
     wrong = study_work_precision(case, SMOOTH, swapped).curves["published-python on published-limit"]
     right = study.curves["published-python on published-limit"]

@@ -240,9 +240,9 @@ def command_report(options: argparse.Namespace) -> int:
             tqdm(desc="runs", unit="run", disable=None, leave=False) as bar,
         ):
 
-            def progress(made: int, planned: int, tag: str) -> None:
+            def progress(made: int, planned: int, label: str) -> None:
                 bar.total = planned
-                bar.set_postfix_str(tag, refresh=False)
+                bar.set_postfix_str(label, refresh=False)
                 bar.update(made - bar.n)
 
             gathered = gather_report(ask, progress, options.jobs, Stages(say), store, pool)

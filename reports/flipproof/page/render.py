@@ -15,7 +15,7 @@ from flipproof.frame.gather import Gathered, Told
 from flipproof.page.headlines import headlines
 from flipproof.page.inline import data_uri, shape
 from flipproof.page.lead import answers, lead_words
-from flipproof.page.sections import sections
+from flipproof.page.parts import sections
 from flipproof.page.templating import environment
 from flipproof.page.verdict import answer, strips, tiles
 

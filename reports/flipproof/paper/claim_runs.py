@@ -152,8 +152,8 @@ def plan_published(half: str) -> dict[Pair, tuple[Run, int]]:
                 steps, thin = 1 + (case.steps - 1) // 2, 1
             settings = {"steps": steps, "store": "full" if case.key in kept else "summary"}
             words = HALF_WORDS if half == "slices" else HALF_STEPS_WORDS
-            tag = f"claims, {PUBLISHED}, {case.key}{words}"
-            runs[PUBLISHED, case.key] = Run(PUBLISHED, scenario, settings, label=tag), thin
+            label = f"claims, {PUBLISHED}, {case.key}{words}"
+            runs[PUBLISHED, case.key] = Run(PUBLISHED, scenario, settings, label), thin
     return runs
 
 

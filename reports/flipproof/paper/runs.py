@@ -78,17 +78,6 @@ def plan_groups(keys: Iterable[str] | None = None) -> list[list[Planned]]:
     return [planned[k : k + GROUP] for k in range(0, len(planned), GROUP)]
 
 
-def plan_paper(keys: Iterable[str] | None = None) -> list[Run]:
-    """Return every run that the figures need, one for each case and solver, the slowest solver first.
-
-    Parameters
-    ----------
-    keys : keys of cases, optional
-        Only these.
-    """
-    return [planned.run for planned in _planned(keys)]
-
-
 @dataclass(frozen=True, slots=True)
 class Planned:
     """A run of the figures, with the case that it is of."""
@@ -129,7 +118,7 @@ def gather_paper(
     Parameters
     ----------
     pool : executor of worker processes
-    progress : callable (made, planned, tag)
+    progress : callable (made, planned, label)
     keys : keys of cases, optional
         Only these.
     costs : bool

@@ -1,6 +1,6 @@
-"""The runs that a study plans, as a sweep: a design made of them, and their rows read back by tag.
+"""The runs that a study plans, as a sweep: a design made of them, and their rows read back by run.
 
-A study in ``flipproof.studies`` plans runs and reads what became of them; who makes them, and whether the program died
+A study of a chapter plans runs and reads what became of them; who makes them, and whether the program died
 in between, is not its business. Here a sweep makes them. A run finds its row by what was computed, solver, scenario
 and settings to the last bit: a design that misses a run of its plan cannot go unnoticed.
 """

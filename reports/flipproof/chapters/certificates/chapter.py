@@ -42,7 +42,7 @@ def claims(found: Certificates) -> Claims:
         yield claim_certificate(name, certificate)
 
 
-def claim_certificate(tag: str, certificate: Mapping[str, Any]) -> Finding:
+def claim_certificate(name: str, certificate: Mapping[str, Any]) -> Finding:
     """What an engine says of its own run: how far omega(t) may be off at the settings it was certified for."""
     settings, order = certificate["settings"], certificate["order"]
     words = [f"Δt = {settings['step']:.3g} s" if settings.get("step") else "no step was completed"]
@@ -55,8 +55,8 @@ def claim_certificate(tag: str, certificate: Mapping[str, Any]) -> Finding:
     if certificate["reason"]:
         words.append(certificate["reason"])
     return Finding(
-        id=f"certificate-{tag.replace(' ', '-')}",
-        title=f"{tag}: {certificate['status']}, band of ω(t)",
+        id=f"certificate-{name.replace(' ', '-')}",
+        title=f"{name}: {certificate['status']}, band of ω(t)",
         value=certificate["band"],
         unit="of ω₀",
         kind="observation",

@@ -66,13 +66,11 @@ def levels(base: int, multiple: int, count: int) -> list[list[int]]:
     return [[base * (multiple + phase) * 2**level for phase in range(PHASES)] for level in range(count)]
 
 
-def plan_step_size(
-    scenario: Scenario, scheme: str, base: int, multiple: int, count: int, *, tag: str = "throw"
-) -> list[list[Run]]:
-    """Return the runs of every level; all their grids share ``base + 1`` times. ``tag`` leads the runs' tags."""
+def plan_step_size(scenario: Scenario, scheme: str, base: int, multiple: int, count: int) -> list[list[Run]]:
+    """Return the runs of every level; all their grids share ``base + 1`` times."""
     return [
         [
-            Run(scheme, scenario, {"steps": steps + 1, "store": "summary"}, label=f"{tag}, {scheme}, {steps} steps")
+            Run(scheme, scenario, {"steps": steps + 1, "store": "summary"}, f"{scheme}, {steps} steps")
             for steps in members
         ]
         for members in levels(base, multiple, count)

@@ -37,6 +37,7 @@ class Section:
     id, title, sentence : str - anchor, heading, and in one sentence what it shows
     html : Markup - its content, without heading and sentence
     counts : verdict -> number of its findings
+    figure : name of its first figure, "" if it has none
     """
 
     id: str
@@ -44,6 +45,7 @@ class Section:
     sentence: str
     html: Markup
     counts: Mapping[str, int]
+    figure: str = ""
 
 
 def sections(gathered: Gathered, told: Mapping[str, Told], templates: Environment) -> tuple[Section, ...]:
@@ -62,6 +64,7 @@ def _section(gathered: Gathered, part: Part, chapters: Sequence[Told], templates
         sentence=part.sentence,
         html=Markup("\n").join(_chapter(gathered, each, templates) for each in chapters),
         counts=Counter(finding.verdict for each in chapters for finding in each.findings),
+        figure=next((figure.name for each in chapters for figure in each.figures), ""),
     )
 
 
