@@ -38,8 +38,8 @@ def thresholds():
 
 @pytest.fixture
 def computed(monkeypatch, thresholds):
-    def known(group, throw):
-        return iter(thresholds) if group == "thresholds" else findings_of(group, throw)
+    def known(group, throw, store):
+        return iter(thresholds) if group == "thresholds" else findings_of(group, throw, store)
 
     monkeypatch.setattr(check_module, "findings_of", known)
 
@@ -105,13 +105,13 @@ def test_a_finding_must_stay_where_the_baseline_has_it_and_in_the_interval_chose
     assert [case.get("name") for case in suite if case.find("failure") is not None] == ([STEP] if failed else [])
 
 
-def test_without_a_baseline_ice_vectors_and_convergence_are_checked(place, capsys):
+def test_without_a_baseline_ice_vectors_convergence_and_reference_are_checked(place, capsys):
     folder = place()
     assert flipproof("check", folder / "throw.toml") == 0
     lines = capsys.readouterr().out.splitlines()
     names = {words.split()[1].partition("-")[0] for words in lines[:-1]}
-    assert names == {"ice", "vectors", "order"}
-    assert lines[-1] == "17 of 17 checks hold."
+    assert names == {"ice", "vectors", "order", "reference"}
+    assert lines[-1] == "19 of 19 checks hold."
 
 
 def test_a_threshold_of_the_baseline_holds_for_the_other_groups_too(tmp_path):

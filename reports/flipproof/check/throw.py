@@ -1,4 +1,4 @@
-"""A throw held to what is known, in a few seconds: ice, published vectors, convergence, and a baseline's thresholds.
+"""A throw held to what is known, in seconds: ice, vectors, convergence, the reference by its witness, a baseline's thresholds.
 
 The baseline is the summary of a report of the same throw. Of its findings those are computed again that need neither an
 engine nor an ensemble of flights: the differences between schemes and equations, and the audit of the paper. Each must
@@ -71,7 +71,7 @@ def check(
     ----------
     scenario : Scenario
     groups : sequence of str
-        Of "ice", "vectors", "convergence", "thresholds"; the last needs a baseline.
+        Of "ice", "vectors", "convergence", "reference", "thresholds"; the last needs a baseline.
     baseline : Path or None
         A report's folder or ``summary.json``, of the same throw.
     tolerance : float
@@ -160,6 +160,7 @@ CHECKS: Final[Mapping[str, tuple[str, ...]]] = {
     "ice": ("ice",),
     "vectors": ("vectors",),
     "convergence": ("step-size",),
+    "reference": ("reference",),
     "thresholds": ("differences", "errata"),
 }
 """Group -> the chapters whose claims it checks, at the size "check"."""
