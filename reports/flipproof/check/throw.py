@@ -1,4 +1,4 @@
-"""A throw held to what is known, in seconds: ice, vectors, convergence, the reference by its witness, a baseline's thresholds.
+"""A throw held to what is known, in seconds: ice, vectors, convergence, reference, and a baseline's thresholds.
 
 The baseline is the summary of a report of the same throw. Of its findings those are computed again that need neither an
 engine nor an ensemble of flights: the differences between schemes and equations, and the audit of the paper. Each must

@@ -32,8 +32,8 @@ def add_checks(commands: Any) -> None:
     )  # fmt: skip
     check.add_argument("--tolerance", type=tolerance, metavar="X", help=TOLERANCE_HELP)
     check.add_argument(
-        "--only", type=_groups, metavar="LIST", help="some of ice,vectors,convergence,reference,thresholds, and of other "
-        "chapters that can be checked (default: all; thresholds only with --baseline)",
+        "--only", type=_groups, metavar="LIST", help="some of ice,vectors,convergence,reference,thresholds, "
+        "and of other chapters that can be checked (default: all; thresholds only with --baseline)",
     )  # fmt: skip
     add_no_cache(check)
     check.add_argument("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML, too")
