@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flipproof.chapters.paper.chapter import CHAPTER
 from flipproof.frame.solvers import Run, make
 from flipproof.page.templating import environment
 from flipproof.paper import claim, claim_runs, claims_landing, claims_throw, observe
@@ -717,10 +718,13 @@ def test_the_page_shows_every_verdict_with_word_sign_and_number(runs, read_page)
     templates = environment()
     verdicts = judge_paper(runs)
     macros = (
+        "{% macro draw(figures) %}{% endmacro %}"
         "{% macro anchor(id, words) %}<a href='#{{ id }}'>{{ words }}</a>{% endmacro %}"
         "{% macro scroll(words) %}<div>{{ caller() }}</div>{% endmacro %}"
     )
-    text = templates.from_string(macros + '{% include "paper.html.j2" %}').render(paper=verdicts)
+    text = templates.from_string(macros + CHAPTER.template.read_text(encoding="utf-8")).render(
+        paper=verdicts, figures=()
+    )
     page = read_page(text)
     assert len(set(page.ids)) == len(page.ids)
     assert {f"paper-{claim.id}" for claim in CLAIMS} <= set(page.ids)

@@ -184,7 +184,7 @@ def test_a_plan_for_some_cases_has_no_others():
 
 
 def test_thinning_keeps_both_ends():
-    run = runs.Run("a", PUBLISHED, paper_throw().with_slices(3), {"steps": 10})
+    run = runs.Run(PUBLISHED, paper_throw().with_slices(3), {"steps": 10})
     whole, thinned = (runs.make_thinned([(run, every)])[0].trajectory for every in (1, 3))
     np.testing.assert_array_equal(thinned.t, whole.t[::3])
     np.testing.assert_array_equal(thinned.r, whole.r[::3])

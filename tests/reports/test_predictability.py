@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flipproof.chapters.alignment.figures import figure_predictability
 from flipproof.chapters.differences.study import study_difference
+from flipproof.chapters.predictability.figure import figure_predictability
 from flipproof.chapters.predictability.study import (
     SIZES,
     fit_growth,

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from flipproof.chapters.alignment.figures import figure_gantt
+from flipproof.chapters.alignment.figure import figure_gantt
 from flipproof.chapters.alignment.found import Alignment, Keyed, Rests, end_name
 from flipproof.chapters.alignment.study import study_alignment
 from flipproof.chapters.alignment.tube import Tube, study_tube

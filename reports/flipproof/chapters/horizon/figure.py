@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from flipproof.chapters.alignment.figures import SIZE_LINES
 from flipproof.chapters.horizon.study import Ensemble, Horizon, Kind
+from flipproof.chapters.predictability.figure import SIZE_LINES
 from flipproof.figures.style import new_figure, solver_style, styled
 
 ROWS: tuple[tuple[tuple[Kind, ...], str], ...] = (

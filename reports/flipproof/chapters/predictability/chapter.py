@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
-from flipproof.chapters.alignment.figures import figure_predictability
+from flipproof.chapters.predictability.figure import figure_predictability
 from flipproof.chapters.predictability.study import Predictability, plan_predictability, study_predictability
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Outcome, Study, attempt, judged
 from flipproof.output.columns import curves_csv

@@ -1,4 +1,4 @@
-"""Impacts of two runs side by side, a curve in its tube, and the growth of tiny changes."""
+"""Impacts of two runs side by side."""
 
 from __future__ import annotations
 
@@ -12,16 +12,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from flipproof.chapters.alignment.found import Alignment, Keyed, Rests
-from flipproof.chapters.alignment.tube import Tube
-from flipproof.chapters.predictability.study import Predictability
-from flipproof.figures.style import new_figure, shared_legend, solver_style, styled
+from flipproof.figures.style import new_figure, styled
 from slicemodel.trajectory import BASE, CAP
 
 MOST_ROWS = 16
 FIRST_LANE, SECOND_LANE = 0.2, -0.2
 END_COLOURS = {BASE: "#0072B2", CAP: "#E69F00"}
 END_MARKERS = {BASE: "v", CAP: "^"}
-SIZE_LINES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (3, 1.5, 1, 1.5)), (0, (1, 1.5)))
 
 IMPACTS: dict[str, dict[str, Any]] = {
     "agrees": {"color": "#444444", "markersize": 3.5},
@@ -29,13 +26,6 @@ IMPACTS: dict[str, dict[str, Any]] = {
     "missing": {"color": "#D1001C", "markersize": 6.5},
     "extra": {"color": "#A030C0", "markersize": 6.5},
     "after a fork": {"color": "#BBBBBB", "markersize": 3.5},
-}
-
-SIGNAL_LABELS = {
-    "omega": "angular velocity ω [rad/s]",
-    "theta": "angle θ [rad]",
-    "r_cm": "centre of mass r_CM [m], cap = 0",
-    "inertia": "moment of inertia J [kg m²]",
 }
 
 
@@ -146,67 +136,3 @@ def _gantt_handles(alignment: Alignment) -> list[Patch | Line2D]:
         Line2D([], [], linestyle="", marker="*", markersize=9, color="black", label=f"fork ({len(alignment.forks)})")
     )
     return handles
-
-
-@styled
-def figure_tube(tube: Tube) -> Figure:
-    """Draw a curve in the tube around its reference, with what lies outside marked."""
-    figure, axes = new_figure()
-    reference, run = (solver_style(label, k) for k, label in enumerate((tube.first, tube.second)))
-    words = f"tube: ±{tube.dt * 1e3:g} ms and ±{tube.dy:.3g} {_unit(tube.signal)}"
-    axes.fill_between(tube.t, tube.lower, tube.upper, color=reference["color"], alpha=0.2, linewidth=0, label=words)
-    axes.plot(tube.t, tube.reference, label=tube.first, **{**reference, "linewidth": 1.0})
-    axes.plot(tube.t, tube.value, label=tube.second, **{**run, "linewidth": 1.4})
-    if not tube.inside:
-        outside = ~((tube.value >= tube.lower) & (tube.value <= tube.upper))
-        axes.plot(
-            tube.t,
-            np.where(outside, tube.value, np.nan),
-            color="#D1001C",
-            linewidth=3.5,
-            alpha=0.45,
-            zorder=1.5,
-            label=f"outside ({1 - tube.share:.0%} of the time)",
-        )
-        axes.axvline(tube.first_exit or 0.0, color="#444444", linewidth=1.0, linestyle=":", label="first exit")
-    axes.set_xlabel("time t [s]")
-    axes.set_ylabel(SIGNAL_LABELS.get(tube.signal, f"{tube.signal} [m], cap = 0"))
-    axes.margins(x=0.01)
-    shared_legend(figure, axes, columns=3 if tube.inside else 5)
-    return figure
-
-
-def _unit(signal: str) -> str:
-    return {"omega": "rad/s", "theta": "rad", "inertia": "kg m²"}.get(signal, "m")
-
-
-@styled
-def figure_predictability(studies: Sequence[Predictability]) -> Figure:
-    """Spread of ω after tiny changes of the release, one panel per solver and one line style per size."""
-    figure, panels = new_figure(
-        1, len(studies), size=(max(8.0, 2.9 * len(studies)), 4.4), sharex=True, sharey=True, squeeze=False
-    )
-    for k, (axes, study) in enumerate(zip(panels[0], studies, strict=True)):
-        colour = solver_style(study.solver, k)["color"]
-        axes.axhline(study.band, color="#444444", linewidth=1.0, linestyle=":")
-        for j, (row, horizon) in enumerate(zip(study.spread, study.horizons, strict=True)):
-            shown = np.where(np.isfinite(row), row, np.nan)
-            axes.plot(study.t, shown, color=colour, linestyle=SIZE_LINES[j % len(SIZE_LINES)], linewidth=1.3)
-            if horizon is not None:
-                axes.plot(horizon, study.band, "o", color=colour, markeredgecolor="white", markersize=7, zorder=4)
-        axes.set_yscale("log")
-        axes.set_title(study.solver, fontsize=10, loc="left", color=colour)
-        axes.set_xlabel("time t [s]")
-        axes.margins(x=0.01)
-    panels[0][0].set_ylabel("largest |change of ω| / ω₀ [1]")
-    handles = [
-        Line2D(
-            [], [], color="#444444", linestyle=SIZE_LINES[j % len(SIZE_LINES)], label=f"release changed by {size:.0e}"
-        )
-        for j, size in enumerate(studies[0].sizes)
-    ]
-    handles.append(Line2D([], [], color="#444444", linestyle=":", linewidth=1.0, label=f"band {studies[0].band:g}"))
-    if any(study.horizon is not None for study in studies):
-        handles.append(Line2D([], [], linestyle="", marker="o", color="#444444", label="horizon"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
-    return figure
