@@ -36,7 +36,7 @@ def thresholds():
 
 @pytest.fixture
 def computed(monkeypatch, thresholds):
-    monkeypatch.setitem(check_module.__dict__, "CHECKS", {**CHECKS, "thresholds": lambda _: iter(thresholds)})
+    monkeypatch.setitem(check_module.__dict__, "CHECKS", {**CHECKS, "thresholds": lambda *_: iter(thresholds)})
 
 
 @pytest.fixture

@@ -78,7 +78,7 @@ def check(
     baseline: Path | None = None,
     tolerance: float = TOLERANCE,
     say: Callable[[str], None] = lambda _: None,
-    make: Make = make,
+    made_by: Make | None = None,
 ) -> Checked:
     """Check a throw.
 
@@ -93,7 +93,7 @@ def check(
         What a finding may move beyond its bands, in its own unit.
     say : callable (line)
         Called with a line for each claim, as soon as it is known.
-    make : callable (run)
+    made_by : callable (run), optional
         How a run is made; ``RunStore.make`` finds slow ones that were kept.
 
     Raises
@@ -113,7 +113,7 @@ def check(
     throw = scenario.with_slices(slices)
     found = []
     for group in groups:
-        for finding in CHECKS[group](throw, make):
+        for finding in CHECKS[group](throw, made_by):
             was = known.get(finding.id)
             if was is None and group == "thresholds":
                 continue
@@ -171,52 +171,55 @@ def _held_to(finding: Finding, was: Mapping[str, Any], tolerance: float, *, move
 # ---------------------------------------------------------------------- the groups
 
 
-def check_ice(throw: Scenario, make: Make = make) -> Iterator[Finding]:
+def check_ice(throw: Scenario, made_by: Make | None = None) -> Iterator[Finding]:
     """Yield that a frozen bottle keeps its angular velocity in schemes, equations and engine."""
     for run in plan_ice(throw, tuple(LIMITS), ICED, ENGINE):
         label = run.tag.removeprefix("ice, ")
-        made = make(run)
+        made = (made_by or make)(run)
         if made.trajectory is None:
             yield claims.not_evaluated(f"ice-{label.replace(' ', '-')}", f"ice: {label} keeps ω constant", made.reason)
         else:
             yield claims.claim_ice(study_ice(label, made.trajectory))
 
 
-def check_vectors(throw: Scenario, make: Make = make) -> Iterator[Finding]:
+def check_vectors(throw: Scenario, made_by: Make | None = None) -> Iterator[Finding]:
     """Yield that the published programs' printed numbers are reproduced; they are runs of the paper's throws."""
     del throw
     for vector in vectors.load_all():
-        made = make(Run(f"vector {vector.name}", vector.scheme, vector.scenario, {"steps": vector.steps}))
+        made = (made_by or make)(Run(f"vector {vector.name}", vector.scheme, vector.scenario, {"steps": vector.steps}))
         if made.trajectory is None:
             yield claims.not_evaluated(f"vectors-{vector.name}", f"published run {vector.name}", made.reason)
         else:
             yield claims.claim_vectors(vector.name, vector.scheme, vectors.deviations(vector, made.trajectory))
 
 
-def check_convergence(throw: Scenario, make: Make = make) -> Iterator[Finding]:
+def check_convergence(throw: Scenario, made_by: Make | None = None) -> Iterator[Finding]:
     """Yield that both schemes converge to their equations at first order, on the paper's own throw."""
     del throw
     for scheme, model in LIMITS.items():
-        reference = make(Run(f"{CHECK}, {model}", model, REFERENCE)).trajectory
+        reference = (made_by or make)(Run(f"{CHECK}, {model}", model, REFERENCE)).trajectory
         start = None if reference is None else before_first_impact(REFERENCE, reference)
         parts: tuple[tuple[str, Scenario | None, int, int], ...] = (
             ("before the first impact", start, COMMON_START, 14),
             ("across impacts", REFERENCE, COMMON, 108),
         )
         for where, scenario, common, multiple in parts:
-            yield _order(scheme, model, where, scenario, common, multiple, make)
+            yield _order(scheme, model, where, scenario, common, multiple, made_by)
 
 
 def _order(
-    scheme: str, model: str, where: str, scenario: Scenario | None, common: int, multiple: int, make: Make
+    scheme: str, model: str, where: str, scenario: Scenario | None, common: int, multiple: int, made_by: Make | None
 ) -> Finding:
     id_, title = f"order-{scheme}-{where.replace(' ', '-')}", f"{scheme} converges to {model}, {where}"
     if scenario is None:
         return claims.not_evaluated(id_, title, f"{model} was not computed or strikes no end")
     times = np.linspace(0.0, scenario.duration, common + 1)
     settings = {"times": times} if scenario is not REFERENCE else {}
-    reference = make(Run("reference", model, scenario, settings))
-    levels = [[make(run) for run in level] for level in plan_step_size(scenario, scheme, common, multiple, LEVELS)]
+    reference = (made_by or make)(Run("reference", model, scenario, settings))
+    levels = [
+        [(made_by or make)(run) for run in level]
+        for level in plan_step_size(scenario, scheme, common, multiple, LEVELS)
+    ]
     problem = _first_problem([reference, *(made for level in levels for made in level)])
     if reference.trajectory is None or problem:
         return claims.not_evaluated(id_, title, problem)
@@ -224,7 +227,7 @@ def _order(
     return claims.claim_order(study_step_size(reference.trajectory, runs), where)
 
 
-def check_thresholds(throw: Scenario, make: Make = make) -> Iterator[Finding]:
+def check_thresholds(throw: Scenario, made_by: Make | None = None) -> Iterator[Finding]:
     """Yield the findings of a report on this throw that take no engine and no ensemble of flights."""
     cheap = {name for name, solver in catalogue().items() if solver.package in CHEAP}
     made: dict[str, Made] = {}
@@ -233,7 +236,7 @@ def check_thresholds(throw: Scenario, make: Make = make) -> Iterator[Finding]:
             continue
         for solver in (first, second):
             settings = {"steps": STEPS} if catalogue()[solver].package == CHEAP[0] else {}
-            made.setdefault(solver, make(Run(solver, solver, throw, settings)))
+            made.setdefault(solver, (made_by or make)(Run(solver, solver, throw, settings)))
         yield _difference(name, made[first], made[second])
     for erratum in study_errata(throw):
         yield claims.claim_erratum(erratum)
@@ -252,7 +255,7 @@ def _first_problem(made: Iterable[Made]) -> str:
     return next((f"{one.run.tag}: {one.reason}" for one in made if one.trajectory is None), "")
 
 
-CHECKS: Final[Mapping[str, Callable[[Scenario, Make], Iterator[Finding]]]] = {
+CHECKS: Final[Mapping[str, Callable[[Scenario, Make | None], Iterator[Finding]]]] = {
     "ice": check_ice,
     "vectors": check_vectors,
     "convergence": check_convergence,

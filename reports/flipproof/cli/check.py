@@ -80,7 +80,7 @@ def command_check(options: argparse.Namespace) -> int:
         print(line, flush=True)
 
     with RunStore(None if options.no_cache else default_place()) as store:
-        found = check(scenario, groups, baseline=options.baseline, tolerance=allowed, say=say, make=store.make)
+        found = check(scenario, groups, baseline=options.baseline, tolerance=allowed, say=say, made_by=store.make)
     if options.junit:
         from flipproof.output.folder import write_text
         from flipproof.output.junit import junit_text
