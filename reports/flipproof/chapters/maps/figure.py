@@ -1,0 +1,175 @@
+"""Maps of validity: how far an approximation is off, and which assumption has the largest fair share in it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import ListedColormap, LogNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+from numpy.typing import NDArray
+
+from flipproof.chapters.maps.study import LABELS, RUNGS, SCHEMES, Measure, ValidityMap
+from flipproof.figures.style import new_figure, styled
+from slicemodel.scenario import shortened
+from slicemodel.trajectory import FloatArray
+
+COLOURS = ("#606060", "#D95F02", "#C2A500", "#7B3FB5", "#1F78B4", "#128A63", "#C2247F")
+"""One per rung, dark enough for an outline on every shade; their order follows RUNGS."""
+
+SHADES = ListedColormap(colormaps["Greys"](np.linspace(0.0, 0.6, 256)))
+"""Light enough for black lines on top."""
+
+RANGE = (1e-3, 1.0)
+"""Errors of the lightest and of the darkest shade, as fractions of omega_0."""
+
+CONTOURS: tuple[tuple[float, Literal["--", "-"]], ...] = ((0.01, "--"), (0.1, "-"))
+"""Error of the approximation as a fraction of omega_0, and the line that shows it."""
+
+LINES = ("#000000", "#D00000")
+HATCH = "////"
+
+INSET = 0.12
+"""Distance of an outline from its cell's border, as a fraction of the cell."""
+
+WIDE = 80
+"""Characters of the reasons that a legend has room for."""
+
+
+@styled
+def figure_map(study: ValidityMap, approximation: str = "published-python", measure: Measure = "plateau") -> Figure:
+    """Size of an approximation's error as shade, the largest fair share as outline, failed cells hatched with reasons.
+
+    Along "step" shade and contours are those of the schemes against their own equations, since only schemes have a
+    step; the shade is the first scheme's.
+    """
+    figure, axes = new_figure(size=(8.0, 6.0))
+    logarithmic = study.axis != "restitution"
+    x, y = _edges(study.fills, logarithmic=False), _edges(study.values, logarithmic=logarithmic)
+    shown = errors(study, approximation, measure)
+    words, error = shown[0]
+    shade = axes.pcolormesh(
+        x, y, np.ma.masked_invalid(np.clip(error, *RANGE)), cmap=SHADES, norm=LogNorm(*RANGE), rasterized=False
+    )
+    bar = figure.colorbar(shade, ax=axes, label=f"{words} [of ω₀]", extend="min", ticks=[1e-3, 1e-2, 1e-1, 1.0])
+    bar.ax.set_yticklabels(["0.1%", "1%", "10%", "100%"])
+    for k, colour in enumerate(COLOURS):
+        outline = _outline(study.dominant == k, x, y, logarithmic=logarithmic)
+        axes.add_collection(LineCollection(outline, colors=colour, linewidths=2.2, capstyle="projecting"))
+    for row, column in zip(*np.nonzero(study.dominant < 0), strict=True):
+        corner = (x[column], y[row])
+        size = (x[column + 1] - x[column], y[row + 1] - y[row])
+        axes.add_patch(Rectangle(corner, *size, facecolor="none", edgecolor="#555555", hatch=HATCH, linewidth=0))
+    handles: list[Artist] = [
+        Patch(facecolor="none", edgecolor=colour, linewidth=2.2, label=name)
+        for colour, name in zip(COLOURS, RUNGS, strict=True)
+    ]
+    for (words, error), colour in zip(shown, LINES, strict=False):
+        handles += _contours(axes, study, error, words, colour)
+    if logarithmic:
+        axes.set_yscale("log")
+    axes.set_xlim(x[0], x[-1])
+    axes.set_ylim(y[0], y[-1])
+    axes.grid(visible=False)
+    axes.set_xlabel("fill fraction M_w / M_max [1]")
+    axes.set_ylabel(LABELS[study.axis])
+    axes.set_title(
+        f"Plateau of ω / ω₀ at N = {study.slices}: {words} (shade), largest fair share (outline)",
+        fontsize=10,
+        loc="left",
+    )
+    reasons = _reasons(study)
+    if reasons:
+        handles.append(Patch(facecolor="none", edgecolor="#555555", hatch=HATCH, label=f"not computed: {reasons}"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    return figure
+
+
+def errors(
+    study: ValidityMap, approximation: str = "published-python", measure: Measure = "plateau"
+) -> Sequence[tuple[str, FloatArray]]:
+    """Return what the contours show, with its name."""
+    if study.axis == "step":
+        return [(f"step error of {scheme}", study.step_error[scheme]) for scheme in SCHEMES]
+    return [(f"error of {approximation}", study.error(approximation, measure))]
+
+
+def _contours(axes: Axes, study: ValidityMap, error: FloatArray, words: str, colour: str) -> list[Line2D]:
+    """Draw the contours that exist; return a legend entry for each, saying where the map lies if there is none."""
+    handles = []
+    for level, style in CONTOURS:
+        finite = error[np.isfinite(error)]
+        label = f"{words}: {level:.0%}"
+        if _crosses(error, level):
+            lines = axes.contour(
+                study.fills, study.values, error, levels=[level], colors=colour, linestyles=style, linewidths=1.6
+            )
+            axes.clabel(lines, fmt={level: f"{level:.0%}"}, fontsize=8)
+        elif finite.size:
+            label += " (all above)" if finite.min() >= level else " (all below)"
+        handles.append(Line2D([], [], color=colour, linestyle=style, linewidth=1.6, label=label))
+    return handles
+
+
+def _crosses(error: FloatArray, level: float) -> bool:
+    """Return whether a map has a contour at ``level``."""
+    finite = error[np.isfinite(error)]
+    return bool(finite.size and finite.min() < level < finite.max() and min(error.shape) > 1)
+
+
+def contour_lines(study: ValidityMap, error: FloatArray, level: float) -> list[FloatArray]:
+    """Return the contour of ``error`` as lines of (fill fraction, value), each of shape (K, 2)."""
+    if not _crosses(error, level):
+        return []
+    found = Figure().subplots().contour(study.fills, study.values, error, levels=[level])
+    return [np.asarray(line) for line in found.allsegs[0] if len(line)]
+
+
+def _edges(centres: FloatArray, *, logarithmic: bool) -> FloatArray:
+    """Return the borders of cells around ``centres``, halfway between neighbours on the axis as it is drawn."""
+    at = np.log(centres) if logarithmic else centres
+    if len(at) == 1:
+        inner = np.array([at[0] - 0.5, at[0] + 0.5])
+    else:
+        middle = 0.5 * (at[:-1] + at[1:])
+        inner = np.concatenate(([2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]))
+    return np.exp(inner) if logarithmic else np.asarray(inner)
+
+
+def _outline(
+    inside: NDArray[np.bool_], x: FloatArray, y: FloatArray, *, logarithmic: bool
+) -> list[list[tuple[float, float]]]:
+    """Return the border of the cells ``inside`` as segments, moved inwards so that neighbours' borders stay apart."""
+    at = np.log(y) if logarithmic else y
+    around = np.pad(inside, 1)
+    segments = []
+    for row, column in zip(*np.nonzero(inside), strict=True):
+        below, above = not around[row, column + 1], not around[row + 2, column + 1]
+        before, behind = not around[row + 1, column], not around[row + 1, column + 2]
+        dx, dy = INSET * (x[column + 1] - x[column]), INSET * (at[row + 1] - at[row])
+        left, right = x[column] + before * dx, x[column + 1] - behind * dx
+        low, high = at[row] + below * dy, at[row + 1] - above * dy
+        sides = (
+            (before, ((left, low), (left, high))),
+            (behind, ((right, low), (right, high))),
+            (below, ((left, low), (right, low))),
+            (above, ((left, high), (right, high))),
+        )
+        segments += [
+            [(float(a), float(np.exp(b) if logarithmic else b)) for a, b in side] for there, side in sides if there
+        ]
+    return segments
+
+
+def _reasons(study: ValidityMap) -> str:
+    """Return every reason once, with the number of cells it holds for."""
+    found, counts = np.unique(study.reason[study.reason != ""], return_counts=True)
+    words = [f"{reason} ({count})" for reason, count in zip(found, counts, strict=True)]
+    return shortened(", ".join(words[:3]), WIDE) + (f" and {len(words) - 3} more" if len(words) > 3 else "")
