@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Final
@@ -11,9 +11,8 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.foreign import checks_basic, checks_equation, checks_impacts, checks_order
-from flipproof.foreign.answers import Answer
-from flipproof.foreign.checking import Check, Found, NotApplicableError
-from flipproof.foreign.contract import Ask, Traits
+from flipproof.foreign.checking import Check, Found, NotApplicableError, drive
+from flipproof.foreign.contract import Traits
 from flipproof.foreign.specs import ForeignError, Runner, WaitingError
 
 PASSED: Final = "passed"
@@ -175,30 +174,6 @@ def _result(name: str, traits: Traits, runner: Runner) -> Result:
         unexpected = f"declared as a failure ({known}), but holds" if known else ""
         return Result(check=name, verdict=PASSED, title=title, found=found, reason=unexpected)
     return Result(check=name, verdict=EXPECTED if known else FAILED, title=title, found=found, reason=known or "")
-
-
-def drive(making: Iterator[Any], runner: Callable[[Ask], Answer]) -> Found:
-    """Drive a check to its end, asking ``runner`` whatever it yields."""
-    try:
-        asks: Sequence[Ask] = next(making)
-        while True:
-            asks = making.send(_answers(asks, runner))  # type: ignore[attr-defined]
-    except StopIteration as end:
-        found: Found = end.value
-        return found
-
-
-def _answers(asks: Sequence[Ask], runner: Callable[[Ask], Answer]) -> list[Answer]:
-    """Return an answer to each ask; where answers are written by hand, all asks are put before any is waited for."""
-    answers, waiting = [], None
-    for ask in asks:
-        try:
-            answers.append(runner(ask))
-        except WaitingError as why:
-            waiting = waiting or why
-    if waiting is not None:
-        raise waiting
-    return answers
 
 
 def versions() -> dict[str, str]:
