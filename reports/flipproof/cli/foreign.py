@@ -6,10 +6,19 @@ import argparse
 import json
 import sys
 from contextlib import closing
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, read_scenario
+from flipproof.cli.arguments import (
+    SCENARIO_HELP,
+    add_command,
+    add_json,
+    check_writable,
+    count,
+    read_scenario,
+    write_json,
+)
 
 SPEC_HELP = (
     "a name that flipproof models lists, package.module:name, file.py:name, csv:file.csv or "
@@ -24,7 +33,7 @@ def add_foreign(commands: Any) -> None:
     )
     _add_spec(certify)
     certify.add_argument("--equation", metavar="E", help="hold it to this equation, whatever it declares")
-    certify.add_argument("--json", type=Path, metavar="FILE", help="write the passport: traits, results, versions")
+    add_json(certify, "the passport (traits, results, versions)")
     certify.add_argument("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML")
 
     place = add_command(commands, "place", "Find out which equation a solver solves, and how well.", command_place)
@@ -47,7 +56,7 @@ def add_foreign(commands: Any) -> None:
 
     grade = add_command(commands, "grade", "Judge the answers in a kit.", command_grade)
     grade.add_argument("folder", type=Path, metavar="DIR", help="the folder that flipproof kit made")
-    grade.add_argument("--json", type=Path, metavar="FILE", help="write the passport")
+    add_json(grade, "the passport")
 
     power = add_command(
         commands, "power", "Plant known mistakes in a good solver; which checks see them?", command_power
@@ -68,6 +77,19 @@ def print_offered() -> None:
         print(f"  {name}\n      {point.value}, from {owner}")
 
 
+def print_offered_json() -> None:
+    """Print every solver, flipproof's own and those that installed packages offer, as JSON."""
+    from flipproof.foreign.specs import offered
+    from flipproof.frame.solvers import catalogue
+
+    points = {
+        name: {"object": point.value, "distribution": point.dist.name if point.dist else None}
+        for name, point in sorted(offered().items())
+    }
+    own = {solver.name: asdict(solver) for solver in catalogue().values()}
+    print(json.dumps({"solvers": own, "offered": points}, indent=1, ensure_ascii=False))
+
+
 def _add_spec(command: argparse.ArgumentParser) -> None:
     command.add_argument("spec", metavar="SPEC", help=SPEC_HELP)
     command.add_argument(
@@ -83,12 +105,12 @@ def command_certify(options: argparse.Namespace) -> int:
 
     if options.equation is not None:
         check_equation(options.equation)
-    for path in (options.json, options.junit):
-        if path is not None and (path.is_dir() or not path.parent.is_dir()):
-            raise ValueError(f"{path} cannot be written: {'it is a folder' if path.is_dir() else 'no such folder'}")
+    for name in ("json", "junit"):
+        if getattr(options, name) is not None:
+            check_writable(f"--{name}", getattr(options, name))
     with closing(opened(options.spec, options.timeout)) as runner:
         found = certify(runner, equation=options.equation, say=lambda result: print(result.line, flush=True))
-    _write_passport(found, options.json)
+    write_json(options.json, found.to_mapping())
     if options.junit is not None:
         from flipproof.foreign.verdicts import junit_of
         from flipproof.output.folder import write_text
@@ -96,13 +118,6 @@ def command_certify(options: argparse.Namespace) -> int:
         write_text(options.junit, junit_of(found))
     print(found.conclusion)
     return 1 if found.failed else 0
-
-
-def _write_passport(found: Any, path: Path | None) -> None:
-    if path is not None:
-        from flipproof.output.folder import write_text
-
-        write_text(path, json.dumps(found.to_mapping(), indent=1, ensure_ascii=False) + "\n")
 
 
 def command_place(options: argparse.Namespace) -> int:
@@ -158,7 +173,7 @@ def command_grade(options: argparse.Namespace) -> int:
     found, waiting = Kit(options.folder).grade()
     for result in found.results:
         print(result.line)
-    _write_passport(found, options.json)
+    write_json(options.json, found.to_mapping())
     print(found.conclusion)
     if waiting:
         print(f"{waiting} checks wait for answers in {options.folder / 'asks'}; grade again when they are there")

@@ -27,7 +27,7 @@ from flipproof.cli.check import add_checks
 from flipproof.cli.compare import add_compare
 from flipproof.cli.console import readable, speak_plainly
 from flipproof.cli.fit import add_fit
-from flipproof.cli.foreign import add_foreign, print_offered
+from flipproof.cli.foreign import add_foreign, print_offered, print_offered_json
 from flipproof.cli.paper import add_paper
 from flipproof.cli.start import INTERRUPTED, INTERRUPTED_WORDS, SIGNALS
 from flipproof.cli.sweeps import add_sweeps
@@ -184,7 +184,8 @@ def parser() -> argparse.ArgumentParser:
     add_fit(commands)
     add_animate(commands)
     add_foreign(commands)
-    add_command(commands, "models", "List every scheme, model and engine.", command_models)
+    models = add_command(commands, "models", "List every scheme, model and engine.", command_models)
+    models.add_argument("--json", action="store_true", help="print JSON")
     return top
 
 
@@ -283,11 +284,13 @@ def command_simulate(options: argparse.Namespace) -> int:
 
 def command_models(options: argparse.Namespace) -> int:
     """List every solver with its equation and the reason it is there."""
-    del options
     import textwrap
 
     from flipproof.frame.solvers import catalogue
 
+    if options.json:
+        print_offered_json()
+        return 0
     package = ""
     for solver in catalogue().values():
         if solver.package != package:
