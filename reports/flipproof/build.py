@@ -72,7 +72,8 @@ def build(evidence: Evidence, provenance: Mapping[str, str], jobs: int | None = 
             tag: trajectory_csv(trajectory)
             for tag in (*FLIGHTS, *OTHERS)
             if (trajectory := evidence.trajectory(tag)) is not None
-        },
+        }
+        | {f"guest-{g.slug}": trajectory_csv(g.run) for g in evidence.guests.guests if g.run is not None},
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from flipproof import claims, claims_engines
+from flipproof.chapters.guests.claims import claim_guests
 from flipproof.claims_work_precision import claim_work_precision
 from flipproof.evidence import CHECK, CROSS_CHECKED, ENGINE, ICED, LIMITS, WITNESS, Evidence
 from flipproof.frame.findings import Finding
@@ -26,6 +27,7 @@ def evaluate(evidence: Evidence) -> Iterator[Finding]:
     yield from _instrument_findings(evidence)
     yield from _attribution_findings(evidence)
     yield from claim_work_precision(evidence.precision)
+    yield from claim_guests(evidence.guests)
 
 
 def _instrument_findings(evidence: Evidence) -> Iterator[Finding]:

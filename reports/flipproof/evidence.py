@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from flipproof.attribution import (
     plan_attribution,
     study_attribution,
 )
+from flipproof.chapters.guests.study import Guests, invite, received, study_guests
 from flipproof.frame.pool import Progress, make_all, workers
 from flipproof.frame.solvers import Made, Run, make, without_gravity
 from flipproof.frame.stages import Stages
@@ -39,7 +40,7 @@ from flipproof.studies.waterfall import NAMES
 from flipproof.studies.work_precision import WorkPrecision, gather_work_precision
 from ode_reference.models import LADDER
 from slicemodel import Scenario, Trajectory
-from slicemodel.trajectory import FloatArray
+from slicemodel.trajectory import FloatArray, output_times
 
 ENGINE = "pymunk"
 FREE = LADDER[-1]
@@ -183,6 +184,7 @@ class Evidence:
     precision: tuple[WorkPrecision, ...]
     paper: Paper | None
     stages: Stages
+    guests: Guests = field(default_factory=Guests)
 
     def trajectory(self, tag: str) -> Trajectory | None:
         """Return the trajectory of a run, or None if it failed."""
@@ -231,7 +233,13 @@ def witnessed(scenario: Scenario, model: str) -> dict[str, Any]:
 
 
 def gather(
-    scenario: Scenario, size: Size, progress: Progress, jobs: int | None = None, stages: Stages | None = None
+    scenario: Scenario,
+    size: Size,
+    progress: Progress,
+    jobs: int | None = None,
+    stages: Stages | None = None,
+    guests: Sequence[str] = (),
+    timeout: float | None = None,
 ) -> Evidence:
     """Make every run of a report and study them.
 
@@ -245,6 +253,10 @@ def gather(
         Worker processes for the reference and the engine; None: one per core.
     stages : Stages or None
         The stopwatch of the report, if somebody watches it.
+    guests : sequence of str
+        Specs of other people's solvers.
+    timeout : float or None
+        Seconds that one run of theirs may take; None: as they declare.
     """
     throw = scenario.with_slices(size.slices)
     runs = plan(throw, size)
@@ -259,6 +271,7 @@ def gather(
     stages = stages or Stages()
     with workers(jobs) as pool:
         audit = pool.submit(study_errata, throw)
+        pending = invite(pool, guests, throw, output_times(throw, None), timeout)
         with stages.lap("runs"):
             made = make_all(pool, flat, progress)
         with stages.lap("work and precision"):
@@ -272,6 +285,8 @@ def gather(
             attribution = study_attribution(throw, size.scope, size.steps, made, pool, audit, charts)
         with stages.lap("the paper"):
             paper = _gather_paper(pool, progress) if size.paper else None
+        with stages.lap("guests"):
+            visits = received(pending)
 
     differences = tuple(_differences(made))
     return Evidence(
@@ -304,6 +319,9 @@ def gather(
         precision=precision,
         paper=paper,
         stages=stages,
+        guests=study_guests(
+            visits, {m: run for m in LADDER if (run := made[m].trajectory) is not None}, run_bands(made)
+        ),
     )
 
 

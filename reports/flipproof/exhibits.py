@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from flipproof import exhibit_tables as tables
+from flipproof.chapters.guests.figures import draw_guests
 from flipproof.evidence import FLIGHTS, LIMITS, Evidence
 from flipproof.exhibits_attribution import draw_attribution
 from flipproof.exhibits_engines import draw_instruments
@@ -42,6 +43,7 @@ def draw_all(evidence: Evidence) -> Iterator[Exhibit]:
     yield from draw_instruments(evidence.instruments)
     yield from draw_work_precision(evidence.precision)
     yield from draw_attribution(evidence.attribution)
+    yield from draw_guests(evidence.guests)
 
 
 def _draw_flights(flights: list[Trajectory]) -> Iterator[Exhibit]:

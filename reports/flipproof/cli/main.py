@@ -159,6 +159,16 @@ def parser() -> argparse.ArgumentParser:
         "--slices", type=count, metavar="N", help="slices at which solvers are compared (default 50, or the file's "
         "number if smaller)",
     )  # fmt: skip
+    report.add_argument(
+        "--with",
+        dest="guests",
+        action="append",
+        default=[],
+        metavar="SPEC",
+        help="certify another solver, such as mine.py:solve, and hold it against all others; may be repeated; a check "
+        "that it fails is a claim that fails",
+    )
+    report.add_argument("--timeout", type=count, metavar="S", help="seconds one run of a --with solver may take")
     report.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
     report.add_argument(
         "--pdf", action="store_true", help="also print the page to report.pdf (needs Chromium, Chrome or Edge)"
@@ -205,6 +215,7 @@ def command_report(options: argparse.Namespace) -> int:
     from flipproof.page.pdf import print_page, require_browser
 
     check_replaceable(options.out, "report")
+    _check_guests(options.guests)
     if options.pdf:
         require_browser()
 
@@ -233,13 +244,28 @@ def command_report(options: argparse.Namespace) -> int:
                 bar.set_postfix_str(tag, refresh=False)
                 bar.update(made - bar.n)
 
-            evidence = gather(scenario, size, progress, options.jobs, Stages(say))
+            evidence = gather(
+                scenario, size, progress, options.jobs, Stages(say), guests=options.guests, timeout=options.timeout
+            )
         report = build(evidence, provenance(command), options.jobs)
         write(report, folder)
         if options.pdf:
             print_page(folder / "index.html", folder / "report.pdf")
+    for guest in evidence.guests.guests:
+        found = guest.visit.certificate
+        print(f"{guest.label}: {found.conclusion if found else '; '.join(guest.visit.problems.values())}")
     _print_report(report, options.out, time.perf_counter() - began)
     return 1 if report.failed else 0
+
+
+def _check_guests(specs: Sequence[str]) -> None:
+    """Refuse, before the work begins, a spec that names nothing or is there twice; no foreign code runs."""
+    from flipproof.frame.solvers import find
+
+    for spec in specs:
+        find(spec)
+        if specs.count(spec) > 1:
+            raise ValueError(f"--with {spec} is there twice")
 
 
 def _print_report(report: Any, out: Path, seconds: float) -> None:

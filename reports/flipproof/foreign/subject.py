@@ -30,6 +30,10 @@ MOST_IMPACTS = 20
 them without end."""
 
 
+HALVINGS = 42
+"""Halvings of a step by which a rebound is located in it."""
+
+
 class Subject:
     """The solver as it should be. Each part that a mistake may spoil is a method of its own."""
 
@@ -194,7 +198,7 @@ class Subject:
             if self.frozen or not self.struck(new).any():
                 return self.let_go(new)
             low, high = 0.0, h
-            while high - low > 1e-12 * h:
+            for _ in range(HALVINGS):
                 middle = (low + high) / 2
                 low, high = (low, middle) if self.struck(self.advance(y, middle)).any() else (middle, high)
             at = self.advance(y, high)

@@ -74,6 +74,8 @@ def summarise(
         "stages": {name: round(seconds, 3) for name, seconds in evidence.stages.seconds.items()},
         "provenance": dict(provenance),
     }
+    if evidence.guests.guests:
+        summary["guests"] = [guest.to_mapping() for guest in evidence.guests.guests]
     return {name: json_ready(value) for name, value in summary.items()}
 
 

@@ -39,6 +39,7 @@ CONTENTS = {
     "maps": "For which bottles",
     "throws": "Explore other throws",
     "paper": "The paper's figures and claims",
+    "guests": "Guests",
     "errata": "Errata",
     "findings": "All findings",
     "solvers": "Every solver",
@@ -162,6 +163,7 @@ def render(
             ("maps", found.maps or reasons["maps"]),
             ("throws", explore),
             ("paper", paper),
+            ("guests", evidence.guests.guests),
         )
         if not there
     }
@@ -201,6 +203,7 @@ def render(
         motion=motion,
         explore=explore,
         paper=paper,
+        guests=evidence.guests,
         assets=read_assets(),
         provenance=provenance,
         twin_words=BAND_WORDS,

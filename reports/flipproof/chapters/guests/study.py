@@ -1,0 +1,261 @@
+r"""What a report finds about a solver of somebody else on its throw.
+
+    visit(spec, throw, times)         in a worker: the certificate, the throw at four efforts, the throw in ice
+    study_guests(visits, ladder)      at home: differences to every equation of the ladder, agreement, energy
+
+Each run is made in the solver's own process with a time limit; what it does wrong costs that run and becomes a reason.
+The energy of a run, in the frame of the centre of mass C_M, is that of turning and of sliding (Koenig):
+
+    E = J omega^2 / 2 + sum_i m (v_i - v_CM)^2 / 2 + M_b v_CM^2 / 2
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor, Future
+from contextlib import closing
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import pairwise
+from typing import Any, Final
+
+import numpy as np
+
+from flipproof.foreign.answers import trajectory_of
+from flipproof.foreign.certify import Certificate, certify
+from flipproof.foreign.checking import effort_of
+from flipproof.foreign.contract import Ask, Traits
+from flipproof.foreign.specs import CSV, Runner, opened
+from flipproof.studies.agreement import Agreement, study_agreement
+from flipproof.studies.differences import Difference, study_difference
+from flipproof.studies.ice import IceDrift, frozen, study_ice
+from slicemodel import Scenario, Trajectory
+from slicemodel.observables import centre_of_mass_velocity
+from slicemodel.trajectory import FloatArray
+
+LEVELS: Final = (-4, -2, 0, 2)
+"""Levels of refinement at which the throw is made; the last is the flight that is shown, the one before its band."""
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """One run of the throw: its effort (None: it has none), the seconds it took, and the run."""
+
+    effort: float | None
+    seconds: float
+    run: Trajectory
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Visit:
+    """What a solver answered; ``problems`` maps what is missing to the reason."""
+
+    spec: str
+    traits: Traits | None = None
+    certificate: Certificate | None = None
+    efforts: tuple[Effort, ...] = ()
+    ice: IceDrift | None = None
+    problems: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Guest:
+    """A solver of somebody else on the report's throw.
+
+    Parameters
+    ----------
+    label : str - its name; with its spec, if another solver has that name
+    slug : str - the name in ids, files and anchors
+    differences : mapping rung -> Difference - of the finest run, with the sum of both bands
+    band : float or None - largest change of omega between its two finest runs, fraction of omega_0
+    errors : tuple of float - largest difference of each effort's run to ``equation``, fraction of omega_0
+    equation : str or None - the rung that it declares, else the nearest
+    energy : array or None - E(t) / E(0) of the finest run; None without r and v
+    """
+
+    visit: Visit
+    label: str
+    slug: str
+    differences: Mapping[str, Difference]
+    band: float | None
+    errors: tuple[float, ...]
+    equation: str | None
+    energy: FloatArray | None
+
+    @property
+    def run(self) -> Trajectory | None:
+        """The finest run."""
+        return self.visit.efforts[-1].run if self.visit.efforts else None
+
+    @property
+    def nearest(self) -> Difference | None:
+        """The difference to the nearest rung."""
+        return min(self.differences.values(), key=lambda d: d.largest, default=None)
+
+    @property
+    def rise(self) -> float | None:
+        """Largest rise of the energy between two output times, fraction of E(0)."""
+        return None if self.energy is None else float(max(0.0, np.max(np.diff(self.energy), initial=0.0)))
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the guest as JSON-ready data."""
+        visit = self.visit
+        return {
+            "spec": visit.spec,
+            "name": self.label,
+            "equation": self.equation,
+            "passport": None if visit.certificate is None else visit.certificate.to_mapping(),
+            "problems": dict(visit.problems),
+            "band": self.band,
+            "differences": {
+                rung: {"largest": d.largest, "time": d.largest_time, "final": d.final, "band": d.band}
+                for rung, d in self.differences.items()
+            },
+            "efforts": [
+                {"effort": one.effort, "seconds": round(one.seconds, 4), "error": error}
+                for one, error in zip(visit.efforts, self.errors, strict=True)
+            ],
+            "ice_drift": None if visit.ice is None else visit.ice.largest,
+            "energy_rise": self.rise,
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Guests:
+    """All guests of a report, the ladder they are held against, and who agrees with whom (None: fewer than two)."""
+
+    guests: tuple[Guest, ...] = ()
+    ladder: Mapping[str, Trajectory] = field(default_factory=dict)
+    agreement: Agreement | None = None
+
+
+def invite(
+    pool: Executor, specs: Sequence[str], throw: Scenario, times: FloatArray, timeout: float | None
+) -> dict[str, Future[Visit]]:
+    """Send each solver to a worker; ``received`` waits for them."""
+    return {spec: pool.submit(visit, spec, throw, times, timeout) for spec in specs}
+
+
+def received(pending: Mapping[str, Future[Visit]]) -> tuple[Visit, ...]:
+    """Return every visit; one whose worker died says so."""
+    found = []
+    for spec, future in pending.items():
+        try:
+            found.append(future.result())
+        except (RuntimeError, ValueError, ArithmeticError) as error:
+            found.append(Visit(spec=spec, problems={"solver": f"{type(error).__name__}: {error}"}))
+    return tuple(found)
+
+
+def visit(spec: str, throw: Scenario, times: FloatArray, timeout: float | None = None) -> Visit:
+    """Certify a solver, let it make the throw at each of its efforts, and in ice.
+
+    Parameters
+    ----------
+    spec : str
+    throw : Scenario
+    times : array, shape (P,) - output times [s]
+    timeout : float, optional - seconds one run may take, instead of what the solver says
+    """
+    problems: dict[str, str] = {}
+
+    def attempt(name: str, make: Callable[[], Any]) -> Any:
+        try:
+            return make()
+        except (ValueError, ArithmeticError, MemoryError) as error:
+            problems[name] = str(error)
+            return None
+
+    runner = attempt("solver", lambda: opened(spec, timeout, curves=True))
+    if runner is None:
+        return Visit(spec=spec, problems=problems)
+    with closing(runner):
+        traits = attempt("solver", lambda: runner.traits)
+        if traits is None:
+            return Visit(spec=spec, problems=problems)
+        curve = spec.startswith(CSV)
+        if curve:
+            problems["certificate"] = "a curve in a file cannot be asked"
+        certificate = None if curve else attempt("certificate", lambda: certify(runner))
+        levels = LEVELS if traits.refined_by is not None else LEVELS[-1:]
+        efforts = [attempt(f"flight at level {k}", partial(_flight, runner, throw, times, k)) for k in levels]
+        ice = None if curve else attempt("ice", lambda: _flight(runner, frozen(throw), times, 0).run)
+    return Visit(
+        spec=spec,
+        traits=traits,
+        certificate=certificate,
+        efforts=tuple(one for one in efforts if one is not None),
+        ice=None if ice is None else study_ice(traits.name, ice),
+        problems=problems,
+    )
+
+
+def _flight(runner: Runner, throw: Scenario, times: FloatArray, level: int) -> Effort:
+    effort = effort_of(runner.traits, throw, level)
+    ask = Ask.of(throw, np.array(times), effort)
+    began = time.perf_counter()
+    answer = runner(ask)
+    seconds = time.perf_counter() - began
+    return Effort(effort, seconds, trajectory_of(ask, answer, runner.traits))
+
+
+def study_guests(visits: Sequence[Visit], ladder: Mapping[str, Trajectory], bands: Mapping[str, float]) -> Guests:
+    """Hold every visit against the ladder.
+
+    Parameters
+    ----------
+    visits : sequence of Visit
+    ladder : mapping rung -> Trajectory - of the same throw
+    bands : mapping rung -> float - how far omega may be off, fraction of omega_0
+    """
+    taken = [one.traits.name if one.traits else one.spec for one in visits]
+    guests: list[Guest] = []
+    for k, (one, name) in enumerate(zip(visits, taken, strict=True)):
+        label = name if taken.count(name) == 1 and name not in ladder else f"{name} ({one.spec})"
+        slug = re.sub(r"[^a-z0-9]+", "-", label.lower()).strip("-")[:40] or "solver"
+        slug = f"{slug}-{k + 1}" if any(guest.slug == slug for guest in guests) else slug
+        guests.append(_guest(one, label, slug, ladder, bands))
+    runs = dict(ladder)
+    known = {rung: bands.get(rung, 0.0) for rung in ladder}
+    for guest in guests:
+        first = next(iter(ladder.values()), None)
+        if guest.run is not None and first is not None and np.array_equal(guest.run.t, first.t):
+            runs[guest.label] = guest.run
+            known[guest.label] = guest.band or 0.0
+    agreement = study_agreement(runs, known) if guests and len(runs) > 1 else None
+    return Guests(guests=tuple(guests), ladder=dict(ladder), agreement=agreement)
+
+
+def _guest(one: Visit, label: str, slug: str, ladder: Mapping[str, Trajectory], bands: Mapping[str, float]) -> Guest:
+    run = one.efforts[-1].run if one.efforts else None
+    changes = [study_difference(label, a.run, b.run).largest for a, b in pairwise(one.efforts)]
+    band = changes[-1] if changes else None
+    differences = {}
+    if run is not None and len(run.t) > 1:
+        for rung, reference in ladder.items():
+            whole = None if band is None else band + bands.get(rung, 0.0)
+            differences[rung] = study_difference(f"{label} and {rung}", reference, run, band=whole)
+    declared = one.traits.equation if one.traits is not None else None
+    nearest = min(differences, key=lambda rung: differences[rung].largest, default=None)
+    equation = declared if declared in ladder else nearest
+    errors = [study_difference(label, ladder[equation], e.run).largest for e in one.efforts] if equation else []
+    return Guest(
+        visit=one,
+        label=label,
+        slug=slug,
+        differences=differences,
+        band=band,
+        errors=tuple(errors),
+        equation=equation,
+        energy=None if run is None or len(run.v) != len(run.t) else energy_of(run),
+    )
+
+
+def energy_of(run: Trajectory) -> FloatArray:
+    """Return E(t) / E(0) in the frame of C_M (module docstring), shape (P,)."""
+    scenario, drift = run.scenario, centre_of_mass_velocity(run.scenario, run.v)
+    sliding = scenario.slice_mass * ((run.v - drift[:, None]) ** 2).sum(axis=1) + scenario.bottle.mass * drift**2
+    energy = (run.inertia * run.omega**2 + sliding) / 2
+    return np.asarray(energy / energy[0])
