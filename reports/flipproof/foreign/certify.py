@@ -54,15 +54,19 @@ class Result:
 
     @property
     def line(self) -> str:
-        """One line: verdict, check, what came against what was expected, where, and what to do if it failed."""
-        head = f"{self.verdict:17} {self.check:21}"
+        """One line: verdict, check and ``words``."""
+        return f"{self.verdict:17} {self.check:21} {self.words}"
+
+    @property
+    def words(self) -> str:
+        """What came against what was expected, where, and what to do if it failed; or why there are no numbers."""
         if self.found is None:
-            return f"{head} {self.reason}"
+            return self.reason
         said = f"{self.found.came} (expected: {self.found.expected})"
         place = f"; {self.found.where}" if self.found.where else ""
         advice = f"; {self.found.advice}" if self.verdict == FAILED and self.found.advice else ""
         known = f"; known: {self.reason}" if self.reason else ""
-        return f"{head} {said}{place}{advice}{known}"
+        return f"{said}{place}{advice}{known}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

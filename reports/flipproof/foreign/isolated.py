@@ -71,6 +71,7 @@ class Isolated:
         points = len(ask.times)
         most = 8 * (points * (len(REQUIRED) + len(PER_TIME) + 2 * ask.scenario.n_slices) + 5 * MOST_IMPACTS)
         header, arrays = self._exchange(header, {"times": ask.times, "start": ask.start}, limit, most)
+        self._late = 0
         if "reason" in header:
             raise ForeignError(str(header["reason"]))
         fields: dict[str, Any] = {name: array for name, array in arrays.items() if "." not in name}
@@ -149,7 +150,6 @@ class Isolated:
             how = self._ending(reply)
             self.close()
             raise ForeignError(how)
-        self._late = 0
         found: tuple[dict[str, Any], dict[str, Any]] = reply
         return found
 

@@ -23,7 +23,7 @@ def findings_of(certificate: Certificate, id_: str = "certify-", title: str = ""
                 unit="",
                 kind="observation" if idle else "regression",
                 admissible=(1.0, 1.0),
-                note=result.line if result.found else result.reason,
+                note=result.words,
             )
         )
     return tuple(found)

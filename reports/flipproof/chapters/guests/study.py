@@ -18,7 +18,6 @@ from concurrent.futures import Executor, Future
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -36,7 +35,10 @@ from slicemodel.observables import centre_of_mass_velocity
 from slicemodel.trajectory import FloatArray
 
 LEVELS: Final = (-4, -2, 0, 2)
-"""Levels of refinement at which the throw is made; the last is the flight that is shown, the one before its band."""
+"""Levels of refinement at which the throw is made; the finest is also the flight that is shown."""
+
+SPARSE: Final = 27
+"""Every so many output times are asked for at ``LEVELS``: a solver makes at least one step from each to the next."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +57,7 @@ class Visit:
     spec: str
     traits: Traits | None = None
     certificate: Certificate | None = None
+    flight: Trajectory | None = None
     efforts: tuple[Effort, ...] = ()
     ice: IceDrift | None = None
     problems: Mapping[str, str] = field(default_factory=dict)
@@ -68,11 +71,11 @@ class Guest:
     ----------
     label : str - its name; with its spec, if another solver has that name
     slug : str - the name in ids, files and anchors
-    differences : mapping rung -> Difference - of the finest run, with the sum of both bands
-    band : float or None - largest change of omega between its two finest runs, fraction of omega_0
+    differences : mapping rung -> Difference - of the flight, with the sum of both bands
+    band : float or None - largest change of omega between its two finest efforts, fraction of omega_0
     errors : tuple of float - largest difference of each effort's run to ``equation``, fraction of omega_0
     equation : str or None - the rung that it declares, else the nearest
-    energy : array or None - E(t) / E(0) of the finest run; None without r and v
+    energy : array or None - E(t) / E(0) of the flight; None without r and v
     """
 
     visit: Visit
@@ -86,8 +89,8 @@ class Guest:
 
     @property
     def run(self) -> Trajectory | None:
-        """The finest run."""
-        return self.visit.efforts[-1].run if self.visit.efforts else None
+        """The flight at the finest effort."""
+        return self.visit.flight
 
     @property
     def nearest(self) -> Difference | None:
@@ -179,13 +182,15 @@ def visit(spec: str, throw: Scenario, times: FloatArray, timeout: float | None =
         if curve:
             problems["certificate"] = "a curve in a file cannot be asked"
         certificate = None if curve else attempt("certificate", lambda: certify(runner))
-        levels = LEVELS if traits.refined_by is not None else LEVELS[-1:]
-        efforts = [attempt(f"flight at level {k}", partial(_flight, runner, throw, times, k)) for k in levels]
+        flight = attempt("flight", lambda: _flight(runner, throw, times, LEVELS[-1]).run)
+        levels = LEVELS if traits.refined_by is not None else ()
+        efforts = [attempt(f"flight at level {k}", partial(_flight, runner, throw, times[::SPARSE], k)) for k in levels]
         ice = None if curve else attempt("ice", lambda: _flight(runner, frozen(throw), times, 0).run)
     return Visit(
         spec=spec,
         traits=traits,
         certificate=certificate,
+        flight=flight,
         efforts=tuple(one for one in efforts if one is not None),
         ice=None if ice is None else study_ice(traits.name, ice),
         problems=problems,
@@ -229,9 +234,8 @@ def study_guests(visits: Sequence[Visit], ladder: Mapping[str, Trajectory], band
 
 
 def _guest(one: Visit, label: str, slug: str, ladder: Mapping[str, Trajectory], bands: Mapping[str, float]) -> Guest:
-    run = one.efforts[-1].run if one.efforts else None
-    changes = [study_difference(label, a.run, b.run).largest for a, b in pairwise(one.efforts)]
-    band = changes[-1] if changes else None
+    run = one.flight
+    band = _apart(one.efforts[-2].run, one.efforts[-1].run) if len(one.efforts) > 1 else None
     differences = {}
     if run is not None and len(run.t) > 1:
         for rung, reference in ladder.items():
@@ -240,7 +244,7 @@ def _guest(one: Visit, label: str, slug: str, ladder: Mapping[str, Trajectory], 
     declared = one.traits.equation if one.traits is not None else None
     nearest = min(differences, key=lambda rung: differences[rung].largest, default=None)
     equation = declared if declared in ladder else nearest
-    errors = [study_difference(label, ladder[equation], e.run).largest for e in one.efforts] if equation else []
+    errors = [_apart(ladder[equation], effort.run) for effort in one.efforts] if equation else []
     return Guest(
         visit=one,
         label=label,
@@ -251,6 +255,12 @@ def _guest(one: Visit, label: str, slug: str, ladder: Mapping[str, Trajectory], 
         equation=equation,
         energy=None if run is None or len(run.v) != len(run.t) else energy_of(run),
     )
+
+
+def _apart(one: Trajectory, other: Trajectory) -> float:
+    """Return the largest difference of omega at the times of both, fraction of omega_0."""
+    _, here, there = np.intersect1d(one.t, other.t, assume_unique=True, return_indices=True)
+    return float(np.max(np.abs(one.omega[here] - other.omega[there])) / abs(one.scenario.omega0))
 
 
 def energy_of(run: Trajectory) -> FloatArray:
