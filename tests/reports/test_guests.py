@@ -34,13 +34,13 @@ def ladder():
     return {rung: solve(rung, THROW, times=TIMES) for rung in RUNGS}
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def few_checks(monkeypatch):
     monkeypatch.setattr(suite.certify, "__defaults__", (("shape", "ice"),))
 
 
 @pytest.fixture
-def studied(few_checks, ladder):
+def studied(ladder):
     return study_guests([visit(RK4, THROW, TIMES)], ladder, dict.fromkeys(RUNGS, 1e-9))
 
 
@@ -72,7 +72,7 @@ def test_findings_have_ids_of_their_own_and_visits_travel(studied):
     assert pickle.loads(pickle.dumps(studied.guests[0].visit)).spec == RK4
 
 
-def test_solvers_of_one_name_are_told_apart(few_checks, ladder):
+def test_solvers_of_one_name_are_told_apart(ladder):
     one = visit(RK4, THROW, TIMES)
     found = study_guests([one, one], ladder, {})
     assert len({guest.slug for guest in found.guests}) == 2
@@ -103,7 +103,7 @@ def test_a_curve_in_a_file_is_compared_and_not_certified(tmp_path, ladder):
 
 
 @pytest.mark.parametrize("name", ["raises", "segfaults", "not_a_number", "hangs", "returns_none", "not_a_solver"])
-def test_a_hostile_guest_is_named_with_its_reason(tmp_path, few_checks, ladder, name):
+def test_a_hostile_guest_is_named_with_its_reason(tmp_path, ladder, name):
     shutil.copy(HOSTILE, tmp_path)
     spec = f"{tmp_path / 'hostile.py'}:{name}"
     found = study_guests([visit(spec, THROW, TIMES, 1.0), visit(RK4, THROW, TIMES)], ladder, {})
@@ -118,7 +118,7 @@ def test_a_hostile_guest_is_named_with_its_reason(tmp_path, few_checks, ladder, 
     assert json.dumps(bad.to_mapping(), allow_nan=False)
 
 
-def test_a_solver_that_is_late_twice_is_not_asked_again(tmp_path, few_checks):
+def test_a_solver_that_is_late_twice_is_not_asked_again(tmp_path):
     shutil.copy(HOSTILE, tmp_path)
     found = visit(f"{tmp_path / 'hostile.py'}:hangs", THROW, TIMES, 0.5)
     assert found.problems["flight"] == "not asked: 2 runs in a row gave no answer in time"
