@@ -25,10 +25,8 @@ from slicemodel.trajectory import FloatArray
 IntArray = NDArray[np.int64]
 
 
-MOST_IMPACTS = 20
-"""Impacts of one step after which it goes on without; the solver as it should be has 9 at the most, a mistake may cause
-them without end."""
-
+MOST_IMPACTS = 500
+"""Impacts of a flight after which it goes on without; a mistake may cause them without end."""
 
 HALVINGS = 42
 """Halvings of a step by which a rebound is located in it."""
@@ -56,6 +54,7 @@ class Subject:
         self.own_inertia = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
         self.frozen = s.frozen
         self.ask = ask
+        self.impacts = 0
         self.side: IntArray = np.zeros(self.n, dtype=np.int64)
         self.momentum = self.inertia(np.array(ask.start)) * s.omega0
 
@@ -193,7 +192,7 @@ class Subject:
 
     def step(self, y: FloatArray, h: float) -> FloatArray:
         """Return the state after a step with all its rebounds, each at its own time."""
-        for _ in range(MOST_IMPACTS):
+        while self.impacts < MOST_IMPACTS:
             new = self.advance(y, h)
             if self.frozen or not self.struck(new).any():
                 return self.let_go(new)
@@ -201,6 +200,7 @@ class Subject:
             for _ in range(HALVINGS):
                 middle = (low + high) / 2
                 low, high = (low, middle) if self.struck(self.advance(y, middle)).any() else (middle, high)
+            self.impacts += 1
             at = self.advance(y, high)
             y, h = self.meet(at, self.struck(at)), h - high
         return self.advance(y, h)
