@@ -62,7 +62,9 @@ def add_foreign(commands: Any) -> None:
         commands, "power", "Plant known mistakes in a good solver; which checks see them?", command_power
     )
     power.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
-    power.add_argument("--out", type=Path, metavar="DIR", help="also write power.csv, power.svg and power.png there")
+    power.add_argument(
+        "--out", type=Path, metavar="DIR", help="also write power.csv, power.svg, power.png and junit.xml there"
+    )
 
 
 def print_offered() -> None:
@@ -182,8 +184,10 @@ def command_grade(options: argparse.Namespace) -> int:
 
 def command_power(options: argparse.Namespace) -> int:
     """Print a line a mistake; return 1 if one is caught by no check, or the clean solver by any."""
-    from flipproof.foreign.power import CLEAN, detect_all
+    from flipproof.foreign.power import claim_power, detect_all, matrix_csv
     from flipproof.frame.pool import workers
+    from flipproof.output.folder import write_text
+    from flipproof.output.junit import junit_text
 
     def say(caught: Any) -> None:
         seen = ", ".join(caught.checks) or "no check"
@@ -194,17 +198,18 @@ def command_power(options: argparse.Namespace) -> int:
     if options.out is not None:
         from flipproof.figures.power import figure_power
         from flipproof.figures.style import draw
-        from flipproof.foreign.power import matrix_csv
-        from flipproof.output.folder import write_text
 
         options.out.mkdir(parents=True, exist_ok=True)
         drawing = draw(figure_power(found))
         write_text(options.out / "power.csv", matrix_csv(found))
         write_text(options.out / "power.svg", drawing.svg)
         (options.out / "power.png").write_bytes(drawing.png)
-    missed = [c.mistake for c in found if c.mistake != CLEAN and not c.checks]
-    wrong = [c for c in found if c.mistake == CLEAN and c.checks]
-    print(f"{len(found) - 1} mistakes planted, {len(found) - 1 - len(missed)} caught; the clean solver: "
-          f"{'accused' if wrong else 'passed by all'}")  # fmt: skip
+    claims = claim_power(found)
+    for claim in claims:
+        print(
+            f"{'FAIL' if claim.failed else 'PASS'}  {claim.title}: {claim.value:g} {claim.unit} {claim.note}".rstrip()
+        )
+    if options.out is not None:
+        write_text(options.out / "junit.xml", junit_text(claims, "flipproof power"))
     sys.stdout.flush()
-    return 1 if missed or wrong else 0
+    return 1 if any(claim.failed for claim in claims) else 0

@@ -41,6 +41,10 @@ SPARSE: Final = 27
 """Every so many output times are asked for at ``LEVELS``: a solver makes at least one step from each to the next."""
 
 
+LONGEST: Final = 60
+"""Letters of the name by which files and anchors call a guest; one with more is called by its number."""
+
+
 @dataclass(frozen=True, slots=True)
 class Effort:
     """One run of the throw: its effort (None: it has none), the seconds it took, and the run."""
@@ -219,8 +223,11 @@ def study_guests(visits: Sequence[Visit], ladder: Mapping[str, Trajectory], band
     guests: list[Guest] = []
     for k, (one, name) in enumerate(zip(visits, taken, strict=True)):
         label = name if taken.count(name) == 1 and name not in ladder else f"{name} ({one.spec})"
-        slug = re.sub(r"[^a-z0-9]+", "-", label.lower()).strip("-")[:40] or "solver"
-        slug = f"{slug}-{k + 1}" if any(guest.slug == slug for guest in guests) else slug
+        slug = re.sub(r"[^a-z0-9]+", "-", label.lower()).strip("-")
+        if not 0 < len(slug) <= LONGEST:
+            slug = f"solver-{k + 1}"
+        while any(guest.slug == slug for guest in guests):
+            slug += f"-{k + 1}"
         guests.append(_guest(one, label, slug, ladder, bands))
     runs = dict(ladder)
     known = {rung: bands.get(rung, 0.0) for rung in ladder}
