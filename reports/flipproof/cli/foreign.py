@@ -62,9 +62,7 @@ def add_foreign(commands: Any) -> None:
         commands, "power", "Plant known mistakes in a good solver; which checks see them?", command_power
     )
     power.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
-    power.add_argument(
-        "--out", type=Path, metavar="DIR", help="also write power.csv, power.svg, power.png and junit.xml there"
-    )
+    power.add_argument("--out", type=Path, metavar="DIR", help="also write power.csv, .svg, .png and junit.xml there")
 
 
 def print_offered() -> None:
@@ -206,9 +204,8 @@ def command_power(options: argparse.Namespace) -> int:
         (options.out / "power.png").write_bytes(drawing.png)
     claims = claim_power(found)
     for claim in claims:
-        print(
-            f"{'FAIL' if claim.failed else 'PASS'}  {claim.title}: {claim.value:g} {claim.unit} {claim.note}".rstrip()
-        )
+        verdict = "FAIL" if claim.failed else "PASS"
+        print(f"{verdict}  {claim.title}: {claim.value:g} {claim.unit} {claim.note}".rstrip())
     if options.out is not None:
         write_text(options.out / "junit.xml", junit_text(claims, "flipproof power"))
     sys.stdout.flush()
