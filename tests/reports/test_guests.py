@@ -17,7 +17,8 @@ from flipproof.cli import main as cli
 from flipproof.foreign import certify as suite
 from flipproof.foreign.specs import load
 from flipproof.frame.exhibit import drawn
-from flipproof.frame.pool import workers
+from flipproof.frame.flights import Call, Flights
+from flipproof.frame.pool import make_all, workers
 from flipproof.frame.solvers import solve
 from slicemodel import Scenario
 
@@ -89,7 +90,7 @@ def test_every_figure_is_drawn_with_its_numbers(studied):
     assert [exhibit.name for exhibit in exhibits] == [
         "guests-omega", "guests-differences", "guests-convergence", "guests-ice-energy",
     ]  # fmt: skip
-    assert all(exhibit.section == "guests" and exhibit.table.count("\n") > 1 for exhibit in exhibits)
+    assert all(exhibit.table.count("\n") > 1 for exhibit in exhibits)
 
 
 def test_a_curve_in_a_file_is_compared_and_not_certified(tmp_path, ladder):
@@ -125,9 +126,11 @@ def test_a_solver_that_is_late_twice_is_not_asked_again(tmp_path):
 
 
 def test_a_dead_worker_costs_its_guest(ladder):
+    call = Call(die, label="guest x", timed=True)
     with workers(1) as pool:
-        (found,) = received({"x": pool.submit(die)})
-    assert "WorkerDiedError" in found.problems["solver"]
+        flights = Flights(*make_all(pool, [], lambda *_: None, [call]))
+    (found,) = received({"x": call}, flights)
+    assert "guest x: the worker process died" in found.problems["solver"]
     (guest,) = study_guests([found], ladder, {}).guests
     assert guest.label == "x"
 

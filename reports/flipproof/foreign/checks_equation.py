@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from flipproof.chapters.vectors.published import Vector, load_all
 from flipproof.foreign.answers import Answer
 from flipproof.foreign.checking import Found, Making, NotApplicableError
 from flipproof.foreign.contract import Ask, Traits
 from flipproof.foreign.place import LIMITS, THROWS, name_of, placing, switches_of
-from flipproof.vectors import Vector, load_all
 
 VECTOR = 1e-8
 """Largest relative difference to a published number; flipproof's own schemes keep to 1e-10."""

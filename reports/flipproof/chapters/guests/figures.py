@@ -45,7 +45,6 @@ def _draw_omega(flown: Sequence[Guest], ladder: Mapping[str, Trajectory], more: 
     ends = ", ".join(f"{name} {run.omega[-1] / run.scenario.omega0:.3f}" for name, run in runs.items())
     return Exhibit(
         name="guests-omega",
-        section="guests",
         title="Angular velocity of the guests and of the ladder",
         caption=f"Broken lines are the equations of the ladder, solid lines the guests at their finest effort.{more}",
         alt=f"Line plot of omega over omega_0 against time. Values at the end: {ends}.",
@@ -62,7 +61,6 @@ def _draw_differences(guests: Sequence[Guest]) -> Exhibit:
         words.append(f"{guest.label}: " + ("none" if to is None else f"{to.first} {to.largest:.2g} of omega_0"))
     return Exhibit(
         name="guests-differences",
-        section="guests",
         title="How far each guest is from every equation",
         caption="One panel a guest. The dotted line is the guest's own band, the largest change of ω between its two "
         "finest efforts: a difference above it is not explained by refinement.",
@@ -88,7 +86,6 @@ def _draw_convergence(guests: Sequence[Guest]) -> Exhibit:
     words = "; ".join(f"{guest.label}: {guest.errors[0]:.2g} to {guest.errors[-1]:.2g} of omega_0" for guest in guests)
     return Exhibit(
         name="guests-convergence",
-        section="guests",
         title="What refinement buys each guest",
         caption="Largest difference in ω to the guest's own equation, or to the nearest if it declares none, against "
         "its effort relative to the coarsest run. A curve that levels off has met another equation, another parameter, "
@@ -113,7 +110,6 @@ def _draw_ice_energy(guests: Sequence[Guest]) -> Exhibit:
             columns[f"E/E(0) {guest.label} [1]"] = run.t, guest.energy
     return Exhibit(
         name="guests-ice-energy",
-        section="guests",
         title="Ice and energy",
         caption="Left: in a bottle of ice every drift of ω is an error of the solver. Right: energy in the frame of "
         "the centre of mass. In free flight drag and impacts only take energy away; in Eq. 8 the weight may add some.",

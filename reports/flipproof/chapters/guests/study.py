@@ -1,5 +1,6 @@
 r"""What a report finds about a solver of somebody else on its throw.
 
+    study(ask)                        the chapter's: one call a guest, and the ladder with the bands of its equations
     visit(spec, throw, times)         in a worker: the certificate, the throw at four efforts, the throw in ice
     study_guests(visits, ladder)      at home: differences to every equation of the ladder, agreement, energy
 
@@ -14,25 +15,29 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor, Future
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Final
 
 import numpy as np
 
+from flipproof.chapters.agreement.study import Agreement, study_agreement
+from flipproof.chapters.differences.chapter import run_bands
+from flipproof.chapters.differences.study import Difference, study_difference
+from flipproof.chapters.ice.chapter import Drift, measure
+from flipproof.foreign import contract
 from flipproof.foreign.answers import trajectory_of
 from flipproof.foreign.certify import Certificate, certify
 from flipproof.foreign.checking import effort_of
-from flipproof.foreign.contract import Ask, Traits
+from flipproof.foreign.contract import Traits
 from flipproof.foreign.specs import CSV, Runner, opened
-from flipproof.studies.agreement import Agreement, study_agreement
-from flipproof.studies.differences import Difference, study_difference
-from flipproof.studies.ice import IceDrift, frozen, study_ice
+from flipproof.frame.chapter import Ask, Call, Flights, Study, attempt
+from flipproof.frame.twins import twins
+from ode_reference.models import LADDER
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import centre_of_mass_velocity
-from slicemodel.trajectory import FloatArray
+from slicemodel.trajectory import FloatArray, output_times
 
 LEVELS: Final = (-4, -2, 0, 2)
 """Levels of refinement at which the throw is made; the finest is also the flight that is shown."""
@@ -63,7 +68,7 @@ class Visit:
     certificate: Certificate | None = None
     flight: Trajectory | None = None
     efforts: tuple[Effort, ...] = ()
-    ice: IceDrift | None = None
+    ice: Drift | None = None
     problems: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -138,22 +143,24 @@ class Guests:
     agreement: Agreement | None = None
 
 
-def invite(
-    pool: Executor, specs: Sequence[str], throw: Scenario, times: FloatArray, timeout: float | None
-) -> dict[str, Future[Visit]]:
-    """Send each solver to a worker; ``received`` waits for them."""
-    return {spec: pool.submit(visit, spec, throw, times, timeout) for spec in specs}
+def study(ask: Ask) -> Study[Guests]:
+    """Certify the solvers of ``ask.work``, which is their specs and a time limit a run [s] or None, and fly the throw.
+
+    A call that is timed is never answered from the store: whether somebody else's code changed is not known.
+    """
+    specs, timeout = ask.work
+    times = output_times(ask.throw, None)
+    calls = {spec: Call(visit, (spec, ask.throw, times, timeout), f"guest {spec}", timed=True) for spec in specs}
+    ladder = {rung: ask.solvers[rung] for rung in LADDER}
+    flights = yield [*calls.values(), *ladder.values(), *(twin for run in ladder.values() for twin in twins(run))]
+    flown = {rung: run for rung, each in ladder.items() if (run := flights.trajectory(each)) is not None}
+    return study_guests(received(calls, flights), flown, run_bands(ask.solvers, flights))
 
 
-def received(pending: Mapping[str, Future[Visit]]) -> tuple[Visit, ...]:
+def received(calls: Mapping[str, Call], flights: Flights) -> tuple[Visit, ...]:
     """Return every visit; one whose worker died says so."""
-    found = []
-    for spec, future in pending.items():
-        try:
-            found.append(future.result())
-        except (RuntimeError, ValueError, ArithmeticError) as error:
-            found.append(Visit(spec=spec, problems={"solver": f"{type(error).__name__}: {error}"}))
-    return tuple(found)
+    answers = {spec: attempt(flights.answer, call) for spec, call in calls.items()}
+    return tuple(each.found or Visit(spec=spec, problems={"solver": each.reason}) for spec, each in answers.items())
 
 
 def visit(spec: str, throw: Scenario, times: FloatArray, timeout: float | None = None) -> Visit:
@@ -168,42 +175,42 @@ def visit(spec: str, throw: Scenario, times: FloatArray, timeout: float | None =
     """
     problems: dict[str, str] = {}
 
-    def attempt(name: str, make: Callable[[], Any]) -> Any:
+    def tried(name: str, make: Callable[[], Any]) -> Any:
         try:
             return make()
         except (ValueError, ArithmeticError, MemoryError) as error:
             problems[name] = str(error)
             return None
 
-    runner = attempt("solver", lambda: opened(spec, timeout, curves=True))
+    runner = tried("solver", lambda: opened(spec, timeout, curves=True))
     if runner is None:
         return Visit(spec=spec, problems=problems)
     with closing(runner):
-        traits = attempt("solver", lambda: runner.traits)
+        traits = tried("solver", lambda: runner.traits)
         if traits is None:
             return Visit(spec=spec, problems=problems)
         curve = spec.startswith(CSV)
         if curve:
             problems["certificate"] = "a curve in a file cannot be asked"
-        certificate = None if curve else attempt("certificate", lambda: certify(runner))
-        flight = attempt("flight", lambda: _flight(runner, throw, times, LEVELS[-1]).run)
+        certificate = None if curve else tried("certificate", lambda: certify(runner))
+        flight = tried("flight", lambda: _flight(runner, throw, times, LEVELS[-1]).run)
         levels = LEVELS if traits.refined_by is not None else ()
-        efforts = [attempt(f"flight at level {k}", partial(_flight, runner, throw, times[::SPARSE], k)) for k in levels]
-        ice = None if curve else attempt("ice", lambda: _flight(runner, frozen(throw), times, 0).run)
+        efforts = [tried(f"flight at level {k}", partial(_flight, runner, throw, times[::SPARSE], k)) for k in levels]
+        ice = None if curve else tried("ice", lambda: _flight(runner, replace(throw, frozen=True), times, 0).run)
     return Visit(
         spec=spec,
         traits=traits,
         certificate=certificate,
         flight=flight,
         efforts=tuple(one for one in efforts if one is not None),
-        ice=None if ice is None else study_ice(traits.name, ice),
+        ice=None if ice is None else measure(traits.name, ice),
         problems=problems,
     )
 
 
 def _flight(runner: Runner, throw: Scenario, times: FloatArray, level: int) -> Effort:
     effort = effort_of(runner.traits, throw, level)
-    ask = Ask.of(throw, np.array(times), effort)
+    ask = contract.Ask.of(throw, np.array(times), effort)
     began = time.perf_counter()
     answer = runner(ask)
     seconds = time.perf_counter() - began
