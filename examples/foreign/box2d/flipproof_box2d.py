@@ -10,6 +10,7 @@ acts along the tube, on the slice and back on the tube, as a force of each step.
 """
 
 import math
+from typing import ClassVar
 
 import numpy as np
 from Box2D import b2CircleShape, b2Filter, b2FixtureDef, b2MassData, b2PolygonShape, b2Vec2, b2World
@@ -35,6 +36,11 @@ class Box2D:
     order = 1
     scale = 100.0  # units a metre
     timeout = 300.0
+    expected_failures: ClassVar = {
+        "order-before-impacts": "the slice that rests on the base is pressed with 49 m/s^2 and gains 1 unit/s, Box2D's "
+        "velocity threshold, in 0.2 ms: in longer steps it rebounds, in shorter ones it rests, and errors change by a "
+        "factor of four in between; with e = 0, and on either side, the order is 1"
+    }
 
     def solve(self, ask):
         """Answer at the times asked, with steps of at most ``ask.effort`` seconds."""
@@ -140,3 +146,7 @@ class Box2DSI(Box2D):
 
     name = "box2d-si"
     scale = 1.0
+    expected_failures: ClassVar = {
+        "restitution": "impacts slower than 1 unit/s do not rebound in Box2D",
+        "equation": "free flight in which slow impacts do not rebound is no equation of the ladder",
+    }

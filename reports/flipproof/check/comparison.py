@@ -53,6 +53,26 @@ class Comparison:
     apart: tuple[Apart, ...]
     notes: tuple[str, ...]
 
+    def to_mapping(self) -> dict[str, object]:
+        """Return labels, notes and, for each quantity, the largest difference, its time and what it is divided by."""
+        rows = [(one, int(one.size.argmax())) for one in self.apart]
+        return {
+            "first": self.first,
+            "second": self.second,
+            "notes": list(self.notes),
+            "differences": [
+                {
+                    "quantity": one.quantity,
+                    "unit": "omega_0" if one.quantity == "omega" else UNITS[one.quantity],
+                    "largest": float(one.size[k]),
+                    "time": float(one.t[k]),
+                    "times": len(one.t),
+                    "interpolated": one.interpolated,
+                }
+                for one, k in rows
+            ],
+        }
+
 
 def compare(first: Curve, second: Curve) -> Comparison:
     """Compare two curves; omega is taken relative to the first curve's initial value.

@@ -14,7 +14,7 @@ import json
 import math
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -95,6 +95,10 @@ class Comparison:
         count, apart = len(self.differences), len(self.changes) - len(self.differences)
         words = f"{self.compared} findings compared: " + (f"{count} differ" if count else "no difference")
         return words + (f", {apart} not comparable" if apart else "")
+
+    def to_mapping(self) -> dict[str, object]:
+        """Return the comparison as JSON-ready data."""
+        return asdict(self) | {"same": self.same, "conclusion": self.conclusion}
 
     @property
     def text(self) -> str:

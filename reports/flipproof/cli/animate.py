@@ -49,6 +49,8 @@ def command_animate(options: argparse.Namespace) -> int:
         run = solve(name, throw)
         if len(run.t) < 2:
             raise ValueError(f"--solvers {name}: nothing to show on this throw: {run.status}: {run.message}")
+        if "r_cm" in run.diagnostics.get("not_given", ()):
+            raise ValueError(f"--solvers {name}: gives neither r nor r_cm; a picture needs one of them")
         runs.append(run)
     film = film_of(runs, times, fps=options.fps, slow=options.slow)
     with tqdm(total=len(times), desc="drawing", unit="frame", disable=hide, leave=False) as bar:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
@@ -69,6 +70,20 @@ def check_writable(option: str, path: Path) -> None:
         raise ValueError(f"{option} {path} is a folder; name a file")
     if not path.parent.is_dir():
         raise ValueError(f"{option} {path}: the folder {path.parent} does not exist")
+
+
+def add_json(command: argparse.ArgumentParser, what: str) -> None:
+    """Add ``--json FILE``."""
+    command.add_argument("--json", type=Path, metavar="FILE", help=f"write {what} as JSON, too")
+
+
+def write_json(path: Path | None, mapping: Mapping[str, Any]) -> None:
+    """Write a mapping into the file that ``--json`` names, if any; what JSON cannot say becomes text."""
+    if path is not None:
+        from flipproof.output.columns import json_ready
+        from flipproof.output.folder import write_text
+
+        write_text(path, json.dumps(json_ready(mapping), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 
 
 def read_scenario(path: str | None, slices: int | None = None) -> Any:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.cli.arguments import add_command, add_no_cache, check_writable
+from flipproof.cli.arguments import add_command, add_json, add_no_cache, check_writable, write_json
 
 TOLERANCE_HELP: Final = (
     "what a finding may move beyond its bands, in its own unit (default 1e-6: round-off of another machine; 0 for the "
@@ -24,6 +24,8 @@ def add_checks(commands: Any) -> None:
         "--html", type=Path, metavar="FILE", help="write the comparison as one page, too, with the curves of both"
     )
 
+    add_json(diff, "the comparison")
+
     check = add_command(commands, "check", "Check a throw in a few seconds, one line per claim.", command_check)
     check.add_argument("scenario", metavar="SCENARIO.toml", help="scenario file (TOML with [scenario] and [bottle])")
     check.add_argument(
@@ -35,6 +37,7 @@ def add_checks(commands: Any) -> None:
         "--only", type=_groups, metavar="LIST", help="some of ice,vectors,convergence,reference,thresholds, "
         "and of other chapters that can be checked (default: all; thresholds only with --baseline)",
     )  # fmt: skip
+    add_json(check, "the findings")
     add_no_cache(check)
     check.add_argument("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML, too")
 
@@ -43,6 +46,8 @@ def command_diff(options: argparse.Namespace) -> int:
     """Print what differs; return 1 if anything does."""
     if options.html:
         check_writable("--html", options.html)
+    if options.json:
+        check_writable("--json", options.json)
     from flipproof.check.diff import TOLERANCE, compare_summaries, read_summary
 
     old, new = read_summary(options.old), read_summary(options.new)
@@ -52,6 +57,7 @@ def command_diff(options: argparse.Namespace) -> int:
         from flipproof.output.folder import write_text
 
         write_text(options.html, diff_page(options.old, options.new, old, new, found))
+    write_json(options.json, found.to_mapping())
     print(found.text)
     return 0 if found.same else 1
 
@@ -68,6 +74,8 @@ def command_check(options: argparse.Namespace) -> int:
         raise ValueError("--only thresholds: needs --baseline, the summary.json of a report of this throw")
     if options.junit:
         check_writable("--junit", options.junit)
+    if options.json:
+        check_writable("--json", options.json)
     from flipproof.check.diff import TOLERANCE
     from flipproof.check.throw import check
     from flipproof.frame.store import RunStore, default_place
@@ -84,6 +92,7 @@ def command_check(options: argparse.Namespace) -> int:
         from flipproof.output.junit import junit_text
 
         write_text(options.junit, junit_text(found.findings, "flipproof check"))
+    write_json(options.json, {"findings": [one.to_mapping() for one in found.findings], "conclusion": found.conclusion})
     say(found.conclusion)
     return 1 if found.failed else 0
 

@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 from typing import Any
 
-from flipproof.cli.arguments import SCENARIO_HELP, add_command, check_writable, count, read_scenario
+from flipproof.cli.arguments import (
+    SCENARIO_HELP,
+    add_command,
+    add_json,
+    check_writable,
+    count,
+    read_scenario,
+    write_json,
+)
 from flipproof.cli.check import tolerance
 
 
@@ -24,6 +33,7 @@ def add_compare(commands: Any) -> None:
         "--tolerance", type=tolerance, metavar="X", help="end with status 1 if the largest difference in omega exceeds "
         "X omega_0; without omega in both, in theta X rad; without theta, in r_cm X m",
     )  # fmt: skip
+    add_json(compare, "both curves' differences")
     compare.add_argument("--junit", type=Path, metavar="FILE", help="write that verdict as JUnit XML, too")
 
 
@@ -33,6 +43,8 @@ def command_compare(options: argparse.Namespace) -> int:
         if options.tolerance is None:
             raise ValueError(f"--junit {options.junit} needs --tolerance: without it no comparison can fail")
         check_writable("--junit", options.junit)
+    if options.json:
+        check_writable("--json", options.json)
     from flipproof.check.comparison import claims, compare, table
     from flipproof.frame.solvers import find, solve
     from flipproof.output.tables import Curve, read_curve
@@ -52,9 +64,11 @@ def command_compare(options: argparse.Namespace) -> int:
 
     found = compare(load(options.first), load(options.second))
     print(table(found))
+    allowed = math.inf if options.tolerance is None else options.tolerance
+    held = claims(found, allowed)
+    write_json(options.json, {**found.to_mapping(), "findings": [finding.to_mapping() for finding in held]})
     if options.tolerance is None:
         return 0
-    held = claims(found, options.tolerance)
     if options.junit:
         from flipproof.output.folder import write_text
         from flipproof.output.junit import junit_text

@@ -6,10 +6,19 @@ import argparse
 import json
 import sys
 from contextlib import closing
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, read_scenario
+from flipproof.cli.arguments import (
+    SCENARIO_HELP,
+    add_command,
+    add_json,
+    check_writable,
+    count,
+    read_scenario,
+    write_json,
+)
 
 SPEC_HELP = (
     "a name that flipproof models lists, package.module:name, file.py:name, csv:file.csv or "
@@ -24,7 +33,7 @@ def add_foreign(commands: Any) -> None:
     )
     _add_spec(certify)
     certify.add_argument("--equation", metavar="E", help="hold it to this equation, whatever it declares")
-    certify.add_argument("--json", type=Path, metavar="FILE", help="write the passport: traits, results, versions")
+    add_json(certify, "the passport (traits, results, versions)")
     certify.add_argument("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML")
 
     place = add_command(commands, "place", "Find out which equation a solver solves, and how well.", command_place)
@@ -47,13 +56,13 @@ def add_foreign(commands: Any) -> None:
 
     grade = add_command(commands, "grade", "Judge the answers in a kit.", command_grade)
     grade.add_argument("folder", type=Path, metavar="DIR", help="the folder that flipproof kit made")
-    grade.add_argument("--json", type=Path, metavar="FILE", help="write the passport")
+    add_json(grade, "the passport")
 
     power = add_command(
         commands, "power", "Plant known mistakes in a good solver; which checks see them?", command_power
     )
     power.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
-    power.add_argument("--out", type=Path, metavar="DIR", help="also write power.csv, power.svg and power.png there")
+    power.add_argument("--out", type=Path, metavar="DIR", help="also write power.csv, .svg, .png and junit.xml there")
 
 
 def print_offered() -> None:
@@ -66,6 +75,19 @@ def print_offered() -> None:
     for name, point in sorted(points.items()):
         owner = f"{point.dist.name} {point.dist.version}" if point.dist else "an unnamed package"
         print(f"  {name}\n      {point.value}, from {owner}")
+
+
+def print_offered_json() -> None:
+    """Print every solver, flipproof's own and those that installed packages offer, as JSON."""
+    from flipproof.foreign.specs import offered
+    from flipproof.frame.solvers import catalogue
+
+    points = {
+        name: {"object": point.value, "distribution": point.dist.name if point.dist else None}
+        for name, point in sorted(offered().items())
+    }
+    own = {solver.name: asdict(solver) for solver in catalogue().values()}
+    print(json.dumps({"solvers": own, "offered": points}, indent=1, ensure_ascii=False))
 
 
 def _add_spec(command: argparse.ArgumentParser) -> None:
@@ -83,12 +105,12 @@ def command_certify(options: argparse.Namespace) -> int:
 
     if options.equation is not None:
         check_equation(options.equation)
-    for path in (options.json, options.junit):
-        if path is not None and (path.is_dir() or not path.parent.is_dir()):
-            raise ValueError(f"{path} cannot be written: {'it is a folder' if path.is_dir() else 'no such folder'}")
+    for name in ("json", "junit"):
+        if getattr(options, name) is not None:
+            check_writable(f"--{name}", getattr(options, name))
     with closing(opened(options.spec, options.timeout)) as runner:
         found = certify(runner, equation=options.equation, say=lambda result: print(result.line, flush=True))
-    _write_passport(found, options.json)
+    write_json(options.json, found.to_mapping())
     if options.junit is not None:
         from flipproof.foreign.verdicts import junit_of
         from flipproof.output.folder import write_text
@@ -96,13 +118,6 @@ def command_certify(options: argparse.Namespace) -> int:
         write_text(options.junit, junit_of(found))
     print(found.conclusion)
     return 1 if found.failed else 0
-
-
-def _write_passport(found: Any, path: Path | None) -> None:
-    if path is not None:
-        from flipproof.output.folder import write_text
-
-        write_text(path, json.dumps(found.to_mapping(), indent=1, ensure_ascii=False) + "\n")
 
 
 def command_place(options: argparse.Namespace) -> int:
@@ -158,7 +173,7 @@ def command_grade(options: argparse.Namespace) -> int:
     found, waiting = Kit(options.folder).grade()
     for result in found.results:
         print(result.line)
-    _write_passport(found, options.json)
+    write_json(options.json, found.to_mapping())
     print(found.conclusion)
     if waiting:
         print(f"{waiting} checks wait for answers in {options.folder / 'asks'}; grade again when they are there")
@@ -167,8 +182,10 @@ def command_grade(options: argparse.Namespace) -> int:
 
 def command_power(options: argparse.Namespace) -> int:
     """Print a line a mistake; return 1 if one is caught by no check, or the clean solver by any."""
-    from flipproof.foreign.power import CLEAN, detect_all
+    from flipproof.foreign.power import claim_power, detect_all, matrix_csv
     from flipproof.frame.pool import workers
+    from flipproof.output.folder import write_text
+    from flipproof.output.junit import junit_text
 
     def say(caught: Any) -> None:
         seen = ", ".join(caught.checks) or "no check"
@@ -179,17 +196,17 @@ def command_power(options: argparse.Namespace) -> int:
     if options.out is not None:
         from flipproof.figures.power import figure_power
         from flipproof.figures.style import draw
-        from flipproof.foreign.power import matrix_csv
-        from flipproof.output.folder import write_text
 
         options.out.mkdir(parents=True, exist_ok=True)
         drawing = draw(figure_power(found))
         write_text(options.out / "power.csv", matrix_csv(found))
         write_text(options.out / "power.svg", drawing.svg)
         (options.out / "power.png").write_bytes(drawing.png)
-    missed = [c.mistake for c in found if c.mistake != CLEAN and not c.checks]
-    wrong = [c for c in found if c.mistake == CLEAN and c.checks]
-    print(f"{len(found) - 1} mistakes planted, {len(found) - 1 - len(missed)} caught; the clean solver: "
-          f"{'accused' if wrong else 'passed by all'}")  # fmt: skip
+    claims = claim_power(found)
+    for claim in claims:
+        verdict = "FAIL" if claim.failed else "PASS"
+        print(f"{verdict}  {claim.title}: {claim.value:g} {claim.unit} {claim.note}".rstrip())
+    if options.out is not None:
+        write_text(options.out / "junit.xml", junit_text(claims, "flipproof power"))
     sys.stdout.flush()
-    return 1 if missed or wrong else 0
+    return 1 if any(claim.failed for claim in claims) else 0

@@ -34,7 +34,7 @@ from flipproof.cli.check import add_checks
 from flipproof.cli.compare import add_compare
 from flipproof.cli.console import readable, speak_plainly
 from flipproof.cli.fit import add_fit
-from flipproof.cli.foreign import add_foreign, print_offered
+from flipproof.cli.foreign import add_foreign, print_offered, print_offered_json
 from flipproof.cli.paper import add_paper
 from flipproof.cli.start import INTERRUPTED, INTERRUPTED_WORDS, SIGNALS
 from flipproof.cli.sweeps import add_sweeps
@@ -166,6 +166,16 @@ def parser() -> argparse.ArgumentParser:
         "--slices", type=count, metavar="N", help="slices at which solvers are compared (default 50, or the file's "
         "number if smaller)",
     )  # fmt: skip
+    report.add_argument(
+        "--with",
+        dest="guests",
+        action="append",
+        default=[],
+        metavar="SPEC",
+        help="certify another solver, such as mine.py:solve, and hold it against all others; may be repeated; a check "
+        "that it fails is a claim that fails",
+    )
+    report.add_argument("--timeout", type=count, metavar="S", help="seconds one run of a --with solver may take")
     report.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
     add_no_cache(report)
     report.add_argument("--png", action="store_true", help="also write every figure as PNG, beside the SVG")
@@ -193,7 +203,8 @@ def parser() -> argparse.ArgumentParser:
     add_fit(commands)
     add_animate(commands)
     add_foreign(commands)
-    add_command(commands, "models", "List every scheme, model and engine.", command_models)
+    models = add_command(commands, "models", "List every scheme, model and engine.", command_models)
+    models.add_argument("--json", action="store_true", help="print JSON")
     return top
 
 
@@ -213,6 +224,7 @@ def command_report(options: argparse.Namespace) -> int:
     from flipproof.page.pdf import print_page, require_browser
 
     check_replaceable(options.out, "report")
+    _check_guests(options.guests)
     if options.pdf:
         require_browser()
 
@@ -245,14 +257,29 @@ def command_report(options: argparse.Namespace) -> int:
                 bar.set_postfix_str(label, refresh=False)
                 bar.update(made - bar.n)
 
-            gathered = gather_report(ask, progress, options.jobs, Stages(say), store, pool)
+            work = {"guests": (tuple(options.guests), options.timeout)} if options.guests else {}
+            gathered = gather_report(ask, progress, options.jobs, Stages(say), store, pool, work=work)
             facts = provenance(command) | store.facts()
             report = build(gathered, facts, pool=store.remembering(pool), png=options.png)
         write(report, folder)
         if options.pdf:
             print_page(folder / "index.html", folder / "report.pdf")
+    guests = gathered.found("guests")
+    for guest in guests.guests if guests is not None else ():
+        found = guest.visit.certificate
+        print(f"{guest.label}: {found.conclusion if found else '; '.join(guest.visit.problems.values())}")
     _print_report(report, options.out, time.perf_counter() - began)
     return 1 if report.failed else 0
+
+
+def _check_guests(specs: Sequence[str]) -> None:
+    """Refuse, before the work begins, a spec that names nothing or is there twice; no foreign code runs."""
+    from flipproof.frame.solvers import find
+
+    for spec in specs:
+        find(spec)
+        if specs.count(spec) > 1:
+            raise ValueError(f"--with {spec} is there twice")
 
 
 def _print_report(report: Any, out: Path, seconds: float) -> None:
@@ -298,11 +325,13 @@ def command_simulate(options: argparse.Namespace) -> int:
 
 def command_models(options: argparse.Namespace) -> int:
     """List every solver with its equation and the reason it is there."""
-    del options
     import textwrap
 
     from flipproof.frame.solvers import catalogue
 
+    if options.json:
+        print_offered_json()
+        return 0
     package = ""
     for solver in catalogue().values():
         if solver.package != package:

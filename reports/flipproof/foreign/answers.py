@@ -152,24 +152,18 @@ def _impacts_of(given: object, n_slices: int) -> Impacts:
 def trajectory_of(ask: Ask, answer: Answer, traits: Traits) -> Trajectory:
     """Return an answer as a Trajectory of method ``traits.name``, for comparison with every other solver.
 
-    Where the solver gave neither r nor inertia, inertia is what the conserved angular momentum implies,
-    J_0 omega_0 / omega; ``diagnostics["implied"]`` names it then.
-
-    Raises
-    ------
-    AnswerError
-        If neither r nor r_cm was given, or neither r nor inertia and omega is zero somewhere.
+    ``diagnostics["not_given"]`` names what the solver did not give: inertia is then what the conserved angular momentum
+    implies, J_0 omega_0 / omega, and r_cm what it was at release; neither is shown or compared.
     """
-    n = ask.scenario.n_slices
-    inertia, r_cm = answer.inertia, answer.r_cm
-    implied = ["inertia"] if inertia is None else []
+    r_cm, inertia = answer.r_cm, answer.inertia
     if r_cm is None:
-        raise AnswerError("neither r nor r_cm was given; a trajectory needs one of them")
+        r_cm = np.full(len(answer.t), float(centre_of_mass(ask.scenario, ask.start)))
     if inertia is None:
-        if not np.all(answer.omega):
-            raise AnswerError("omega = 0 rad/s somewhere and no inertia was given: angular momentum is not conserved")
-        j0 = float(moment_of_inertia(ask.scenario, ask.start))
-        inertia = j0 * ask.scenario.omega0 / answer.omega
+        turning = np.where(answer.omega == 0.0, ask.scenario.omega0, answer.omega)
+        inertia = float(moment_of_inertia(ask.scenario, ask.start)) * ask.scenario.omega0 / turning
+    r, v = answer.r, answer.v
+    if r is None or v is None:
+        r = v = np.empty((0, ask.scenario.n_slices))
     return Trajectory(
         scenario=ask.scenario,
         solver="foreign",
@@ -177,11 +171,11 @@ def trajectory_of(ask: Ask, answer: Answer, traits: Traits) -> Trajectory:
         t=answer.t,
         theta=answer.theta,
         omega=answer.omega,
-        r=np.empty((0, n)) if answer.r is None or answer.v is None else answer.r,
-        v=np.empty((0, n)) if answer.r is None or answer.v is None else answer.v,
+        r=r,
+        v=v,
         r_cm=r_cm,
         inertia=inertia,
         impacts=answer.impacts,
         settings={"spec": traits.name, "effort": ask.effort, **ask.options},
-        diagnostics={"implied": implied},
+        diagnostics={"not_given": [name for name in PER_TIME if getattr(answer, name) is None]},
     )

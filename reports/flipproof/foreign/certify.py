@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Final
@@ -11,9 +11,8 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.foreign import checks_basic, checks_equation, checks_impacts, checks_order
-from flipproof.foreign.answers import Answer
-from flipproof.foreign.checking import Check, Found, NotApplicableError
-from flipproof.foreign.contract import Ask, Traits
+from flipproof.foreign.checking import Check, Found, NotApplicableError, drive
+from flipproof.foreign.contract import Traits
 from flipproof.foreign.specs import ForeignError, Runner, WaitingError
 
 PASSED: Final = "passed"
@@ -55,15 +54,19 @@ class Result:
 
     @property
     def line(self) -> str:
-        """One line: verdict, check, what came against what was expected, where, and what to do if it failed."""
-        head = f"{self.verdict:17} {self.check:21}"
+        """One line: verdict, check and ``words``."""
+        return f"{self.verdict:17} {self.check:21} {self.words}"
+
+    @property
+    def words(self) -> str:
+        """What came against what was expected, where, and what to do if it failed; or why there are no numbers."""
         if self.found is None:
-            return f"{head} {self.reason}"
+            return self.reason
         said = f"{self.found.came} (expected: {self.found.expected})"
         place = f"; {self.found.where}" if self.found.where else ""
         advice = f"; {self.found.advice}" if self.verdict == FAILED and self.found.advice else ""
         known = f"; known: {self.reason}" if self.reason else ""
-        return f"{head} {said}{place}{advice}{known}"
+        return f"{said}{place}{advice}{known}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,30 +178,6 @@ def _result(name: str, traits: Traits, runner: Runner) -> Result:
         unexpected = f"declared as a failure ({known}), but holds" if known else ""
         return Result(check=name, verdict=PASSED, title=title, found=found, reason=unexpected)
     return Result(check=name, verdict=EXPECTED if known else FAILED, title=title, found=found, reason=known or "")
-
-
-def drive(making: Iterator[Any], runner: Callable[[Ask], Answer]) -> Found:
-    """Drive a check to its end, asking ``runner`` whatever it yields."""
-    try:
-        asks: Sequence[Ask] = next(making)
-        while True:
-            asks = making.send(_answers(asks, runner))  # type: ignore[attr-defined]
-    except StopIteration as end:
-        found: Found = end.value
-        return found
-
-
-def _answers(asks: Sequence[Ask], runner: Callable[[Ask], Answer]) -> list[Answer]:
-    """Return an answer to each ask; where answers are written by hand, all asks are put before any is waited for."""
-    answers, waiting = [], None
-    for ask in asks:
-        try:
-            answers.append(runner(ask))
-        except WaitingError as why:
-            waiting = waiting or why
-    if waiting is not None:
-        raise waiting
-    return answers
 
 
 def versions() -> dict[str, str]:

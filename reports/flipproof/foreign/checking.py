@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
 from flipproof.foreign.answers import Answer
 from flipproof.foreign.contract import Ask, Traits
+from flipproof.foreign.specs import WaitingError
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
@@ -47,6 +48,7 @@ class Found:
     facts: Mapping[str, Any] = field(default_factory=dict)
 
 
+Result = TypeVar("Result")
 Making = Generator[Sequence[Ask], Sequence[Answer], Found]
 Check = Callable[[Traits], Making]
 
@@ -80,3 +82,27 @@ def shift(one: Answer, other: Answer, scale: float) -> float:
 def when(times: FloatArray, values: FloatArray) -> str:
     """Return at which time the largest of ``values`` lies, as a phrase."""
     return f"t = {times[int(np.argmax(values))]:.4g} s"
+
+
+def drive(making: Generator[Sequence[Ask], Sequence[Answer], Result], runner: Callable[[Ask], Answer]) -> Result:
+    """Drive a generator of asks to its end, asking ``runner`` whatever it yields, and return what it found."""
+    try:
+        asks = next(making)
+        while True:
+            asks = making.send(_answers(asks, runner))
+    except StopIteration as end:
+        found: Result = end.value
+        return found
+
+
+def _answers(asks: Sequence[Ask], runner: Callable[[Ask], Answer]) -> list[Answer]:
+    """Return an answer to each ask; where answers are written by hand, all asks are put before any is waited for."""
+    answers, waiting = [], None
+    for ask in asks:
+        try:
+            answers.append(runner(ask))
+        except WaitingError as why:
+            waiting = waiting or why
+    if waiting is not None:
+        raise waiting
+    return answers

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from flipproof.chapters.vectors.published import Vector, load_all
 from flipproof.foreign.answers import Answer
-from flipproof.foreign.checking import Found, Making, NotApplicableError, ask_of
+from flipproof.foreign.checking import Found, Making, NotApplicableError
 from flipproof.foreign.contract import Ask, Traits
-from flipproof.foreign.place import LEVEL, LIMITS, THROWS, lattice, located, name_of, switches_of
+from flipproof.foreign.place import LIMITS, THROWS, name_of, placing, switches_of
 
 VECTOR = 1e-8
 """Largest relative difference to a published number; flipproof's own schemes keep to 1e-10."""
@@ -54,10 +52,7 @@ def _off(vector: Vector, answer: Answer, column: str) -> float:
 
 def check_equation(traits: Traits) -> Making:
     """The solver is nearest to the equation it declares, and no farther from it than its own error explains."""
-    levels = (LEVEL, LEVEL - 1, LEVEL - 2) if traits.refined_by is not None else (LEVEL,)
-    answers = yield [ask_of(traits, throw, level) for level in levels for throw in THROWS]
-    curves = [_curves(answers[k : k + len(THROWS)]) for k in range(0, len(answers), len(THROWS))]
-    found = located(traits.name, curves[0], curves[1:], lattice(), traits.epsilon)
+    found = yield from placing(traits)
     facts = {"place": found.to_mapping()}
     if traits.equation is None:
         raise NotApplicableError(f"none is declared; {found.text}")
@@ -71,11 +66,7 @@ def check_equation(traits: Traits) -> Making:
         holds=found.equation == declared and found.on_lattice,
         expected=declared,
         came=found.text,
-        where=f"two throws of {THROWS[0].duration:g} s",
+        where=f"{len(THROWS)} throws of {THROWS[0].duration:g} to {THROWS[-1].duration:g} s",
         advice="flipproof explain compares it with the declared equation, switch by switch",
         facts=facts,
     )
-
-
-def _curves(answers: Sequence[Answer]) -> tuple[np.ndarray, ...]:
-    return tuple(answer.omega / throw.omega0 for answer, throw in zip(answers, THROWS, strict=True))

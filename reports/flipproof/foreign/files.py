@@ -16,6 +16,7 @@ import numpy as np
 
 from flipproof.foreign.answers import PER_SLICE, Answer, AnswerError, answer_of
 from flipproof.foreign.contract import TIMEOUT, Ask, Traits
+from flipproof.foreign.isolated import PATIENCE
 from flipproof.foreign.specs import COMMAND, CSV, ForeignError
 
 FIELDS: Final = ("scenario", "times", "start", "effort", "out")
@@ -103,11 +104,14 @@ class Command:
             raise ValueError(f"solver {spec!r}: a command must hold {{out}}, the CSV file that it is to write")
         effort = any("{effort" in word for word in self.words)
         self.timeout = timeout or TIMEOUT
+        self._late = 0
         name = next((Path(w).name for w in self.words[1:] if not w.startswith(("-", "{"))), Path(self.words[0]).name)
         self.traits = Traits(name=name, refined_by="dt" if effort else None, timeout=self.timeout)
 
     def __call__(self, ask: Ask) -> Answer:
         """Return the checked answer."""
+        if self._late >= PATIENCE:
+            raise ForeignError(f"not asked: {PATIENCE} runs in a row gave no answer in time")
         with tempfile.TemporaryDirectory(prefix="flipproof-") as scratch:
             values = write_ask(ask, Path(scratch))
             words = self.words
@@ -132,7 +136,9 @@ class Command:
                 raise ForeignError(f"{words[0]} cannot be started ({error.strerror or error})") from None
             try:
                 status = process.wait(timeout=self.timeout)
+                self._late = 0
             except subprocess.TimeoutExpired:
+                self._late += 1
                 raise ForeignError(f"no answer within {self.timeout:g} s; the program was ended") from None
             finally:
                 if process.poll() is None:

@@ -23,6 +23,9 @@ LOADING: Final = 60.0
 KEPT: Final = 4096
 """Bytes of what a solver prints that are kept, from the end."""
 
+PATIENCE: Final = 2
+"""Runs in a row without an answer in time after which a solver is not asked again."""
+
 MOST_IMPACTS: Final = 10_000_000
 """Impacts of one answer at the most."""
 
@@ -40,6 +43,7 @@ class Isolated:
         self.spec, self.timeout = spec, timeout
         self._process: subprocess.Popen[bytes] | None = None
         self._traits: Traits | None = None
+        self._late = 0
 
     @property
     def traits(self) -> Traits:
@@ -58,6 +62,8 @@ class Isolated:
             One line: what the solver raised or returned, how its process ended, or that its time was up.
         """
         traits = self.traits
+        if self._late >= PATIENCE:
+            raise ForeignError(f"not asked: {PATIENCE} runs in a row gave no answer in time")
         if self._process is None:
             self._start()
         header = {"scenario": ask.scenario.to_mapping(), "effort": ask.effort, "options": dict(ask.options)}
@@ -65,6 +71,7 @@ class Isolated:
         points = len(ask.times)
         most = 8 * (points * (len(REQUIRED) + len(PER_TIME) + 2 * ask.scenario.n_slices) + 5 * MOST_IMPACTS)
         header, arrays = self._exchange(header, {"times": ask.times, "start": ask.start}, limit, most)
+        self._late = 0
         if "reason" in header:
             raise ForeignError(str(header["reason"]))
         fields: dict[str, Any] = {name: array for name, array in arrays.items() if "." not in name}
@@ -136,6 +143,7 @@ class Isolated:
         try:
             reply = replies.get(timeout=limit)
         except queue.Empty:
+            self._late += 1
             self.close()
             raise ForeignError(f"no answer within {limit:g} s; the process was ended") from None
         if isinstance(reply, Exception):

@@ -1,13 +1,14 @@
 """Which equation a solver solves: the nearest of the 64 of the ladder, how near, and what else it might be.
 
-Two short throws are asked for, chosen so that all equations that differ at all differ by 0.007 of omega_0 or more in
-omega(t) on at least one of them. Of the 64 sets of switches 40 are different equations: without signs nothing drags,
-and where the tube moves the drag acts on it, so that "drag_on_centre" has no effect there.
+Three short throws are asked for, chosen so that all equations that differ at all differ by 0.029 of omega_0 or more in
+omega(t) on at least one of them; each is judged by what the solver's own answers still change there. Of the 64 sets of
+switches 40 are different equations: without signs nothing drags, and where the tube moves the drag acts on it, so that
+"drag_on_centre" has no effect there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from itertools import pairwise
@@ -18,7 +19,8 @@ import numpy as np
 
 from flipproof.chapters.waterfall.study import canonical
 from flipproof.foreign.answers import Answer
-from flipproof.foreign.checking import ask_of, times_of
+from flipproof.foreign.checking import ask_of, drive, times_of
+from flipproof.foreign.contract import Ask, Traits
 from flipproof.foreign.specs import Runner
 from flipproof.frame.solvers import solve
 from ode_reference.models import MODELS
@@ -27,14 +29,15 @@ from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
 
-def _throw(n_slices: int, water_mass: float, rate: float) -> Scenario:
-    """Return a throw of 0.2 s with damping rate ``rate`` [1/s]; otherwise the paper's own."""
-    throw = Scenario(water_mass=water_mass, n_slices=n_slices, duration=0.2)
+def _throw(n_slices: int, water_mass: float, rate: float, omega0: float, duration: float) -> Scenario:
+    """Return a throw with damping rate ``rate`` [1/s]; otherwise the paper's own."""
+    throw = Scenario(water_mass=water_mass, n_slices=n_slices, omega0=omega0, duration=duration)
     return replace(throw, drag=2 * rate * throw.slice_mass)
 
 
-THROWS: Final = (_throw(3, 0.35, 6.0), _throw(4, 0.45, 4.0))
-"""The throws that tell equations apart: drag, gravity, and impacts on both ends."""
+THROWS: Final = (_throw(3, 0.35, 6.0, 20.0, 0.2), _throw(4, 0.45, 4.0, 20.0, 0.2), _throw(3, 0.7, 1.0, 6.0, 0.5))
+"""The throws that tell equations apart: two with drag, gravity and impacts on both ends, and a slow one in which slices
+rest on an end and leave it, and in which a restitution 10 % low changes omega by 0.01 of omega_0."""
 
 LEVEL: Final = 3
 """Refinement at which a solver is placed; its own change is the larger one of the two refinements before it."""
@@ -66,7 +69,8 @@ class Place:
     solver : str
     equation : str - the nearest equation, by its name on the ladder if it has one
     switches : Switches - of it
-    distance : float - largest difference of omega(t) to it, fraction of omega_0
+    distance : float - largest difference of omega(t) to it, fraction of omega_0, on the throw where it exceeds what
+        the solver's own change there explains most
     change : float or None - the same between two refinements of the solver; None if it cannot be refined
     following : str, and following_distance : float - the next equation that is a different one
     inert : tuple of str - switches without effect in the nearest equation
@@ -88,8 +92,7 @@ class Place:
     @property
     def room(self) -> float:
         """Distance that the solver's own error explains, fraction of omega_0."""
-        floor = max(FLOOR, 64 * self.epsilon)
-        return floor + (SURE * self.change if self.change is not None else self.following_distance / 5)
+        return _room(self.change, self.following_distance, self.epsilon)
 
     @property
     def on_lattice(self) -> bool:
@@ -178,13 +181,18 @@ def place(runner: Runner) -> Place:
     ForeignError
         If the solver gives no answer.
     """
-    traits = runner.traits
-    answers = [runner(ask_of(traits, throw, LEVEL)) for throw in THROWS]
-    curves = tuple(answer.omega / throw.omega0 for answer, throw in zip(answers, THROWS, strict=True))
-    levels = (LEVEL - 1, LEVEL - 2) if traits.refined_by is not None else ()
-    coarser = [tuple(runner(ask_of(traits, throw, level)).omega / throw.omega0 for throw in THROWS) for level in levels]
-    references: Mapping[Switches, tuple[FloatArray, ...]] = lattice()
-    return located(traits.name, curves, coarser, references, traits.epsilon)
+    return drive(placing(runner.traits), runner)
+
+
+def placing(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], Place]:
+    """Yield the asks by which a solver is placed, at its finest level and two before it; return its place."""
+    levels = (LEVEL, LEVEL - 1, LEVEL - 2) if traits.refined_by is not None else (LEVEL,)
+    answers = yield [ask_of(traits, throw, level) for level in levels for throw in THROWS]
+    rows = [answers[k : k + len(THROWS)] for k in range(0, len(answers), len(THROWS))]
+    finest, *coarser = (
+        tuple(answer.omega / throw.omega0 for answer, throw in zip(row, THROWS, strict=True)) for row in rows
+    )
+    return located(traits.name, finest, coarser, lattice(), traits.epsilon)
 
 
 def located(
@@ -195,17 +203,21 @@ def located(
     epsilon: float,
 ) -> Place:
     """Return the place of curves among references; all are omega/omega_0 on the same throws and times."""
-    distances = {s: _distance(curves, reference) for s, reference in references.items()}
+    distances = {s: max(_apart(curves, reference)) for s, reference in references.items()}
     nearest = min(distances, key=lambda s: (distances[s], s.name))
     following = min((s for s in distances if s != nearest), key=lambda s: (distances[s], s.name))
     still = max(float(np.max(np.abs(c - 1.0))) for c in curves)
-    refined = [curves, *coarser]
-    change = max((_distance(a, b) for a, b in pairwise(refined)), default=None)
+    steps = [_apart(a, b) for a, b in pairwise([curves, *coarser])]
+    changes = [max(of_throw) for of_throw in zip(*steps, strict=True)] if steps else [None] * len(curves)
+    distance, change = max(
+        zip(_apart(curves, references[nearest]), changes, strict=True),
+        key=lambda found: found[0] / _room(found[1], distances[following], epsilon),
+    )
     return Place(
         solver=solver,
         equation=name_of(nearest),
         switches=nearest,
-        distance=distances[nearest],
+        distance=distance,
         change=change,
         following=name_of(following),
         following_distance=distances[following],
@@ -220,5 +232,11 @@ def located(
     )
 
 
-def _distance(one: tuple[FloatArray, ...], other: tuple[FloatArray, ...]) -> float:
-    return max(float(np.max(np.abs(a - b))) for a, b in zip(one, other, strict=True))
+def _apart(one: tuple[FloatArray, ...], other: tuple[FloatArray, ...]) -> list[float]:
+    """Return the largest difference of two solvers on each throw."""
+    return [float(np.max(np.abs(a - b))) for a, b in zip(one, other, strict=True)]
+
+
+def _room(change: float | None, following: float, epsilon: float) -> float:
+    """Return the distance that a solver's own change explains; where it has none, a fifth of that to the next one."""
+    return max(FLOOR, 64 * epsilon) + (following / 5 if change is None else SURE * change)

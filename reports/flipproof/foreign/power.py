@@ -13,6 +13,7 @@ from flipproof.foreign.contract import Ask, Traits, traits_of
 from flipproof.foreign.mistakes import MISTAKES
 from flipproof.foreign.specs import ForeignError
 from flipproof.foreign.subject import Subject
+from flipproof.frame.findings import Finding
 
 CLEAN: Final = "none"
 
@@ -52,6 +53,33 @@ def detect(name: str, checks: Sequence[str] = tuple(CHECKS)) -> Caught:
     found = certify(InProcess(kind(), name), checks)
     words = "no mistake" if name == CLEAN else (kind.__doc__ or "").partition("\n")[0]
     return Caught(name, words, tuple(r.check for r in found.results if r.verdict == FAILED))
+
+
+def claim_power(found: Sequence[Caught]) -> tuple[Finding, ...]:
+    """Return two claims: every planted mistake is caught by a check, and the solver without one by none."""
+    planted = [caught for caught in found if caught.mistake != CLEAN]
+    missed = [caught.mistake for caught in planted if not caught.checks]
+    accused = [name for caught in found if caught.mistake == CLEAN for name in caught.checks]
+    return (
+        Finding(
+            id="power-caught",
+            title="planted mistakes that at least one check sees",
+            value=float(len(planted) - len(missed)),
+            unit=f"of {len(planted)}",
+            kind="regression",
+            admissible=(float(len(planted)), float(len(planted))),
+            note=f"not seen: {', '.join(missed)}" if missed else "",
+        ),
+        Finding(
+            id="power-clean",
+            title="checks that accuse the solver without a mistake",
+            value=float(len(accused)),
+            unit="",
+            kind="regression",
+            admissible=(0.0, 0.0),
+            note=", ".join(accused),
+        ),
+    )
 
 
 def matrix_csv(found: Sequence[Caught]) -> str:

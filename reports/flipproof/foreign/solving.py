@@ -6,7 +6,7 @@ import atexit
 from functools import cache
 from typing import Any
 
-from flipproof.foreign.answers import AnswerError, trajectory_of
+from flipproof.foreign.answers import trajectory_of
 from flipproof.foreign.checking import effort_of
 from flipproof.foreign.contract import Ask
 from flipproof.foreign.specs import ForeignError, Runner, opened
@@ -30,15 +30,13 @@ def solve(
     Raises
     ------
     ForeignError
-        If it gives no answer, or one from which no trajectory can be made.
+        If it gives no answer.
     """
     runner = _runner(spec)
     given = effort_of(runner.traits, scenario, 0) if effort is None else effort
     ask = Ask.of(scenario, output_times(scenario, times), given, **options)
     try:
         return trajectory_of(ask, runner(ask), runner.traits)
-    except AnswerError as error:
-        raise ForeignError(f"{spec}: {error}") from None
     except ForeignError as error:
         raise type(error)(f"{spec}: {error}") from None
 

@@ -82,6 +82,17 @@ def check_spec(spec: str) -> None:
         locate(spec)
 
 
+def check_asked(spec: str) -> None:
+    """Refuse a curve in a file, which cannot be asked for another throw.
+
+    Raises
+    ------
+    ValueError
+    """
+    if spec.startswith(CSV):
+        raise ValueError(f"solver {spec!r}: a curve cannot be asked; flipproof compare holds it against a solver")
+
+
 def opened(spec: str, timeout: float | None = None, *, curves: bool = False) -> Runner:
     """Return the solver that a spec names, ready to be asked.
 
@@ -102,7 +113,7 @@ def opened(spec: str, timeout: float | None = None, *, curves: bool = False) -> 
         return Own(find(spec))
     if spec.startswith(CSV):
         if not curves:
-            raise ValueError(f"solver {spec!r}: a curve cannot be asked; flipproof compare holds it against a solver")
+            check_asked(spec)
         from flipproof.foreign.files import File
 
         return File(spec)

@@ -25,8 +25,11 @@ from slicemodel.trajectory import FloatArray
 IntArray = NDArray[np.int64]
 
 
-STALLED = 4
-"""Impacts without time between them after which a step goes on; a mistake may cause them without end."""
+MOST_IMPACTS = 500
+"""Impacts of a flight after which it goes on without; a mistake may cause them without end."""
+
+HALVINGS = 42
+"""Halvings of a step by which a rebound is located in it."""
 
 
 class Subject:
@@ -51,6 +54,7 @@ class Subject:
         self.own_inertia = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
         self.frozen = s.frozen
         self.ask = ask
+        self.impacts = 0
         self.side: IntArray = np.zeros(self.n, dtype=np.int64)
         self.momentum = self.inertia(np.array(ask.start)) * s.omega0
 
@@ -172,10 +176,13 @@ class Subject:
         return v
 
     def let_go(self, y: FloatArray) -> FloatArray:
-        """Release the slices that their end no longer presses."""
-        if self.side.any():
-            push = self.side * self.acceleration(y)
-            self.side[(self.side != 0) & (push < 0)] = 0
+        """Release the slices that their end no longer presses, unless it would press them again as soon as they go."""
+        held = self.side.copy()
+        going = held * self.acceleration(y) < 0
+        if going.any():
+            self.side[going] = 0
+            back = going & (held * self.acceleration(y) >= 0)
+            self.side[back] = held[back]
         return y
 
     def struck(self, y: FloatArray) -> IntArray:
@@ -185,19 +192,16 @@ class Subject:
 
     def step(self, y: FloatArray, h: float) -> FloatArray:
         """Return the state after a step with all its rebounds, each at its own time."""
-        stalled = 0
-        while stalled < STALLED:
+        while self.impacts < MOST_IMPACTS:
             new = self.advance(y, h)
             if self.frozen or not self.struck(new).any():
                 return self.let_go(new)
             low, high = 0.0, h
-            for _ in range(60):
-                if high <= 1e-12 * h:
-                    break
+            for _ in range(HALVINGS):
                 middle = (low + high) / 2
                 low, high = (low, middle) if self.struck(self.advance(y, middle)).any() else (middle, high)
+            self.impacts += 1
             at = self.advance(y, high)
-            stalled = stalled + 1 if high <= 1e-9 * h else 0
             y, h = self.meet(at, self.struck(at)), h - high
         return self.advance(y, h)
 

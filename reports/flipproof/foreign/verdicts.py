@@ -7,20 +7,23 @@ from flipproof.frame.findings import Finding
 from flipproof.output.junit import junit_text
 
 
-def findings_of(certificate: Certificate) -> tuple[Finding, ...]:
-    """Return one finding a check: 1 if it holds, 0 if not; expected failures and idle checks are observations."""
+def findings_of(certificate: Certificate, id_: str = "certify-", title: str = "") -> tuple[Finding, ...]:
+    """Return one finding a check, with ``id_`` and ``title`` before its own.
+
+    The value is 1 if it holds, 0 if not; expected failures and idle checks are observations.
+    """
     found = []
     for result in certificate.results:
         idle = result.verdict in (IDLE, EXPECTED)
         found.append(
             Finding(
-                id=f"certify-{result.check}",
-                title=result.title,
+                id=f"{id_}{result.check}",
+                title=f"{title}{result.title}",
                 value=None if result.verdict == IDLE else float(result.verdict != FAILED),
                 unit="",
                 kind="observation" if idle else "regression",
                 admissible=(1.0, 1.0),
-                note=result.line if result.found else result.reason,
+                note=result.words,
             )
         )
     return tuple(found)

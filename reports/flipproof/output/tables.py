@@ -25,10 +25,10 @@ COLUMNS = ("t", "theta", "omega", "r_cm", "inertia")
 def trajectory_csv(trajectory: Trajectory) -> str:
     """Return the run as CSV text: t, theta, omega, r_cm, inertia, then r_i and v_i of every slice if they are stored.
 
-    Slices count from 0. Numbers have 15 significant digits.
+    Slices count from 0. Numbers have 15 significant digits. What a solver did not give is left out.
     """
-    columns = [getattr(trajectory, name) for name in COLUMNS]
-    names = list(COLUMNS)
+    names = [name for name in COLUMNS if name not in trajectory.diagnostics.get("not_given", ())]
+    columns = [getattr(trajectory, name) for name in names]
     if len(trajectory.r) == len(trajectory.t):
         slices = range(trajectory.scenario.n_slices)
         names += [f"r_{i}" for i in slices] + [f"v_{i}" for i in slices]
@@ -58,8 +58,9 @@ class Curve:
 
     @classmethod
     def of(cls, trajectory: Trajectory) -> Curve:
-        """Return the curve of a run."""
-        return cls(trajectory.label, {name: (trajectory.t, getattr(trajectory, name)) for name in QUANTITIES})
+        """Return the curve of a run, without what its solver did not give."""
+        given = [name for name in QUANTITIES if name not in trajectory.diagnostics.get("not_given", ())]
+        return cls(trajectory.label, {name: (trajectory.t, getattr(trajectory, name)) for name in given})
 
 
 def read_curve(path: Path) -> Curve:

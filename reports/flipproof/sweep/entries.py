@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
+from flipproof.foreign.specs import check_asked
 from flipproof.frame.solvers import Solver, find, solve
 from flipproof.sweep.errors import SweepError
 from slicemodel.scenario import Scenario, unknown_name
@@ -51,6 +52,7 @@ def _entry(table: dict[str, Any], where: str) -> Entry:
         raise SweepError(f"{where} name = {name!r} is not a solver's name; 'flipproof models' lists them")
     try:
         solver = find(name)
+        check_asked(name)
     except ValueError as error:
         raise SweepError(f"{where}: {error}") from None
     where = f"{where} ({name})"

@@ -218,6 +218,9 @@ def _read(
             }
         values = {name: value if math.isfinite(value) else None for name, value in found.items()}
         reasons += [f"{name} is not finite" for name, value in values.items() if value is None]
+        if isinstance(flight, Trajectory) and "r_cm" in flight.diagnostics.get("not_given", ()):
+            values["r_cm_end"] = None
+            reasons.append(f"{flight.method} gives no r_cm")
     else:
         reasons.append(f"{flight.status}: the flight ends at t = {flight.t[-1]:.6g} s")
     if flight.impacts is None:

@@ -10,7 +10,7 @@ import pytest
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, certify
 from flipproof.foreign.contract import Ask
 from flipproof.foreign.mistakes import MISTAKES
-from flipproof.foreign.power import Caught, InProcess, matrix_csv
+from flipproof.foreign.power import CLEAN, Caught, InProcess, claim_power, matrix_csv
 from flipproof.foreign.specs import load, opened
 from flipproof.foreign.subject import Subject
 from flipproof.foreign.verdicts import findings_of, junit_of
@@ -171,3 +171,12 @@ def test_there_are_at_least_twenty_mistakes_and_each_says_what_it_is():
     table = matrix_csv([Caught("none", "no mistake", ()), Caught("x", "y", ("ice",))]).splitlines()
     assert table[0] == "mistake," + ",".join(CHECKS)
     assert table[2].split(",").count("1") == 1
+
+
+def test_a_mistake_that_nobody_sees_and_a_clean_solver_that_is_accused_fail():
+    good = [Caught(CLEAN, "no mistake", ()), Caught("x", "y", ("ice",))]
+    assert not any(claim.failed for claim in claim_power(good))
+    missed, accused = claim_power([Caught(CLEAN, "no mistake", ("ice",)), Caught("x", "y", ())])
+    assert missed.failed
+    assert missed.note == "not seen: x"
+    assert accused.failed

@@ -69,7 +69,7 @@ def test_certify_writes_passport_and_verdicts_and_says_so(folder, capsys, monkey
     [
         (("certify", "nowhere.py:solve"), "there is no file nowhere.py"),
         (("certify", "eq8", "--equation", "eq9"), "equation = 'eq9'"),
-        (("certify", "eq8", "--json", "no/such/p.json"), "no/such/p.json cannot be written: no such folder"),
+        (("certify", "eq8", "--json", "no/such/p.json"), "--json no/such/p.json: the folder no/such does not exist"),
         (("certify", "math:no_such"), "cannot be loaded: AttributeError"),
         (("place", "eq9"), "'eq9'"),
         (("explain", "eq8", "csv:x.csv"), "a curve cannot be asked"),

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from flipproof.foreign.explain import explain, shares
+from flipproof.foreign.mistakes import MISTAKES
 from flipproof.foreign.place import LIMITS, lattice, name_of, place, switches_of
+from flipproof.foreign.power import InProcess
 from flipproof.foreign.specs import ForeignError, opened
 from flipproof.frame.solvers import catalogue
 from ode_reference.switches import Switches
@@ -72,6 +74,14 @@ def test_wrong_constants_are_off_the_lattice(name):
     assert "off the lattice" in found.text
 
 
+@pytest.mark.parametrize("name", ["RestitutionLow", "ElasticCap", "StickForEver"])
+def test_mistakes_in_impacts_and_rest_are_off_the_lattice(name):
+    """Impacts change omega(t) little where drag is strong; one throw is there for them."""
+    found = place(InProcess(MISTAKES[name](), name))
+    assert (found.equation, found.on_lattice) in {("free-flight", False), ("switches:110011", False)}
+    assert found.distance > 5 * found.room
+
+
 def test_gravity_explains_what_gravity_does():
     with_it, without = (opened(f"{EXAMPLES / 'rk4.py'}:{name}") for name in ("Eq8", "Weightless"))
     try:
@@ -107,4 +117,4 @@ def test_the_lattice_tells_different_equations_apart():
     curves = list(lattice().values())
     apart = [max(float(np.max(np.abs(a - b))) for a, b in zip(one, other, strict=True))
              for k, one in enumerate(curves) for other in curves[:k]]  # fmt: skip
-    assert min(apart) > 0.005
+    assert min(apart) > 0.02

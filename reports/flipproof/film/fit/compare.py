@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from flipproof.film.fit.estimate import Estimate
-from flipproof.film.fit.problem import is_scheme
+from flipproof.film.fit.problem import package_of
 from flipproof.film.fit.temperature import fits
 from flipproof.film.fit.uncertainty import Interval, intervals
 
@@ -114,7 +114,7 @@ def promise(solver: str, *, fits: bool) -> str:
     """
     if not fits:
         return "intervals widened by the misfit; no coverage is claimed for an equation that does not fit"
-    if not is_scheme(solver) and solver not in COUNTED:
+    if package_of(solver) != "slicemodel" and solver not in COUNTED:
         return "intervals meant to hold drag and restitution together in 95 %, which was not measured for this equation"
     return "intervals that hold drag and restitution together in 95 %"
 

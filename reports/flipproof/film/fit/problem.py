@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
 import numpy as np
 
+from flipproof.frame.solvers import FOREIGN
 from slicemodel import Scenario
 from slicemodel.scenario import unknown_name
 from slicemodel.trajectory import FloatArray
@@ -218,14 +220,18 @@ def predict(throws: Sequence[Scenario], solver: str, measured: Measurement) -> F
 def flights(throws: Sequence[Scenario], solver: str, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return theta and omega of throws of equal duration at ``times`` by the settings of a fit, each of shape (M, P).
 
-    A scheme runs on a grid of ``STEP`` and is interpolated; the reference is asked for the times themselves.
+    A scheme runs on a grid of ``STEP`` and is interpolated; the reference and somebody else's solver are asked for the
+    times themselves. Where the latter gives no answer, theta and omega are NaN.
 
     Raises
     ------
     ValueError
-        If the solver is no scheme and no model of the reference.
+        If the solver is an engine, or a curve in a file.
     """
-    if is_scheme(solver):
+    package = package_of(solver)
+    if package == FOREIGN:
+        return foreign_flights(throws, solver, times)
+    if package == "slicemodel":
         from slicemodel.batch import solve_batch
 
         steps = math.ceil(throws[0].duration / STEP) + 1
@@ -251,21 +257,37 @@ def sampled(grid: FloatArray, theta: FloatArray, omega: FloatArray, times: Float
     return between, (1 - s) * omega[:, k] + s * omega[:, k + 1]
 
 
-def is_scheme(solver: str) -> bool:
-    """Return whether a solver is a scheme of the slice model; if not it is a model of the reference.
+def foreign_flights(throws: Sequence[Scenario], spec: str, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return theta and omega of throws by somebody else's solver at ``times``, each of shape (M, P)."""
+    from flipproof.foreign.solving import solve
+    from flipproof.foreign.specs import ForeignError
+
+    found = np.full((2, len(throws), len(times)), np.nan)
+    for k, throw in enumerate(throws):
+        with suppress(ForeignError):
+            run = solve(throw, spec=spec, times=times)
+            found[:, k] = run.theta, run.omega
+    return found[0], found[1]
+
+
+def package_of(solver: str) -> str:
+    """Return the package of a solver that can be fitted.
 
     Raises
     ------
     ValueError
-        If there is no such solver, or it is an engine.
+        If there is no such solver, or it is an engine, or a curve in a file.
     """
+    from flipproof.foreign.specs import check_asked
     from flipproof.frame.solvers import catalogue, find
 
     package = find(solver).package
     if package == "engine_check":
         able = [name for name, other in catalogue().items() if other.package != package]
         raise ValueError(f"model = {solver!r} is a physics engine, too slow to fit with; choose from {', '.join(able)}")
-    return package == "slicemodel"
+    if package == FOREIGN:
+        check_asked(solver)
+    return package
 
 
 def pose(
@@ -294,7 +316,7 @@ def pose(
     for name in also:
         if name not in ALSO:
             raise ValueError(unknown_name("also =", name, ALSO))
-    is_scheme(solver)  # an engine is refused here
+    package_of(solver)  # an engine is refused here
     known = replace(throw.with_slices(slices or min(throw.n_slices, SLICES)), duration=float(measured.t[-1]))
     guess = first_frames(measured)
     first = {name: guess[name] for name in also if name in guess}

@@ -1,0 +1,285 @@
+r"""What a report finds about a solver of somebody else on its throw.
+
+    study(ask)                        the chapter's: one call a guest, and the ladder with the bands of its equations
+    visit(spec, throw, times)         in a worker: the certificate, the throw at four efforts, the throw in ice
+    study_guests(visits, ladder)      at home: differences to every equation of the ladder, agreement, energy
+
+Each run is made in the solver's own process with a time limit; what it does wrong costs that run and becomes a reason.
+The energy of a run, in the frame of the centre of mass C_M, is that of turning and of sliding (Koenig):
+
+    E = J omega^2 / 2 + sum_i m (v_i - v_CM)^2 / 2 + M_b v_CM^2 / 2
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, Final
+
+import numpy as np
+
+from flipproof.chapters.agreement.study import Agreement, study_agreement
+from flipproof.chapters.differences.chapter import run_bands
+from flipproof.chapters.differences.study import Difference, study_difference
+from flipproof.chapters.ice.chapter import Drift, measure
+from flipproof.foreign import contract
+from flipproof.foreign.answers import trajectory_of
+from flipproof.foreign.certify import Certificate, certify
+from flipproof.foreign.checking import effort_of
+from flipproof.foreign.contract import Traits
+from flipproof.foreign.specs import CSV, Runner, opened
+from flipproof.frame.chapter import Ask, Call, Flights, Study, attempt
+from flipproof.frame.twins import twins
+from ode_reference.models import LADDER
+from slicemodel import Scenario, Trajectory
+from slicemodel.observables import centre_of_mass_velocity
+from slicemodel.trajectory import FloatArray, output_times
+
+LEVELS: Final = (-4, -2, 0, 2)
+"""Levels of refinement at which the throw is made; the finest is also the flight that is shown."""
+
+SPARSE: Final = 27
+"""Every so many output times are asked for at ``LEVELS``: a solver makes at least one step from each to the next."""
+
+
+LONGEST: Final = 60
+"""Letters of the name by which files and anchors call a guest; one with more is called by its number."""
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """One run of the throw: its effort (None: it has none), the seconds it took, and the run."""
+
+    effort: float | None
+    seconds: float
+    run: Trajectory
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Visit:
+    """What a solver answered; ``problems`` maps what is missing to the reason."""
+
+    spec: str
+    traits: Traits | None = None
+    certificate: Certificate | None = None
+    flight: Trajectory | None = None
+    efforts: tuple[Effort, ...] = ()
+    ice: Drift | None = None
+    problems: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Guest:
+    """A solver of somebody else on the report's throw.
+
+    Parameters
+    ----------
+    label : str - its name; with its spec, if another solver has that name
+    slug : str - the name in ids, files and anchors
+    differences : mapping rung -> Difference - of the flight, with the sum of both bands
+    band : float or None - largest change of omega between its two finest efforts, fraction of omega_0
+    errors : tuple of float - largest difference of each effort's run to ``equation``, fraction of omega_0
+    equation : str or None - the rung that it declares, else the nearest
+    energy : array or None - E(t) / E(0) of the flight; None without r and v
+    """
+
+    visit: Visit
+    label: str
+    slug: str
+    differences: Mapping[str, Difference]
+    band: float | None
+    errors: tuple[float, ...]
+    equation: str | None
+    energy: FloatArray | None
+
+    @property
+    def run(self) -> Trajectory | None:
+        """The flight at the finest effort."""
+        return self.visit.flight
+
+    @property
+    def nearest(self) -> Difference | None:
+        """The difference to the nearest rung."""
+        return min(self.differences.values(), key=lambda d: d.largest, default=None)
+
+    @property
+    def rise(self) -> float | None:
+        """Largest rise of the energy between two output times, fraction of E(0)."""
+        return None if self.energy is None else float(max(0.0, np.max(np.diff(self.energy), initial=0.0)))
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the guest as JSON-ready data."""
+        visit = self.visit
+        return {
+            "spec": visit.spec,
+            "name": self.label,
+            "equation": self.equation,
+            "passport": None if visit.certificate is None else visit.certificate.to_mapping(),
+            "problems": dict(visit.problems),
+            "band": self.band,
+            "differences": {
+                rung: {"largest": d.largest, "time": d.largest_time, "final": d.final, "band": d.band}
+                for rung, d in self.differences.items()
+            },
+            "efforts": [
+                {"effort": one.effort, "seconds": round(one.seconds, 4), "error": error}
+                for one, error in zip(visit.efforts, self.errors, strict=True)
+            ],
+            "ice_drift": None if visit.ice is None else visit.ice.largest,
+            "energy_rise": self.rise,
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Guests:
+    """All guests of a report, the ladder they are held against, and who agrees with whom (None: fewer than two)."""
+
+    guests: tuple[Guest, ...] = ()
+    ladder: Mapping[str, Trajectory] = field(default_factory=dict)
+    agreement: Agreement | None = None
+
+
+def study(ask: Ask) -> Study[Guests]:
+    """Certify the solvers of ``ask.work``, which is their specs and a time limit a run [s] or None, and fly the throw.
+
+    A call that is timed is never answered from the store: whether somebody else's code changed is not known.
+    """
+    specs, timeout = ask.work
+    times = output_times(ask.throw, None)
+    calls = {spec: Call(visit, (spec, ask.throw, times, timeout), f"guest {spec}", timed=True) for spec in specs}
+    ladder = {rung: ask.solvers[rung] for rung in LADDER}
+    flights = yield [*calls.values(), *ladder.values(), *(twin for run in ladder.values() for twin in twins(run))]
+    flown = {rung: run for rung, each in ladder.items() if (run := flights.trajectory(each)) is not None}
+    return study_guests(received(calls, flights), flown, run_bands(ask.solvers, flights))
+
+
+def received(calls: Mapping[str, Call], flights: Flights) -> tuple[Visit, ...]:
+    """Return every visit; one whose worker died says so."""
+    answers = {spec: attempt(flights.answer, call) for spec, call in calls.items()}
+    return tuple(each.found or Visit(spec=spec, problems={"solver": each.reason}) for spec, each in answers.items())
+
+
+def visit(spec: str, throw: Scenario, times: FloatArray, timeout: float | None = None) -> Visit:
+    """Certify a solver, let it make the throw at each of its efforts, and in ice.
+
+    Parameters
+    ----------
+    spec : str
+    throw : Scenario
+    times : array, shape (P,) - output times [s]
+    timeout : float, optional - seconds one run may take, instead of what the solver says
+    """
+    problems: dict[str, str] = {}
+
+    def tried(name: str, make: Callable[[], Any]) -> Any:
+        try:
+            return make()
+        except (ValueError, ArithmeticError, MemoryError) as error:
+            problems[name] = str(error)
+            return None
+
+    runner = tried("solver", lambda: opened(spec, timeout, curves=True))
+    if runner is None:
+        return Visit(spec=spec, problems=problems)
+    with closing(runner):
+        traits = tried("solver", lambda: runner.traits)
+        if traits is None:
+            return Visit(spec=spec, problems=problems)
+        curve = spec.startswith(CSV)
+        if curve:
+            problems["certificate"] = "a curve in a file cannot be asked"
+        certificate = None if curve else tried("certificate", lambda: certify(runner))
+        flight = tried("flight", lambda: _flight(runner, throw, times, LEVELS[-1]).run)
+        levels = LEVELS if traits.refined_by is not None else ()
+        efforts = [tried(f"flight at level {k}", partial(_flight, runner, throw, times[::SPARSE], k)) for k in levels]
+        ice = None if curve else tried("ice", lambda: _flight(runner, replace(throw, frozen=True), times, 0).run)
+    return Visit(
+        spec=spec,
+        traits=traits,
+        certificate=certificate,
+        flight=flight,
+        efforts=tuple(one for one in efforts if one is not None),
+        ice=None if ice is None else measure(traits.name, ice),
+        problems=problems,
+    )
+
+
+def _flight(runner: Runner, throw: Scenario, times: FloatArray, level: int) -> Effort:
+    effort = effort_of(runner.traits, throw, level)
+    ask = contract.Ask.of(throw, np.array(times), effort)
+    began = time.perf_counter()
+    answer = runner(ask)
+    seconds = time.perf_counter() - began
+    return Effort(effort, seconds, trajectory_of(ask, answer, runner.traits))
+
+
+def study_guests(visits: Sequence[Visit], ladder: Mapping[str, Trajectory], bands: Mapping[str, float]) -> Guests:
+    """Hold every visit against the ladder.
+
+    Parameters
+    ----------
+    visits : sequence of Visit
+    ladder : mapping rung -> Trajectory - of the same throw
+    bands : mapping rung -> float - how far omega may be off, fraction of omega_0
+    """
+    taken = [one.traits.name if one.traits else one.spec for one in visits]
+    guests: list[Guest] = []
+    for k, (one, name) in enumerate(zip(visits, taken, strict=True)):
+        label = name if taken.count(name) == 1 and name not in ladder else f"{name} ({one.spec})"
+        slug = re.sub(r"[^a-z0-9]+", "-", label.lower()).strip("-")
+        if not 0 < len(slug) <= LONGEST:
+            slug = f"solver-{k + 1}"
+        while any(guest.slug == slug for guest in guests):
+            slug += f"-{k + 1}"
+        guests.append(_guest(one, label, slug, ladder, bands))
+    runs = dict(ladder)
+    known = {rung: bands.get(rung, 0.0) for rung in ladder}
+    for guest in guests:
+        first = next(iter(ladder.values()), None)
+        if guest.run is not None and first is not None and np.array_equal(guest.run.t, first.t):
+            runs[guest.label] = guest.run
+            known[guest.label] = guest.band or 0.0
+    agreement = study_agreement(runs, known) if guests and len(runs) > 1 else None
+    return Guests(guests=tuple(guests), ladder=dict(ladder), agreement=agreement)
+
+
+def _guest(one: Visit, label: str, slug: str, ladder: Mapping[str, Trajectory], bands: Mapping[str, float]) -> Guest:
+    run = one.flight
+    band = _apart(one.efforts[-2].run, one.efforts[-1].run) if len(one.efforts) > 1 else None
+    differences = {}
+    if run is not None and len(run.t) > 1:
+        for rung, reference in ladder.items():
+            whole = None if band is None else band + bands.get(rung, 0.0)
+            differences[rung] = study_difference(f"{label} and {rung}", reference, run, band=whole)
+    declared = one.traits.equation if one.traits is not None else None
+    nearest = min(differences, key=lambda rung: differences[rung].largest, default=None)
+    equation = declared if declared in ladder else nearest
+    errors = [_apart(ladder[equation], effort.run) for effort in one.efforts] if equation else []
+    return Guest(
+        visit=one,
+        label=label,
+        slug=slug,
+        differences=differences,
+        band=band,
+        errors=tuple(errors),
+        equation=equation,
+        energy=None if run is None or len(run.v) != len(run.t) else energy_of(run),
+    )
+
+
+def _apart(one: Trajectory, other: Trajectory) -> float:
+    """Return the largest difference of omega at the times of both, fraction of omega_0."""
+    _, here, there = np.intersect1d(one.t, other.t, assume_unique=True, return_indices=True)
+    return float(np.max(np.abs(one.omega[here] - other.omega[there])) / abs(one.scenario.omega0))
+
+
+def energy_of(run: Trajectory) -> FloatArray:
+    """Return E(t) / E(0) in the frame of C_M (module docstring), shape (P,)."""
+    scenario, drift = run.scenario, centre_of_mass_velocity(run.scenario, run.v)
+    sliding = scenario.slice_mass * ((run.v - drift[:, None]) ** 2).sum(axis=1) + scenario.bottle.mass * drift**2
+    energy = (run.inertia * run.omega**2 + sliding) / 2
+    return np.asarray(energy / energy[0])

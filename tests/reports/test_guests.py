@@ -1,0 +1,150 @@
+"""Guests of a report: certified, held against the ladder, hostile ones named with their reasons, nothing lost."""
+
+import json
+import pickle
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flipproof.chapters.guests.claims import claim_guests
+from flipproof.chapters.guests.figures import draw_guests
+from flipproof.chapters.guests.study import SPARSE, Guests, energy_of, received, study_guests, visit
+from flipproof.cli import main as cli
+from flipproof.foreign import certify as suite
+from flipproof.foreign.specs import load
+from flipproof.frame.exhibit import drawn
+from flipproof.frame.flights import Call, Flights
+from flipproof.frame.pool import make_all, workers
+from flipproof.frame.solvers import solve
+from slicemodel import Scenario
+
+ROOT = Path(__file__).resolve().parents[2]
+RK4 = f"{ROOT / 'examples' / 'foreign' / 'rk4.py'}:Eq8"
+HOSTILE = ROOT / "tests" / "reports" / "foreign" / "hostile.py"
+THROW = Scenario(n_slices=5, duration=0.2)
+TIMES = np.linspace(0.0, THROW.duration, 1000)
+RUNGS = ("eq8", "eq8-weightless", "free-flight")
+
+
+@pytest.fixture(scope="module")
+def ladder():
+    return {rung: solve(rung, THROW, times=TIMES) for rung in RUNGS}
+
+
+@pytest.fixture(autouse=True)
+def few_checks(monkeypatch):
+    monkeypatch.setattr(suite.certify, "__defaults__", (("shape", "ice"),))
+
+
+@pytest.fixture
+def studied(ladder):
+    return study_guests([visit(RK4, THROW, TIMES)], ladder, dict.fromkeys(RUNGS, 1e-9))
+
+
+def test_a_guest_is_held_against_every_equation(studied):
+    (guest,) = studied.guests
+    assert guest.equation == "eq8"
+    assert guest.nearest.first == "eq8"
+    assert guest.differences["eq8"].largest < 1e-3 < guest.differences["free-flight"].largest
+    assert guest.visit.ice.largest == 0.0
+    assert studied.agreement.pair("naive RK4", "eq8").largest == guest.differences["eq8"].largest
+
+
+def test_errors_fall_with_effort_on_times_that_all_efforts_share(studied):
+    (guest,) = studied.guests
+    assert [len(one.run.t) for one in guest.visit.efforts] == [len(TIMES[::SPARSE])] * 4
+    assert guest.errors[-1] < 0.1 * guest.errors[0]
+    assert 0.0 < guest.band < guest.errors[0]
+
+
+def test_findings_have_ids_of_their_own_and_visits_travel(studied):
+    twice = replace(studied, guests=(*studied.guests, *studied.guests))
+    assert isinstance(twice, Guests)
+    findings = list(claim_guests(studied))
+    ids = [finding.id for finding in findings]
+    assert len(set(ids)) == len(ids)
+    assert ids[0] == "guest-naive-rk4-certify-shape"
+    assert not any(re.search(r"\s", name) for name in ids)
+    assert not any(finding.failed for finding in findings)
+    assert pickle.loads(pickle.dumps(studied.guests[0].visit)).spec == RK4
+
+
+def test_solvers_of_one_name_are_told_apart(ladder):
+    one = visit(RK4, THROW, TIMES)
+    found = study_guests([one, one], ladder, {})
+    assert len({guest.slug for guest in found.guests}) == 2
+
+
+def test_energy_falls_in_free_flight_and_is_that_of_turning_in_ice():
+    flight = solve("free-flight", THROW, times=TIMES)
+    assert np.diff(energy_of(flight)).max() < 1e-9
+    np.testing.assert_allclose(energy_of(solve("eq8", replace(THROW, frozen=True), times=TIMES)), 1.0, rtol=1e-12)
+
+
+def test_every_figure_is_drawn_with_its_numbers(studied):
+    exhibits = drawn(tuple(draw_guests(studied)), 1)
+    assert [exhibit.name for exhibit in exhibits] == [
+        "guests-omega", "guests-differences", "guests-convergence", "guests-ice-energy",
+    ]  # fmt: skip
+    assert all(exhibit.table.count("\n") > 1 for exhibit in exhibits)
+
+
+def test_a_curve_in_a_file_is_compared_and_not_certified(tmp_path, ladder):
+    file = tmp_path / "curve.csv"
+    run = ladder["eq8"]
+    np.savetxt(file, np.column_stack([run.t, run.theta, run.omega]), delimiter=",", header="t,theta,omega", comments="")
+    (guest,) = study_guests([visit(f"csv:{file}", THROW, TIMES)], ladder, {}).guests
+    assert guest.differences["eq8"].largest < 1e-12
+    assert guest.visit.problems == {"certificate": "a curve in a file cannot be asked"}
+    assert not any(finding.failed for finding in claim_guests(Guests(guests=(guest,))))
+
+
+@pytest.mark.parametrize("name", ["raises", "segfaults", "not_a_number", "hangs", "returns_none", "not_a_solver"])
+def test_a_hostile_guest_is_named_with_its_reason(tmp_path, ladder, name):
+    shutil.copy(HOSTILE, tmp_path)
+    spec = f"{tmp_path / 'hostile.py'}:{name}"
+    found = study_guests([visit(spec, THROW, TIMES, 1.0), visit(RK4, THROW, TIMES)], ladder, {})
+    bad, good = found.guests
+    failed = [finding for finding in claim_guests(found) if finding.failed]
+    assert failed
+    assert all(finding.id.startswith(f"guest-{bad.slug}-") for finding in failed)
+    pattern = load(f"{HOSTILE}:WRONG").get(name, "5 is neither callable").replace("2 s", "1 s")
+    assert any(re.search(pattern, finding.note) for finding in failed)
+    assert bad.run is None
+    assert good.run is not None
+    assert json.dumps(bad.to_mapping(), allow_nan=False)
+
+
+def test_a_solver_that_is_late_twice_is_not_asked_again(tmp_path):
+    shutil.copy(HOSTILE, tmp_path)
+    found = visit(f"{tmp_path / 'hostile.py'}:hangs", THROW, TIMES, 0.5)
+    assert found.problems["flight"] == "not asked: 2 runs in a row gave no answer in time"
+
+
+def test_a_dead_worker_costs_its_guest(ladder):
+    call = Call(die, label="guest x", timed=True)
+    with workers(1) as pool:
+        flights = Flights(*make_all(pool, [], lambda *_: None, [call]))
+    (found,) = received({"x": call}, flights)
+    assert "guest x: the worker process died" in found.problems["solver"]
+    (guest,) = study_guests([found], ladder, {}).guests
+    assert guest.label == "x"
+
+
+def die():
+    import os
+
+    os._exit(3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [(["--with", "nowhere.py:solve"], "there is no file nowhere.py"), (["--with", RK4] * 2, "is there twice")],
+)
+def test_a_spec_that_names_nothing_is_refused_before_the_work(capsys, tmp_path, arguments, said):
+    assert cli.main(["report", "--out", str(tmp_path / "r"), *arguments]) == 2
+    assert said in capsys.readouterr().err
