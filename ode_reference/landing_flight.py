@@ -40,7 +40,8 @@ def fly(scenario: Scenario, table: Table, slices: str = "exclude", *, dt: float 
     --------
     As ``land``: order 2 in ``dt`` between impacts, which are located.
     """
-    from ode_reference import landing_core
+    from ode_reference.landing_core import loop
+    from ode_reference.landing_core.layout import TOUCHED
 
     dt = number_within("dt", dt, 1e-6, 1e-3, unit=" s")
     bottle, r = scenario.bottle, scenario.initial_positions()
@@ -68,8 +69,8 @@ def fly(scenario: Scenario, table: Table, slices: str = "exclude", *, dt: float 
             "the bottle has to be over the table at release"
         )
     none = np.empty((0, 7 + 2 * world.n))
-    run = landing_core.land(q, s, w, dt, scenario.duration, True, world, 1.0, none)
-    if run.code != landing_core.TOUCHED:
+    run = loop.land(q, s, w, dt, scenario.duration, True, world, 1.0, none)
+    if run.code != TOUCHED:
         raise ValueError(f"table.height = {table.height:g} m is not reached within duration = {scenario.duration:g} s")
     return Touch(
         scenario=scenario,
