@@ -3,6 +3,7 @@
     python benchmarks/landing_witnesses.py                    30 touches each of water and ice, six slices
     python benchmarks/landing_witnesses.py --touches 200      as many as the claim asks for
     python benchmarks/landing_witnesses.py --engines pymunk   one engine only
+    python benchmarks/landing_witnesses.py --json FILE        write the matrices to a file, too
 
 Throws are scattered widely in omega_0 and table height and kept if they come down within 35 degrees of upright, where
 outcomes are open. The flight is the event-driven one for all. A disagreement is counted only between certified
@@ -13,10 +14,14 @@ the saddle: a bottle that almost balances on its rim ends on either side by its 
 from __future__ import annotations
 
 import argparse
+import json
 import math
+import shlex
 import sys
 import time
 from collections import Counter
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -59,8 +64,8 @@ def closest_to_saddle(touch: Touch, table: Table, law: str | None, slices: str) 
     return float(np.min(np.abs(run.energy[slow] / run.saddle - 1), initial=math.inf))
 
 
-def compare(found: list[Touch], table: Table, law: str | None, slices: str, engines: list[str]) -> int:
-    """Print outcomes and disagreements of all programs that have this law; return the number of disagreements."""
+def compare(found: list[Touch], table: Table, law: str | None, slices: str, engines: list[str]) -> list[dict[str, Any]]:
+    """Print outcomes and disagreements of all programs that have this law; return the matrix of every pair."""
     programs: dict[str, list[Outcome]] = {"event-driven": []}
     seconds = {}
     for name in ["event-driven", *engines]:
@@ -77,20 +82,27 @@ def compare(found: list[Touch], table: Table, law: str | None, slices: str, engi
     for name, outcomes in programs.items():
         reasons = dict(Counter(outcome.reason for outcome in outcomes if outcome.reason))
         print(f"    {name:17} {dict(Counter(o.outcome for o in outcomes))} {seconds[name]:.3f} s each {reasons or ''}")
-    names, total = list(programs), 0
+    names = list(programs)
+    matrices = []
     for i, one in enumerate(names):
         for other in names[i + 1 :]:
             pairs = list(zip(programs[one], programs[other], strict=True))
             differ = [k for k, (a, b) in enumerate(pairs) if a.decided and b.decided and a.outcome != b.outcome]
             both = sum(a.decided and b.decided for a, b in pairs)
-            near = [f"{closest_to_saddle(found[k], table, law, slices):.1e}" for k in differ]
-            print(
-                f"      {one} / {other}: {len(differ)} of {both} differ"
-                + (f", saddle missed by {near}" if near else "")
+            near = [closest_to_saddle(found[k], table, law, slices) for k in differ]
+            missed = f", saddle missed by {[f'{least:.1e}' for least in near]}" if near else ""
+            print(f"      {one} / {other}: {len(differ)} of {both} differ{missed}", flush=True)
+            matrices.append(
+                {
+                    "programs": [one, other],
+                    "outcomes": dict(sorted(Counter(f"{a.outcome}/{b.outcome}" for a, b in pairs).items())),
+                    "touches": len(pairs),
+                    "decided by both": both,
+                    "differ": len(differ),
+                    "saddle missed by": [round(least, 6) for least in near],
+                }
             )
-            if "compliant" not in one + other:
-                total += len(differ)
-    return total
+    return matrices
 
 
 def main() -> int:
@@ -100,9 +112,11 @@ def main() -> int:
     parser.add_argument("--n-slices", type=int, default=6)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--fillings", type=float, nargs="+", default=[0.4])
+    parser.add_argument("--json", type=Path, metavar="FILE")
     parser.add_argument("--engines", nargs="+", choices=list(LANDERS), default=list(LANDERS))
     options = parser.parse_args()
     table, total, compared = Table(height=0.0), 0, 0
+    cases = []
     for filling in options.fillings:
         for slices, law in (
             (None, None), ("exclude", "together"), ("exclude", "in-turn"),
@@ -114,9 +128,14 @@ def main() -> int:
             print(
                 f"filling {filling:g}, {'ice' if slices is None else f'water, slices {slices}, law {law}'}", flush=True
             )
-            total += compare(found, table, law, slices or "staggered", options.engines)
+            matrices = compare(found, table, law, slices or "staggered", options.engines)
+            total += sum(m["differ"] for m in matrices if "mujoco-compliant" not in m["programs"])
             compared += len(found)
+            cases.append({"filling": filling, "slices": slices, "law": law, "matrices": matrices})
     print(f"rigid programs differ {total} times from {compared} touches")
+    if options.json:
+        facts = {"command": shlex.join(["python", *sys.argv]), "n_slices": options.n_slices, "cases": cases}
+        options.json.write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
     return 0 if total <= 0.03 * compared else 1
 
 

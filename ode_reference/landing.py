@@ -22,7 +22,7 @@ from slicemodel.trajectory import FloatArray
 if TYPE_CHECKING:
     from ode_reference.landing_core.layout import Landing, World
 
-DEFAULT_DT: Final = 2e-4
+DEFAULT_DT: Final = 4e-4
 """Longest step [s]; half of it certifies."""
 
 SLICES: Final[Mapping[str, str]] = MappingProxyType(

@@ -6,10 +6,10 @@ import math
 
 from ode_reference.landing_core.layout import CREEPING, MOST_POOLS, MOST_SWEEPS
 from ode_reference.landing_core.pools import pool_chain, pool_stops
-from slicemodel.compiled import inner
+from slicemodel.compiled import merged
 
 
-@inner
+@merged
 def coulomb(demand, slip, nn, nt, tt, friction):
     """Return the normal and tangential impulse of one corner that would rise by ``-demand`` too little without them.
 
@@ -31,7 +31,7 @@ def coulomb(demand, slip, nn, nt, tt, friction):
     return demand / nn, 0.0
 
 
-@inner
+@merged
 def respond(x, tube, start, s1, s2, sine, cosine, angle, closed, target, world, free, work, y, pn, pt):
     """Find all impulses of one instant, or of one step; return the tube's axial value, v_t, omega and whether solved.
 

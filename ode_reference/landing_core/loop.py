@@ -47,10 +47,10 @@ def land(q, s, w, dt, longest, fly, world, every, record):
     steps, impacts, unresolved, bounces = 0, 0, 0, 0
     aloft, still = False, 0
     origin = q[0] + world.half * math.sin(q[2])
+    rates(w, q, world, rate)
     while t < longest:
         # This instant: whatever touches and approaches strikes.
         gaps(s, q, world, gap)
-        rates(w, q, world, rate)
         strikes = False
         lowest = gap[0]
         for k in range(count):
@@ -91,7 +91,6 @@ def land(q, s, w, dt, longest, fly, world, every, record):
             margin = (world.saddle - before) / world.saddle
             return Landing(code, t, margin, bounces, slid, rise, steps, impacts, unresolved)
         # The time until the next instant: a step, or less if a gap closes in it.
-        rates(w, q, world, rate)
         h = min(dt, longest - t)
         while True:
             steps += 1

@@ -30,7 +30,7 @@ def step(q, s, w, h, closed, world, free, target, work, x, y, pn, pt, q1, s1, w1
     start = v_r + world.gravity * cosine * h
     for c in range(4):
         target[c] = 0.0
-    for _ in range(3):
+    for _ in range(2):  # the second time with the mean spin of the first: order 2, as the rule itself has
         mean = (q[5] + omega) / 2
         push = 0.0
         rate1, rate2 = 0.0, 0.0

@@ -5,15 +5,27 @@ from __future__ import annotations
 import numpy as np
 
 from ode_reference.landing_core.layout import MOST_POOLS
-from slicemodel.compiled import inner
+from slicemodel.compiled import merged
 
 
-@inner
+@merged
+def join(value, mass, blocks, total, weight, count):
+    """Add a body behind ``blocks`` of pooled ones, pool those that approach, and return how many blocks there are."""
+    total[blocks], weight[blocks], count[blocks] = value * mass, mass, 1
+    while blocks > 0 and total[blocks] * weight[blocks - 1] > total[blocks - 1] * weight[blocks]:
+        total[blocks - 1] += total[blocks]
+        weight[blocks - 1] += weight[blocks]
+        count[blocks - 1] += count[blocks]
+        blocks -= 1
+    return blocks + 1
+
+
+@merged
 def pool_chain(x, tube, closed, world, y, total, weight, count):
     """Project ``x`` and ``tube`` on what the closed gaps of a chain allow; return the tube's value and its pool's mass.
 
-    The order is: slices resting on the cap, the tube, slices resting on the base, then slices that touch neither end.
-    Along it values may not rise across a closed gap.
+    Bodies that touch one another make a run, along which values may not rise: slices resting on the cap, the tube and
+    slices resting on the base make one, slices that touch neither end the others.
     """
     n = world.n
     on_base = 0
@@ -22,47 +34,47 @@ def pool_chain(x, tube, closed, world, y, total, weight, count):
     on_cap = n
     while on_cap > on_base and closed[4 + on_cap]:
         on_cap -= 1
-    behind = n - on_cap
     blocks = 0
-    for k in range(n + 1):
-        if k < behind:
-            value, mass, linked = x[on_cap + k], world.m, k > 0
-        elif k == behind:
-            value, mass, linked = tube, world.tube, k > 0
-        else:
-            i = k - behind - 1
-            value, mass, linked = x[i], world.m, closed[4 + i]
-        total[blocks], weight[blocks], count[blocks] = value * mass, mass, 1
-        if not linked:
-            count[blocks] = -1  # a block that begins a run: negative count
-        blocks += 1
-        while (
-            blocks > 1
-            and count[blocks - 1] > 0
-            and total[blocks - 1] * weight[blocks - 2] > total[blocks - 2] * weight[blocks - 1]
-        ):
-            total[blocks - 2] += total[blocks - 1]
-            weight[blocks - 2] += weight[blocks - 1]
-            joined = abs(count[blocks - 2]) + count[blocks - 1]
-            count[blocks - 2] = joined if count[blocks - 2] > 0 else -joined
-            blocks -= 1
-    k = 0
+    for i in range(on_cap, n):
+        blocks = join(x[i], world.m, blocks, total, weight, count)
+    blocks = join(tube, world.tube, blocks, total, weight, count)
+    for i in range(on_base):
+        blocks = join(x[i], world.m, blocks, total, weight, count)
     at, pooled = tube, world.tube
+    k, behind = 0, n - on_cap
     for block in range(blocks):
+        alone = count[block] == 1
         value = total[block] / weight[block]
-        alone = abs(count[block]) == 1
-        for _ in range(int(abs(count[block]))):
+        for _ in range(int(count[block])):
             if k < behind:
                 y[on_cap + k] = x[on_cap + k] if alone else value
-            elif k == behind:
-                at, pooled = tube if alone else value, weight[block]
-            else:
+            elif k > behind:
                 y[k - behind - 1] = x[k - behind - 1] if alone else value
+            elif not alone:
+                at, pooled = value, weight[block]
             k += 1
+    begin = on_base
+    while begin < on_cap:
+        end = begin + 1
+        while end < on_cap and closed[4 + end]:
+            end += 1
+        y[begin] = x[begin]
+        if end > begin + 1:
+            blocks = 0
+            for i in range(begin, end):
+                blocks = join(x[i], world.m, blocks, total, weight, count)
+            k = begin
+            for block in range(blocks):
+                alone = count[block] == 1
+                value = total[block] / weight[block]
+                for _ in range(int(count[block])):
+                    y[k] = x[k] if alone else value
+                    k += 1
+        begin = end
     return at, pooled
 
 
-@inner
+@merged
 def pool_stops(x, tube, closed, world, y):
     """Do the same where each slice has its own stops: it is pooled with the tube or with nothing."""
     n = world.n
