@@ -134,7 +134,8 @@ def main() -> int:
             cases.append({"filling": filling, "slices": slices, "law": law, "matrices": matrices})
     print(f"rigid programs differ {total} times from {compared} touches")
     if options.json:
-        facts = {"command": shlex.join(["python", *sys.argv]), "n_slices": options.n_slices, "cases": cases}
+        facts: dict[str, Any] = {"command": shlex.join(["python", *sys.argv])}
+        facts |= {"touches": options.touches, "n_slices": options.n_slices, "cases": cases}
         options.json.write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
     return 0 if total <= 0.03 * compared else 1
 

@@ -32,15 +32,14 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.output.ownership import MARKER, OutputError, check_own, marker_text, sole_writer
-from flipproof.sweep.design import Design
 from flipproof.sweep.entries import settings_text
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import TEMPORARY, sweep_away_parts, whole_file, write_whole
 from flipproof.sweep.inspection import damage, inspect, is_damage, result_code
+from flipproof.sweep.plan import Plan
 from flipproof.sweep.schema import (
     APPLICATION,
     FILE,
-    NUMBERS,
     PAGE,
     SCHEMA,
     SHARED,
@@ -65,7 +64,7 @@ SAFE: Final = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANT
 class Store:
     """The rows of one design in a folder. Use as a context manager; the folder is locked until it ends."""
 
-    def __init__(self, folder: Path, design: Design, code: str) -> None:
+    def __init__(self, folder: Path, design: Plan, code: str) -> None:
         """Open or begin the store.
 
         Raises
@@ -204,8 +203,7 @@ class Store:
             *point.values,
             point.solver,
             settings_text(point.settings),
-            *(getattr(outcome, name) for name in NUMBERS),
-            outcome.impacts,
+            *(getattr(outcome, name) for name in self.design.readings),
             outcome.status,
             outcome.message,
             outcome.reason,
