@@ -105,13 +105,13 @@ def turn(
     return record[:, 0], theta, record[:, 2] + FAR - reach
 
 
-def _released(scenario: Scenario, table: Table, slices: str) -> tuple[State, World]:
-    """Return the state at release over the table, and the world."""
+def release(scenario: Scenario) -> Touch:
+    """Return a throw at its release, as if it touched a table there: where ``path`` may begin."""
     bottle, r = scenario.bottle, scenario.initial_positions()
     sine, cosine = math.sin(scenario.theta0), math.cos(scenario.theta0)
     centre = (bottle.mass * bottle.length / 2 + scenario.slice_mass * float(r.sum())) / scenario.total_mass
     swing = (bottle.length / 2 - centre) * scenario.omega0
-    release = Touch(
+    return Touch(
         scenario=scenario,
         theta=scenario.theta0,
         omega=scenario.omega0,
@@ -122,9 +122,14 @@ def _released(scenario: Scenario, table: Table, slices: str) -> tuple[State, Wor
         r=r,
         v=np.zeros(scenario.n_slices),
     )
-    world = world_of(release, table, "together", slices)
-    q, s, w = state_of(release, world)
-    q[0], q[1] = world.half * sine, -world.half * cosine - table.height
+
+
+def _released(scenario: Scenario, table: Table, slices: str) -> tuple[State, World]:
+    """Return the state at release over the table, and the world."""
+    start = release(scenario)
+    world = world_of(start, table, "together", slices)
+    q, s, w = state_of(start, world)
+    q[0], q[1] = world.half * math.sin(start.theta), -world.half * math.cos(start.theta) - table.height
     return (q, s, w), world
 
 

@@ -12,7 +12,7 @@ from flipproof.frame.findings import Finding
 from flipproof.studies.agreement import Agreement
 from flipproof.studies.engine_facts import EngineFact
 from flipproof.studies.horizon import Horizon
-from flipproof.studies.overlap import EXCLUDE, PASS, Overlap
+from flipproof.studies.overlap import COLUMN, EXCLUDE, PASS, Overlap
 from flipproof.studies.predictability import HORIZON_BAND
 from flipproof.studies.stability import DEFAULT_ITERATIONS, GOOD, RULE_DT, StabilityPanel
 from slicemodel import Trajectory
@@ -196,6 +196,6 @@ def claim_overlap(study: Overlap) -> Finding:
         value=study.missing_from_ice(PASS),
         unit="",
         kind="observation",
-        note=f"{study.missing_from_ice(EXCLUDE):.2g} when they exclude each other; N = {study.slices}; the paper "
-        "expects a full bottle to behave like ice",
+        note=f"{study.missing_from_ice(EXCLUDE):.2g} when they exclude each other, {study.missing_from_ice(COLUMN):.2g} "
+        f"for a column; N = {study.slices}; the paper expects a full bottle to behave like ice",
     )

@@ -52,7 +52,10 @@ class Aim:
 
 
 def aimed(throw: Scenario, family: str, offset: float = 0.0) -> Aim:
-    """Return the throw that touches the table ``offset`` [rad] beyond the next upright angle.
+    """Return the throw whose lowest rim is at the height of the table ``offset`` [rad] beyond the next upright angle.
+
+    A bottle whose rim turns faster than the bottle falls, omega R > |v_y|, has met such a table a moment before: ice
+    of family A does.
 
     Raises
     ------

@@ -120,8 +120,9 @@ class Throws:
         k = bisect_right(self.ends, number)
         case = self.cases[k]
         place = number - (self.ends[k] - case.throws)
-        throw = scattered(case.aim.throw, case.scatter, (self.seed, case.stream, place)).to_mapping()
-        return Point(number, (k, place), throw, LAND, case.settings())
+        seed = self.seed, case.stream, place
+        throw = scattered(case.aim.throw, case.scatter, seed).to_mapping()
+        return Point(number, (k, place), throw, LAND, {**case.settings(), "seed": list(seed)})
 
     def facts(self) -> dict[str, Any]:
         """Return what tells this design from another."""

@@ -18,7 +18,7 @@ from typing import Final
 from flipproof.chapters.landing.figures import figures
 from flipproof.chapters.landing.study import Found, Rows, Size, Wave, study
 from flipproof.chapters.landing.tables import map_csv, share_line, shares_csv
-from flipproof.landing.design import Throws
+from flipproof.landing.design import Case, Throws
 from flipproof.landing.work import LANDING, Landed, make_landing
 from flipproof.output.ownership import MARKER, OutputError, check_own, marker_text
 from flipproof.sweep.command import Begin, completed
@@ -86,9 +86,22 @@ def drive(throw: Scenario, size: Size, make: Callable[[Wave], Rows]) -> Found:
             return found
 
 
-def make_case(wave: Wave, k: int, seed: int) -> list[Landed]:
+def drive_in_processes(throw: Scenario, size: Size, jobs: int | None = None) -> Found:
+    """Run the study in worker processes and keep no rows; the same to the last bit."""
+    from flipproof.frame.pool import workers
+
+    with workers(jobs) as pool:
+
+        def make(wave: Wave) -> Rows:
+            pending = [pool.submit(make_case, case, size.seed) for case in wave.cases]
+            return [future.result() for future in pending]
+
+        return drive(throw, size, make)
+
+
+def make_case(case: Case, seed: int) -> list[Landed]:
     """Make the throws of one case in this process, numbered as in its own design."""
-    design = Throws(cases=(wave.cases[k],), seed=seed, text="")
+    design = Throws(cases=(case,), seed=seed, text="")
     return [make_landing(design.point(number)) for number in range(design.size)]
 
 

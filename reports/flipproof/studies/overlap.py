@@ -46,6 +46,8 @@ PASS, EXCLUDE, CHECK = (
     f"{REFERENCE}, slices overlap",
 )
 COARSER: Final = f"{EXCLUDE}, coarser"
+COLUMN: Final = "column"
+"""Water as one stretching column: it cannot overlap, and nothing about it is chosen (``ode_reference.column``)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +56,7 @@ class Curve:
 
     Parameters
     ----------
-    name : str - PASS, EXCLUDE or CHECK
+    name : str - PASS, EXCLUDE, CHECK or COLUMN
     level : (F,) - mean of omega / omega_0 over the second half; NaN where the run failed
     band : (F,) - twice what halving the step changed; NaN where that was not measured
     reason : F strings - "" or why the run cannot be used
@@ -81,6 +83,11 @@ class Overlap:
         return self.curves[PASS].level - self.curves[EXCLUDE].level
 
     @property
+    def cost_to_column(self) -> FloatArray:
+        """Return the same between exact equations: slices that overlap in free flight minus the column, shape (F,)."""
+        return self.curves[CHECK].level - self.curves[COLUMN].level
+
+    @property
     def check(self) -> FloatArray:
         """Return |engine - reference| of slices that overlap, shape (F,)."""
         return np.abs(self.curves[PASS].level - self.curves[CHECK].level)
@@ -92,7 +99,7 @@ class Overlap:
 
 
 def plan_overlap(throw: Scenario, fills: Sequence[float] = FILLS, *, slices: int = SLICES, dt: float = DT) -> list[Run]:
-    """Return the runs: four for each fill fraction, gamma of the throw unchanged."""
+    """Return the runs: five for each fill fraction, gamma of the throw unchanged."""
     cut = throw.with_slices(slices)
     times = np.linspace(0.0, throw.duration, POINTS)
     kinds: dict[str, tuple[str, dict[str, Any]]] = {
@@ -100,6 +107,7 @@ def plan_overlap(throw: Scenario, fills: Sequence[float] = FILLS, *, slices: int
         COARSER: (ENGINE, {"slices": "exclude", "dt": dt}),
         PASS: (ENGINE, {"dt": dt}),
         CHECK: (REFERENCE, {}),
+        COLUMN: (COLUMN, {}),
     }
     return [
         Run(_tag(name, fill), solver, vary(cut, fill=fill), settings | {"times": times})
@@ -117,13 +125,13 @@ def study_overlap(
 ) -> Overlap:
     """Read the runs that ``plan_overlap`` planned with the same arguments; ``made`` maps tags to their outcome."""
     coarser = _curve(COARSER, made, fills).level
-    exclude, passing, check = (_curve(name, made, fills) for name in (EXCLUDE, PASS, CHECK))
+    exclude, passing, check, column = (_curve(name, made, fills) for name in (EXCLUDE, PASS, CHECK, COLUMN))
     halved = Curve(name=EXCLUDE, level=exclude.level, band=2.0 * np.abs(exclude.level - coarser), reason=exclude.reason)
     return Overlap(
         fills=np.asarray(fills, dtype=np.float64),
         slices=slices,
         restitution=throw.restitution,
-        curves={curve.name: curve for curve in (passing, halved, check)},
+        curves={curve.name: curve for curve in (passing, halved, check, column)},
     )
 
 

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from flipproof.frame.solvers import Run, find, make
 from flipproof.output.provenance import provenance
 from flipproof.sweep.design import Point
+from ode_reference.solver import COLUMN
 from slicemodel.observables import centre_of_mass_velocity, plateau
 from slicemodel.scenario import Scenario, ScenarioError
 from slicemodel.trajectory import STATUSES, FloatArray, Trajectory
@@ -176,7 +177,7 @@ def make_together(points: Sequence[Point]) -> list[Outcome] | None:
     solver, settings = points[0].solver, points[0].settings
     if any(point.solver != solver or point.settings != settings for point in points):
         return None
-    if find(solver).package != "ode_reference" or not settings.keys() <= SHARED:
+    if find(solver).package != "ode_reference" or solver == COLUMN or not settings.keys() <= SHARED:
         return None
     from ode_reference import solve_batch
 

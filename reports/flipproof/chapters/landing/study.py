@@ -38,7 +38,8 @@ WATER: Final = ("together", "in-turn", "compliant")
 """The laws of water: three models of one impact, shown side by side and never averaged."""
 
 AIMING, COUNTING, MAPPING = range(3)
-"""Streams of seeds: throws that choose an aim are never counted."""
+AXES: Final = {"restitution": 3, "friction": 4, "scatter": 5}
+"""Streams of seeds: throws that choose an aim are never counted, and every axis has throws of its own."""
 
 COMPLIANT: Final = "mujoco-compliant"
 PATHS: Final = 10
@@ -73,6 +74,13 @@ class Size:
     friction: float = 0.4
     scatter: Scatter = field(default_factory=Scatter)
     seed: int = 1
+
+
+PAGE: Final = Size(
+    families=("B",), throws=150, aim_throws=30, offsets=tuple(math.radians(angle) for angle in (-20, -10, 0, 10, 20)),
+    axis_throws=100, map_cells=(16, 16), engine_throws=0,
+)  # fmt: skip
+"""What a page shows that has no folder of ``flipproof upright`` to read from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,7 +266,7 @@ def counting(throw: Scenario, size: Size, aims: Mapping[tuple[str, float, bool],
         ):  # fmt: skip
             for value in values:
                 change = {axis: size.scatter.times(value) if axis == "scatter" else value}
-                case = replace(_case(size, aim, kind, size.axis_throws), **change)
+                case = replace(_case(size, aim, kind, size.axis_throws, AXES[axis]), **change)
                 asked.append((Key(axis, value, family, filling, kind), case))
     fillings, omegas = map_axes(size)
     for kind in ("together", "ice"):

@@ -93,3 +93,13 @@ def _csv(names: Iterable[str], rows: Iterable[list[object]]) -> str:
     for row in rows:
         writer.writerow(["" if isinstance(cell, float) and math.isnan(cell) else cell for cell in row])
     return text.getvalue()
+
+
+def page(found: Found) -> dict[str, object]:
+    """Return what the chapter's template takes."""
+    return {
+        "found": found,
+        "assumed": found.assumed,
+        "lines": [share_line(found, family) for family in found.size.families],
+        "unaimed": sorted(set(found.unaimed.values())),
+    }
