@@ -204,7 +204,7 @@ def state_of(touch: Touch, world: World) -> tuple[FloatArray, FloatArray, FloatA
 
 
 def _run(touch: Touch, world: World, dt: float) -> Landing:
-    from ode_reference.landing_core import loop, motion
+    from ode_reference.landing_core import loop
 
     q, s, w = state_of(touch, world)
     none = np.empty((0, 7 + 2 * world.n))

@@ -64,8 +64,8 @@ def fly(scenario: Scenario, table: Table, slices: str = "exclude", *, dt: float 
             room = _room(state, world)
         if room <= 0.0:
             raise ValueError(
-                f"table.height = {table.height:g} m is not reached from above: the bottle is not over it at release, nor "
-                "when its centre of mass is highest"
+                f"table.height = {table.height:g} m is not reached from above: the bottle is not over it at release, "
+                "nor when its centre of mass is highest"
             )
     q, s, w = state
     run = _loop(q, s, w, dt, scenario.duration - begin, world)

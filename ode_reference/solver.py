@@ -25,8 +25,8 @@ COLUMN: Final = "column"
 
 COLUMN_EQUATION: Final = "m_e h'' = omega^2/2 dJ/dh - (N alpha/3) h', one column of height h"
 COLUMN_REASON: Final = (
-    "Water as one uniformly stretching column: it cannot overlap, a full bottle turns like ice, and there is nothing to "
-    "choose."
+    "Water as one uniformly stretching column: it cannot overlap, a full bottle turns like ice, and there is nothing "
+    "to choose."
 )
 """What solves it, and why it is there, as of the other models (``ode_reference.column``)."""
 

@@ -196,6 +196,6 @@ def claim_overlap(study: Overlap) -> Finding:
         value=study.missing_from_ice(PASS),
         unit="",
         kind="observation",
-        note=f"{study.missing_from_ice(EXCLUDE):.2g} when they exclude each other, {study.missing_from_ice(COLUMN):.2g} "
-        f"for a column; N = {study.slices}; the paper expects a full bottle to behave like ice",
+        note=f"{study.missing_from_ice(EXCLUDE):.2g} when they exclude each other, "
+        f"{study.missing_from_ice(COLUMN):.2g} for a column; N = {study.slices}; the paper expects a full bottle to behave like ice",
     )

@@ -69,7 +69,7 @@ def test_ice_turns_as_its_angular_velocity_says():
 
 
 def test_a_table_beside_the_thrower_is_reached_from_above_or_refused():
-    """Ice that is over the table when its centre of mass is highest lands on it; a table above all of that is missed."""
+    """Ice that is over the table when its centre of mass is highest lands on it; a table above that is missed."""
     ice = replace(WATER, frozen=True, omega0=20.0)
     touch = ode_reference.fly(ice, Table(height=0.07))
     speed = ice.launch_velocity[1] - ice.gravity * touch.time

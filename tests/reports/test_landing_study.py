@@ -188,9 +188,7 @@ def test_energy_at_the_touch_is_that_of_the_throw():
     assert read["touch_energy"] * saddle(throw) == pytest.approx(
         start + block.mass * throw.gravity * height, rel=2e-5, abs=0
     )
-    assert read["touch_speed"] == pytest.approx(
-        throw.gravity * touch.time - throw.launch_velocity[1], rel=1e-5, abs=0
-    )
+    assert read["touch_speed"] == pytest.approx(throw.gravity * touch.time - throw.launch_velocity[1], rel=1e-5, abs=0)
 
 
 @pytest.mark.parametrize(
@@ -271,7 +269,9 @@ def test_every_finding_and_figure_says_what_is_assumed(found):
 def test_the_stored_witnesses_are_enough_and_agree(found):
     stored = witnesses()
     assert stored["touches"] >= 200
-    assert not [finding.note for finding in claims(found) if finding.id.startswith("landing-witnesses") and finding.failed]
+    assert not [
+        finding.note for finding in claims(found) if finding.id.startswith("landing-witnesses") and finding.failed
+    ]
 
 
 def test_the_sweep_makes_the_same_and_goes_on(found, tmp_path):

@@ -31,7 +31,7 @@ def add_landing(commands: Any) -> None:
                       "mujoco-compliant (%(default)s)")  # fmt: skip
     land.add_argument("--slices", type=count, default=SLICES, metavar="N", help="slices (%(default)s)")
     land.add_argument("--film", type=Path, metavar="FILE", help="also write water beside ice as .gif or .mp4")
-    land.add_argument("--slow", type=number, default=9.6, metavar="X", help="times slower than the flight (%(default)s)")
+    land.add_argument("--slow", type=number, default=9.6, metavar="X", help="times slower than it is (%(default)s)")
     land.add_argument("--fps", type=count, default=25, metavar="N", help="frames per second (%(default)s)")
     land.add_argument("--quiet", action="store_true", help="no progress")
 
@@ -41,7 +41,9 @@ def add_landing(commands: Any) -> None:
     upright.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     upright.add_argument("--throws", type=count, default=300, metavar="N", help="throws a point (%(default)s)")
     upright.add_argument("--slices", type=count, default=SLICES, metavar="N", help="slices (%(default)s)")
-    upright.add_argument("--fillings", type=_shares, metavar="X,Y,Z", help="fill fractions (default: eight, 0.1 to 0.95)")
+    upright.add_argument(
+        "--fillings", type=_shares, metavar="X,Y,Z", help="fill fractions (default: eight, 0.1 to 0.95)"
+    )
     upright.add_argument(
         "--families", default="A,B", metavar="A,B", help="A: omega_0 as thrown, height of the table solved for; B: time "
         "of flight as thrown, omega_0 solved for (%(default)s)",

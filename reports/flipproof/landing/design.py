@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
@@ -127,5 +126,3 @@ class Throws:
     def facts(self) -> dict[str, Any]:
         """Return what tells this design from another."""
         return {"study": "landing", "seed": self.seed, "cases": [case.facts() for case in self.cases]}
-
-

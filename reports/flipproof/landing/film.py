@@ -102,7 +102,10 @@ def _scene(bottles: Sequence[Shown]) -> tuple[Any, Any, list[_Panel], Line2D]:
     canvas = cast(Any, FigureCanvasAgg(figure))
     above, below = figure.subfigures(2, 1, height_ratios=(2.0, 1.0), squeeze=False)[:, 0]
     axes = list(above.subplots(1, len(bottles), squeeze=False)[0])
-    panels = [_panel(place, bottle, COLOURS[k % len(COLOURS)]) for k, (place, bottle) in enumerate(zip(axes, bottles, strict=True))]
+    panels = [
+        _panel(place, bottle, COLOURS[k % len(COLOURS)])
+        for k, (place, bottle) in enumerate(zip(axes, bottles, strict=True))
+    ]
     cursor = _energies(below.subplots(), bottles)
     title = figure.suptitle(" ", fontsize=10, family="monospace")
     canvas.draw()

@@ -107,6 +107,3 @@ def wilson(count: int, throws: int) -> tuple[float, float]:
     half = Z * math.sqrt(share * (1 - share) / throws + z / (4 * throws * throws)) / (1 + z / throws)
     # Rounding must not put the ends beyond what is possible.
     return (0.0 if count == 0 else middle - half), (1.0 if count == throws else middle + half)
-
-
-

@@ -101,8 +101,8 @@ def _touch_lines(name: str, touch: Touch) -> list[str]:
     read = touch_readings(touch)
     stands = "below" if read["static_margin"] > 0.0 else "above"
     return [
-        f"{name} touches at t = {touch.time:.4f} s: tilt {math.degrees(touch.tilt):+.1f} degrees, {stands} its toppling "
-        f"angle by {math.degrees(abs(read['static_margin'])):.1f}; omega {touch.omega:.2f} rad/s; falls at "
+        f"{name} touches at t = {touch.time:.4f} s: tilt {math.degrees(touch.tilt):+.1f} degrees, {stands} its "
+        f"toppling angle by {math.degrees(abs(read['static_margin'])):.1f}; omega {touch.omega:.2f} rad/s; falls at "
         f"{read['touch_speed']:.2f} m/s; energy {read['touch_energy']:.2f} E_s (saddle {saddle(touch.scenario):.4f} J)"
     ]
 

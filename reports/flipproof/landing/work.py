@@ -92,9 +92,7 @@ def make_landing(point: Point) -> Landed:
 
     try:
         scenario = point.scenario()
-        table = Table(
-            height=settings["height"], restitution=settings["restitution"], friction=settings["friction"]
-        )
+        table = Table(height=settings["height"], restitution=settings["restitution"], friction=settings["friction"])
     except ScenarioError as error:
         return lost("impossible", str(error))
     try:

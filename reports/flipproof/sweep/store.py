@@ -27,7 +27,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -50,6 +50,9 @@ from flipproof.sweep.schema import (
 )
 from flipproof.sweep.work import CURVES, Outcome, Returned
 from slicemodel.trajectory import FloatArray
+
+if TYPE_CHECKING:
+    from flipproof.landing.work import Landed
 
 LOCK: Final = "sweep.lock"
 KIND: Final = "sweep"
@@ -195,7 +198,7 @@ class Store:
         (number,) = self.connection.execute("SELECT id FROM versions WHERE facts = ?", (facts,)).fetchone()
         return int(number)
 
-    def _row(self, outcome: Outcome, flight: str | None, versions: int) -> tuple[Any, ...]:
+    def _row(self, outcome: Outcome | Landed, flight: str | None, versions: int) -> tuple[Any, ...]:
         point = self.design.point(outcome.number)
         cells = (
             outcome.number,

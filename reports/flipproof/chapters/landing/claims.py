@@ -64,7 +64,7 @@ def _water_and_ice(found: Found) -> Iterator[Finding]:
 
 
 def _best_filling(found: Found) -> Finding:
-    """Where P(water) is largest: the paper's optimum is 0.2 to 0.5 (section 5)."""
+    """Return where P(water) is largest: the paper's optimum is 0.2 to 0.5 (section 5)."""
     curve = found.curve(_family(found), "together")
     inside = [pair for pair in curve if OPTIMAL[0] <= pair[0] <= OPTIMAL[1]]
     outside = [pair for pair in curve if pair not in inside]
@@ -83,8 +83,8 @@ def _best_filling(found: Found) -> Finding:
         unit="",
         kind="observation",
         note=(
-            f"best inside: {best[0]:g} with {share(best):.3f}, outside: {other[0]:g} with {share(other):.3f}; difference "
-            f"{difference:+.3f}, 95 % interval {low:+.3f} to {high:+.3f}: "
+            f"best inside: {best[0]:g} with {share(best):.3f}, outside: {other[0]:g} with {share(other):.3f}; "
+            f"difference {difference:+.3f}, 95 % interval {low:+.3f} to {high:+.3f}: "
             f"{'decided' if low > 0 or high < 0 else 'not decided'}; {found.assumed}"
         ),
     )
@@ -113,7 +113,7 @@ def _static(found: Found) -> Iterator[Finding]:
 
 
 def _slow_rotation(found: Found) -> Finding:
-    """Do bottles that turn more slowly at the touch stand more often (section 6)?"""
+    """Return whether bottles that turn more slowly at the touch stand more often (section 6)."""
     family = _family(found)
     title = "P(upright) of the slower minus the faster half of the touches, water (section 6: slow rotation helps)"
     if (family, "together") not in found.slow:
@@ -135,7 +135,7 @@ def _slow_rotation(found: Found) -> Finding:
 
 
 def _bounces(found: Found) -> Finding:
-    """Does falling water dampen the bounce (section 6)?"""
+    """Return whether falling water dampens the bounce (section 6)."""
     family, filling = _family(found), found.size.axis_filling
     title = f"Bounces of ice minus bounces of water at filling {filling:g} (section 6: falling water dampens them)"
     water, ice = (found.cell(family, kind, filling) for kind in ("together", "ice"))
@@ -155,7 +155,7 @@ def _bounces(found: Found) -> Finding:
 
 
 def _model_uncertainty(found: Found) -> Finding:
-    """How far the laws of the impact are apart: a band of the model, not of the sample."""
+    """Return how far the laws of the impact are apart: a band of the model, not of the sample."""
     family = _family(found)
     title = "Largest distance in P(upright) between two laws of the impact, water"
     widest, where = -math.inf, ""
@@ -177,7 +177,7 @@ def _model_uncertainty(found: Found) -> Finding:
 
 
 def _undecided(found: Found) -> Finding:
-    """How many landings of the reference could not be certified."""
+    """Return how many landings of the reference could not be certified."""
     cells = [cell for key, cell in found.cells.items() if key.kind in ("together", "in-turn", "ice")]
     throws = sum(cell.share.throws for cell in cells)
     unknown = sum(cell.share.undecided for cell in cells)

@@ -137,7 +137,8 @@ def figure_static(found: Found) -> Figure:
 def figure_energy(found: Found) -> Figure:
     """Energy of a few landings over the saddle: below 1 the outcome is final."""
     figure, panels = new_figure(1, 2, size=(8.6, 4.0), sharey=True)
-    for axes, kind in zip(panels, ("together", "ice"), strict=True):
+    kinds: tuple[Kind, ...] = ("together", "ice")
+    for axes, kind in zip(panels, kinds, strict=True):
         for run in found.energies:
             if run.kind == kind:
                 _energy(axes, run)

@@ -85,8 +85,8 @@ def figures(found: Found) -> list[Exhibit]:
             section=SECTION,
             title="Where the static criterion is right and wrong",
             caption=(
-                "The toppling angle of Eq. 13a, with the water where it is at the touch, says whether a bottle put down "
-                "at rest would come upright. Of the throws it calls upright, and of the others, the share that stands. "
+                "The toppling angle of Eq. 13a, with the water where it is at the touch, says whether a bottle put "
+                "down at rest would come upright. Of the throws it calls upright, and of the others, the share that stands. "
                 f"All fillings. {found.assumed.capitalize()}."
             ),
             alt=_static_words(found),
@@ -99,8 +99,8 @@ def figures(found: Found) -> list[Exhibit]:
             section=SECTION,
             title="Energy against the saddle",
             caption=(
-                f"The same throwers with water and with ice, filling {size.axis_filling:g}. Below 1 the energy does not "
-                f"suffice to get from the base over a rim, and the outcome is final. {found.assumed.capitalize()}."
+                f"The same throwers with water and with ice, filling {size.axis_filling:g}. Below 1 the energy does "
+                f"not suffice to get from the base over a rim, and the outcome is final. {found.assumed.capitalize()}."
             ),
             alt=_energy_words(found),
             maker=drawings.figure_energy,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -258,14 +258,14 @@ def counting(throw: Scenario, size: Size, aims: Mapping[tuple[str, float, bool],
                     asked.append((Key("filling", filling, family, filling, kind), _case(size, aim, kind, throws)))
     family, filling = size.families[-1], size.axis_filling
     for kind in ("together", "in-turn", "ice"):
-        aim = aims.get((family, filling, KINDS[kind][0]))
-        if aim is None:
+        if (family, filling, KINDS[kind][0]) not in aims:
             continue
+        aim = aims[family, filling, KINDS[kind][0]]
         for axis, values in (
             ("restitution", size.restitutions), ("friction", size.frictions), ("scatter", size.scatters)
         ):  # fmt: skip
             for value in values:
-                change = {axis: size.scatter.times(value) if axis == "scatter" else value}
+                change: dict[str, Any] = {axis: size.scatter.times(value) if axis == "scatter" else value}
                 case = replace(_case(size, aim, kind, size.axis_throws, AXES[axis]), **change)
                 asked.append((Key(axis, value, family, filling, kind), case))
     fillings, omegas = map_axes(size)
@@ -405,8 +405,5 @@ def _energies(wave: Wave, rows: Rows, size: Size) -> tuple[Energy, ...]:
             if row.outcome in (None, "undecided"):
                 continue
             run = path(ode_reference.fly(design.point(place).scenario(), table), table, case.law, duration=PATH)
-            found.append(
-                Energy(kind=kind, t=run.t, energy=run.energy / run.saddle, outcome=str(row.outcome))
-            )
+            found.append(Energy(kind=kind, t=run.t, energy=run.energy / run.saddle, outcome=str(row.outcome)))
     return tuple(found)
-

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from flipproof.chapters.landing.study import KINDS, Cell, Found, Kind
 
@@ -86,7 +86,7 @@ def share_line(found: Found, family: str) -> str:
     return "\n".join(lines)
 
 
-def _csv(names: Iterable[str], rows: Iterable[list[object]]) -> str:
+def _csv(names: Iterable[str], rows: Iterable[Sequence[object]]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(names)
