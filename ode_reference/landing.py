@@ -175,6 +175,7 @@ def world_of(touch: Touch, table: Table, law: str, slices: str) -> World:
         saddle=saddle,
         upright=math.atan2(bottle.radius, rest),
         cap=math.pi - math.atan2(bottle.radius, upside_down),
+        cap_saddle=scenario.total_mass * scenario.gravity * math.hypot(bottle.radius, upside_down),
     )
 
 
@@ -235,7 +236,7 @@ def path(
     q, s, w = state_of(touch, world)
     q[1] += drop
     record = np.full((math.ceil(duration / every), 7 + 2 * world.n), np.nan)
-    loop.land(q, s, w, dt, duration, False, world._replace(saddle=-math.inf), every, record)
+    loop.land(q, s, w, dt, duration, False, world._replace(saddle=-math.inf, cap_saddle=-math.inf), every, record)
     record = record[np.isfinite(record[:, 0])]
     n = world.n
     energy = [motion.energy(row[1:7], row[7 : 7 + n], row[7 + n :], world) for row in record]

@@ -32,8 +32,8 @@ UPRIGHT, LYING, CAP, TIMEOUT, BROKEN, TOUCHED = range(6)
 class World(NamedTuple):
     """What does not change during a landing (SI). ``chain``: slices meet each other; else each has its own two stops.
 
-    ``low`` and ``high`` are those stops, from the tube's middle. ``saddle`` is E_s, ``upright`` and ``cap`` the tilts
-    that part the basins [rad].
+    ``low`` and ``high`` are those stops, from the tube's middle. ``saddle`` is E_s, ``upright`` and ``cap`` are the
+    tilts that part the basins [rad], ``cap_saddle`` is the saddle out of the basin of the cap.
     """
 
     n: int
@@ -56,6 +56,7 @@ class World(NamedTuple):
     saddle: float
     upright: float
     cap: float
+    cap_saddle: float
 
 
 class Landing(NamedTuple):

@@ -84,11 +84,12 @@ def land(q, s, w, dt, longest, fly, world, every, record):
             rows += 1
         if not math.isfinite(before):
             return Landing(BROKEN, t, 0.0, bounces, 0.0, rise, steps, impacts, unresolved)
-        if not fly and before < world.saddle:
-            tilt = abs(q[2] - 2 * math.pi * math.floor(q[2] / (2 * math.pi) + 0.5))
+        tilt = abs(q[2] - 2 * math.pi * math.floor(q[2] / (2 * math.pi) + 0.5))
+        saddle = world.cap_saddle if tilt > world.cap else world.saddle
+        if not fly and before < saddle:
             code = UPRIGHT if tilt < world.upright else CAP if tilt > world.cap else LYING
             slid = q[0] + world.half * math.sin(q[2]) - origin
-            margin = (world.saddle - before) / world.saddle
+            margin = (saddle - before) / saddle
             return Landing(code, t, margin, bounces, slid, rise, steps, impacts, unresolved)
         # The time until the next instant: a step, or less if a gap closes in it.
         h = min(dt, longest - t)

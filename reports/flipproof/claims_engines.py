@@ -197,5 +197,6 @@ def claim_overlap(study: Overlap) -> Finding:
         unit="",
         kind="observation",
         note=f"{study.missing_from_ice(EXCLUDE):.2g} when they exclude each other, "
-        f"{study.missing_from_ice(COLUMN):.2g} for a column; N = {study.slices}; the paper expects a full bottle to behave like ice",
+        f"{study.missing_from_ice(COLUMN):.2g} for a column; N = {study.slices}; the paper expects a full bottle to "
+        "behave like ice",
     )

@@ -43,8 +43,8 @@ def draw_overlap(study: Overlap) -> Exhibit:
         caption="In the paper slices pass through each other, and a full bottle, which ought to behave like ice, slows "
         "down. In the same engine, slices that are rods and exclude each other keep the angular velocity of a full "
         "bottle. The two curves differ by what overlap does. Water as one stretching column cannot overlap either, and "
-        "has nothing to choose. In the paper's experiment the fall is largest at fillings of 0.25 to 0.5, and a filling of "
-        "0.1 turns like ice. Bars: twice what halving the step changes.",
+        "has nothing to choose. In the paper's experiment the fall is largest at fillings of 0.25 to 0.5, and a "
+        "filling of 0.1 turns like ice. Bars: twice what halving the step changes.",
         alt=f"Line plot of the plateau of omega over omega_0 against the fill fraction; ice is 1. {rows}.",
         maker=figure_overlap,
         data=(study,),

@@ -45,8 +45,8 @@ def add_landing(commands: Any) -> None:
         "--fillings", type=_shares, metavar="X,Y,Z", help="fill fractions (default: eight, 0.1 to 0.95)"
     )
     upright.add_argument(
-        "--families", default="A,B", metavar="A,B", help="A: omega_0 as thrown, height of the table solved for; B: time "
-        "of flight as thrown, omega_0 solved for (%(default)s)",
+        "--families", default="A,B", metavar="A,B", help="A: omega_0 as thrown, height of the table solved for; B: "
+        "time of flight as thrown, omega_0 solved for (%(default)s)",
     )  # fmt: skip
     upright.add_argument("--scatter", type=_scatter, metavar="SPIN,DEGREES,SPEED", help="standard deviations: share of "
                          "omega_0, of theta_0 [degrees], of the launch velocity [m/s] (0.05,5,0.1)")  # fmt: skip

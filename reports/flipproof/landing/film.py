@@ -33,6 +33,9 @@ EVERY: Final = 5e-4
 TOP: Final = 4.0
 """Largest energy that is drawn [E_s]."""
 
+TABLE: Final = 0.04
+"""Thickness of the table that is drawn [m]."""
+
 DPI: Final = 100
 
 
@@ -102,8 +105,9 @@ def _scene(bottles: Sequence[Shown]) -> tuple[Any, Any, list[_Panel], Line2D]:
     canvas = cast(Any, FigureCanvasAgg(figure))
     above, below = figure.subfigures(2, 1, height_ratios=(2.0, 1.0), squeeze=False)[:, 0]
     axes = list(above.subplots(1, len(bottles), squeeze=False)[0])
+    window = _window(bottles)
     panels = [
-        _panel(place, bottle, COLOURS[k % len(COLOURS)])
+        _panel(place, bottle, COLOURS[k % len(COLOURS)], window)
         for k, (place, bottle) in enumerate(zip(axes, bottles, strict=True))
     ]
     cursor = _energies(below.subplots(), bottles)
@@ -113,15 +117,22 @@ def _scene(bottles: Sequence[Shown]) -> tuple[Any, Any, list[_Panel], Line2D]:
     return canvas, title, panels, cursor
 
 
-def _panel(axes: Axes, bottle: Shown, colour: str) -> _Panel:
-    motion, half = bottle.motion, bottle.touch.scenario.bottle.length / 2
-    reach = half + bottle.touch.scenario.bottle.radius
-    x, y = motion.centre.T
-    axes.set_xlim(x.min() - reach, x.max() + reach)
-    axes.set_ylim(-0.04, max(y.max() + reach, 3 * half))
+def _window(bottles: Sequence[Shown]) -> tuple[float, float]:
+    """Return width and height that hold every bottle's motion [m]: all panels have one scale."""
+    reach = max(b.touch.scenario.bottle.length / 2 + b.touch.scenario.bottle.radius for b in bottles)
+    width = max(float(np.ptp(b.motion.centre[:, 0])) for b in bottles)
+    height = max(float(b.motion.centre[:, 1].max()) for b in bottles)
+    return width + 2 * reach, height + reach
+
+
+def _panel(axes: Axes, bottle: Shown, colour: str, window: tuple[float, float]) -> _Panel:
+    x = bottle.motion.centre[:, 0]
+    middle, (width, height) = float(x.min() + x.max()) / 2, window
+    axes.set_xlim(middle - width / 2, middle + width / 2)
+    axes.set_ylim(-TABLE, height)
     axes.set_aspect("equal")
     axes.set_axis_off()
-    axes.axhspan(-1.0, 0.0, color="#C8B79A")
+    axes.axhspan(-TABLE, 0.0, color="#C8B79A")
     axes.set_title(f"{bottle.name}: {bottle.outcome.outcome}", fontsize=10, color=colour)
     tint = ICE if bottle.touch.scenario.frozen else WATER
     water = PolyCollection([], facecolors=tint, edgecolors="none")

@@ -86,7 +86,8 @@ def figures(found: Found) -> list[Exhibit]:
             title="Where the static criterion is right and wrong",
             caption=(
                 "The toppling angle of Eq. 13a, with the water where it is at the touch, says whether a bottle put "
-                "down at rest would come upright. Of the throws it calls upright, and of the others, the share that stands. "
+                "down at rest would come upright. Of the throws it calls upright, and of the others, the share that "
+                "stands. "
                 f"All fillings. {found.assumed.capitalize()}."
             ),
             alt=_static_words(found),
