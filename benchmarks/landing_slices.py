@@ -1,4 +1,4 @@
-"""How many slices does P(upright) need, and how many landings a second are made?
+"""Measure how many slices P(upright) needs, and how many landings are made a second.
 
     python benchmarks/landing_slices.py                       600 throws with 20 and with 40 slices, filling 0.4
     python benchmarks/landing_slices.py --slices 10 20 40     others

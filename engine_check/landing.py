@@ -110,7 +110,7 @@ class Watch:
         return "upright" if tilt < self.lean else "cap" if tilt > math.pi - self.lean_on_cap else "lying"
 
     def limit(self, theta: float) -> float:
-        """Return the saddle out of the basin of the cap for a bottle over its cap, else the one out of the others [J]."""
+        """Return the saddle out of the basin of the cap for a bottle over its cap, else the other one [J]."""
         over_cap = abs(math.remainder(theta, math.tau)) > math.pi - self.lean_on_cap
         return self.cap_saddle if over_cap else self.saddle
 
