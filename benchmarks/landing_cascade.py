@@ -6,8 +6,8 @@
 Staggered slices, six, filling 0.25: the touches of landing_witnesses whose outcomes differ. Water that still rebounds
 on the base lies micrometres over it at the touch. A grid whose step is longer than those gaps take to close lets bottle
 and water strike at once; the event-driven landing strikes them one after the other. Prints the gaps, and the spin a
-few microseconds later on finer and finer grids of MuJoCo's mass matrix. Where even the finest does not give it, gaps differ
-by less than the 3e-10 m (``TOUCHING``) below which the event-driven landing counts two things as touching.
+few microseconds later on finer and finer grids of MuJoCo's mass matrix. Where even the finest does
+not give it, gaps differ by less than the 3e-10 m below which the event-driven landing counts things as touching.
 """
 
 from __future__ import annotations

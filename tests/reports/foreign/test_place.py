@@ -15,7 +15,8 @@ from slicemodel import Scenario
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "foreign"
 VARIANTS = Path(__file__).with_name("rk4_variants.py")
 PLACED = {name: LIMITS.get(name, "free-flight" if solver.package == "engine_check" else name)
-          for name, solver in catalogue().items() if name not in ("published-matlab", "paper-typeset", "column")}  # fmt: skip
+          for name, solver in catalogue().items()
+          if name not in ("published-matlab", "paper-typeset", "column")}  # fmt: skip
 
 
 def placed(spec):
