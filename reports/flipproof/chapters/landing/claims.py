@@ -14,9 +14,6 @@ from flipproof.frame.findings import Finding
 OPTIMAL: Final = (0.2, 0.5)
 """Fillings that the paper calls optimal (section 5)."""
 
-ENOUGH: Final = 0.5
-"""Share of the throws that the static criterion calls upright which has to stand, if it is to predict anything."""
-
 ALIKE: Final = 0.02
 ALIKE_OF_IMPULSES: Final = 0.03
 """Share of outcomes in which two programs of one law may differ: with pymunk, and with MuJoCo's impulses."""
@@ -91,23 +88,24 @@ def _best_filling(found: Found) -> Finding:
 
 
 def _static(found: Found) -> Iterator[Finding]:
-    """Yield how many of the throws stand that the static criterion calls upright (section 6, Eq. 13a)."""
+    """Yield how often the static criterion says the outcome rightly (section 6, Eq. 13a)."""
     for (family, kind), counts in found.static.items():
         said = counts[True, True] + counts[True, False]
         others = counts[False, True] + counts[False, False]
-        if not said:
+        if not said + others:
             continue
-        stands = counts[True, True] / said
-        word = "predicts" if stands >= ENOUGH else "does not predict"
         yield Finding(
             id=f"landing-static-{family}-{kind.replace(', ', '-')}",
-            title=f"Throws with a tilt below the toppling angle at touch that stand: {NAMES[kind]}, family {family}",
-            value=stands,
+            title=(
+                "Throws of which the toppling angle at the touch says rightly whether they stand: "
+                f"{NAMES[kind]}, family {family}"
+            ),
+            value=(counts[True, True] + counts[False, False]) / (said + others),
             unit="",
             kind="observation",
             note=(
-                f"{counts[True, True]} of {said}; of the others {counts[False, True]} of {others} stand: the criterion "
-                f"{word} the outcome; {found.assumed}"
+                f"of those with a tilt below it {counts[True, True]} of {said} stand, of those above it "
+                f"{counts[False, True]} of {others}; {found.assumed}"
             ),
         )
 
