@@ -3,7 +3,7 @@
     python benchmarks/landing_witnesses.py                    30 touches each of water and ice, six slices
     python benchmarks/landing_witnesses.py --touches 200      as many as the claim asks for
     python benchmarks/landing_witnesses.py --engines pymunk   one engine only
-    python benchmarks/landing_witnesses.py --touches 200 --cases ice together --jobs 2 --json FILE
+    python benchmarks/landing_witnesses.py --touches 200 --cases ice together in-turn --jobs 2 --json FILE
 
 Throws are scattered widely in omega_0 and table height and kept if they come down within 35 degrees of upright, where
 outcomes are open. The flight is the event-driven one for all. A disagreement is counted only between certified
