@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from flipproof.page.render import CONTENTS
+from flipproof.chapters import CONTENTS
 
 LARGEST = 5e6
 """Bytes of the whole page, the validity maps of a full report included."""
@@ -40,7 +40,8 @@ def test_the_page_stays_small(folder):
 
 def test_sections_stand_in_the_order_of_the_contents(opened):
     ids = opened.page.evaluate("[...document.querySelectorAll('main > section')].map(section => section.id)")
-    assert ids == [section for section in CONTENTS if section in ids]
+    known = ["verdict", *(section[0] for section in CONTENTS), "throws", "findings", "solvers", "provenance"]
+    assert ids == [section for section in known if section in ids]
     assert {"verdict", "flights", "steps", "events", "ice", "engines", "errata", "findings", "provenance"} <= set(ids)
     links = opened.page.evaluate("[...document.querySelectorAll('nav a')].map(link => link.hash.slice(1))")
     assert links == ids

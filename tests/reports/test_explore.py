@@ -8,6 +8,7 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
+from flipproof.chapters.maps.study import LADDER, RUNGS
 from flipproof.frame.solvers import make
 from flipproof.page import explore
 from flipproof.page.explore import (
@@ -26,7 +27,6 @@ from flipproof.page.explore import (
     plan,
 )
 from flipproof.page.templating import environment
-from flipproof.studies.validity import LADDER, RUNGS
 from flipproof.sweep.planned import Row
 from slicemodel import Scenario
 from slicemodel.observables import plateau
@@ -167,12 +167,12 @@ def made_up_rows(spoiled=None):
         for run in runs:
             level = 0.1 * LADDER.index(run.solver) if run.solver in LADDER else 0.0
             level += 0.01 * run.scenario.fill_fraction + 0.001 * run.scenario.damping_rate / 5 + 0.2 * e
-            rows[run.tag] = row(level, np.full(3, level * FEW.omega0))
+            rows[run] = row(level, np.full(3, level * FEW.omega0))
         read.append(rows)
     if spoiled:
-        e, tag_part = spoiled
-        tag = next(run.tag for run in planned[e] if tag_part in run.tag)
-        read[e][tag] = row(None, None, "failed", "RuntimeError: no")
+        e, words = spoiled
+        lost = next(run for run in planned[e] if words in run.label)
+        read[e][lost] = row(None, None, "failed", "RuntimeError: no")
     return planned, read
 
 

@@ -1,17 +1,17 @@
 """The page's words: the answer, its numbers, the bars of the waterfall, and failures where they belong."""
 
-import dataclasses
 import re
 from types import SimpleNamespace
 
 import pytest
+from made_up import spoiled
 
-from flipproof.evidence import FLIGHTS
-from flipproof.frame.solvers import Made
+from flipproof.chapters.solvers import FLIGHTS
+from flipproof.chapters.waterfall.study import program_run
+from flipproof.frame.gather import tell
 from flipproof.output.provenance import provenance
-from flipproof.output.summary import solver_rows
 from flipproof.page.pdf import VARIABLE, PrintError, find_browser, print_page, require_browser
-from flipproof.page.render import CONTENTS, PLACES, read_assets, render, sort_problems, unbroken
+from flipproof.page.render import read_assets, render, unbroken
 from flipproof.page.verdict import strips
 
 pytestmark = pytest.mark.xdist_group("evidence")
@@ -37,35 +37,21 @@ def test_bars_below_zero_stay_inside_and_values_that_are_not_finite_draw_nothing
     assert all(strip.width == 0 for strip in strips(waterfall(0.0, 0.0, 0.0)))
 
 
-def test_every_failed_study_has_a_section():
-    sorted_problems = sort_problems({"waterfall": "a", "map over gamma": "b", "something else": "c", "horizon": "d"})
-    assert dict(sorted_problems) == {
-        "assumptions": [("waterfall", "a")],
-        "maps": [("map over gamma", "b")],
-        "events": [("something else", "c")],
-        "engines": [("horizon", "d")],
-    }
-    assert set(PLACES.values()) <= set(CONTENTS)
-
-
 def section_of(page, name):
     return re.search(rf'<section id="{name}">.*?</section>', page, re.S).group()
 
 
-def test_a_failed_solver_and_a_failed_study_stand_where_their_results_would(evidence, report):
-    made = dict(evidence.made)
-    made["pymunk"] = Made(made["pymunk"].run, None, 0.1, "SetupError: the world is <not> the one that was meant")
-    found = dataclasses.replace(evidence.attribution, waterfalls=(), problems={"waterfall": "ArithmeticError: no run"})
-    broken = dataclasses.replace(evidence, made=made, attribution=found)
-    exhibits = [exhibit for exhibit in report.exhibits if exhibit.name != "waterfall"]
-    page = render(broken, report.findings, exhibits, solver_rows(broken), provenance("flipproof report"))
+def test_a_failed_solver_and_a_failed_study_stand_where_their_results_would(gathered):
+    lost = (gathered.ask.solvers["pymunk"], program_run(gathered.ask.throw, gathered.ask.steps))
+    broken = spoiled(gathered, lost, "SetupError: the world is <not> the one that was meant", ("flights", "waterfall"))
+    page = render(broken, tell(broken), provenance("flipproof report"))
     flights = section_of(page, "flights")
     row = re.search(r"<tr><th[^>]*>pymunk</th>.*?</tr>", flights, re.S).group()
     assert "✗ failed" in row
     assert "SetupError: the world is &lt;not&gt; the one that was meant" in row
     assert "trajectories/pymunk/" not in page
     assert "solvers failed on this throw" in section_of(page, "verdict")
-    assert "ArithmeticError: no run" in section_of(page, "assumptions")
+    assert "the world is &lt;not&gt;" in section_of(page, "assumptions")
     assert 'class="strips"' not in page
 
 

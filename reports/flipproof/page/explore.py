@@ -32,8 +32,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from flipproof.chapters.maps.study import LADDER, RUNGS, Reading, plan_map, study_readings, word
 from flipproof.frame.solvers import Run
-from flipproof.studies.validity import LADDER, RUNGS, Reading, plan_map, study_readings, word
 from flipproof.sweep.axes import DAMPING, FILL
 from flipproof.sweep.command import Begin, completed
 from flipproof.sweep.files import write_whole
@@ -53,6 +53,9 @@ SLICES: Final = 50
 
 STEPS: Final = 1000
 """Points of the published program's grid: its own default."""
+
+HOW: Final[Mapping[str, Any]] = {"steps": STEPS, "points": None, "shares": True}
+"""How the runs are planned and read."""
 
 POINTS: Final = 61
 """Equal times at which omega is kept."""
@@ -91,14 +94,10 @@ GRID: Final = Grid(
 
 
 def plan(throw: Scenario, grid: Grid) -> list[list[Run]]:
-    """Return the runs for each restitution: every set of assumptions on every cell of a map over fill and gamma.
-
-    The tags of one restitution are unique; two restitutions share theirs.
-    """
+    """Return the runs for each restitution: every set of assumptions on every cell of a map over fill and gamma."""
     dampings = _dampings(throw, grid)
     throws = [replace(throw, restitution=restitution) for restitution in grid.restitutions]
-    how: dict[str, Any] = {"steps": STEPS, "points": None, "shares": True}
-    return [plan_map(t, "gamma", grid.fills, dampings, **how) for t in throws]
+    return [plan_map(t, "gamma", grid.fills, dampings, **HOW) for t in throws]
 
 
 def compute(
@@ -130,7 +129,7 @@ def pack(
     throw: Scenario,
     grid: Grid,
     planned: Sequence[Sequence[Run]],
-    read: Sequence[Mapping[str, Row]],
+    read: Sequence[Mapping[Run, Row]],
     points: int = POINTS,
 ) -> dict[str, Any]:
     """Return the data file's content from the rows of the planned runs, one mapping for each restitution."""
@@ -141,8 +140,9 @@ def pack(
     dominant = np.full(shape, MISSING_RUNG, dtype=np.uint8)
     problems: dict[str, str] = {}
     for at, (runs, rows) in enumerate(zip(planned, read, strict=True)):
-        readings = {tag: _reading(row) for tag, row in rows.items()}
-        study = study_readings(throw, "gamma", grid.fills, _dampings(throw, grid), readings, steps=STEPS, shares=True)
+        readings = {run: _reading(row) for run, row in rows.items()}
+        bouncing = replace(throw, restitution=grid.restitutions[at])
+        study = study_readings(bouncing, "gamma", grid.fills, _dampings(throw, grid), readings, **HOW)
         assert study.shares is not None
         for name, share in zip(RUNGS, study.shares, strict=True):
             shares[name][at] = share
@@ -150,7 +150,7 @@ def pack(
         for name in LADDER:
             plateau[name][at] = study.level[name]
         for place, run in _shown_runs(runs, shape):
-            curve = rows[run.tag].curves.get("omega")
+            curve = rows[run].curves.get("omega")
             if curve is not None:
                 omega[run.solver][at][place] = curve / abs(throw.omega0)
         for place in zip(*np.nonzero(study.reason), strict=True):

@@ -3,64 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any
 
+from jinja2 import Environment
 from markupsafe import Markup
 
-from flipproof.evidence import FLIGHTS, Evidence
-from flipproof.exhibits_work_precision import tabulate_work_precision
-from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.findings import Finding
-from flipproof.frame.twins import BAND_WORDS
-from flipproof.instruments import witnesses
+from flipproof.chapters.differences.study import Difference, moved, percent
+from flipproof.frame.gather import Gathered, Told
 from flipproof.page.headlines import headlines
 from flipproof.page.inline import data_uri, shape
 from flipproof.page.lead import answers, lead_words
+from flipproof.page.parts import sections
 from flipproof.page.templating import environment
 from flipproof.page.verdict import answer, strips, tiles
-from flipproof.studies.differences import Difference, moved, percent
-from flipproof.studies.slices import FINER
-
-CONTENTS = {
-    "verdict": "Verdict",
-    "assumptions": "What each assumption costs",
-    "flights": "The flights",
-    "differences": "Where they part",
-    "steps": "Step size",
-    "slices": "How many slices",
-    "events": "Events",
-    "energy": "Energy",
-    "ice": "Ice",
-    "engines": "Engines",
-    "work-precision": "What a digit costs",
-    "maps": "For which bottles",
-    "throws": "Explore other throws",
-    "paper": "The paper's figures and claims",
-    "errata": "Errata",
-    "findings": "All findings",
-    "solvers": "Every solver",
-    "provenance": "Settings and provenance",
-}
-"""Section -> its name in the contents, in the order of the page."""
-
-PLACES = {
-    "waterfall": "assumptions",
-    "frozen": "steps",
-    "limit of": "steps",
-    "map over": "maps",
-    "ledger of": "energy",
-    "exact cases": "energy",
-    "errata": "errata",
-    "agreement": "engines",
-    "stability chart": "engines",
-    "engine facts": "engines",
-    "horizon": "engines",
-    "overlap": "engines",
-}
-"""How the name of a study begins -> the section that tells of its failure; every other stands with the events."""
 
 SYMBOLS = {
     "omega_0": "ω₀", "omega0": "ω₀", "omega": "ω", "theta": "θ", "gamma": "γ", "alpha": "α", "epsilon": "ε",
@@ -118,91 +75,48 @@ def read_assets() -> dict[str, Markup]:
     }
 
 
-def sort_problems(problems: Mapping[str, str]) -> Mapping[str, Sequence[tuple[str, str]]]:
-    """Return section -> studies that failed there, each with its reason."""
-    sorted_problems: dict[str, list[tuple[str, str]]] = defaultdict(list)
-    for name, reason in problems.items():
-        place = next((section for begin, section in PLACES.items() if name.startswith(begin)), "events")
-        sorted_problems[place].append((name, reason))
-    return sorted_problems
-
-
-def render(
-    evidence: Evidence,
-    findings: Sequence[Finding],
-    exhibits: Sequence[Exhibit],
-    solvers: Sequence[Mapping[str, Any]],
-    provenance: Mapping[str, str],
-    *,
-    motion: Any = None,
-    explore: Any = None,
-    paper: Any = None,
-) -> str:
-    """Return the whole page.
-
-    ``motion``, ``explore`` and ``paper`` are what their templates draw from; a part that is None is left out.
-    """
-    templates = environment()
-    templates.tests["about_the_paper"] = lambda id_: id_.startswith("paper-")
-    templates.filters["typeset"] = typeset
-    templates.filters["unbroken"] = unbroken
-    templates.filters["amount"] = amount
-    templates.filters["percent"] = percent
-    templates.filters["data_uri"] = data_uri
-    templates.filters["shape"] = shape
-    templates.filters["short"] = short
-    templates.filters["restitution_error"] = restitution_error
-    found = evidence.attribution
-    reasons = sort_problems({**found.problems, **evidence.instruments.problems})
-    tables = list(tabulate_work_precision(evidence.precision))
-    absent = {
-        name
-        for name, there in (
-            ("work-precision", tables),
-            ("maps", found.maps or reasons["maps"]),
-            ("throws", explore),
-            ("paper", paper),
-        )
-        if not there
-    }
-    verdict = headlines(evidence)
+def render(gathered: Gathered, told: Mapping[str, Told], provenance: Mapping[str, str], *, explore: Any = None) -> str:
+    """Return the whole page; ``explore`` is what its template draws from, and a part that is None is left out."""
+    templates = page_environment()
+    body = sections(gathered, told, templates)
+    verdict = headlines(gathered)
+    waterfalls = gathered.found("waterfall")
+    findings = [finding for each in told.values() for finding in each.findings]
     regressions = [finding for finding in findings if finding.kind == "regression"]
+    flown = gathered.found("flights")
+    ahead = [("verdict", "Verdict"), *((section.id, section.title) for section in body)]
+    behind = [("findings", "All findings"), ("solvers", "Every solver"), ("provenance", "Settings and provenance")]
     return templates.get_template("report.html.j2").render(
-        scenario=evidence.scenario,
-        throw=evidence.throw,
-        finer=FINER,
-        costs=tuple(
-            zip(evidence.finite_step, evidence.finite_step_finer or (None,) * len(evidence.finite_step), strict=True)
-        ),
-        size=evidence.size,
-        contents=[(section, words) for section, words in CONTENTS.items() if section not in absent],
+        scenario=gathered.ask.scenario,
+        throw=gathered.ask.throw,
+        contents=[*ahead, *([("throws", "Explore other throws")] if explore else []), *behind],
+        sections=body,
         answer=answer(verdict),
         tiles=tiles(verdict),
-        strips=strips(found.waterfalls[0]) if found.waterfalls else (),
-        differences=sorted(evidence.differences, key=lambda difference: -difference.largest),
+        waterfall=waterfalls[0] if waterfalls else None,
+        strips=strips(waterfalls[0]) if waterfalls else (),
         lead=lead_words(verdict),
         answers=tuple(answers(verdict)),
         regressions=regressions,
         observations=[finding for finding in findings if finding.kind == "observation"],
         failed=[finding for finding in regressions if finding.failed],
-        exhibits=exhibits,
-        steps=evidence.flights_by_step,
-        slices=evidence.slices,
-        growths=evidence.growths,
-        found=found,
-        instruments=evidence.instruments,
-        uncertified=[tag for tag in witnesses(evidence.throw) if tag not in evidence.size.bench.certified],
-        tables=tables,
-        forms_omega=[(pair, forms["omega"]) for pair, forms in found.forms.items()],
-        solvers=solvers,
-        flown=[row for row in solvers if row["name"] in FLIGHTS],
-        problems=[made for made in evidence.made.values() if made.trajectory is None],
-        reasons=reasons,
-        motion=motion,
+        solvers=flown.rows if flown is not None else [],
+        problems=[made for made in gathered.flights.values() if made.trajectory is None],
+        notes=[note for each in told.values() for note in each.notes],
         explore=explore,
-        paper=paper,
         assets=read_assets(),
         provenance=provenance,
-        twin_words=BAND_WORDS,
-        settings=evidence.scenario.to_toml(),
+        settings=gathered.ask.scenario.to_toml(),
     )
+
+
+def page_environment() -> Environment:
+    """Return the environment of the page's templates, with the filters that they and the chapters' parts use."""
+    templates = environment()
+    templates.tests["about_the_paper"] = lambda id_: id_.startswith("paper-")
+    templates.filters |= {
+        "typeset": typeset, "unbroken": unbroken, "amount": amount, "percent": percent, "data_uri": data_uri,
+        "shape": shape, "short": short, "restitution_error": restitution_error,
+    }  # fmt: skip
+    templates.globals["assets"] = read_assets()
+    return templates

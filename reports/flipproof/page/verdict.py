@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from flipproof.chapters.differences.study import PARTING_BAND, percent
+from flipproof.chapters.waterfall.study import Waterfall
 from flipproof.page.headlines import Headline
 from flipproof.page.lead import at_slices, signed, tied
-from flipproof.studies.differences import PARTING_BAND, percent
-from flipproof.studies.waterfall import Waterfall
 
 State = Literal["pass", "fail", ""]
 
