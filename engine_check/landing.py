@@ -73,6 +73,7 @@ class Watch:
 
     scenario: Scenario
     saddle: float = field(init=False)
+    cap_saddle: float = field(init=False)
     lean: float = field(init=False)
     lean_on_cap: float = field(init=False)
     bounces: int = 0
@@ -84,7 +85,8 @@ class Watch:
         level = self.scenario.fill_fraction * bottle.length / 2
         height = (water * level + bottle.mass * bottle.length / 2) / self.scenario.total_mass
         on_cap = bottle.length - height if self.scenario.frozen else height
-        self.saddle = self.scenario.total_mass * self.scenario.gravity * math.hypot(height, bottle.radius)
+        weight = self.scenario.total_mass * self.scenario.gravity
+        self.saddle, self.cap_saddle = (weight * math.hypot(over, bottle.radius) for over in (height, on_cap))
         self.lean, self.lean_on_cap = math.atan(bottle.radius / height), math.atan(bottle.radius / on_cap)
 
     def lowest(self, y: float, theta: float) -> float:
@@ -102,10 +104,15 @@ class Watch:
 
     def outcome(self, theta: float, energy: float) -> str | None:
         """Return the outcome if the energy is below the saddle."""
-        if not energy < self.saddle:
+        if not energy < self.limit(theta):
             return None
         tilt = abs(math.remainder(theta, math.tau))
         return "upright" if tilt < self.lean else "cap" if tilt > math.pi - self.lean_on_cap else "lying"
+
+    def limit(self, theta: float) -> float:
+        """Return the saddle out of the basin of the cap for a bottle over its cap, else the other one [J]."""
+        over_cap = abs(math.remainder(theta, math.tau)) > math.pi - self.lean_on_cap
+        return self.cap_saddle if over_cap else self.saddle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -168,7 +175,7 @@ def landed(body: Body, scenario: Scenario, dt: float) -> Run:
     return Run(
         outcome=outcome or "undecided",
         time=k * dt,
-        margin=(watch.saddle - before) / watch.saddle,
+        margin=1.0 - before / watch.limit(theta),
         bounces=watch.bounces,
         slid=x + scenario.bottle.length / 2 * math.sin(theta) - origin,
         rise=watch.rise if body.ledger is None else body.ledger,

@@ -13,13 +13,27 @@ if TYPE_CHECKING:
     from ode_reference.combinations import model_of
     from ode_reference.impacts import LAWS
     from ode_reference.landing import land
-    from ode_reference.landing_flight import fly
+    from ode_reference.landing_batch import land_batch
+    from ode_reference.landing_flight import fly, turn
     from ode_reference.models import LADDER, MODELS
     from ode_reference.solver import solve, solve_batch
     from ode_reference.switches import Switches
     from ode_reference.witness import METHODS
 
-__all__ = ["LADDER", "LAWS", "METHODS", "MODELS", "Switches", "fly", "land", "model_of", "solve", "solve_batch"]
+__all__ = [
+    "LADDER",
+    "LAWS",
+    "METHODS",
+    "MODELS",
+    "Switches",
+    "fly",
+    "land",
+    "land_batch",
+    "model_of",
+    "solve",
+    "solve_batch",
+    "turn",
+]
 
 _HOMES = {
     "LADDER": "ode_reference.models",
@@ -29,9 +43,11 @@ _HOMES = {
     "Switches": "ode_reference.switches",
     "fly": "ode_reference.landing_flight",
     "land": "ode_reference.landing",
+    "land_batch": "ode_reference.landing_batch",
     "model_of": "ode_reference.combinations",
     "solve": "ode_reference.solver",
     "solve_batch": "ode_reference.solver",
+    "turn": "ode_reference.landing_flight",
 }
 
 

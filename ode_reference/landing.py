@@ -20,9 +20,9 @@ from slicemodel.table import ENERGY_RISE, LAWS, LONGEST_LANDING, Outcome, Table,
 from slicemodel.trajectory import FloatArray
 
 if TYPE_CHECKING:
-    from ode_reference.landing_core import Landing, World
+    from ode_reference.landing_core.layout import Landing, World
 
-DEFAULT_DT: Final = 2e-4
+DEFAULT_DT: Final = 4e-4
 """Longest step [s]; half of it certifies."""
 
 SLICES: Final[Mapping[str, str]] = MappingProxyType(
@@ -131,7 +131,7 @@ def _law(scenario: Scenario, law: str | None) -> str:
 
 def world_of(touch: Touch, table: Table, law: str, slices: str) -> World:
     """Return the constants of a landing, or raise ValueError for slices that are not where they may be."""
-    from ode_reference.landing_core import World
+    from ode_reference.landing_core.layout import World
 
     if known_name("slices", slices, SLICES) == "overlap":
         raise ValueError(
@@ -175,6 +175,7 @@ def world_of(touch: Touch, table: Table, law: str, slices: str) -> World:
         saddle=saddle,
         upright=math.atan2(bottle.radius, rest),
         cap=math.pi - math.atan2(bottle.radius, upside_down),
+        cap_saddle=scenario.total_mass * scenario.gravity * math.hypot(bottle.radius, upside_down),
     )
 
 
@@ -204,11 +205,11 @@ def state_of(touch: Touch, world: World) -> tuple[FloatArray, FloatArray, FloatA
 
 
 def _run(touch: Touch, world: World, dt: float) -> Landing:
-    from ode_reference import landing_core
+    from ode_reference.landing_core import loop
 
     q, s, w = state_of(touch, world)
     none = np.empty((0, 7 + 2 * world.n))
-    run: Landing = landing_core.land(q, s, w, dt, LONGEST_LANDING, False, world, 1.0, none)
+    run: Landing = loop.land(q, s, w, dt, LONGEST_LANDING, False, world, 1.0, none)
     return run
 
 
@@ -228,17 +229,17 @@ def path(
     ``every`` is the time between two instants, at most ``dt`` late, ``duration`` the whole [s]; the touch may be lifted
     by ``drop`` [m] first.
     """
-    from ode_reference import landing_core
+    from ode_reference.landing_core import loop, motion
 
     # Without a saddle nothing ends the run before its time.
     world = world_of(touch, table, _law(touch.scenario, law), slices)
     q, s, w = state_of(touch, world)
     q[1] += drop
     record = np.full((math.ceil(duration / every), 7 + 2 * world.n), np.nan)
-    landing_core.land(q, s, w, dt, duration, False, world._replace(saddle=-math.inf), every, record)
+    loop.land(q, s, w, dt, duration, False, world._replace(saddle=-math.inf, cap_saddle=-math.inf), every, record)
     record = record[np.isfinite(record[:, 0])]
     n = world.n
-    energy = [landing_core.energy(row[1:7], row[7 : 7 + n], row[7 + n :], world) for row in record]
+    energy = [motion.energy(row[1:7], row[7 : 7 + n], row[7 + n :], world) for row in record]
     return Path(
         t=record[:, 0],
         centre=record[:, 1:3],
@@ -254,7 +255,7 @@ def path(
 
 def _outcome(coarse: Landing, fine: Landing, settings: Mapping[str, object]) -> Outcome:
     """Return the outcome of two runs from one touch, the second with half the step."""
-    from ode_reference.landing_core import BROKEN, CAP, LYING, TIMEOUT, UPRIGHT
+    from ode_reference.landing_core.layout import BROKEN, CAP, LYING, TIMEOUT, UPRIGHT
 
     names = {UPRIGHT: "upright", LYING: "lying", CAP: "cap"}
     rise = max(coarse.rise, fine.rise)

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import math
+from typing import Any, Final
 
 import numpy as np
 
-from ode_reference.arguments import number_within
-from ode_reference.landing import DEFAULT_DT, state_of, world_of
+from ode_reference.arguments import number_above, number_within
+from ode_reference.landing import state_of, world_of
+from ode_reference.landing_core.layout import TOUCHED, World
 from slicemodel.scenario import Scenario
 from slicemodel.table import Table, Touch
+from slicemodel.trajectory import FloatArray
+
+FLIGHT_DT: Final = 2e-4
+"""Longest step of a flight [s]."""
+
+FAR: Final = -1e4
+"""Height of a table that no flight reaches [m]."""
+
+State = tuple[FloatArray, FloatArray, FloatArray]
 
 
-def fly(scenario: Scenario, table: Table, slices: str = "exclude", *, dt: float = DEFAULT_DT) -> Touch:
+def fly(scenario: Scenario, table: Table, slices: str = "exclude", *, dt: float = FLIGHT_DT) -> Touch:
     """Throw a bottle until it comes down on a table; slices keep their room as in ``land``.
 
     Parameters
@@ -20,6 +31,8 @@ def fly(scenario: Scenario, table: Table, slices: str = "exclude", *, dt: float 
     scenario : Scenario
         Its duration is the longest flight.
     table : Table
+        The bottle must be over it at release, or when its centre of mass is highest: a table may stand beside the
+        thrower and higher than the hand.
     slices : str
         "exclude" or "staggered".
     dt : float
@@ -33,21 +46,72 @@ def fly(scenario: Scenario, table: Table, slices: str = "exclude", *, dt: float 
     Raises
     ------
     ValueError
-        Naming the argument, its value and the admissible values: a bottle that starts below the table, or does not come
-        down on it within the duration.
+        Naming the argument, its value and the admissible values: a bottle that does not come down on the table from
+        above within the duration.
 
     Accuracy
     --------
     As ``land``: order 2 in ``dt`` between impacts, which are located.
     """
-    from ode_reference import landing_core
-
     dt = number_within("dt", dt, 1e-6, 1e-3, unit=" s")
+    state, world = _released(scenario, table, slices)
+    begin = 0.0
+    if _room(state, world) <= 0.0:
+        begin = scenario.launch_velocity[1] / scenario.gravity
+        room = -math.inf
+        if 0.0 < begin < scenario.duration:
+            _free(state, world, begin, dt)
+            room = _room(state, world)
+        if room <= 0.0:
+            raise ValueError(
+                f"table.height = {table.height:g} m is not reached from above: the bottle is not over it at release, "
+                "nor when its centre of mass is highest"
+            )
+    q, s, w = state
+    run = _loop(q, s, w, dt, scenario.duration - begin, world)
+    if run.code != TOUCHED:
+        raise ValueError(f"table.height = {table.height:g} m is not reached within duration = {scenario.duration:g} s")
+    return Touch(
+        scenario=scenario,
+        theta=float(q[2]),
+        omega=float(q[5]),
+        velocity=(float(q[3]), float(q[4])),
+        r=s + world.half,
+        v=np.zeros(world.n) if world.rigid else w,
+        time=begin + run.time,
+    )
+
+
+def turn(
+    scenario: Scenario, every: float, slices: str = "exclude", *, dt: float = FLIGHT_DT
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return t [s], theta [rad] and the height of the lowest rim over O [m] of a flight over no table, shape (P,) each.
+
+    Parameters
+    ----------
+    scenario : Scenario - the flight lasts for its duration
+    every : float - time between two instants [s], which are at most ``dt`` late
+    slices, dt : as for ``fly``
+    """
+    dt = number_within("dt", dt, 1e-6, 1e-3, unit=" s")
+    every = number_above("every", every, 0.0, scenario.duration)
+    (q, s, w), world = _released(scenario, Table(height=FAR), slices)
+    record = np.full((math.ceil(scenario.duration / every) + 1, 7 + 2 * world.n), np.nan)
+    _loop(q, s, w, dt, scenario.duration, world, every, record)
+    record[-1, :7] = scenario.duration, *q
+    record = record[np.isfinite(record[:, 0])]
+    theta = record[:, 3]
+    reach = world.half * np.abs(np.cos(theta)) + world.radius * np.abs(np.sin(theta))
+    return record[:, 0], theta, record[:, 2] + FAR - reach
+
+
+def release(scenario: Scenario) -> Touch:
+    """Return a throw at its release, as if it touched a table there: where ``path`` may begin."""
     bottle, r = scenario.bottle, scenario.initial_positions()
     sine, cosine = math.sin(scenario.theta0), math.cos(scenario.theta0)
     centre = (bottle.mass * bottle.length / 2 + scenario.slice_mass * float(r.sum())) / scenario.total_mass
     swing = (bottle.length / 2 - centre) * scenario.omega0
-    release = Touch(
+    return Touch(
         scenario=scenario,
         theta=scenario.theta0,
         omega=scenario.omega0,
@@ -58,25 +122,42 @@ def fly(scenario: Scenario, table: Table, slices: str = "exclude", *, dt: float 
         r=r,
         v=np.zeros(scenario.n_slices),
     )
-    world = world_of(release, table, "together", slices)
-    q, s, w = state_of(release, world)
-    on_table = q[1]
-    q[0], q[1] = world.half * sine, -world.half * cosine - table.height
-    if q[1] <= on_table:
-        raise ValueError(
-            f"table.height = {table.height:g} m is outside (-inf, {table.height + q[1] - on_table:g}) m: "
-            "the bottle has to be over the table at release"
-        )
-    none = np.empty((0, 7 + 2 * world.n))
-    run = landing_core.land(q, s, w, dt, scenario.duration, True, world, 1.0, none)
-    if run.code != landing_core.TOUCHED:
-        raise ValueError(f"table.height = {table.height:g} m is not reached within duration = {scenario.duration:g} s")
-    return Touch(
-        scenario=scenario,
-        theta=float(q[2]),
-        omega=float(q[5]),
-        velocity=(float(q[3]), float(q[4])),
-        r=s + world.half,
-        v=np.zeros(world.n) if world.rigid else w,
-        time=run.time,
-    )
+
+
+def _released(scenario: Scenario, table: Table, slices: str) -> tuple[State, World]:
+    """Return the state at release over the table, and the world."""
+    start = release(scenario)
+    world = world_of(start, table, "together", slices)
+    q, s, w = state_of(start, world)
+    q[0], q[1] = world.half * math.sin(start.theta), -world.half * math.cos(start.theta) - table.height
+    return (q, s, w), world
+
+
+def _room(state: State, world: World) -> float:
+    """Return the height of the lowest rim over the table [m]."""
+    q, _, _ = state
+    return float(q[1] - world.half * abs(math.cos(q[2])) - world.radius * abs(math.sin(q[2])))
+
+
+def _free(state: State, world: World, duration: float, dt: float) -> None:
+    """Advance a state as if there were no table."""
+    q, s, w = state
+    q[1] -= FAR
+    _loop(q, s, w, dt, duration, world)
+    q[1] += FAR
+
+
+def _loop(
+    q: FloatArray,
+    s: FloatArray,
+    w: FloatArray,
+    dt: float,
+    duration: float,
+    world: World,
+    every: float = 1.0,
+    record: FloatArray | None = None,
+) -> Any:
+    from ode_reference.landing_core.loop import land
+
+    record = np.empty((0, 7 + 2 * world.n)) if record is None else record
+    return land(q, s, w, dt, duration, True, world, every, record)

@@ -23,6 +23,13 @@ if TYPE_CHECKING:
 COLUMN: Final = "column"
 """The name among the models of water as one stretching column."""
 
+COLUMN_EQUATION: Final = "m_e h'' = omega^2/2 dJ/dh - (N alpha/3) h', one column of height h"
+COLUMN_REASON: Final = (
+    "Water as one uniformly stretching column: it cannot overlap, a full bottle turns like ice, and there is nothing "
+    "to choose."
+)
+"""What solves it, and why it is there, as of the other models (``ode_reference.column``)."""
+
 TAYLOR: Final = "taylor"
 """The name of the reduced flow among the methods."""
 

@@ -159,7 +159,8 @@ class Outcome:
 
     The saddle E_s = M g sqrt(R^2 + z_rest^2) is the least energy over the table with which a bottle can get from its
     base to its side or back, z_rest being the height of the centre of mass over the base while the water rests on it.
-    Once the energy is below it no passive law can change the outcome.
+    Once the energy is below it no passive law can change the outcome. Ice on the cap has its weight high: there the
+    saddle is that of the cap, M g sqrt(R^2 + (L - z_rest)^2).
 
     Parameters
     ----------

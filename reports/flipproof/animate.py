@@ -105,19 +105,24 @@ def write_film(film: Film, path: Path, step: Step) -> None:
     FilmError
         If ``path`` will not do, or ffmpeg fails.
     """
+    write_pictures(draw_frames(film), len(film.t), film.fps, path, step)
+
+
+def write_pictures(pictures: Iterator[Picture], count: int, fps: int, path: Path, step: Step) -> None:
+    """Write ``count`` pictures as a film; errors as of ``write_film``."""
     check_target(path)
-    frames = _counted(film, step)
+    frames = _counted(pictures, count, step)
     with whole_file(path) as part:
         if path.suffix.lower() == ".gif":
-            _write_gif(frames, frame_durations(len(film.t), film.fps), part)
+            _write_gif(frames, frame_durations(count, fps), part)
         else:
-            _write_mp4(frames, film.fps, part)
+            _write_mp4(frames, fps, part)
 
 
-def _counted(film: Film, step: Step) -> Iterator[Picture]:
-    for k, frame in enumerate(draw_frames(film), start=1):
-        yield frame
-        step(k, len(film.t))
+def _counted(pictures: Iterator[Picture], count: int, step: Step) -> Iterator[Picture]:
+    for k, picture in enumerate(pictures, start=1):
+        yield picture
+        step(k, count)
 
 
 def frame_durations(count: int, fps: int) -> list[int]:

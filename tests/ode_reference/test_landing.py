@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import engine_check
 import ode_reference
 from ode_reference import rods
 from ode_reference.landing import path, world_of
@@ -227,6 +228,18 @@ def test_the_saddle_is_that_of_water_at_rest_not_of_the_touch():
     assert low.saddle == high.saddle
     mass, _, _, rho, _ = block(scenario)
     assert low.saddle == pytest.approx(mass * G * rho, rel=1e-12, abs=0)
+
+
+@pytest.mark.parametrize("program", ["ode_reference", "mujoco", "pymunk"])
+def test_ice_that_stands_on_its_cap_is_certain(program):
+    """Its energy stays above E_s, but below the saddle out of the basin of the cap."""
+    start = at_rest(replace(ICE, water_mass=0.5), math.pi - 0.01)
+    if program == "ode_reference":
+        outcome = ode_reference.land(start, Table(height=0.0))
+    else:
+        outcome = engine_check.land(start, Table(height=0.0), program)
+    assert outcome.outcome == "cap"
+    assert 0.0 < outcome.margin < 0.2
 
 
 def flown(seed, **changes):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flipproof.chapters.overlap.figure import figure_overlap
-from flipproof.chapters.overlap.study import CHECK, COARSER, EXCLUDE, PASS, plan_overlap, study_overlap
+from flipproof.chapters.overlap.study import CHECK, COARSER, COLUMN, EXCLUDE, PASS, plan_overlap, study_overlap
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import Made, make
 from slicemodel import Scenario, Trajectory
@@ -35,13 +35,13 @@ def flat(run, level, status="ok", message=""):
     return Made(run, trajectory, 0.0)
 
 
-LEVELS = {EXCLUDE: (0.23, 0.996), COARSER: (0.22, 0.99), PASS: (0.19, 0.4), CHECK: (0.191, 0.402)}
+LEVELS = {EXCLUDE: (0.23, 0.996), COARSER: (0.22, 0.99), PASS: (0.19, 0.4), CHECK: (0.191, 0.402), COLUMN: (0.33, 1.0)}
 
 
 def made_up(spoil=lambda _made: None):
     made = {}
     for run in plan_overlap(THROW, FILLS, slices=4):
-        name = next(name for name in (COARSER, EXCLUDE, PASS, CHECK) if f"{name}, fill" in run.label)
+        name = next(name for name in (COARSER, EXCLUDE, PASS, CHECK, COLUMN) if f"{name}, fill" in run.label)
         made[run] = flat(run, LEVELS[name][FILLS.index(run.scenario.fill_fraction)])
     spoil(made)
     return study_overlap(THROW, made, FILLS, slices=4)
@@ -49,7 +49,7 @@ def made_up(spoil=lambda _made: None):
 
 def test_the_plan_differs_in_contacts_alone_and_halves_the_step():
     runs = plan_overlap(THROW, FILLS, slices=4, dt=2e-4)
-    assert len({run.label for run in runs}) == len(runs) == 8
+    assert len({run.label for run in runs}) == len(runs) == 10
     by_kind = {}
     for run in runs:
         assert run.scenario.n_slices == 4
@@ -60,6 +60,7 @@ def test_the_plan_differs_in_contacts_alone_and_halves_the_step():
     assert by_kind[EXCLUDE][0].settings["dt"] == by_kind[COARSER][0].settings["dt"] / 2 == 1e-4
     assert by_kind[PASS][0].settings["dt"] == 2e-4
     assert {run.solver for run in by_kind[CHECK]} == {"free-flight"}
+    assert {run.solver for run in by_kind[COLUMN]} == {"column"}
     assert [run.scenario.fill_fraction for run in by_kind[PASS]] == [0.5, 1.0]
 
 
@@ -70,6 +71,7 @@ def test_levels_bands_cost_and_distance_from_ice_are_read_off():
     assert np.isnan(study.curves[PASS].band).all()
     assert study.cost == pytest.approx([-0.04, -0.596])
     assert study.check == pytest.approx([0.001, 0.002])
+    assert study.cost_to_column == pytest.approx([-0.139, -0.598])
     assert study.missing_from_ice(EXCLUDE) == pytest.approx(0.004)
     assert study.missing_from_ice(PASS) == pytest.approx(0.6)
     assert study.restitution == 0.5
@@ -111,6 +113,7 @@ def test_a_full_bottle_is_ice_only_if_slices_exclude_each_other(real):
     assert 0.0 <= real.missing_from_ice(EXCLUDE) <= real.curves[EXCLUDE].band[1]
     assert real.missing_from_ice(PASS) > 0.4
     assert real.missing_from_ice(CHECK) > 0.4
+    assert abs(real.missing_from_ice(COLUMN)) < 1e-12
 
 
 def test_overlap_always_slows_and_the_engine_follows_the_reference(real):
@@ -127,7 +130,7 @@ def test_the_figure_draws_ice_and_names_its_axes(real):
     assert any("ice" in text.get_text() for text in axes.texts)
     assert any(np.all(np.asarray(line.get_ydata()) == 1.0) for line in axes.lines)
     labels = axes.get_legend_handles_labels()[1]
-    assert {PASS, CHECK, EXCLUDE} <= set(labels)
+    assert {PASS, CHECK, EXCLUDE, COLUMN} <= set(labels)
     assert draw(figure).svg.startswith("<?xml")
 
 

@@ -35,6 +35,7 @@ from flipproof.cli.compare import add_compare
 from flipproof.cli.console import readable, speak_plainly
 from flipproof.cli.fit import add_fit
 from flipproof.cli.foreign import add_foreign, print_offered, print_offered_json
+from flipproof.cli.landing import add_landing
 from flipproof.cli.paper import add_paper
 from flipproof.cli.start import INTERRUPTED, INTERRUPTED_WORDS, SIGNALS
 from flipproof.cli.sweeps import add_sweeps
@@ -71,6 +72,8 @@ examples:
   flipproof track video.txt --cap cap --base base --length-unit m
   flipproof fit flight.csv --model midpoint free-flight
   flipproof animate --out flips.gif             the flights side by side, 9.6 times slower
+  flipproof land throw.toml --film landing.gif  what happens at the touch and after it, law by law
+  flipproof upright --out my-landings           how many scattered throws end upright; run it again to go on
   flipproof certify mine.py:solve               anybody's solver: a line a check; place, explain and kit go on from here
 
 exit status:
@@ -202,6 +205,7 @@ def parser() -> argparse.ArgumentParser:
     add_tracker(commands)
     add_fit(commands)
     add_animate(commands)
+    add_landing(commands)
     add_foreign(commands)
     models = add_command(commands, "models", "List every scheme, model and engine.", command_models)
     models.add_argument("--json", action="store_true", help="print JSON")

@@ -47,7 +47,7 @@ def command_sweep(options: argparse.Namespace) -> int:
     """Make the points of a design that have no row yet."""
     from flipproof.sweep.command import sweep
 
-    return _fill(options, lambda begin, where: sweep(options.design, options.out, begin, **where))
+    return fill(options, lambda begin, where: sweep(options.design, options.out, begin, **where))
 
 
 def command_map(options: argparse.Namespace) -> int:
@@ -56,7 +56,7 @@ def command_map(options: argparse.Namespace) -> int:
     from flipproof.sweep.validity_map import Plan, make_map
 
     plan = Plan.of_size(throw, options.axis, *options.size)
-    return _fill(options, lambda begin, where: make_map(plan, options.out, begin, **where))
+    return fill(options, lambda begin, where: make_map(plan, options.out, begin, **where))
 
 
 def command_waterfall(options: argparse.Namespace) -> int:
@@ -64,10 +64,19 @@ def command_waterfall(options: argparse.Namespace) -> int:
     throw = read_scenario(options.scenario, options.slices)
     from flipproof.sweep.split import make_split
 
-    return _fill(options, lambda begin, where: make_split(throw, options.out, begin, **where))
+    return fill(options, lambda begin, where: make_split(throw, options.out, begin, **where))
 
 
 def _add_store(command: argparse.ArgumentParser) -> None:
+    add_where(command)
+    command.add_argument(
+        "--salvage", type=Path, metavar="FILE", help="begin DIR with the rows that are whole in a damaged sweep's "
+        "FILE, and end; the same command without it makes the others",
+    )  # fmt: skip
+
+
+def add_where(command: argparse.ArgumentParser) -> None:
+    """Add what every command takes that fills a folder: where its rows go, and who makes them."""
     command.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder; holds one SQLite file of rows")
     where = command.add_mutually_exclusive_group()
     where.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
@@ -77,10 +86,6 @@ def _add_store(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--export", type=Path, metavar="FILE", help="when complete, write all rows to a .csv or .parquet"
     )
-    command.add_argument(
-        "--salvage", type=Path, metavar="FILE", help="begin DIR with the rows that are whole in a damaged sweep's "
-        "FILE, and end; the same command without it makes the others",
-    )  # fmt: skip
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
@@ -100,7 +105,7 @@ def _size(text: str) -> tuple[int, int]:
     return int(columns), int(rows)
 
 
-def _fill(options: argparse.Namespace, make: Callable[[Any, dict[str, Any]], str]) -> int:
+def fill(options: argparse.Namespace, make: Callable[[Any, dict[str, Any]], str]) -> int:
     """Run ``make(begin, where)`` under a bar of progress and print what it returns; an interrupt says what is kept."""
     from contextlib import ExitStack
 
@@ -130,10 +135,10 @@ def _fill(options: argparse.Namespace, make: Callable[[Any, dict[str, Any]], str
 
     try:
         with ExitStack() as bars:
-            words = make(
-                begin,
-                {"jobs": options.jobs, "dask": options.dask, "export_to": options.export, "damaged": options.salvage},
-            )
+            where = {"jobs": options.jobs, "dask": options.dask, "export_to": options.export}
+            if "salvage" in options:
+                where["damaged"] = options.salvage
+            words = make(begin, where)
     except KeyboardInterrupt:
         there = f"{stored[0]} of {stored[1]} points are stored; " if stored[1] else ""
         print(f"flipproof: interrupted; {there}the same command goes on from there", file=sys.stderr)

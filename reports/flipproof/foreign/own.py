@@ -11,6 +11,7 @@ from flipproof.foreign.answers import Answer, AnswerError, answer_of
 from flipproof.foreign.contract import Ask, Traits
 from flipproof.foreign.specs import ForeignError
 from flipproof.frame.solvers import Solver, solve
+from ode_reference.solver import COLUMN
 
 GRID: float = 1e-9
 """How far asked times may lie from a uniform grid, as a fraction of their distance."""
@@ -22,7 +23,8 @@ class Own:
     def __init__(self, solver: Solver) -> None:
         self.solver = solver
         refined = {"slicemodel": "steps", "ode_reference": None, "engine_check": "dt"}[solver.package]
-        equations = {"ode_reference": solver.name, "engine_check": "free-flight"}
+        # The column is no equation of slices: it stands on no rung and declares none.
+        equations = {"ode_reference": None if solver.name == COLUMN else solver.name, "engine_check": "free-flight"}
         orders = {"midpoint": 2.0} if solver.package == "slicemodel" else {}
         self.traits = Traits(
             name=solver.name,

@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
-from flipproof.sweep.design import Design, read_design
+from flipproof.sweep.design import read_design
 from flipproof.sweep.entries import try_entries
 from flipproof.sweep.export import check_export, export
 from flipproof.sweep.local import Workers, local_workers
+from flipproof.sweep.plan import Plan
 from flipproof.sweep.run import Progress, run_sweep
 from flipproof.sweep.salvage import salvage
 from flipproof.sweep.schema import FILE
@@ -62,7 +63,7 @@ def sweep(
 
 @contextmanager
 def completed(
-    design: Design,
+    design: Plan,
     out: Path,
     begin: Begin,
     *,

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.sweep.design import Design
+from flipproof.sweep.plan import Plan
 from flipproof.sweep.schema import PAGE, as_stored, intact, kinds
 
 POINT: Final = re.compile(rb"[\x04-\x7f]\x00\x81\x0d")
@@ -45,7 +45,7 @@ Row = tuple[Any, ...]
 PageOf = Callable[[int], bytes]
 
 
-def rows(file: Path, design: Design, code: str) -> Iterator[Row]:
+def rows(file: Path, design: Plan, code: str) -> Iterator[Row]:
     """Yield the rows of the design's points, made by ``code``, that are whole in a damaged file; some may come twice.
 
     Raises
@@ -65,7 +65,7 @@ def versions(file: Path) -> dict[int, str]:
     return {row[0]: row[1] for row in _records(file, VERSIONS, 3) if intact(row[1:], ("TEXT", "TEXT"))}
 
 
-def count(file: Path, design: Design, code: str) -> int:
+def count(file: Path, design: Plan, code: str) -> int:
     """Return how many points of the design have a row that is whole; raise as ``rows``."""
     found = bytearray(design.size)
     for row in rows(file, design, code):

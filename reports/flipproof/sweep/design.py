@@ -40,6 +40,7 @@ import numpy as np
 from flipproof.sweep.axes import DAMPING, FILL, Axis, Choices, Range, Value, read_axes
 from flipproof.sweep.entries import Entry, read_entries
 from flipproof.sweep.errors import SweepError
+from flipproof.sweep.plan import FLIGHT
 from slicemodel.scenario import (
     Bottle,
     Scenario,
@@ -156,6 +157,16 @@ class Design:
     def size(self) -> int:
         """Points of all solvers."""
         return self.throws * len(self.entries)
+
+    @property
+    def lines(self) -> tuple[range, ...]:
+        """Numbers of the points of each solver: a worker that has compiled a solver gets more of it."""
+        return tuple(range(k * self.throws, (k + 1) * self.throws) for k in range(len(self.entries)))
+
+    @property
+    def readings(self) -> Mapping[str, str]:
+        """What a row holds of a flight."""
+        return FLIGHT
 
     def point(self, number: int) -> Point:
         """Return the point of that number in [0, size)."""

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from flipproof.sweep.damaged import count
-from flipproof.sweep.design import Design
 from flipproof.sweep.errors import SweepError
+from flipproof.sweep.plan import Plan
 from flipproof.sweep.schema import APPLICATION, SCHEMA, columns, intact, kinds
 from slicemodel.scenario import shortened
 
@@ -24,7 +24,7 @@ LONGEST: Final = 120
 """Characters of what SQLite says."""
 
 
-def inspect(file: Path, design: Design, code: str, patience: float) -> None:
+def inspect(file: Path, design: Plan, code: str, patience: float) -> None:
     """Read a sweep's file through and refuse it unless every row is as it was written, of this design and this code.
 
     Parameters
@@ -64,7 +64,7 @@ def inspect(file: Path, design: Design, code: str, patience: float) -> None:
         raise damage(file, design, code, wrong)
 
 
-def damage(file: Path, design: Design, code: str, wrong: str) -> SweepError:
+def damage(file: Path, design: Plan, code: str, wrong: str) -> SweepError:
     """Return the error that says what is wrong with a file and how many of its points can be saved."""
     try:
         whole = count(file, design, code)
@@ -88,7 +88,7 @@ def result_code(error: Exception) -> int:
     return int(getattr(error, "sqlite_errorcode", 0)) & 0xFF
 
 
-def _wrong(file: Path, connection: sqlite3.Connection, design: Design, code: str) -> str:
+def _wrong(file: Path, connection: sqlite3.Connection, design: Plan, code: str) -> str:
     """Return what is damaged, or nothing; raise if the file is whole and something else than this sweep."""
     connection.text_factory = lambda text: text.decode("utf-8", "surrogateescape")
     (application,) = connection.execute("PRAGMA application_id").fetchone()
@@ -115,7 +115,7 @@ def _wrong(file: Path, connection: sqlite3.Connection, design: Design, code: str
     return _wrong_design(file, connection, design, code) or _wrong_rows(connection, design)
 
 
-def _wrong_design(file: Path, connection: sqlite3.Connection, design: Design, code: str) -> str:
+def _wrong_design(file: Path, connection: sqlite3.Connection, design: Plan, code: str) -> str:
     found = connection.execute("SELECT code, size, facts, source, checksum FROM design").fetchall()
     if len(found) != 1:
         return f"its table design has {len(found)} rows instead of 1"
@@ -133,7 +133,7 @@ def _wrong_design(file: Path, connection: sqlite3.Connection, design: Design, co
     return ""
 
 
-def _wrong_rows(connection: sqlite3.Connection, design: Design) -> str:
+def _wrong_rows(connection: sqlite3.Connection, design: Plan) -> str:
     types, names = kinds(design), columns(design)
     known = {number: (facts, sum_) for number, facts, sum_ in connection.execute("SELECT * FROM versions")}
     for number, cells in known.items():

@@ -15,9 +15,10 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import Final
 
-from flipproof.sweep.design import Design, Point
+from flipproof.sweep.design import Point
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.local import Workers
+from flipproof.sweep.plan import Plan
 from flipproof.sweep.store import Store
 from flipproof.sweep.work import Outcome, Returned, make_batch, versions
 
@@ -138,20 +139,18 @@ def run_sweep(store: Store, workers: Workers, progress: Progress) -> None:
         if came:
             store.add(came)
             outcomes = [outcome for returned in came for outcome in returned.outcomes]
-            progress(len(outcomes), sum(outcome.omega_end is None for outcome in outcomes))
+            progress(len(outcomes), sum(not outcome.whole for outcome in outcomes))
         if problem:
             raise problem
 
 
-def _lines(design: Design, done: bytearray) -> list[Line]:
-    """Return one line of waiting points for each solver: a worker that has compiled a solver gets more of it."""
+def _lines(design: Plan, done: bytearray) -> list[Line]:
+    """Return the waiting points of every line of the design."""
     lines = []
-    for which in range(len(design.entries)):
-        first = which * design.throws
-        left = design.throws - done.count(1, first, first + design.throws)
-        numbers = range(first, first + design.throws)
+    for numbers in design.lines:
+        left = len(numbers) - done.count(1, numbers.start, numbers.stop)
         points = (design.point(number) for number in numbers if not done[number])
-        lines.append(Line(points, design.throws, left))
+        lines.append(Line(points, len(numbers), left))
     return lines
 
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from flipproof.sweep.damaged import count, rows, versions
-from flipproof.sweep.design import Design
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import whole_file
+from flipproof.sweep.plan import Plan
 from flipproof.sweep.schema import FILE, columns
 from flipproof.sweep.store import Store
 
@@ -21,7 +21,7 @@ CHUNK: Final = 1000
 Row = tuple[Any, ...]
 
 
-def salvage(damaged: Path, out: Path, design: Design, code: str) -> str:
+def salvage(damaged: Path, out: Path, design: Plan, code: str) -> str:
     """Begin the sweep of a design in ``out`` with the rows and flights that are whole in a damaged file; say how many.
 
     The damaged file, or the folder that holds it, is left as it is.

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from flipproof.sweep.axes import column
-from flipproof.sweep.design import Design
+from flipproof.sweep.plan import Plan
 from flipproof.sweep.work import CURVES, OUTCOMES
 
 SCHEMA: Final = 2
@@ -26,7 +26,6 @@ PAGE: Final = 4096
 
 FILE: Final = "sweep.sqlite"
 
-NUMBERS: Final = ("plateau", "omega_end", "theta_end", "r_cm_end", "t_end")
 TYPES: Final = MappingProxyType({"real": "REAL", "whole": "INTEGER", "truth": "INTEGER"})
 
 SHARED: Final = """
@@ -46,11 +45,14 @@ CREATE TABLE versions (
 """
 
 
-def points_table(design: Design) -> str:
+def points_table(design: Plan) -> str:
     """Return the statements that make the table of points, with a column for every swept field."""
     swept = "".join(f"    {column(axis.name)} {TYPES[axis.kind]} NOT NULL,\n" for axis in design.axes)
-    numbers = "".join(f"    {name} REAL CHECK (typeof({name}) IN ('real', 'null')),\n" for name in NUMBERS)
-    known = " AND ".join(f"{name} IS NOT NULL" for name in (*NUMBERS, "impacts"))
+    readings = "".join(
+        f"    {name} {kind} CHECK (typeof({name}) IN ('{kind.lower()}', 'null')),\n"
+        for name, kind in design.readings.items()
+    )
+    known = " AND ".join(f"{name} IS NOT NULL" for name in design.readings)
     statuses = ", ".join(f"'{status}'" for status in OUTCOMES)
     curves = f"    curves BLOB,  -- float64, little-endian: {', '.join(CURVES)}\n" if design.curves else ""
     return f"""
@@ -59,8 +61,7 @@ CREATE TABLE points (
     key TEXT NOT NULL UNIQUE,    -- SHA-256 of parameters and code
 {swept}    solver TEXT NOT NULL,
     settings TEXT NOT NULL,      -- JSON
-{numbers}    impacts INTEGER CHECK (typeof(impacts) IN ('integer', 'null')),
-    status TEXT NOT NULL CHECK (status IN ({statuses})),
+{readings}    status TEXT NOT NULL CHECK (status IN ({statuses})),
     message TEXT NOT NULL,
     reason TEXT NOT NULL,        -- why a number is NULL
     seconds REAL NOT NULL,
@@ -74,19 +75,19 @@ CREATE INDEX points_by_solver ON points (solver, status);
 """
 
 
-def columns(design: Design) -> tuple[str, ...]:
+def columns(design: Plan) -> tuple[str, ...]:
     """Return the columns of the table of points, in order."""
     swept = (column(axis.name) for axis in design.axes)
     kept = ("trajectory", "curves") if design.curves else ("trajectory",)
     told = ("status", "message", "reason", "seconds", *kept, "versions", "parameters", "checksum")
-    return ("number", "key", *swept, "solver", "settings", *NUMBERS, "impacts", *told)
+    return ("number", "key", *swept, "solver", "settings", *design.readings, *told)
 
 
-def kinds(design: Design) -> tuple[str, ...]:
+def kinds(design: Plan) -> tuple[str, ...]:
     """Return the SQLite type of every column of the table of points."""
     types = {column(axis.name): TYPES[axis.kind] for axis in design.axes}
-    types |= {**dict.fromkeys((*NUMBERS, "seconds"), "REAL"), "curves": "BLOB"}
-    types |= dict.fromkeys(("number", "impacts", "versions"), "INTEGER")
+    types |= {**design.readings, "seconds": "REAL", "curves": "BLOB"}
+    types |= dict.fromkeys(("number", "versions"), "INTEGER")
     return tuple(types.get(name, "TEXT") for name in columns(design))
 
 

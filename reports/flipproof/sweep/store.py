@@ -27,20 +27,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from flipproof.output.ownership import MARKER, OutputError, check_own, marker_text, sole_writer
-from flipproof.sweep.design import Design, key_of
+from flipproof.sweep.design import key_of
 from flipproof.sweep.entries import settings_text
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import TEMPORARY, sweep_away_parts, whole_file, write_whole
 from flipproof.sweep.inspection import damage, inspect, is_damage, result_code
+from flipproof.sweep.plan import Plan
 from flipproof.sweep.schema import (
     APPLICATION,
     FILE,
-    NUMBERS,
     PAGE,
     SCHEMA,
     SHARED,
@@ -51,6 +51,9 @@ from flipproof.sweep.schema import (
 )
 from flipproof.sweep.work import CURVES, Outcome, Returned
 from slicemodel.trajectory import FloatArray
+
+if TYPE_CHECKING:
+    from flipproof.landing.work import Landed
 
 LOCK: Final = "sweep.lock"
 KIND: Final = "sweep"
@@ -65,7 +68,7 @@ SAFE: Final = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANT
 class Store:
     """The rows of one design in a folder. Use as a context manager; the folder is locked until it ends."""
 
-    def __init__(self, folder: Path, design: Design, code: str) -> None:
+    def __init__(self, folder: Path, design: Plan, code: str) -> None:
         """Open or begin the store.
 
         Raises
@@ -196,7 +199,7 @@ class Store:
         (number,) = self.connection.execute("SELECT id FROM versions WHERE facts = ?", (facts,)).fetchone()
         return int(number)
 
-    def _row(self, outcome: Outcome, flight: str | None, versions: int) -> tuple[Any, ...]:
+    def _row(self, outcome: Outcome | Landed, flight: str | None, versions: int) -> tuple[Any, ...]:
         point = self.design.point(outcome.number)
         parameters = point.text()
         cells = (
@@ -205,8 +208,7 @@ class Store:
             *point.values,
             point.solver,
             settings_text(point.settings),
-            *(getattr(outcome, name) for name in NUMBERS),
-            outcome.impacts,
+            *(getattr(outcome, name) for name in self.design.readings),
             outcome.status,
             outcome.message,
             outcome.reason,

@@ -22,11 +22,13 @@ from flipproof.frame.solvers import Run, find, make
 from flipproof.frame.sources import fingerprint
 from flipproof.output.provenance import provenance
 from flipproof.sweep.design import Point
+from ode_reference.solver import COLUMN
 from slicemodel.observables import centre_of_mass_velocity, plateau
 from slicemodel.scenario import Scenario, ScenarioError
 from slicemodel.trajectory import STATUSES, FloatArray, Trajectory
 
 if TYPE_CHECKING:
+    from flipproof.landing.work import Landed
     from ode_reference.flow.api import Flown
 
 WHOLE: Final = ("ok", "escaped")
@@ -34,13 +36,25 @@ WHOLE: Final = ("ok", "escaped")
 
 OUTCOMES: Final = {
     **STATUSES,
+    "undecided": "of a landing: its outcome could not be certified",
+    "missed": "of a landing: the bottle did not come down on the table from above",
     "impossible": "no bottle can be thrown so; the solver was not called",
     "failed": "the solver raised an error or returned nothing",
     "worker-died": "the point was alone in its worker each time that the worker died",
 }
 """Status of a row -> its meaning."""
 
-SOURCES: Final = ("slicemodel", "ode_reference", "engine_check", "flipproof.frame.solvers", "flipproof.sweep.work")
+LAND: Final = "land"
+"""What a point names in the place of a solver if a landing is to be made."""
+
+SOURCES: Final = (
+    "slicemodel",
+    "ode_reference",
+    "engine_check",
+    "flipproof.frame.solvers",
+    "flipproof.sweep.work",
+    "flipproof.landing.work",
+)
 """What a point's numbers depend on."""
 
 TOGETHER: Final = 64
@@ -90,6 +104,11 @@ class Outcome:
     arrays: Arrays | None = None
     curves: FloatArray | None = None
 
+    @property
+    def whole(self) -> bool:
+        """True if the flight reached its end and its numbers are known."""
+        return self.omega_end is not None
+
 
 @dataclass(frozen=True, slots=True)
 class Returned:
@@ -97,7 +116,7 @@ class Returned:
 
     code: str
     versions: Mapping[str, str]
-    outcomes: Sequence[Outcome]
+    outcomes: Sequence[Outcome | Landed]
     seconds: float
 
 
@@ -128,7 +147,11 @@ def make_batch(code: str, points: Sequence[Point], keep: bool, curves: int = 0) 
     """
     began = time.perf_counter()
     here = code_identity()
-    outcomes: list[Outcome] = []
+    outcomes: list[Outcome | Landed] = []
+    if here == code and points and points[0].solver == LAND:
+        from flipproof.landing.work import make_landings
+
+        return Returned(here, versions(), make_landings(points), time.perf_counter() - began)
     for begin in range(0, len(points) if here == code else 0, TOGETHER):
         some = points[begin : begin + TOGETHER]
         made = None if keep or curves else make_together(some)
@@ -141,7 +164,7 @@ def make_together(points: Sequence[Point]) -> list[Outcome] | None:
     solver, settings = points[0].solver, points[0].settings
     if any(point.solver != solver or point.settings != settings for point in points):
         return None
-    if find(solver).package != "ode_reference" or not settings.keys() <= SHARED:
+    if find(solver).package != "ode_reference" or solver == COLUMN or not settings.keys() <= SHARED:
         return None
     from ode_reference import solve_batch
 

@@ -17,7 +17,8 @@ from slicemodel import Scenario
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "foreign"
 VARIANTS = Path(__file__).with_name("rk4_variants.py")
 PLACED = {name: LIMITS.get(name, "free-flight" if solver.package == "engine_check" else name)
-          for name, solver in catalogue().items() if name not in ("published-matlab", "paper-typeset")}  # fmt: skip
+          for name, solver in catalogue().items()
+          if name not in ("published-matlab", "paper-typeset", "column")}  # fmt: skip
 
 
 def placed(spec):
@@ -49,6 +50,10 @@ def test_typeset_paper_lets_nothing_move():
     assert found.still
     assert not found.on_lattice
     assert "omega stays constant" in found.text
+
+
+def test_water_that_cannot_overlap_solves_no_equation_of_overlapping_slices():
+    assert not placed("column").on_lattice
 
 
 def test_published_matlab_does_not_answer():

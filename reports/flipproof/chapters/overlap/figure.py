@@ -5,13 +5,14 @@ from __future__ import annotations
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from flipproof.chapters.overlap.study import CHECK, ENGINE, EXCLUDE, ICE, PASS, REFERENCE, Overlap
+from flipproof.chapters.overlap.study import CHECK, COLUMN, ENGINE, EXCLUDE, ICE, PASS, REFERENCE, Overlap
 from flipproof.figures.style import STYLES, new_figure, shared_legend, styled
 
 LOOKS = {
     EXCLUDE: {"color": "#0072B2", "linestyle": "-", "linewidth": 2.2, "marker": "s"},
     PASS: STYLES[ENGINE] | {"marker": "o"},
     CHECK: STYLES[REFERENCE] | {"marker": "x"},
+    COLUMN: {"color": "#CC79A7", "linestyle": "-.", "linewidth": 1.8, "marker": "d"},
 }
 
 
@@ -20,7 +21,7 @@ def figure_overlap(study: Overlap) -> Figure:
     """Plateau over fill fraction; what overlap costs is the distance between the two engine curves, ice is the top."""
     figure, axes = new_figure(size=(8.0, 4.6))
     _ice(axes)
-    for name in (PASS, CHECK, EXCLUDE):
+    for name in (PASS, CHECK, EXCLUDE, COLUMN):
         curve = study.curves[name]
         axes.plot(study.fills, curve.level, label=name, markersize=6, **LOOKS[name])
     exclude = study.curves[EXCLUDE]
@@ -53,7 +54,7 @@ def _ice(axes: Axes) -> None:
 
 def _failures(axes: Axes, study: Overlap) -> None:
     """Mark each run that failed at the foot of its fill fraction, so that a gap in a curve is not taken for data."""
-    for k, name in enumerate((PASS, CHECK, EXCLUDE)):
+    for k, name in enumerate((PASS, CHECK, EXCLUDE, COLUMN)):
         for fill, reason in zip(study.fills, study.curves[name].reason, strict=True):
             if reason:
                 axes.annotate(

@@ -43,6 +43,8 @@ PASS, EXCLUDE, CHECK = (
     f"{REFERENCE}, slices overlap",
 )
 COARSER: Final = f"{EXCLUDE}, coarser"
+COLUMN: Final = "column"
+"""Water as one stretching column: it cannot overlap, and nothing about it is chosen (``ode_reference.column``)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +53,7 @@ class Curve:
 
     Parameters
     ----------
-    name : str - PASS, EXCLUDE or CHECK
+    name : str - PASS, EXCLUDE, CHECK or COLUMN
     level : (F,) - mean of omega / omega_0 over the second half; NaN where the run failed
     band : (F,) - twice what halving the step changed; NaN where that was not measured
     reason : F strings - "" or why the run cannot be used
@@ -78,6 +80,11 @@ class Overlap:
         return self.curves[PASS].level - self.curves[EXCLUDE].level
 
     @property
+    def cost_to_column(self) -> FloatArray:
+        """Return the same between exact equations: slices that overlap in free flight minus the column, shape (F,)."""
+        return self.curves[CHECK].level - self.curves[COLUMN].level
+
+    @property
     def check(self) -> FloatArray:
         """Return |engine - reference| of slices that overlap, shape (F,)."""
         return np.abs(self.curves[PASS].level - self.curves[CHECK].level)
@@ -89,7 +96,7 @@ class Overlap:
 
 
 def plan_overlap(throw: Scenario, fills: Sequence[float] = FILLS, *, slices: int = SLICES, dt: float = DT) -> list[Run]:
-    """Return the runs: four for each fill fraction, gamma of the throw unchanged."""
+    """Return the runs: five for each fill fraction, gamma of the throw unchanged."""
     return [run for runs in _plan(throw, fills, slices, dt).values() for run in runs]
 
 
@@ -102,6 +109,7 @@ def _plan(throw: Scenario, fills: Sequence[float], slices: int, dt: float) -> di
         COARSER: (ENGINE, {"slices": "exclude", "dt": dt}),
         PASS: (ENGINE, {"dt": dt}),
         CHECK: (REFERENCE, {}),
+        COLUMN: (COLUMN, {}),
     }
     return {
         name: [
@@ -127,7 +135,7 @@ def study_overlap(
         fills=np.asarray(fills, dtype=np.float64),
         slices=slices,
         restitution=throw.restitution,
-        curves={PASS: curves[PASS], EXCLUDE: halved, CHECK: curves[CHECK]},
+        curves={PASS: curves[PASS], EXCLUDE: halved, CHECK: curves[CHECK], COLUMN: curves[COLUMN]},
     )
 
 

@@ -1,0 +1,73 @@
+"""What a compiled landing is given and returns, and the limits that it keeps."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from slicemodel.trajectory import FloatArray
+
+TOUCHING = 1e-9
+"""Gap below which two things touch [L]; a located impact leaves 1e-12."""
+
+LOCATED = 1e-10
+"""Gap at which the search for an impact ends [L]."""
+
+STILL = 1e-11
+"""Speed that counts as none [m/s]."""
+
+MOST_TRIALS = 60
+MOST_SWEEPS = 500
+CREEPING = 1e-3
+"""Change of a velocity in the last sweep that is tolerated [m/s]: two corners can share their friction in many ways."""
+
+MOST_POOLS = 100
+MOST_ROUNDS = 100
+
+ALOFT, LANDED = 1e-3, 1e-4
+"""Heights of the lowest corner beyond which the bottle is off the table, and below which it is on it again [m]."""
+
+UPRIGHT, LYING, CAP, TIMEOUT, BROKEN, TOUCHED = range(6)
+
+
+class World(NamedTuple):
+    """What does not change during a landing (SI). ``chain``: slices meet each other; else each has its own two stops.
+
+    ``low`` and ``high`` are those stops, from the tube's middle. ``saddle`` is E_s, ``upright`` and ``cap`` are the
+    tilts that part the basins [rad], ``cap_saddle`` is the saddle out of the basin of the cap.
+    """
+
+    n: int
+    chain: bool
+    rigid: bool
+    in_turn: bool
+    half: float
+    radius: float
+    tube: float
+    own: float
+    m: float
+    rub: float
+    gravity: float
+    e_water: float
+    e_table: float
+    friction: float
+    rod: float
+    low: FloatArray
+    high: FloatArray
+    saddle: float
+    upright: float
+    cap: float
+    cap_saddle: float
+
+
+class Landing(NamedTuple):
+    """How a landing ended: a code, when [s], margin [E_s], bounces, path [m], largest energy rise [E_s], counts."""
+
+    code: int
+    time: float
+    margin: float
+    bounces: int
+    slid: float
+    rise: float
+    steps: int
+    impacts: int
+    unresolved: int

@@ -1,0 +1,105 @@
+"""Impulses along the axis: neighbours that approach are pooled."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ode_reference.landing_core.layout import MOST_POOLS
+from slicemodel.compiled import merged
+
+
+@merged
+def join(value, mass, blocks, total, weight, count):
+    """Add a body behind ``blocks`` of pooled ones, pool those that approach, and return how many blocks there are."""
+    total[blocks], weight[blocks], count[blocks] = value * mass, mass, 1
+    while blocks > 0 and total[blocks] * weight[blocks - 1] > total[blocks - 1] * weight[blocks]:
+        total[blocks - 1] += total[blocks]
+        weight[blocks - 1] += weight[blocks]
+        count[blocks - 1] += count[blocks]
+        blocks -= 1
+    return blocks + 1
+
+
+@merged
+def pool_chain(x, tube, closed, world, y, total, weight, count):
+    """Project ``x`` and ``tube`` on what the closed gaps of a chain allow; return the tube's value and its pool's mass.
+
+    Bodies that touch one another make a run, along which values may not rise: slices resting on the cap, the tube and
+    slices resting on the base make one, slices that touch neither end the others.
+    """
+    n = world.n
+    on_base = 0
+    while on_base < n and closed[4 + on_base]:
+        on_base += 1
+    on_cap = n
+    while on_cap > on_base and closed[4 + on_cap]:
+        on_cap -= 1
+    blocks = 0
+    for i in range(on_cap, n):
+        blocks = join(x[i], world.m, blocks, total, weight, count)
+    blocks = join(tube, world.tube, blocks, total, weight, count)
+    for i in range(on_base):
+        blocks = join(x[i], world.m, blocks, total, weight, count)
+    at, pooled = tube, world.tube
+    k, behind = 0, n - on_cap
+    for block in range(blocks):
+        alone = count[block] == 1
+        value = total[block] / weight[block]
+        for _ in range(int(count[block])):
+            if k < behind:
+                y[on_cap + k] = x[on_cap + k] if alone else value
+            elif k > behind:
+                y[k - behind - 1] = x[k - behind - 1] if alone else value
+            elif not alone:
+                at, pooled = value, weight[block]
+            k += 1
+    begin = on_base
+    while begin < on_cap:
+        end = begin + 1
+        while end < on_cap and closed[4 + end]:
+            end += 1
+        y[begin] = x[begin]
+        if end > begin + 1:
+            blocks = 0
+            for i in range(begin, end):
+                blocks = join(x[i], world.m, blocks, total, weight, count)
+            k = begin
+            for block in range(blocks):
+                alone = count[block] == 1
+                value = total[block] / weight[block]
+                for _ in range(int(count[block])):
+                    y[k] = x[k] if alone else value
+                    k += 1
+        begin = end
+    return at, pooled
+
+
+@merged
+def pool_stops(x, tube, closed, world, y):
+    """Do the same where each slice has its own stops: it is pooled with the tube or with nothing."""
+    n = world.n
+    below, above = -np.inf, np.inf
+    at, pooled = tube, world.tube
+    for _ in range(MOST_POOLS):
+        mass, momentum = world.tube, world.tube * tube
+        for i in range(n):
+            if (closed[4 + i] and x[i] > at) or (closed[4 + n + i] and x[i] < at):
+                mass += world.m
+                momentum += world.m * x[i]
+        new = momentum / mass
+        pooled = mass
+        if new == at:
+            break
+        # The momentum balance is monotone in the tube's value: keep Newton's step inside what is known of its root.
+        if new > at:
+            below = at
+        else:
+            above = at
+        if not below <= new <= above:
+            new = (below + above) / 2
+        at = new
+    for i in range(n):
+        y[i] = x[i]
+        if (closed[4 + i] and x[i] > at) or (closed[4 + n + i] and x[i] < at):
+            y[i] = at
+    return at, pooled

@@ -1,0 +1,187 @@
+"""The figures of the landing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from flipproof.chapters.landing.study import Cell, Energy, Found, Kind
+from flipproof.chapters.landing.tables import NAMES
+from flipproof.figures.style import new_figure, shared_legend, styled
+
+LOOKS: Final[Mapping[Kind, dict[str, Any]]] = {
+    "together": {"color": "#0072B2", "marker": "o", "linestyle": "-"},
+    "in-turn": {"color": "#56B4E9", "marker": "^", "linestyle": "--"},
+    "compliant": {"color": "#CC79A7", "marker": "v", "linestyle": ":"},
+    "ice": {"color": "#444444", "marker": "s", "linestyle": "-"},
+    "ice, compliant": {"color": "#999999", "marker": "D", "linestyle": ":"},
+}
+
+SHADES: Final = {
+    "upright": "#0072B2", "lying": "#E8E2D4", "cap": "#E69F00", "undecided": "#CC79A7", "missed": "#FFFFFF"
+}  # fmt: skip
+"""Colour of every outcome on the map; water and ice alike."""
+
+TOP: Final = 4.0
+"""Largest energy that is drawn [E_s]."""
+
+
+@styled
+def figure_shares(found: Found) -> Figure:
+    """P(upright) over the filling with 95 % intervals, a panel a family."""
+    figure, panels = new_figure(1, len(found.size.families), size=(8.6, 4.4), squeeze=False, sharey=True)
+    for axes, family in zip(panels[0], found.size.families, strict=True):
+        for kind in LOOKS:
+            _curve(axes, kind, found.curve(family, kind))
+        axes.axvspan(0.2, 0.5, color="#0072B2", alpha=0.06, linewidth=0)
+        axes.set_xlabel("fill fraction M_w / M_max [1]")
+        axes.set_title({"A": "A: ω₀ as thrown", "B": "B: time of flight as thrown"}[family], fontsize=10, loc="left")
+        axes.set_ylim(0.0, 1.0)
+    panels[0, 0].set_ylabel("P(upright) [1]")
+    shared_legend(figure, panels[0, -1], columns=5)
+    return figure
+
+
+@styled
+def figure_axes(found: Found) -> Figure:
+    """P(upright) along what is assumed: restitution and friction of the table, scatter of the thrower."""
+    names = {"restitution": "e_table [1]", "friction": "friction of the table [1]", "scatter": "scatter, times assumed"}
+    figure, panels = new_figure(1, 3, size=(8.6, 3.8), sharey=True)
+    for axes, (axis, label) in zip(panels, names.items(), strict=True):
+        for kind in ("together", "in-turn", "ice"):
+            _curve(axes, kind, found.along(axis, kind))
+        axes.set_xlabel(label)
+        axes.set_ylim(0.0, 1.0)
+    panels[0].set_ylabel("P(upright) [1]")
+    panels[0].set_title(
+        f"filling {found.size.axis_filling:g}, family {found.size.families[-1]}", fontsize=10, loc="left"
+    )
+    shared_legend(figure, panels[0])
+    return figure
+
+
+def _curve(axes: Axes, kind: Kind, curve: Sequence[tuple[float, Cell]]) -> None:
+    if not curve:
+        return
+    x = [value for value, _ in curve]
+    low, high = np.array([cell.share.interval for _, cell in curve]).T
+    axes.plot(x, [cell.share.value for _, cell in curve], label=NAMES[kind], markersize=4.5, **LOOKS[kind])
+    axes.fill_between(x, low, high, color=LOOKS[kind]["color"], alpha=0.13, linewidth=0)
+
+
+@styled
+def figure_map(found: Found) -> Figure:
+    """Outcome of one throw without scatter over filling and omega_0; lines where the bottle touches upright."""
+    figure, panels = new_figure(1, max(len(found.maps), 1), size=(8.6, 4.6), squeeze=False, sharey=True)
+    names = list(SHADES)
+    for axes, (kind, outcomes) in zip(panels[0], found.maps.items(), strict=False):
+        codes = np.vectorize(lambda name: names.index(name) if name in names else len(names) - 1)(outcomes.outcome)
+        axes.pcolormesh(
+            found.fillings, found.omegas, codes, cmap=ListedColormap(list(SHADES.values())), vmin=-0.5,
+            vmax=len(names) - 0.5, shading="nearest", rasterized=True,
+        )  # fmt: skip
+        turns = outcomes.theta / math.tau
+        for level, style in ((1.0, "-"), (2.0, "--")):
+            if np.isfinite(turns).any() and np.nanmin(turns) < level < np.nanmax(turns):
+                axes.contour(
+                    found.fillings, found.omegas, turns, levels=[level], colors="black", linestyles=style,
+                    linewidths=1.3,
+                )  # fmt: skip
+        axes.set_title(NAMES[kind], fontsize=10, loc="left")
+        axes.set_xlabel("fill fraction M_w / M_max [1]")
+        axes.grid(visible=False)
+    panels[0, 0].set_ylabel("ω₀ [rad/s]")
+    shown = {str(name) for outcomes in found.maps.values() for name in outcomes.outcome.ravel()}
+    handles: list[Any] = [
+        Patch(facecolor=shade, edgecolor="#bbbbbb", label=name) for name, shade in SHADES.items() if name in shown
+    ]
+    handles += [
+        Line2D([], [], color="black", linestyle="-", label="touches at 360 degrees"),
+        Line2D([], [], color="black", linestyle="--", label="at 720 degrees"),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=5)
+    return figure
+
+
+@styled
+def figure_static(found: Found) -> Figure:
+    """Of the throws that the static criterion calls upright, and of those it does not, the share that stands."""
+    names = [name for name, counts in found.static.items() if sum(counts.values())]
+    figure, axes = new_figure(size=(8.6, 3.9))
+    width = 0.38
+    for side, (said, colour, label) in enumerate(
+        ((True, "#0072B2", "tilt below the toppling angle at touch"), (False, "#D55E00", "tilt above it"))
+    ):
+        for k, name in enumerate(names):
+            counts = found.static[name]
+            total = counts[said, True] + counts[said, False]
+            height = counts[said, True] / total if total else 0.0
+            bar = axes.bar(k + (side - 0.5) * width, height, width, color=colour, label=label if k == 0 else None)
+            axes.bar_label(bar, [f"{counts[said, True]} of {total}"], fontsize=7.5, padding=2)
+    axes.set_xticks(range(len(names)), [f"{NAMES[kind]}\nfamily {family}" for family, kind in names], fontsize=8)
+    axes.set_ylim(0.0, 1.1)
+    axes.set_ylabel("share that stands [1]")
+    shared_legend(figure, axes, columns=2)
+    return figure
+
+
+@styled
+def figure_energy(found: Found) -> Figure:
+    """Energy of a few landings over the saddle: below 1 the outcome is final."""
+    figure, panels = new_figure(1, 2, size=(8.6, 4.0), sharey=True)
+    kinds: tuple[Kind, ...] = ("together", "ice")
+    for axes, kind in zip(panels, kinds, strict=True):
+        for run in found.energies:
+            if run.kind == kind:
+                _energy(axes, run)
+        axes.axhline(1.0, color="black", linewidth=1.2)
+        axes.set_title(NAMES[kind], fontsize=10, loc="left")
+        axes.set_xlabel("time from the touch [s]")
+        axes.set_ylim(0.4, TOP)
+        axes.margins(x=0.0)
+    panels[0].set_ylabel("energy over the table / saddle E_s [1]")
+    handles = [Line2D([], [], color=SHADES["upright"], label="ends upright")]
+    handles += [Line2D([], [], color="#B08D57", label="ends lying or on the cap")]
+    handles += [Line2D([], [], color="black", label="saddle: below it the outcome is final")]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    return figure
+
+
+def _energy(axes: Axes, run: Energy) -> None:
+    colour = SHADES["upright"] if run.outcome == "upright" else "#B08D57"
+    axes.plot(run.t, np.minimum(run.energy, 2 * TOP), color=colour, linewidth=1.1, alpha=0.85)
+
+
+@styled
+def figure_witnesses(cases: Sequence[Mapping[str, Any]]) -> Figure:
+    """Outcomes of two programs from one touch, a matrix for each pair and law."""
+    matrices = [(case, matrix) for case in cases for matrix in case["matrices"]]
+    columns = 5
+    rows = -(-len(matrices) // columns)
+    figure, panels = new_figure(rows, columns, size=(8.6, 1.75 * rows + 0.3), squeeze=False)
+    names = ("upright", "lying", "cap", "undecided")
+    for axes in panels.ravel()[len(matrices) :]:
+        axes.set_axis_off()
+    for axes, (case, matrix) in zip(panels.ravel(), matrices, strict=False):
+        counts = np.array([[matrix["outcomes"].get(f"{one}/{other}", 0) for other in names] for one in names])
+        axes.imshow(np.sqrt(counts), cmap="Blues", vmin=0.0, vmax=1.6 * math.sqrt(matrix["touches"]))
+        for (row, column), count in np.ndenumerate(counts):
+            if count:
+                colour = "#B00020" if row != column else "black"
+                axes.text(column, row, str(count), ha="center", va="center", fontsize=7, color=colour)
+        axes.set_xticks(range(4), ["up", "ly", "cap", "?"], fontsize=6.5)
+        axes.set_yticks(range(4), ["up", "ly", "cap", "?"], fontsize=6.5)
+        axes.grid(visible=False)
+        kind = "ice" if case["law"] is None else f"{case['slices']}, {case['law']}"
+        axes.set_title(kind, fontsize=7)
+        axes.set_ylabel(matrix["programs"][0], fontsize=6.5)
+        axes.set_xlabel(matrix["programs"][1], fontsize=6.5)
+    return figure

@@ -1,0 +1,195 @@
+"""The commands of ``flipproof`` about the landing: one throw, and the share of many that ends upright."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, number, read_scenario
+from flipproof.cli.sweeps import add_where, fill
+
+SLICES: Final = 20
+
+
+def add_landing(commands: Any) -> None:
+    """Add both commands."""
+    land = add_command(commands, "land", "Land one throw: touch, outcome and certificate, law by law.", command_land)
+    land.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
+    where = land.add_mutually_exclusive_group()
+    where.add_argument(
+        "--height", type=number, metavar="M", help="table over the place of the cap at release [m] (default: where the "
+        "bottle would touch it standing after the throw's duration)",
+    )  # fmt: skip
+    where.add_argument("--aim", choices=("A", "B"), help="solve for a throw that touches upright; see 'upright'")
+    _add_table(land)
+    land.add_argument("--law", metavar="NAME", help="together or in-turn (default: both)")
+    land.add_argument("--programs", default="ode_reference", metavar="A,B", help="ode_reference, pymunk, mujoco, "
+                      "mujoco-compliant (%(default)s)")  # fmt: skip
+    land.add_argument("--slices", type=count, default=SLICES, metavar="N", help="slices (%(default)s)")
+    land.add_argument("--film", type=Path, metavar="FILE", help="also write water beside ice as .gif or .mp4")
+    land.add_argument("--slow", type=number, default=9.6, metavar="X", help="times slower than it is (%(default)s)")
+    land.add_argument("--fps", type=count, default=25, metavar="N", help="frames per second (%(default)s)")
+    land.add_argument("--quiet", action="store_true", help="no progress")
+
+    upright = add_command(
+        commands, "upright", "Count how many scattered throws end upright, or go on with it.", command_upright
+    )
+    upright.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
+    upright.add_argument("--throws", type=count, default=300, metavar="N", help="throws a point (%(default)s)")
+    upright.add_argument("--slices", type=count, default=SLICES, metavar="N", help="slices (%(default)s)")
+    upright.add_argument(
+        "--fillings", type=_shares, metavar="X,Y,Z", help="fill fractions (default: eight, 0.1 to 0.95)"
+    )
+    upright.add_argument(
+        "--families", default="A,B", metavar="A,B", help="A: omega_0 as thrown, height of the table solved for; B: "
+        "time of flight as thrown, omega_0 solved for (%(default)s)",
+    )  # fmt: skip
+    upright.add_argument("--scatter", type=_scatter, metavar="SPIN,DEGREES,SPEED", help="standard deviations: share of "
+                         "omega_0, of theta_0 [degrees], of the launch velocity [m/s] (0.05,5,0.1)")  # fmt: skip
+    upright.add_argument("--seed", type=_seed, default=1, metavar="N", help="seed of all throws (%(default)s)")
+    upright.add_argument("--map", type=_cells, default=(24, 24), metavar="CxR", help="cells of the map (24x24)")
+    upright.add_argument(
+        "--engine", type=_seed, default=60, metavar="N", help="throws a point by soft contacts; 0: none (%(default)s)"
+    )
+    _add_table(upright)
+    add_where(upright)
+
+
+def _add_table(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--restitution", type=number, default=0.3, metavar="E", help="of rim and table (%(default)s)")
+    command.add_argument("--friction", type=number, default=0.4, metavar="MU", help="of rim and table (%(default)s)")
+
+
+def command_land(options: argparse.Namespace) -> int:
+    """Throw one bottle on a table and say how it lands."""
+    throw = read_scenario(options.scenario, options.slices)
+    from flipproof.chapters.landing.study import standing
+    from flipproof.landing.aim import aimed
+    from flipproof.landing.throw import land_throw, told
+    from slicemodel import Table
+
+    if options.film:
+        from flipproof.animate import check_target
+
+        check_target(options.film)
+    Table(height=0.0, restitution=options.restitution, friction=options.friction)
+    height = options.height
+    if options.aim:
+        aim = aimed(throw, options.aim)
+        throw, height = replace(aim.throw, duration=aim.time), aim.height
+        print(f"aimed: omega_0 = {throw.omega0:.4f} rad/s, table at {height:.4f} m, touch after {aim.time:.4f} s")
+    elif height is None:
+        height = standing(throw).height
+    table = Table(height=height, restitution=options.restitution, friction=options.friction)
+    rows = land_throw(throw, table, options.law, [name.strip() for name in options.programs.split(",")])
+    print(told(rows, table))
+    if options.film:
+        _film(options, rows, table)
+    return 0
+
+
+def _film(options: argparse.Namespace, rows: Any, table: Any) -> None:
+    from tqdm import tqdm
+
+    from flipproof.animate import MOST_FPS, MOST_FRAMES, FilmError, write_pictures
+    from flipproof.landing.film import draw_landing, film_times, shown
+    from flipproof.landing.work import REFERENCE
+
+    if not options.slow > 0:
+        raise FilmError(f"--slow {options.slow:g} is outside (0, inf): 1 is real time, 9.6 the paper's slow motion")
+    if options.fps > MOST_FPS:
+        raise FilmError(f"--fps {options.fps} is outside [1, {MOST_FPS}] frames per second")
+    chosen = [row for row in rows if row.program == REFERENCE] or list(rows)
+    bottles = [
+        shown(row.name if row.law is None else f"{row.name}, {row.law}", row.touch, table, row.law, row.outcome)
+        for row in chosen
+    ]
+    times = film_times(bottles, options.slow, options.fps)
+    if len(times) > MOST_FRAMES:
+        raise FilmError(f"--slow {options.slow:g} makes {len(times)} frames (admissible: at most {MOST_FRAMES})")
+    hide = True if options.quiet else None
+    with tqdm(total=len(times), desc="drawing", unit="frame", disable=hide, leave=False) as bar:
+
+        def step(drawn: int, _frames: int) -> None:
+            bar.update(drawn - bar.n)
+
+        write_pictures(draw_landing(bottles, times, options.slow), len(times), options.fps, options.film, step)
+    print(f"{options.film}: {len(times)} frames, {len(bottles)} bottles ({options.slow:g} times slower)")
+
+
+def command_upright(options: argparse.Namespace) -> int:
+    """Make the throws of the study that have no row yet, and write its tables and figures."""
+    throw = read_scenario(options.scenario, options.slices)
+    from flipproof.chapters.landing.study import Size
+    from flipproof.landing.aim import FAMILIES
+    from flipproof.landing.scatter import Scatter
+    from flipproof.landing.upright import make_upright
+    from slicemodel import Table
+    from slicemodel.scenario import unknown_name
+
+    Table(height=0.0, restitution=options.restitution, friction=options.friction)
+    families = tuple(dict.fromkeys(name.strip() for name in options.families.split(",")))
+    for family in families:
+        if family not in FAMILIES:
+            raise ValueError(unknown_name("--families", family, FAMILIES))
+    if throw.frozen:
+        raise ValueError("scenario.frozen = true: the study throws water and ice beside it; leave it out")
+    size = Size(
+        families=families,
+        throws=options.throws,
+        axis_throws=options.throws,
+        aim_throws=max(1, options.throws // 5),
+        slices=options.slices,
+        map_cells=options.map,
+        engine_throws=options.engine,
+        restitution=options.restitution,
+        friction=options.friction,
+        seed=options.seed,
+    )
+    if options.fillings:
+        middle = min(options.fillings, key=lambda filling: abs(filling - size.axis_filling))
+        size = replace(size, fillings=options.fillings, axis_filling=middle)
+    if options.scatter:
+        spin, angle, speed = options.scatter
+        size = replace(size, scatter=Scatter(spin=spin, angle=math.radians(angle), speed=speed))
+
+    def say(words: str) -> None:
+        if not options.quiet:
+            print(f"flipproof: {words}", file=sys.stderr, flush=True)
+
+    return fill(options, lambda begin, where: make_upright(throw, size, options.out, begin, say, **where))
+
+
+def _shares(text: str) -> tuple[float, ...]:
+    """Return increasing fill fractions in (0, 1]."""
+    values = tuple(number(part.strip()) for part in text.split(","))
+    for value in values:
+        if not 0.0 < value <= 1.0:
+            raise argparse.ArgumentTypeError(f"{value:g} is outside (0, 1], as a fill fraction has to be")
+    if list(values) != sorted(set(values)):
+        raise argparse.ArgumentTypeError(f"{text!r} does not increase")
+    return values
+
+
+def _scatter(text: str) -> tuple[float, float, float]:
+    values = [number(part.strip()) for part in text.split(",")]
+    if len(values) != 3 or min(values) < 0.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not SPIN,DEGREES,SPEED, three numbers in [0, inf)")
+    return values[0], values[1], values[2]
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal() or int(text) >= 2**63:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number in [0, 2^63)")
+    return int(text)
+
+
+def _cells(text: str) -> tuple[int, int]:
+    columns, _, rows = text.partition("x")
+    if not all(side.isdecimal() and 2 <= int(side) <= 200 for side in (columns, rows)):
+        raise argparse.ArgumentTypeError(f"{text!r} is not COLUMNSxROWS, each in [2, 200], such as 24x24")
+    return int(columns), int(rows)

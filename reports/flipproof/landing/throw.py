@@ -1,0 +1,124 @@
+"""One throw that lands: its touch, its outcome under every law, and ice thrown alike."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import ode_reference
+from flipproof.landing.aim import SPARE
+from flipproof.landing.work import REFERENCE, landed, saddle, touch_readings
+from slicemodel import Outcome, Scenario, Table, Touch
+from slicemodel.scenario import unknown_name
+from slicemodel.table import LAWS
+
+SLICES: Final = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """One landing: what landed, by which program under which law, and how it ended."""
+
+    name: str
+    touch: Touch
+    program: str
+    law: str | None
+    outcome: Outcome
+
+
+def land_throw(
+    throw: Scenario, table: Table, law: str | None = None, programs: Sequence[str] = (REFERENCE,)
+) -> list[Row]:
+    """Throw water and ice alike on a table and land both by every program and law asked for.
+
+    Parameters
+    ----------
+    throw : Scenario
+        Its duration is the time within which the table has to be reached.
+    table : Table
+    law : str or None
+        One law; None: every law that a program has.
+    programs : names - "ode_reference", or engines of ``engine_check.land``
+
+    Raises
+    ------
+    ValueError
+        Naming the argument: an unknown program, a law for ice, a table that is not reached.
+    """
+    from engine_check.landing import LANDERS
+
+    for program in programs:
+        if program != REFERENCE and program not in LANDERS:
+            raise ValueError(unknown_name("program =", program, (REFERENCE, *LANDERS)))
+    if throw.frozen and law is not None:
+        raise ValueError(f"law = {law!r} has no meaning for ice (scenario.frozen): leave it out")
+    if law is not None and law not in LAWS:
+        raise ValueError(unknown_name("law =", law, LAWS))
+    rows = []
+    for name, bottle in _bottles(throw):
+        touch = ode_reference.fly(bottle, table)
+        for program in programs:
+            for chosen in _laws(program, bottle.frozen, law):
+                outcome = landed(touch, table, program, chosen)
+                rows.append(Row(name=name, touch=touch, program=program, law=chosen, outcome=outcome))
+    return rows
+
+
+def _bottles(throw: Scenario) -> list[tuple[str, Scenario]]:
+    long = replace(throw, duration=throw.duration + SPARE)
+    if throw.frozen:
+        return [("ice", long)]
+    return [("water", long), ("ice", replace(long, frozen=True))]
+
+
+def _laws(program: str, frozen: bool, law: str | None) -> tuple[str | None, ...]:
+    from engine_check.landing import LANDERS
+
+    known = tuple(LAWS) if program == REFERENCE else LANDERS[program].laws
+    if frozen or not known:
+        return (None,)
+    return known if law is None else tuple(name for name in known if name == law)
+
+
+def told(rows: Sequence[Row], table: Table) -> str:
+    """Return what happens as lines: the touch of each bottle, then a line for each landing."""
+    lines = [
+        f"table at {table.height:g} m, e_table = {table.restitution:g}, friction {table.friction:g} (both assumed: no "
+        "measured ones were found)"
+    ]
+    said: set[str] = set()
+    for row in rows:
+        if row.name not in said:
+            said.add(row.name)
+            lines += _touch_lines(row.name, row.touch)
+        lines.append(f"  {_who(row):34} {_how(row.outcome)}")
+    return "\n".join(lines)
+
+
+def _touch_lines(name: str, touch: Touch) -> list[str]:
+    read = touch_readings(touch)
+    stands = "below" if read["static_margin"] > 0.0 else "above"
+    return [
+        f"{name} touches at t = {touch.time:.4f} s: tilt {math.degrees(touch.tilt):+.1f} degrees, {stands} its "
+        f"toppling angle by {math.degrees(abs(read['static_margin'])):.1f}; omega {touch.omega:.2f} rad/s; falls at "
+        f"{read['touch_speed']:.2f} m/s; energy {read['touch_energy']:.2f} E_s (saddle {saddle(touch.scenario):.4f} J)"
+    ]
+
+
+def _who(row: Row) -> str:
+    program = "event by event" if row.program == REFERENCE else row.program
+    return program if row.law is None else f"{program}, {row.law}"
+
+
+def _how(outcome: Outcome) -> str:
+    if not outcome.decided:
+        return f"undecided: {outcome.reason}"
+    assert outcome.certified is not None
+    assert outcome.margin is not None
+    assert outcome.slid is not None
+    return (
+        f"{outcome.outcome}; certain {outcome.certified:.3f} s after the touch, {outcome.margin:.1%} below the saddle; "
+        f"bounces {outcome.bounces}; slid {1000 * outcome.slid:+.0f} mm"
+    )

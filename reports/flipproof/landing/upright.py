@@ -1,0 +1,128 @@
+"""The study as a command: both waves as sweeps that can be resumed, then tables and figures.
+
+::
+
+    DIR/aims/sweep.sqlite      throws that chose the aims, one row each
+    DIR/throws/sweep.sqlite    throws that are counted, one row each
+    DIR/upright.csv            shares with their intervals, one row a cell
+    DIR/map.csv                outcomes over filling and omega_0
+    DIR/*.svg, DIR/*.png       the figures
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from flipproof.chapters.landing.figures import figures
+from flipproof.chapters.landing.study import Found, Rows, Size, Wave, study
+from flipproof.chapters.landing.tables import map_csv, share_line, shares_csv
+from flipproof.landing.design import Case, Throws
+from flipproof.landing.work import LANDING, Landed, make_landing
+from flipproof.output.ownership import MARKER, OutputError, check_own, marker_text
+from flipproof.sweep.command import Begin, completed
+from flipproof.sweep.errors import SweepError
+from flipproof.sweep.files import write_whole
+from flipproof.sweep.store import Store
+from slicemodel import Scenario
+
+KIND: Final = "landing"
+COLUMNS: Final = ("number", "status", "message", "reason", "seconds", *LANDING)
+
+Say = Callable[[str], None]
+
+
+def make_upright(
+    throw: Scenario,
+    size: Size,
+    out: Path,
+    begin: Begin,
+    say: Say,
+    *,
+    jobs: int | None = None,
+    dask: str | None = None,
+    export_to: Path | None = None,
+) -> str:
+    """Make every throw of the study that has no row in ``out``, write tables and figures; return lines that tell them.
+
+    Raises
+    ------
+    SweepError
+        If the folder, the workers or the disk will not do; what was stored is kept.
+    """
+    _own(out)
+    summaries = []
+
+    def make(wave: Wave) -> Rows:
+        design = Throws(cases=wave.cases, seed=size.seed, text=f"flipproof upright, {wave.name}")
+        say(f"{wave.name}: {design.size} throws")
+        last = export_to if wave.name == "throws" else None
+        with completed(design, out / wave.name, begin, jobs=jobs, dask=dask, export_to=last) as (store, summary):
+            summaries.append(summary)
+            return read_rows(store, design)
+
+    found = drive(throw, size, make)
+    say("figures")
+    write_whole(out / "upright.csv", shares_csv(found).encode())
+    write_whole(out / "map.csv", map_csv(found).encode())
+    for exhibit in figures(found):
+        drawing = exhibit.drawing
+        write_whole(out / f"{exhibit.name}.svg", drawing.svg.encode())
+        write_whole(out / f"{exhibit.name}.png", drawing.png)
+    lines = [share_line(found, family) for family in size.families]
+    return "\n".join([*lines, f"({found.assumed})", *summaries, f"Tables and figures: {out}"])
+
+
+def drive(throw: Scenario, size: Size, make: Callable[[Wave], Rows]) -> Found:
+    """Run the study, its waves made by ``make``."""
+    steps = study(throw, size)
+    wave = next(steps)
+    while True:
+        try:
+            wave = steps.send(make(wave))
+        except StopIteration as end:
+            found: Found = end.value
+            return found
+
+
+def drive_in_processes(throw: Scenario, size: Size, jobs: int | None = None) -> Found:
+    """Run the study in worker processes and keep no rows; the same to the last bit."""
+    from flipproof.frame.pool import workers
+
+    with workers(jobs) as pool:
+
+        def make(wave: Wave) -> Rows:
+            pending = [pool.submit(make_case, case, size.seed) for case in wave.cases]
+            return [future.result() for future in pending]
+
+        return drive(throw, size, make)
+
+
+def make_case(case: Case, seed: int) -> list[Landed]:
+    """Make the throws of one case in this process, numbered as in its own design."""
+    design = Throws(cases=(case,), seed=seed, text="")
+    return [make_landing(design.point(number)) for number in range(design.size)]
+
+
+def read_rows(store: Store, design: Throws) -> list[list[Landed]]:
+    """Return the rows of a complete store, case by case."""
+    made = store.connection.execute(f"SELECT {', '.join(COLUMNS)} FROM points ORDER BY number")
+    rows = [Landed(**dict(zip(COLUMNS, row, strict=True))) for row in made]
+    return [rows[end - case.throws : end] for case, end in zip(design.cases, design.ends, strict=True)]
+
+
+def _own(out: Path) -> None:
+    """Make the folder, or refuse one that holds anything but this study."""
+    try:
+        if out.exists() and not out.is_dir():
+            raise SweepError(f"{out} is a file; --out names a folder")
+        if out.exists():
+            check_own(out, KIND)
+        out.mkdir(parents=True, exist_ok=True)
+        if not (out / MARKER).exists():
+            write_whole(out / MARKER, marker_text(KIND).encode())
+    except OutputError as error:
+        raise SweepError(str(error)) from None
+    except OSError as error:
+        raise SweepError(f"{out} cannot be written ({error.strerror or error})") from None

@@ -1,0 +1,173 @@
+"""One throw of the study, from its release to its outcome: what a worker makes and a row holds."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+
+from flipproof.sweep.design import Point
+from slicemodel import Outcome, Scenario, Table, Touch
+from slicemodel.observables import centre_of_mass, centre_of_mass_at_rest, toppling_angle
+from slicemodel.scenario import ScenarioError
+
+LANDING: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "outcome": "TEXT",
+        "touch_time": "REAL",
+        "touch_theta": "REAL",
+        "touch_omega": "REAL",
+        "touch_speed": "REAL",
+        "touch_energy": "REAL",
+        "static_margin": "REAL",
+        "certified": "REAL",
+        "margin": "REAL",
+        "slid": "REAL",
+        "bounces": "INTEGER",
+    }
+)
+"""What a row holds of a landing -> its SQLite type."""
+
+REFERENCE: Final = "ode_reference"
+"""The program that lands event by event; every other name is an engine's."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Landed:
+    """What became of a throw. A number that is not known is None, and ``reason`` says why.
+
+    Parameters
+    ----------
+    outcome : str or None - a key of ``slicemodel.table.OUTCOMES``
+    touch_time [s], touch_theta [rad], touch_omega [rad/s] : float or None
+    touch_speed : float or None - of the centre of mass, downwards [m/s]
+    touch_energy : float or None - over the table, share of the saddle E_s [1]
+    static_margin : float or None - toppling angle of the water as it is at the touch, minus |tilt| [rad] (Eq. 13a)
+    certified [s], margin [E_s], slid [m], bounces : as of ``slicemodel.Outcome``
+    status : a key of ``flipproof.sweep.work.OUTCOMES``
+    """
+
+    number: int
+    outcome: str | None = None
+    touch_time: float | None = None
+    touch_theta: float | None = None
+    touch_omega: float | None = None
+    touch_speed: float | None = None
+    touch_energy: float | None = None
+    static_margin: float | None = None
+    certified: float | None = None
+    margin: float | None = None
+    slid: float | None = None
+    bounces: int | None = None
+    status: str
+    message: str = ""
+    reason: str = ""
+    seconds: float = 0.0
+    arrays: None = None
+    curves: None = None
+
+    @property
+    def whole(self) -> bool:
+        """True if it is known how the throw ended."""
+        return self.outcome not in (None, "undecided") or self.status == "missed"
+
+
+def make_landings(points: Sequence[Point]) -> list[Landed]:
+    """Make the points of one process."""
+    return [make_landing(point) for point in points]
+
+
+def make_landing(point: Point) -> Landed:
+    """Throw and land one bottle; whatever goes wrong becomes its status and reason."""
+    settings = point.settings
+    began = time.perf_counter()
+
+    def lost(status: str, reason: str) -> Landed:
+        return Landed(number=point.number, status=status, reason=reason, seconds=time.perf_counter() - began)
+
+    try:
+        scenario = point.scenario()
+        table = Table(height=settings["height"], restitution=settings["restitution"], friction=settings["friction"])
+    except ScenarioError as error:
+        return lost("impossible", str(error))
+    try:
+        import ode_reference
+
+        touch = ode_reference.fly(scenario, table)
+    except ValueError as error:
+        return lost("missed", str(error))
+    except Exception as error:
+        return lost("failed", f"{type(error).__name__}: {error}")
+    try:
+        outcome = landed(touch, table, settings["program"], settings["law"])
+    except Exception as error:
+        return lost("failed", f"{type(error).__name__}: {error}")
+    return Landed(
+        number=point.number,
+        outcome=outcome.outcome,
+        **touch_readings(touch),
+        certified=outcome.certified,
+        margin=outcome.margin,
+        slid=outcome.slid,
+        bounces=outcome.bounces,
+        status="ok" if outcome.decided else "undecided",
+        reason=outcome.reason,
+        seconds=time.perf_counter() - began,
+    )
+
+
+def landed(touch: Touch, table: Table, program: str, law: str | None) -> Outcome:
+    """Return the outcome by one program; ice is asked for no law, and an engine for the slices that it has."""
+    law = None if touch.scenario.frozen else law
+    if program == REFERENCE:
+        import ode_reference
+
+        return ode_reference.land(touch, table, law)
+    import engine_check
+    from engine_check.landing import LANDERS
+
+    return engine_check.land(touch, table, program, law=law, slices=LANDERS[program].slices[0])
+
+
+def touch_readings(touch: Touch) -> dict[str, Any]:
+    """Return what a row holds of a touch."""
+    scenario = touch.scenario
+    r_cm = float(centre_of_mass(scenario, touch.r))
+    energy, speed = touch_energy(touch, r_cm)
+    return {
+        "touch_time": touch.time,
+        "touch_theta": touch.theta,
+        "touch_omega": touch.omega,
+        "touch_speed": speed,
+        "touch_energy": energy / saddle(scenario),
+        "static_margin": float(toppling_angle(scenario, r_cm)) - abs(touch.tilt),
+    }
+
+
+def saddle(scenario: Scenario) -> float:
+    """Return E_s = M g sqrt(R^2 + z_rest^2) [J]."""
+    rest = scenario.bottle.length - centre_of_mass_at_rest(scenario)
+    return scenario.total_mass * scenario.gravity * math.hypot(scenario.bottle.radius, rest)
+
+
+def touch_energy(touch: Touch, r_cm: float) -> tuple[float, float]:
+    """Return the energy over the table of bottle and point slices [J], and how fast their centre falls [m/s]."""
+    scenario, bottle = touch.scenario, touch.scenario.bottle
+    sine, cosine = math.sin(touch.theta), math.cos(touch.theta)
+    (v_x, v_y), half = touch.velocity, bottle.length / 2
+    middle = half * abs(cosine) + bottle.radius * abs(sine)
+    along, across = v_x * sine - v_y * cosine, v_x * cosine + v_y * sine
+    s = touch.r - half
+    water_along, water_across = along + touch.v, across + touch.omega * s
+    kinetic = bottle.mass * (along**2 + across**2 + touch.omega**2 * (bottle.radius**2 / 2 + bottle.length**2 / 12)) / 2
+    kinetic += scenario.slice_mass * float(np.sum(water_along**2 + water_across**2)) / 2
+    height = middle - (r_cm - half) * cosine
+    down = (bottle.mass * v_y + scenario.slice_mass * float(np.sum(water_across * sine - water_along * cosine))) / -(
+        scenario.total_mass
+    )
+    return kinetic + scenario.total_mass * scenario.gravity * height, down
