@@ -15,7 +15,6 @@ from flipproof.frame.findings import Finding
 from flipproof.output.junit import junit_text
 from flipproof.output.summary import SCHEMA_NAME, schema_text, solver_rows, summarise, summary_text
 from flipproof.output.tables import trajectory_csv
-from flipproof.page.explore import page_data
 from flipproof.page.motion import motion_data
 from flipproof.page.render import render
 from flipproof.paper.figures import exhibits_paper
@@ -52,6 +51,7 @@ def build(evidence: Evidence, provenance: Mapping[str, str], jobs: int | None = 
     with evidence.stages.lap("figures"):
         exhibits = drawn((*draw_all(evidence), *(exhibits_paper(paper.runs) if paper else ())), jobs)
     solvers = solver_rows(evidence)
+    summary = summarise(evidence, findings, exhibits, solvers, provenance)
     with evidence.stages.lap("page"):
         html = render(
             evidence,
@@ -59,15 +59,16 @@ def build(evidence: Evidence, provenance: Mapping[str, str], jobs: int | None = 
             exhibits,
             solvers,
             provenance,
+            summary=summary,
             motion=motion_data(evidence.throw, evidence.made),
-            explore=page_data(),
             paper=paper.verdicts if paper else None,
         )
+    summary["stages"]["page"] = round(evidence.stages.seconds["page"], 3)
     return Report(
         findings=findings,
         exhibits=exhibits,
         html=html,
-        summary=summarise(evidence, findings, exhibits, solvers, provenance),
+        summary=summary,
         tables={
             tag: trajectory_csv(trajectory)
             for tag in (*FLIGHTS, *OTHERS)

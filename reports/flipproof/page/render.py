@@ -16,34 +16,21 @@ from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding
 from flipproof.frame.twins import BAND_WORDS
 from flipproof.instruments import witnesses
+from flipproof.output.summary import summarise
+from flipproof.page.glossary import TERMS, linked
+from flipproof.page.glossary import anchor as term_anchor
 from flipproof.page.headlines import headlines
 from flipproof.page.inline import data_uri, shape
 from flipproof.page.lead import answers, lead_words
+from flipproof.page.sections import EVIDENCE, STORY, folded, grouped
+from flipproof.page.story.facts import story
+from flipproof.page.story.live import live_data, sliders
 from flipproof.page.templating import environment
-from flipproof.page.verdict import answer, strips, tiles
+from flipproof.page.verdict import answer
 from flipproof.studies.differences import Difference, moved, percent
 from flipproof.studies.slices import FINER
 
-CONTENTS = {
-    "verdict": "Verdict",
-    "assumptions": "What each assumption costs",
-    "flights": "The flights",
-    "differences": "Where they part",
-    "steps": "Step size",
-    "slices": "How many slices",
-    "events": "Events",
-    "energy": "Energy",
-    "ice": "Ice",
-    "engines": "Engines",
-    "work-precision": "What a digit costs",
-    "maps": "For which bottles",
-    "throws": "Explore other throws",
-    "paper": "The paper's figures and claims",
-    "errata": "Errata",
-    "findings": "All findings",
-    "solvers": "Every solver",
-    "provenance": "Settings and provenance",
-}
+CONTENTS = {**STORY, **{id_: title for id_, (title, _) in EVIDENCE.items()}}
 """Section -> its name in the contents, in the order of the page."""
 
 PLACES = {
@@ -134,16 +121,17 @@ def render(
     solvers: Sequence[Mapping[str, Any]],
     provenance: Mapping[str, str],
     *,
+    summary: Mapping[str, Any] | None = None,
     motion: Any = None,
-    explore: Any = None,
     paper: Any = None,
 ) -> str:
     """Return the whole page.
 
-    ``motion``, ``explore`` and ``paper`` are what their templates draw from; a part that is None is left out.
+    ``motion`` and ``paper`` are what their templates draw from; a part that is None is left out. ``summary`` is the
+    content of summary.json, which the story is told from; None: made here.
     """
+    summary = summary or summarise(evidence, findings, exhibits, solvers, provenance)
     templates = environment()
-    templates.tests["about_the_paper"] = lambda id_: id_.startswith("paper-")
     templates.filters["typeset"] = typeset
     templates.filters["unbroken"] = unbroken
     templates.filters["amount"] = amount
@@ -152,22 +140,14 @@ def render(
     templates.filters["shape"] = shape
     templates.filters["short"] = short
     templates.filters["restitution_error"] = restitution_error
+    templates.filters["term_anchor"] = term_anchor
     found = evidence.attribution
     reasons = sort_problems({**found.problems, **evidence.instruments.problems})
     tables = list(tabulate_work_precision(evidence.precision))
-    absent = {
-        name
-        for name, there in (
-            ("work-precision", tables),
-            ("maps", found.maps or reasons["maps"]),
-            ("throws", explore),
-            ("paper", paper),
-        )
-        if not there
-    }
     verdict = headlines(evidence)
     regressions = [finding for finding in findings if finding.kind == "regression"]
-    return templates.get_template("report.html.j2").render(
+    told = story(summary, {exhibit.name: exhibit.table for exhibit in exhibits})
+    context = dict(
         scenario=evidence.scenario,
         throw=evidence.throw,
         finer=FINER,
@@ -175,15 +155,12 @@ def render(
             zip(evidence.finite_step, evidence.finite_step_finer or (None,) * len(evidence.finite_step), strict=True)
         ),
         size=evidence.size,
-        contents=[(section, words) for section, words in CONTENTS.items() if section not in absent],
         answer=answer(verdict),
-        tiles=tiles(verdict),
-        strips=strips(found.waterfalls[0]) if found.waterfalls else (),
         differences=sorted(evidence.differences, key=lambda difference: -difference.largest),
         lead=lead_words(verdict),
         answers=tuple(answers(verdict)),
         regressions=regressions,
-        observations=[finding for finding in findings if finding.kind == "observation"],
+        grouped=grouped(findings),
         failed=[finding for finding in regressions if finding.failed],
         exhibits=exhibits,
         steps=evidence.flights_by_step,
@@ -199,10 +176,27 @@ def render(
         problems=[made for made in evidence.made.values() if made.trajectory is None],
         reasons=reasons,
         motion=motion,
-        explore=explore,
         paper=paper,
         assets=read_assets(),
         provenance=provenance,
         twin_words=BAND_WORDS,
         settings=evidence.scenario.to_toml(),
+        terms=TERMS,
+    )
+    sections = folded(templates.get_template("evidence.html.j2").render(context), findings, exhibits)
+    there = {
+        **dict.fromkeys(("verdict", "answer", "live", "survives", "sure"), True),
+        "motion-story": motion,
+        "shares": told.shares,
+        "bottles": told.map,
+        **{section.id: True for section in sections},
+    }
+    return templates.get_template("report.html.j2").render(
+        context,
+        contents=[(id_, words) for id_, words in CONTENTS.items() if there.get(id_)],
+        story_ids=STORY,
+        story=told,
+        sliders=sliders(evidence.throw),
+        live=live_data(evidence.throw),
+        sections=sections,
     )
