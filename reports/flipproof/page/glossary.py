@@ -54,6 +54,9 @@ TERMS: Final[Mapping[str, str]] = {
     "impact": "A slice strikes an end of the bottle.",
 }  # fmt: skip
 
+_PLACES: Final = {"ω₀": "omega-at-release", "M̃": "filling", "Eq. 8": "equation-8", "free-flight": "free-flight-in-tables"}
+"""Term -> its place, where the term itself makes none."""
+
 _WORD: Final = re.compile(
     r"(?<![\w₀])(" + "|".join(re.escape(term) for term in sorted(TERMS, key=len, reverse=True)) + r")(?![\w₀-])"
 )
@@ -67,7 +70,7 @@ _CLOSED: Final = frozenset(
 
 def anchor(term: str) -> str:
     """Return the id of a term's place in the glossary."""
-    return "term-" + re.sub(r"\W+", "-", term.replace("₀", "0").replace("M̃", "filling")).strip("-")
+    return "term-" + _PLACES.get(term, re.sub(r"\W+", "-", term))
 
 
 def linked(html: str) -> Markup:

@@ -21,12 +21,11 @@ from flipproof.page.glossary import TERMS, linked
 from flipproof.page.glossary import anchor as term_anchor
 from flipproof.page.headlines import headlines
 from flipproof.page.inline import data_uri, shape
-from flipproof.page.lead import answers, lead_words
+from flipproof.page.lead import answer, answers, lead_words
 from flipproof.page.sections import EVIDENCE, STORY, folded, grouped
 from flipproof.page.story.facts import story
 from flipproof.page.story.live import live_data, sliders
 from flipproof.page.templating import environment
-from flipproof.page.verdict import answer
 from flipproof.studies.differences import Difference, moved, percent
 from flipproof.studies.slices import FINER
 

@@ -16,7 +16,6 @@ window.flipproofState = (() => {
 /* Contents that say where the reader is, a filter for the findings, and no idle stops for the keyboard.
    The page is whole without it. */
 (() => {
-  document.documentElement.classList.add("scripted");
   const rail = document.querySelector(".rail");
   const button = rail.querySelector("button");
   const links = new Map([...rail.querySelectorAll("a")].map((link) => [link.hash.slice(1), link]));
@@ -167,6 +166,7 @@ window.flipproofState = (() => {
     else if (location.hash.startsWith("#findings?")) setFilter(state.linked("findings"));
     reveal();
   });
+  document.documentElement.classList.add("ready");
   if (location.hash) reveal();
 
   /* What does not scroll need not be stopped at by those who go from place to place with the keyboard. */

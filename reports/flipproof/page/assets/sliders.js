@@ -68,8 +68,7 @@
     set({ ...start, ...Object.fromEntries(asked.filter(([name, value]) => name in start && Number.isFinite(value))) }, false);
   };
   window.addEventListener("hashchange", () => { if (location.hash.startsWith("#live?")) recall(); });
-  chart.onWidth(find("omega"), draw);
-  recall();
+  window.addEventListener("load", () => setTimeout(() => { recall(); chart.onWidth(find("omega"), draw); }, 0));
 
   // What a test, or a curious reader at the console, may ask.
   window.flipproofSliders = { drawn: () => drawn, set: (change) => { thrown = { ...thrown, ...change }; draw(); return drawn; } };

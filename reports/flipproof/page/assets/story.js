@@ -194,6 +194,5 @@
     draw();
   }
 
-  ride();
-  map();
+  window.addEventListener("load", () => setTimeout(() => { ride(); map(); }, 0));
 })();

@@ -66,7 +66,8 @@ PLAIN: Final[Mapping[str, str]] = {
     "held": "count findings verdict pass",
     "failed": "count findings verdict fail",
     "observed": "count findings verdict observed",
-    "vectors": "count findings unit relative",
+    "regressions": "count findings kind regression",
+    "vectors": "count findings id vectors-*",
     "experiments": "length paper/experiment",
     "omega0": "scenario/scenario/omega0",
     "duration": "scenario/scenario/duration",
@@ -76,7 +77,6 @@ PLAIN: Final[Mapping[str, str]] = {
 """Name -> source of a number that is printed as it is."""
 
 EXPERIMENTS: Final = {"minimum": "minimum", "change": "change-of-behaviour", "landing": "landing-angle"}
-PRINTED_RUN: Final = "vectors-"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,8 +87,9 @@ class Layer:
     question: str
     number: Number
     kind: str
-    more: str
     section: str
+    finer: Number | None
+    finer_slices: Number | None
 
     @property
     def within(self) -> bool:
@@ -153,12 +154,7 @@ def story(content: Mapping[str, Any], tables: Mapping[str, str | None]) -> Simpl
 
 
 def _layers(summary: Summary, n: Mapping[str, Number | None]) -> list[Layer]:
-    def finer(id_: str) -> str:
-        other, slices = summary.at(f"headlines/{id_}/finer"), summary.at(f"headlines/{id_}/finer_slices")
-        return "" if other is None or slices is None else f"; at N = {slices}: {percent(other)}"
-
     steps = summary.at("headlines/step/note") or "the steps"
-    slices = summary.at("slices")
     asked = (
         ("step", "The time step", f"Does it matter that the program holds ω constant over each of its {steps}?",
          "largest difference in ω between the program and its own equation solved exactly", "steps", "step"),
@@ -172,9 +168,10 @@ def _layers(summary: Summary, n: Mapping[str, Number | None]) -> list[Layer]:
             name=name,
             question=question,
             number=number,
-            kind=f"{kind}, N = {slices}{finer(id_)}",
-            more="",
+            kind=kind,
             section=section,
+            finer=summary.number(f"headlines/{id_}/finer", percent),
+            finer_slices=summary.number(f"headlines/{id_}/finer_slices", plain),
         )
         for key, name, question, kind, section, id_ in asked
         if (number := n[key]) is not None

@@ -4,7 +4,8 @@
 
     headlines/eq8-free/value                                  keys, and entries of a list by their id or name
     headlines/program-eq8/value : headlines/whole/value       a ratio
-    count findings verdict pass                               entries of a list whose field has, or lists, a value
+    count findings verdict pass                               entries of a list whose field has, or lists, a value;
+                                                              vectors-* is any text that begins so
     length paper/experiment                                   entries of a list
 """
 
@@ -74,7 +75,9 @@ class Summary:
 
 
 def _has(found: Any, wanted: str) -> bool:
-    return wanted in found if isinstance(found, list) else found == wanted
+    if isinstance(found, list):
+        return wanted in found
+    return str(found).startswith(wanted[:-1]) if wanted.endswith("*") else found == wanted
 
 
 def joined(*parts: Any) -> Markup:
