@@ -19,7 +19,7 @@ STEPS = 1000
 ADMISSIBLE = 2e-3
 """Share of omega_0 by which Eq. 8 and free flight may differ from Python's, where their own bands are smaller."""
 
-TWINS = 8
+TWINS = 40
 """Flights of Python by which the band of a chaotic throw is known."""
 
 
@@ -55,13 +55,15 @@ def apart(one, other, scenario):
 
 
 def band(scenario, model, usual):
-    """Return how far the flight moves when release and rest speed change by what nobody can know."""
-    rest = usual.settings["rest_speed"]
-    moved = [ode_reference.solve(scenario, model=model, rest_speed=rest / 10)]
-    for k in range(1, TWINS):
-        twin = replace(scenario, omega0=scenario.omega0 * (1 + (-1) ** k * 10.0 ** (-12 + k)))
-        moved.append(ode_reference.solve(twin, model=model))
-    return max(apart(other.omega, usual.omega, scenario) for other in moved)
+    """Return the width of omega among flights that should be one: inputs changed by 1e-11 to 1e-6, and rest speeds."""
+    flights = [usual.omega]
+    for k in range(TWINS):
+        name = ("restitution", "drag", "omega0", "theta0")[k % 4]
+        change = 1 + (-1) ** (k // 4) * 10.0 ** (-11 + 5 * k / TWINS)
+        rest = usual.settings["rest_speed"] * (1.0, 0.1)[k % 2]
+        twin = replace(scenario, **{name: getattr(scenario, name) * change})
+        flights.append(ode_reference.solve(twin, model=model, rest_speed=rest).omega)
+    return float(np.max(np.ptp(flights, axis=0))) / scenario.omega0
 
 
 @pytest.fixture(scope="module")

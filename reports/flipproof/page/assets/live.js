@@ -69,7 +69,7 @@ window.flipproofLive = (() => {
       push = free ? (-drag * m * speed) / body : g * Math.cos(angle) + (drag * m * speed) / M;
       return spin;
     }
-    const presses = (end) => end * (spring * (end * wall - centre) + push) >= 0;
+    const pressure = (end) => end * (spring * (end * wall - centre) + push), presses = (end) => pressure(end) >= 0;
     // Writes places and speeds after a time h to y1 and v1; returns the angle.
     function step(h) {
       let angle = theta;
@@ -169,11 +169,16 @@ window.flipproofLive = (() => {
     for (let k = 1; k < points; k++) {
       let left = duration / (points - 1);
       for (let tries = 0; left > 0 && tries < 1000; tries++) {
-        const turn = weigh(y, v, theta) * left, angle = step(left);
+        const turn = weigh(y, v, theta) * left, ends = [1, -1].filter((end) => side.includes(end)), pressed = ends.map(pressure);
+        const angle = step(left);
         let when = 1, struck = -1;
+        if (ends.length) weigh(y1, v1, angle);
+        ends.forEach((end, k) => {
+          if (!presses(end)) when = Math.min(when, pressed[k] / (pressed[k] - pressure(end)) + 1e-6);
+        });
         for (let i = 0; i < n; i++) {
           const here = crossing(i, left);
-          if (here < when || (struck < 0 && here === 1)) [when, struck] = [here, i];
+          if (here < when || (here === when && struck < 0)) [when, struck] = [here, i];
         }
         turnTo(when, left);
         theta += when * (turn + when * (angle - theta - turn));
