@@ -45,7 +45,7 @@ window.flipproofLive = (() => {
   }
 
   // Omega of Eq. 8, or of free flight, at equal times. A slice slower than `rest` that its end presses on rests there.
-  function flow(thrown, free, points = 1000, rest = free ? 1e-3 : 1e-5) {
+  function flow(thrown, free, points = 1000, parts = free ? 2 : 1, rest = free ? 1e-3 : 1e-5) {
     const { n, m, M, mass, wall, y, v, inertia, momentum, gamma, g, e, theta0, duration } = prepared(thrown);
     const side = new Int8Array(n), ratio = m / mass, drag = 2 * gamma, omega = new Float64Array(points);
     const rows = () => Array.from({ length: 5 }, () => new Float64Array(n)), [ys, vs, as] = [rows(), rows(), rows()];
@@ -166,8 +166,8 @@ window.flipproofLive = (() => {
     for (let i = 0; i < n; i++) side[i] = Math.abs(y[i]) === wall ? Math.sign(y[i]) : 0;
     release();
     omega[0] = weigh(y, v, theta);
-    for (let k = 1; k < points; k++) {
-      let left = duration / (points - 1);
+    for (let k = 1; k <= (points - 1) * parts; k++) {
+      let left = duration / ((points - 1) * parts);
       for (let tries = 0; left > 0 && tries < 1000; tries++) {
         const turn = weigh(y, v, theta) * left, ends = [1, -1].filter((end) => side.includes(end)), pressed = ends.map(pressure);
         const angle = step(left);
@@ -189,7 +189,7 @@ window.flipproofLive = (() => {
         if (hits.length) rebound(hits);
         release();
       }
-      omega[k] = weigh(y, v, theta);
+      if (k % parts === 0) omega[k / parts] = weigh(y, v, theta);
     }
     return omega;
   }
