@@ -10,6 +10,7 @@ from typing import Any
 from flipproof.evaluation import evaluate
 from flipproof.evidence import FLIGHTS, OTHERS, Evidence
 from flipproof.exhibits import draw_all
+from flipproof.film.measured import Measured
 from flipproof.frame.exhibit import Exhibit, drawn
 from flipproof.frame.findings import Finding
 from flipproof.output.junit import junit_text
@@ -36,7 +37,9 @@ class Report:
         return tuple(finding for finding in self.findings if finding.failed)
 
 
-def build(evidence: Evidence, provenance: Mapping[str, str], jobs: int | None = None) -> Report:
+def build(
+    evidence: Evidence, provenance: Mapping[str, str], jobs: int | None = None, measured: Measured | None = None
+) -> Report:
     """Evaluate every claim, draw every figure and write the page, all in memory.
 
     Parameters
@@ -45,11 +48,18 @@ def build(evidence: Evidence, provenance: Mapping[str, str], jobs: int | None = 
     provenance : mapping
     jobs : int or None
         Worker processes that draw; None: one per core, 1: this process.
+    measured : Measured or None
+        A measured flight that the report holds beside its solvers.
     """
     paper = evidence.paper
-    findings = (*evaluate(evidence), *(paper.verdicts.findings() if paper else ()))
+    findings = (
+        *evaluate(evidence),
+        *(paper.verdicts.findings() if paper else ()),
+        *(measured.findings() if measured else ()),
+    )
     with evidence.stages.lap("figures"):
-        exhibits = drawn((*draw_all(evidence), *(exhibits_paper(paper.runs) if paper else ())), jobs)
+        figures = (*draw_all(evidence), *(exhibits_paper(paper.runs) if paper else ()))
+        exhibits = drawn((*figures, *((measured.exhibit(),) if measured else ())), jobs)
     solvers = solver_rows(evidence)
     summary = summarise(evidence, findings, exhibits, solvers, provenance)
     with evidence.stages.lap("page"):
@@ -62,6 +72,7 @@ def build(evidence: Evidence, provenance: Mapping[str, str], jobs: int | None = 
             summary=summary,
             motion=motion_data(evidence.throw, evidence.made),
             paper=paper.verdicts if paper else None,
+            measured=measured,
         )
     summary["stages"]["page"] = round(evidence.stages.seconds["page"], 3)
     return Report(

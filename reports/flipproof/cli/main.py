@@ -159,6 +159,10 @@ def parser() -> argparse.ArgumentParser:
         "--slices", type=count, metavar="N", help="slices at which solvers are compared (default 50, or the file's "
         "number if smaller)",
     )  # fmt: skip
+    report.add_argument(
+        "--measured", type=Path, metavar="TRACK.csv", help="a measured flight to hold beside the solvers: a track of "
+        "'flipproof track', or a CSV with t and theta or omega from release to landing",
+    )  # fmt: skip
     report.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
     report.add_argument(
         "--pdf", action="store_true", help="also print the page to report.pdf (needs Chromium, Chrome or Edge)"
@@ -204,6 +208,11 @@ def command_report(options: argparse.Namespace) -> int:
     from flipproof.page.pdf import print_page, require_browser
 
     check_replaceable(options.out, "report")
+    measurement = None
+    if options.measured is not None:
+        from flipproof.film.measured import hold, read_measured
+
+        measurement = read_measured(options.measured)
     if options.pdf:
         require_browser()
 
@@ -233,7 +242,11 @@ def command_report(options: argparse.Namespace) -> int:
                 bar.update(made - bar.n)
 
             evidence = gather(scenario, size, progress, options.jobs, Stages(say))
-        report = build(evidence, provenance(command), options.jobs)
+        measured = None
+        if measurement is not None:
+            say("fits of the measurement")
+            measured = hold(measurement, scenario)
+        report = build(evidence, provenance(command), options.jobs, measured)
         write(report, folder)
         if options.pdf:
             print_page(folder / "index.html", folder / "report.pdf")
@@ -249,6 +262,9 @@ def _print_report(report: Any, out: Path, seconds: float) -> None:
     regressions = [finding for finding in report.findings if finding.kind == "regression"]
     for finding in report.failed:
         print(f"FAIL  {finding.title}: {finding.value_text} (threshold {finding.threshold_text}) {finding.note}")
+    for finding in report.findings:
+        if finding.id.startswith("measured-fit-"):
+            print(f"{finding.title}: {finding.value_text} root mean square")
     print(f"{len(regressions) - len(report.failed)} of {len(regressions)} regression claims hold.")
     print(f"Report: {out / 'index.html'} ({seconds:.0f} s)")
 

@@ -123,10 +123,11 @@ def render(
     summary: Mapping[str, Any] | None = None,
     motion: Any = None,
     paper: Any = None,
+    measured: Any = None,
 ) -> str:
     """Return the whole page.
 
-    ``motion`` and ``paper`` are what their templates draw from; a part that is None is left out. ``summary`` is the
+    ``motion``, ``paper`` and ``measured`` are what their templates draw from; a part that is None is left out. ``summary`` is the
     content of summary.json, which the story is told from; None: made here.
     """
     summary = summary or summarise(evidence, findings, exhibits, solvers, provenance)
@@ -181,6 +182,7 @@ def render(
         twin_words=BAND_WORDS,
         settings=evidence.scenario.to_toml(),
         terms=TERMS,
+        measured=measured,
     )
     sections = folded(templates.get_template("evidence.html.j2").render(context), findings, exhibits)
     there = {

@@ -27,6 +27,7 @@ STORY: Final[Mapping[str, str]] = {
 """Screen of the story -> its name in the contents, in the order of the page."""
 
 EVIDENCE: Final[Mapping[str, tuple[str, str]]] = {
+    "measured": ("Your measurement", "The flight that was measured, over the solvers and fitted by them: which equation is nearest."),
     "assumptions": ("What each assumption costs", "Each change that leads from the published program to free flight, made in every order, and what it does to ω."),
     "flights": ("The flights", "Every solver's flight of this throw: ω, θ, the centre of mass and the slices over time, and the bottles in motion."),
     "differences": ("Where the solvers differ", "Which pairs of solvers differ by how much, when the difference is largest, and when it first exceeds 1 % of ω₀."),
@@ -48,6 +49,7 @@ EVIDENCE: Final[Mapping[str, tuple[str, str]]] = {
 """Section of the evidence -> its title and what it shows, in the order of the page."""
 
 BELONGS: Final[Mapping[str, str]] = {
+    "measured": "measured",
     "waterfall": "assumptions", "difference": "differences", "order": "steps", "finite-step": "steps",
     "limit": "steps", "model-form": "steps", "tube": "events", "predictability": "events", "energy": "energy",
     "ice": "ice", "engine": "engines", "certificate": "engines", "agreement": "engines", "horizon": "engines",
