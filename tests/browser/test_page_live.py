@@ -125,7 +125,9 @@ def test_gravity_moves_eq8_and_not_free_flight(visit):
     with visit(fragment="#live") as visited:
         before = {name: line(visited, name) for name in ("eq8", "free-flight", "published-python")}
         visited.page.get_by_test_id("live-weightless").click()
-        visited.page.wait_for_function("() => document.querySelector('[data-testid=live-said]').textContent.startsWith('With g = 0')")
+        visited.page.wait_for_function(
+            "() => document.querySelector('[data-testid=live-said]').textContent.startsWith('With g = 0')"
+        )
         after = {name: line(visited, name) for name in before}
         assert after["free-flight"] == before["free-flight"]
         assert max(abs(a - b) for a, b in zip(after["eq8"], before["eq8"], strict=True)) > 50

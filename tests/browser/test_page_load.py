@@ -41,7 +41,9 @@ def test_the_page_stays_small(folder):
 def test_sections_stand_in_the_order_of_the_contents(opened):
     ids = opened.page.evaluate("[...document.querySelectorAll('main > section')].map(section => section.id)")
     assert ids == [section for section in CONTENTS if section in ids]
-    assert {"verdict", "answer", "live", "sure", "flights", "steps", "ice", "errata", "findings", "glossary"} <= set(ids)
+    assert {"verdict", "answer", "live", "sure", "flights", "steps", "ice", "errata", "findings", "glossary"} <= set(
+        ids
+    )
     links = opened.page.evaluate("[...document.querySelectorAll('nav a')].map(link => link.hash.slice(1))")
     assert links == ids
 

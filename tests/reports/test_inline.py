@@ -29,7 +29,12 @@ def structure(text):
     places = {e.get("id"): f"name {k}" for k, e in enumerate(e for e in tree.iter() if e.get("id") in used)}
     assert used == set(places)
     for element in tree.iter():
-        if "rdf" in element.tag or "purl" in element.tag or "creativecommons" in element.tag or "metadata" in element.tag:
+        if (
+            "rdf" in element.tag
+            or "purl" in element.tag
+            or "creativecommons" in element.tag
+            or "metadata" in element.tag
+        ):
             continue
         words.append(element.tag)
         for name, value in element.attrib.items():

@@ -27,7 +27,9 @@ NAMED = re.compile(
 def screens(page):
     """Return the sections of the story as HTML."""
     wanted = [name for name in STORY if f'<section id="{name}"' in page]
-    return {name: re.search(rf'<section id="{name}" class="screen">(.*?)</section>', page, re.S).group(1) for name in wanted}
+    return {
+        name: re.search(rf'<section id="{name}" class="screen">(.*?)</section>', page, re.S).group(1) for name in wanted
+    }
 
 
 def looked_up(summary, place):
@@ -79,7 +81,9 @@ def as_printed(text):
 @pytest.fixture
 def marked(report):
     summary = json.loads(json.dumps(report.summary))
-    found = re.findall(r'<data value="([^"]*)" data-source="([^"]*)">([^<]*)</data>', "".join(screens(report.html).values()))
+    found = re.findall(
+        r'<data value="([^"]*)" data-source="([^"]*)">([^<]*)</data>', "".join(screens(report.html).values())
+    )
     return summary, [(float(value), html.unescape(source), html.unescape(text)) for value, source, text in found]
 
 
@@ -95,12 +99,14 @@ def test_every_number_of_the_story_is_computed_again_from_the_summary(marked):
 def test_no_other_number_stands_in_the_story(report):
     for name, screen in screens(report.html).items():
         if name == "verdict":
-            screen = screen.partition('<h1')[2]
+            screen = screen.partition("<h1")[2]
         for part in ("svg", "script", "math", "data", "style", "details", "fieldset", "output"):
             screen = re.sub(rf"<{part}\b.*?</{part}>", "", screen, flags=re.S)
         screen = re.sub(r'<span class="soft">The throw: .*?</span>', "", screen, flags=re.S)
         screen = re.sub(r'<table class="chapters">.*?</table>', "", screen, flags=re.S)
-        words = NAMED.sub("", html.unescape(re.sub(r"<[^>]*>", "", NAMED.sub("", screen))).replace("\N{NO-BREAK SPACE}", " "))
+        words = NAMED.sub(
+            "", html.unescape(re.sub(r"<[^>]*>", "", NAMED.sub("", screen))).replace("\N{NO-BREAK SPACE}", " ")
+        )
         words = NAMED.sub("", re.sub(r"\s+", " ", words))
         assert re.findall(r"[^ ]*\d[^ ]*", words) == [], name
 
@@ -120,7 +126,11 @@ def test_the_counts_by_chapter_are_those_of_the_findings(report):
 def test_what_the_snapshot_found_is_told_in_full():
     """The snapshot is a full report's summary without its solvers and the paper: those are made up."""
     experiment = [
-        {"id": id_, "closest": ["free-flight"], "equations": {solver: {"value": 0.3, "verdict": "fails"} for solver in SOLVERS}}
+        {
+            "id": id_,
+            "closest": ["free-flight"],
+            "equations": {solver: {"value": 0.3, "verdict": "fails"} for solver in SOLVERS},
+        }
         for id_ in EXPERIMENTS.values()
     ]
     solvers = [{"name": solver, "plateau": 0.3} for solver in SOLVERS]
@@ -177,7 +187,9 @@ def test_every_term_has_a_sentence_and_a_place_of_its_own(report):
 
 
 def test_the_first_appearance_of_a_term_is_a_link_and_nothing_inside_a_link_or_a_script():
-    made = linked('<p>recoil and <a href="#x">free flight</a> and recoil</p><script>if (a < recoil) b</script><p>ice</p>')
+    made = linked(
+        '<p>recoil and <a href="#x">free flight</a> and recoil</p><script>if (a < recoil) b</script><p>ice</p>'
+    )
     assert made.count('href="#term-recoil"') == 1
     assert "term-free-flight" not in made
     assert "a < recoil) b</script>" in made

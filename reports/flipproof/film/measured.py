@@ -176,4 +176,3 @@ def figure_measured(
     axes[1][0].set_ylabel(f"measured − computed [{unit}]")
     axes[0][0].legend()
     return figure
-

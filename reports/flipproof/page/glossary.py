@@ -54,7 +54,12 @@ TERMS: Final[Mapping[str, str]] = {
     "impact": "A slice strikes an end of the bottle.",
 }  # fmt: skip
 
-_PLACES: Final = {"ω₀": "omega-at-release", "M̃": "filling", "Eq. 8": "equation-8", "free-flight": "free-flight-in-tables"}
+_PLACES: Final = {
+    "ω₀": "omega-at-release",
+    "M̃": "filling",
+    "Eq. 8": "equation-8",
+    "free-flight": "free-flight-in-tables",
+}
 """Term -> its place, where the term itself makes none."""
 
 _WORD: Final = re.compile(
