@@ -25,19 +25,23 @@ PAGES = {
 """File -> its name in the site's contents, in their order."""
 
 GREEK = {
-    "omega": "ω", "theta": "θ", "gamma": "γ", "alpha": "α", "beta": "β", "kappa": "κ", "eps": "ε", "mu": "μ", "rho": "ρ",
-    "pi": "π", "sum": "Σ", "sqrt": "√", "phi": "φ", "lambda": "λ", "tau": "τ", "delta": "δ",
+    "omega": "ω", "theta": "θ", "gamma": "γ", "alpha": "α", "beta": "β", "kappa": "κ", "eps": "ε", "mu": "μ",
+    "rho": "ρ", "pi": "π", "sum": "Σ", "sqrt": "√", "phi": "φ", "lambda": "λ", "tau": "τ", "delta": "δ",
 }  # fmt: skip
 STYLE = """
 :root { color-scheme: light dark; --ink: #1b1f24; --paper: #fff; --line: #d0d7de; --link: #0550ae; --panel: #f6f8fa }
-@media (prefers-color-scheme: dark) { :root { --ink: #e6edf3; --paper: #0d1117; --line: #3d444d; --link: #79b8ff; --panel: #161b22 } }
+@media (prefers-color-scheme: dark) {
+ :root { --ink: #e6edf3; --paper: #0d1117; --line: #3d444d; --link: #79b8ff; --panel: #161b22 }
+}
 body { margin: 0; background: var(--paper); color: var(--ink); font: 16px/1.55 system-ui, sans-serif; }
 .all { max-width: 78rem; margin: 0 auto; display: grid; gap: 2rem; padding: 1rem; }
 @media (min-width: 60rem) { .all { grid-template-columns: 13rem minmax(0, 1fr); } }
 nav ul { list-style: none; padding: 0; } a { color: var(--link); } [aria-current] { font-weight: 700; }
-pre, .formula { background: var(--panel); border: 1px solid var(--line); border-radius: 6px; padding: .7rem; overflow-x: auto; }
-.formula { font-family: "Latin Modern Math", "STIX Two Math", Cambria, Georgia, serif; font-size: 1.08rem; white-space: pre; }
-table { border-collapse: collapse; display: block; overflow-x: auto; } th, td { border-bottom: 1px solid var(--line); padding: .3rem .8rem .3rem 0; text-align: left; vertical-align: top; }
+pre, .formula { background: var(--panel); border: 1px solid var(--line); border-radius: 6px; padding: .7rem; }
+pre, .formula, table { overflow-x: auto; }
+.formula { font: 1.08rem/1.5 "STIX Two Math", Cambria, Georgia, serif; white-space: pre; }
+table { border-collapse: collapse; display: block; }
+th, td { border-bottom: 1px solid var(--line); padding: .3rem .8rem .3rem 0; text-align: left; vertical-align: top; }
 img { max-width: 100%; }
 """
 
@@ -84,9 +88,10 @@ def page_of(path: Path, current: str, report: bool) -> str:
     links += '<li><a href="reference/index.html">Reference</a></li>'
     links += '<li><a href="report/index.html">Example report</a></li>' if report else ""
     return (
-        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-        f"<title>flipproof: {PAGES[current]}</title><style>{STYLE}</style></head><body><div class=all><nav aria-label=Contents>"
-        f"<ul>{links}</ul></nav><main>{made}</main></div></body></html>\n"
+        '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width">'
+        f"<title>flipproof: {PAGES[current]}</title><style>{STYLE}</style></head><body><div class=all>"
+        f"<nav aria-label=Contents><ul>{links}</ul></nav><main>{made}</main></div></body></html>\n"
     )
 
 

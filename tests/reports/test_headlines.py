@@ -13,7 +13,7 @@ from flipproof.claims import claim_finite_step
 from flipproof.evidence import BY_ENGINE, EQ8_FREE, PROGRAM_EQ8, TOTAL
 from flipproof.output.snapshot import BEGIN, END, PLACE, README, front_page, write_front_page
 from flipproof.page.headlines import MEASURES, Headline, headlines
-from flipproof.page.lead import answer, amount, lead_words, sentences, signed
+from flipproof.page.lead import amount, answer, lead_words, sentences, signed
 from flipproof.studies.differences import percent
 from flipproof.studies.finite_step import EVERYTHING, HELD, LOCATED, WAYS
 from flipproof.studies.slices import FINER

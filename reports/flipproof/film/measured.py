@@ -14,7 +14,8 @@ from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.film.fit.compare import Contender, compare, verdict
 from flipproof.film.fit.estimate import estimate
 from flipproof.film.fit.figures import MEASURED
-from flipproof.film.fit.problem import ALSO, SLICES, Measurement, pose, predict
+from flipproof.film.fit.problem import ALSO, SLICES, Measurement, Quantity, pose, predict
+from flipproof.film.fit.reading import QUANTITIES
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding
 from flipproof.output.columns import columns_csv
@@ -76,7 +77,8 @@ class Measured:
                 Finding(
                     id=f"measured-{name}", title=f"{HELD[name]} as thrown, held against {self.measurement.label}",
                     value=misfit, unit=unit, kind="observation", band=self.noise,
-                    note="root mean square of measured minus computed, nothing fitted; the band is the noise of a value",
+                    note="root mean square of measured minus computed, nothing fitted; the band is the noise of "
+                    "a value",
                 )
                 for name, misfit in self.misfits.items()
             ),
@@ -84,7 +86,10 @@ class Measured:
                 Finding(
                     id=f"measured-fit-{one.solver}", title=f"{HELD[one.solver]} fitted to {self.measurement.label}",
                     value=one.root_mean_square, unit=unit, kind="observation", band=self.noise,
-                    note=", ".join(f"{found.name} = {found.value:.4g} [{found.low:.4g}, {found.high:.4g}]" for found in one.intervals),
+                    note=", ".join(
+                        f"{found.name} = {found.value:.4g} [{found.low:.4g}, {found.high:.4g}]"
+                        for found in one.intervals
+                    ),
                 )
                 for one in self.fits
             ),
@@ -124,7 +129,7 @@ def read_measured(path: Path) -> Measurement:
         Naming file, line and column.
     """
     curve = read_curve(path)
-    quantity = next((name for name in ("theta", "omega") if name in curve.series), None)
+    quantity: Quantity | None = next((name for name in QUANTITIES if name in curve.series), None)
     if quantity is None:
         raise ValueError(f"{path}: has neither theta nor omega")
     t, values = curve.series[quantity]

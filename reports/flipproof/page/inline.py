@@ -29,7 +29,7 @@ ESCAPES = str.maketrans({"%": "%25", "#": "%23", "<": "%3C", "&": "%26"})
 
 
 def compact_svg(svg: str) -> str:
-    """Return the same picture in fewer characters: no comments or metadata, no idle blanks or long names, shorter coordinates."""
+    """Return the same picture in fewer characters: no comments, blanks or long names, shorter coordinates."""
     svg = COORDINATES.sub(lambda found: NUMBER.sub(_rounded, found.group()), UNSEEN.sub("", svg))
     svg = PATHS.sub(lambda found: 'd="' + COMMANDS.sub(r"\1", found.group()[3:]), svg)
     svg = STYLES.sub(lambda found: 'style="' + found.group()[7:].replace(": ", ":").replace("; ", ";"), svg)

@@ -17,7 +17,7 @@ from flipproof.frame.findings import Finding
 from flipproof.frame.twins import BAND_WORDS
 from flipproof.instruments import witnesses
 from flipproof.output.summary import summarise
-from flipproof.page.glossary import TERMS, linked
+from flipproof.page.glossary import TERMS
 from flipproof.page.glossary import anchor as term_anchor
 from flipproof.page.headlines import headlines
 from flipproof.page.inline import data_uri, shape
@@ -127,8 +127,8 @@ def render(
 ) -> str:
     """Return the whole page.
 
-    ``motion``, ``paper`` and ``measured`` are what their templates draw from; a part that is None is left out. ``summary`` is the
-    content of summary.json, which the story is told from; None: made here.
+    ``motion``, ``paper`` and ``measured`` are what their templates draw from; a part that is None is left out.
+    ``summary`` is the content of summary.json, which the story is told from; None: made here.
     """
     summary = summary or summarise(evidence, findings, exhibits, solvers, provenance)
     templates = environment()

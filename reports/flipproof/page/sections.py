@@ -27,24 +27,37 @@ STORY: Final[Mapping[str, str]] = {
 """Screen of the story -> its name in the contents, in the order of the page."""
 
 EVIDENCE: Final[Mapping[str, tuple[str, str]]] = {
-    "measured": ("Your measurement", "The flight that was measured, over the solvers and fitted by them: which equation is nearest."),
-    "assumptions": ("What each assumption costs", "Each change that leads from the published program to free flight, made in every order, and what it does to ω."),
-    "flights": ("The flights", "Every solver's flight of this throw: ω, θ, the centre of mass and the slices over time, and the bottles in motion."),
-    "differences": ("Where the solvers differ", "Which pairs of solvers differ by how much, when the difference is largest, and when it first exceeds 1 % of ω₀."),
-    "steps": ("Step size", "How the error falls as the step becomes shorter, and what holding ω constant over a step costs by itself."),
+    "measured": ("Your measurement", "The flight that was measured, over the solvers and fitted by them: which "
+    "equation is nearest."),
+    "assumptions": ("What each assumption costs", "Each change that leads from the published program to free "
+    "flight, made in every order, and what it does to ω."),
+    "flights": ("The flights", "Every solver's flight of this throw: ω, θ, the centre of mass and the slices "
+    "over time, and the bottles in motion."),
+    "differences": ("Where the solvers differ", "Which pairs of solvers differ by how much, when the difference "
+    "is largest, and when it first exceeds 1 % of ω₀."),
+    "steps": ("Step size", "How the error falls as the step becomes shorter, and what holding ω constant over a "
+    "step costs by itself."),
     "slices": ("How many slices", "How far the numbers move when the water is cut into more slices."),
-    "events": ("Impacts", "When slices hit the ends in each solver, which impacts correspond, and how a small change of the release grows."),
-    "energy": ("Energy", "Where the energy of the flight goes, and whether the energy ledger of every equation closes."),
+    "events": ("Impacts", "When slices hit the ends in each solver, which impacts correspond, and how a small "
+    "change of the release grows."),
+    "energy": ("Energy", "Where the energy of the flight goes, and whether the energy ledger of every equation "
+    "closes."),
     "ice": ("Ice", "Frozen water cannot slide, so ω must stay constant: how closely every solver keeps it."),
-    "engines": ("The engines", "What each physics engine computes by itself, how far its result can be trusted, and where it fails."),
+    "engines": ("The engines", "What each physics engine computes by itself, how far its result can be trusted, "
+    "and where it fails."),
     "work-precision": ("What a digit costs", "How much computing one more correct digit of ω costs, solver by solver."),
-    "maps": ("Maps of validity", "Over filling and damping, step size or restitution: how wrong an approximation is, and which assumption is to blame."),
-    "paper": ("The paper's figures and claims", "Every statement of the paper about its model and about the bottles really thrown, judged by three equations."),
-    "errata": ("Errata", "What the paper prints, what follows from its own earlier equations, and the number that separates the two."),
+    "maps": ("Maps of validity", "Over filling and damping, step size or restitution: how wrong an "
+    "approximation is, and which assumption is to blame."),
+    "paper": ("The paper's figures and claims", "Every statement of the paper about its model and about the "
+    "bottles really thrown, judged by three equations."),
+    "errata": ("Errata", "What the paper prints, what follows from its own earlier equations, and the number "
+    "that separates the two."),
     "findings": ("All findings", "Every claim and every observation of this report, to search and to link to."),
-    "solvers": ("Every solver", "What each solver solves, how it ended on this throw, and how it was checked against a second method."),
+    "solvers": ("Every solver", "What each solver solves, how it ended on this throw, and how it was checked "
+    "against a second method."),
     "glossary": ("Glossary", "Every name and symbol of this page in one plain sentence."),
-    "provenance": ("Settings and provenance", "What was thrown, with which versions, on which machine; files for machines."),
+    "provenance": ("Settings and provenance", "What was thrown, with which versions, on which machine; files "
+    "for machines."),
 }  # fmt: skip
 """Section of the evidence -> its title and what it shows, in the order of the page."""
 
@@ -63,7 +76,7 @@ _SECTION: Final = re.compile(r'<section id="([\w-]+)">\s*<h2>.*?</h2>(.*?)</sect
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """One folded section: its place, its title, one sentence, its content, its findings by verdict, its first figure."""
+    """One folded section: its place, its title, one sentence, its content, its findings, its first figure."""
 
     id: str
     title: str

@@ -22,7 +22,8 @@ NAMES: Final[Mapping[str, str]] = {
 """Solver -> its name on the story's charts."""
 
 CHANGES: Final[Mapping[str, str]] = {
-    "signs of Eq. 9d: no damping": "Eq. 9d has the wrong sign in one term, and the program has it too: its drag does not damp.",
+    "signs of Eq. 9d: no damping": "Eq. 9d has the wrong sign in one term, and the program has it too: its drag "
+    "does not damp.",
     "roots of Eq. 9a: γ ≪ ω": "Eq. 9a is solved as if drag were small; at the end of the flight it is not.",
     "drag against C_M": "Eq. 8 measures drag against the centre of mass; water rubs on the wall of the bottle.",
     "gravity in Eq. 8": "Eq. 8 lets weight push water along the bottle; a falling bottle feels none.",
