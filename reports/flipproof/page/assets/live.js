@@ -3,6 +3,7 @@
 //   cap  y = -wall |------ o -- o - C_M ---- o -- o -| y = +wall  base     y = r - L/2; a slice at rest has side = +1, -1
 window.flipproofLive = (() => {
   "use strict";
+  const PART = [1 / 2, 1 / 2, 1, 0], WEIGHT = [1 / 6, 1 / 3, 1 / 3, 1 / 6]; // of Runge and Kutta
 
   // What stays the same in a flight, and its beginning. A throw: {bottle, slices, fill, gamma = alpha / (2 m), ...}, SI.
   function prepared(thrown) {
@@ -49,8 +50,8 @@ window.flipproofLive = (() => {
     const { n, m, M, mass, wall, y, v, inertia, momentum, gamma, g, e, theta0, duration } = prepared(thrown);
     const side = new Int8Array(n), ratio = m / mass, drag = 2 * gamma, omega = new Float64Array(points);
     const rows = () => Array.from({ length: 5 }, () => new Float64Array(n)), [ys, vs, as] = [rows(), rows(), rows()];
-    const [y1, v1] = [ys[4], vs[4]];
-    let theta = theta0, spin = 0, spring = 0, centre = 0, push = 0;
+    const [y1, v1] = [ys[4], vs[4]], [va, vb, vc, vd] = vs, [aa, ab, ac, ad] = as;
+    let theta = theta0, spin = 0, began = 0, spring = 0, centre = 0, push = 0;
 
     // Sets omega, and the acceleration (y - centre) spring + push - drag v of all free slices.
     function weigh(at, speeds, angle) {
@@ -76,18 +77,19 @@ window.flipproofLive = (() => {
       ys[0].set(y);
       vs[0].set(v);
       for (let k = 0; k < 4; k++) {
-        const turn = weigh(ys[k], vs[k], theta + [0, h / 2, h / 2, h][k] * spin), part = [h / 2, h / 2, h, 0][k];
-        const [at, speeds, a, nextY, nextV] = [ys[k], vs[k], as[k], ys[k + 1], vs[k + 1]];
+        const at = ys[k], speeds = vs[k], a = as[k], nextY = ys[k + 1], nextV = vs[k + 1], part = PART[k] * h;
+        weigh(at, speeds, k ? theta + PART[k - 1] * h * spin : theta);
         for (let i = 0; i < n; i++) {
           a[i] = side[i] ? 0 : spring * (at[i] - centre) + push - drag * speeds[i];
           nextY[i] = y[i] + part * speeds[i];
           nextV[i] = v[i] + part * a[i];
         }
-        angle += (turn * h) / [6, 3, 3, 6][k];
+        if (k === 0) began = spin;
+        angle += WEIGHT[k] * h * spin;
       }
       for (let i = 0; i < n; i++) {
-        y1[i] = y[i] + (h / 6) * (vs[0][i] + 2 * vs[1][i] + 2 * vs[2][i] + vs[3][i]);
-        v1[i] = v[i] + (h / 6) * (as[0][i] + 2 * as[1][i] + 2 * as[2][i] + as[3][i]);
+        y1[i] = y[i] + (h / 6) * (va[i] + 2 * (vb[i] + vc[i]) + vd[i]);
+        v1[i] = v[i] + (h / 6) * (aa[i] + 2 * (ab[i] + ac[i]) + ad[i]);
       }
       return angle;
     }
@@ -158,6 +160,7 @@ window.flipproofLive = (() => {
     // Slices at rest leave when their end would have to pull them.
     function release() {
       for (const end of [1, -1]) {
+        if (!side.includes(end)) continue;
         weigh(y, v, theta);
         if (!presses(end)) for (let i = 0; i < n; i++) if (side[i] === end) side[i] = 0;
       }
@@ -169,8 +172,9 @@ window.flipproofLive = (() => {
     for (let k = 1; k <= (points - 1) * parts; k++) {
       let left = duration / ((points - 1) * parts);
       for (let tries = 0; left > 0 && tries < 1000; tries++) {
-        const turn = weigh(y, v, theta) * left, ends = [1, -1].filter((end) => side.includes(end)), pressed = ends.map(pressure);
-        const angle = step(left);
+        const ends = [1, -1].filter((end) => side.includes(end));
+        if (ends.length) weigh(y, v, theta);
+        const pressed = ends.map(pressure), angle = step(left), turn = began * left;
         let when = 1, struck = -1;
         if (ends.length) weigh(y1, v1, angle);
         ends.forEach((end, k) => {
@@ -184,9 +188,12 @@ window.flipproofLive = (() => {
         theta += when * (turn + when * (angle - theta - turn));
         left -= when * left;
         const touches = (i) => i === struck || (!side[i] && Math.abs(y[i]) >= wall * (1 - 1e-9) && v[i] * y[i] > 0);
-        const hits = struck < 0 ? [] : [...y.keys()].filter(touches);
-        for (const i of hits) y[i] = Math.sign(y[i]) * wall;
-        if (hits.length) rebound(hits);
+        if (struck >= 0) {
+          const hits = [];
+          for (let i = 0; i < n; i++) if (touches(i)) hits.push(i);
+          for (const i of hits) y[i] = Math.sign(y[i]) * wall;
+          rebound(hits);
+        }
         release();
       }
       if (k % parts === 0) omega[k / parts] = weigh(y, v, theta);

@@ -180,7 +180,12 @@
         if (found.length < 16 || !which) continue;
         const [ci, cj] = [0, 1].map((axis) => found.reduce((sum, place) => sum + place[axis], 0) / found.length);
         const [i, j] = found.reduce((best, place) => (Math.hypot(place[0] - ci, place[1] - cj) < Math.hypot(best[0] - ci, best[1] - cj) ? place : best));
-        chart.words(which, { class: "map-name", x: x(i) + w / 2, y: y(j) + h / 2 + 4, "text-anchor": "middle" }, svg);
+        // A name that its own region has no room for is told by the line below the map alone.
+        const room = w * Math.min(...[-1, 0, 1].map((row) => found.filter((place) => place[1] === j + row).length));
+        if (room < 7 * which.length) continue;
+        const left = x(Math.min(...found.filter((place) => place[1] === j).map((place) => place[0])));
+        const middle = Math.max(x(i) + w / 2, left + 3.6 * which.length);
+        chart.words(which, { class: "map-name", x: middle, y: y(j) + h / 2 + 4, "text-anchor": "middle" }, svg);
       }
     }
     svg.addEventListener("keydown", (event) => {

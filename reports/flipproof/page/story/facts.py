@@ -91,6 +91,7 @@ class Layer:
     section: str
     finer: Number | None
     finer_slices: Number | None
+    band: Number | None
 
     @property
     def within(self) -> bool:
@@ -173,6 +174,7 @@ def _layers(summary: Summary, n: Mapping[str, Number | None]) -> list[Layer]:
             section=section,
             finer=summary.number(f"headlines/{id_}/finer", percent),
             finer_slices=summary.number(f"headlines/{id_}/finer_slices", plain),
+            band=summary.number(f"headlines/{id_}/band", small),
         )
         for key, name, question, kind, section, id_ in asked
         if (number := n[key]) is not None
