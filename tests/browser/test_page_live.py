@@ -16,8 +16,8 @@ from slicemodel import Scenario
 SETTINGS = 40
 STEPS = 1000
 
-ADMISSIBLE = 2e-3
-"""Share of omega_0 by which Eq. 8 and free flight may differ from Python's, where their own bands are smaller."""
+ADMISSIBLE = {"eq8": 2e-3, "free-flight": 3e-3}
+"""Share of omega_0 by which an equation may differ from Python's; of free flight the band that the report states."""
 
 TWINS = 40
 """Flights of Python by which the band of a chaotic throw is known."""
@@ -35,8 +35,8 @@ def drawn_at_random():
             "theta0": round(chance.uniform(-math.pi, math.pi), 3),
             "fill": round(chance.uniform(0.1, 1.0), 2),
             "gamma": round(chance.uniform(0.0, 20.0), 1),
-            "e": round(chance.uniform(0.0, 0.9), 2),
-            "omega0": round(chance.uniform(5.0, 30.0), 1),
+            "e": round(chance.uniform(0.0, 0.8), 2),
+            "omega0": round(chance.uniform(5.0, 25.0), 1),
         }
         for k in range(SETTINGS)
     ]
@@ -94,7 +94,7 @@ def test_the_equations_in_the_browser_are_those_of_the_reference(solved, name, m
         scenario = scenario_of(thrown)
         expected = ode_reference.solve(scenario, model=model)
         difference = apart(curves[name], expected.omega, scenario)
-        assert difference < ADMISSIBLE or difference <= band(scenario, model, expected), (thrown, difference)
+        assert difference < ADMISSIBLE[model] or difference <= band(scenario, model, expected), (thrown, difference)
 
 
 def test_a_wrong_sign_in_the_script_is_seen(browser):
@@ -107,7 +107,7 @@ def test_a_wrong_sign_in_the_script_is_seen(browser):
     scenario = scenario_of(thrown)
     curve = page.evaluate("thrown => Array.from(flipproofLive.eq8(thrown))", thrown)
     page.close()
-    assert apart(curve, ode_reference.solve(scenario, model="eq8").omega, scenario) > 10 * ADMISSIBLE
+    assert apart(curve, ode_reference.solve(scenario, model="eq8").omega, scenario) > 10 * ADMISSIBLE["eq8"]
 
 
 def line(visited, name):

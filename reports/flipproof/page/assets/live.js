@@ -51,18 +51,10 @@ window.flipproofLive = (() => {
     const side = new Int8Array(n), ratio = m / mass, drag = 2 * gamma, omega = new Float64Array(points);
     const rows = () => Array.from({ length: 5 }, () => new Float64Array(n)), [ys, vs, as] = [rows(), rows(), rows()];
     const [y1, v1] = [ys[4], vs[4]], [va, vb, vc, vd] = vs, [aa, ab, ac, ad] = as;
-    let theta = theta0, spin = 0, began = 0, spring = 0, centre = 0, push = 0;
+    let theta = theta0, spin = 0, began = 0, spring = 0, centre = 0, push = 0, resting = 0, sides = 0;
 
-    // Sets omega, and the acceleration (y - centre) spring + push - drag v of all free slices.
-    function weigh(at, speeds, angle) {
-      let first = 0, second = 0, speed = 0, resting = 0, sides = 0;
-      for (let i = 0; i < n; i++) {
-        first += at[i];
-        second += at[i] * at[i];
-        speed += speeds[i];
-        resting += Math.abs(side[i]);
-        sides += side[i];
-      }
+    // Sets omega, and the acceleration (y - centre) spring + push - drag v of all free slices, from sums over all slices.
+    function balance(first, second, speed, angle) {
       const body = mass + m * resting;
       spin = momentum / inertia(first, second, (m * first) / M);
       spring = spin * spin;
@@ -70,22 +62,36 @@ window.flipproofLive = (() => {
       push = free ? (-drag * m * speed) / body : g * Math.cos(angle) + (drag * m * speed) / M;
       return spin;
     }
+    function weigh(at, speeds, angle) {
+      let first = 0, second = 0, speed = 0;
+      resting = sides = 0;
+      for (let i = 0; i < n; i++) {
+        first += at[i];
+        second += at[i] * at[i];
+        speed += speeds[i];
+        resting += Math.abs(side[i]);
+        sides += side[i];
+      }
+      return balance(first, second, speed, angle);
+    }
     const pressure = (end) => end * (spring * (end * wall - centre) + push), presses = (end) => pressure(end) >= 0;
     // Writes places and speeds after a time h to y1 and v1; returns the angle.
     function step(h) {
-      let angle = theta;
       ys[0].set(y);
       vs[0].set(v);
+      began = weigh(y, v, theta);
+      let angle = theta + WEIGHT[0] * h * spin;
       for (let k = 0; k < 4; k++) {
         const at = ys[k], speeds = vs[k], a = as[k], nextY = ys[k + 1], nextV = vs[k + 1], part = PART[k] * h;
-        weigh(at, speeds, k ? theta + PART[k - 1] * h * spin : theta);
+        let first = 0, second = 0, speed = 0;
         for (let i = 0; i < n; i++) {
           a[i] = side[i] ? 0 : spring * (at[i] - centre) + push - drag * speeds[i];
-          nextY[i] = y[i] + part * speeds[i];
-          nextV[i] = v[i] + part * a[i];
+          const there = (nextY[i] = y[i] + part * speeds[i]);
+          first += there;
+          second += there * there;
+          speed += nextV[i] = v[i] + part * a[i];
         }
-        if (k === 0) began = spin;
-        angle += WEIGHT[k] * h * spin;
+        if (k < 3) angle += WEIGHT[k + 1] * h * balance(first, second, speed, theta + part * spin);
       }
       for (let i = 0; i < n; i++) {
         y1[i] = y[i] + (h / 6) * (va[i] + 2 * (vb[i] + vc[i]) + vd[i]);
@@ -138,7 +144,7 @@ window.flipproofLive = (() => {
     // All that touch at one instant rebound together; who is slow and pressed on comes to rest, at the tube's expense.
     function rebound(hits) {
       const V = free ? gained(hits) : 0, before = hits.map((i) => Math.abs(v[i]));
-      let loose = 0, resting = 0;
+      let loose = 0, still = 0;
       for (let i = 0; i < n; i++) {
         if (!side[i]) v[i] -= V;
         else if (side[i] * V > 0) [side[i], v[i]] = [0, -V];
@@ -153,9 +159,9 @@ window.flipproofLive = (() => {
           loose += v[i];
           [side[i], v[i]] = [Math.sign(y[i]), 0];
         }
-        resting += Math.abs(side[i]);
+        still += Math.abs(side[i]);
       }
-      for (let i = 0; free && i < n; i++) if (!side[i]) v[i] -= (ratio * loose) / (1 + ratio * resting);
+      for (let i = 0; free && i < n; i++) if (!side[i]) v[i] -= (ratio * loose) / (1 + ratio * still);
     }
     // Slices at rest leave when their end would have to pull them.
     function release() {

@@ -17,15 +17,22 @@
     eq8: solve.eq8({ ...fixed, ...set }),
     "free-flight": solve.free({ ...fixed, ...set }),
   });
+  // The throw with the gravity of the report is solved anew when something else than gravity is changed.
+  let usual = { key: "", curves: null };
+  const unchanged = (set) => {
+    const key = JSON.stringify(set);
+    if (usual.key !== key) usual = { key, curves: flown(set) };
+    return usual.curves;
+  };
   const times = (count) => Array.from({ length: count }, (_, k) => (k * fixed.duration) / (count - 1));
   const farthest = (one, other) => one.reduce((most, value, k) => Math.max(most, Math.abs(value - other[k])), 0) / thrown.omega0;
   const percent = (share) => `${Number((100 * share).toPrecision(2))} %`;
 
   function draw() {
     const began = performance.now();
-    const now = flown(thrown), changed = thrown.g !== start.g;
+    const changed = thrown.g !== start.g, before = unchanged({ ...thrown, g: start.g });
     // Free flight is solved again too: that it does not change is what is to be seen.
-    const before = changed ? flown({ ...thrown, g: start.g }) : now;
+    const now = changed ? flown(thrown) : before;
     const line = (name, omega, more) => ({ name, x: times(omega.length), y: Array.from(omega, (value) => value / thrown.omega0), ...more });
     const lines = Object.keys(now).map((name) => line(name, now[name], { label: names[name] }));
     if (changed) lines.unshift(...Object.keys(now).map((name) => line(name, before[name], { faint: true })));

@@ -38,8 +38,8 @@ def sliders(throw: Scenario) -> list[Slider]:
         ("theta0", "angle of release θ₀", "°", -180.0, 180.0, 1.0, 0, math.degrees(throw.theta0)),
         ("fill", "filling", "%", 10.0, 100.0, 1.0, 0, 100.0 * throw.fill_fraction),
         ("gamma", "drag γ", "/s", 0.0, 20.0, 0.1, 1, throw.damping_rate),
-        ("e", "restitution e", "", 0.0, 0.9, 0.01, 2, throw.restitution),
-        ("omega0", "spin ω₀", "rad/s", 5.0, 30.0, 0.1, 1, throw.omega0),
+        ("e", "restitution e", "", 0.0, 0.8, 0.01, 2, throw.restitution),
+        ("omega0", "spin ω₀", "rad/s", 5.0, 25.0, 0.1, 1, throw.omega0),
     )
     return [
         Slider(
