@@ -135,7 +135,8 @@ window.flipproofState = (() => {
   const rows = [...document.querySelectorAll(".findings tbody tr")];
   const chapters = rows.map((row) => row.closest(".group").dataset.chapter);
   const words = rows.map((row) => `${row.id} ${row.textContent}`.toLowerCase());
-  const names = rows.map((row) => ` ${row.id} ${row.querySelector("th").firstChild.textContent} `.toLowerCase());
+  const title = (row) => [...row.querySelector("th").childNodes].filter((node) => !node.classList?.contains("soft"));
+  const names = rows.map((row) => `${row.id} ${title(row).map((node) => node.textContent).join("")}`.toLowerCase());
   const filter = () => {
     const wanted = field.value.toLowerCase().split(/\s+/).filter(Boolean);
     const [chapter, verdict, solver] = choices.map((choice) => choice.value);
