@@ -57,8 +57,8 @@ REDRAW = """() => {
   let seed = 1;
   const chance = (low, high) => { seed = (seed * 16807) % 2147483647; return low + (high - low) * seed / 2147483647; };
   return Array.from({ length: 40 }, () => {
-    const set = { g: chance(0, 20), theta0: chance(-3, 3), fill: chance(0.1, 1), gamma: chance(0, 20), e: chance(0, 0.8),
-                  omega0: chance(5, 25) };
+    const set = { g: chance(0, 20), theta0: chance(-3, 3), fill: chance(0.1, 1), gamma: chance(0, 20),
+                  e: chance(0, 0.8), omega0: chance(5, 25) };
     return Math.min(...[1, 2, 3].map(() => window.flipproofSliders.set(set).milliseconds));
   });
 }"""
