@@ -29,7 +29,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import slicemodel
-from flipproof import vectors
+from flipproof.chapters.vectors import published as vectors
 from slicemodel import Scenario
 
 ROOT = Path(__file__).resolve().parent.parent

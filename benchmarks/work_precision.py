@@ -17,11 +17,13 @@ import sys
 import time
 from pathlib import Path
 
-from flipproof.claims_work_precision import claim_work_precision
-from flipproof.exhibits_work_precision import draw_work_precision, summarise_work_precision, tabulate_work_precision
-from flipproof.frame.pool import workers
-from flipproof.studies.contenders import COMPLETE, FULL, QUICK
-from flipproof.studies.work_precision import gather_work_precision
+from flipproof.build import ask_of, gather_report
+from flipproof.chapters import chapters_named
+from flipproof.chapters.work_precision.claims import claim_work_precision
+from flipproof.chapters.work_precision.contenders import COMPLETE, FULL, QUICK
+from flipproof.chapters.work_precision.exhibits import draw_work_precision
+from flipproof.chapters.work_precision.tables import summarise_work_precision, tabulate_work_precision
+from slicemodel import Scenario
 
 RESULTS = Path(__file__).resolve().parent / "results"
 SIZES = {effort.name: effort for effort in (COMPLETE, FULL, QUICK)}
@@ -35,8 +37,14 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder for the results")
     arguments = parser.parse_args()
     began = time.perf_counter()
-    with workers(arguments.jobs) as pool:
-        studies = gather_work_precision(pool, SIZES[arguments.size])
+    chapter = "work-precision"
+    gathered = gather_report(
+        ask_of(Scenario(), "full"),
+        jobs=arguments.jobs,
+        contents=chapters_named(chapter),
+        work={chapter: SIZES[arguments.size]},
+    )
+    studies = gathered.outcomes[chapter].value
     seconds = time.perf_counter() - began
     findings = list(claim_work_precision(studies))
     for finding in findings:

@@ -136,7 +136,7 @@ class _Flight:
         self._steps, self._sizes = 0, list[float]()
         self._worst = dict.fromkeys((*watch.BANDS, *(rods.BANDS if exclude else ())), 0.0)
         self._good: list[State] = []
-        self._cause = ""
+        self._cause, self._reason = "", ""
 
     def record(self) -> None:
         """Keep the present state as an output point."""
@@ -198,6 +198,7 @@ class _Flight:
 
     def _judge(self) -> str:
         if not self._state.finite:
+            self._reason = "not_finite"
             return "the engine's numbers are no longer finite; raise iterations"
         with np.errstate(over="ignore", invalid="ignore"):
             residuals = watch.measure(self._state, self._scenario, self._angular_momentum)
@@ -205,6 +206,9 @@ class _Flight:
                 residuals |= rods.measure(self._state, self._scenario)
             for name, value in residuals.items():
                 self._worst[name] = max(self._worst[name], value)
+            bands = (*([impacts.BANDS] if self._located is not None else []), *([rods.BANDS] if self._exclude else []))
+            left = (watch.first_left(residuals, each)[0] for each in (watch.BANDS, *bands))
+            self._reason = next(filter(None, left), "")
             cause = watch.broken(residuals, self._cap_thickness)
             if self._located is not None:
                 cause = cause or watch.first_left(residuals, impacts.BANDS)[1]
@@ -243,6 +247,7 @@ class _Flight:
             impacts=None,
             status="diverged" if self._cause else "ok",
             message=message,
+            reason=self._reason,
             settings={
                 **settings,
                 "step": max(self._sizes, default=None),

@@ -104,8 +104,8 @@ def solve(
     changes by less than 1e-7 omega_0 when the rest speed is cut tenfold, unless a slice grazes an end (``grazes``). The
     exception is "accelerating-origin" with 1e-4 omega_0, since there only a slice at rest pushes the tube. With recoil
     the band is 3e-3 omega_0 on the paper's throw, and 4e-3 has been seen on another bottle with 50 slices: which slice
-    rests when decides the order of all later impacts. Where gamma = |omega0| exactly and ``roots`` are off, the water
-    at rest is balanced; with ``origin`` on such a run may end as "stalled" at t = 0.
+    rests when decides the order of all later impacts. Where gamma = |omega0| exactly and ``roots`` are off, nothing
+    pushes the water and it stays where it is.
     The other methods add the error of their steps: at their default tolerances they agree with "taylor" to the same
     band over half a second. An error grows as slices fly apart, and rests end it: with e = 1 and without drag none
     comes to rest, and Eq. 8 at N = 20 is off by 1e-9 omega_0 after half a second and by 1e-4 omega_0 after three;

@@ -82,9 +82,9 @@ def plateau(t: ArrayLike, omega: ArrayLike, omega0: float) -> float:
     """
     times, values = np.asarray(t, dtype=np.float64), np.asarray(omega, dtype=np.float64)
     middle = (times[0] + times[-1]) / 2
-    late = times > middle
-    grid = np.concatenate(([middle], times[late]))
-    curve = np.concatenate(([np.interp(middle, times, values)], values[late]))
+    late = int(np.searchsorted(times, middle, side="right"))
+    grid = np.concatenate(([middle], times[late:]))
+    curve = np.concatenate(([np.interp(middle, times, values)], values[late:]))
     return float(np.trapezoid(curve, grid) / (grid[-1] - grid[0]) / omega0)
 
 

@@ -113,6 +113,8 @@ class Trajectory:
         "ok" or a reason code of ``STATUSES``.
     message : str
         What happened, where and when, in words.
+    reason : str
+        Code of what ended the run, such as the residual that left its band; "" where the status says it all.
     settings : mapping
         The exact settings that made this run; enough to repeat it.
     diagnostics : mapping
@@ -137,6 +139,7 @@ class Trajectory:
     impacts: Impacts | None = None
     status: str = "ok"
     message: str = ""
+    reason: str = ""
     settings: Mapping[str, Any] = field(default_factory=dict)
     diagnostics: Mapping[str, Any] = field(default_factory=dict)
 

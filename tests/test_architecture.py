@@ -140,3 +140,16 @@ def test_a_relative_tolerance_says_what_holds_near_zero():
             if isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) == "approx":
                 given = {keyword.arg for keyword in node.keywords}
                 assert "rel" not in given or "abs" in given, f"{file}:{node.lineno}: approx with rel and without abs"
+
+
+def test_the_frame_knows_no_subject_and_chapters_are_named_once():
+    """What drives chapters imports none; each chapter of the contents is a folder of its own, and each folder one."""
+    for file in sorted((folder_of("flipproof") / "frame").glob("*.py")):
+        for module, _ in imports_of(file):
+            assert not module.startswith("flipproof.chapters"), f"{file} imports {module}"
+    from flipproof.chapters import CONTENTS
+
+    named = [name for *_, names in CONTENTS for name in names]
+    folders = {file.parent.name for file in (folder_of("flipproof") / "chapters").glob("*/chapter.py")}
+    assert sorted(named) == sorted(folders)
+    assert len(list(folder_of("flipproof").glob("*.py"))) <= 6

@@ -65,16 +65,18 @@ def first_zero(table: FloatArray, order: int, x: float) -> tuple[float, bool]:
 
 
 @inner
-def without_leading_zeros(now: Any, table: FloatArray, order: int, unit: float) -> int:
+def without_leading_zeros(now: Any, table: FloatArray, order: int, unit: float, integrals: int) -> int:
     """Divide the polynomial by the power of x that it has as a factor, but for rounding; return the order of the rest.
 
-    ``unit`` is the magnitude of what adds up to the first coefficient, and falls by rate * h from one to the next. The
-    order is -1 if nothing is left.
+    An acceleration has terms of at most ``unit`` (rate h x)^k / k! by the fastest rate of the equations, and rounding
+    in it has the same course; it is integrated so many times (0 or 2). So the acceleration of a slice and the gap that
+    follows from it are held for zero together. The order is -1 if nothing is left.
     """
-    lead = 0
+    lead, rate = 0, max(now.rate, now.damping)
+    unit *= 0.5 if integrals == 2 else 1.0
     while lead <= order and abs(table[POLYNOMIAL, lead]) <= ROUNDING * unit:
         lead += 1
-        unit *= now.rate * now.h
+        unit *= rate * now.h / (lead + integrals)
     for k in range(order - lead + 1):
         table[POLYNOMIAL, k] = table[POLYNOMIAL, k + lead]
     return order - lead
@@ -156,7 +158,7 @@ def contact(now: Any, table: FloatArray, points: FloatArray, marks: IntArray, j:
     if marks[STILL, j] == end:
         for k in range(2, p + 1):
             table[POLYNOMIAL, k - 2] = table[POLYNOMIAL, k]
-        p = without_leading_zeros(now, table, p - 2, now.thrust * now.h * now.h)
+        p = without_leading_zeros(now, table, p - 2, now.thrust * now.h * now.h, 2)
         if p < 0:
             return NONE, False
         if table[POLYNOMIAL, 0] < 0.0:
@@ -175,7 +177,7 @@ def release(now: Any, table: FloatArray, end: float) -> tuple[float, bool]:
         drag = now.push_dz * (k + 1) * table[Z, k + 1] / now.h
         thrown = table[SQUARE, k] * arm - now.push_z * table[PULL, k]
         table[POLYNOMIAL, k] = end * (thrown + drag + now.weight * table[FORCE, k])
-    p = without_leading_zeros(now, table, p, now.thrust)
+    p = without_leading_zeros(now, table, p, now.thrust, 0)
     if p < 0:
         return NONE, False
     if table[POLYNOMIAL, 0] < 0.0:

@@ -1,29 +1,38 @@
-"""From evidence to a report folder: findings, figures, page, summary, verdicts for CI systems, and tables."""
+"""From a scenario to a report folder: findings, figures, page, summary, verdicts for CI systems, and tables."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from concurrent.futures import Executor
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
-from flipproof.evaluation import evaluate
-from flipproof.evidence import FLIGHTS, OTHERS, Evidence
-from flipproof.exhibits import draw_all
-from flipproof.film.measured import Measured
+from flipproof.chapters import parts
+from flipproof.chapters.solvers import CERTIFIED, solver_runs
+from flipproof.frame.chapter import Ask, Part, Size
 from flipproof.frame.exhibit import Exhibit, drawn
 from flipproof.frame.findings import Finding
+from flipproof.frame.gather import Gathered, gather, tell
+from flipproof.frame.pool import Progress, compile_kernels, workers
+from flipproof.frame.stages import Stages
+from flipproof.frame.store import RunStore
 from flipproof.output.junit import junit_text
-from flipproof.output.summary import SCHEMA_NAME, schema_text, solver_rows, summarise, summary_text
-from flipproof.output.tables import trajectory_csv
-from flipproof.page.motion import motion_data
+from flipproof.output.summary import SCHEMA_NAME, schema_text, summarise, summary_text
 from flipproof.page.render import render
-from flipproof.paper.figures import exhibits_paper
+from slicemodel import Scenario
+
+SLICES: Final = 50
+"""Slices at which solvers are compared, unless told otherwise."""
+
+STEPS: Final = 1000
+"""Points of a scheme's grid."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
-    """A finished report in memory."""
+    """A finished report in memory; ``tables`` maps paths in its folder to the text of files."""
 
     findings: tuple[Finding, ...]
     exhibits: tuple[Exhibit, ...]
@@ -37,71 +46,102 @@ class Report:
         return tuple(finding for finding in self.findings if finding.failed)
 
 
+def ask_of(scenario: Scenario, size: Size, slices: int | None = None, certified: tuple[str, ...] | None = None) -> Ask:
+    """Return what a report asks of its chapters.
+
+    Parameters
+    ----------
+    scenario : the throw as given
+    size : {"check", "quick", "full"}
+    slices : at which solvers are compared; None: SLICES, or the scenario's own if they are fewer
+    certified : witnesses that are certified; None: those of the size
+    """
+    throw = scenario.with_slices(slices or min(SLICES, scenario.n_slices))
+    solvers = solver_runs(throw, STEPS, CERTIFIED[size] if certified is None else certified)
+    return Ask(scenario=scenario, throw=throw, size=size, steps=STEPS, solvers=solvers)
+
+
+def gather_report(
+    ask: Ask,
+    progress: Progress = lambda *_: None,
+    jobs: int | None = None,
+    stages: Stages | None = None,
+    store: RunStore | None = None,
+    pool: Executor | None = None,
+    *,
+    contents: tuple[Part, ...] | None = None,
+    work: Mapping[str, Any] | None = None,
+) -> Gathered:
+    """Make every run of a report and study them, in a ``pool`` or by worker processes (``jobs``; None: one per core).
+
+    Slow runs and calls are looked for in the ``store`` and kept there.
+    """
+    contents = parts() if contents is None else contents
+    with workers(jobs) if pool is None else nullcontext(pool) as made_by:
+        compile_kernels(made_by)
+        return gather(contents, ask, made_by, progress, work=work, stages=stages, store=store)
+
+
 def build(
-    evidence: Evidence, provenance: Mapping[str, str], jobs: int | None = None, measured: Measured | None = None
+    gathered: Gathered,
+    provenance: Mapping[str, str],
+    jobs: int | None = None,
+    *,
+    pool: Executor | None = None,
+    png: bool = False,
 ) -> Report:
     """Evaluate every claim, draw every figure and write the page, all in memory.
 
     Parameters
     ----------
-    evidence : Evidence
+    gathered : Gathered
     provenance : mapping
     jobs : int or None
         Worker processes that draw; None: one per core, 1: this process.
-    measured : Measured or None
-        A measured flight that the report holds beside its solvers.
+    pool : Executor or None
+        Workers that are there already and draw instead.
+    png : bool
+        Whether figures are made as PNG, too.
     """
-    paper = evidence.paper
-    findings = (
-        *evaluate(evidence),
-        *(paper.verdicts.findings() if paper else ()),
-        *(measured.findings() if measured else ()),
-    )
-    with evidence.stages.lap("figures"):
-        figures = (*draw_all(evidence), *(exhibits_paper(paper.runs) if paper else ()))
-        exhibits = drawn((*figures, *((measured.exhibit(),) if measured else ())), jobs)
-    solvers = solver_rows(evidence)
-    summary = summarise(evidence, findings, exhibits, solvers, provenance)
-    with evidence.stages.lap("page"):
-        html = render(
-            evidence,
-            findings,
-            exhibits,
-            solvers,
-            provenance,
-            summary=summary,
-            motion=motion_data(evidence.throw, evidence.made),
-            paper=paper.verdicts if paper else None,
-            measured=measured,
-        )
-    summary["stages"]["page"] = round(evidence.stages.seconds["page"], 3)
+    told = tell(gathered)
+    with gathered.stages.lap("figures"):
+        figures = [figure for each in told.values() for figure in each.figures]
+        exhibits = drawn(figures, jobs, pool=pool, png=png)
+    by_name = {exhibit.name: exhibit for exhibit in exhibits}
+    told = {
+        name: replace(each, figures=tuple(by_name[figure.name] for figure in each.figures))
+        for name, each in told.items()
+    }
+    summary = summarise(gathered, told, provenance)
+    with gathered.stages.lap("page"):
+        html = render(gathered, told, provenance, summary)
+    summary["stages"]["page"] = round(gathered.stages.seconds["page"], 3)
+    made = [each for each in told.values() if each.found is not None]
     return Report(
-        findings=findings,
+        findings=tuple(finding for each in told.values() for finding in each.findings),
         exhibits=exhibits,
         html=html,
         summary=summary,
-        tables={
-            tag: trajectory_csv(trajectory)
-            for tag in (*FLIGHTS, *OTHERS)
-            if (trajectory := evidence.trajectory(tag)) is not None
-        },
+        tables={path: text for each in made for path, text in each.chapter.tables(each.found).items()},
     )
 
 
 def write(report: Report, folder: Path) -> None:
     """Write a finished report into an empty folder."""
-    (folder / "index.html").write_text(report.html, encoding="utf-8")
-    (folder / "summary.json").write_text(summary_text(report.summary), encoding="utf-8")
-    (folder / SCHEMA_NAME).write_text(schema_text(), encoding="utf-8")
-    (folder / "junit.xml").write_text(junit_text(report.findings), encoding="utf-8")
+    files: dict[str, str | bytes] = {
+        "index.html": report.html,
+        "summary.json": summary_text(report.summary),
+        SCHEMA_NAME: schema_text(),
+        "junit.xml": junit_text(report.findings),
+        **report.tables,
+    }
     for exhibit in report.exhibits:
-        place = folder / "figures"
-        place.mkdir(exist_ok=True)
-        (place / f"{exhibit.name}.svg").write_text(exhibit.drawing.svg, encoding="utf-8")
-        (place / f"{exhibit.name}.png").write_bytes(exhibit.drawing.png)
+        files[f"figures/{exhibit.name}.svg"] = exhibit.drawing.svg
+        if exhibit.drawing.png:
+            files[f"figures/{exhibit.name}.png"] = exhibit.drawing.png
         if exhibit.table is not None:
-            (place / f"{exhibit.name}.csv").write_text(exhibit.table, encoding="utf-8")
-    for tag, table in report.tables.items():
-        place = folder / "trajectories" / tag
-        place.mkdir(parents=True, exist_ok=True)
-        (place / "data.csv").write_text(table, encoding="utf-8")
+            files[f"figures/{exhibit.name}.csv"] = exhibit.table
+    for path, content in files.items():
+        place = folder / path
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))

@@ -183,6 +183,28 @@ def test_a_release_is_not_undone_by_rounding():
     assert found.diagnostics["steps"] < 200
 
 
+@pytest.mark.parametrize("switches", [each for each in Switches.every() if not each.roots], ids=lambda each: each.name)
+@pytest.mark.parametrize("omega0", [20.0, -13.7])
+def test_water_that_nothing_pushes_stays_where_it_is(switches, omega0):
+    """gamma = |omega0| without roots: k^2 = 0 and f = 0 for ever; only rounding could call that a push or a pull."""
+    for n, water in ((1, 0.25), (2, 0.5), (3, 0.1), (20, 0.7), (50, 0.5), (50, 1.0), (100, 0.7)):
+        scenario = Scenario(n_slices=n, water_mass=water, omega0=omega0, drag=2 * abs(omega0) * water / n)
+        found = solve(scenario, switches, times=np.linspace(0.0, 0.5, 11))
+        assert found.ok, found.message
+        assert len(found.impacts) == 0
+        assert found.omega == pytest.approx(omega0, rel=1e-12, abs=0.0)
+        assert found.r == pytest.approx(np.tile(scenario.initial_positions(), (11, 1)), abs=1e-12)
+
+
+@pytest.mark.parametrize("share", [1 - 1e-9, 1 + 1e-9, 1 - 1e-14, 1 + 1e-14])
+@pytest.mark.parametrize("name", ["switches:100110", "switches:101011"])
+def test_water_that_is_hardly_pushed_does_not_stall(share, name):
+    scenario = Scenario(n_slices=20, water_mass=0.7, drag=2 * 20.0 * 0.7 / 20 * share)
+    found = solve(scenario, name, times=[0.0, 0.5])
+    assert found.ok, found.message
+    assert found.omega[-1] == pytest.approx(20.0, rel=1e-4, abs=0.0)
+
+
 # ---------------------------------------------------------------------- statuses
 
 

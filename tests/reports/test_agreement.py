@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flipproof.studies.agreement import study_agreement
+from flipproof.chapters.agreement.study import study_agreement
 from slicemodel import Scenario, Trajectory
 
 SCENARIO = Scenario(n_slices=1)

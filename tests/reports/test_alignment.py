@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 import ode_reference
 import slicemodel
-from flipproof.figures.events import even_rows, figure_gantt
+from flipproof.chapters.alignment.figure import even_rows, figure_gantt
+from flipproof.chapters.alignment.found import count_key, ordinal
+from flipproof.chapters.alignment.study import rest_intervals, study_alignment
 from flipproof.figures.style import draw
-from flipproof.studies.alignment import count_key, ordinal, rest_intervals, study_alignment
 from slicemodel import Impacts, Scenario, Trajectory
 
 BASE, CAP = 1, -1

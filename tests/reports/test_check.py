@@ -7,9 +7,11 @@ from dataclasses import replace
 
 import pytest
 
+from flipproof.chapters.errata import chapter as errata
 from flipproof.check import throw as check_module
-from flipproof.check.throw import CHECKS, check, line
-from flipproof.cli.check import GROUPS, add_checks
+from flipproof.check.throw import CHECKS, check, findings_of, groups, line
+from flipproof.cli.check import add_checks
+from flipproof.frame import pool
 from flipproof.frame.findings import Finding
 from flipproof.frame.solvers import Made
 from flipproof.frame.solvers import make as really_make
@@ -31,12 +33,15 @@ def flipproof(*arguments):
 @pytest.fixture(scope="module")
 def thresholds():
     """What the group finds on the throw, computed once."""
-    return tuple(CHECKS["thresholds"](THROW))
+    return tuple(findings_of("thresholds", THROW))
 
 
 @pytest.fixture
 def computed(monkeypatch, thresholds):
-    monkeypatch.setitem(check_module.__dict__, "CHECKS", {**CHECKS, "thresholds": lambda _: iter(thresholds)})
+    def known(group, throw, store):
+        return iter(thresholds) if group == "thresholds" else findings_of(group, throw, store)
+
+    monkeypatch.setattr(check_module, "findings_of", known)
 
 
 @pytest.fixture
@@ -100,13 +105,13 @@ def test_a_finding_must_stay_where_the_baseline_has_it_and_in_the_interval_chose
     assert [case.get("name") for case in suite if case.find("failure") is not None] == ([STEP] if failed else [])
 
 
-def test_without_a_baseline_ice_vectors_and_convergence_are_checked(place, capsys):
+def test_without_a_baseline_ice_vectors_convergence_and_reference_are_checked(place, capsys):
     folder = place()
     assert flipproof("check", folder / "throw.toml") == 0
     lines = capsys.readouterr().out.splitlines()
     names = {words.split()[1].partition("-")[0] for words in lines[:-1]}
-    assert names == {"ice", "vectors", "order"}
-    assert lines[-1] == "17 of 17 checks hold."
+    assert names == {"ice", "vectors", "order", "reference"}
+    assert lines[-1] == "19 of 19 checks hold."
 
 
 def test_a_threshold_of_the_baseline_holds_for_the_other_groups_too(tmp_path):
@@ -126,13 +131,13 @@ def test_a_solver_that_fails_is_a_failed_check_with_its_reason(monkeypatch):
             return Made(run, None, 0.0, "RuntimeError: no\nluck")
         return really_make(run)
 
-    monkeypatch.setattr(check_module, "make", broken)
+    monkeypatch.setattr(pool, "make", broken)
     said = []
     found = check(THROW, ("ice", "convergence"), say=said.append)
     assert [finding.id for finding in found.failed] == [
         "ice-eq8", "order-exact-step-before-the-first-impact", "order-exact-step-across-impacts",
     ]  # fmt: skip
-    assert "FAIL  ice-eq8: not evaluated: RuntimeError: no luck" in said
+    assert "FAIL  ice-eq8: not evaluated: ice, eq8: RuntimeError: no luck" in said
     assert all("\n" not in words for words in said)
 
 
@@ -140,8 +145,8 @@ def test_a_difference_without_one_of_its_runs_is_not_evaluated(monkeypatch, plac
     def broken(run):
         return Made(run, None, 0.0, "RuntimeError: no luck")
 
-    monkeypatch.setattr(check_module, "make", broken)
-    monkeypatch.setattr(check_module, "study_errata", lambda _: ())
+    monkeypatch.setattr(pool, "make", broken)
+    monkeypatch.setattr(errata, "study_errata", lambda _: ())
     found = check(THROW, ("thresholds",), baseline=place())
     assert len(found.failed) == len(found.findings) > 5
     assert all("no luck" in finding.note for finding in found.failed)
@@ -181,7 +186,7 @@ def test_bad_arguments_are_refused(place, capsys):
             flipproof("check", throw, *arguments)
         assert caught.value.code == 2
     assert "'luck'" not in capsys.readouterr().out
-    assert set(GROUPS) == set(CHECKS)
+    assert tuple(groups()) == tuple(CHECKS)
 
 
 def test_a_value_that_is_not_a_number_fails():

@@ -5,74 +5,54 @@ import copy
 import dataclasses
 import json
 import re
-from concurrent.futures import Executor, Future
-from contextlib import contextmanager
 from types import MappingProxyType
 
 import numpy as np
 import pytest
 
-from flipproof import evidence as evidence_module
-from flipproof import instruments
-from flipproof.attribution import Scope
+from flipproof.build import ask_of
+from flipproof.chapters import parts
+from flipproof.chapters.horizon.study import Reach
+from flipproof.chapters.overlap import chapter as overlap
+from flipproof.chapters.overlap.chapter import Amount
+from flipproof.chapters.stability.study import Layout
 from flipproof.check.diff import Change, change_of, compare_summaries, read_summary, scenario_changes, within
 from flipproof.check.diff_page import read_curves
 from flipproof.cli.check import add_checks
-from flipproof.evaluation import evaluate
-from flipproof.evidence import QUICK, with_slices
 from flipproof.figures.report_pair import differences, figure_report_pair
 from flipproof.frame import pool, solvers
 from flipproof.frame.findings import Finding
-from flipproof.instruments import Bench
+from flipproof.frame.gather import gather, tell
 from flipproof.output.columns import curves_csv
 from flipproof.output.provenance import provenance
-from flipproof.output.summary import solver_rows, summarise, summary_text
-from flipproof.studies.horizon import Reach
-from flipproof.studies.stability import Layout
+from flipproof.output.summary import summarise, summary_text
 from slicemodel import Scenario, schemes
 from slicemodel import solver as slice_solver
 
 THROW = Scenario(water_mass=0.5, n_slices=6, drag=0.8, duration=0.3)
-SIZE = dataclasses.replace(
-    with_slices(QUICK, THROW.n_slices),
-    levels=4,
-    counts=(3, 6),
-    scope=Scope(waterfall_slices=2, map_slices=4, map_cells=0, perturbations=(1e-9,), exact=(), forms=()),
-    bench=Bench(
-        layout=Layout(panels=((18.0, 10),), dt=(2e-3, 2e-4), iterations=(10, 90), duration=0.1, budget=2e6),
-        reach=Reach(solvers=("pymunk",), sizes=(1e-9,), seeds=(1,), slices=3),
-        fills=(1.0,),
-        slices=3,
-        dt=4e-4,
-        certified=(),
-    ),
-)
+WORK = {
+    "step-size": 4,
+    "slices": (3, 6),
+    "waterfall": 2,
+    "exact-cases": (),
+    "model-form": (),
+    "stability": Layout(panels=((18.0, 10),), dt=(2e-3, 2e-4), iterations=(10, 90), duration=0.1, budget=2e6),
+    "horizon": Reach(solvers=("pymunk",), sizes=(1e-9,), seeds=(1,), slices=3),
+    "overlap": Amount(fills=(1.0,), slices=3, dt=4e-4),
+}
 """As small as a report can be that makes all kinds of claims."""
-
-
-class Here(Executor):
-    """Does at once, in this process, what it is asked to do: a fault that is seeded here is seeded for all."""
-
-    def submit(self, function, *arguments):
-        future = Future()
-        future.set_result(function(*arguments))
-        return future
-
-
-@contextmanager
-def here(_):
-    yield Here()
 
 
 def summary_of_a_run(make=solvers.make):
     """Return the summary of a small report; ``make`` makes its runs."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(evidence_module, "workers", here)
-        patch.setattr(evidence_module, "REFERENCE", dataclasses.replace(Scenario().with_slices(5), duration=0.3))
-        patch.setattr(instruments, "FULL_DT", 1e-4)
+        patch.setattr(overlap, "FULL_DT", 1e-4)
         patch.setattr(pool, "make", make)
-        found = evidence_module.gather(THROW, SIZE, lambda *_: None)
-    made = summarise(found, tuple(evaluate(found)), (), solver_rows(found), provenance("flipproof report"))
+        reference = dataclasses.replace(Scenario().with_slices(5), duration=0.3)
+        ask = dataclasses.replace(ask_of(THROW, "quick", certified=()), reference=reference)
+        # In this process: a fault that is seeded here is seeded for all.
+        found = gather(parts(), ask, pool.Here(), work=WORK)
+        made = summarise(found, tell(found), provenance("flipproof report"))
     return json.loads(summary_text(made))
 
 

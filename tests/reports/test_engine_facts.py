@@ -6,12 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from flipproof.claims_engines import claim_engine_fact
-from flipproof.exhibits_engines import draw_gallery
-from flipproof.figures.engines import figure_gallery
+from flipproof.chapters.engine_facts import worlds
+from flipproof.chapters.engine_facts.chapter import claim_engine_fact, draw_gallery
+from flipproof.chapters.engine_facts.figure import figure_gallery
+from flipproof.chapters.engine_facts.study import plan_engine_facts, study_engine_facts
 from flipproof.frame.solvers import Made, make
-from flipproof.studies import engine_worlds as worlds
-from flipproof.studies.engine_facts import plan_engine_facts, study_engine_facts
 from slicemodel import Scenario
 
 PYMUNK = (
@@ -23,7 +22,7 @@ MUJOCO = ("mujoco-limit", "mujoco-contact")
 
 @pytest.fixture(scope="module")
 def made():
-    return {run.tag: make(run) for run in plan_engine_facts(Scenario())}
+    return {words: make(run) for words, run in plan_engine_facts(Scenario()).items()}
 
 
 @pytest.fixture(scope="module")
@@ -31,9 +30,9 @@ def facts(made):
     return {fact.id: fact for fact in study_engine_facts(made)}
 
 
-def test_the_plan_has_unique_tags_and_explicit_steps():
-    runs = plan_engine_facts(Scenario(duration=0.1))
-    assert len({run.tag for run in runs}) == len(runs)
+def test_the_plan_has_different_runs_and_explicit_steps():
+    runs = plan_engine_facts(Scenario(duration=0.1)).values()
+    assert len(set(runs)) == len(runs)
     assert all({"dt", "iterations"} <= set(run.settings) for run in runs)
     assert all(run.settings["times"][-1] == run.scenario.duration == 0.1 for run in runs)
 
@@ -68,16 +67,16 @@ def test_an_engine_that_is_missing_is_not_evaluated_and_no_failure(made, monkeyp
 
 def test_a_fact_whose_run_is_missing_or_stopped_fails(made):
     broken = dict(made)
-    usual = made["engine fact, usual"]
-    broken["engine fact, usual"] = Made(usual.run, None, 0.0, "MemoryError: too much")
+    usual = made["usual"]
+    broken["usual"] = Made(usual.run, None, 0.0, "MemoryError: too much")
     fact = study_engine_facts(broken)[0]
     assert (fact.id, fact.value, fact.absent) == ("gravity", None, False)
     assert "MemoryError" in fact.note
     assert claim_engine_fact(fact).failed
     stopped = replace(usual.trajectory, status="diverged", message="diverged: joints")
-    assert study_engine_facts(made | {"engine fact, usual": replace(usual, trajectory=stopped)})[0].value is None
+    assert study_engine_facts(made | {"usual": replace(usual, trajectory=stopped)})[0].value is None
     # A run that was to explode and did not is no evidence that it explodes sooner.
-    calm = {tag: replace(usual, run=m.run) if "few" in tag else m for tag, m in made.items()}
+    calm = {words: replace(usual, run=m.run) if "few" in words else m for words, m in made.items()}
     assert study_engine_facts(calm)[1].value is None
 
 

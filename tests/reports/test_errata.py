@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flipproof.studies import errata
+from flipproof.chapters.errata import equations, programs
+from flipproof.chapters.errata import study as errata
 from slicemodel import Bottle, Scenario
 
 THROW = Scenario()
@@ -35,20 +36,22 @@ def test_the_sums_that_eq11e_is_held_against_are_a_rod_and_a_tube():
     off_bottle, off_water = (1 - e) * (1 - m) / 2, e * (1 - m) / 2
     true = bottle.mass * bottle.length**2 * (1 / 12 + bottle.radius**2 / (2 * bottle.length**2) + off_bottle**2)
     true += THROW.water_mass * bottle.length**2 * (m**2 / 12 + off_water**2)
-    assert errata.printed_11e(THROW) / true == pytest.approx(errata.erratum_eq11e(THROW, 0.5).value, rel=1e-6, abs=0.0)
+    assert equations.printed_11e(THROW) / true == pytest.approx(
+        equations.erratum_eq11e(THROW, 0.5).value, rel=1e-6, abs=0.0
+    )
 
 
 def test_the_roots_leave_the_square_of_gamma_over_omega(audit):
-    assert errata.residual_9a(0.0, 20.0) == 0.0
-    assert errata.residual_9a(5.0, 20.0) == pytest.approx(1 / 16)
+    assert equations.residual_9a(0.0, 20.0) == 0.0
+    assert equations.residual_9a(5.0, 20.0) == pytest.approx(1 / 16)
     assert audit["eq9a-roots"].value > 1.0  # gamma exceeds omega on the plateau
-    assert errata.erratum_roots(replace(THROW, drag=1e-4, n_slices=50)).verdict == "as printed"
+    assert equations.erratum_roots(replace(THROW, drag=1e-4, n_slices=50)).verdict == "as printed"
 
 
 def test_eq9c_solves_eq9a_s_equation_with_its_initial_values():
     h = 1e-4
     gamma, omega = 5.0, 20.0
-    x = [errata.printed_9c(0.03, 0.2, gamma, omega, k * h) for k in (-1, 0, 1)]
+    x = [equations.printed_9c(0.03, 0.2, gamma, omega, k * h) for k in (-1, 0, 1)]
     assert x[1] == 0.03
     assert (x[2] - x[0]) / (2 * h) == pytest.approx(0.2, rel=1e-4, abs=0.0)
     acceleration = (x[2] - 2 * x[1] + x[0]) / h**2
@@ -60,7 +63,7 @@ def test_signs(audit):
     assert audit["eq9d-sinh-sign"].value == pytest.approx(-1.0, abs=1e-6)
     assert abs(audit["python-sinh-sign"].value) < 1e-3
     assert audit["contact-sign"].value == 0.5
-    assert errata.erratum_contact_sign(0.0).verdict == "as printed"
+    assert programs.erratum_contact_sign(0.0).verdict == "as printed"
 
 
 def test_a_scheme_with_the_right_sign_would_pass(monkeypatch):
@@ -68,7 +71,7 @@ def test_a_scheme_with_the_right_sign_would_pass(monkeypatch):
 
     mended = dict(schemes.SCHEMES) | {"published-python": schemes.SCHEMES["signs-corrected"]}
     monkeypatch.setattr(schemes, "SCHEMES", mended)
-    assert errata.erratum_python_sign(THROW).verdict == "as printed"
+    assert equations.erratum_python_sign(THROW).verdict == "as printed"
 
 
 def test_matlab(audit):
@@ -78,7 +81,7 @@ def test_matlab(audit):
 
 
 def test_main_m_as_printed_stops_at_a_comment():
-    printed = errata.erratum_matlab_comment()
+    printed = programs.erratum_matlab_comment()
     assert (printed.verdict, printed.value) == ("erratum", 1.0)
     assert "density of water" in printed.note
     for right in (
@@ -88,7 +91,7 @@ def test_main_m_as_printed_stops_at_a_comment():
         "rho =1000;",
         "CheckBoundaryConditions(r)",
     ):
-        assert errata.erratum_matlab_comment(right).verdict == "as printed"
+        assert programs.erratum_matlab_comment(right).verdict == "as printed"
 
 
 def test_the_square_is_judged_for_both_meanings_of_n(audit):
@@ -98,35 +101,35 @@ def test_the_square_is_judged_for_both_meanings_of_n(audit):
 
 def test_epsilon_agrees_if_the_bottle_is_the_cylinder_it_is_said_to_be():
     capacity = 1000.0 * math.pi * 0.04**2 * 0.28
-    assert errata.erratum_eq4b(THROW).value == pytest.approx(0.7216, abs=1e-4)
-    assert errata.erratum_eq4b(replace(THROW, bottle=Bottle(capacity=capacity))).verdict == "as printed"
+    assert equations.erratum_eq4b(THROW).value == pytest.approx(0.7216, abs=1e-4)
+    assert equations.erratum_eq4b(replace(THROW, bottle=Bottle(capacity=capacity))).verdict == "as printed"
 
 
 def test_cost_is_linear_in_slices_and_only_the_matlab_program_is_quadratic_in_steps():
-    assert errata.exponents_of_cost(copies_history=False) == pytest.approx((1.0, 1.0), abs=0.02)
-    assert errata.exponents_of_cost(copies_history=True) == pytest.approx((1.0, 2.0), abs=0.05)
+    assert programs.exponents_of_cost(copies_history=False) == pytest.approx((1.0, 1.0), abs=0.02)
+    assert programs.exponents_of_cost(copies_history=True) == pytest.approx((1.0, 2.0), abs=0.05)
 
 
 def test_counting_counts():
-    one, two = (errata.count_operations(n, 3, copies_history=False) for n in (10, 20))
+    one, two = (programs.count_operations(n, 3, copies_history=False) for n in (10, 20))
     assert two == 2 * one > 0
 
 
 def test_mechanics(audit):
     assert audit["alpha-unit"].value == 2
     assert audit["eq8-gravity"].value > 0.01
-    assert errata.erratum_gravity(replace(THROW, gravity=0.0)).verdict == "as printed"
+    assert equations.erratum_gravity(replace(THROW, gravity=0.0)).verdict == "as printed"
     # r''_CM = omega^2 (r_CM - L/2) M_b / (M_b + M_w), and the slices spread over h about their middle.
     share = 0.028 / 0.528
     offset = 0.07 * (1 - share)
     expected = share * offset / np.hypot(0.14 / np.sqrt(12), 0.07 * share)
     assert audit["eq8-origin"].value == pytest.approx(expected, rel=1e-3, abs=0.0)
     heavy_water = replace(THROW, bottle=Bottle(mass=1e-6))
-    assert errata.erratum_origin(heavy_water).verdict == "as printed"
+    assert equations.erratum_origin(heavy_water).verdict == "as printed"
     assert share < audit["eq8-drag"].value < 1.0
 
 
 def test_what_cannot_be_computed_says_so():
-    item = errata._attempt("x", lambda: errata.erratum_eq11e(THROW, 2.0))  # more water than the bottle holds
+    item = errata._attempt("x", lambda: equations.erratum_eq11e(THROW, 2.0))  # more water than the bottle holds
     assert item.verdict == "not evaluated"
     assert item.note.startswith("ScenarioError: water_mass = 2.0 kg exceeds")

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flipproof.figures.frozen import figure_frozen
+from flipproof.chapters.frozen.figure import figure_frozen
+from flipproof.chapters.frozen.study import LIMITS, QUANTITIES, plan_frozen, study_frozen
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import make
-from flipproof.studies.frozen import LIMITS, QUANTITIES, plan_frozen, study_frozen
 from slicemodel import Bottle, Scenario
 
 THROW = Scenario().with_slices(20)
@@ -29,7 +29,7 @@ def test_plans_a_full_run_and_its_own_equation_at_the_same_times():
         run, reference = plan_frozen(THROW, scheme, 101)
         assert (run.solver, run.settings["store"], reference.solver) == (scheme, "full", model)
         assert len(reference.settings["times"]) == run.settings["steps"]
-        assert run.tag != reference.tag
+        assert run.label != reference.label
 
 
 def test_defects_added_up_are_the_error_before_the_first_impact(study):

@@ -9,15 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from flipproof.claims import claim_finite_step
-from flipproof.evidence import BY_ENGINE, EQ8_FREE, PROGRAM_EQ8, TOTAL
+from flipproof.chapters.differences.chapter import BY_ENGINE, EQ8_FREE, PROGRAM_EQ8, TOTAL
+from flipproof.chapters.differences.study import percent
+from flipproof.chapters.finite_step.chapter import claim_finite_step
+from flipproof.chapters.finite_step.study import EVERYTHING, HELD, LOCATED, WAYS
+from flipproof.chapters.waterfall.study import STEP
+from flipproof.frame.throws import FINER
 from flipproof.output.snapshot import BEGIN, END, PLACE, README, front_page, write_front_page
 from flipproof.page.headlines import MEASURES, Headline, headlines
 from flipproof.page.lead import amount, answer, lead_words, sentences, signed
-from flipproof.studies.differences import percent
-from flipproof.studies.finite_step import EVERYTHING, HELD, LOCATED, WAYS
-from flipproof.studies.slices import FINER
-from flipproof.studies.waterfall import STEP
 
 pytestmark = pytest.mark.xdist_group("evidence")
 
@@ -76,11 +76,11 @@ def test_the_snapshots_numbers_are_those_of_its_differences_and_findings(kept):
     check_against_the_rest(kept)
 
 
-def test_a_fresh_reports_numbers_are_those_of_its_differences_and_findings(report, evidence):
+def test_a_fresh_reports_numbers_are_those_of_its_differences_and_findings(report, gathered):
     check_against_the_rest(report.summary)
-    found = {headline.id: headline for headline in headlines(evidence)}
+    found = {headline.id: headline for headline in headlines(gathered)}
     assert found == of(report.summary)
-    waterfall = evidence.attribution.waterfalls[0]
+    waterfall = gathered.found("waterfall")[0]
     bars = {bar.name: bar for bar in waterfall.bars if bar.name != STEP}
     best = max(bars.values(), key=lambda bar: abs(bar.average))
     share = found["share"]
@@ -234,8 +234,8 @@ def test_the_answer_follows_from_step_and_equation(step, equation, words):
 # ---------------------------------------------------------------------- the finite step
 
 
-def test_a_step_is_taken_apart_by_changing_one_thing_at_a_time(evidence):
-    costs = {cost.way.name: cost for cost in evidence.finite_step}
+def test_a_step_is_taken_apart_by_changing_one_thing_at_a_time(gathered):
+    costs = {cost.way.name: cost for cost in gathered.found("finite-step").costs}
     assert list(costs) == [way.name for way in WAYS]
     # Without the lag the start costs far less; with the lag alone it is most of what the program loses.
     assert 0.0 < 5 * costs[HELD].start < costs[EVERYTHING].start
@@ -246,7 +246,11 @@ def test_a_step_is_taken_apart_by_changing_one_thing_at_a_time(evidence):
     assert claim_finite_step(costs[HELD]).value == costs[HELD].flight
 
 
-def test_what_is_called_everything_is_the_difference_of_the_program_from_its_own_equation(evidence):
-    found = {headline.id: headline for headline in headlines(evidence)}
-    step = next(d for d in evidence.differences if d.first == "published-python" and d.second == "published-limit")
+def test_what_is_called_everything_is_the_difference_of_the_program_from_its_own_equation(gathered):
+    found = {headline.id: headline for headline in headlines(gathered)}
+    step = next(
+        d
+        for d in gathered.found("differences").pairs
+        if d.first == "published-python" and d.second == "published-limit"
+    )
     assert found["step"].value == pytest.approx(step.largest, rel=1e-12, abs=0.0)

@@ -9,12 +9,10 @@ import pytest
 from engine_check import PymunkKnobs
 from engine_check.pymunk_settings import insertion_order
 from engine_check.pymunk_world import build
-from flipproof.claims_engines import claim_angle, claim_horizon, claim_order_of_bodies
-from flipproof.exhibits_engines import draw_horizon, draw_instruments
-from flipproof.figures.engines import figure_horizon
+from flipproof.chapters.horizon.chapter import claim_angle, claim_horizon, claim_order_of_bodies, draw_horizon, figures
+from flipproof.chapters.horizon.figure import figure_horizon
+from flipproof.chapters.horizon.study import FULL, QUICK, Reach, plan_horizon, study_ensemble, study_horizon
 from flipproof.frame.solvers import Made, make, solve
-from flipproof.instruments import Instruments
-from flipproof.studies.horizon import FULL, QUICK, Reach, plan_horizon, study_ensemble, study_horizon
 from slicemodel import Scenario, Trajectory
 
 THROW = Scenario(duration=0.1)
@@ -47,7 +45,7 @@ def ensemble(*members):
 
 def made_up(change_of, spoil=None):
     """Study flights whose change is ``change_of(tag)``; ``spoil`` maps tags to what became of them instead."""
-    made = {run.tag: Made(run, flight(change_of(run.tag)), 0.0) for run in plan_horizon(THROW, SMALL)}
+    made = {run: Made(run, flight(change_of(run.label)), 0.0) for run in plan_horizon(THROW, SMALL)}
     return study_horizon(THROW, SMALL, made | (spoil or {}))
 
 
@@ -95,21 +93,21 @@ def test_what_is_no_ensemble_is_refused():
 @pytest.mark.parametrize("reach", [FULL, QUICK, SMALL])
 def test_the_plan_changes_one_thing_at_a_time(reach):
     runs = plan_horizon(THROW, reach)
-    assert len({run.tag for run in runs}) == len(runs)
-    base = {run.solver: run for run in runs if run.tag.endswith("as it is")}
+    assert len(set(runs)) == len(runs)
+    base = {run.solver: run for run in runs if run.label.endswith("as it is")}
     assert tuple(base) == reach.solvers
     for run in runs:
         usual = base[run.solver]
         turned = run.scenario.theta0 - usual.scenario.theta0
         changed = {name for name in run.settings if run.settings[name] is not usual.settings.get(name)} - {"times"}
-        if "angle" in run.tag:
-            assert turned == pytest.approx(float(run.tag.split()[-1]), rel=1e-6, abs=0.0)
+        if "angle" in run.label:
+            assert turned == pytest.approx(float(run.label.split()[-1]), rel=1e-6, abs=0.0)
             assert min(abs(abs(turned) / size - 1) for size in reach.sizes) < 1e-6
             assert run.scenario == replace(usual.scenario, theta0=run.scenario.theta0)
-        if "order" in run.tag:
+        if "order" in run.label:
             assert run.scenario == usual.scenario
             assert run.settings["shuffle"] in reach.seeds
-        assert changed <= ({"shuffle"} if "order" in run.tag else set())
+        assert changed <= ({"shuffle"} if "order" in run.label else set())
     for run in (run for run in runs if run.solver == "pymunk"):
         assert run.settings["dt"] == reach.dt
         assert run.settings["iterations"] >= 50
@@ -139,9 +137,9 @@ def test_every_ensemble_is_read_from_its_own_runs():
 
 
 def test_a_solver_that_did_not_run_stays_with_its_reason():
-    tag = "horizon, pymunk, as it is"
-    run = plan_horizon(THROW, SMALL)[0]
-    engine, equation = made_up(lambda _: 0.0, {tag: Made(run, None, 0.0, "RuntimeError: not installed")})
+    planned = {run.label: run for run in plan_horizon(THROW, SMALL)}
+    run, member = planned["horizon, pymunk, as it is"], planned["horizon, pymunk, angle +1e-06"]
+    engine, equation = made_up(lambda _: 0.0, {run: Made(run, None, 0.0, "RuntimeError: not installed")})
     assert (engine.ensembles, engine.largest, engine.horizon) == ((), None, None)
     assert "not installed" in engine.words
     assert claim_horizon(engine).verdict == claim_angle(engine).verdict == "not evaluated"
@@ -149,11 +147,10 @@ def test_a_solver_that_did_not_run_stays_with_its_reason():
     assert "pymunk was not run" in draw_horizon([engine, equation]).caption
     legend = [text.get_text() for text in figure_horizon([engine, equation]).legends[0].get_texts()]
     assert "pymunk: not run" in legend
-    member = "horizon, pymunk, angle +1e-06"
-    engine, _ = made_up(lambda _: 0.0, {member: Made(run, None, 0.0, "MemoryError: too much")})
+    engine, _ = made_up(lambda _: 0.0, {member: Made(member, None, 0.0, "MemoryError: too much")})
     assert [(e.kind, e.size) for e in engine.ensembles if e.kind == "angle"] == [("angle", 1e-9)]
     assert "MemoryError" in engine.problems[0]
-    assert list(draw_instruments(Instruments(horizons=(replace(engine, ensembles=()),)))) == []
+    assert list(figures((replace(engine, ensembles=()),))) == []
 
 
 def test_the_figure_labels_band_sizes_and_horizons():
@@ -214,7 +211,7 @@ def test_an_impossible_seed_is_refused(seed):
 
 
 def test_free_flight_does_not_feel_the_angle_and_the_engine_only_by_arithmetic():
-    made = {run.tag: make(run) for run in plan_horizon(THROW, SMALL)}
+    made = {run: make(run) for run in plan_horizon(THROW, SMALL)}
     engine, equation = study_horizon(THROW, SMALL, made)
     assert not engine.problems
     assert not equation.problems

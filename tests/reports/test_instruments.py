@@ -2,75 +2,87 @@
 
 import dataclasses
 
-import numpy as np
 import pytest
+from made_up import spoiled
 
 from engine_check.solver import DEFAULT_TOLERANCE
-from flipproof import instruments
 from flipproof.build import build
-from flipproof.evidence import REFERENCE
-from flipproof.frame.solvers import Made, make
-from flipproof.instruments import plan_witnesses, study_instruments, witnesses
+from flipproof.chapters.solvers import CERTIFIED, TOLERANCE, UNCERTIFIED_DT, WITNESSES, solver_runs, witnesses
+from flipproof.frame.gather import tell
+from flipproof.frame.solvers import make
+from flipproof.frame.throws import REFERENCE
 from flipproof.output.provenance import provenance
 
 pytestmark = pytest.mark.xdist_group("evidence")
 
+ENGINES = ("flights", "differences", "certificates", "agreement")
 
-def without(evidence, tag, reason="RuntimeError: not installed"):
-    made = {**evidence.made, tag: Made(evidence.made[tag].run, None, 0.0, reason)}
-    band = np.full(len(evidence.trajectory("free-flight").t), 1e-3)
-    found = study_instruments(REFERENCE, evidence.throw, evidence.size.bench, made, band)
-    return dataclasses.replace(evidence, made=made, instruments=found)
+
+def without(gathered, *names, reason="RuntimeError: not installed"):
+    return spoiled(gathered, [gathered.ask.solvers[name] for name in names], reason, ENGINES)
+
+
+def engine_runs(throw, size):
+    return {name: run for name, run in solver_runs(throw, 1000, CERTIFIED[size]).items() if name in WITNESSES}
 
 
 def test_a_report_certifies_to_what_solve_asks_by_itself():
-    assert instruments.TOLERANCE == DEFAULT_TOLERANCE
-    assert [run.tag for run in plan_witnesses(REFERENCE, instruments.FULL)] == list(witnesses(REFERENCE))
-    assert all(run.settings["tolerance"] == DEFAULT_TOLERANCE for run in plan_witnesses(REFERENCE, instruments.FULL))
+    assert TOLERANCE == DEFAULT_TOLERANCE
+    runs = engine_runs(REFERENCE, "full")
+    assert tuple(runs) == witnesses(REFERENCE)
+    assert all(run.settings["tolerance"] == DEFAULT_TOLERANCE for run in runs.values())
 
 
 def test_the_hybrid_stands_beside_the_grid_where_there_is_no_drag_and_nowhere_else():
     dry = dataclasses.replace(REFERENCE, drag=0.0)
-    assert list(witnesses(REFERENCE)) == ["pymunk", "mujoco", "pymunk rotating"]
-    assert list(witnesses(dry)) == ["pymunk", "pymunk located", "mujoco", "pymunk rotating"]
-    assert list(witnesses(dataclasses.replace(dry, frozen=True))) == ["pymunk", "mujoco", "pymunk rotating"]
+    assert witnesses(REFERENCE) == ("pymunk", "mujoco", "pymunk rotating")
+    assert witnesses(dry) == ("pymunk", "pymunk located", "mujoco", "pymunk rotating")
+    assert witnesses(dataclasses.replace(dry, frozen=True)) == ("pymunk", "mujoco", "pymunk rotating")
     short = dataclasses.replace(dry.with_slices(3), duration=0.02)
-    runs = {run.tag: make(run).trajectory for run in plan_witnesses(short, instruments.QUICK)}
-    assert {tag: run.settings["hits"] for tag, run in runs.items()} == {
+    runs = {name: make(run).trajectory for name, run in engine_runs(short, "quick").items()}
+    assert {name: run.settings["hits"] for name, run in runs.items()} == {
         "pymunk": "grid", "pymunk located": "located", "mujoco": "located", "pymunk rotating": "grid",
     }  # fmt: skip
 
 
-def test_a_quick_report_says_what_it_does_not_certify(evidence):
-    size = dataclasses.replace(evidence.size, bench=instruments.QUICK)
-    planned = {run.tag: run.settings for run in plan_witnesses(REFERENCE, instruments.QUICK)}
-    assert planned["pymunk"] == {"dt": instruments.UNCERTIFIED_DT}
-    quick = dataclasses.replace(evidence, size=size)
-    assert "pymunk and mujoco: not certified in a quick report" in build(quick, provenance("flipproof report")).html
+def test_a_quick_report_says_what_it_does_not_certify(gathered):
+    runs = engine_runs(REFERENCE, "quick")
+    assert runs["pymunk"].settings == {"dt": UNCERTIFIED_DT}
+    found = dataclasses.replace(gathered.found("certificates"), uncertified=("pymunk", "mujoco"))
+    outcome = dataclasses.replace(gathered.outcomes["certificates"], found=found)
+    quick = dataclasses.replace(gathered, outcomes={**gathered.outcomes, "certificates": outcome})
+    html = build(quick, provenance("flipproof report"), jobs=1).html
+    assert "pymunk and mujoco: not certified in a quick report" in html
 
 
-def test_every_witness_has_its_certificate(evidence, read_page):
-    found = evidence.instruments
-    assert not found.problems
-    assert list(found.certificates) == list(witnesses(evidence.throw))
+def test_every_witness_has_its_certificate(gathered, report, read_page):
+    found = gathered.found("certificates")
+    assert tuple(found.certificates) == witnesses(gathered.ask.throw)
     assert all(certificate["status"] == "certified" for certificate in found.certificates.values())
-    assert found.agreement is not None
-    assert set(found.agreement.names) == {"free-flight", "pymunk", "mujoco"}
-    page = read_page(build(evidence, provenance("flipproof report")).html)
+    agreements = gathered.found("agreement").agreements
+    assert set(agreements["free-flight"].names) == {"free-flight", "solve_ivp", "pymunk", "mujoco"}
+    assert set(agreements["eq8"].names) == {"eq8", "solve_ivp", "pymunk rotating"}
+    assert all(agreement.odd is None for agreement in agreements.values())
+    page = read_page(report.html)
     assert {"engines", "work-precision", "figure-stability", "figure-horizon", "figure-overlap"} <= set(page.ids)
 
 
-def test_an_engine_that_is_not_installed_is_named_with_its_reason(evidence):
-    poorer = without(evidence, "mujoco")
-    assert "mujoco" not in poorer.instruments.certificates
-    assert set(poorer.instruments.agreement.names) == {"free-flight", "pymunk"}
-    report = build(poorer, provenance("flipproof report"))
-    assert "RuntimeError: not installed" in report.html
-    assert not report.failed
+def test_an_engine_that_is_not_installed_is_named_with_its_reason(gathered):
+    poorer = without(gathered, "mujoco")
+    assert "mujoco" not in poorer.found("certificates").certificates
+    assert set(poorer.found("agreement").agreements["free-flight"].names) == {"free-flight", "solve_ivp", "pymunk"}
+    told = tell(poorer)
+    assert "RuntimeError: not installed" in poorer.found("flights").made["mujoco"].reason
+    assert not [finding.id for each in told.values() for finding in each.findings if finding.failed]
 
 
-def test_without_any_engine_there_is_no_agreement_but_a_reason(evidence):
-    poorest = without(without(evidence, "mujoco"), "pymunk")
-    assert poorest.instruments.agreement is None
-    assert "at least two" in poorest.instruments.problems["agreement"]
-    assert "agreement" not in {finding.id for finding in build(poorest, provenance("flipproof report")).findings}
+def test_without_any_engine_the_equations_are_held_against_the_witness(gathered):
+    poorest = without(gathered, "mujoco", "pymunk", "pymunk rotating")
+    agreements = poorest.found("agreement").agreements
+    assert {name: agreement.names for name, agreement in agreements.items()} == {
+        "free-flight": ("free-flight", "solve_ivp"),
+        "eq8": ("eq8", "solve_ivp"),
+    }
+    findings = {finding.id: finding for each in tell(poorest).values() for finding in each.findings}
+    assert findings["agreement-eq8"].value < 1e-9
+    assert findings["agreement"].value < 3e-3

@@ -13,11 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_up import study_map
 
+from flipproof.chapters.maps.study import CURVE, LADDER, RUNGS
+from flipproof.chapters.waterfall.study import OBSERVABLES, study_waterfall
 from flipproof.cli import main as cli
 from flipproof.frame.solvers import make
-from flipproof.studies.validity import CURVE, LADDER, RUNGS, study_map
-from flipproof.studies.waterfall import OBSERVABLES, study_waterfall
 from flipproof.sweep.design import design_of
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.local import Workers
@@ -87,8 +88,8 @@ def same(one, other):
 @pytest.mark.parametrize("axis", AXES)
 def test_a_map_from_rows_is_that_of_direct_runs_to_the_last_bit(axis, tmp_path):
     plan = Plan.of_size(THROW, axis, 3, 2)
-    made = {r.tag: make(r) for r in plan.runs()}
-    direct = study_map(THROW, axis, plan.fills, plan.values, made)
+    made = {r: make(r) for r in plan.runs()}
+    direct = study_map(THROW, axis, plan.fills, plan.values, made, points=None)
     assert direct.dominant.shape == (2, 3)
     assert all(np.isfinite(values).all() for values in direct.level.values())
     assert all(np.isfinite(values).all() for values in direct.largest.values())
@@ -98,8 +99,8 @@ def test_a_map_from_rows_is_that_of_direct_runs_to_the_last_bit(axis, tmp_path):
 def test_a_throw_of_its_own_keeps_all_its_fields(tmp_path):
     throw = Scenario(omega0=-15.0, theta0=0.7, drag=0.3, gravity=3.0, duration=0.2, restitution=0.8).with_slices(2)
     plan = Plan.of_size(throw, "gamma", 2, 2)
-    made = {r.tag: make(r) for r in plan.runs()}
-    same(by_hand(plan, tmp_path / "out"), study_map(throw, "gamma", plan.fills, plan.values, made))
+    made = {r: make(r) for r in plan.runs()}
+    same(by_hand(plan, tmp_path / "out"), study_map(throw, "gamma", plan.fills, plan.values, made, points=None))
 
 
 def test_a_step_map_runs_every_model_once_per_fill_and_joins_equal_grids():
@@ -233,24 +234,24 @@ def split(tmp_path_factory):
 
 
 def test_a_waterfall_from_rows_is_that_of_direct_runs_to_the_last_bit(split):
-    throw, runs, design, out = split
+    _, runs, design, out = split
     with Store(out, design, code_identity()) as store:
         rows = read_runs(store, runs)
-    made = {r.tag: make(r).trajectory for r in runs}
-    direct = study_waterfall(made)
+    made = {r: make(r).trajectory for r in runs}
+    direct = study_waterfall(runs[0], made)
     assert [part.observable.name for part in direct] == [observable.name for observable in OBSERVABLES]
-    assert split_rows(throw, rows) == direct
+    assert split_rows(rows) == direct
     assert len(waterfall_csv(direct).splitlines()) == 1 + len(direct) * (2 + len(direct[0].bars))
 
 
 def test_a_waterfall_s_run_that_is_not_whole_is_named(split):
-    throw, runs, design, out = split
+    _, runs, design, out = split
     with Store(out, design, code_identity()) as store:
         rows = read_runs(store, runs)
-    tag = runs[5].tag
-    rows[tag] = replace(rows[tag], status="stalled", message="time hardly passes")
-    with pytest.raises(SweepError, match=f"{tag}: stalled: time hardly passes"):
-        split_rows(throw, rows)
+    lost = runs[5]
+    rows[lost] = replace(rows[lost], status="stalled", message="time hardly passes")
+    with pytest.raises(SweepError, match=f"{lost.name}: stalled: time hardly passes"):
+        split_rows(rows)
 
 
 def test_the_waterfall_command_draws_every_observable(capsys, tmp_path, monkeypatch):

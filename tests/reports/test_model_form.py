@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flipproof.chapters.model_form.richardson import richardson
+from flipproof.chapters.model_form.study import ModelForm, study_model_form, study_signals
+from flipproof.chapters.step_size.study import before_first_impact, plan_step_size
 from flipproof.frame.solvers import make, solve
-from flipproof.studies.model_form import ModelForm, richardson, study_model_form, study_signals
-from flipproof.studies.step_size import before_first_impact, plan_step_size
 from slicemodel import Bottle, Scenario
 
 LEVELS = 5e-3 * 2.0 ** -np.arange(7)

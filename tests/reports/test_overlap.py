@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flipproof.figures.overlap import figure_overlap
+from flipproof.chapters.overlap.figure import figure_overlap
+from flipproof.chapters.overlap.study import CHECK, COARSER, EXCLUDE, PASS, plan_overlap, study_overlap
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import Made, make
-from flipproof.studies.overlap import CHECK, COARSER, EXCLUDE, PASS, plan_overlap, study_overlap
 from slicemodel import Scenario, Trajectory
 
 THROW = Scenario().with_slices(50)
@@ -41,20 +41,20 @@ LEVELS = {EXCLUDE: (0.23, 0.996), COARSER: (0.22, 0.99), PASS: (0.19, 0.4), CHEC
 def made_up(spoil=lambda _made: None):
     made = {}
     for run in plan_overlap(THROW, FILLS, slices=4):
-        name = next(name for name in (COARSER, EXCLUDE, PASS, CHECK) if f"{name}, fill" in run.tag)
-        made[run.tag] = flat(run, LEVELS[name][FILLS.index(run.scenario.fill_fraction)])
+        name = next(name for name in (COARSER, EXCLUDE, PASS, CHECK) if f"{name}, fill" in run.label)
+        made[run] = flat(run, LEVELS[name][FILLS.index(run.scenario.fill_fraction)])
     spoil(made)
     return study_overlap(THROW, made, FILLS, slices=4)
 
 
 def test_the_plan_differs_in_contacts_alone_and_halves_the_step():
     runs = plan_overlap(THROW, FILLS, slices=4, dt=2e-4)
-    assert len({run.tag for run in runs}) == len(runs) == 8
+    assert len({run.label for run in runs}) == len(runs) == 8
     by_kind = {}
     for run in runs:
         assert run.scenario.n_slices == 4
         assert run.scenario.damping_rate == pytest.approx(THROW.damping_rate)
-        by_kind.setdefault(run.tag.rpartition(", fill")[0].removeprefix("overlap, "), []).append(run)
+        by_kind.setdefault(run.label.rpartition(", fill")[0].removeprefix("overlap, "), []).append(run)
     assert {run.settings["slices"] for run in by_kind[EXCLUDE] + by_kind[COARSER]} == {"exclude"}
     assert all("slices" not in run.settings for run in by_kind[PASS] + by_kind[CHECK])
     assert by_kind[EXCLUDE][0].settings["dt"] == by_kind[COARSER][0].settings["dt"] / 2 == 1e-4
@@ -77,12 +77,11 @@ def test_levels_bands_cost_and_distance_from_ice_are_read_off():
 
 def test_a_failure_keeps_its_reason_and_leaves_a_gap():
     def spoil(made):
-        tags = list(made)
-        failed = next(tag for tag in tags if tag.startswith(f"overlap, {PASS}, fill 0.5"))
-        made[failed] = Made(made[failed].run, None, 0.0, "SetupError: not the one meant")
-        burst = next(tag for tag in tags if tag.startswith(f"overlap, {EXCLUDE}, fill 1"))
-        made[burst] = flat(made[burst].run, 0.9, "diverged", "overlap 0.02 exceeds 0.01")
-        del made[next(tag for tag in tags if tag.startswith(f"overlap, {CHECK}, fill 1"))]
+        of = {run.label: run for run in made}
+        failed, burst = of[f"overlap, {PASS}, fill 0.5"], of[f"overlap, {EXCLUDE}, fill 1"]
+        made[failed] = Made(failed, None, 0.0, "SetupError: not the one meant")
+        made[burst] = flat(burst, 0.9, "diverged", "overlap 0.02 exceeds 0.01")
+        del made[of[f"overlap, {CHECK}, fill 1"]]
 
     study = made_up(spoil)
     assert study.curves[PASS].reason == ("SetupError: not the one meant", "")
@@ -96,7 +95,7 @@ def test_a_failure_keeps_its_reason_and_leaves_a_gap():
 
 def test_without_a_full_bottle_there_is_no_distance_from_ice():
     runs = plan_overlap(THROW, (0.5,), slices=4)
-    study = study_overlap(THROW, {run.tag: flat(run, 0.3) for run in runs}, (0.5,), slices=4)
+    study = study_overlap(THROW, {run: flat(run, 0.3) for run in runs}, (0.5,), slices=4)
     assert np.isnan(study.missing_from_ice(EXCLUDE))
 
 
@@ -104,7 +103,7 @@ def test_without_a_full_bottle_there_is_no_distance_from_ice():
 def real():
     """Four slices, a coarse step, the half-full and the full bottle: what the study finds shows there already."""
     runs = plan_overlap(THROW, FILLS, slices=4, dt=2e-4)
-    return study_overlap(THROW, {run.tag: make(run) for run in runs}, FILLS, slices=4)
+    return study_overlap(THROW, {run: make(run) for run in runs}, FILLS, slices=4, dt=2e-4)
 
 
 def test_a_full_bottle_is_ice_only_if_slices_exclude_each_other(real):
@@ -134,6 +133,7 @@ def test_the_figure_draws_ice_and_names_its_axes(real):
 
 def test_gravity_does_not_matter(real):
     """Free flight: a second study without gravity, one run of each kind, gives the same full bottle."""
-    runs = [run for run in plan_overlap(replace(THROW, gravity=0.0), (1.0,), slices=4, dt=2e-4) if EXCLUDE in run.tag]
-    study = study_overlap(THROW, {run.tag: make(run) for run in runs}, (1.0,), slices=4)
+    light = replace(THROW, gravity=0.0)
+    runs = [run for run in plan_overlap(light, (1.0,), slices=4, dt=2e-4) if EXCLUDE in run.label]
+    study = study_overlap(light, {run: make(run) for run in runs}, (1.0,), slices=4, dt=2e-4)
     assert study.curves[EXCLUDE].level[0] == pytest.approx(real.curves[EXCLUDE].level[1], abs=1e-6)

@@ -1,29 +1,18 @@
 """The page's words: the answer, its numbers, the bars of the waterfall, and failures where they belong."""
 
-import dataclasses
 import re
 
 import pytest
+from made_up import spoiled
 
-from flipproof.evidence import FLIGHTS
-from flipproof.frame.solvers import Made
+from flipproof.chapters.solvers import FLIGHTS
+from flipproof.chapters.waterfall.study import program_run
+from flipproof.frame.gather import tell
 from flipproof.output.provenance import provenance
-from flipproof.output.summary import solver_rows
 from flipproof.page.pdf import VARIABLE, PrintError, find_browser, print_page, require_browser
-from flipproof.page.render import CONTENTS, PLACES, read_assets, render, sort_problems, unbroken
+from flipproof.page.render import read_assets, render, unbroken
 
 pytestmark = pytest.mark.xdist_group("evidence")
-
-
-def test_every_failed_study_has_a_section():
-    sorted_problems = sort_problems({"waterfall": "a", "map over gamma": "b", "something else": "c", "horizon": "d"})
-    assert dict(sorted_problems) == {
-        "assumptions": [("waterfall", "a")],
-        "maps": [("map over gamma", "b")],
-        "events": [("something else", "c")],
-        "engines": [("horizon", "d")],
-    }
-    assert set(PLACES.values()) <= set(CONTENTS)
 
 
 def section_of(page, name):
@@ -32,20 +21,17 @@ def section_of(page, name):
     return re.sub(r'<a class="term"[^>]*>(.*?)</a>', r"\1", section)
 
 
-def test_a_failed_solver_and_a_failed_study_stand_where_their_results_would(evidence, report):
-    made = dict(evidence.made)
-    made["pymunk"] = Made(made["pymunk"].run, None, 0.1, "SetupError: the world is <not> the one that was meant")
-    found = dataclasses.replace(evidence.attribution, waterfalls=(), problems={"waterfall": "ArithmeticError: no run"})
-    broken = dataclasses.replace(evidence, made=made, attribution=found)
-    exhibits = [exhibit for exhibit in report.exhibits if exhibit.name != "waterfall"]
-    page = render(broken, report.findings, exhibits, solver_rows(broken), provenance("flipproof report"))
+def test_a_failed_solver_and_a_failed_study_stand_where_their_results_would(gathered):
+    lost = (gathered.ask.solvers["pymunk"], program_run(gathered.ask.throw, gathered.ask.steps))
+    broken = spoiled(gathered, lost, "SetupError: the world is <not> the one that was meant", ("flights", "waterfall"))
+    page = render(broken, tell(broken), provenance("flipproof report"))
     flights = section_of(page, "flights")
     row = re.search(r"<tr><th[^>]*>pymunk</th>.*?</tr>", flights, re.S).group()
     assert "✗ failed" in row
     assert "SetupError: the world is &lt;not&gt; the one that was meant" in row
     assert "trajectories/pymunk/" not in page
     assert "solvers failed on this throw" in section_of(page, "answer")
-    assert "ArithmeticError: no run" in section_of(page, "assumptions")
+    assert "the world is &lt;not&gt;" in section_of(page, "assumptions")
     assert 'id="shares"' not in page
 
 

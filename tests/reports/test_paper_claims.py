@@ -2,24 +2,24 @@
 
 import json
 import math
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from flipproof.chapters.paper.chapter import CHAPTER
 from flipproof.frame.solvers import Run, make
 from flipproof.page.templating import environment
 from flipproof.paper import claim, claim_runs, claims_landing, claims_throw, observe
 from flipproof.paper.cases import FAMILIES, all_cases, family
 from flipproof.paper.claim import Claim, judge
-from flipproof.paper.claim_runs import ClaimRuns, gather_claims, plan_further, plan_halved, plan_published
+from flipproof.paper.claim_runs import ClaimRuns, plan_claims, plan_further, plan_halved, plan_published
 from flipproof.paper.claims import CLAIMS, STEADY, claim_weight_slows_the_tenth, judge_all
 from flipproof.paper.claims_cost import many_steps_key, same_steps_key
 from flipproof.paper.claims_model import finest_key
 from flipproof.paper.observe import Flights, MissingFlightError
 from flipproof.paper.parameters import numbers, paper_throw
-from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS, PaperRuns, plan_paper, scenario_of
+from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS, PaperRuns, make_thinned, plan_groups, scenario_of
 from flipproof.paper.statements import OMEGA, Reading
 from flipproof.paper.verdicts import judge_paper
 from slicemodel import Trajectory
@@ -409,7 +409,7 @@ def test_a_wrong_filling_of_change_fails(monkeypatch):
 def test_free_flight_throws_water_to_the_cap_from_that_filling_on(filling, over):
     """Slices may overlap and sink to the base first, which puts the centre of mass lower: 0.13 to 0.14."""
     throw = paper_throw(filling).with_slices(20)
-    run = make(Run("around", "free-flight", throw)).trajectory
+    run = make(Run("free-flight", throw, label="around")).trajectory
     assert int((run.r < throw.bottle.length / 2).any(axis=0).sum()) == over
     steady = plateau(run.t, run.omega, throw.omega0)
     assert steady > 0.85 if over == 0 else steady < 0.75
@@ -536,11 +536,9 @@ def test_statements_stand_once_each_with_all_their_words():
 
 
 def test_further_runs_repeat_none_of_the_figures():
-    figures = {run.tag for run in plan_paper()}
+    figures = {each.run for group in plan_groups() for each in group}
     further, halved = plan_further(), plan_halved()
-    tags = [run.tag for run in (*further.values(), *halved.values())]
-    assert len(set(tags)) == len(tags)
-    assert not figures & set(tags)
+    assert not figures & {*further.values(), *halved.values()}
     for (solver, key), run in halved.items():
         if key in all_cases():
             usual = scenario_of(solver, all_cases()[key])
@@ -555,8 +553,8 @@ def test_further_runs_repeat_none_of_the_figures():
 def test_the_published_program_is_flown_with_half_its_slices_and_with_half_its_steps():
     slices, steps = plan_published("slices"), plan_published("steps")
     assert set(slices) < set(steps)
-    tags = [run.tag for run, _ in (*slices.values(), *steps.values())]
-    assert len(set(tags)) == len(tags)
+    planned = [run for run, _ in (*slices.values(), *steps.values())]
+    assert len(set(planned)) == len(planned)
     for (solver, key), (run, thin) in slices.items():
         usual = all_cases()[key]
         assert (solver, run.settings["steps"], thin) == (PUBLISHED, usual.steps, usual.thin)
@@ -571,17 +569,18 @@ def test_the_published_program_is_flown_with_half_its_slices_and_with_half_its_s
 
 def test_gathering_keeps_what_belongs_together(monkeypatch):
     scenario = replace(THROW, duration=0.01)
-    one = Run("one", PUBLISHED, scenario, {"steps": 5, "store": "summary"})
-    two = Run("two", PUBLISHED, replace(scenario, omega0=10.0), {"steps": 5, "store": "summary"})
+    one = Run(PUBLISHED, scenario, {"steps": 5, "store": "summary"}, label="one")
+    two = Run(PUBLISHED, replace(scenario, omega0=10.0), {"steps": 5, "store": "summary"}, label="two")
     monkeypatch.setattr(claim_runs, "plan_further", lambda: {(PUBLISHED, "a"): one})
     monkeypatch.setattr(claim_runs, "plan_halved", lambda: {("eq8", "a"): two})
-    three = replace(two, tag="three", scenario=replace(scenario, omega0=15.0))
-    four = replace(two, tag="four", scenario=replace(scenario, omega0=16.0))
+    three = replace(two, label="three", scenario=replace(scenario, omega0=15.0))
+    four = replace(two, label="four", scenario=replace(scenario, omega0=16.0))
     half = {"slices": three, "steps": four}
     monkeypatch.setattr(claim_runs, "plan_published", lambda of: {(PUBLISHED, "a"): (half[of], 1)})
     paper = PaperRuns(made={}, costs=())
-    with ThreadPoolExecutor(1) as pool:
-        runs = gather_claims(pool, paper, lambda *_: None)
+    plan = plan_claims()
+    made = {each.run: each for group in plan.groups for each in make_thinned(group)} | {r: make(r) for r in plan.runs}
+    runs = ClaimRuns.of(paper, plan, made)
     assert runs.trajectory(PUBLISHED, "a").scenario.omega0 == 20.0
     assert runs.flights("eq8").halved.runs["a"].scenario.omega0 == 10.0
     assert runs.flights("eq8").half_steps is None
@@ -614,11 +613,13 @@ def runs():
         for half in ("slices", "steps")
     }
     for key, case in cases.items():
-        made[PUBLISHED, key] = make(Run(key, PUBLISHED, case.scenario, {"steps": case.steps, "store": store(key)}))
+        made[PUBLISHED, key] = make(
+            Run(PUBLISHED, case.scenario, {"steps": case.steps, "store": store(key)}, label=key)
+        )
     planned = plan_further()
     further = {pair: make(run) for pair, run in planned.items() if pair[0] in (PUBLISHED, "eq8-weightless")}
     tenth = paper_throw(0.1).with_slices(50)
-    made["free-flight", "filling 0.1"] = make(Run("tenth", "free-flight", tenth))
+    made["free-flight", "filling 0.1"] = make(Run("free-flight", tenth, label="tenth"))
     everything = [*made.values(), *further.values(), *halves["slices"].values(), *halves["steps"].values()]
     assert not [each.reason for each in everything if each.trajectory is None]
     return ClaimRuns(
@@ -699,7 +700,7 @@ def test_weight_is_what_slows_the_bottle_filled_to_a_tenth(runs):
 
 def test_free_flight_does_not_know_where_down_is():
     made = {
-        ("free-flight", case.key): make(Run(case.key, "free-flight", case.scenario.with_slices(5)))
+        ("free-flight", case.key): make(Run("free-flight", case.scenario.with_slices(5), label=case.key))
         for case in family("angle")
     }
     runs = ClaimRuns(paper=PaperRuns(made=made, costs=()), further={}, halved={})
@@ -717,10 +718,13 @@ def test_the_page_shows_every_verdict_with_word_sign_and_number(runs, read_page)
     templates = environment()
     verdicts = judge_paper(runs)
     macros = (
+        "{% macro draw(figures) %}{% endmacro %}"
         "{% macro anchor(id, words) %}<a href='#{{ id }}'>{{ words }}</a>{% endmacro %}"
         "{% macro scroll(words) %}<div>{{ caller() }}</div>{% endmacro %}"
     )
-    text = templates.from_string(macros + '{% include "paper.html.j2" %}').render(paper=verdicts)
+    text = templates.from_string(macros + CHAPTER.template.read_text(encoding="utf-8")).render(
+        paper=verdicts, figures=()
+    )
     page = read_page(text)
     assert len(set(page.ids)) == len(page.ids)
     assert {f"paper-{claim.id}" for claim in CLAIMS} <= set(page.ids)

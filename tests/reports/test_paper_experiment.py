@@ -152,7 +152,7 @@ def test_all_statements_are_compared_for_all_equations():
     made = {}
     for solver in SOLVERS:
         for key, run in flights(experimental).runs.items():
-            made[solver, key] = Made(Run(key, solver, run.scenario), run, 0.0)
+            made[solver, key] = Made(Run(solver, run.scenario, label=key), run, 0.0)
     runs = ClaimRuns(paper=PaperRuns(made=made, costs=()), further={}, halved={})
     compared = experiment.compare_all(runs)
     assert [each.observation.id for each in compared] == list(BY_ID)

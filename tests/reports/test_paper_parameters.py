@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import slicemodel
-from flipproof import vectors
+from flipproof.chapters.vectors import published as vectors
 from flipproof.paper import cases, parameters, runs, tables
 from flipproof.paper.cases import FAMILIES, HALF_FULL, all_cases, bottle_of_aspect, family
 from flipproof.paper.examples import EXAMPLES
 from flipproof.paper.parameters import CHOSEN, PARAMETERS, number, numbers, paper_throw
-from flipproof.paper.runs import PUBLISHED, SOLVERS, plan_paper
+from flipproof.paper.runs import PUBLISHED, SOLVERS, plan_groups
 from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass_at_rest
 
@@ -165,9 +165,9 @@ def test_four_throws_are_those_of_the_published_vectors():
 
 
 def test_the_plan_flies_every_case_with_its_own_slices():
-    plan = plan_paper()
-    assert len({run.tag for run in plan}) == len(plan)
-    by_tag = {run.tag: run for run in plan}
+    plan = [each.run for group in plan_groups() for each in group]
+    assert len({run.label for run in plan}) == len(plan)
+    by_tag = {run.label: run for run in plan}
     for solver in SOLVERS:
         for key, case in all_cases().items():
             run = by_tag.get(f"paper, {solver}, {key}")
@@ -180,11 +180,11 @@ def test_the_plan_flies_every_case_with_its_own_slices():
 
 
 def test_a_plan_for_some_cases_has_no_others():
-    assert {run.tag for run in plan_paper(keys={cases.ICE})} == {f"paper, {solver}, ice" for solver in SOLVERS}
+    assert {each.run.label for each in plan_groups({cases.ICE})[0]} == {f"paper, {solver}, ice" for solver in SOLVERS}
 
 
 def test_thinning_keeps_both_ends():
-    run = runs.Run("a", PUBLISHED, paper_throw().with_slices(3), {"steps": 10})
+    run = runs.Run(PUBLISHED, paper_throw().with_slices(3), {"steps": 10})
     whole, thinned = (runs.make_thinned([(run, every)])[0].trajectory for every in (1, 3))
     np.testing.assert_array_equal(thinned.t, whole.t[::3])
     np.testing.assert_array_equal(thinned.r, whole.r[::3])

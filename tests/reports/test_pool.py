@@ -22,8 +22,8 @@ def die_the_first_time(mark: Path) -> int:
 
 
 def die_with_run_2(runs):
-    """Make runs as ``make_each`` does, but die with the run of tag "2"."""
-    if any(run.tag == "2" for run in runs):
+    """Make runs as ``make_each`` does, but die with the run labelled "2"."""
+    if any(run.label == "2" for run in runs):
         os.kill(os.getpid(), signal.SIGKILL)
     return [pool.make(run) for run in runs]
 
@@ -42,9 +42,9 @@ def _always_die():
 
 def test_only_the_run_that_kills_its_worker_is_lost_and_the_order_stays(monkeypatch):
     monkeypatch.setattr(pool, "make_each", die_with_run_2)
-    runs = [Run(f"{n}", "eq8", Scenario(n_slices=n, duration=0.02)) for n in (1, 2, 3)]
+    runs = [Run("eq8", Scenario(n_slices=n, duration=0.02), label=f"{n}") for n in (1, 2, 3)]
     with workers(2) as processes:
-        made = make_all(processes, runs, lambda *_: None)
-    assert list(made) == ["1", "2", "3"]
+        made, _ = make_all(processes, runs, lambda *_: None)
+    assert list(made) == runs
     assert [result.trajectory is None for result in made.values()] == [False, True, False]
-    assert made["2"].reason == f"the worker process died {TRIES} times with this run (exit code -9)"
+    assert made[runs[1]].reason == f"the worker process died {TRIES} times with this run (exit code -9)"

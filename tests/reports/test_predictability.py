@@ -6,17 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flipproof.figures.events import figure_predictability
-from flipproof.figures.style import draw
-from flipproof.frame.solvers import make, solve
-from flipproof.studies.differences import study_difference
-from flipproof.studies.predictability import (
+from flipproof.chapters.differences.study import study_difference
+from flipproof.chapters.predictability.figure import figure_predictability
+from flipproof.chapters.predictability.study import (
     SIZES,
     fit_growth,
     plan_predictability,
     study_parting_growth,
     study_predictability,
 )
+from flipproof.figures.style import draw
+from flipproof.frame.solvers import make, solve
 from slicemodel import Impacts, Scenario, Trajectory
 
 T = np.linspace(0.0, 0.5, 1001)
@@ -110,7 +110,7 @@ def test_the_plan_changes_angle_and_spin_by_each_size_both_ways():
     assert np.abs(changes[0]) == pytest.approx(1e-8, rel=1e-6, abs=0.0)
     assert np.abs(changes[1]) == pytest.approx(1e-6, rel=1e-6, abs=0.0)
     assert len({tuple(np.sign(pair)) for pair in changes[0]}) == 4
-    assert len({run.tag for level in plan for run in level}) == 8
+    assert len({run.label for level in plan for run in level}) == 8
     assert all(run.settings == {"rtol": 1e-9} for level in plan for run in level)
 
 

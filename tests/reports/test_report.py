@@ -17,25 +17,21 @@ from pathlib import Path
 
 import pytest
 from jsonschema import validate
+from made_up import spoiled
 
 from flipproof import build as build_module
-from flipproof import claims
-from flipproof import evidence as evidence_module
+from flipproof.chapters.differences.chapter import PAIRS
+from flipproof.chapters.engine_facts.chapter import CHECK_DT
+from flipproof.chapters.solvers import ENGINE, FLIGHTS, OTHER_SCHEMES
+from flipproof.chapters.vectors import chapter as vectors
 from flipproof.cli import main as cli
-from flipproof.evaluation import evaluate
-from flipproof.evidence import (
-    CHECK,
-    DIFFERENCES,
-    ENGINE,
-    FLIGHTS,
-    OTHER_SCHEMES,
-)
-from flipproof.exhibits import draw_all
 from flipproof.figures.style import Drawing
 from flipproof.frame import pool
 from flipproof.frame.exhibit import FEW, drawn
+from flipproof.frame.gather import tell
 from flipproof.frame.pool import make_all, workers
-from flipproof.frame.solvers import Made, Run, make
+from flipproof.frame.solvers import Run, make
+from flipproof.frame.throws import REFERENCE
 from flipproof.output.ownership import MARKER, marker_text
 from flipproof.page.render import typeset
 from slicemodel import Scenario
@@ -44,8 +40,20 @@ ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.xdist_group("evidence")
 
 
-def test_every_claim_is_evaluated_and_holds(evidence):
-    findings = list(evaluate(evidence))
+def findings_of(gathered):
+    return [finding for each in tell(gathered).values() for finding in each.findings]
+
+
+def exhibits_of(gathered):
+    return [figure for each in tell(gathered).values() for figure in each.figures]
+
+
+def flights_of(gathered):
+    return [gathered.found("flights").made[name].trajectory for name in FLIGHTS]
+
+
+def test_every_claim_is_evaluated_and_holds(gathered):
+    findings = findings_of(gathered)
     assert [(f.id, f.value, f.note) for f in findings if f.failed] == []
     assert len({f.id for f in findings}) == len(findings)
     ids = {f.id for f in findings}
@@ -56,9 +64,9 @@ def test_every_claim_is_evaluated_and_holds(evidence):
         "waterfall-plateau", "model-form-exact-step-eq8", "predictability-free-flight",
     ):  # fmt: skip
         assert needed in ids
-    assert sum(f.id.startswith("difference-") for f in findings) == len(DIFFERENCES)
+    assert sum(f.id.startswith("difference-") for f in findings) == len(PAIRS)
     assert sum(f.id.startswith("erratum-") for f in findings) >= 20
-    assert evidence.attribution.problems == {}
+    assert [note for each in tell(gathered).values() for note in each.notes] == []
 
 
 def test_the_page_is_whole_and_stands_alone(report, read_page):
@@ -112,26 +120,25 @@ def is_number(cell):
     return True
 
 
-def test_the_csv_of_a_figure_is_what_is_drawn(evidence, report):
+def test_the_csv_of_a_figure_is_what_is_drawn(gathered, report):
     """Read back from the tables: the last omega of each flight, and the largest of each difference."""
     tables = {exhibit.name: list(csv.DictReader(io.StringIO(exhibit.table))) for exhibit in report.exhibits}
-    for tag in FLIGHTS:
-        run = evidence.trajectory(tag)
+    for run in flights_of(gathered):
         column = [float(row[f"omega/omega_0 {run.label} [1]"]) for row in tables["omega"]]
         assert column == pytest.approx(run.omega / run.scenario.omega0, rel=1e-8, abs=0.0)
-    for difference in evidence.differences:
+    for difference in gathered.found("differences").pairs:
         column = [float(row[f"difference in omega/omega_0: {difference.name} [1]"]) for row in tables["differences"]]
         assert max(map(abs, column)) == pytest.approx(difference.largest, rel=1e-8, abs=0.0)
-    waterfall = evidence.attribution.waterfalls[0]
+    waterfall = gathered.found("waterfall")[0]
     bars = [float(row["mean of all orders [1]"]) for row in tables["waterfall"]]
     assert sum(bars[:-1]) == pytest.approx(bars[-1], abs=1e-7)
     assert bars[-1] == pytest.approx(waterfall.end, rel=1e-8, abs=0.0)
 
 
-def test_workers_draw_the_same_bytes_in_the_same_order(evidence, report):
+def test_workers_draw_the_same_bytes_in_the_same_order(gathered, report):
     """Only the figures that are quickest to draw: what is asked of is the way there and back."""
     quick = ("omega", "theta", "slice-count", "waterfall")
-    exhibits = [exhibit for exhibit in draw_all(evidence) if exhibit.name in quick]
+    exhibits = [exhibit for exhibit in exhibits_of(gathered) if exhibit.name in quick]
     assert len(exhibits) == len(quick) > FEW
     here = {exhibit.name: exhibit.drawing for exhibit in report.exhibits}
     away = drawn(exhibits, 2)
@@ -140,27 +147,16 @@ def test_workers_draw_the_same_bytes_in_the_same_order(evidence, report):
         assert exhibit.drawn == here[exhibit.name]
 
 
-def test_every_figure_can_be_sent_to_a_worker(evidence):
-    for exhibit in draw_all(evidence):
+def test_every_figure_can_be_sent_to_a_worker(gathered):
+    for exhibit in exhibits_of(gathered):
         maker, _ = pickle.loads(pickle.dumps((exhibit.maker, exhibit.data)))
         assert maker is exhibit.maker
 
 
-def test_axes_carry_units(evidence):
-    from flipproof.figures import flights as drawn
-    from flipproof.figures import numerics
-
-    flights = [evidence.trajectory(tag) for tag in FLIGHTS]
-    made = [
-        drawn.figure_omega(flights),
-        drawn.figure_theta(flights),
-        drawn.figure_centre_of_mass(flights),
-        drawn.figure_slices(flights),
-        drawn.figure_differences(evidence.differences),
-        numerics.figure_step_size(list(evidence.flights_by_step.values()), list(evidence.starts_by_step.values())),
-        numerics.figure_ice((*evidence.ice, *evidence.welded)),
-        numerics.figure_slice_count(evidence.slices),
-    ]
+def test_axes_carry_units(gathered):
+    names = ("omega", "theta", "centre-of-mass", "slices", "differences", "step-size", "ice", "slice-count")
+    made = [exhibit.maker(*exhibit.data) for exhibit in exhibits_of(gathered) if exhibit.name in names]
+    assert len(made) == len(names)
     for figure in made:
         for axes in figure.axes:
             # A panel that shares its axis with a neighbour shows no label of its own; every other must have one.
@@ -171,30 +167,32 @@ def test_axes_carry_units(evidence):
                 assert re.search(r"\[(s|1|degrees)\]", label) or (shared and not label), label
 
 
-def test_the_same_data_draw_the_same_bytes(evidence):
-    from flipproof.figures.flights import figure_omega
+def test_the_same_data_draw_the_same_bytes(gathered):
+    from flipproof.chapters.flights.figures import figure_omega
     from flipproof.figures.style import draw
 
-    flights = [evidence.trajectory(tag) for tag in FLIGHTS]
+    flights = flights_of(gathered)
     first, second = (draw(figure_omega(flights)) for _ in range(2))
     assert first.svg == second.svg
 
 
-def with_a_stand_in(exhibits, jobs=None):
-    del jobs
-    return tuple(dataclasses.replace(exhibit, drawn=Drawing("<?xml?><svg/>", b"\x89PNG")) for exhibit in exhibits)
+def with_a_stand_in(exhibits, jobs=None, *, pool=None, png=False):
+    del jobs, pool
+    drawing = Drawing("<?xml?><svg/>", b"\x89PNG" if png else b"")
+    return tuple(dataclasses.replace(exhibit, drawn=drawing) for exhibit in exhibits)
 
 
-def run_report(monkeypatch, evidence, folder, *arguments):
-    monkeypatch.setattr(evidence_module, "gather", lambda *_: evidence)
+def run_report(monkeypatch, gathered, folder, *arguments):
+    monkeypatch.setattr(build_module, "gather_report", lambda *_: gathered)
     # Drawn before: what these tests ask about is what is made of the figures.
     monkeypatch.setattr(build_module, "drawn", with_a_stand_in)
     return cli.main(["report", "--out", str(folder), *arguments])
 
 
-def test_the_folder_holds_everything(monkeypatch, capsys, tmp_path, evidence, read_page):
+@pytest.mark.parametrize("png", [False, True])
+def test_the_folder_holds_everything(monkeypatch, capsys, tmp_path, gathered, read_page, png):
     folder = tmp_path / "latest"
-    assert run_report(monkeypatch, evidence, folder) == 0
+    assert run_report(monkeypatch, gathered, folder, *(["--png"] if png else [])) == 0
     out = capsys.readouterr().out
     assert "regression claims hold." in out
     assert str(folder / "index.html") in out
@@ -206,37 +204,38 @@ def test_the_folder_holds_everything(monkeypatch, capsys, tmp_path, evidence, re
         header = (folder / "trajectories" / tag / "data.csv").read_text().splitlines()[0]
         assert header.startswith("t,theta,omega,r_cm,inertia,r_0")
     names = {path.stem for path in (folder / "figures").iterdir()}
-    assert {path.suffix for path in (folder / "figures").iterdir()} == {".svg", ".png", ".csv"}
+    kinds = ["svg", "table", *(["png"] if png else [])]
+    assert {path.suffix for path in (folder / "figures").iterdir()} == {".svg", ".csv", *([".png"] if png else [])}
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert {figure["name"] for figure in summary["figures"]} == names
     for figure in summary["figures"]:
-        assert all((folder / figure[kind]).is_file() for kind in ("svg", "png", "table"))
+        assert all((folder / figure[kind]).is_file() for kind in kinds)
+        assert png or figure["png"] is None
     assert (folder / summary["$schema"]).is_file()
     assert (folder / "junit.xml").is_file()
-    assert Scenario.from_mapping(summary["scenario"]) == evidence.scenario
+    assert Scenario.from_mapping(summary["scenario"]) == gathered.ask.scenario
     for finding in summary["findings"]:
         assert {"id", "title", "value", "unit", "band", "admissible", "kind", "verdict", "note"} <= set(finding)
         assert "threshold" in finding
-    assert {run["tag"] for run in summary["runs"]} == set(evidence.made)
+    assert {run["tag"] for run in summary["runs"]} == {run.name for run in gathered.flights}
     assert summary["provenance"]["command"].startswith("flipproof")
 
 
-def test_a_failed_regression_sets_status_1_and_says_which(monkeypatch, capsys, tmp_path, evidence):
-    monkeypatch.setitem(claims.VECTOR_TOLERANCE, "published-python", 1e-18)
+def test_a_failed_regression_sets_status_1_and_says_which(monkeypatch, capsys, tmp_path, gathered):
+    monkeypatch.setitem(vectors.TOLERANCE, "published-python", 1e-18)
     folder = tmp_path / "latest"
-    assert run_report(monkeypatch, evidence, folder) == 1
+    assert run_report(monkeypatch, gathered, folder) == 1
     out = capsys.readouterr().out
     assert "FAIL  published-python reproduces the published run python_default" in out
     assert "regression claims fail" in (folder / "index.html").read_text(encoding="utf-8")
 
 
-def test_a_solver_that_fails_is_shown_in_place(monkeypatch, capsys, tmp_path, evidence):
+def test_a_solver_that_fails_is_shown_in_place(monkeypatch, capsys, tmp_path, gathered):
     """The page, the summary and the verdicts for CI systems give the reason; the rest of the report is whole."""
     reason = "SetupError: the world is not the one that was meant"
-    made = dict(evidence.made)
-    for tag in (ENGINE, f"{CHECK}, {ENGINE}"):
-        made[tag] = Made(made[tag].run, None, 0.1, reason)
-    broken = dataclasses.replace(evidence, made=made, differences=evidence.differences[:3])
+    runs = [gathered.ask.solvers[ENGINE], Run(ENGINE, REFERENCE, {"dt": CHECK_DT})]
+    chapters = ("flights", "differences", "certificates", "agreement", "engine-facts")
+    broken = spoiled(gathered, runs, reason, chapters)
     folder = tmp_path / "latest"
     assert run_report(monkeypatch, broken, folder) == 1
     page = (folder / "index.html").read_text(encoding="utf-8")
@@ -257,7 +256,7 @@ def test_a_solver_that_fails_is_shown_in_place(monkeypatch, capsys, tmp_path, ev
     assert suite.get("errors") == "1"
 
 
-def test_a_report_that_cannot_be_written_whole_leaves_the_one_before(monkeypatch, capsys, tmp_path, evidence):
+def test_a_report_that_cannot_be_written_whole_leaves_the_one_before(monkeypatch, capsys, tmp_path, gathered):
     folder = tmp_path / "latest"
     folder.mkdir()
     (folder / "summary.json").write_text("the old one")
@@ -267,23 +266,23 @@ def test_a_report_that_cannot_be_written_whole_leaves_the_one_before(monkeypatch
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(build_module, "junit_text", break_off)
-    assert run_report(monkeypatch, evidence, folder) == 2
+    assert run_report(monkeypatch, gathered, folder) == 2
     assert "No space left" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["latest"]
     assert sorted(path.name for path in folder.iterdir()) == [MARKER, "summary.json"]
     assert (folder / "summary.json").read_text() == "the old one"
 
 
-def test_the_snapshot_has_every_claim_that_the_code_makes(evidence):
+def test_the_snapshot_has_every_claim_that_the_code_makes(gathered):
     """A full report makes all claims of a quick one."""
     summary = json.loads((ROOT / "reports" / "snapshot" / "summary.json").read_text(encoding="utf-8"))
     held = {finding["id"] for finding in summary["findings"] if finding["kind"] == "regression"}
-    made = {finding.id for finding in evaluate(evidence) if finding.kind == "regression"}
+    made = {finding.id for finding in findings_of(gathered) if finding.kind == "regression"}
     assert sorted(made - held) == []
 
 
 def test_a_run_that_raises_becomes_its_reason():
-    run = Run("bad", "eq8", Scenario(n_slices=1), {"rtol": -1.0})
+    run = Run("eq8", Scenario(n_slices=1), {"rtol": -1.0}, label="bad")
     result = make(run)
     assert result.trajectory is None
     assert result.reason.startswith("ValueError: ")
@@ -291,10 +290,10 @@ def test_a_run_that_raises_becomes_its_reason():
 
 
 def test_workers_bring_home_the_same_trajectory():
-    run = Run("eq8", "eq8", Scenario(n_slices=2, duration=0.05))
+    run = Run("eq8", Scenario(n_slices=2, duration=0.05), label="eq8")
     seen = []
     with workers(1) as processes:
-        away = make_all(processes, [run], lambda *call: seen.append(call))["eq8"].trajectory
+        away = make_all(processes, [run], lambda *call: seen.append(call))[0][run].trajectory
     here = make(run).trajectory
     assert seen == [(1, 1, "eq8")]
     assert (away.omega == here.omega).all()
@@ -322,11 +321,11 @@ class LastFirst(Executor):
 
 def test_results_stand_in_the_order_asked_whichever_worker_is_faster(monkeypatch):
     """A step must never be paired with the drift of another: what is read off this table is read in order."""
-    monkeypatch.setattr(pool, "SMALL", 0.0)
-    runs = [Run(f"{n}", "eq8", Scenario(n_slices=n, duration=0.02)) for n in (1, 2, 3)]
-    made = make_all(LastFirst(3), runs, lambda *_: None)
-    assert list(made) == ["1", "2", "3"]
-    assert [result.run.tag for result in made.values()] == ["1", "2", "3"]
+    monkeypatch.setattr(pool, "GROUP", 1)
+    runs = [Run("eq8", Scenario(n_slices=n, duration=0.02), label=f"{n}") for n in (1, 2, 3)]
+    made, _ = make_all(LastFirst(3), runs, lambda *_: None)
+    assert list(made) == runs
+    assert [result.run.label for result in made.values()] == ["1", "2", "3"]
 
 
 def test_typeset():
@@ -346,7 +345,7 @@ def test_the_real_command_from_a_cold_start(tmp_path):
     )
     told = [re.fullmatch(r"flipproof: \d+ s: (.+)", line) for line in result.stderr.splitlines()]
     assert [line and line[1] for line in told] == [
-        "runs", "work and precision", "validity maps", "studies", "the paper", "figures", "page",
+        "runs, wave 1", "studies", "runs, wave 2", "studies", "figures", "page",
     ]  # fmt: skip
     assert result.returncode == 0, result.stdout
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))

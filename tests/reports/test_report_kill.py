@@ -27,12 +27,12 @@ from flipproof.frame.solvers import Run
 from slicemodel import Scenario
 
 if __name__ == "__main__":
-    runs = [Run(f"{n}", "eq8", Scenario(n_slices=n, duration=0.05)) for n in range(1, 20)]
+    runs = [Run("eq8", Scenario(n_slices=n, duration=0.05), label=f"{n}") for n in range(1, 20)]
     with replaced_folder(Path(sys.argv[-1]), "report") as folder:
         with workers(2) as pool:
-            made = make_all(pool, runs, lambda *_: None)
-        for tag, run in made.items():
-            (folder / f"{tag}.txt").write_text(f"{run.trajectory.omega[-1]!r}")
+            made, _ = make_all(pool, runs, lambda *_: None)
+        for run, each in made.items():
+            (folder / f"{run.label}.txt").write_text(f"{each.trajectory.omega[-1]!r}")
         (folder / "summary.json").write_text("whole")
 """
 """What a report does, in small: runs in the pool, then a folder."""

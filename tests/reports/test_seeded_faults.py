@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import slicemodel
+from flipproof.chapters.waterfall.study import NAMES, PROGRAM, STEP, plan_waterfall, program_run, study_waterfall
 from flipproof.frame.solvers import make
-from flipproof.studies.waterfall import NAMES, PROGRAM, STEP, plan_waterfall, study_waterfall
 from ode_reference import combinations, contact, motion, witness
 from slicemodel import Scenario
 
@@ -131,9 +131,9 @@ def bars():
     for planned in plan_waterfall(THROW, STEPS):
         how = {} if planned.solver == PROGRAM else {"method": "DOP853", "rtol": 1e-9}
         trajectory = make(dataclasses.replace(planned, settings={**planned.settings, **how})).trajectory
-        assert trajectory is not None, planned.tag
-        runs[planned.tag] = trajectory
-    plateau = study_waterfall(runs)[0]
+        assert trajectory is not None, planned.label
+        runs[planned] = trajectory
+    plateau = study_waterfall(program_run(THROW, STEPS), runs)[0]
     assert plateau.observable.name == "plateau"
     return {bar.name: bar.forward for bar in plateau.bars}
 

@@ -5,11 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flipproof.claims_engines import claim_default_iterations_explode, claim_rule_of_iterations, claim_whole_and_wrong
-from flipproof.exhibits_engines import draw_stability
-from flipproof.figures.engines import COLOURS, SIGNS, figure_stability
-from flipproof.frame.solvers import Made, make
-from flipproof.studies.stability import (
+from flipproof.chapters.stability.chapter import (
+    claim_default_iterations_explode,
+    claim_rule_of_iterations,
+    claim_whole_and_wrong,
+    draw_stability,
+)
+from flipproof.chapters.stability.figure import COLOURS, SIGNS, figure_stability
+from flipproof.chapters.stability.study import (
     FULL,
     GRADES,
     QUICK,
@@ -19,13 +22,14 @@ from flipproof.studies.stability import (
     plan_stability,
     study_stability,
 )
+from flipproof.frame.solvers import Made, make
 from slicemodel import Scenario, Trajectory
 
 THROW = Scenario()
 SMALL = Layout(panels=((6.0, 10),), dt=(2e-3, 2e-4), iterations=(5, 10, 60), duration=0.1, budget=2e5)
 
 
-def flight(run, error=0.0, message="", points=None) -> Made:
+def flight(run, error=0.0, message="", points=None, reason="") -> Made:
     """A run whose omega is off by a fraction of omega_0 from the middle on; stopped if there is a message."""
     t = run.settings["times"][:points]
     zero = np.zeros(len(t))
@@ -42,22 +46,23 @@ def flight(run, error=0.0, message="", points=None) -> Made:
         inertia=zero + 1.0,
         status="diverged" if message else "ok",
         message=message,
+        reason=reason,
     )
     return Made(run, trajectory, 0.0)
 
 
 def chart(spoil, layout=SMALL):
-    """Study a chart whose runs are perfect but for those that ``spoil`` makes, by words in their tags."""
+    """Study a chart whose runs are perfect but for those that ``spoil`` makes, by words in their labels."""
     made = {}
     for run in plan_stability(THROW, layout):
-        found = [change for words, change in spoil.items() if words in run.tag]
-        made[run.tag] = found[0](run) if found else flight(run)
+        found = [change for words, change in spoil.items() if words in run.label]
+        made[run] = found[0](run) if found else flight(run)
     return study_stability(THROW, layout, made)
 
 
-def test_the_plan_has_unique_tags_explicit_settings_and_references_with_twins():
+def test_the_plan_has_different_runs_explicit_settings_and_references_with_twins():
     runs = plan_stability(THROW, FULL)
-    assert len({run.tag for run in runs}) == len(runs)
+    assert len({run.label for run in runs}) == len(runs)
     engine = [run for run in runs if run.solver == "pymunk"]
     assert all({"dt", "iterations", "times"} == set(run.settings) for run in engine)
     assert sum(run.solver == "free-flight" for run in runs) == 3 * len(FULL.panels)
@@ -85,7 +90,7 @@ def test_a_panel_is_the_throw_with_other_water():
 def test_every_grade_is_given_for_its_reason_and_no_other():
     spoil = {
         "dt 0.002 s, 5 iterations": lambda run: flight(run, message="diverged: joints; raise iterations", points=3),
-        "dt 0.002 s, 10 iterations": lambda run: flight(run, message="diverged: depth; reduce dt", points=5),
+        "dt 0.002 s, 10 iterations": lambda run: flight(run, message="diverged: depth", reason="penetration", points=5),
         "dt 0.002 s, 60 iterations": lambda run: flight(run, 0.011),
         "dt 0.0002 s, 5 iterations": lambda run: flight(run, 0.009),
         "dt 0.0002 s, 10 iterations": lambda run: flight(run, 0.0009),
@@ -168,7 +173,7 @@ def test_the_figure_signs_every_cell_and_draws_rule_and_default():
 
 def test_pymunk_explodes_at_its_default_and_follows_free_flight_by_the_rule():
     layout = replace(SMALL, budget=1e6)
-    panels = study_stability(THROW, layout, {run.tag: make(run) for run in plan_stability(THROW, layout)})
+    panels = study_stability(THROW, layout, {run: make(run) for run in plan_stability(THROW, layout)})
     (panel,) = panels
     assert panel.grade[:2].tolist() == [["explodes"] * 2] * 2
     # A finer step explodes sooner.

@@ -3,16 +3,18 @@
 import html
 import json
 import re
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
+from flipproof.chapters.waterfall.study import NAMES
+from flipproof.frame.gather import tell
 from flipproof.page.glossary import TERMS, anchor, linked
-from flipproof.page.sections import EVIDENCE, STORY, counted, section_of
+from flipproof.page.sections import STORY
 from flipproof.page.story.facts import CHANGES, EXPERIMENTS, story
 from flipproof.page.story.live import sliders
 from flipproof.page.story.numbers import Summary
-from flipproof.studies.waterfall import NAMES
 from slicemodel import Scenario
 
 pytestmark = pytest.mark.xdist_group("evidence")
@@ -111,16 +113,20 @@ def test_no_other_number_stands_in_the_story(report):
         assert re.findall(r"[^ ]*\d[^ ]*", words) == [], name
 
 
-def test_the_counts_by_chapter_are_those_of_the_findings(report):
-    counts = counted(report.findings)
+def test_the_counts_by_chapter_are_those_of_the_findings(report, gathered):
+    told = tell(gathered)
+    counts = {
+        part.id: Counter(f.verdict for chapter in part.chapters if chapter.name in told
+                         for f in told[chapter.name].findings)
+        for part in gathered.parts
+    }  # fmt: skip
     table = re.search(r'<table class="chapters">.*?</table>', report.html, re.S).group()
     rows = re.findall(r'href="#([\w-]+)">[^<]*</a></th>' + r'<td class="number">([^<]*)</td>' * 3, table)
-    assert {row[0] for row in rows} == {section for section in counts if section in EVIDENCE}
-    for section, *shown in rows:
-        expected = [counts[section].get(verdict, 0) for verdict in ("pass", "fail", "observed")]
+    assert [row[0] for row in rows] == [part for part in counts if counts[part]]
+    for part, *shown in rows:
+        expected = [counts[part][verdict] for verdict in ("pass", "fail", "observed")]
         assert [0 if text == "–" else int(text) for text in shown] == expected
-    assert sum(sum(verdicts.values()) for verdicts in counts.values()) == len(report.findings)
-    assert [finding.id for finding in report.findings if section_of(finding.id) == "findings"] == []
+    assert sum(map(Counter.total, counts.values())) == len(report.findings)
 
 
 def test_what_the_snapshot_found_is_told_in_full():

@@ -7,9 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flipproof.figures.events import figure_tube
-from flipproof.figures.style import draw
-from flipproof.studies.tube import hold_against_tube, study_tube, tube_around
+from flipproof.chapters.alignment.tube import hold_against_tube, study_tube, tube_around
 from slicemodel import Scenario, Trajectory
 
 T = np.linspace(0.0, 0.5, 501)
@@ -133,10 +131,3 @@ def test_impossible_questions_are_refused():
     for dt, dy in ((-1.0, 1.0), (1.0, -1.0), (math.nan, 1.0)):
         with pytest.raises(ValueError, match="must not be negative"):
             study_tube(one, one, dt=dt, dy=dy)
-
-
-def test_the_figure_marks_what_is_outside():
-    tube = study_tube(run(np.full(501, 20.0)), run(np.full(501, 20.3)), dt=0.001, dy=0.2)
-    words = [text.get_text() for text in figure_tube(tube).legends[0].get_texts()]
-    assert "outside (100% of the time)" in words
-    assert draw(figure_tube(tube)).png.startswith(b"\x89PNG")

@@ -1,16 +1,14 @@
 """Maps of validity on made-up plateaus, and a small real one."""
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_up import study_map
 
 import ode_reference
-from flipproof.figures.style import draw
-from flipproof.figures.validity import figure_map
-from flipproof.frame.solvers import Made, Run, make
-from flipproof.studies.validity import (
+from flipproof.chapters.maps.figure import figure_map
+from flipproof.chapters.maps.study import (
     EXTRA,
     LADDER,
     POINTS,
@@ -18,11 +16,13 @@ from flipproof.studies.validity import (
     SCHEMES,
     SETS,
     cells,
-    gather_map,
+    make_readings,
     plan_map,
-    study_map,
+    study_readings,
     vary,
 )
+from flipproof.figures.style import draw
+from flipproof.frame.solvers import Made, Run, make
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import plateau
 
@@ -51,9 +51,9 @@ def flat(run: Run, level: float, status: str = "ok") -> Made:
 
 
 def made_up(axis, values, level_of, spoil=None):
-    """Make every planned run up; ``spoil`` maps tags to what became of them instead."""
+    """Make every planned run up; ``spoil`` maps runs to what became of them instead."""
     runs = plan_map(THROW, axis, FILLS, values)
-    made = {run.tag: flat(run, level_of(run)) for run in runs} | (spoil or {})
+    made = {run: flat(run, level_of(run)) for run in runs} | (spoil or {})
     return study_map(THROW, axis, FILLS, values, made)
 
 
@@ -72,9 +72,9 @@ def test_the_ladder_and_its_rungs_fit_together():
     assert len(RUNGS) == len(LADDER) - 1
 
 
-def test_tags_are_unique_within_and_across_maps():
+def test_labels_tell_the_runs_of_all_maps_apart():
     runs = [run for axis in ("gamma", "step", "restitution") for run in plan_map(THROW, axis, FILLS, (0.1, 0.2, 0.3))]
-    assert len({run.tag for run in runs}) == len(runs)
+    assert len({run.label for run in runs}) == len(runs)
 
 
 def test_a_model_runs_once_per_fill_along_the_step_axis():
@@ -128,14 +128,14 @@ def test_fair_shares_colour_a_map_where_every_set_was_flown():
     worth = {"signs": 0.06, "roots": -0.02, "weightless": 0.05, "origin": 0.01, "recoil": -0.01}
     runs = plan_map(THROW, "gamma", FILLS, (0.1, 0.2), shares=True)
     assert len(runs) == 4 * (2 + 40)
-    made = {run.tag: flat(run, by_set(worth)(run)) for run in runs}
+    made = {run: flat(run, by_set(worth)(run)) for run in runs}
     study = study_map(THROW, "gamma", FILLS, (0.1, 0.2), made, shares=True)
     assert study.shares[:, 1, 0] == pytest.approx([0.1, 0.11, -0.02, 0.0, 0.05, 0.01, 0.04], abs=1e-12)
     assert (study.dominant == RUNGS.index("sign of Eq. 9d")).all()
     assert study.shares.sum(axis=0) == pytest.approx(study.level["free-flight"] - study.level["published-python"])
     ladder = study_map(THROW, "gamma", FILLS, (0.1, 0.2), made)
     assert ladder.shares is None
-    missing = {**made, runs[5].tag: Made(runs[5], None, 0.0, "MemoryError: too much")}
+    missing = {**made, runs[5]: Made(runs[5], None, 0.0, "MemoryError: too much")}
     assert (study_map(THROW, "gamma", FILLS, (0.1, 0.2), missing, shares=True).dominant == -1).sum() == 1
 
 
@@ -148,11 +148,11 @@ def test_step_errors_are_held_against_the_scheme_s_own_equation():
 
 def test_a_cell_that_could_not_be_computed_carries_its_reason_and_no_colour():
     values = (0.1, 0.2)
-    runs = {run.tag: run for run in plan_map(THROW, "gamma", FILLS, values)}
+    runs = {run.label: run for run in plan_map(THROW, "gamma", FILLS, values)}
     stalled, failed = "map gamma, row 0, column 1, free-flight", "map gamma, row 1, column 0, eq8"
     spoil = {
-        stalled: flat(runs[stalled], 0.5, "stalled"),
-        failed: Made(runs[failed], None, 0.0, "MemoryError: too much"),
+        runs[stalled]: flat(runs[stalled], 0.5, "stalled"),
+        runs[failed]: Made(runs[failed], None, 0.0, "MemoryError: too much"),
     }
     study = made_up("gamma", values, by_rung(4), spoil)
     assert study.reason.tolist() == [["", "free-flight: stalled"], ["eq8: MemoryError", ""]]
@@ -184,7 +184,7 @@ def test_figures_name_their_axes_with_units_and_their_levels(axis):
 
 def test_a_real_map_agrees_with_the_reference_and_has_a_band():
     values = (0.25,)
-    made = {run.tag: make(run) for run in plan_map(THROW, "gamma", FILLS, values, banded=True)}
+    made = {run: make(run) for run in plan_map(THROW, "gamma", FILLS, values, banded=True)}
     study = study_map(THROW, "gamma", FILLS, values, made)
     assert (study.reason == "").all()
     for column, fill in enumerate(FILLS):
@@ -210,9 +210,9 @@ def twin_levels(fill, damping):
 def test_workers_make_the_map_that_the_runs_make():
     values = (0.1, 0.4)
     runs = plan_map(THROW, "step", FILLS, values, shares=True, banded=True)
-    alone = study_map(THROW, "step", FILLS, values, {run.tag: make(run) for run in runs}, shares=True)
-    with ThreadPoolExecutor(2) as pool:
-        gathered = gather_map(pool, THROW, "step", FILLS, values)()
+    alone = study_map(THROW, "step", FILLS, values, {run: make(run) for run in runs}, shares=True)
+    readings = dict(zip(runs, make_readings(runs), strict=True))
+    gathered = study_readings(THROW, "step", FILLS, values, readings, shares=True)
     np.testing.assert_array_equal(gathered.shares, alone.shares)
     np.testing.assert_array_equal(gathered.band, alone.band)
     assert (gathered.reason == "").all()
@@ -220,7 +220,7 @@ def test_workers_make_the_map_that_the_runs_make():
 
 def test_without_gravity_the_weight_is_no_mistake():
     far = replace(THROW, gravity=0.0)
-    made = {run.tag: make(run) for run in plan_map(far, "gamma", (0.5,), (0.25,))}
+    made = {run: make(run) for run in plan_map(far, "gamma", (0.5,), (0.25,))}
     study = study_map(far, "gamma", (0.5,), (0.25,), made)
     assert study.differences[RUNGS.index("gravity")] == pytest.approx(0.0, abs=1e-3)
     assert study.dominant[0, 0] != RUNGS.index("gravity")

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 import ode_reference
+from flipproof.chapters.waterfall import study as waterfall
+from flipproof.chapters.waterfall.study import NAMES, OBSERVABLES, canonical, plan_waterfall, study_waterfall
 from flipproof.frame import twins
-from flipproof.studies import waterfall
-from flipproof.studies.waterfall import NAMES, OBSERVABLES, canonical, plan_waterfall, study_waterfall
 from ode_reference.switches import Switches
 from slicemodel import Scenario, Trajectory
 
 THROW = Scenario(n_slices=1)
+PROGRAM_RUN = waterfall.program_run(THROW, 1000)
 NAME_OF = {switch: words for switch, words in NAMES.items()}
 
 
@@ -33,15 +34,15 @@ def made_up(value: float) -> Trajectory:
     )
 
 
-def split(value_of, *, program=0.0, moved=0.0, kind=twins.RELEASE):
+def split(value_of, *, program=0.0, moved=0.0, kind="twin in release"):
     runs = {}
     for run in plan_waterfall(THROW, 1000):
         if run.solver == waterfall.PROGRAM:
-            runs[run.tag] = made_up(program)
+            runs[run] = made_up(program)
             continue
         value = value_of(Switches.from_name(run.solver))
-        runs[run.tag] = made_up(value + (moved if run.tag.endswith(kind) else 0.0))
-    return study_waterfall(runs)
+        runs[run] = made_up(value + (moved if run.label.endswith(kind) else 0.0))
+    return study_waterfall(PROGRAM_RUN, runs)
 
 
 def plateau_bars(result):
@@ -51,10 +52,10 @@ def plateau_bars(result):
 
 def test_the_plan_names_every_equation_once_and_gives_it_two_twins():
     runs = plan_waterfall(THROW, 1000)
-    assert len({run.tag for run in runs}) == len(runs) == 121
+    assert len(set(runs)) == len(runs) == 121
     for usual, release, rest in zip(runs[1:41], runs[41::2], runs[42::2], strict=True):
         assert usual.solver == release.solver == rest.solver
-        assert release.confirms == rest.confirms == usual.tag
+        assert (release, rest) == twins.twins(usual)
         assert usual.settings == release.settings == {}
         assert usual.scenario == rest.scenario
         assert release.scenario.omega0 / THROW.omega0 - 1 == pytest.approx(twins.CHANGE, rel=1e-4, abs=0.0)
@@ -94,7 +95,7 @@ def test_every_split_of_every_observable_sums_to_the_whole():
         assert part.largest.name in {bar.name for bar in part.bars}
 
 
-@pytest.mark.parametrize("kind", twins.KINDS)
+@pytest.mark.parametrize("kind", ["twin in release", "twin in rest speed"])
 def test_bands_come_from_the_twins(kind):
     bars = plateau_bars(split(lambda s: 1.0 if s.signs else 0.0, moved=1e-3, kind=kind))
     for words in NAME_OF.values():
@@ -103,12 +104,12 @@ def test_bands_come_from_the_twins(kind):
 
 
 def test_a_run_that_is_not_whole_is_named():
-    runs = {run.tag: made_up(1.0) for run in plan_waterfall(THROW, 1000)}
-    tag = next(tag for tag in runs if tag != waterfall.PROGRAM_TAG)
-    runs[tag] = dataclasses.replace(runs[tag], status="stalled", message="time hardly passes")
+    runs = {run: made_up(1.0) for run in plan_waterfall(THROW, 1000)}
+    run = next(run for run in runs if run != PROGRAM_RUN)
+    runs[run] = dataclasses.replace(runs[run], status="stalled", message="time hardly passes")
     with pytest.raises(ArithmeticError, match="stalled: time hardly passes") as refusal:
-        study_waterfall(runs)
-    assert tag in str(refusal.value)
+        study_waterfall(PROGRAM_RUN, runs)
+    assert run.name in str(refusal.value)
 
 
 def test_canonical_sets_make_the_same_equation():

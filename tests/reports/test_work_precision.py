@@ -2,7 +2,6 @@
 
 import json
 import math
-from concurrent.futures import Executor, Future
 from dataclasses import replace
 
 import numpy as np
@@ -10,16 +9,10 @@ import pytest
 
 import slicemodel
 from engine_check.solver import ENGINES
-from flipproof.claims_work_precision import claim_work_precision
-from flipproof.exhibits_work_precision import (
-    draw_work_precision,
-    summarise_work_precision,
-    tabulate_work_precision,
-)
-from flipproof.figures.work_precision import figure_work_precision
-from flipproof.frame.solvers import Made, Run, make
-from flipproof.frame.timing import at_times, make_all_timed, make_timed, sampled
-from flipproof.studies.contenders import (
+from flipproof.build import ask_of
+from flipproof.chapters import chapters_named
+from flipproof.chapters.work_precision.claims import claim_work_precision
+from flipproof.chapters.work_precision.contenders import (
     AT_REST,
     CASES,
     COMMON,
@@ -35,14 +28,23 @@ from flipproof.studies.contenders import (
     contenders,
     left_out,
 )
-from flipproof.studies.work_precision import (
+from flipproof.chapters.work_precision.exhibits import draw_work_precision
+from flipproof.chapters.work_precision.figure import figure_work_precision
+from flipproof.chapters.work_precision.study import (
     Price,
-    gather_work_precision,
     plan_work_precision,
     price,
     study_work_precision,
     work_of,
 )
+from flipproof.chapters.work_precision.tables import (
+    summarise_work_precision,
+    tabulate_work_precision,
+)
+from flipproof.frame.gather import gather
+from flipproof.frame.pool import Here
+from flipproof.frame.solvers import Made, Run, make
+from flipproof.frame.timing import at_times, batches, make_timed, sampled
 from ode_reference.models import MODELS
 from slicemodel import Scenario, Trajectory
 from slicemodel.schemes import SCHEMES
@@ -59,17 +61,13 @@ SMOOTH = replace(
 )
 
 
-class Here(Executor):
-    """A pool that works in this process."""
-
-    def submit(self, function, /, *arguments, **options):
-        done = Future()
-        done.set_result(function(*arguments, **options))
-        return done
+def timed(runs):
+    """Make runs as the chapter's calls do, and return them by run."""
+    return {each.run: each for job in batches(runs) for each in make_timed(job)}
 
 
 def run(case, effort):
-    return make_all_timed(Here(), [(planned, case.times) for planned in plan_work_precision(case, effort)])
+    return timed([(planned, case.times) for planned in plan_work_precision(case, effort)])
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +79,9 @@ def smooth():
 
 @pytest.fixture(scope="module")
 def quick():
-    return gather_work_precision(Here(), QUICK)
+    return gather(
+        chapters_named("work-precision"), ask_of(Scenario(), "quick", 6), Here(), work={"work-precision": QUICK}
+    ).found("work-precision")
 
 
 # ---------------------------------------------------------------------- who competes
@@ -127,7 +127,7 @@ def test_each_is_held_against_its_own_equation(case):
 @pytest.mark.parametrize("effort", [FULL, QUICK], ids=lambda effort: effort.name)
 def test_runs_are_unique_and_say_how_they_are_refined(effort):
     runs = [planned for name in effort.cases for planned in plan_work_precision(CASES[name], effort)]
-    assert len({planned.tag for planned in runs}) == len(runs)
+    assert len(set(runs)) == len(runs)
     for planned in runs:
         if planned.solver in SCHEMES:
             assert (planned.settings["steps"] - 1) % COMMON == 0
@@ -149,11 +149,11 @@ def test_a_scheme_that_no_equation_knows_competes_against_its_own_limit(monkeypa
 def test_nothing_strikes_in_the_smooth_throw():
     case = CASES["smooth"]
     for model in MODELS:
-        made = make(Run(model, model, case.scenario, {"times": case.times}))
+        made = make(Run(model, case.scenario, {"times": case.times}, label=model))
         assert made.trajectory is not None
         assert len(made.trajectory.impacts) == 0, model
         longer = replace(case.scenario, duration=1.4 * case.scenario.duration)
-        assert len(make(Run(model, model, longer)).trajectory.impacts) > 0, model
+        assert len(make(Run(model, longer, label=model)).trajectory.impacts) > 0, model
 
 
 # ---------------------------------------------------------------------- what made-up curves say
@@ -185,7 +185,7 @@ CASE = Case(name="made-up", title="made up", scenario=Scenario(n_slices=2))
 
 def studied(monkeypatch, errors, floor=1e-9, spoiled=None):
     """Return the curve that the study makes of a scheme with these errors at 40, 80, 160 ... steps."""
-    from flipproof.studies import work_precision
+    from flipproof.chapters.work_precision import study as work_precision
 
     rival = Contender(
         name="exact-step",
@@ -198,13 +198,13 @@ def studied(monkeypatch, errors, floor=1e-9, spoiled=None):
     made = {}
     for planned in plan_work_precision(CASE, QUICK):
         if planned.solver == "eq8":
-            error = 0.0 if "reference" in planned.tag else floor
-            made[planned.tag] = Made(planned, curve(CASE, error), 1.0)
+            error = 0.0 if "reference" in planned.label else floor
+            made[planned] = Made(planned, curve(CASE, error), 1.0)
         else:
             k = round(math.log2((planned.settings["steps"] - 1) / COMMON))
-            made[planned.tag] = Made(planned, curve(CASE, errors[k], **planned.settings), 0.1 * 2**k)
-    for tag, outcome in (spoiled or {}).items():
-        at = next(name for name in made if name.endswith(tag))
+            made[planned] = Made(planned, curve(CASE, errors[k], **planned.settings), 0.1 * 2**k)
+    for words, outcome in (spoiled or {}).items():
+        at = next(run for run in made if run.label.endswith(words))
         made[at] = replace(made[at], **outcome)
     study = study_work_precision(CASE, QUICK, made)
     return study, study.curves[rival.key]
@@ -350,9 +350,10 @@ def test_against_another_equation_no_scheme_converges(smooth):
     """The published program goes to its own limit; held against Eq. 8 its error would stand still."""
     made, study = smooth
     case = CASES["smooth"]
+    of = {run.label: outcome for run, outcome in made.items()}
     swapped = {
-        tag: made[tag.replace("published-limit", "eq8")] if tag.endswith(", published-limit") else outcome
-        for tag, outcome in made.items()
+        run: of[run.label.replace("published-limit", "eq8")] if run.label.endswith(", published-limit") else outcome
+        for run, outcome in made.items()
     }
     wrong = study_work_precision(case, SMOOTH, swapped).curves["published-python on published-limit"]
     right = study.curves["published-python on published-limit"]
@@ -368,9 +369,9 @@ def test_midpoint_keeps_its_order_through_impacts_only_without_drag(drag, lowest
     scenario = scenario if drag else replace(scenario, drag=0.0)
     case = Case(name="drag", title="drag", scenario=scenario)
     effort = replace(SMOOTH, scheme_levels=7, scheme_members=(4, 5, 6, 7))
-    runs = [r for r in plan_work_precision(case, effort) if r.tag.endswith(", eq8") or "midpoint on" in r.tag]
-    made = make_all_timed(Here(), [(planned, case.times) for planned in runs])
-    nothing = {r.tag: Made(r, None, 0.0, "not asked") for r in plan_work_precision(case, effort) if r.tag not in made}
+    runs = [r for r in plan_work_precision(case, effort) if r.label.endswith(", eq8") or "midpoint on" in r.label]
+    made = timed([(planned, case.times) for planned in runs])
+    nothing = {r: Made(r, None, 0.0, "not asked") for r in plan_work_precision(case, effort) if r not in made}
     found = study_work_precision(case, effort, nothing | made).curves["midpoint on eq8"]
     assert lowest < found.slope < highest
 
@@ -386,10 +387,10 @@ def test_work_is_counted_as_stated():
         ("mujoco", {}, 4),
     ):
         dt = case.scenario.duration / 80
-        flight = make(Run("x", solver, case.scenario, {"dt": dt, "times": case.times, **settings})).trajectory
+        flight = make(Run(solver, case.scenario, {"dt": dt, "times": case.times, **settings}, label="x")).trajectory
         assert work_of(flight) == flight.diagnostics["steps"] * n * per_step
         assert flight.diagnostics["steps"] == 80 or flight.status == "diverged"
-    flight = make(Run("x", "eq8", case.scenario, {"times": case.times})).trajectory
+    flight = make(Run("eq8", case.scenario, {"times": case.times}, label="x")).trajectory
     assert work_of(flight) == flight.diagnostics["evaluations"] * n
 
 
@@ -405,7 +406,7 @@ def test_times_that_a_run_does_not_hold_are_refused():
 
 def test_a_timed_run_is_thinned_and_costs_something():
     case = CASES["smooth"]
-    planned = Run("x", "exact-step", case.scenario, {"steps": 4 * COMMON + 1})
+    planned = Run("exact-step", case.scenario, {"steps": 4 * COMMON + 1}, label="x")
     (made,) = make_timed([(planned, case.times)])
     assert made.run == planned
     assert 0.0 < made.seconds < math.inf
@@ -423,19 +424,20 @@ def test_a_run_that_ends_early_is_thinned_up_to_there():
                                r_cm=short.r_cm[:5], inertia=short.inertia[:5]), times).t) == 5  # fmt: skip
 
 
-def test_runs_come_back_in_order_and_failures_keep_their_reason():
+def test_runs_come_back_and_failures_keep_their_reason():
     case = CASES["smooth"]
     runs = [
-        (Run("b", "eq8", case.scenario, {"times": case.times, "method": "LSODA"}), case.times),
-        (Run("a", "eq8", case.scenario, {"times": case.times, "method": "nobody"}), case.times),
-        (Run("c", "midpoint", case.scenario, {"steps": COMMON + 1}), case.times),
-        (Run("d", "eq8", case.scenario, {"times": case.times, "method": "LSODA", "rtol": 1e-6}), case.times),
+        (Run("eq8", case.scenario, {"times": case.times, "method": "LSODA"}, label="b"), case.times),
+        (Run("eq8", case.scenario, {"times": case.times, "method": "nobody"}, label="a"), case.times),
+        (Run("midpoint", case.scenario, {"steps": COMMON + 1}, label="c"), case.times),
+        (Run("eq8", case.scenario, {"times": case.times, "method": "LSODA", "rtol": 1e-6}, label="d"), case.times),
     ]
-    made = make_all_timed(Here(), runs)
-    assert list(made) == ["b", "a", "c", "d"]
-    assert made["a"].trajectory is None
-    assert "nobody" in made["a"].reason
-    assert made["b"].trajectory is not None
+    made = timed(runs)
+    assert set(made) == {run for run, _ in runs}
+    unknown = made[runs[1][0]]
+    assert unknown.trajectory is None
+    assert "nobody" in unknown.reason
+    assert made[runs[0][0]].trajectory is not None
 
 
 # ---------------------------------------------------------------------- as a report shows it

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flipproof.chapters.differences.study import PARTING_BAND, first_crossing
 from flipproof.frame.findings import Finding
 from flipproof.output.tables import QUANTITIES, Curve
-from flipproof.studies.differences import PARTING_BAND, first_crossing
 from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray
 

@@ -274,7 +274,7 @@ def _flat(scenario: Mapping[str, Any]) -> dict[str, Any]:
     return flat
 
 
-APART: Final = ("command", "made")
+APART: Final = ("command", "made", "from the store")
 """Of the provenance, what differs between any two reports."""
 
 

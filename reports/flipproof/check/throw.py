@@ -1,4 +1,4 @@
-"""A throw held to what is known, in a few seconds: ice, published vectors, convergence, and a baseline's thresholds.
+"""A throw held to what is known, in seconds: ice, vectors, convergence, reference, and a baseline's thresholds.
 
 The baseline is the summary of a report of the same throw. Of its findings those are computed again that need neither an
 engine nor an ensemble of flights: the differences between schemes and equations, and the audit of the paper. Each must
@@ -15,35 +15,22 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-
-from flipproof import claims, vectors
+from flipproof.build import ask_of
+from flipproof.chapters import chapters_named, parts
 from flipproof.check.diff import LEAST, ROUND_OFF, TOLERANCE, bands, number, read_summary, scenario_changes
-from flipproof.evidence import CHECK, COMMON, COMMON_START, DIFFERENCES, ENGINE, ICED, LIMITS, REFERENCE
 from flipproof.frame.findings import Finding
-from flipproof.frame.solvers import Made, Run, catalogue, make
-from flipproof.studies.differences import study_difference
-from flipproof.studies.errata import study_errata
-from flipproof.studies.ice import plan_ice, study_ice
-from flipproof.studies.step_size import before_first_impact, plan_step_size, study_step_size
-from slicemodel import Scenario, Trajectory
+from flipproof.frame.gather import gather, tell
+from flipproof.frame.pool import Here
+from flipproof.frame.store import RunStore
+from slicemodel import Scenario
 
 SLICES: Final = 50
 """Slices at most, where no baseline says how many."""
-
-STEPS: Final = 1000
-"""Points of a scheme's grid, as in every report."""
-
-LEVELS: Final = 4
-"""Step sizes of the convergence, as in every report."""
-
-CHEAP: Final = ("slicemodel", "ode_reference")
-"""Packages whose runs take well below a second."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,6 +63,7 @@ def check(
     baseline: Path | None = None,
     tolerance: float = TOLERANCE,
     say: Callable[[str], None] = lambda _: None,
+    store: RunStore | None = None,
 ) -> Checked:
     """Check a throw.
 
@@ -83,13 +71,15 @@ def check(
     ----------
     scenario : Scenario
     groups : sequence of str
-        Of "ice", "vectors", "convergence", "thresholds"; the last needs a baseline.
+        Of "ice", "vectors", "convergence", "reference", "thresholds"; the last needs a baseline.
     baseline : Path or None
         A report's folder or ``summary.json``, of the same throw.
     tolerance : float
         What a finding may move beyond its bands, in its own unit.
     say : callable (line)
         Called with a line for each claim, as soon as it is known.
+    store : RunStore or None
+        Slow runs are looked for and kept there.
 
     Raises
     ------
@@ -108,7 +98,7 @@ def check(
     throw = scenario.with_slices(slices)
     found = []
     for group in groups:
-        for finding in CHECKS[group](throw):
+        for finding in findings_of(group, throw, store):
             was = known.get(finding.id)
             if was is None and group == "thresholds":
                 continue
@@ -166,88 +156,31 @@ def _held_to(finding: Finding, was: Mapping[str, Any], tolerance: float, *, move
 # ---------------------------------------------------------------------- the groups
 
 
-def check_ice(throw: Scenario) -> Iterator[Finding]:
-    """Yield that a frozen bottle keeps its angular velocity in schemes, equations and engine."""
-    for run in plan_ice(throw, tuple(LIMITS), ICED, ENGINE):
-        label = run.tag.removeprefix("ice, ")
-        made = make(run)
-        if made.trajectory is None:
-            yield claims.not_evaluated(f"ice-{label.replace(' ', '-')}", f"ice: {label} keeps ω constant", made.reason)
-        else:
-            yield claims.claim_ice(study_ice(label, made.trajectory))
-
-
-def check_vectors(throw: Scenario) -> Iterator[Finding]:
-    """Yield that the published programs' printed numbers are reproduced; they are runs of the paper's throws."""
-    del throw
-    for vector in vectors.load_all():
-        made = make(Run(f"vector {vector.name}", vector.scheme, vector.scenario, {"steps": vector.steps}))
-        if made.trajectory is None:
-            yield claims.not_evaluated(f"vectors-{vector.name}", f"published run {vector.name}", made.reason)
-        else:
-            yield claims.claim_vectors(vector.name, vector.scheme, vectors.deviations(vector, made.trajectory))
-
-
-def check_convergence(throw: Scenario) -> Iterator[Finding]:
-    """Yield that both schemes converge to their equations at first order, on the paper's own throw."""
-    del throw
-    for scheme, model in LIMITS.items():
-        reference = make(Run(f"{CHECK}, {model}", model, REFERENCE)).trajectory
-        start = None if reference is None else before_first_impact(REFERENCE, reference)
-        parts: tuple[tuple[str, Scenario | None, int, int], ...] = (
-            ("before the first impact", start, COMMON_START, 14),
-            ("across impacts", REFERENCE, COMMON, 108),
-        )
-        for where, scenario, common, multiple in parts:
-            yield _order(scheme, model, where, scenario, common, multiple)
-
-
-def _order(scheme: str, model: str, where: str, scenario: Scenario | None, common: int, multiple: int) -> Finding:
-    id_, title = f"order-{scheme}-{where.replace(' ', '-')}", f"{scheme} converges to {model}, {where}"
-    if scenario is None:
-        return claims.not_evaluated(id_, title, f"{model} was not computed or strikes no end")
-    times = np.linspace(0.0, scenario.duration, common + 1)
-    settings = {"times": times} if scenario is not REFERENCE else {}
-    reference = make(Run("reference", model, scenario, settings))
-    levels = [[make(run) for run in level] for level in plan_step_size(scenario, scheme, common, multiple, LEVELS)]
-    problem = _first_problem([reference, *(made for level in levels for made in level)])
-    if reference.trajectory is None or problem:
-        return claims.not_evaluated(id_, title, problem)
-    runs = [[made.trajectory for made in level if made.trajectory is not None] for level in levels]
-    return claims.claim_order(study_step_size(reference.trajectory, runs), where)
-
-
-def check_thresholds(throw: Scenario) -> Iterator[Finding]:
-    """Yield the findings of a report on this throw that take no engine and no ensemble of flights."""
-    cheap = {name for name, solver in catalogue().items() if solver.package in CHEAP}
-    made: dict[str, Made] = {}
-    for name, first, second in DIFFERENCES:
-        if not {first, second} <= cheap:
-            continue
-        for solver in (first, second):
-            settings = {"steps": STEPS} if catalogue()[solver].package == CHEAP[0] else {}
-            made.setdefault(solver, make(Run(solver, solver, throw, settings)))
-        yield _difference(name, made[first], made[second])
-    for erratum in study_errata(throw):
-        yield claims.claim_erratum(erratum)
-
-
-def _difference(name: str, first: Made, second: Made) -> Finding:
-    runs: list[Trajectory] = [made.trajectory for made in (first, second) if made.trajectory is not None]
-    if len(runs) < 2:
-        id_ = f"difference-{first.run.tag}-{second.run.tag}"
-        return claims.not_evaluated(id_, name, _first_problem((first, second)))
-    return claims.claim_difference(study_difference(name, *runs))
-
-
-def _first_problem(made: Iterable[Made]) -> str:
-    """Return why the first of the runs that failed did; nothing if all are there."""
-    return next((f"{one.run.tag}: {one.reason}" for one in made if one.trajectory is None), "")
-
-
-CHECKS: Final[Mapping[str, Callable[[Scenario], Iterator[Finding]]]] = {
-    "ice": check_ice,
-    "vectors": check_vectors,
-    "convergence": check_convergence,
-    "thresholds": check_thresholds,
+CHECKS: Final[Mapping[str, tuple[str, ...]]] = {
+    "ice": ("ice",),
+    "vectors": ("vectors",),
+    "convergence": ("step-size",),
+    "reference": ("reference",),
+    "thresholds": ("differences", "errata"),
 }
+"""Group -> the chapters whose claims it checks, at the size "check"."""
+
+
+def groups() -> dict[str, tuple[str, ...]]:
+    """Return ``CHECKS``, and before the last a group for every other chapter that has the size "check"."""
+    known = {name for names in CHECKS.values() for name in names}
+    quick = [chapter.name for part in parts() for chapter in part.chapters if "check" in chapter.work]
+    *first, last = CHECKS
+    return (
+        {group: CHECKS[group] for group in first}
+        | {name: (name,) for name in quick if name not in known}
+        | {last: CHECKS[last]}
+    )
+
+
+def findings_of(group: str, throw: Scenario, store: RunStore | None = None) -> Iterator[Finding]:
+    """Yield the findings of a group's chapters on a throw; runs are made in this process."""
+    ask = ask_of(throw, "check", throw.n_slices)
+    told = tell(gather(chapters_named(*groups()[group]), ask, Here(), store=store))
+    for each in told.values():
+        yield from each.findings

@@ -30,6 +30,15 @@ def add_command(
     return command
 
 
+def add_no_cache(command: argparse.ArgumentParser) -> None:
+    """Let a command do without the runs of an earlier time."""
+    command.add_argument(
+        "--no-cache",
+        action="store_true",
+        help="make every run anew, and keep none (else slow runs are kept in the user's cache folder)",
+    )
+
+
 def count(text: str) -> int:
     """Return a whole number of at least 1."""
     if not text.isdecimal() or int(text) < 1:

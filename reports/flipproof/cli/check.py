@@ -6,11 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.cli.arguments import add_command, check_writable
-
-GROUPS: Final = ("ice", "vectors", "convergence", "thresholds")
-"""What ``check`` can check; the last needs a baseline."""
-
+from flipproof.cli.arguments import add_command, add_no_cache, check_writable
 
 TOLERANCE_HELP: Final = (
     "what a finding may move beyond its bands, in its own unit (default 1e-6: round-off of another machine; 0 for the "
@@ -36,9 +32,10 @@ def add_checks(commands: Any) -> None:
     )  # fmt: skip
     check.add_argument("--tolerance", type=tolerance, metavar="X", help=TOLERANCE_HELP)
     check.add_argument(
-        "--only", type=_groups, metavar="LIST", help=f"some of {','.join(GROUPS)} (default: all; thresholds only "
-        "with --baseline)",
+        "--only", type=_groups, metavar="LIST", help="some of ice,vectors,convergence,reference,thresholds, "
+        "and of other chapters that can be checked (default: all; thresholds only with --baseline)",
     )  # fmt: skip
+    add_no_cache(check)
     check.add_argument("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML, too")
 
 
@@ -64,20 +61,24 @@ def command_check(options: argparse.Namespace) -> int:
     from slicemodel import Scenario
 
     scenario = Scenario.from_toml(options.scenario)
-    groups = options.only or (GROUPS if options.baseline else GROUPS[:-1])
+    from flipproof.check.throw import groups as known
+
+    groups = options.only or tuple(group for group in known() if options.baseline or group != "thresholds")
     if "thresholds" in groups and options.baseline is None:
         raise ValueError("--only thresholds: needs --baseline, the summary.json of a report of this throw")
     if options.junit:
         check_writable("--junit", options.junit)
     from flipproof.check.diff import TOLERANCE
     from flipproof.check.throw import check
+    from flipproof.frame.store import RunStore, default_place
 
     allowed = TOLERANCE if options.tolerance is None else options.tolerance
 
     def say(line: str) -> None:
         print(line, flush=True)
 
-    found = check(scenario, groups, baseline=options.baseline, tolerance=allowed, say=say)
+    with RunStore(None if options.no_cache else default_place()) as store:
+        found = check(scenario, groups, baseline=options.baseline, tolerance=allowed, say=say, store=store)
     if options.junit:
         from flipproof.output.folder import write_text
         from flipproof.output.junit import junit_text
@@ -88,11 +89,13 @@ def command_check(options: argparse.Namespace) -> int:
 
 
 def _groups(text: str) -> tuple[str, ...]:
-    given = [word.strip() for word in text.split(",") if word.strip()]
-    unknown = [word for word in given if word not in GROUPS]
+    from flipproof.check.throw import groups
+
+    given, known = [word.strip() for word in text.split(",") if word.strip()], groups()
+    unknown = [word for word in given if word not in known]
     if unknown or not given:
-        raise argparse.ArgumentTypeError(f"{', '.join(unknown) or text!r} is not among {', '.join(GROUPS)}")
-    return tuple(group for group in GROUPS if group in given)
+        raise argparse.ArgumentTypeError(f"{', '.join(unknown) or text!r} is not among {', '.join(known)}")
+    return tuple(group for group in known if group in given)
 
 
 def tolerance(text: str) -> float:

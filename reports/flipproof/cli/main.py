@@ -22,7 +22,14 @@ from pathlib import Path
 from typing import Any, Final, NoReturn
 
 from flipproof.cli.animate import add_animate
-from flipproof.cli.arguments import SCENARIO_HELP, OneLineParser, add_command, count, read_scenario
+from flipproof.cli.arguments import (
+    SCENARIO_HELP,
+    OneLineParser,
+    add_command,
+    add_no_cache,
+    count,
+    read_scenario,
+)
 from flipproof.cli.check import add_checks
 from flipproof.cli.compare import add_compare
 from flipproof.cli.console import readable, speak_plainly
@@ -164,6 +171,8 @@ def parser() -> argparse.ArgumentParser:
         "'flipproof track', or a CSV with t and theta or omega from release to landing",
     )  # fmt: skip
     report.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
+    add_no_cache(report)
+    report.add_argument("--png", action="store_true", help="also write every figure as PNG, beside the SVG")
     report.add_argument(
         "--pdf", action="store_true", help="also print the page to report.pdf (needs Chromium, Chrome or Edge)"
     )
@@ -210,7 +219,7 @@ def command_report(options: argparse.Namespace) -> int:
     check_replaceable(options.out, "report")
     measurement = None
     if options.measured is not None:
-        from flipproof.film.measured import hold, read_measured
+        from flipproof.film.measured import read_measured
 
         measurement = read_measured(options.measured)
     if options.pdf:
@@ -218,9 +227,12 @@ def command_report(options: argparse.Namespace) -> int:
 
     from tqdm import tqdm
 
-    from flipproof.build import build, write
-    from flipproof.evidence import FULL, QUICK, gather, with_slices
+    from flipproof.build import ask_of, build, gather_report, write
+    from flipproof.chapters import parts
+    from flipproof.chapters.measured.chapter import part_measured
+    from flipproof.frame.pool import workers
     from flipproof.frame.stages import Stages
+    from flipproof.frame.store import RunStore, default_place
     from flipproof.output.provenance import provenance
 
     began = time.perf_counter()
@@ -230,23 +242,24 @@ def command_report(options: argparse.Namespace) -> int:
         if not sys.stderr.isatty():
             print(f"flipproof: {time.perf_counter() - began:.0f} s: {stage}", file=sys.stderr, flush=True)
 
-    size = QUICK if options.quick else FULL
-    size = with_slices(size, options.slices or min(size.slices, scenario.n_slices))
+    ask = ask_of(scenario, "quick" if options.quick else "full", options.slices)
     command = shlex.join(["flipproof", *sys.argv[1:]])
     with replaced_folder(options.out, "report") as folder:
-        with tqdm(desc="runs", unit="run", disable=None, leave=False) as bar:
+        with (
+            RunStore(None if options.no_cache else default_place()) as store,
+            workers(options.jobs) as pool,
+            tqdm(desc="runs", unit="run", disable=None, leave=False) as bar,
+        ):
 
-            def progress(made: int, planned: int, tag: str) -> None:
+            def progress(made: int, planned: int, label: str) -> None:
                 bar.total = planned
-                bar.set_postfix_str(tag, refresh=False)
+                bar.set_postfix_str(label, refresh=False)
                 bar.update(made - bar.n)
 
-            evidence = gather(scenario, size, progress, options.jobs, Stages(say))
-        measured = None
-        if measurement is not None:
-            say("fits of the measurement")
-            measured = hold(measurement, scenario)
-        report = build(evidence, provenance(command), options.jobs, measured)
+            contents = parts() if measurement is None else (part_measured(measurement), *parts())
+            gathered = gather_report(ask, progress, options.jobs, Stages(say), store, pool, contents=contents)
+            facts = provenance(command) | store.facts()
+            report = build(gathered, facts, pool=store.remembering(pool), png=options.png)
         write(report, folder)
         if options.pdf:
             print_page(folder / "index.html", folder / "report.pdf")
@@ -258,7 +271,8 @@ def _print_report(report: Any, out: Path, seconds: float) -> None:
     print("Largest |difference in omega| / omega_0:")
     for finding in report.findings:
         if finding.id.startswith("difference-"):
-            print(f"  {finding.value:8.3%}  {finding.title}")
+            size = "       –" if finding.value is None else f"{finding.value:8.3%}"
+            print(f"  {size}  {finding.title}")
     regressions = [finding for finding in report.findings if finding.kind == "regression"]
     for finding in report.failed:
         print(f"FAIL  {finding.title}: {finding.value_text} (threshold {finding.threshold_text}) {finding.note}")

@@ -37,9 +37,9 @@ def command_paper(options: argparse.Namespace) -> int:
     made_by = provenance(shlex.join(["flipproof", *sys.argv[1:]]))
     with tqdm(desc="flights", unit="flight", disable=None, leave=False) as bar:
 
-        def progress(made: int, planned: int, tag: str) -> None:
+        def progress(made: int, planned: int, label: str) -> None:
             bar.total = planned
-            bar.set_postfix_str(tag, refresh=False)
+            bar.set_postfix_str(label, refresh=False)
             bar.update(made - bar.n)
 
         words = make_gallery(names, options.out, progress, made_by, jobs=options.jobs)

@@ -72,7 +72,7 @@ class PlainPowers(LogFormatterMathtext):
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """One finished figure as SVG text and PNG bytes."""
+    """One finished figure as SVG text, and as PNG bytes if somebody asked for them."""
 
     svg: str
     png: bytes
@@ -93,17 +93,18 @@ def styled(function: Maker) -> Maker:
 
 
 @styled
-def draw(figure: Figure) -> Drawing:
-    """Render a figure; the same data give the same bytes (fixed ids, no date)."""
+def draw(figure: Figure, png: bool = True) -> Drawing:
+    """Render a figure; the same data give the same bytes (fixed ids, no date). Without ``png`` it has none."""
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
             if isinstance(axis.get_major_formatter(), LogFormatterMathtext):
                 axis.set_major_formatter(PlainPowers())
-    svg, png = BytesIO(), BytesIO()
-    figure.savefig(svg, format="svg", metadata={"Date": None})
+    lines, points = BytesIO(), BytesIO()
+    figure.savefig(lines, format="svg", metadata={"Date": None})
     figure.set_layout_engine("none")  # laid out by now; to do it again for the second format costs as much as drawing
-    figure.savefig(png, format="png", dpi=100)
-    return Drawing(svg.getvalue().decode("utf-8"), png.getvalue())
+    if png:
+        figure.savefig(points, format="png", dpi=100)
+    return Drawing(lines.getvalue().decode("utf-8"), points.getvalue())
 
 
 def solver_style(label: str, k: int = 0) -> dict[str, Any]:

@@ -104,7 +104,6 @@ class Measured:
         nearest = next(iter(self.misfits))
         return Exhibit(
             name="measured",
-            section="measured",
             title="Your measurement and the solvers",
             caption="Above: the measured values with twice their noise, and the solvers for the throw of this report. "
             "Below: measured minus computed; left nothing is fitted, right drag, restitution and the release are. Grey "

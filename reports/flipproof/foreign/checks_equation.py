@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from flipproof.chapters.vectors.published import Vector, load_all
 from flipproof.foreign.answers import Answer
 from flipproof.foreign.checking import Found, Making, NotApplicableError, ask_of
 from flipproof.foreign.contract import Ask, Traits
 from flipproof.foreign.place import LEVEL, LIMITS, THROWS, lattice, located, name_of, switches_of
-from flipproof.vectors import Vector, load_all
 
 VECTOR = 1e-8
 """Largest relative difference to a published number; flipproof's own schemes keep to 1e-10."""

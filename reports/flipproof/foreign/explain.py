@@ -10,10 +10,10 @@ import math
 from dataclasses import dataclass, fields, replace
 from itertools import combinations
 
+from flipproof.chapters.waterfall.study import NAMES, canonical
 from flipproof.foreign.checking import ask_of, times_of
 from flipproof.foreign.place import Place, curve, place
 from flipproof.foreign.specs import Runner
-from flipproof.studies.waterfall import NAMES, canonical
 from ode_reference.switches import Switches
 from slicemodel import Scenario
 from slicemodel.observables import plateau

@@ -16,11 +16,11 @@ from typing import Final
 
 import numpy as np
 
+from flipproof.chapters.waterfall.study import canonical
 from flipproof.foreign.answers import Answer
 from flipproof.foreign.checking import ask_of, times_of
 from flipproof.foreign.specs import Runner
 from flipproof.frame.solvers import solve
-from flipproof.studies.waterfall import canonical
 from ode_reference.models import MODELS
 from ode_reference.switches import PREFIX, Switches
 from slicemodel import Scenario

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,11 +19,11 @@ FEW = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exhibit:
-    """A figure with its words, and the section of the page it belongs to.
+    """A figure with its words.
 
     Parameters
     ----------
-    name, section, title, caption, alt : str
+    name, title, caption, alt : str
         ``caption`` says how to read the figure, ``alt`` what this throw shows, with its numbers.
     maker : callable
         A function of a module that makes the figure of ``data``: both must reach a worker process.
@@ -34,7 +36,6 @@ class Exhibit:
     """
 
     name: str
-    section: str
     title: str
     caption: str
     alt: str
@@ -49,7 +50,9 @@ class Exhibit:
         return self.drawn or draw(self.maker(*self.data))
 
 
-def drawn(exhibits: Sequence[Exhibit], jobs: int | None = None) -> tuple[Exhibit, ...]:
+def drawn(
+    exhibits: Sequence[Exhibit], jobs: int | None = None, *, pool: Executor | None = None, png: bool = True
+) -> tuple[Exhibit, ...]:
     """Return the exhibits with their figures, in the order given.
 
     Parameters
@@ -58,15 +61,19 @@ def drawn(exhibits: Sequence[Exhibit], jobs: int | None = None) -> tuple[Exhibit
     jobs : int or None
         Worker processes; None: one per core. One job, and few figures, are drawn in this process. The bytes are the
         same either way.
+    pool : Executor or None
+        Workers that are there already; then ``jobs`` does not count.
+    png : bool
+        Whether the figures are wanted as PNG, too.
     """
-    if jobs == 1 or len(exhibits) <= FEW:
-        return tuple(replace(exhibit, drawn=exhibit.drawing) for exhibit in exhibits)
-    with workers(jobs) as pool:
+    if pool is None and (jobs == 1 or len(exhibits) <= FEW):
+        return tuple(replace(each, drawn=each.drawn or _draw(each.maker, each.data, png)) for each in exhibits)
+    with workers(jobs) if pool is None else nullcontext(pool) as drawing:
         # The figures with most to draw first, so that no worker is left with a long one at the end.
         order = sorted(exhibits, key=lambda exhibit: -len(exhibit.table or ""))
-        pending = {exhibit.name: pool.submit(_draw, exhibit.maker, exhibit.data) for exhibit in order}
+        pending = {exhibit.name: drawing.submit(_draw, exhibit.maker, exhibit.data, png) for exhibit in order}
         return tuple(replace(exhibit, drawn=pending[exhibit.name].result()) for exhibit in exhibits)
 
 
-def _draw(maker: Callable[..., Figure], data: tuple[Any, ...]) -> Drawing:
-    return draw(maker(*data))
+def _draw(maker: Callable[..., Figure], data: tuple[Any, ...], png: bool) -> Drawing:
+    return draw(maker(*data), png)

@@ -3,47 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import Executor, Future, as_completed, wait
 from contextlib import AbstractContextManager
-from dataclasses import replace
 from typing import Any
 
+from flipproof.frame.flights import Call, Outcome, attempt
 from flipproof.frame.processes import WorkerDiedError, processes
 from flipproof.frame.solvers import Made, Run, find, make
+from flipproof.frame.store import RunStore
+from slicemodel import Scenario
 
 Progress = Callable[[int, int, str], None]
-"""Called with runs made, runs planned and the last run's tag."""
-
-SMALL = 8.0
-"""Slices times seconds of flight below which runs are made in groups."""
+"""Called with runs made, runs planned and the last run's name."""
 
 GROUP = 8
-"""Runs of a group."""
+"""Runs of a group: sending a quick one away alone would cost as much as making it."""
+
+QUICK = ("slicemodel", "ode_reference")
+"""Packages whose runs take milliseconds, but for those by a ``method`` of SciPy's."""
+
+COMPILED = ("exact-step", "eq8")
+"""A solver of each compiled loop."""
 
 TRIES = 2
 """Times that a call is made when its worker dies: what killed one worker may have had nothing to do with the call."""
 
 
-def make_all(pool: Executor, runs: Iterable[Run], progress: Progress) -> dict[str, Made]:
-    """Make runs in worker processes: one job for each slow run, one for all of the slice model's.
+def make_all(
+    pool: Executor,
+    runs: Iterable[Run],
+    progress: Progress,
+    calls: Iterable[Call] = (),
+    store: RunStore | None = None,
+) -> tuple[dict[Run, Made], dict[Call, Outcome[Any]]]:
+    """Make runs in worker processes, equal ones once, but for those that the store has; keep slow ones there.
 
-    This process only waits, so that it can be interrupted at any time; the slice model compiles in one worker only.
+    One job for each run of an engine and of a witness, and groups of the others. Calls are made beside them, each a
+    job, and kept in the store too, but for those that measure time. This process only waits, so that it can be
+    interrupted at any time. Both results are in the order asked.
     """
-    runs = list(runs)
-    # Runs that differ in their tag only are made once.
-    same: dict[tuple[Any, ...], list[Run]] = {}
-    for run in runs:
-        same.setdefault((run.solver, run.scenario, repr(sorted(run.settings.items()))), []).append(run)
-    different = [group[0] for group in same.values()]
-    others = {group[0].tag: group for group in same.values()}
-    quick = [run for run in different if find(run.solver).package == "slicemodel"]
-    slow = [run for run in different if find(run.solver).package != "slicemodel"]
-    # Small runs go in groups: sending each away alone would cost as much as making it.
-    small = [run for run in slow if run.scenario.n_slices * run.scenario.duration < SMALL]
-    jobs = [[run] for run in slow if run.scenario.n_slices * run.scenario.duration >= SMALL]
-    jobs += [small[k : k + GROUP] for k in range(0, len(small), GROUP)]
-    made: dict[str, Made] = {}
-    jobs = ([quick] if quick else []) + jobs
+    runs, store = list(dict.fromkeys(runs)), store or RunStore(None)
+    keeping = store.remembering(pool)
+    pending_calls = {call: (pool if call.timed else keeping).submit(call.function, *call.arguments) for call in calls}
+    made: dict[Run, Made] = {run: found for run in runs if (found := store.find(run)) is not None}
+    jobs = _jobs([run for run in runs if run not in made])
     while jobs:
         pending = {pool.submit(make_each, job): job for job in jobs}
         jobs = []
@@ -58,11 +61,40 @@ def make_all(pool: Executor, runs: Iterable[Run], progress: Progress) -> dict[st
                     continue
                 results = [Made(job[0], None, 0.0, f"the worker process died {TRIES} times with this run ({error})")]
             for result in results:
-                for run in others[result.run.tag]:
-                    made[run.tag] = replace(result, run=run)
-                progress(len(made), len(runs), result.run.tag)
+                store.keep(result)
+                made[result.run] = result
+                progress(len(made), len(runs), result.run.name)
+    called: dict[Call, Outcome[Any]] = {}
+    for call, answer in pending_calls.items():
+        progress(len(made), len(runs), call.label)
+        called[call] = _answered(call, answer)
     # In the order asked, whichever worker was faster: what is read off this table must not depend on load.
-    return {run.tag: made[run.tag] for run in runs}
+    return {run: made[run] for run in runs}, called
+
+
+def _answered(call: Call, answer: Future[Any]) -> Outcome[Any]:
+    try:
+        return attempt(answer.result)
+    except WorkerDiedError as error:
+        return Outcome(None, f"{call.label}: the worker process died {TRIES} times with this call ({error})")
+
+
+def compile_kernels(pool: Executor) -> None:
+    """Wait until two workers have compiled the loops of schemes and of equations, or read them from numba's cache.
+
+    Runs that are sent away after that find them there, whichever worker makes them.
+    """
+    short = Scenario(n_slices=2, duration=1e-3)
+    wait([pool.submit(make_each, [Run(name, short)]) for name in COMPILED])
+
+
+def _jobs(runs: list[Run]) -> list[list[Run]]:
+    """Return runs by jobs: each that may be slow alone, and these first; the others in groups."""
+    quick: list[Run] = []
+    slow: list[Run] = []
+    for run in runs:
+        (quick if find(run.solver).package in QUICK and "method" not in run.settings else slow).append(run)
+    return [*([run] for run in slow), *(quick[k : k + GROUP] for k in range(0, len(quick), GROUP))]
 
 
 def make_each(runs: Iterable[Run]) -> list[Made]:
@@ -73,3 +105,16 @@ def make_each(runs: Iterable[Run]) -> list[Made]:
 def workers(jobs: int | None) -> AbstractContextManager[Executor]:
     """Give a pool of worker processes that makes a call once more when its worker dies; one per core unless told."""
     return processes(jobs, tries=TRIES)
+
+
+class Here(Executor):
+    """Makes every call at once, in this process."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Return what came of the call."""
+        answer: Future[Any] = Future()
+        try:
+            answer.set_result(fn(*args, **kwargs))
+        except Exception as error:
+            answer.set_exception(error)
+        return answer

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from slicemodel import Scenario, Trajectory
 from slicemodel.scenario import unknown_name
 
@@ -64,19 +66,49 @@ def find(name: str) -> Solver:
     return solvers[name]
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
-    """One run to make: solver, scenario and settings. ``tag`` tells runs of one solver apart; it must be unique.
+class Missing(KeyError):  # noqa: N818
+    """A flight, or what is made of flights, is not there; the message says why."""
 
-    ``confirms`` is the tag of the run whose band this one shows, as its twin (``flipproof.frame.twins``). "" if it
-    confirms none.
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """One run to make: solver, scenario and settings. Equal runs are one run: it is made once, and is its own key.
+
+    ``label`` is how the run is named to a reader; it takes no part in the comparison.
     """
 
-    tag: str
     solver: str
     scenario: Scenario
     settings: Mapping[str, Any] = field(default_factory=dict)
-    confirms: str = ""
+    label: str = ""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Run) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    @property
+    def _key(self) -> tuple[Any, ...]:
+        return self.solver, self.scenario, _hashable(self.settings)
+
+    @property
+    def name(self) -> str:
+        """The label, or the solver where there is none."""
+        return self.label or self.solver
+
+
+def _hashable(value: Any) -> Any:
+    """Return a value that compares like ``value`` and can be hashed: mappings, lists and arrays become tuples."""
+    if isinstance(value, Mapping):
+        return tuple(sorted((name, _hashable(each)) for name, each in value.items()))
+    if isinstance(value, np.ndarray):
+        return value.dtype.str, value.shape, value.tobytes()
+    # 1 == 1.0 == True, but a solver may take them for different things.
+    return tuple(map(_hashable, value)) if isinstance(value, (list, tuple)) else (type(value).__name__, value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +119,20 @@ class Made:
     trajectory: Trajectory | None
     seconds: float
     reason: str = ""
+
+    @property
+    def flight(self) -> Trajectory:
+        """The trajectory; raises Missing with the reason if there is none."""
+        if self.trajectory is None:
+            raise Missing(f"{self.run.name}: {self.reason}")
+        return self.trajectory
+
+    @property
+    def whole(self) -> Trajectory:
+        """The trajectory; raises Missing with the reason if there is none or the run did not reach its end."""
+        if not self.flight.ok:
+            raise Missing(f"{self.run.name}: {self.flight.status}: {self.flight.message}")
+        return self.flight
 
 
 def make(run: Run) -> Made:
@@ -120,7 +166,7 @@ def solve(name: str, scenario: Scenario, **settings: Any) -> Trajectory:
     import engine_check
 
     # Without step and tolerance an engine would certify each run, at several times its cost; the report's own
-    # refinement (``evidence.run_bands``) says what its runs are worth.
+    # refinement (``chapters.differences``) says what its runs are worth.
     given = {} if "tolerance" in settings else {"dt": engine_check.DEFAULT_DT}
     return engine_check.solve(scenario, **{**given, **settings})
 

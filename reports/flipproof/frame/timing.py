@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, as_completed
 from dataclasses import replace
 from typing import Any, Final
 
@@ -44,15 +43,6 @@ def make_timed(runs: Sequence[tuple[Run, FloatArray]]) -> list[Made]:
     return [_made_timed(run, times) for run, times in runs]
 
 
-def make_all_timed(pool: Executor, runs: Iterable[tuple[Run, FloatArray]], batch: int = 12) -> dict[str, Made]:
-    """Make runs in the workers of ``pool``, those of one solver together; return them by tag, in the order asked."""
-    runs = list(runs)
-    made: dict[str, Made] = {}
-    for future in as_completed([pool.submit(make_timed, job) for job in _batches(runs, batch)]):
-        made |= {result.run.tag: result for result in future.result()}
-    return {run.tag: made[run.tag] for run, _ in runs}
-
-
 def at_times(t: FloatArray, times: FloatArray) -> NDArray[np.int64]:
     """Return the indices at which ``t`` holds ``times``.
 
@@ -69,7 +59,7 @@ def at_times(t: FloatArray, times: FloatArray) -> NDArray[np.int64]:
     return at
 
 
-def _batches(runs: list[tuple[Run, FloatArray]], batch: int) -> Iterator[list[tuple[Run, FloatArray]]]:
+def batches(runs: list[tuple[Run, FloatArray]], batch: int = 12) -> Iterator[list[tuple[Run, FloatArray]]]:
     """Yield jobs, the slice model's first: one for all of it, so that its loop is compiled in one worker only."""
     compiled = [job for job in runs if find(job[0].solver).package == "slicemodel"]
     if compiled:

@@ -26,24 +26,17 @@ CHANGE: Final = 3e-11
 CUT: Final = 10.0
 """Usual rest speed over that of the twin in rest speed."""
 
-RELEASE, REST = "twin in release", "twin in rest speed"
-KINDS: Final = (RELEASE, REST)
 BAND_WORDS: Final = f"the larger change when ω₀ is {CHANGE:g} faster and when the rest speed is cut {CUT:g}-fold"
 
 
-def twin_tag(tag: str, kind: str) -> str:
-    """Return the tag of a twin, from that of its run."""
-    return f"{tag}, {kind}"
-
-
-def twins(run: Run) -> list[Run]:
-    """Return both twins of a run of an equation that has the solver's own rest speed."""
+def twins(run: Run) -> tuple[Run, Run]:
+    """Return both twins of a run of an equation that has the solver's own rest speed: in release, in rest speed."""
     released = replace(run.scenario, omega0=run.scenario.omega0 * (1.0 + CHANGE))
     rest = {**run.settings, "rest_speed": usual_rest_speed(run.solver) / CUT}
-    return [
-        replace(run, tag=twin_tag(run.tag, RELEASE), scenario=released, confirms=run.tag),
-        replace(run, tag=twin_tag(run.tag, REST), settings=rest, confirms=run.tag),
-    ]
+    return (
+        replace(run, label=f"{run.name}, twin in release", scenario=released),
+        replace(run, label=f"{run.name}, twin in rest speed", settings=rest),
+    )
 
 
 def usual_rest_speed(model: str) -> float:
@@ -52,6 +45,6 @@ def usual_rest_speed(model: str) -> float:
     return REST_SPEED_WITH_RECOIL if switches.recoil else REST_SPEED
 
 
-def band(tag: str, values: Mapping[str, float]) -> float:
-    """Return the larger difference of a run's number from those of its twins; ``values`` maps tags to numbers."""
-    return max(abs(values[tag] - values[twin_tag(tag, kind)]) for kind in KINDS)
+def band(run: Run, values: Mapping[Run, float]) -> float:
+    """Return the larger difference of a run's number from those of its twins."""
+    return max(abs(values[run] - values[twin]) for twin in twins(run))

@@ -75,3 +75,16 @@ def _cell(value: Any) -> str:
     if isinstance(value, (float, np.floating)):
         return f"{value:.{DIGITS}g}" if not math.isnan(value) else ""
     return str(value)
+
+
+def json_ready(value: Any) -> Any:
+    """Return a value as JSON holds it: arrays are left out of mappings, what JSON cannot say becomes text."""
+    if isinstance(value, Mapping):
+        return {str(name): json_ready(each) for name, each in value.items() if not getattr(each, "shape", None)}
+    if hasattr(value, "item"):
+        value = value.item()
+    if isinstance(value, (list, tuple)):
+        return [json_ready(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value if value is None or isinstance(value, (bool, int, float, str)) else str(value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import platform
 from datetime import UTC, datetime
@@ -17,15 +18,20 @@ def provenance(command: str) -> dict[str, str]:
         "made": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "Python": platform.python_version(),
     }
-    for package in PACKAGES:
-        try:
-            facts[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            facts[package] = "checkout" if package == "flipproof" else "not installed"
+    facts |= {package: version_of(package) for package in PACKAGES}
     facts["system"] = f"{platform.system()} {platform.machine()}"
     facts["processor"] = _processor()
     facts["cores"] = str(_cores())
     return facts
+
+
+@functools.cache
+def version_of(package: str) -> str:
+    """Return the version of an installed package; "not installed", and of flipproof itself "checkout", without one."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "checkout" if package == "flipproof" else "not installed"
 
 
 def _cores() -> int:

@@ -1,7 +1,7 @@
 """The committed snapshot of a full report: what the front page of the repository shows.
 
     python -m flipproof.output.snapshot               make a full report and keep its summary and key pictures
-    python -m flipproof.output.snapshot --from DIR    the same from a full report that is already there
+    python -m flipproof.output.snapshot --from DIR    the same from a full report, made with --png, that is there
 
 Both also write the numbers of the summary into the README, between its two marks. Run times, settings and figures are
 left out of the summary; what stays is compared with the code by the tests.
@@ -54,7 +54,7 @@ def take(report: Path, place: Path = PLACE) -> None:
     pictures = [report / "figures" / f"{name}.png" for name in PICTURES]
     for picture in pictures:
         if not picture.is_file():
-            raise ValueError(f"{report}: has no figures/{picture.name}")
+            raise ValueError(f"{report}: has no figures/{picture.name}; run flipproof report --png")
     kept = {"$schema": f"../flipproof/output/schema/{SCHEMA_NAME}", **{name: summary[name] for name in KEPT}}
     with replaced_folder(place, "snapshot") as folder:
         (folder / "summary.json").write_text(summary_text(kept), encoding="utf-8")
@@ -105,7 +105,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             with tempfile.TemporaryDirectory() as scratch:
                 from flipproof.cli.main import main as flipproof
 
-                status = flipproof(["report", "--out", f"{scratch}/report"])
+                status = flipproof(["report", "--out", f"{scratch}/report", "--png"])
                 if status:
                     return status
                 take(Path(scratch, "report"), options.to)

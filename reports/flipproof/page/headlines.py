@@ -16,11 +16,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Final, Literal
 
-from flipproof.evidence import BY_ENGINE, EQ8_FREE, FREE, PROGRAM_EQ8, TOTAL, Evidence
-from flipproof.studies.differences import Difference
-from flipproof.studies.finite_step import EVERYTHING, HELD, LOCATED
-from flipproof.studies.slices import FINER
-from flipproof.studies.waterfall import NAMES, STEP, Bar, Waterfall
+from flipproof.chapters.differences.chapter import BY_ENGINE, EQ8_FREE, PROGRAM_EQ8, TOTAL, Differences
+from flipproof.chapters.differences.study import Difference
+from flipproof.chapters.finite_step.chapter import StepCosts
+from flipproof.chapters.finite_step.study import EVERYTHING, HELD, LOCATED
+from flipproof.chapters.solvers import FREE
+from flipproof.chapters.waterfall.study import NAMES, STEP, Bar, Waterfall
+from flipproof.frame.gather import Gathered
+from flipproof.frame.throws import FINER
 
 Measure = Literal["largest", "start", "landing", "share", "order"]
 
@@ -77,22 +80,16 @@ class Headline:
         return cls(**known)
 
 
-def headlines(evidence: Evidence) -> tuple[Headline, ...]:
+def headlines(gathered: Gathered) -> tuple[Headline, ...]:
     """Return the numbers of the verdict that could be computed."""
-    found = evidence.attribution
-    plateau = found.waterfalls[0] if found.waterfalls else None
+    differences: Differences | None = gathered.found("differences")
+    waterfalls: tuple[Waterfall, ...] = gathered.found("waterfall") or ()
+    costs: StepCosts | None = gathered.found("finite-step")
     return (
-        *_pairs(evidence.differences, _ended(evidence)),
-        *(_shares(plateau) if plateau is not None else ()),
-        *_steps(evidence),
+        *(_pairs(differences.pairs, differences.ended) if differences is not None else ()),
+        *(_shares(waterfalls[0]) if waterfalls else ()),
+        *(_steps(costs) if costs is not None else ()),
     )
-
-
-def _ended(evidence: Evidence) -> str:
-    free = evidence.trajectory(FREE)
-    if free is None or free.ok:
-        return ""
-    return f"up to t = {1e3 * free.t[-1]:.0f} ms, where {free.method} {free.status}"
 
 
 def _pairs(differences: Sequence[Difference], ended: str) -> Iterator[Headline]:
@@ -145,10 +142,10 @@ def _shares(waterfall: Waterfall) -> Iterator[Headline]:
         yield headline("away-share", away, "share")
 
 
-def _steps(evidence: Evidence) -> Iterator[Headline]:
-    costs = {cost.way.name: cost for cost in evidence.finite_step}
-    finer = {cost.way.name: cost for cost in evidence.finite_step_finer}
-    n = evidence.throw.n_slices
+def _steps(found: StepCosts) -> Iterator[Headline]:
+    costs = {cost.way.name: cost for cost in found.costs}
+    finer = {cost.way.name: cost for cost in found.more}
+    n = found.slices
     asked: tuple[tuple[str, str, Measure], ...] = (
         ("held", HELD, "start"),
         ("held-through", LOCATED, "largest"),

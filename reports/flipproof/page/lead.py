@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from flipproof.chapters.differences.study import PARTING_BAND, moved, percent
 from flipproof.page.headlines import Headline
-from flipproof.studies.differences import PARTING_BAND, moved, percent
 
 NOTHING = 1e-6
 """Fraction of omega_0 below which two solvers are said to agree."""

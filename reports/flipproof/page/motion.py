@@ -136,8 +136,8 @@ def motion_data(
     Parameters
     ----------
     throw : Scenario - the throw of all runs, cut as they were
-    made : mapping from tag to outcome - a solver that failed is shown with its reason
-    solvers : tags, in the order of the bottles
+    made : mapping from name to outcome - a solver that failed is shown with its reason
+    solvers : names, in the order of the bottles
     frames : int - frames of a whole flight
     """
     times = frame_times(throw, frames)

@@ -3,50 +3,25 @@
 from __future__ import annotations
 
 import re
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any
 
+from jinja2 import Environment
 from markupsafe import Markup
 
-from flipproof.evidence import FLIGHTS, Evidence
-from flipproof.exhibits_work_precision import tabulate_work_precision
-from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.findings import Finding
-from flipproof.frame.twins import BAND_WORDS
-from flipproof.instruments import witnesses
+from flipproof.chapters.differences.study import Difference, moved, percent
+from flipproof.frame.gather import Gathered, Told
 from flipproof.output.summary import summarise
-from flipproof.page.glossary import TERMS
-from flipproof.page.glossary import anchor as term_anchor
+from flipproof.page.glossary import TERMS, anchor
 from flipproof.page.headlines import headlines
 from flipproof.page.inline import data_uri, shape
 from flipproof.page.lead import answer, answers, lead_words
-from flipproof.page.sections import EVIDENCE, STORY, folded, grouped
+from flipproof.page.parts import sections
+from flipproof.page.sections import STORY, behind
 from flipproof.page.story.facts import story
 from flipproof.page.story.live import live_data, sliders
 from flipproof.page.templating import environment
-from flipproof.studies.differences import Difference, moved, percent
-from flipproof.studies.slices import FINER
-
-CONTENTS = {**STORY, **{id_: title for id_, (title, _) in EVIDENCE.items()}}
-"""Section -> its name in the contents, in the order of the page."""
-
-PLACES = {
-    "waterfall": "assumptions",
-    "frozen": "steps",
-    "limit of": "steps",
-    "map over": "maps",
-    "ledger of": "energy",
-    "exact cases": "energy",
-    "errata": "errata",
-    "agreement": "engines",
-    "stability chart": "engines",
-    "engine facts": "engines",
-    "horizon": "engines",
-    "overlap": "engines",
-}
-"""How the name of a study begins -> the section that tells of its failure; every other stands with the events."""
 
 SYMBOLS = {
     "omega_0": "ω₀", "omega0": "ω₀", "omega": "ω", "theta": "θ", "gamma": "γ", "alpha": "α", "epsilon": "ε",
@@ -104,100 +79,57 @@ def read_assets() -> dict[str, Markup]:
     }
 
 
-def sort_problems(problems: Mapping[str, str]) -> Mapping[str, Sequence[tuple[str, str]]]:
-    """Return section -> studies that failed there, each with its reason."""
-    sorted_problems: dict[str, list[tuple[str, str]]] = defaultdict(list)
-    for name, reason in problems.items():
-        place = next((section for begin, section in PLACES.items() if name.startswith(begin)), "events")
-        sorted_problems[place].append((name, reason))
-    return sorted_problems
-
-
 def render(
-    evidence: Evidence,
-    findings: Sequence[Finding],
-    exhibits: Sequence[Exhibit],
-    solvers: Sequence[Mapping[str, Any]],
+    gathered: Gathered,
+    told: Mapping[str, Told],
     provenance: Mapping[str, str],
-    *,
     summary: Mapping[str, Any] | None = None,
-    motion: Any = None,
-    paper: Any = None,
-    measured: Any = None,
 ) -> str:
-    """Return the whole page.
-
-    ``motion``, ``paper`` and ``measured`` are what their templates draw from; a part that is None is left out.
-    ``summary`` is the content of summary.json, which the story is told from; None: made here.
-    """
-    summary = summary or summarise(evidence, findings, exhibits, solvers, provenance)
-    templates = environment()
-    templates.filters["typeset"] = typeset
-    templates.filters["unbroken"] = unbroken
-    templates.filters["amount"] = amount
-    templates.filters["percent"] = percent
-    templates.filters["data_uri"] = data_uri
-    templates.filters["shape"] = shape
-    templates.filters["short"] = short
-    templates.filters["restitution_error"] = restitution_error
-    templates.filters["term_anchor"] = term_anchor
-    found = evidence.attribution
-    reasons = sort_problems({**found.problems, **evidence.instruments.problems})
-    tables = list(tabulate_work_precision(evidence.precision))
-    verdict = headlines(evidence)
+    """Return the whole page; ``summary``, which its story is told from, is that of the report, made here if None."""
+    summary = summary or summarise(gathered, told, provenance)
+    templates = page_environment()
+    verdict = headlines(gathered)
+    findings = [finding for each in told.values() for finding in each.findings]
     regressions = [finding for finding in findings if finding.kind == "regression"]
-    told = story(summary, {exhibit.name: exhibit.table for exhibit in exhibits})
+    flown = gathered.found("flights")
+    motion = flown.motion if flown is not None else None
+    facts = story(summary, {figure.name: figure.table for each in told.values() for figure in each.figures})
     context = dict(
-        scenario=evidence.scenario,
-        throw=evidence.throw,
-        finer=FINER,
-        costs=tuple(
-            zip(evidence.finite_step, evidence.finite_step_finer or (None,) * len(evidence.finite_step), strict=True)
-        ),
-        size=evidence.size,
+        scenario=gathered.ask.scenario,
+        throw=gathered.ask.throw,
         answer=answer(verdict),
-        differences=sorted(evidence.differences, key=lambda difference: -difference.largest),
         lead=lead_words(verdict),
         answers=tuple(answers(verdict)),
         regressions=regressions,
-        grouped=grouped(findings),
         failed=[finding for finding in regressions if finding.failed],
-        exhibits=exhibits,
-        steps=evidence.flights_by_step,
-        slices=evidence.slices,
-        growths=evidence.growths,
-        found=found,
-        instruments=evidence.instruments,
-        uncertified=[tag for tag in witnesses(evidence.throw) if tag not in evidence.size.bench.certified],
-        tables=tables,
-        forms_omega=[(pair, forms["omega"]) for pair, forms in found.forms.items()],
-        solvers=solvers,
-        flown=[row for row in solvers if row["name"] in FLIGHTS],
-        problems=[made for made in evidence.made.values() if made.trajectory is None],
-        reasons=reasons,
+        solvers=flown.rows if flown is not None else [],
+        problems=[made for made in gathered.flights.values() if made.trajectory is None],
+        notes=[note for each in told.values() for note in each.notes],
         motion=motion,
-        paper=paper,
-        assets=read_assets(),
+        measured=gathered.found("measured"),
         provenance=provenance,
-        twin_words=BAND_WORDS,
-        settings=evidence.scenario.to_toml(),
+        settings=gathered.ask.scenario.to_toml(),
         terms=TERMS,
-        measured=measured,
-    )
-    sections = folded(templates.get_template("evidence.html.j2").render(context), findings, exhibits)
-    there = {
-        **dict.fromkeys(("verdict", "answer", "live", "survives", "sure"), True),
-        "motion-story": motion,
-        "shares": told.shares,
-        "bottles": told.map,
-        **{section.id: True for section in sections},
-    }
-    return templates.get_template("report.html.j2").render(
-        context,
-        contents=[(id_, words) for id_, words in CONTENTS.items() if there.get(id_)],
+        story=facts,
         story_ids=STORY,
-        story=told,
-        sliders=sliders(evidence.throw),
-        live=live_data(evidence.throw),
-        sections=sections,
+        sliders=sliders(gathered.ask.throw),
+        live=live_data(gathered.ask.throw),
     )
+    parts = sections(gathered, told, templates)
+    body = (*parts, *behind(parts, templates, context))
+    left_out = {"motion-story": not motion, "shares": not facts.shares, "bottles": not facts.map}
+    screens = [(id_, words) for id_, words in STORY.items() if not left_out.get(id_)]
+    return templates.get_template("report.html.j2").render(
+        context, contents=[*screens, *((section.id, section.title) for section in body)], sections=body
+    )
+
+
+def page_environment() -> Environment:
+    """Return the environment of the page's templates, with the filters that they and the chapters' parts use."""
+    templates = environment()
+    templates.filters |= {
+        "typeset": typeset, "unbroken": unbroken, "amount": amount, "percent": percent, "data_uri": data_uri,
+        "shape": shape, "short": short, "restitution_error": restitution_error, "term_anchor": anchor,
+    }  # fmt: skip
+    templates.globals["assets"] = read_assets()
+    return templates

@@ -3,25 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
-from flipproof.frame.pool import Progress, make_all
 from flipproof.frame.solvers import Made, Run
 from flipproof.paper.cases import Case, family
 from flipproof.paper.claims_cost import MANY_STEPS, many_steps_key, same_steps_key
 from flipproof.paper.claims_model import FINEST, MANY_SLICES, finest_key
 from flipproof.paper.observe import Flights
 from flipproof.paper.parameters import numbers, paper_steps, paper_throw
-from flipproof.paper.runs import (
-    GROUP,
-    PUBLISHED,
-    SOLVERS,
-    PaperRuns,
-    make_thinned,
-    scenario_of,
-)
+from flipproof.paper.runs import GROUP, PUBLISHED, SOLVERS, PaperRuns, scenario_of
 from slicemodel import Scenario, Trajectory
 
 EVENT_DRIVEN: Final = SOLVERS[1:]
@@ -29,8 +20,8 @@ EVENT_DRIVEN: Final = SOLVERS[1:]
 HALVED: Final = ("filling", "long", "drag", "spin", "angle", "aspect")
 """Families flown with half the slices too; in the others their number is the subject."""
 
-SLICES: Final = ("slices", "slices at 5 /s")
-"""Families in which the number of slices is the subject."""
+SLICES: Final = {"slices": "", "slices at 5 /s": " at 5 /s"}
+"""Families in which the number of slices is the subject, and the words for their damping."""
 
 REBOUNDS: Final = ("beta", "beta at 5 /s")
 
@@ -63,6 +54,17 @@ class ClaimRuns:
     halved: Mapping[Pair, Made]
     half_steps: Mapping[Pair, Made] = field(default_factory=dict)
 
+    @classmethod
+    def of(cls, paper: PaperRuns, plan: ClaimPlan, made: Mapping[Run, Made]) -> ClaimRuns:
+        """Return the runs of the figures and those of the plan."""
+        return cls(
+            paper=paper,
+            further={pair: made[run] for pair, run in plan.further.items()},
+            halved={pair: made[run] for pair, run in plan.halved.items()}
+            | {pair: made[run] for pair, (run, _) in plan.half_slices.items()},
+            half_steps={pair: made[run] for pair, (run, _) in plan.half_steps.items()},
+        )
+
     def flights(self, solver: str) -> Flights:
         """Return the flights of one equation, with those at half the slices and half the steps where there are any."""
         usual = {**_of(solver, self.paper.made), **_of(solver, self.further)}
@@ -94,10 +96,10 @@ def _flights(solver: str, made: Mapping[str, Made]) -> Flights:
 def plan_further() -> dict[Pair, Run]:
     """Return the runs that no figure needs: finer in slices and in time, and without weight."""
     runs: dict[Pair, Run] = {}
-    for name in SLICES:
+    for name, damping in SLICES.items():
         many = next(case for case in family(name) if case.value == MANY_SLICES)
         for solver in EVENT_DRIVEN:
-            finest = finest_key(name.removeprefix("slices"))
+            finest = finest_key(damping)
             runs[solver, finest] = _run(solver, finest, many.scenario.with_slices(FINEST))
     for filling in numbers("figure-S1-filling"):
         throw, key, same = paper_throw(filling), many_steps_key(filling), same_steps_key(filling)
@@ -111,7 +113,7 @@ def plan_further() -> dict[Pair, Run]:
 def _run(solver: str, key: str, scenario: Scenario, steps: int | None = None, words: str = "") -> Run:
     """Return one run: of a scheme with its steps, or of an equation."""
     settings: dict[str, Any] = {} if steps is None else {"steps": steps, "store": "summary"}
-    return Run(f"claims, {solver}, {key}{words}", solver, scenario, settings)
+    return Run(solver, scenario, settings, label=f"claims, {solver}, {key}{words}")
 
 
 def plan_halved() -> dict[Pair, Run]:
@@ -150,23 +152,40 @@ def plan_published(half: str) -> dict[Pair, tuple[Run, int]]:
                 steps, thin = 1 + (case.steps - 1) // 2, 1
             settings = {"steps": steps, "store": "full" if case.key in kept else "summary"}
             words = HALF_WORDS if half == "slices" else HALF_STEPS_WORDS
-            tag = f"claims, {PUBLISHED}, {case.key}{words}"
-            runs[PUBLISHED, case.key] = Run(tag, PUBLISHED, scenario, settings), thin
+            label = f"claims, {PUBLISHED}, {case.key}{words}"
+            runs[PUBLISHED, case.key] = Run(PUBLISHED, scenario, settings, label), thin
     return runs
 
 
-def gather_claims(pool: Executor, paper: PaperRuns, progress: Progress) -> ClaimRuns:
-    """Make what the statements need beside the runs of the figures, in the same pool."""
-    further, halved = plan_further(), plan_halved()
-    half_slices, half_steps = plan_published("slices"), plan_published("steps")
-    jobs = [*half_slices.values(), *half_steps.values()]
-    thinned = [pool.submit(make_thinned, jobs[k : k + GROUP]) for k in range(0, len(jobs), GROUP)]
-    made = make_all(pool, [*halved.values(), *further.values()], progress)
-    made |= {each.run.tag: each for group in thinned for each in group.result()}
-    return ClaimRuns(
-        paper=paper,
-        further={pair: made[run.tag] for pair, run in further.items()},
-        halved={pair: made[run.tag] for pair, run in halved.items()}
-        | {pair: made[run.tag] for pair, (run, _) in half_slices.items()},
-        half_steps={pair: made[run.tag] for pair, (run, _) in half_steps.items()},
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClaimPlan:
+    """What the statements need beside the runs of the figures, by solver and key of the case.
+
+    Of the published program's runs with half the slices or half the steps every so many points are kept.
+    """
+
+    further: Mapping[Pair, Run]
+    halved: Mapping[Pair, Run]
+    half_slices: Mapping[Pair, tuple[Run, int]]
+    half_steps: Mapping[Pair, tuple[Run, int]]
+
+    @property
+    def runs(self) -> list[Run]:
+        """The runs that are kept whole."""
+        return [*self.halved.values(), *self.further.values()]
+
+    @property
+    def groups(self) -> list[list[tuple[Run, int]]]:
+        """The runs that are thinned, in groups of which a worker makes one at a time."""
+        jobs = [*self.half_slices.values(), *self.half_steps.values()]
+        return [jobs[k : k + GROUP] for k in range(0, len(jobs), GROUP)]
+
+
+def plan_claims() -> ClaimPlan:
+    """Return what the statements need beside the runs of the figures."""
+    return ClaimPlan(
+        further=plan_further(),
+        halved=plan_halved(),
+        half_slices=plan_published("slices"),
+        half_steps=plan_published("steps"),
     )

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from flipproof.chapters.errata.erratum import SQUARE
+from flipproof.chapters.errata.programs import exponents_of_cost
 from flipproof.paper.observe import Flights, distance, level, level_by_points
 from flipproof.paper.parameters import numbers, paper_steps
 from flipproof.paper.runs import PUBLISHED
 from flipproof.paper.statements import OMEGA, Reading
-from flipproof.studies.errata import SQUARE, exponents_of_cost
 
 MORE: Final = 0.1
 """By how much one exponent must exceed another to be the larger."""

@@ -20,7 +20,7 @@ from flipproof.frame.exhibit import Exhibit
 from flipproof.output.columns import rows_csv
 from flipproof.paper.cases import HALF_FULL, family
 from flipproof.paper.figures_panels import COLUMN, NAMES, head, legend_below
-from flipproof.paper.figures_words import SECTION, listed, settings_words
+from flipproof.paper.figures_words import listed, settings_words
 from flipproof.paper.runs import SOLVERS, PaperRuns
 from slicemodel import Scenario, Trajectory
 from slicemodel.landing import lab_motion, moment_at
@@ -321,7 +321,7 @@ def _exhibit(
     name: str, title: str, caption: str, alt: str, maker: Callable[..., Figure], data: tuple[Any, ...], table: str
 ) -> Exhibit:
     return Exhibit(
-        name=f"paper-{name}", section=SECTION, title=f"Fig. {name}: {title}", caption=caption, alt=alt, maker=maker,
+        name=f"paper-{name}", title=f"Fig. {name}: {title}", caption=caption, alt=alt, maker=maker,
         data=data, table=table,
     )  # fmt: skip
 

@@ -23,7 +23,7 @@ from flipproof.paper.figures_panels import (
     stretched,
     table_grid,
 )
-from flipproof.paper.figures_words import SECTION, listed, settings_words
+from flipproof.paper.figures_words import listed, settings_words
 from flipproof.paper.parameters import number, numbers
 from flipproof.paper.runs import PUBLISHED, SOLVERS, PaperRuns
 from slicemodel import Trajectory
@@ -97,7 +97,6 @@ def _exhibit(name: str, title: str, caption: str, alt: str, grid: Grid) -> Exhib
     settings = settings_words()
     return Exhibit(
         name=f"paper-{name}",
-        section=SECTION,
         title=f"Fig. {name}: {title}",
         caption=f"{caption} {settings}",
         alt=alt,

@@ -24,7 +24,7 @@ from flipproof.paper.figures_panels import (
     stretched,
     table_grid,
 )
-from flipproof.paper.figures_words import SECTION, listed, settings_words
+from flipproof.paper.figures_words import listed, settings_words
 from flipproof.paper.parameters import paper_throw
 from flipproof.paper.runs import PUBLISHED, SOLVERS, PaperRuns
 from slicemodel import Trajectory
@@ -249,7 +249,6 @@ def _longest(costs: Sequence[Cost]) -> float:
 def _exhibit(name: str, title: str, caption: str, alt: str, grid: Grid) -> Exhibit:
     return Exhibit(
         name=f"paper-{name}",
-        section=SECTION,
         title=f"Fig. {name}: {title}",
         caption=f"{caption} {settings_words()}",
         alt=alt,

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final
 
 from flipproof.paper.figures_panels import NAMES
 from flipproof.paper.runs import BANDS
-
-SECTION: Final = "paper"
 
 
 def settings_words() -> str:

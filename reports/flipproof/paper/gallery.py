@@ -34,7 +34,7 @@ def make_gallery(
         Figures such as "7b"; none: all.
     out : path
         Folder; an older gallery in it is replaced when the new one is complete.
-    progress : callable (made, planned, tag)
+    progress : callable (made, planned, label)
     provenance : mapping
     jobs : int or None
         Worker processes; None: one per core.

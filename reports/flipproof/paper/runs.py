@@ -43,6 +43,11 @@ class PaperRuns:
     made: Mapping[tuple[str, str], Made]
     costs: tuple[Cost, ...]
 
+    @classmethod
+    def of(cls, groups: Iterable[Mapping[tuple[str, str], Made]], costs: tuple[Cost, ...] = ()) -> PaperRuns:
+        """Return the runs of ``plan_groups``, made group by group."""
+        return cls(made={pair: made for group in groups for pair, made in group.items()}, costs=costs)
+
     def trajectory(self, solver: str, key: str) -> Trajectory | None:
         """Return the trajectory of a case, or None if it was not planned or failed."""
         made = self.made.get((solver, key))
@@ -67,37 +72,35 @@ def scenario_of(solver: str, case: Case) -> Scenario | None:
     return case.scenario
 
 
-def plan_paper(keys: Iterable[str] | None = None) -> list[Run]:
-    """Return every run that the figures need, one for each case and solver, the slowest solver first.
-
-    Parameters
-    ----------
-    keys : keys of cases, optional
-        Only these.
-    """
-    return [planned.run for planned in _planned(keys)]
+def plan_groups(keys: Iterable[str] | None = None) -> list[list[Planned]]:
+    """Return every run that the figures need, in groups of which a worker makes one at a time."""
+    planned = list(_planned(keys))
+    return [planned[k : k + GROUP] for k in range(0, len(planned), GROUP)]
 
 
 @dataclass(frozen=True, slots=True)
-class _Planned:
+class Planned:
+    """A run of the figures, with the case that it is of."""
+
     solver: str
     case: Case
     run: Run
 
     @property
     def pair(self) -> tuple[str, str]:
+        """The solver and the key of its case."""
         return self.solver, self.case.key
 
 
-def _planned(keys: Iterable[str] | None) -> Iterator[_Planned]:
+def _planned(keys: Iterable[str] | None) -> Iterator[Planned]:
     cases = all_cases()
     wanted = set(cases if keys is None else keys)
     for solver in reversed(SOLVERS):
         for key, case in cases.items():
             scenario = scenario_of(solver, case) if key in wanted else None
             if scenario is not None:
-                run = Run(f"paper, {solver}, {key}", solver, scenario, _settings(solver, case))
-                yield _Planned(solver, case, run)
+                run = Run(solver, scenario, _settings(solver, case), label=f"paper, {solver}, {key}")
+                yield Planned(solver, case, run)
 
 
 def _settings(solver: str, case: Case) -> dict[str, Any]:
@@ -115,22 +118,21 @@ def gather_paper(
     Parameters
     ----------
     pool : executor of worker processes
-    progress : callable (made, planned, tag)
+    progress : callable (made, planned, label)
     keys : keys of cases, optional
         Only these.
     costs : bool
         Whether to measure what runs cost too, after everything else.
     """
-    planned = list(_planned(keys))
-    thinned = [pool.submit(_make_group, planned[k : k + GROUP]) for k in range(0, len(planned), GROUP)]
-    made: dict[tuple[str, str], Made] = {}
-    for future in thinned:
-        made |= future.result()
-        progress(len(made), len(planned), next(reversed(made))[1])
-    return PaperRuns(made={each.pair: made[each.pair] for each in planned}, costs=_measure_costs(pool) if costs else ())
+    groups = plan_groups(keys)
+    made: list[dict[tuple[str, str], Made]] = []
+    for group, future in [(group, pool.submit(make_group, group)) for group in groups]:
+        made.append(future.result())
+        progress(sum(map(len, made)), sum(map(len, groups)), group[-1].pair[1])
+    return PaperRuns.of(made, _measure_costs(pool) if costs else ())
 
 
-def _make_group(group: Iterable[_Planned]) -> dict[tuple[str, str], Made]:
+def make_group(group: Iterable[Planned]) -> dict[tuple[str, str], Made]:
     """Make runs one after the other and keep of each what is looked at."""
     found = {}
     for each in group:

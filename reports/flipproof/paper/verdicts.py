@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
 
 from flipproof.frame.findings import Finding
-from flipproof.frame.pool import Progress
-from flipproof.paper.claim_runs import ClaimRuns, gather_claims
+from flipproof.paper.claim_runs import ClaimRuns
 from flipproof.paper.claims import STEADY, claim_weight_slows_the_tenth, judge_all
 from flipproof.paper.claims_landing import claim_filling_of_change
 from flipproof.paper.experiment import CAVEAT, Comparison, agreement, closest_overall, compare_all, times_closest
-from flipproof.paper.runs import SOLVERS, PaperRuns
+from flipproof.paper.runs import SOLVERS
 from flipproof.paper.statements import Judgement, Statement, Verdict
 
 NAMES: Final[Mapping[str, str]] = MappingProxyType(
@@ -115,8 +113,3 @@ def judge_paper(runs: ClaimRuns) -> PaperVerdicts:
         comparisons=compare_all(runs),
         weights=(*(claim_weight_slows_the_tenth(runs, solver) for solver in STEADY), claim_filling_of_change()),
     )
-
-
-def gather_verdicts(pool: Executor, paper: PaperRuns, progress: Progress) -> PaperVerdicts:
-    """Make the runs that the figures do not have, in the pool that made those, and judge."""
-    return judge_paper(gather_claims(pool, paper, progress))

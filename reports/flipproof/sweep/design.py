@@ -64,9 +64,9 @@ MOST_CURVE: Final = 10_000
 """Points of a row's curves at the most."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Point:
-    """One throw by one solver.
+    """One throw by one solver; without slots, whose pickling by ``dataclass`` takes three times as long.
 
     Parameters
     ----------
@@ -100,10 +100,18 @@ class Point:
         """Return all that makes this point; ``from_parameters`` reads it back to the last bit."""
         return {**self.throw, "solver": self.solver, "settings": self.settings}
 
+    def text(self) -> str:
+        """Return the parameters as JSON, keys in order; it reads back to the last bit."""
+        return _dumps(self.parameters())
+
     def key(self, code: str) -> str:
-        """Return the SHA-256 of the parameters, floats bit by bit, and of the code that makes the point."""
-        text = _dumps(_exact({**self.parameters(), "code": code}))
-        return hashlib.sha256(text.encode()).hexdigest()
+        """Return the key of this point as made by the code."""
+        return key_of(self.text(), code)
+
+
+def key_of(text: str, code: str) -> str:
+    """Return the SHA-256 of a point's ``text``, floats to the last bit, and of the code that makes the point."""
+    return hashlib.sha256(f"{code}\n{text}".encode()).hexdigest()
 
 
 def from_parameters(text: str) -> Point:
@@ -113,17 +121,7 @@ def from_parameters(text: str) -> Point:
     return Point(0, (), throw, stated["solver"], stated["settings"])
 
 
-_dumps = json.JSONEncoder(sort_keys=True, separators=(",", ":")).encode
-
-
-def _exact(value: Any) -> Any:
-    if isinstance(value, float):
-        return value.hex()
-    if isinstance(value, str | int):
-        return value
-    if isinstance(value, Mapping):
-        return {key: _exact(item) for key, item in value.items()}
-    return [_exact(item) for item in value] if isinstance(value, list | tuple) else value
+_dumps = json.JSONEncoder(sort_keys=True).encode
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,6 +1,6 @@
-"""The runs that a study plans, as a sweep: a design made of them, and their rows read back by tag.
+"""The runs that a study plans, as a sweep: a design made of them, and their rows read back by run.
 
-A study in ``flipproof.studies`` plans runs and reads what became of them; who makes them, and whether the program died
+A study of a chapter plans runs and reads what became of them; who makes them, and whether the program died
 in between, is not its business. Here a sweep makes them. A run finds its row by what was computed, solver, scenario
 and settings to the last bit: a design that misses a run of its plan cannot go unnoticed.
 """
@@ -49,8 +49,8 @@ def design_of_runs(runs: Sequence[Run], varied: Mapping[str, Sequence[Value]], c
     return design_of(document, source, f"# {source}\n")
 
 
-def read_runs(store: Store, runs: Sequence[Run]) -> dict[str, Row]:
-    """Return the row of every run by its tag.
+def read_runs(store: Store, runs: Sequence[Run]) -> dict[Run, Row]:
+    """Return the row of every run.
 
     Raises
     ------
@@ -63,4 +63,4 @@ def read_runs(store: Store, runs: Sequence[Run]) -> dict[str, Row]:
     for number, *values in store.connection.execute(f"SELECT number, {', '.join(COLUMNS)} FROM points"):
         found = dict(zip(COLUMNS, values, strict=True))
         rows[number] = Row(**{**found, "curves": read_curves(found["curves"]) if found["curves"] else {}})
-    return {run.tag: rows[numbers[run.solver, run.scenario, settings_text(run.settings)]] for run in runs}
+    return {run: rows[numbers[run.solver, run.scenario, settings_text(run.settings)]] for run in runs}

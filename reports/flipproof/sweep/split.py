@@ -16,10 +16,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from flipproof.chapters.waterfall.figure import figure_waterfall
+from flipproof.chapters.waterfall.study import PROGRAM, Waterfall, plan_waterfall, split_all
 from flipproof.figures.style import draw
-from flipproof.figures.waterfall import figure_waterfall
 from flipproof.frame.solvers import Run
-from flipproof.studies.waterfall import PROGRAM, Waterfall, plan_waterfall, split_all
 from flipproof.sweep.axes import Value
 from flipproof.sweep.command import Begin, completed
 from flipproof.sweep.errors import SweepError
@@ -68,7 +68,7 @@ def make_split(
     if damaged:
         return salvage(damaged, out, design, code_identity())
     with completed(design, out, begin, jobs=jobs, dask=dask, export_to=export_to) as (store, summary):
-        waterfalls = split_rows(throw, read_runs(store, runs))
+        waterfalls = split_rows(read_runs(store, runs))
         for waterfall in waterfalls:
             drawing = draw(figure_waterfall(waterfall))
             write_whole(out / f"waterfall-{waterfall.observable.name}.svg", drawing.svg.encode())
@@ -77,21 +77,22 @@ def make_split(
     return f"{_table(waterfalls[0])}\n{summary}"
 
 
-def split_rows(throw: Scenario, rows: Mapping[str, Row]) -> tuple[Waterfall, ...]:
-    """Split every observable of the rows of ``plan_split``, given by tag.
+def split_rows(rows: Mapping[Run, Row]) -> tuple[Waterfall, ...]:
+    """Split every observable of the rows of ``plan_split``.
 
     Raises
     ------
     SweepError
         If a run is not whole.
     """
-    throws = {run.tag: run.scenario for run in plan_split(throw)}
-    return split_all({tag: _observed(throws[tag], tag, row) for tag, row in rows.items()}, throw.n_slices)
+    program = next(run for run in rows if run.solver == PROGRAM)
+    return split_all(program, {run: _observed(run, row) for run, row in rows.items()})
 
 
-def _observed(throw: Scenario, tag: str, row: Row) -> dict[str, float]:
+def _observed(run: Run, row: Row) -> dict[str, float]:
+    throw = run.scenario
     if row.status != "ok":
-        raise SweepError(f"{tag}: {row.status}: {row.message or row.reason}; a waterfall needs every run whole")
+        raise SweepError(f"{run.name}: {row.status}: {row.message or row.reason}; a waterfall needs every run whole")
     assert row.plateau is not None
     assert row.omega_end is not None
     assert row.theta_end is not None

@@ -32,7 +32,7 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.output.ownership import MARKER, OutputError, check_own, marker_text, sole_writer
-from flipproof.sweep.design import Design
+from flipproof.sweep.design import Design, key_of
 from flipproof.sweep.entries import settings_text
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import TEMPORARY, sweep_away_parts, whole_file, write_whole
@@ -198,9 +198,10 @@ class Store:
 
     def _row(self, outcome: Outcome, flight: str | None, versions: int) -> tuple[Any, ...]:
         point = self.design.point(outcome.number)
+        parameters = point.text()
         cells = (
             outcome.number,
-            point.key(self.code),
+            key_of(parameters, self.code),
             *point.values,
             point.solver,
             settings_text(point.settings),
@@ -213,7 +214,7 @@ class Store:
             flight,
             *([_bytes(outcome.curves)] if self.design.curves else []),
             versions,
-            json.dumps(point.parameters()),
+            parameters,
         )
         return self._signed(cells)
 

@@ -20,10 +20,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from flipproof.figures.style import draw
-from flipproof.figures.validity import CONTOURS, contour_lines, errors, figure_map
-from flipproof.frame.solvers import Run
-from flipproof.studies.validity import (
+from flipproof.chapters.maps.figure import CONTOURS, contour_lines, errors, figure_map
+from flipproof.chapters.maps.study import (
     CURVE,
     EXTRA,
     LADDER,
@@ -37,6 +35,8 @@ from flipproof.studies.validity import (
     study_readings,
     word,
 )
+from flipproof.figures.style import draw
+from flipproof.frame.solvers import Run
 from flipproof.sweep.axes import DAMPING, FILL, Value
 from flipproof.sweep.command import Begin, completed
 from flipproof.sweep.files import write_whole
@@ -77,10 +77,10 @@ class Plan:
         restitution = {"restitution": self.values} if self.axis == "restitution" else {}
         return {**restitution, DAMPING: [self.throw.damping_rate], FILL: self.fills}
 
-    def study(self, rows: Mapping[str, Row]) -> ValidityMap:
+    def study(self, rows: Mapping[Run, Row]) -> ValidityMap:
         """Return the map that the rows of its runs make."""
-        readings = {tag: _reading(row) for tag, row in rows.items()}
-        return study_readings(self.throw, self.axis, self.fills, self.values, readings, steps=STEPS)
+        readings = {run: _reading(row) for run, row in rows.items()}
+        return study_readings(self.throw, self.axis, self.fills, self.values, readings, steps=STEPS, points=None)
 
 
 def make_map(

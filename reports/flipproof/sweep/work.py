@@ -8,20 +8,18 @@ own parameters: batches, workers and resuming cannot change a bit of it.
 from __future__ import annotations
 
 import functools
-import hashlib
 import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
-from importlib.util import find_spec
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flipproof.frame.solvers import Run, find, make
+from flipproof.frame.sources import fingerprint
 from flipproof.output.provenance import provenance
 from flipproof.sweep.design import Point
 from slicemodel.observables import centre_of_mass_velocity, plateau
@@ -57,9 +55,11 @@ CURVES: Final = ("omega", "theta", "r_cm", "v_cm")
 Arrays = Mapping[str, NDArray[Any]]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Outcome:
     """What became of a point. A number that is not known is None, and ``reason`` says why.
+
+    Without slots, as ``Point`` is.
 
     Parameters
     ----------
@@ -103,25 +103,12 @@ class Returned:
 
 @functools.cache
 def code_identity() -> str:
-    """Return version and fingerprint of the code that makes points, such as "0.1.0+3f2a9c41d0be".
-
-    Two checkouts have one version and different sources, so the sources count.
-    """
+    """Return version and fingerprint of the code that makes points, such as "0.1.0+3f2a9c41d0be"."""
     try:
         version = metadata.version("flipproof")
     except metadata.PackageNotFoundError:
         version = "checkout"
-    sources = hashlib.sha256()
-    for name in SOURCES:
-        spec = find_spec(name)
-        assert spec is not None
-        assert spec.origin is not None
-        origin = Path(spec.origin)
-        package = spec.submodule_search_locations is not None
-        for file in sorted(origin.parent.rglob("*.py")) if package else [origin]:
-            sources.update(f"{name}/{file.relative_to(origin.parent).as_posix()}\0".encode())
-            sources.update(file.read_bytes())
-    return f"{version}+{sources.hexdigest()[:12]}"
+    return f"{version}+{fingerprint(*SOURCES):.12}"
 
 
 @functools.cache
@@ -185,7 +172,7 @@ def make_point(point: Point, keep: bool = False, curves: int = 0) -> Outcome:
         return Outcome(number=point.number, status="impossible", reason=str(error))
     began = time.perf_counter()
     try:
-        made = make(Run("", point.solver, scenario, point.settings))
+        made = make(Run(point.solver, scenario, point.settings, label=""))
     except Exception as error:
         # A sweep of days does not end because one point met a mistake in a solver.
         seconds = time.perf_counter() - began

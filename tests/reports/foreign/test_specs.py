@@ -127,7 +127,7 @@ def test_a_curve_answers_at_its_own_times(tmp_path):
 def test_a_run_of_a_foreign_solver_is_a_run(tmp_path):
     file = tmp_path / "mine.py"
     file.write_text("def solve(ask):\n    raise ValueError('not today')\n")
-    made = make(Run("tag", f"{file}:solve", THROW))
+    made = make(Run(f"{file}:solve", THROW, label="tag"))
     assert made.trajectory is None
     assert made.reason.endswith("ValueError: not today")
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any, Final
 
+from flipproof.chapters.differences.study import PARTING_BAND, percent
 from flipproof.page.story.numbers import Number, Summary
-from flipproof.studies.differences import PARTING_BAND, percent
 
 NAMES: Final[Mapping[str, str]] = {
     "published-python": "published program",

@@ -1,0 +1,66 @@
+"""The chapters of a report: one folder a subject, one line in ``CONTENTS``."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Final
+
+from flipproof.frame.chapter import Part
+
+CONTENTS: Final[tuple[tuple[str, str, str, tuple[str, ...]], ...]] = (
+    ("assumptions", "What each assumption costs",
+     "Each change that leads from the published program to free flight, made in every order, and what it does to ω.",
+     ("waterfall",)),
+    ("flights", "The flights", "Every solver's flight of this throw: ω, θ, the centre of mass and the slices over "
+     "time, and the bottles in motion.", ("flights",)),
+    ("differences", "Where the solvers differ",
+     "Which pairs of solvers differ by how much, when the difference is largest, and when it first exceeds 1 % of ω₀.",
+     ("differences",)),
+    ("steps", "Step size",
+     "How the error falls as the step becomes shorter, and what holding ω constant over a step costs by itself.",
+     ("finite_step", "step_size", "frozen", "model_form")),
+    ("slices", "How many slices", "How far the numbers move when the water is cut into more slices.", ("slices",)),
+    ("events", "Impacts", "When slices hit the ends in each solver, which impacts correspond, and how a small change "
+     "of the release grows.", ("alignment", "predictability")),
+    ("energy", "Energy", "Where the energy of the flight goes, and whether the energy ledger of every equation closes.",
+     ("energy",)),
+    ("checks", "Whether the programs are right",
+     "Published numbers, exact solutions and independent integrations are reproduced.",
+     ("vectors", "exact_cases", "reference")),
+    ("ice", "Ice", "Frozen water cannot slide, so ω must stay constant: how closely every solver keeps it.", ("ice",)),
+    ("engines", "The engines",
+     "What each physics engine computes by itself, how far its result can be trusted, and where it fails.",
+     ("certificates", "agreement", "stability", "engine_facts", "horizon", "overlap")),
+    ("work-precision", "What a digit costs",
+     "How much computing one more correct digit of ω costs, solver by solver.", ("work_precision",)),
+    ("maps", "Maps of validity", "Over filling and damping, step size or restitution: how wrong an approximation is, "
+     "and which assumption is to blame.", ("maps",)),
+    ("paper", "The paper's figures and claims", "Every statement of the paper about its model and about the bottles "
+     "really thrown, judged by three equations.", ("paper",)),
+    ("errata", "Errata",
+     "What the paper prints, what follows from its own earlier equations, and the number that separates the two.",
+     ("errata",)),
+)  # fmt: skip
+"""Anchor, title, what it shows in one sentence, and the folders of its chapters; in the order of the page.
+
+A name with a dot is a module elsewhere that holds a ``CHAPTER``.
+"""
+
+
+def parts() -> tuple[Part, ...]:
+    """Return what a report consists of, its chapters imported."""
+    return tuple(
+        Part(
+            anchor,
+            title,
+            sentence,
+            tuple(import_module(name if "." in name else f"{__name__}.{name}.chapter").CHAPTER for name in names),
+        )
+        for anchor, title, sentence, names in CONTENTS
+    )
+
+
+def chapters_named(*names: str) -> tuple[Part, ...]:
+    """Return a part with these chapters alone, for a command that needs no more."""
+    chapters = [chapter for part in parts() for chapter in part.chapters if chapter.name in names]
+    return (Part("", "", "", tuple(sorted(chapters, key=lambda chapter: names.index(chapter.name)))),)

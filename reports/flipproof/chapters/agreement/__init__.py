@@ -1,0 +1,1 @@
+"""Free flight by several solvers: who agrees with whom, each within its own band."""

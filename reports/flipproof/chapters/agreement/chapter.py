@@ -1,0 +1,112 @@
+"""Free flight and Eq. 8 by several solvers: who agrees with whom, each within its own band."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from flipproof.chapters.agreement.study import Agreement, study_agreement
+from flipproof.chapters.differences.chapter import MODEL_FLOOR
+from flipproof.chapters.reference.chapter import witnessed
+from flipproof.chapters.solvers import FREE, LOCATED
+from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Flights, Missing, Run, Study
+from flipproof.frame.flights import attempt
+from flipproof.frame.twins import twins, usual_rest_speed
+from slicemodel.trajectory import FloatArray
+
+SOLVE_IVP: Final = "solve_ivp"
+"""Name of the witness: ``scipy.integrate.solve_ivp`` over all 2N + 1 equations (``ode_reference.witness``)."""
+
+COARSER: Final = {"rtol": 1e-9, "atol": 1e-12}
+"""Tolerances of a second run of the witness, at the usual rest speed: by how much that differs is its own band."""
+
+SOLVERS: Final = {FREE: ("pymunk", LOCATED, "mujoco"), "eq8": ("pymunk rotating",)}
+"""Equation -> the engine runs that solve it, beside the equation itself and the witness, on the same throw."""
+
+
+@dataclass(frozen=True, slots=True)
+class Agreed:
+    """Equation -> the comparison of those who solve it, at a number of slices."""
+
+    agreements: Mapping[str, Agreement]
+    slices: int
+
+
+def study(ask: Ask) -> Study[Agreed]:
+    """Compare, for free flight and for Eq. 8, the solvers that reached the end and know their band."""
+    runs: dict[str, dict[str, Run]] = {}
+    coarser: dict[str, Run] = {}
+    for equation, engines in SOLVERS.items():
+        settings = witnessed(ask.throw, equation)
+        coarse = {**settings, **COARSER, "rest_speed": usual_rest_speed(equation)}
+        runs[equation] = {
+            equation: ask.solvers[equation],
+            SOLVE_IVP: Run(equation, ask.throw, settings, f"{equation}, {SOLVE_IVP}"),
+            **{name: ask.solvers[name] for name in engines if name in ask.solvers},
+        }
+        coarser[equation] = Run(equation, ask.throw, coarse, f"{equation}, {SOLVE_IVP}, coarser")
+    every = [run for each in runs.values() for run in each.values()]
+    flights = yield [*every, *coarser.values(), *(twin for name in runs for twin in twins(runs[name][name]))]
+    agreements = {name: agreement_on(name, each, coarser[name], flights) for name, each in runs.items()}
+    return Agreed(agreements, ask.throw.n_slices)
+
+
+def agreement_on(equation: str, runs: Mapping[str, Run], coarser: Run, flights: Flights) -> Agreement:
+    """Compare the solvers of one equation, each within its own band, up to the horizon of the engines."""
+    made = {name: run for name, each in runs.items() if (run := flights.trajectory(each)) is not None and run.ok}
+    bands: dict[str, FloatArray] = {
+        name: run.diagnostics["omega_band"] for name, run in made.items() if "omega_band" in run.diagnostics
+    }
+    if equation in made:
+        bands[equation] = band_over_time(runs[equation], twins(runs[equation]), flights)
+    witness = attempt(band_over_time, runs[SOLVE_IVP], (coarser,), flights)
+    if SOLVE_IVP in made and witness.found is not None:
+        bands[SOLVE_IVP] = witness.found
+    certificates = [made[name].diagnostics["certificate"] for name in bands if name not in (equation, SOLVE_IVP)]
+    until = min((each["horizon"] for each in certificates if each["horizon"] is not None), default=np.inf)
+    return study_agreement({name: run for name, run in made.items() if name in bands}, bands, until=until)
+
+
+def band_over_time(run: Run, others_of: Iterable[Run], flights: Flights) -> FloatArray:
+    """Return up to when other runs of the same flight differ from it by how much, fraction of omega_0."""
+    usual, *others = (flights[each].flight for each in (run, *others_of))
+    if any(len(usual.t) != len(other.t) for other in others):
+        raise Missing(f"{run.name} and its twins end at different times: its band is not known")
+    moved = [np.abs(other.omega - usual.omega) / abs(usual.scenario.omega0) for other in others]
+    return np.asarray(np.maximum.accumulate(np.max([*moved, np.full(len(usual.t), MODEL_FLOOR)], axis=0)))
+
+
+def claims(found: Agreed) -> Claims:
+    """Yield the largest difference of a pair for each equation."""
+    for equation, agreement in found.agreements.items():
+        yield claim_agreement(equation, agreement)
+
+
+def claim_agreement(equation: str, agreement: Agreement) -> Finding:
+    """Several solvers of one equation: the largest difference of a pair, and which solver differs from all others."""
+    widest = max(agreement.pairs, key=lambda pair: pair.largest)
+    return Finding(
+        id="agreement" if equation == FREE else f"agreement-{equation}",
+        title=f"{', '.join(agreement.names)}: {agreement.words}",
+        value=widest.largest,
+        unit="of ω₀",
+        kind="observation",
+        band=widest.bands,
+        note="; ".join(
+            f"{p.first} and {p.second} {p.largest:.1e}, {100 * p.share:.0f} % within" for p in agreement.pairs
+        )
+        + f"; up to {1e3 * agreement.until:.0f} ms",
+    )
+
+
+CHAPTER: Final = Chapter(
+    name="agreement",
+    title="One equation by several solvers",
+    study=study,
+    claims=claims,
+    template=Path(__file__).with_name("part.html.j2"),
+)

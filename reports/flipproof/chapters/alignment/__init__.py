@@ -1,0 +1,1 @@
+"""Events: the impacts of two flights side by side, and one curve in the tube around the other."""

@@ -1,0 +1,180 @@
+"""Where two trajectories part: how much, when, and after which impact."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from flipproof.frame.findings import Finding
+from flipproof.frame.solvers import Missing
+from slicemodel import Impact, Trajectory
+from slicemodel.trajectory import FloatArray
+
+PARTING_BAND = 0.01
+"""Two solvers part when their omega differ by this fraction of omega_0."""
+
+
+def percent(share: float) -> str:
+    """Return a fraction as the page prints it, two digits."""
+    return f"{100 * share:.2g} %"
+
+
+def moved(value: float, finer: float, slices: int) -> str:
+    """Return how far a fraction moves with the number of slices, as in "0.35 % of ω₀ less at N = 100"."""
+    return f"{percent(abs(finer - value))} of ω₀ {'more' if finer >= value else 'less'} at N = {slices}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Difference:
+    """Two runs of one throw, compared on their common times.
+
+    Parameters
+    ----------
+    name : str
+        The assumption that separates the two.
+    first, second : str
+        Labels of the runs.
+    t : (P,) [s]
+    omega : (P,)
+        (omega_second - omega_first) / omega_0, signed.
+    theta : (P,) [rad], r_cm : (P,)
+        Signed differences; r_cm as a fraction of the bottle's length.
+    largest : float
+        max |omega| over time, at ``largest_time``.
+    final : float
+        omega at the last common time.
+    parting_time : float or None
+        First time |omega| exceeds PARTING_BAND, interpolated [s]; None if it never does.
+    parting_impact : Impact or None
+        Last impact at or before the parting, in the run given for it.
+    band : float or None
+        Numerical uncertainty of ``largest``: the sum of the two runs' own.
+    slices : int
+        Slices of both runs.
+    finer : (int, float) or None
+        ``largest`` of the same two solvers at another number of slices, and that number; None if not computed.
+    """
+
+    name: str
+    first: str
+    second: str
+    t: FloatArray
+    omega: FloatArray
+    theta: FloatArray
+    r_cm: FloatArray
+    largest: float
+    largest_time: float
+    final: float
+    parting_time: float | None
+    parting_impact: Impact | None
+    band: float | None = None
+    slices: int
+    finer: tuple[int, float] | None = None
+
+    @property
+    def moment(self) -> str:
+        """The parting in words."""
+        if self.parting_time is None:
+            return f"stay within {percent(PARTING_BAND)} of ω₀"
+        words = f"differ by more than {percent(PARTING_BAND)} of ω₀ from t = {self.parting_time * 1e3:.1f} ms on"
+        if self.parting_impact is not None:
+            impact = self.parting_impact
+            words += f", after slice {impact.slice} hit the {impact.end} at {impact.time * 1e3:.1f} ms"
+        return words
+
+
+def study_difference(
+    name: str,
+    first: Trajectory,
+    second: Trajectory,
+    *,
+    impacts_of: Trajectory | None = None,
+    band: float | None = None,
+    finer: tuple[Trajectory, Trajectory] | None = None,
+) -> Difference:
+    """Compare two runs of one throw.
+
+    The two are compared on the first run's times, up to where the shorter one ends; the second is interpolated
+    linearly if its times differ. ``impacts_of`` is the run whose impacts the parting is set against; ``finer`` are the
+    same two solvers at more slices.
+    """
+    end = min(first.t[-1], second.t[-1])
+    t = first.t[first.t <= end]
+    points = len(t)
+    omega0 = first.scenario.omega0
+    omega = (_at(t, second.t, second.omega) - first.omega[:points]) / omega0
+    size = np.abs(omega)
+    k = int(size.argmax())
+    parting = first_crossing(t, size, PARTING_BAND)
+    return Difference(
+        name=name,
+        first=first.label,
+        second=second.label,
+        t=t,
+        omega=omega,
+        theta=_at(t, second.t, second.theta) - first.theta[:points],
+        r_cm=(_at(t, second.t, second.r_cm) - first.r_cm[:points]) / first.scenario.bottle.length,
+        largest=float(size[k]),
+        largest_time=float(t[k]),
+        final=float(omega[-1]),
+        parting_time=parting,
+        parting_impact=_last_impact(parting, impacts_of),
+        band=band,
+        slices=first.scenario.n_slices,
+        finer=None if finer is None else (finer[0].scenario.n_slices, study_difference(name, *finer).largest),
+    )
+
+
+def _at(t: FloatArray, times: FloatArray, values: FloatArray) -> FloatArray:
+    if len(times) >= len(t) and np.array_equal(times[: len(t)], t):
+        return values[: len(t)]
+    return np.asarray(np.interp(t, times, values))
+
+
+def first_crossing(t: FloatArray, size: FloatArray, band: float) -> float | None:
+    """Return when ``size`` first exceeds ``band``, linear between points; None if never."""
+    above = size > band
+    if not above.any():
+        return None
+    k = int(above.argmax())
+    if k == 0:
+        return float(t[0])
+    share = (band - size[k - 1]) / (size[k] - size[k - 1])
+    return float(t[k - 1] + share * (t[k] - t[k - 1]))
+
+
+def _last_impact(parting: float | None, trajectory: Trajectory | None) -> Impact | None:
+    """Return the last impact up to ``parting``, if there is one."""
+    if parting is None or trajectory is None or trajectory.impacts is None:
+        return None
+    impacts = trajectory.impacts
+    k = int(np.searchsorted(impacts.time, parting, side="right"))
+    return impacts[k - 1] if k else None
+
+
+def claim_change(
+    id_: str, title: str, first: Trajectory, second: Trajectory, band: float, *, differ: bool, note: str = ""
+) -> Finding:
+    """Return the claim that two runs agree; a run compared with itself, or not whole, proves nothing.
+
+    Raises
+    ------
+    Missing
+        If the runs do not ``differ`` in their settings, or one is not whole.
+    """
+    if not differ:
+        raise Missing("the two runs have the same settings: comparing them proves nothing")
+    for run in (first, second):
+        if not run.ok:
+            raise Missing(f"{run.method}: {run.message or run.status}")
+    value = largest_change(first, second)
+    return Finding(id=id_, title=title, value=value, unit="of ω₀", kind="regression", admissible=(0.0, band), note=note)
+
+
+def largest_change(first: Trajectory, second: Trajectory) -> float:
+    """Return max |omega_second - omega_first| / |omega_0|; NaN if either run is not complete or the grids differ."""
+    if len(first.t) != len(second.t) or not np.array_equal(first.t, second.t) or not (first.ok and second.ok):
+        return math.nan
+    return float(np.abs(second.omega - first.omega).max() / abs(first.scenario.omega0))

@@ -1,0 +1,1 @@
+"""Energy: where it goes in every equation, and whether the ledger closes."""

@@ -1,0 +1,247 @@
+"""Errata of the equations: Eq. 4, 8, 9 and 11e, and a unit.
+
+Eq. 9c, 9d and 11e are written here once more, exactly as typeset: they are the subject of the audit and must not come
+from a scheme that has mended them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from flipproof.chapters.errata.erratum import MANY_SLICES, MUCH_LESS, ROUND_OFF, WATER_DENSITY, Erratum
+from flipproof.frame.solvers import solve
+from slicemodel import Scenario
+from slicemodel.observables import initial_moment_of_inertia
+from slicemodel.trajectory import FloatArray
+
+
+def printed_9c(x: float, v: float, gamma: float, omega: float, t: float) -> float:
+    """Return r - r_CM + g cos(theta)/omega^2 after t, Eq. 9c as typeset, from distance x and velocity v."""
+    decay = math.exp(-gamma * t)
+    return x * decay * math.cosh(omega * t) + (v / omega + gamma / omega * x) * decay * math.sinh(omega * t)
+
+
+def printed_9d(x: float, v: float, gamma: float, omega: float, t: float) -> float:
+    """Return r' after t, Eq. 9d as typeset; its last sign is a minus."""
+    decay = math.exp(-gamma * t)
+    spring = (omega**2 - gamma**2) / omega
+    return (spring * x + gamma / omega * v) * decay * math.sinh(omega * t) - v * decay * math.cosh(omega * t)
+
+
+def residual_9a(gamma: float, omega: float) -> float:
+    """Return what Eq. 9a leaves of Eq. 8 (frozen, drag against the wall), as a fraction of omega^2 X.
+
+    Eq. 8 asks its exponents l for l^2 + 2 gamma l - omega^2 = 0; Eq. 9a has l = -gamma +- omega.
+    """
+    equation = np.array([1.0, 2.0 * gamma, -(omega**2)])
+    return float(np.abs(np.polyval(equation, np.array([-gamma + omega, -gamma - omega]))).max() / omega**2)
+
+
+def erratum_roots(throw: Scenario) -> Erratum:
+    """Eq. 9a and 9c need gamma << omega, and the plateau is where that fails."""
+    run = solve("published-python", throw, store="summary")
+    slowest = float(np.abs(run.omega).min())
+    gamma = throw.damping_rate
+    start = abs(throw.omega0)
+    return Erratum(
+        id="eq9a-roots",
+        place="Eq. 9a, 9b, 9c",
+        prints="exponents −γ ± ω, for γ ≪ ω",
+        follows="Eq. 8: exponents −γ ± √(ω² + γ²)",
+        value=residual_9a(gamma, slowest),
+        unit="of ω²X left over",
+        admissible=(0.0, MUCH_LESS**2),
+        note=f"γ / ω = {gamma / start:.2f} at release (residual {residual_9a(gamma, start):.2g}), "
+        f"{gamma / slowest:.2f} on the plateau; the residual is (γ / ω)²",
+    )
+
+
+def erratum_cosh_sign(throw: Scenario) -> Erratum:
+    """Eq. 9d ends in minus v cosh: a step of no length reverses the velocity."""
+    kept = printed_9d(0.0, 1.0, throw.damping_rate, throw.omega0, 0.0)
+    return Erratum(
+        id="eq9d-cosh-sign",
+        place="Eq. 9d, last term",
+        prints="− v e^(−γΔt) cosh ωΔt",
+        follows="derivative of Eq. 9c: + v e^(−γΔt) cosh ωΔt",
+        value=kept,
+        unit="of v kept over Δt = 0",
+        admissible=ROUND_OFF,
+    )
+
+
+def erratum_sinh_sign(throw: Scenario) -> Erratum:
+    """Eq. 9d has plus gamma v sinh where the derivative of Eq. 9c has minus: with it nothing is damped."""
+    gamma, omega = throw.damping_rate or 1.0, throw.omega0
+    h = 1e-4 / abs(omega)
+
+    def of_velocity(t: float) -> float:
+        return printed_9d(0.0, 1.0, gamma, omega, t) + 2.0 * math.exp(-gamma * t) * math.cosh(omega * t)
+
+    def derivative(t: float) -> float:
+        return (printed_9c(0.0, 1.0, gamma, omega, t + h) - printed_9c(0.0, 1.0, gamma, omega, t - h)) / (2 * h)
+
+    t = 0.1 / abs(omega)
+    sinh = gamma / omega * math.exp(-gamma * t) * math.sinh(omega * t)
+    rest = math.exp(-gamma * t) * math.cosh(omega * t)
+    return Erratum(
+        id="eq9d-sinh-sign",
+        place="Eq. 9d, term γ v sinh",
+        prints="+ (γ/ω) v e^(−γΔt) sinh ωΔt",
+        follows="derivative of Eq. 9c: − (γ/ω) v e^(−γΔt) sinh ωΔt",
+        value=(of_velocity(t) - rest) / (derivative(t) - rest),
+        unit="of the derivative's term",
+        admissible=ROUND_OFF,
+        note=f"coefficient {sinh:.3g} printed, {derivative(t) - rest:.3g} by differencing Eq. 9c, at ωΔt = 0.1",
+    )
+
+
+def erratum_python_sign(throw: Scenario) -> Erratum:
+    """Show that the Python program has the plus sign too: over a short step its velocity is not damped at all."""
+    from slicemodel import kernel
+    from slicemodel.schemes import SCHEMES
+
+    scheme = SCHEMES["published-python"]
+    damped = throw if throw.drag else replace(throw, drag=0.01)
+    constants = scheme.constants(damped)
+    h = 1e-6 / max(constants.gamma, abs(throw.omega0))
+
+    def coefficient(k: int, t: float) -> float:
+        return float(kernel.step_coefficients(scheme.form, constants, throw.omega0, t)[k])
+
+    printed = (1.0 - coefficient(3, h)) / h
+    position = 1.0 - (coefficient(1, 1.5 * h) - coefficient(1, 0.5 * h)) / h
+    return Erratum(
+        id="python-sinh-sign",
+        place="Supplement, kinetics.py, update_slice_positions",
+        prints="+ velocities / (tau omega) in front of sinh",
+        follows="its own position update, differentiated: velocity damped at 2γ",
+        value=printed * h / position,
+        unit="of the damping of its own positions",
+        admissible=(0.99, 1.01),
+        note=f"2γ = {2 * constants.gamma:g} /s is meant, {abs(printed):.1g} /s is what a step does",
+    )
+
+
+def erratum_eq4b(throw: Scenario) -> Erratum:
+    """Eq. 4b is Eq. 4a only if the water that fills the bottle is rho pi R^2 L, which it is not."""
+    bottle = throw.bottle
+    area = WATER_DENSITY * math.pi * bottle.radius**2
+    empty_height = bottle.mass / area
+    eq4b = empty_height / (empty_height + throw.fill_fraction * bottle.length)
+    eq4a = bottle.mass / throw.total_mass
+    return Erratum(
+        id="eq4b-epsilon",
+        place="Eq. 4b, 5",
+        prints="ε = H₀ / (H₀ + h), H₀ = M_b / ρπR²",
+        follows="Eq. 4a: ε = M_b / (M_b + M_w)",
+        value=eq4b / eq4a,
+        unit="of Eq. 4a",
+        admissible=(0.99, 1.01),
+        note=f"ε = {eq4b:.5f} and {eq4a:.5f}; the cylinder holds {area * bottle.length:.3f} kg, "
+        f"M_max is {bottle.capacity:g} kg",
+    )
+
+
+def printed_11e(throw: Scenario) -> float:
+    """Return J_0 of Eq. 11e exactly as typeset [kg m^2]."""
+    bottle, m = throw.bottle, throw.fill_fraction
+    e = bottle.mass / throw.total_mass
+    square = bottle.length**2
+    of_bottle = 1 / 12 + bottle.radius**2 / (2 * square) + (e / 2 + (1 - e) * m / 2) ** 2
+    of_water = m**2 * (1 / 3 - e + e**2) - m * e * (1 - e / 2) + e**2 / 4
+    return bottle.mass * square * of_bottle + throw.water_mass * square * of_water
+
+
+def erratum_eq11e(throw: Scenario, fill: float) -> Erratum:
+    """Eq. 11e is not the J_0 of Eq. 11a to 11d with the slices of Eq. 3a."""
+    filled = replace(throw, water_mass=fill * throw.bottle.capacity, n_slices=MANY_SLICES)
+    true = initial_moment_of_inertia(filled)
+    return Erratum(
+        id=f"eq11e-{fill:g}",
+        place=f"Eq. 11e at M̃ = {fill:g}",
+        prints=f"J₀ = {printed_11e(filled):.4g} kg m²",
+        follows=f"Eq. 11a to 11d, 10, 3a with N = {MANY_SLICES}: J₀ = {true:.4g} kg m²",
+        value=printed_11e(filled) / true,
+        unit="of the sums",
+        admissible=(0.99, 1.01),
+    )
+
+
+def erratum_alpha_unit() -> Erratum:
+    """Show that the drag coefficient of Eq. 8 is in kg/s; the program says kg/m."""
+    kg, m, s = np.eye(3, dtype=np.int64)
+    force, velocity, printed = kg + m - 2 * s, m - s, kg - m
+    return Erratum(
+        id="alpha-unit",
+        place="Supplement, main.py; α of Eq. 8",
+        prints="alpha, unit: kg/m",
+        follows="Eq. 8: α r' is a force, so that α is in kg/s",
+        value=float(np.abs(printed + velocity - force).sum()),
+        unit="exponents too many or too few",
+        admissible=(0.0, 0.0),
+        note=f"(kg, m, s) of α: {tuple((force - velocity).tolist())} needed, {tuple(printed.tolist())} printed",
+    )
+
+
+def erratum_gravity(throw: Scenario) -> Erratum:
+    """Show that a bottle in free flight spins the same on any planet; under Eq. 8 it does not."""
+    early = replace(throw.with_slices(min(10, throw.n_slices)), duration=min(throw.duration, 0.15))
+    change = {}
+    for model in ("eq8", "free-flight"):
+        here, far = (solve(model, replace(early, gravity=g)) for g in (throw.gravity, 0.0))
+        complete = here.ok and far.ok
+        change[model] = float(np.abs(here.omega - far.omega).max()) / abs(throw.omega0) if complete else math.nan
+    return Erratum(
+        id="eq8-gravity",
+        place="Eq. 6, 8",
+        prints="m g cos θ in the frame of C_M",
+        follows="C_M falls with g, so that weight and inertial force cancel",
+        value=change["eq8"],
+        unit="of ω₀ changed by g",
+        admissible=(0.0, 1e-9),
+        note=f"free flight: {change['free-flight']:.1g}; largest change of ω in the first {early.duration:g} s",
+    )
+
+
+def erratum_origin(throw: Scenario) -> Erratum:
+    """Eq. 7 is written about C_M, Eq. 8 with the acceleration in the bottle: r''_CM is missing."""
+    r = throw.initial_positions()
+    bottle = throw.bottle
+    r_cm = (throw.slice_mass * r.sum() + bottle.mass * bottle.length / 2) / throw.total_mass
+    square = throw.omega0**2
+    centrifugal = square * (r - r_cm)
+    missing = throw.slice_mass * centrifugal.sum() / throw.total_mass
+    return Erratum(
+        id="eq8-origin",
+        place="Eq. 7a, 8",
+        prints="m r'' = … about C_M",
+        follows="m (r'' − r''_CM) = … : C_M accelerates in the bottle",
+        value=float(abs(missing) / np.sqrt(np.mean(centrifugal**2))),
+        unit="of the centrifugal force",
+        admissible=(0.0, 0.01),
+        note=f"at release, no drag, no weight: r''_CM = {missing:.2f} m/s² by Eq. 8 itself, "
+        "a force on every slice that nothing exerts",
+    )
+
+
+def erratum_drag_reference(throw: Scenario) -> Erratum:
+    """Eq. 8 measures the drag against C_M; the water rubs on the wall."""
+    run = solve("exact-step", throw)
+    v: FloatArray = run.v
+    v_cm = throw.slice_mass * v.sum(axis=1) / throw.total_mass
+    against_cm = float(((v - v_cm[:, np.newaxis]) * v).sum())
+    against_wall = float((v * v).sum())
+    return Erratum(
+        id="eq8-drag",
+        place="Eq. 8",
+        prints="− α (r' − r'_CM)",
+        follows="− α r': the wall is at rest in the bottle, C_M is not",
+        value=against_cm / against_wall if against_wall else math.nan,
+        unit="of the work against the wall",
+        admissible=(0.99, 1.01),
+        note=f"water that slides as one is braked by {throw.bottle.mass / throw.total_mass:.3f} of its drag",
+    )

@@ -1,0 +1,1 @@
+"""What a step of finite length costs, taken apart."""

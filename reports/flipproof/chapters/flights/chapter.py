@@ -1,0 +1,194 @@
+"""The flights: every solver on the throw, the flights that are drawn, and the moving bottles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from engine_check.witness import witness_of
+from flipproof.chapters.flights import figures as pictures
+from flipproof.chapters.solvers import FLIGHTS, LIMITS, OTHERS
+from flipproof.frame.chapter import Ask, Chapter, Exhibit, Made, Study
+from flipproof.frame.solvers import find
+from flipproof.output.columns import curves_csv, json_ready
+from flipproof.output.tables import trajectory_csv
+from flipproof.page.motion import motion_data
+from slicemodel import Scenario, Trajectory
+from slicemodel.observables import plateau
+
+
+@dataclass(frozen=True, slots=True)
+class Flown:
+    """What became of every solver on the throw, by its name."""
+
+    throw: Scenario
+    made: Mapping[str, Made]
+
+    @property
+    def drawn(self) -> list[Trajectory]:
+        """The flights that are drawn."""
+        return [run for name in FLIGHTS if (run := self.made[name].trajectory) is not None]
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """What a report says of every solver: status, end, plateau, impacts, diagnostics."""
+        return [solver_row(name, made) for name, made in self.made.items()]
+
+    @property
+    def rows_drawn(self) -> list[dict[str, Any]]:
+        """The rows of the flights that are drawn."""
+        return [row for row in self.rows if row["name"] in FLIGHTS]
+
+    @property
+    def motion(self) -> dict[str, Any] | None:
+        """What the moving bottles are drawn from."""
+        return motion_data(self.throw, self.made)
+
+
+def study(ask: Ask) -> Study[Flown]:
+    """Fly the throw with every solver that can."""
+    flights = yield ask.solvers.values()
+    return Flown(ask.throw, {name: flights[ask.solvers[name]] for name in (*FLIGHTS, *OTHERS) if name in ask.solvers})
+
+
+def solver_row(name: str, made: Made) -> dict[str, Any]:
+    """Return what a report says of one solver."""
+    solver = find(made.run.solver)
+    row: dict[str, Any] = {
+        "name": name,
+        "package": solver.package,
+        "equation": solver.equation,
+        "reason": solver.reason,
+        "seconds": made.seconds,
+    }
+    run = made.trajectory
+    if run is None:
+        return row | {"status": "failed", "message": made.reason}
+    if solver.package == "engine_check":
+        witness = witness_of(run.settings)
+        row |= {"equation": witness.equation, "reason": witness.words}
+    landed = run.t[-1] >= run.scenario.duration * (1 - 1e-12)
+    return row | {
+        "status": run.status,
+        "message": run.message,
+        "final": float(run.omega[-1] / run.scenario.omega0) if landed else None,
+        "plateau": plateau(run.t, run.omega, run.scenario.omega0) if run.ok else None,
+        "impacts": None if run.impacts is None else len(run.impacts),
+        "diagnostics": json_ready(run.diagnostics),
+    }
+
+
+def figures(found: Flown) -> Iterator[Exhibit]:
+    """Yield omega, theta, the centre of mass and a few slices over time."""
+    flights = found.drawn
+    if not flights:
+        return
+    length = found.throw.bottle.length
+    over_time = partial(_over_time, flights)
+    yield over_time(
+        "omega", "Angular velocity", pictures.figure_omega, "omega/omega_0", "[1]",
+        caption="A solid scheme and the dashed equation of the same hue differ by what a finite step does. Curves of "
+        "different hues solve different equations; free-flight and pymunk both solve free flight. All have "
+        f"N = {flights[0].scenario.n_slices} slices.",
+        values={run.label: run.omega / run.scenario.omega0 for run in flights},
+        alt="Line plot of omega over omega_0 against time, 1 at release. Values at the end: {ends}. {apart}",
+        digits=".3f", apart=".2g", unit=" of omega_0",
+    )  # fmt: skip
+    yield over_time(
+        "theta", "Angle", pictures.figure_theta, "theta", "[degrees]",
+        caption="The angle is the integral of the angular velocity above, so that a lasting difference in ω adds up. "
+        "At 0° and at multiples of 360° the bottle stands upright.",
+        values={run.label: np.degrees(run.theta) for run in flights},
+        alt="Line plot of the angle theta in degrees against time. Values at the end: {ends} degrees. {apart}",
+        digits=".0f", apart=".1f", unit=" degrees",
+    )  # fmt: skip
+    yield over_time(
+        "centre-of-mass", "Centre of mass", pictures.figure_centre_of_mass, "r_CM/L", "[1]",
+        caption="Distance from the cap. The nearer to the cap the centre of mass is on landing, the easier the bottle "
+        "topples; in ice it stays where it is.",
+        values={run.label: run.r_cm / length for run in flights},
+        alt="Line plot of the centre of mass from the cap, as a fraction of the length, "
+        f"{flights[0].r_cm[0] / length:.3f} at release. At the end: {{ends}}. {{apart}}",
+        digits=".3f", apart=".2g", unit=" of the length",
+    )  # fmt: skip
+    chosen = pictures.chosen_slices(flights[0])
+    whole = [run for run in flights if len(run.r)]
+    yield Exhibit(
+        name="slices",
+        title="Chosen slices",
+        caption="Cap at the top, base at the bottom. The first slice starts on the base, the last one on top of the "
+        "water; the one in between starts nearest the centre of mass, where the push outwards is weakest.",
+        alt="Line plots of position against time, cap (0) at the top and base (1) at the bottom, every solver. "
+        + " ".join(
+            f"Slice {i}, which {words}, is at the end at "
+            f"{_listed({run.label: float(run.r[-1, i] / length) for run in whole}, '.2f')} of the length."
+            for i, words in chosen
+        ),
+        maker=pictures.figure_slices,
+        data=(whole,),
+        table=curves_csv(
+            {f"r/L of slice {i} {run.label} [1]": (run.t, run.r[:, i] / length) for i, _ in chosen for run in whole}
+        ),
+    )
+
+
+def _over_time(
+    flights: Sequence[Trajectory], name: str, title: str, maker: Any, symbol: str, column_unit: str, *, caption: str,
+    values: Mapping[str, Any], alt: str, digits: str, apart: str, unit: str,
+) -> Exhibit:  # fmt: skip
+    """Return the figure of one quantity; ``values`` is that of each flight by its label."""
+    ends = {label: float(curve[-1]) for label, curve in values.items()}
+    return Exhibit(
+        name=name,
+        title=title,
+        caption=caption,
+        alt=alt.format(ends=_listed(ends, digits), apart=_apart(ends, unit, apart)),
+        maker=maker,
+        data=(list(flights),),
+        table=curves_csv({f"{symbol} {run.label} {column_unit}": (run.t, values[run.label]) for run in flights}),
+    )
+
+
+def _listed(values: Mapping[str, float], digits: str) -> str:
+    return ", ".join(f"{name} {value:{digits}}" for name, value in values.items())
+
+
+def _apart(ends: Mapping[str, float], unit: str, digits: str) -> str:
+    """Return how far the solvers end apart, and how far each scheme from its own equation."""
+    finite = {name: value for name, value in ends.items() if math.isfinite(value)}
+    if len(finite) < 2:
+        return ""
+    low, high = min(finite, key=lambda name: finite[name]), max(finite, key=lambda name: finite[name])
+    words = f"They end up to {finite[high] - finite[low]:{digits}}{unit} apart ({low} to {high})"
+    pairs = [(s, m) for s, m in LIMITS.items() if s in finite and m in finite]
+    if pairs:
+        words += ", a scheme and its own equation up to " + (
+            f"{max(abs(finite[s] - finite[m]) for s, m in pairs):{digits}}{unit}"
+        )
+    return words + "."
+
+
+def tables(found: Flown) -> dict[str, str]:
+    """Return the trajectory of every solver as CSV."""
+    return {
+        f"trajectories/{name}/data.csv": trajectory_csv(made.trajectory)
+        for name, made in found.made.items()
+        if made.trajectory is not None
+    }
+
+
+CHAPTER: Final = Chapter(
+    name="flights",
+    title="The flights",
+    study=study,
+    figures=figures,
+    template=Path(__file__).with_name("part.html.j2"),
+    summary=lambda found: {"solvers": found.rows},
+    tables=tables,
+)

@@ -1,0 +1,1 @@
+"""What holding the coefficients constant over a step costs, step by step."""

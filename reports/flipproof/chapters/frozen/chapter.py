@@ -1,0 +1,61 @@
+"""What holding the coefficients constant over a step costs, step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from flipproof.chapters.frozen.figure import figure_frozen
+from flipproof.chapters.frozen.study import LIMITS, QUANTITIES, Frozen, plan_frozen, study_frozen
+from flipproof.frame.chapter import Ask, Chapter, Exhibit, Run, Study
+from flipproof.output.columns import TIME, columns_csv
+
+SCHEME: Final = "exact-step"
+WORDS: Final = {"omega": "omega", "theta": "theta", "r_cm": "r_CM", "v_cm": "v_CM"}
+
+
+def study(ask: Ask) -> Study[Frozen]:
+    """Store every slice of one scheme's flight, and hold it against its equation."""
+    run, reference = plan_frozen(ask.throw, SCHEME, ask.steps)[0], Run(LIMITS[SCHEME], ask.throw, {}, LIMITS[SCHEME])
+    flights = yield [run, reference]
+    return study_frozen(flights[run].flight, flights[reference].flight)
+
+
+def figures(found: Frozen) -> Iterator[Exhibit]:
+    """Yield changes, defects and what they add up to."""
+    shares = ", ".join(f"{WORDS[name]} {found.share[name]:.0%}" for name in QUANTITIES)
+    peaks = ", ".join(
+        f"{WORDS[name]} {found.peak[name][1]:.1e} m/s at {found.peak[name][0] * 1e3:.0f} ms"
+        for name in QUANTITIES
+        if found.defect[name].any()
+    )
+    yield Exhibit(
+        name="frozen",
+        title="What holding the coefficients constant costs, step by step",
+        caption=(
+            "Top: how much each quantity that is held constant changes within a step. Middle: the velocity that "
+            "holding it constant misses in that step. Bottom: these defects added up, beside the error of the velocity "
+            "and of ω that they lead to."
+        ),
+        alt=f"Curves over time for {found.scheme} at a step of {found.dt * 1e3:.2g} ms. Share of the steps in which "
+        f"freezing costs most: {shares}. Largest velocity missed in one step: {peaks or 'none'}. Largest error of "
+        f"omega over omega_0 against {found.model}: {found.omega_error.max():.2g}.",
+        maker=figure_frozen,
+        data=(found,),
+        table=columns_csv(
+            {
+                TIME: found.t,
+                "|d omega|/omega per step [1]": found.change_omega,
+                "|d theta| per step [rad]": found.change_theta,
+                "|d r_CM|/L per step [1]": found.change_r_cm,
+                "gamma/omega [1]": found.damping,
+                **{f"defect of a frozen {quantity} per step [m/s]": found.defect[quantity] for quantity in QUANTITIES},
+                "defects added up to the end of the step [m/s]": found.cumulative,
+                "error of r' there [m/s]": found.velocity_error,
+                "error of omega/omega_0 there [1]": found.omega_error,
+            }
+        ),
+    )
+
+
+CHAPTER: Final = Chapter(name="frozen", title="ω held constant over a step", study=study, figures=figures)

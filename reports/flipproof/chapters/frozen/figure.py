@@ -1,0 +1,65 @@
+"""The price of frozen coefficients over a flight."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from flipproof.chapters.frozen.study import QUANTITIES, Frozen
+from flipproof.figures.style import ASSUMPTIONS, MARKERS, new_figure, styled
+from slicemodel.trajectory import FloatArray
+
+WORDS = {"omega": "ω", "theta": "θ (gravity)", "r_cm": "r_CM", "v_cm": "v_CM (drag)"}
+COLOURS = dict(zip(QUANTITIES, ("#D55E00", "#0072B2", "#009E73", "#CC79A7"), strict=True))
+
+WIDTHS = {"omega": 1.4, "theta": 1.4, "r_cm": 1.4, "v_cm": 0.6}
+"""v_CM jumps at every impact: a thin line leaves the others to be seen."""
+
+
+@styled
+def figure_frozen(study: Frozen) -> Figure:
+    """Change of every frozen coefficient in a step, the defect each causes, and what becomes of them."""
+    figure, panels = new_figure(3, size=(8.0, 8.6), sharex=True)
+    changes, defects, errors = panels
+    for k, (words, values, colour) in enumerate((
+        ("|Δω| / ω", study.change_omega, COLOURS["omega"]),
+        ("|Δθ| [rad]", study.change_theta, COLOURS["theta"]),
+        ("|Δr_CM| / L", study.change_r_cm, COLOURS["r_cm"]),
+        ("γ / ω, not a change", study.damping, "#000000"),
+    )):  # fmt: skip
+        changes.semilogy(
+            study.t, _shown(values), color=colour, linewidth=1.2, linestyle=":" if k == 3 else "-", label=words
+        )
+    changes.set_title(f"change in one step of {study.dt * 1e3:.2g} ms, {study.scheme}", fontsize=10, loc="left")
+    changes.set_ylabel("change per step [1]")
+    for k, quantity in reversed(tuple(enumerate(QUANTITIES))):
+        values = study.defect[quantity]
+        if not values.any():
+            continue
+        time, peak = study.peak[quantity]
+        label = f"{WORDS[quantity]}: largest at {time * 1e3:.0f} ms, leads {study.share[quantity]:.0%} of the steps"
+        defects.semilogy(study.t, _shown(values), color=COLOURS[quantity], linewidth=WIDTHS[quantity], label=label)
+        defects.plot(time, peak, MARKERS[k], color=COLOURS[quantity], markeredgecolor="white", markersize=8)
+    defects.set_title("velocity missed in one step because a coefficient is frozen", fontsize=10, loc="left")
+    defects.set_ylabel("rms over slices [m/s]")
+    end = study.t + study.dt
+    errors.semilogy(
+        end, _shown(study.velocity_error), color="#56B4E9", label=f"error of r' against {study.model} [m/s]"
+    )
+    errors.semilogy(end, _shown(study.cumulative), color="#444444", label="defects added up [m/s]", linewidth=1.0)
+    errors.semilogy(end, _shown(study.omega_error), color="#D55E00", linestyle="--", label="error of ω / ω₀ [1]")
+    if study.first_impact is not None:
+        errors.axvline(study.first_impact, color=ASSUMPTIONS[4], linewidth=1.0, linestyle=":", label="first impact")
+    words = "" if study.explained is None else f"; before the first impact error / defects = {study.explained:.2f}"
+    errors.set_title(f"what becomes of them, slices that have not hit an end{words}", fontsize=10, loc="left")
+    errors.set_ylabel("added up [m/s], [1]")
+    errors.set_xlabel("time t [s]")
+    for axes in panels:
+        axes.margins(x=0.01)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.3 if axes is errors else -0.06), ncols=2, fontsize=8.5)
+    return figure
+
+
+def _shown(values: FloatArray) -> FloatArray:
+    """Return values for a logarithmic axis: zeros leave a gap."""
+    return np.where(values > 0, values, np.nan)

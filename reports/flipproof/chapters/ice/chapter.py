@@ -1,0 +1,181 @@
+"""Ice: nothing moves inside the bottle, so every change of omega is the solver's own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from flipproof.figures.style import ICE_FLOOR, STYLES, new_figure, shared_legend, styled
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged
+from flipproof.output.columns import curves_csv
+from slicemodel import Scenario, Trajectory
+from slicemodel.trajectory import FloatArray
+
+SOLVERS: Final = ("published-python", "exact-step", "published-limit", "eq8", "free-flight")
+ENGINE: Final = "pymunk"
+
+ADMISSIBLE: Final = {"slicemodel": 1e-12, "ode_reference": 1e-12, "engine_check": 1e-6}
+"""max |omega/omega_0 - 1| by package: round-off where omega is computed from J, else the engine's own drift."""
+
+WELDED_SLICES: Final = 20
+"""Slices of the ice that joints hold; its drift hardly depends on them."""
+
+COARSEST: Final = 4e-4
+"""Longest step of the welded runs [s]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drift:
+    """|omega / omega_0 - 1| of one frozen run over time, its maximum, and the step that made it (None: it has none)."""
+
+    label: str
+    package: str
+    step: float | None
+    t: FloatArray
+    drift: FloatArray
+    largest: float
+
+
+@dataclass(frozen=True, slots=True)
+class Ice:
+    """Frozen runs by label: of every solver, and of an engine whose masses joints hold, the step halved twice."""
+
+    rigid: Mapping[str, Made]
+    welded: Mapping[str, Made]
+
+    @property
+    def drifts(self) -> list[Drift]:
+        """The drift of every run that was made."""
+        runs = {**self.rigid, **self.welded}
+        return [measure(label, made.flight) for label, made in runs.items() if made.trajectory is not None]
+
+
+def study(ask: Ask) -> Study[Ice]:
+    """Throw bottles of ice: every solver, and unless ``ask.work`` is false the engine with masses held by joints."""
+    ice = replace(ask.throw, frozen=True)
+    rigid = {name: Run(name, ice, label=f"ice, {name}") for name in SOLVERS}
+    rigid[f"{ENGINE} rigid"] = Run(ENGINE, ice, {"ice": "rigid"}, f"ice, {ENGINE} rigid")
+    welded = _welded(replace(ask.reference.with_slices(WELDED_SLICES), frozen=True)) if ask.work else {}
+    flights = yield [*rigid.values(), *welded.values()]
+    return Ice(*({label: flights[run] for label, run in runs.items()} for runs in (rigid, welded)))
+
+
+def _welded(ice: Scenario) -> dict[str, Run]:
+    """Return runs at output times by which the engine's step, a whole part of each interval, really halves."""
+    times = np.linspace(0.0, ice.duration, 1 + int(np.ceil(ice.duration / COARSEST)))
+    runs = {}
+    for dt in float(times[1]) / np.array([1, 2, 4]):
+        label = f"{ENGINE} welded, Δt = {dt:.2g} s"
+        runs[label] = Run(ENGINE, ice, {"ice": "welded", "dt": float(dt), "times": times}, f"ice, {label}")
+    return runs
+
+
+def measure(label: str, run: Trajectory) -> Drift:
+    """Return the drift of one frozen run."""
+    drift = np.abs(run.omega / run.scenario.omega0 - 1.0)
+    step = run.settings.get("step")
+    return Drift(label=label, package=run.solver, step=step, t=run.t, drift=drift, largest=float(drift.max()))
+
+
+def claims(found: Ice) -> Claims:
+    """Yield that every solver keeps omega, and that welded masses drift at the engine's printed order."""
+    for label, made in found.rigid.items():
+        yield judged(
+            lambda label, made: claim_ice(measure(label, made.flight)),
+            label,
+            made,
+            id=f"ice-{label.replace(' ', '-')}",
+            title=f"ice: {label} keeps ω constant",
+        )
+    if found.welded:
+        yield judged(
+            lambda: claim_welded_order([made.flight for made in found.welded.values()]),
+            id="ice-welded-order",
+            title="drift of welded ice",
+        )
+
+
+def claim_ice(drift: Drift) -> Finding:
+    """With frozen water omega stays what it was."""
+    return Finding(
+        id=f"ice-{drift.label.replace(' ', '-')}",
+        title=f"ice: {drift.label} keeps ω constant",
+        value=drift.largest,
+        unit="of ω₀",
+        kind="regression",
+        admissible=(0.0, ADMISSIBLE[drift.package]),
+    )
+
+
+def claim_welded_order(runs: Sequence[Trajectory]) -> Finding:
+    """Ice made of masses welded on by joints drifts, and the drift falls with dt at the engine's printed order."""
+    drifts = [measure("", run) for run in runs]
+    printed = runs[0].diagnostics["weld_order"]
+    dt = [np.nan if drift.step is None else drift.step for drift in drifts]
+    sizes = np.array([drift.largest for drift in drifts])
+    order = float(np.polyfit(np.log(dt), np.log(sizes), 1)[0]) if np.all(sizes > 0) else float("nan")
+    return Finding(
+        id="ice-welded-order",
+        title="ice: drift of the welded engine falls with Δt at its printed order",
+        value=order,
+        unit="",
+        kind="regression",
+        admissible=(printed - 0.3, printed + 0.3),
+        note="drift " + ", ".join(f"{size:.2g} at Δt = {step:.2g} s" for step, size in zip(dt, sizes, strict=True)),
+    )
+
+
+def figures(found: Ice) -> Iterator[Exhibit]:
+    """Yield the drifts over time."""
+    drifts = found.drifts
+    if not drifts:
+        return
+    words = ", ".join(f"{ice.label} {ice.largest:.2g}" for ice in drifts)
+    yield Exhibit(
+        name="ice",
+        title="Ice keeps its angular velocity",
+        caption="Nothing moves in a bottle of ice, so that every drift is an error of the solver; the largest value "
+        "stands in the legend. Masses held by joints yield at the start, a quarter as much at half the step.",
+        alt=f"Logarithmic plot of the drift of omega over omega_0 in a bottle of ice. Largest drift: {words}.",
+        maker=draw,
+        data=(drifts,),
+        table=curves_csv({f"|omega/omega_0 - 1| {ice.label} [1]": (ice.t, ice.drift) for ice in drifts}),
+    )
+
+
+@styled
+def draw(drifts: Sequence[Drift]) -> Figure:
+    """Draw the drifts on a logarithmic scale with a floor; each that is zero gets a line of its own above it."""
+    figure, axes = new_figure(size=(8.0, 4.3))
+    others = iter(("#882255", "#CC79A7", "#E69F00"))
+    exact = 0
+    for ice in drifts:
+        floor = ICE_FLOOR * 3.0**exact
+        exact += ice.largest == 0.0
+        words = "none" if ice.largest == 0.0 else f"{ice.largest:.1e}"
+        known = STYLES.get(ENGINE if ice.label == f"{ENGINE} rigid" else ice.label)
+        axes.semilogy(
+            ice.t, np.maximum(ice.drift, floor), color=known["color"] if known else next(others), linewidth=1.5,
+            label=f"{ice.label}: {words}",
+        )  # fmt: skip
+    axes.set_ylim(ICE_FLOOR / 3, 1e-2)
+    axes.set_xlabel("time t [s]")
+    axes.set_ylabel(f"|ω / ω₀ − 1| [1], zero drawn below {1000 * ICE_FLOOR:.0e}")
+    axes.margins(x=0.01)
+    shared_legend(figure, axes, columns=2)
+    return figure
+
+
+CHAPTER: Final = Chapter(
+    name="ice",
+    title="Ice",
+    study=study,
+    claims=claims,
+    kind="regression",
+    figures=figures,
+    work={"check": False, "quick": True, "full": True},
+)

@@ -1,0 +1,154 @@
+"""For which bottles which assumption matters: maps over fill fraction and damping, step or restitution."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from flipproof.chapters.maps.figure import CONTOURS, errors, figure_map
+from flipproof.chapters.maps.study import (
+    CHUNK,
+    EXTRA,
+    LABELS,
+    LADDER,
+    RUNGS,
+    Axis,
+    Reading,
+    ValidityMap,
+    make_readings,
+    map_axes,
+    plan_map,
+    study_readings,
+)
+from flipproof.frame.chapter import Absent, Ask, Call, Chapter, Claims, Exhibit, Outcome, Run, Study, attempt
+from flipproof.frame.twins import BAND_WORDS
+from flipproof.output.columns import rows_csv
+
+AXES: Final[Mapping[Axis, str]] = {"gamma": "damping", "step": "step size", "restitution": "restitution"}
+SLICES: Final = 50
+CELLS: Final = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Maps:
+    """The map of every axis, at a number of slices."""
+
+    maps: Mapping[Axis, Outcome[ValidityMap]]
+    slices: int
+
+
+def study(ask: Ask) -> Study[Maps]:
+    """Fly every set of assumptions on ``ask.work`` by ``ask.work`` cells of each map, many runs to a call."""
+    cut = ask.throw.with_slices(SLICES)
+    ends = {axis: map_axes(axis, ask.work, ask.work) for axis in AXES}
+    runs = {axis: plan_map(cut, axis, *ends[axis], steps=ask.steps, shares=True, banded=True) for axis in AXES}
+    calls = {
+        axis: [Call(make_readings, (some[k : k + CHUNK],), f"map over {axis}") for k in range(0, len(some), CHUNK)]
+        for axis, some in runs.items()
+    }
+    # After the runs of the first wave, the longest of which would else wait behind tens of thousands of short ones.
+    yield ()
+    flights = yield [call for some in calls.values() for call in some]
+
+    def mapped(axis: Axis) -> ValidityMap:
+        readings: dict[Run, Reading] = {}
+        for k, call in enumerate(calls[axis]):
+            # Cells of a chunk whose worker died stay "not run".
+            answer = attempt(flights.answer, call)
+            readings |= zip(runs[axis][k * CHUNK : (k + 1) * CHUNK], answer.found or (), strict=False)
+        return study_readings(cut, axis, *ends[axis], readings, steps=ask.steps, shares=True)
+
+    return Maps({axis: attempt(lambda axis: mapped(axis), axis) for axis in AXES}, cut.n_slices)
+
+
+def claims(found: Maps) -> Claims:
+    """Yield which map could not be made."""
+    for axis, each in found.maps.items():
+        if each.found is None:
+            yield Absent(f"map-{axis}", f"map over {axis}", each.reason, "observation")
+
+
+def figures(found: Maps) -> Iterator[Exhibit]:
+    """Yield every map."""
+    for each in found.maps.values():
+        if each.found is not None:
+            yield _exhibit(each.found)
+
+
+def _exhibit(study: ValidityMap) -> Exhibit:
+    dominant = study.dominant
+    which = "fair share (mean over all orders of mending)"
+    contours = (
+        "the contours are where a scheme is 1 % and 10 % of ω₀ off its own equation."
+        if study.axis == "step"
+        else "the contours are where the published program is 1 % and 10 % of ω₀ off free flight."
+    )
+    counts = ", ".join(f"{name} {int((dominant == k).sum())}" for k, name in enumerate(RUNGS) if (dominant == k).any())
+    return Exhibit(
+        name=f"map-{study.axis}",
+        title=f"Validity over filling and {AXES[study.axis]}",
+        caption=f"Every cell is a throw. Its colour names the assumption with the largest {which} in the plateau, "
+        f"the mean of ω/ω₀ over the second half; {contours} Hatched cells could not be computed."
+        f"{_band_words(study)}",
+        alt=f"Map of {dominant.size} throws of {study.slices} slices, fill fraction {study.fills[0]:g} to "
+        f"{study.fills[-1]:g} by {AXES[study.axis]} {study.values[0]:g} to {study.values[-1]:g}. Cells by "
+        f"largest {which}: {counts or 'none could be computed'}. {_within(study)}",
+        maker=figure_map,
+        data=(study,),
+        table=table(study),
+    )
+
+
+def _band_words(study: ValidityMap) -> str:
+    """Return how certain free flight, the most sensitive equation, is in the cells."""
+    known = np.array([]) if study.band is None else study.band[np.isfinite(study.band)]
+    if not len(known):
+        return ""
+    return (
+        f" The plateau of free flight is certain to {np.median(known):.1g} in the median cell and {known.max():.1g} in "
+        f"the worst: {BAND_WORDS}."
+    )
+
+
+def _within(study: ValidityMap) -> str:
+    """Return how many cells lie within each contour."""
+    parts = []
+    for words, error in errors(study):
+        finite = error[np.isfinite(error)]
+        cells = ", ".join(f"below {level:.0%} in {int((finite < level).sum())}" for level, _ in CONTOURS)
+        parts.append(
+            f"The {words} is {cells} of {finite.size} cells" + (f", at most {finite.max():.2g}" if finite.size else "")
+        )
+    return "; ".join(parts) + "."
+
+
+def table(study: ValidityMap) -> str:
+    """Return every cell: the plateau of each solver, and the assumption with the largest fair share or step."""
+    solvers = (*LADDER, *EXTRA)
+    dominant = study.dominant
+    return rows_csv(
+        ("fill fraction [1]", LABELS[study.axis].translate({ord("γ"): "gamma", ord("ω"): "omega", ord("₀"): "_0",
+                                                            ord("Δ"): "d"}),
+         "largest step down the ladder" if study.shares is None else "largest fair share",
+         *(f"plateau of omega/omega_0 {name} [1]" for name in solvers), "not computed because"),
+        (
+            (study.fills[column], study.values[row], RUNGS[k] if k >= 0 else None,
+             *(study.level[name][row, column] for name in solvers), study.reason[row, column])
+            for (row, column), k in np.ndenumerate(dominant)
+        ),
+    )  # fmt: skip
+
+
+CHAPTER: Final = Chapter(
+    name="maps",
+    title="For which bottles",
+    study=study,
+    claims=claims,
+    figures=figures,
+    template=Path(__file__).with_name("part.html.j2"),
+    work={"full": CELLS},
+)

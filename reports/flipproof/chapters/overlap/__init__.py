@@ -1,0 +1,1 @@
+"""How far omega falls because slices may overlap."""

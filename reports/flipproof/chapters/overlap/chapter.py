@@ -1,0 +1,141 @@
+"""How far omega falls because slices may overlap."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from flipproof.chapters.maps.study import vary
+from flipproof.chapters.overlap.figure import figure_overlap
+from flipproof.chapters.overlap.study import (
+    DT,
+    EXCLUDE,
+    FILLS,
+    PASS,
+    SLICES,
+    Overlap,
+    plan_overlap,
+    study_overlap,
+)
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Run, Study
+from flipproof.output.columns import columns_csv
+from slicemodel import Trajectory
+
+FULL_SLICES: Final = 5
+FULL_DT: Final = 1e-5
+"""A full bottle in which nothing can move: resting contacts creep at first order, hence the fine step."""
+
+FULL_BOTTLE: Final = 1e-3
+"""What a full bottle in which nothing can move may lose of its angular velocity, fraction of omega_0."""
+
+
+class Amount(NamedTuple):
+    """Fill fractions, slices, and the coarser step of the engine [s]."""
+
+    fills: tuple[float, ...] = FILLS
+    slices: int = SLICES
+    dt: float = DT
+
+
+@dataclass(frozen=True, slots=True)
+class Overlaps:
+    """The curves over the fill fraction of the report's throw, and the paper's own bottle filled to the brim."""
+
+    overlap: Overlap
+    full_bottle: Trajectory | None
+
+
+def study(ask: Ask) -> Study[Overlaps]:
+    """Let slices overlap, and not."""
+    fills, slices, dt = ask.work
+    full = vary(ask.reference.with_slices(FULL_SLICES), fill=1.0)
+    settings = {"slices": "exclude", "dt": FULL_DT, "times": np.linspace(0.0, full.duration, 101)}
+    brim = Run("pymunk", full, settings, "full bottle, slices exclude each other")
+    flights = yield [*plan_overlap(ask.throw, fills, slices=slices, dt=dt), brim]
+    run = flights.trajectory(brim)
+    return Overlaps(
+        study_overlap(ask.throw, flights, fills, slices=slices, dt=dt), run if run is not None and run.ok else None
+    )
+
+
+def claims(found: Overlaps) -> Claims:
+    """Yield that a full bottle is ice, and by how much it is not when slices overlap."""
+    yield claim_full_bottle(found.full_bottle)
+    yield claim_overlap(found.overlap)
+
+
+def claim_full_bottle(run: Trajectory | None) -> Finding:
+    """A full bottle whose slices exclude each other keeps its angular velocity: it is ice."""
+    drift = None if run is None else float(np.abs(run.omega / run.scenario.omega0 - 1.0).max())
+    return Finding(
+        id="engine-full-bottle",
+        title="full bottle, slices exclude each other: largest |ω/ω₀ − 1|",
+        value=drift,
+        unit="",
+        kind="regression",
+        admissible=(0.0, FULL_BOTTLE),
+        note="" if run is None else f"N = {run.scenario.n_slices}, Δt = {run.settings['step']:.1g} s; falls with Δt",
+    )
+
+
+def claim_overlap(study: Overlap) -> Finding:
+    """What a full bottle loses because its slices may share their place."""
+    return Finding(
+        id="overlap-full-bottle",
+        title="full bottle: how far the plateau of ω/ω₀ lies below ice when slices overlap",
+        value=study.missing_from_ice(PASS),
+        unit="",
+        kind="observation",
+        note=f"{study.missing_from_ice(EXCLUDE):.2g} when they exclude each other; N = {study.slices}; the paper "
+        "expects a full bottle to behave like ice",
+    )
+
+
+def figures(found: Overlaps) -> Iterator[Exhibit]:
+    """Yield the plateau over the fill fraction."""
+    yield draw_overlap(found.overlap)
+
+
+def draw_overlap(study: Overlap) -> Exhibit:
+    """Return the plateau over the fill fraction, with slices that overlap and with slices that do not."""
+    rows = "; ".join(
+        f"filling {fill:.0%}: " + ", ".join(f"{name} {curve.level[k]:.3f}" for name, curve in study.curves.items())
+        for k, fill in enumerate(study.fills)
+    )
+    return Exhibit(
+        name="overlap",
+        title="How far ω falls because slices may overlap",
+        caption="In the paper slices pass through each other, and a full bottle, which ought to behave like ice, slows "
+        "down. In the same engine, slices that are rods and exclude each other keep the angular velocity of a full "
+        "bottle. The two curves differ by what overlap does. Bars: twice what halving the step changes.",
+        alt=f"Line plot of the plateau of omega over omega_0 against the fill fraction; ice is 1. {rows}.",
+        maker=figure_overlap,
+        data=(study,),
+        table=table_overlap(study),
+    )
+
+
+def table_overlap(study: Overlap) -> str:
+    """Plateau of every curve, its band, and why a run is missing."""
+    columns: dict[str, Any] = {"fill fraction [1]": study.fills}
+    for name, curve in study.curves.items():
+        columns[f"plateau of omega/omega_0 {name} [1]"] = curve.level
+        if np.isfinite(curve.band).any():
+            columns[f"band {name} [1]"] = curve.band
+        if any(curve.reason):
+            columns[f"missing because: {name}"] = curve.reason
+    return columns_csv(columns)
+
+
+CHAPTER: Final = Chapter(
+    name="overlap",
+    title="How far ω falls because slices may overlap",
+    study=study,
+    claims=claims,
+    kind="regression",
+    figures=figures,
+    work={"quick": Amount((0.5, 1.0), 6, 2e-4), "full": Amount()},
+)

@@ -1,0 +1,59 @@
+"""The paper's figures and statements, by three equations; they do not depend on the throw of the report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Exhibit, Study
+from flipproof.paper.claim_runs import ClaimRuns, plan_claims
+from flipproof.paper.figures import exhibits_paper
+from flipproof.paper.runs import PaperRuns, make_group, make_thinned, plan_groups
+from flipproof.paper.verdicts import PaperVerdicts, judge_paper
+
+
+@dataclass(frozen=True, slots=True)
+class Paper:
+    """The paper's own throws, and what becomes of its statements."""
+
+    runs: PaperRuns
+    verdicts: PaperVerdicts
+
+
+def study(ask: Ask) -> Study[Paper]:
+    """Make the throws of the figures, and those that statements need beside them; then judge in a worker."""
+    del ask
+    figures = [Call(make_group, (group,), "the paper's figures") for group in plan_groups()]
+    plan = plan_claims()
+    halved = [Call(make_thinned, (group,), "the paper's statements") for group in plan.groups]
+    flights = yield [*figures, *halved, *plan.runs]
+    runs = PaperRuns.of([flights.answer(call) for call in figures])
+    made = {each.run: each for call in halved for each in flights.answer(call)} | {
+        run: flights[run] for run in plan.runs
+    }
+    return Paper(runs, judge_paper(ClaimRuns.of(runs, plan, made)))
+
+
+def claims(found: Paper) -> Claims:
+    """Yield what the weight must do, and what every equation says of every statement."""
+    yield from found.verdicts.findings()
+
+
+def figures(found: Paper) -> Iterator[Exhibit]:
+    """Yield the paper's figures, drawn anew."""
+    yield from exhibits_paper(found.runs)
+
+
+CHAPTER: Final = Chapter(
+    name="paper",
+    title="The paper's figures and claims",
+    study=study,
+    claims=claims,
+    figures=figures,
+    template=Path(__file__).with_name("part.html.j2"),
+    work={"full": None},
+    summary=lambda found: {"paper": found.verdicts.to_mapping()},
+    page=lambda found: {"paper": found.verdicts},
+)

@@ -1,0 +1,1 @@
+"""How far a small change of the release moves a flight."""

@@ -1,0 +1,99 @@
+"""How far a small change of the release moves a flight."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Final
+
+from flipproof.chapters.predictability.figure import figure_predictability
+from flipproof.chapters.predictability.study import Predictability, plan_predictability, study_predictability
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Outcome, Study, attempt, judged
+from flipproof.output.columns import curves_csv
+
+SOLVERS: Final = ("eq8", "free-flight")
+
+Found = Mapping[str, Outcome[Predictability]]
+
+
+def study(ask: Ask) -> Study[Found]:
+    """Change the release of each solver's flight by the sizes that ``ask.work`` lists."""
+    levels = {name: plan_predictability(ask.throw, name, sizes=ask.work) for name in SOLVERS}
+    flights = yield [
+        run
+        for name, changed in levels.items()
+        for run in (ask.solvers[name], *(run for level in changed for run in level))
+    ]
+    return {
+        name: attempt(
+            lambda name, changed: study_predictability(
+                flights[ask.solvers[name]].flight, [[flights[run].flight for run in level] for level in changed]
+            ),
+            name,
+            changed,
+        )
+        for name, changed in levels.items()
+    }
+
+
+def claims(found: Found) -> Claims:
+    """Yield the amplification of the smallest change."""
+    for solver, each in found.items():
+        yield judged(
+            lambda solver, each: claim_predictability(solver, each.value),
+            solver,
+            each,
+            id=f"predictability-{solver}",
+            title=f"predictability of {solver}",
+            kind="observation",
+        )
+
+
+def claim_predictability(solver: str, study: Predictability) -> Finding:
+    """How much a tiny change of the release is amplified, and up to when a curve means anything."""
+    return Finding(
+        id=f"predictability-{solver}",
+        title=f"{solver}: largest amplification of a change of {study.sizes[0]:.0e} of the release",
+        value=float(study.largest_amplification[0]),
+        unit="",
+        kind="observation",
+        note=study.words,
+    )
+
+
+def figures(found: Found) -> Iterator[Exhibit]:
+    """Yield the spread after every change."""
+    studies = [each.found for each in found.values() if each.found is not None]
+    if not studies:
+        return
+    words = " ".join(f"{study.words}." for study in studies)
+    yield Exhibit(
+        name="predictability",
+        title="How far a small change of the release moves ω",
+        caption=(
+            "Flights whose release differs by a small amount. Where curves are parallel, the difference in ω is "
+            "proportional to the change of the release. Where curves of different changes meet at one level, ω jumps: "
+            "an impact happens in one flight and not in the other."
+        ),
+        alt=f"Logarithmic plot of the spread after tiny changes. {words}".replace("ω₀", "omega_0"),
+        maker=figure_predictability,
+        data=(studies,),
+        table=curves_csv(
+            {
+                f"spread of omega/omega_0 {study.solver}, release changed by {size:.0e} [1]": (study.t, row)
+                for study in studies
+                for size, row in zip(study.sizes, study.spread, strict=True)
+            }
+        ),
+    )
+
+
+CHAPTER: Final = Chapter(
+    name="predictability",
+    title="How far a small change of the release moves ω",
+    study=study,
+    claims=claims,
+    figures=figures,
+    template=Path(__file__).with_name("part.html.j2"),
+    work={"quick": (1e-9,), "full": (1e-9, 1e-6)},
+)

@@ -1,0 +1,321 @@
+"""How long a flight can be predicted, and how fast two flights part: growth of small differences.
+
+A throw is repeated with its release changed by tiny amounts. While the flight is smooth, the difference grows in
+proportion to the change, so that the amplification, difference over change, is the same for every size. An impact
+that one run has and another has not makes it jump instead, and then a smaller change does not help: the
+amplification is therefore stated for every size and never averaged away. Nothing is cut off at the horizon.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from flipproof.chapters.alignment.found import LEAST_SPEED, count_key, ordinal
+from flipproof.chapters.differences.study import PARTING_BAND, Difference, first_crossing, percent
+from flipproof.frame.solvers import Run
+from slicemodel import Impact, Impacts, Scenario, Trajectory
+from slicemodel.trajectory import FloatArray
+
+SIZES = (1e-9, 1e-8, 1e-7, 1e-6)
+"""Changes of the release: of theta_0 in rad and, at once, of omega_0 as a fraction."""
+
+DIRECTIONS = ((1, 1), (-1, -1), (1, -1), (-1, 1))
+"""Signs of the changes of theta_0 and omega_0. Free flight does not feel theta_0, so omega_0 must change with it."""
+
+HORIZON_BAND = 1e-3
+"""A flight is predictable while the difference in omega stays below this fraction of omega_0."""
+
+ROUND_OFF = float(np.finfo(np.float64).eps)
+JUMP_FACTOR = 10.0
+"""The flight is not smooth where the amplifications of two sizes differ by this factor."""
+
+SATURATED = 0.1
+"""Beyond this fraction of omega_0 a difference has no room to grow, and its amplification means nothing."""
+
+GROWTH_WINDOW = 0.05
+"""Growth before and after a parting is fitted over this time [s]."""
+
+FIT_WINDOWS = 12
+LEAST_FIT_WINDOWS = 4
+CLEAR = 3.0
+"""Standard errors that a rate must differ from zero by; with so few windows, noise does so in 5 of 100 cases."""
+
+FLOOR = 1e-14
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Growth:
+    """Exponential growth rate of a difference [1/s] with its standard error; NaN if it cannot be fitted."""
+
+    rate: float
+    error: float
+    start: float
+    stop: float
+
+    @property
+    def clear(self) -> bool:
+        """True if the rate differs from zero by more than CLEAR standard errors."""
+        return abs(self.rate) > CLEAR * self.error
+
+    @property
+    def words(self) -> str:
+        """The growth in words."""
+        if not math.isfinite(self.rate):
+            return "no growth rate (too few points above round-off)"
+        if not self.clear:
+            return f"does not clearly grow ({self.rate:.1f} ± {self.error:.1f} /s)"
+        return f"{'grows' if self.rate > 0 else 'shrinks'} at {abs(self.rate):.1f} ± {self.error:.1f} /s"
+
+
+def fit_growth(t: FloatArray, size: FloatArray, start: float = -math.inf, stop: float = math.inf) -> Growth:
+    """Fit |difference| = A exp(rate t) over [start, stop], robustly.
+
+    A difference changes sign and jumps, so single points and squares of residuals tell little. The interval is divided
+    into FIT_WINDOWS windows with the median of log |difference| in each, and the rate is the median of the slopes
+    between all pairs of them (Theil and Sen). Its standard error is that of a straight line whose scatter is the
+    median absolute residual, scaled to a normal distribution. Points below round-off or not finite are left out.
+    """
+    size = np.abs(size)
+    usable = (t >= start) & (t <= stop) & np.isfinite(size) & (size > FLOOR)
+    times, logs = t[usable], np.log(size[usable])
+    span = (float(times[0]), float(times[-1])) if len(times) else (math.nan, math.nan)
+    none = Growth(rate=math.nan, error=math.nan, start=span[0], stop=span[1])
+    if len(times) < LEAST_FIT_WINDOWS:
+        return none
+    edges = np.linspace(*span, FIT_WINDOWS + 1)
+    window = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, FIT_WINDOWS - 1)
+    filled = np.unique(window)
+    if len(filled) < LEAST_FIT_WINDOWS:
+        return none
+    x = np.array([times[window == w].mean() for w in filled])
+    y = np.array([np.median(logs[window == w]) for w in filled])
+    i, j = np.triu_indices(len(x), 1)
+    rate = float(np.median((y[j] - y[i]) / (x[j] - x[i])))
+    residual = y - rate * x
+    scatter = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
+    scatter *= math.sqrt(len(x) / (len(x) - 2))
+    error = scatter / math.sqrt(float(((x - x.mean()) ** 2).sum()))
+    return Growth(rate=rate, error=error, start=span[0], stop=span[1])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartingGrowth:
+    """How a difference grows before and after it first leaves its band, and the impact it follows.
+
+    ``time`` is None if the two never part; ``k`` says which of its slice's impacts on its end ``impact`` is, from 1.
+    """
+
+    first: str
+    second: str
+    time: float | None
+    before: Growth
+    after: Growth
+    impact: Impact | None
+    k: int | None
+
+    @property
+    def words(self) -> str:
+        """The parting in words."""
+        if self.time is None:
+            return f"{self.first} and {self.second} never part by {percent(PARTING_BAND)} of ω₀"
+        words = f"{self.first} and {self.second} part at {self.time * 1e3:.1f} ms"
+        if self.impact is not None and self.k is not None:
+            words += (
+                f", {(self.time - self.impact.time) * 1e3:.1f} ms after the {ordinal(self.k)} impact of slice "
+                f"{self.impact.slice} on the {self.impact.end}"
+            )
+        return f"{words}; the difference {self.before.words} before and {self.after.words} after"
+
+
+def study_parting_growth(
+    difference: Difference,
+    impacts: Impacts | None = None,
+    *,
+    window: float = GROWTH_WINDOW,
+    least_speed: float = LEAST_SPEED,
+) -> PartingGrowth:
+    """Fit the growth of a difference over ``window`` seconds before and after the parting.
+
+    ``impacts`` is the record of the run whose impacts the parting is set against; those slower than ``least_speed``
+    [m/s] are passed over, because near rest there is always one.
+    """
+    time = difference.parting_time
+    moment = math.nan if time is None else time
+    impact, k = _followed(time, impacts, least_speed)
+    return PartingGrowth(
+        first=difference.first,
+        second=difference.second,
+        time=time,
+        before=fit_growth(difference.t, difference.omega, moment - window, moment),
+        after=fit_growth(difference.t, difference.omega, moment, moment + window),
+        impact=impact,
+        k=k,
+    )
+
+
+def _followed(time: float | None, impacts: Impacts | None, least_speed: float) -> tuple[Impact | None, int | None]:
+    """Return the last impact at or before ``time`` that is fast enough, and its k."""
+    if time is None or impacts is None:
+        return None, None
+    fast = np.flatnonzero((impacts.time <= time) & (impacts.speed_before >= least_speed))
+    if not len(fast):
+        return None, None
+    return impacts[int(fast[-1])], count_key(impacts, int(fast[-1]), least_speed)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Predictability:
+    """What tiny changes of the release do to one solver's flight; one row per size of the change.
+
+    Parameters
+    ----------
+    solver : str
+    sizes : (S,)
+        Sizes of the changes, rising.
+    t : (P,) [s]
+    spread : (S, P)
+        max |omega_member - omega| / |omega_0| over the members; infinite where a member has ended.
+    band : float
+        What the spread may not exceed, as a fraction of omega_0.
+    horizons : tuple of S times or None
+        First time the spread exceeds the band [s]; None: never, predictable to the end.
+    round_off_horizon : float or None
+        The same for a change of the size of round-off, amplified as the smallest change is. It means something only
+        while the flight is smooth.
+    growths : tuple of S Growth
+        Of the spread, up to the horizon.
+    rough_from : float or None
+        First time at which amplifications differ by more than JUMP_FACTOR between sizes [s]: the flight is not smooth
+        there, or the solver's own error exceeds the smallest change.
+    ended : float or None
+        Where the run ends, if that is before the end of the throw [s].
+    """
+
+    solver: str
+    sizes: FloatArray
+    t: FloatArray
+    spread: FloatArray
+    band: float
+    horizons: tuple[float | None, ...]
+    round_off_horizon: float | None
+    growths: tuple[Growth, ...]
+    rough_from: float | None
+    ended: float | None
+
+    @property
+    def amplification(self) -> FloatArray:
+        """Spread over size of the change, shape (S, P); 1 at the start."""
+        return self.spread / self.sizes[:, np.newaxis]
+
+    @property
+    def largest_amplification(self) -> FloatArray:
+        """Largest amplification over the flight for every size, shape (S,)."""
+        return np.asarray(self.amplification.max(axis=1))
+
+    @property
+    def horizon(self) -> float | None:
+        """Earliest horizon of all sizes [s]; None: predictable to the end for all of them."""
+        return min((time for time in self.horizons if time is not None), default=None)
+
+    @property
+    def words(self) -> str:
+        """Amplification of every size, horizon, growth and smoothness in words."""
+        factors = zip(self.sizes, self.largest_amplification, strict=True)
+        each = ", ".join(f"{factor:.3g} (a change of {size:.0e})" for size, factor in factors)
+        words = f"{self.solver}: a change of the release is amplified at most by a factor of {each}"
+        if self.horizon is None:
+            words += f"; none leaves {self.band:g} of ω₀: predictable to the end"
+        for size, time in zip(self.sizes, self.horizons, strict=True):
+            words += "" if time is None else f"; {size:.0e} leaves {self.band:g} of ω₀ at {time * 1e3:.1f} ms"
+        words += f"; the effect of {self.sizes[0]:.0e} {self.growths[0].words}"
+        if self.rough_from is not None:
+            words += (
+                f" and reaches {self.spread[0].max():.1e} of ω₀; the factor depends on the size from "
+                f"{self.rough_from * 1e3:.1f} ms on, so nothing is extrapolated to round-off"
+            )
+        elif self.round_off_horizon is not None:
+            words += f"; even round-off would leave the band at {self.round_off_horizon * 1e3:.1f} ms"
+        return words + (f"; the run ends at {self.ended * 1e3:.1f} ms" if self.ended is not None else "")
+
+
+def plan_predictability(
+    throw: Scenario,
+    solver: str,
+    sizes: Sequence[float] = SIZES,
+    members: int = 2,
+    settings: Mapping[str, Any] | None = None,
+) -> list[list[Run]]:
+    """Return the changed runs, one list per size; the unchanged run is the solver's own with the same settings.
+
+    Raises
+    ------
+    ValueError
+        If ``members`` is not in [1, 4], or a size is not positive.
+    """
+    if not 1 <= members <= len(DIRECTIONS):
+        raise ValueError(f"members = {members} is outside [1, {len(DIRECTIONS)}]")
+    if not all(size > 0 for size in sizes):
+        raise ValueError(f"sizes = {tuple(sizes)} must be positive")
+    return [
+        [
+            Run(
+                solver,
+                replace(throw, theta0=throw.theta0 + turn * size, omega0=throw.omega0 * (1 + spin * size)),
+                dict(settings or {}),
+                label=f"{solver}, release changed by {size:.0e} ({'+-'[turn < 0]}θ₀, {'+-'[spin < 0]}ω₀)",
+            )
+            for turn, spin in DIRECTIONS[:members]
+        ]
+        for size in sorted(sizes)
+    ]
+
+
+def study_predictability(
+    base: Trajectory, members: Sequence[Sequence[Trajectory]], *, band: float = HORIZON_BAND
+) -> Predictability:
+    """Measure how far changed releases move the flight.
+
+    Parameters
+    ----------
+    base : Trajectory
+        The unchanged flight.
+    members : sizes of members
+        Trajectories of the runs of ``plan_predictability``, in its order.
+    band : float
+        Fraction of omega_0.
+    """
+    sizes = np.array([max(_size(base.scenario, run.scenario) for run in level) for level in members])
+    spread = np.array([np.max([_apart(base, run) for run in level], axis=0) for level in members])
+    horizons = tuple(first_crossing(base.t, row, band) for row in spread)
+    stops = [math.inf if time is None else time for time in horizons]
+    # A spread beyond saturation says nothing about smoothness: a larger change has merely less room.
+    amplification = np.where(spread <= SATURATED, spread / sizes[:, np.newaxis], np.nan)
+    with np.errstate(invalid="ignore"):
+        ratio = np.fmax.reduce(amplification, axis=0) / np.fmin.reduce(amplification, axis=0)
+    return Predictability(
+        solver=base.label,
+        sizes=sizes,
+        t=base.t,
+        spread=spread,
+        band=band,
+        horizons=horizons,
+        round_off_horizon=first_crossing(base.t, spread[0] / sizes[0] * ROUND_OFF, band),
+        growths=tuple(fit_growth(base.t, row, stop=stop) for row, stop in zip(spread, stops, strict=True)),
+        rough_from=first_crossing(base.t, np.nan_to_num(ratio, nan=1.0), JUMP_FACTOR),
+        ended=None if base.status in ("ok", "escaped") else float(base.t[-1]),
+    )
+
+
+def _size(base: Scenario, changed: Scenario) -> float:
+    return max(abs(changed.theta0 - base.theta0), abs(changed.omega0 / base.omega0 - 1))
+
+
+def _apart(base: Trajectory, run: Trajectory) -> FloatArray:
+    """Return |difference in omega| / |omega_0| at the times of ``base``, infinite after the end of ``run``."""
+    apart = np.abs(np.interp(base.t, run.t, run.omega) - base.omega) / abs(base.scenario.omega0)
+    return np.where(base.t <= run.t[-1], apart, np.inf)

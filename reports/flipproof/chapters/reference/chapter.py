@@ -1,0 +1,116 @@
+"""Whether the equations are solved right: an independent integration, and a second method, of the paper's own throw."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from flipproof.chapters.differences.study import claim_change
+from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Made, Run, Study, judged
+from flipproof.frame.twins import CUT, usual_rest_speed
+from ode_reference.models import LADDER
+from slicemodel import Scenario, Trajectory
+
+BAND: Final = 1e-7
+"""Fraction of omega_0 by which the reference may change by another method with a tenth of its rest speed."""
+
+WIDER_BANDS: Final = {"accelerating-origin": 1e-4, "free-flight": 3e-3}
+"""The same where a slice that rests pushes the tube and one that bounces below the rest speed does not."""
+
+CROSS_CHECKED: Final = ("published-limit", "eq8")
+"""Models that a second integration method is held against."""
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """The models that are witnessed, and the second method that those of CROSS_CHECKED are held against, if any."""
+
+    models: tuple[str, ...] = LADDER
+    second: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class References:
+    """Model -> its flight of the paper's own throw: as it is, by the witness, and by a second method if asked for."""
+
+    usual: Mapping[str, Made]
+    witness: Mapping[str, Made]
+    second: Mapping[str, Made]
+
+
+def study(ask: Ask) -> Study[References]:
+    """Fly every model twice; those of CROSS_CHECKED a third time if a second method is asked for."""
+    asked: Asked = ask.work
+    models = tuple(reversed(asked.models))
+    usual = {model: Run(model, ask.reference, {}, model) for model in models}
+    witness = {m: Run(m, ask.reference, witnessed(ask.reference, m), f"{m}, solve_ivp DOP853") for m in models}
+    other = {"method": asked.second}
+    second = {m: Run(m, ask.reference, other, f"{m}, {asked.second}") for m in CROSS_CHECKED if asked.second}
+    flights = yield [*second.values(), *witness.values(), *usual.values()]
+    return References(
+        *({model: flights[runs[model]] for model in LADDER if model in runs} for runs in (usual, witness, second))
+    )
+
+
+def witnessed(scenario: Scenario, model: str) -> dict[str, Any]:
+    """Return the settings of the witness: short steps, tight tolerances and a tenth of the usual rest speed."""
+    longest, rest_speed = 0.01 / abs(scenario.omega0), usual_rest_speed(model) / CUT
+    return {"method": "DOP853", "rtol": 1e-11, "atol": 1e-14, "rest_speed": rest_speed, "max_step": longest}
+
+
+def claims(found: References) -> Claims:
+    """Yield that every model is confirmed."""
+    for model, made in found.usual.items():
+        yield judged(
+            lambda made, model: claim_reference_converged(made.flight, found.witness[model].flight),
+            made,
+            model,
+            id=f"reference-{model}",
+            title=f"{model} is converged",
+        )
+        if model in found.second:
+            yield judged(
+                lambda made, model: claim_second_method(made.flight, found.second[model].flight),
+                made,
+                model,
+                id=f"second-method-{model}",
+                title=f"{model} by a second method",
+            )
+
+
+def claim_reference_converged(usual: Trajectory, witness: Trajectory) -> Finding:
+    """An independent integration of all 2N + 1 equations with a tenth of the rest speed gives the same flight."""
+    one, other = usual.settings, witness.settings
+    return claim_change(
+        f"reference-{usual.method}",
+        f"{usual.method}: ω(t) is converged in rest speed, and solve_ivp {other['method']} confirms it",
+        usual,
+        witness,
+        WIDER_BANDS.get(usual.method, BAND),
+        differ=one["method"] != other["method"] and 10 * other["rest_speed"] <= one["rest_speed"] * 1.001,
+        note=f"rest speed {one['rest_speed']:g} → {other['rest_speed']:g} m/s; {one['method']} → "
+        f"{other['method']}, rtol {other['rtol']:g}, longest step {other['max_step']:g} s",
+    )
+
+
+def claim_second_method(usual: Trajectory, other: Trajectory) -> Finding:
+    """A second integration method gives the same flight."""
+    return claim_change(
+        f"second-method-{usual.method}",
+        f"{usual.method}: {other.settings['method']} gives the same ω(t) as {usual.settings['method']}",
+        usual,
+        other,
+        BAND,
+        differ=usual.settings["method"] != other.settings["method"],
+    )
+
+
+CHAPTER: Final = Chapter(
+    name="reference",
+    title="Whether the equations are solved right",
+    study=study,
+    claims=claims,
+    kind="regression",
+    work={"check": Asked(("eq8", "free-flight")), "quick": Asked(), "full": Asked(second="Radau")},
+)

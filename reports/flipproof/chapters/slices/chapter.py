@@ -1,0 +1,129 @@
+"""What more slices would change: the same throw, damping rate alpha/2m unchanged, cut finer and finer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from flipproof.figures.style import new_figure, shared_legend, styled
+from flipproof.frame.chapter import Ask, Chapter, Exhibit, Run, Study, attempt
+from flipproof.frame.throws import FINER
+from flipproof.output.columns import curves_csv
+from slicemodel import Trajectory
+from slicemodel.trajectory import FloatArray
+
+SCHEMES: Final = ("published-python", "exact-step")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SliceCount:
+    """One scheme at several numbers of slices, and its distance from the finest cut, max |d omega| / omega_0."""
+
+    scheme: str
+    counts: tuple[int, ...]
+    trajectories: tuple[Trajectory, ...]
+    distance: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Slices:
+    """The study of every scheme all of whose cuts were made; slices of the report's own throw, and of its finer one."""
+
+    schemes: Mapping[str, SliceCount]
+    slices: int
+    finer: int
+
+
+def study(ask: Ask) -> Study[Slices]:
+    """Throw the bottle in as many slices as ``ask.work`` lists, in increasing order."""
+    runs = {
+        scheme: [
+            Run(scheme, ask.throw.with_slices(n), {"store": "summary"}, f"{scheme}, {n} slices")
+            for n in sorted(ask.work)
+        ]
+        for scheme in SCHEMES
+    }
+    flights = yield [run for cuts in runs.values() for run in cuts]
+    counted = {
+        scheme: attempt(lambda cuts: compare([flights[run].flight for run in cuts]), cuts)
+        for scheme, cuts in runs.items()
+    }
+    schemes = {scheme: each.found for scheme, each in counted.items() if each.found is not None}
+    return Slices(schemes, ask.throw.n_slices, FINER * ask.throw.n_slices)
+
+
+def compare(runs: Sequence[Trajectory]) -> SliceCount:
+    """Compare every cut with the finest, which is the last."""
+    finest = runs[-1]
+    points = min(len(run.t) for run in runs)
+    distance = np.array(
+        [np.abs(run.omega[:points] - finest.omega[:points]).max() / abs(finest.scenario.omega0) for run in runs]
+    )
+    return SliceCount(
+        scheme=finest.method,
+        counts=tuple(run.scenario.n_slices for run in runs),
+        trajectories=tuple(runs),
+        distance=distance,
+    )
+
+
+def figures(found: Slices) -> Iterator[Exhibit]:
+    """Yield omega(t) at every number of slices."""
+    if not found.schemes:
+        return
+    words = "; ".join(
+        f"{scheme}: " + ", ".join(f"N = {n} {d:.2g}" for n, d in zip(s.counts, s.distance, strict=True))
+        for scheme, s in found.schemes.items()
+    )
+    yield Exhibit(
+        name="slice-count",
+        title="What more slices would change",
+        caption="The same water in more and more slices at the same damping rate. How far a curve still moves with the "
+        "number of slices is an error of every number that is computed at one of them.",
+        alt="Line plots of omega over omega_0 for several numbers of slices. Largest distance from the finest cut, of "
+        f"omega_0: {words}.",
+        maker=draw,
+        data=(dict(found.schemes),),
+        table=curves_csv(
+            {
+                f"omega/omega_0 {scheme} N = {n} [1]": (run.t, run.omega / run.scenario.omega0)
+                for scheme, s in found.schemes.items()
+                for n, run in zip(s.counts, s.trajectories, strict=True)
+            }
+        ),
+    )
+
+
+@styled
+def draw(studies: Mapping[str, SliceCount]) -> Figure:
+    """Angular velocity for several numbers of slices, one panel per scheme."""
+    figure, panels = new_figure(1, len(studies), size=(8.0, 4.0), sharey=True, squeeze=False)
+    panels = panels[0]
+    for axes, (scheme, study) in zip(panels, studies.items(), strict=True):
+        colours = mpl.colormaps["viridis"](np.linspace(0.9, 0.0, len(study.counts)))
+        for n, trajectory, colour in zip(study.counts, study.trajectories, colours, strict=True):
+            omega = trajectory.omega / trajectory.scenario.omega0
+            axes.plot(trajectory.t, omega, color=colour, linewidth=1.3, label=f"{n} slices")
+        axes.set_title(scheme, fontsize=10, loc="left")
+        axes.set_xlabel("time t [s]")
+        axes.set_ylim(bottom=0.0)
+        axes.margins(x=0.01)
+    panels[0].set_ylabel("angular velocity ω / ω₀ [1]")
+    shared_legend(figure, panels[0], columns=7)
+    return figure
+
+
+CHAPTER: Final = Chapter(
+    name="slices",
+    title="How many slices",
+    study=study,
+    figures=figures,
+    template=Path(__file__).with_name("part.html.j2"),
+    work={"quick": (5, 20, 50, 200), "full": (5, 10, 20, 50, 100, 200, 500)},
+)

@@ -1,0 +1,63 @@
+"""How every solver flies the throw of a report: chapters that look at one flight ask for the same run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from engine_check.solver import DEFAULT_TOLERANCE
+from flipproof.frame.solvers import Run
+from ode_reference.models import LADDER
+from slicemodel import Scenario
+
+ENGINE: Final = "pymunk"
+FREE: Final = LADDER[-1]
+LIMITS: Final = {"published-python": "published-limit", "exact-step": "eq8"}
+"""Scheme -> the model it converges to."""
+
+LOCATED: Final = "pymunk located"
+"""Name of the hybrid, which exists for throws without drag only."""
+
+WITNESSES: Final[Mapping[str, tuple[str, Mapping[str, Any]]]] = {
+    "pymunk": ("pymunk", {}),
+    LOCATED: ("pymunk", {"hits": "located"}),
+    "mujoco": ("mujoco", {}),
+    "pymunk rotating": ("pymunk", {"frame": "rotating"}),
+}
+"""Name -> engine and settings of every engine run that a report certifies, where the throw allows it."""
+
+TOLERANCE: Final = DEFAULT_TOLERANCE
+"""What the certificates of a report must hold, fraction of omega_0: as ``engine_check.solve`` asks by itself."""
+
+UNCERTIFIED_DT: Final = 1.25e-4
+"""Step of a witness that is not certified [s]: where a certificate begins."""
+
+CERTIFIED: Final = {"check": (), "quick": ("pymunk rotating",), "full": tuple(WITNESSES)}
+"""Witnesses that are certified: a certificate of a free tube costs several runs of all its slices."""
+
+FLIGHTS: Final = ("published-python", "published-limit", "exact-step", "eq8", ENGINE, FREE)
+"""The solvers whose flights are drawn."""
+
+OTHER_SCHEMES: Final = ("midpoint", "published-matlab", "paper-typeset", "signs-corrected", "roots-corrected")
+OTHERS: Final = (
+    *OTHER_SCHEMES,
+    *(model for model in LADDER if model not in FLIGHTS),
+    *(name for name in WITNESSES if name not in FLIGHTS),
+)
+
+
+def witnesses(throw: Scenario) -> tuple[str, ...]:
+    """Return those of ``WITNESSES`` that can fly the throw: hits are located only without drag, and ice has none."""
+    dry = throw.drag == 0.0 and not throw.frozen
+    return tuple(name for name in WITNESSES if dry or name != LOCATED)
+
+
+def solver_runs(throw: Scenario, steps: int, certified: tuple[str, ...]) -> dict[str, Run]:
+    """Return the run of every solver by its name, the slowest first."""
+    runs = {}
+    for name in witnesses(throw):
+        engine, settings = WITNESSES[name]
+        accuracy = {"tolerance": TOLERANCE} if name in certified else {"dt": UNCERTIFIED_DT}
+        runs[name] = Run(engine, throw, {**settings, **accuracy}, name)
+    runs |= {model: Run(model, throw, {}, model) for model in reversed(LADDER)}
+    return runs | {scheme: Run(scheme, throw, {"steps": steps}, scheme) for scheme in (*LIMITS, *OTHER_SCHEMES)}

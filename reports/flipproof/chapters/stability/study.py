@@ -1,0 +1,255 @@
+"""Where pymunk can be believed: step against solver iterations, for heavy and light water and few and many slices.
+
+Too few iterations and the joints open: the run explodes, and the engine's watch stops it. Too long a step and slices
+sink into the ends. Between the two lies a band in which nothing breaks and omega(t) is wrong all the same: only a
+reference shows it. Every cell of the chart is a run, or says why there is none; none is filled in from its neighbours.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipproof.chapters.maps.study import vary
+from flipproof.frame.solvers import Made, Run
+from flipproof.frame.twins import twins
+from slicemodel import Scenario, Trajectory
+from slicemodel.observables import plateau
+from slicemodel.scenario import shortened
+from slicemodel.trajectory import FloatArray
+
+ENGINE: Final = "pymunk"
+REFERENCE: Final = "free-flight"
+
+DEFAULT_ITERATIONS: Final = 10
+"""What pymunk iterates unless told otherwise."""
+
+EXCELLENT: Final = 1e-3
+GOOD: Final = 1e-2
+"""Largest |omega - omega of the reference| up to which a cell is called so, as a fraction of omega_0."""
+
+RULE_DT: Final = 2e-4
+"""The rule of ``enough_iterations`` is held against steps up to this one, twice the engine's default [s]."""
+
+GRADES: Final = ("excellent", "good", "wrong", "sinks in", "explodes", "not run")
+"""Best first. "sinks in": slices lie too deep in an end; "explodes": another invariant broke."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layout:
+    """Which cells a chart has.
+
+    Parameters
+    ----------
+    panels : tuple of (M_w / M_b [1], slices)
+    dt : tuple of steps, falling [s]
+    iterations : tuple of iterations, rising
+    duration : float
+        Flight that is looked at [s]; a whole number of the longest step, which divides the output times.
+    budget : float
+        Slices times iterations times steps beyond which a cell is not run [1]; 1e7 takes about a second.
+    """
+
+    panels: tuple[tuple[float, int], ...]
+    dt: tuple[float, ...]
+    iterations: tuple[int, ...]
+    duration: float
+    budget: float
+
+    @property
+    def times(self) -> FloatArray:
+        """Output times, one longest step apart, so that every cell has equal steps [s]."""
+        return np.linspace(0.0, self.duration, round(self.duration / self.dt[0]) + 1)
+
+
+FULL: Final = Layout(
+    panels=((6.0, 10), (18.0, 10), (6.0, 50), (18.0, 50)),
+    dt=(2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5),
+    iterations=(5, 10, 20, 40, 70, 130, 200),
+    duration=0.25,
+    budget=3.3e7,
+)
+QUICK: Final = Layout(
+    panels=((6.0, 10), (18.0, 20)),
+    dt=(2e-3, 1e-3, 5e-4, 2e-4),
+    iterations=(5, 10, 40, 90),
+    duration=0.2,
+    budget=2e6,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StabilityPanel:
+    """Chart of one bottle. Arrays over cells have shape (iterations, dt).
+
+    Parameters
+    ----------
+    mass_ratio : float - M_w / M_b [1]
+    slices : int
+    duration : float [s]
+    dt, iterations : (columns,) [s], (rows,)
+    grade : array of str - of GRADES
+    error : array - max |omega - omega of the reference| / |omega_0|; NaN where a run did not reach the end
+    plateau_error : array - the same of the mean over the second half
+    held_until : array - last output time before the watch stopped a run [s]; NaN where it did not
+    reason : array of str - why a run stopped or was not made; "" where it is whole
+    enough : int - iterations that the rule asks for
+    band : float - by how much twins of the reference differ from it, fraction of omega_0; NaN if unknown
+    """
+
+    mass_ratio: float
+    slices: int
+    duration: float
+    dt: FloatArray
+    iterations: NDArray[np.int64]
+    grade: NDArray[np.str_]
+    error: FloatArray
+    plateau_error: FloatArray
+    held_until: FloatArray
+    reason: NDArray[np.str_]
+    enough: int
+    band: float
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of cells of each grade, best first."""
+        return {grade: int((self.grade == grade).sum()) for grade in GRADES}
+
+    @property
+    def by_the_rule(self) -> FloatArray:
+        """Errors of the cells that were run by the rule: enough iterations, dt up to RULE_DT; infinite if stopped."""
+        follow = (self.iterations >= self.enough)[:, np.newaxis] & (self.dt <= RULE_DT * (1 + 1e-12))
+        errors = np.where(np.isfinite(self.held_until), np.inf, self.error)
+        return np.asarray(errors[follow & (self.grade != "not run")])
+
+    @property
+    def at_default(self) -> NDArray[np.str_]:
+        """Grades at pymunk's own iterations, of the cells that were run."""
+        row = self.grade[self.iterations == DEFAULT_ITERATIONS]
+        return np.asarray(row[row != "not run"])
+
+    @property
+    def words(self) -> str:
+        """The chart in words."""
+        counts = ", ".join(f"{count} {grade}" for grade, count in self.counts.items() if count)
+        return f"M_w/M_b = {self.mass_ratio:g}, N = {self.slices}: {counts}; the rule asks for {self.enough} iterations"
+
+
+def panel_throw(throw: Scenario, mass_ratio: float, slices: int, duration: float) -> Scenario:
+    """Return the throw with ``mass_ratio`` times the bottle's mass of water; damping rate and release unchanged."""
+    fill = mass_ratio * throw.bottle.mass / throw.bottle.capacity
+    return replace(vary(throw.with_slices(slices), fill=fill), duration=duration)
+
+
+def plan_stability(throw: Scenario, layout: Layout) -> list[Run]:
+    """Return the runs of a chart: each panel's reference with its twins, and the cells in budget, slowest first."""
+    runs, cells = [], []
+    for mass_ratio, slices in layout.panels:
+        scenario = panel_throw(throw, mass_ratio, slices, layout.duration)
+        reference = _reference(scenario, layout)
+        runs += [reference, *twins(reference)]
+        for dt, iterations in _grid(layout):
+            cost = _cost(layout, slices, dt, iterations)
+            if cost <= layout.budget:
+                cells.append((cost, _cell(scenario, layout, dt, iterations)))
+    return runs + [run for _, run in sorted(cells, key=lambda pair: -pair[0])]
+
+
+def _grid(layout: Layout) -> Iterator[tuple[float, int]]:
+    for iterations in layout.iterations:
+        for dt in layout.dt:
+            yield dt, iterations
+
+
+def _cost(layout: Layout, slices: int, dt: float, iterations: int) -> float:
+    return slices * iterations * layout.duration / dt
+
+
+def _reference(scenario: Scenario, layout: Layout) -> Run:
+    return Run(REFERENCE, scenario, {"times": layout.times}, f"{_label(scenario)}, {REFERENCE}")
+
+
+def _cell(scenario: Scenario, layout: Layout, dt: float, iterations: int) -> Run:
+    settings = {"dt": dt, "iterations": iterations, "times": layout.times}
+    return Run(ENGINE, scenario, settings, f"{_label(scenario)}, dt {dt:g} s, {iterations} iterations")
+
+
+def _label(scenario: Scenario) -> str:
+    return f"stability, mass ratio {scenario.water_mass / scenario.bottle.mass:g}, {scenario.n_slices} slices"
+
+
+def study_stability(throw: Scenario, layout: Layout, made: Mapping[Run, Made]) -> tuple[StabilityPanel, ...]:
+    """Read what ``plan_stability`` planned with the same arguments."""
+    return tuple(_panel(throw, layout, *panel, made) for panel in layout.panels)
+
+
+def _panel(throw: Scenario, layout: Layout, mass_ratio: float, slices: int, made: Mapping[Run, Made]) -> StabilityPanel:
+    from engine_check.pymunk_settings import enough_iterations
+
+    shape = (len(layout.iterations), len(layout.dt))
+    error, level, held = (np.full(shape, np.nan) for _ in range(3))
+    grade, reason = np.full(shape, "not run", dtype="<U12"), np.full(shape, "", dtype="<U160")
+    scenario = panel_throw(throw, mass_ratio, slices, layout.duration)
+    reference = _reference(scenario, layout)
+    truth = _whole(made.get(reference))
+    others = [run for twin in twins(reference) if (run := _whole(made.get(twin))) is not None]
+    for k, (dt, iterations) in enumerate(_grid(layout)):
+        at = np.unravel_index(k, shape)
+        cost = _cost(layout, slices, dt, iterations)
+        outcome = made.get(_cell(scenario, layout, dt, iterations))
+        flight = None if outcome is None else outcome.trajectory
+        if cost > layout.budget:
+            reason[at] = f"{cost:.1e} slices × iterations × steps, more than {layout.budget:.1e}"
+        elif outcome is None or flight is None:
+            reason[at] = "not made" if outcome is None else shortened(outcome.reason, 160)
+        elif not flight.ok:
+            grade[at] = "sinks in" if flight.reason == "penetration" else "explodes"
+            reason[at], held[at] = shortened(flight.message, 160), flight.t[-1]
+        elif truth is None:
+            reason[at] = f"{REFERENCE} has no result to hold it against"
+        else:
+            error[at] = _apart(flight, truth)
+            level[at] = abs(_plateau(flight) - _plateau(truth))
+            grade[at] = grade_of(error[at])
+    return StabilityPanel(
+        mass_ratio=mass_ratio,
+        slices=slices,
+        duration=layout.duration,
+        dt=np.asarray(layout.dt, dtype=np.float64),
+        iterations=np.asarray(layout.iterations, dtype=np.int64),
+        grade=grade,
+        error=error,
+        plateau_error=level,
+        held_until=held,
+        reason=reason,
+        enough=enough_iterations(scenario),
+        band=math.nan if truth is None or len(others) < 2 else max(_apart(run, truth) for run in others),
+    )
+
+
+def _whole(outcome: Made | None) -> Trajectory | None:
+    """Return the trajectory of a run that reached the end."""
+    return (
+        outcome.trajectory if outcome is not None and outcome.trajectory is not None and outcome.trajectory.ok else None
+    )
+
+
+def grade_of(error: float) -> str:
+    """Return the grade of a run that is whole, by its error."""
+    # Written as "not inside", because NaN passes every "outside" test.
+    if not error <= GOOD:
+        return "wrong"
+    return "excellent" if error <= EXCELLENT else "good"
+
+
+def _apart(flight: Trajectory, truth: Trajectory) -> float:
+    return float(np.abs(flight.omega - truth.omega).max() / abs(truth.scenario.omega0))
+
+
+def _plateau(flight: Trajectory) -> float:
+    return plateau(flight.t, flight.omega, flight.scenario.omega0)

@@ -1,0 +1,1 @@
+"""The published programs' printed numbers are reproduced, in every column and over the whole run."""

@@ -1,0 +1,128 @@
+"""The published programs' printed numbers, and how far a run of ours is from them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from slicemodel import Scenario, Trajectory
+from slicemodel.trajectory import FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Vector:
+    """One published run: the throw, the scheme that must reproduce it, and what was printed (column -> values)."""
+
+    name: str
+    scenario: Scenario
+    scheme: str
+    middle_slice: int
+    until: float
+    columns: MappingProxyType[str, FloatArray]
+
+    @property
+    def steps(self) -> int:
+        """Points of the published grid."""
+        return len(self.columns["t"])
+
+
+MATLAB_RUNS = (
+    # The default run overflows; it is compared up to 0.2 s, before its slices are thrown out to infinity.
+    ("matlab_default", {"n_slices": 500, "drag": 0.01, "duration": 1.0}, 0.2),
+    ("matlab_no_drag", {"n_slices": 100, "drag": 0.0, "duration": 0.3}, 0.3),
+)
+
+
+def folder() -> Path:
+    """Return where the vectors are: inside the installed package, or beside it in a checkout."""
+    here = Path(__file__).resolve().parent
+    for place in (here / "vectors", here.parents[3] / "tests" / "vectors"):
+        if place.is_dir():
+            return place
+    raise FileNotFoundError(
+        f"the published vectors are neither in {here / 'vectors'} nor in a checkout's tests/vectors"
+    )
+
+
+def load_all() -> tuple[Vector, ...]:
+    """Return every published vector, the Python program's first."""
+    vectors = [
+        Vector(
+            name=entry["file"].removesuffix(".csv"),
+            scenario=Scenario(
+                water_mass=entry["water_mass"],
+                n_slices=entry["n_slices"],
+                drag=entry["alpha"],
+                restitution=-entry["beta"],
+                omega0=entry["omega_0"],
+                theta0=entry["theta_0"],
+                duration=entry["t_max"],
+            ),
+            scheme="published-python",
+            middle_slice=entry["n_slices"] // 2,
+            until=entry["t_max"],
+            columns=_columns(entry["file"]),
+        )
+        for entry in json.loads((folder() / "python_vectors.json").read_text(encoding="utf-8"))
+    ]
+    for name, changes, until in MATLAB_RUNS:
+        scenario = Scenario(**changes)  # type: ignore[arg-type]
+        vectors.append(
+            Vector(
+                name=name,
+                scenario=scenario,
+                scheme="published-matlab",
+                middle_slice=scenario.n_slices // 2 - 1,
+                until=until,
+                columns=_columns(f"{name}.csv"),
+            )
+        )
+    return tuple(vectors)
+
+
+def _columns(file: str) -> MappingProxyType[str, FloatArray]:
+    path = folder() / file
+    with path.open(encoding="utf-8") as lines:
+        header = lines.readline().strip().split(",")
+        table = np.loadtxt(lines, delimiter=",")
+    return MappingProxyType(dict(zip(header, table.T, strict=True)))
+
+
+def deviations(vector: Vector, trajectory: Trajectory) -> dict[str, float]:
+    """Largest relative deviation from every printed column over all t <= ``vector.until``.
+
+    A column that is zero at a point must be zero there. A run that ends too early deviates by infinity.
+    """
+    points = int(np.searchsorted(vector.columns["t"], vector.until, side="right"))
+    if len(trajectory.t) < points:
+        return {"t": float("inf")}
+    ours = {
+        "t": trajectory.t,
+        "theta": trajectory.theta,
+        "omega": trajectory.omega,
+        "r_cm": trajectory.r_cm,
+        "inertia": trajectory.inertia,
+        "r_first": trajectory.r[:, 0],
+        "r_middle": trajectory.r[:, vector.middle_slice],
+        "r_last": trajectory.r[:, -1],
+        "r_min": trajectory.r.min(axis=1),
+        "r_max": trajectory.r.max(axis=1),
+    }
+    return {
+        name: relative_deviation(ours[name][:points], values[:points])
+        for name, values in vector.columns.items()
+        if name in ours
+    }
+
+
+def relative_deviation(values: FloatArray, expected: FloatArray) -> float:
+    """Return max |values - expected| / |expected|, 0 where both are 0; NaN anywhere gives NaN."""
+    difference = np.abs(values - expected)
+    scale = np.abs(expected)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative = np.where((difference == 0.0) & (scale == 0.0), 0.0, difference / scale)
+    return float(relative.max())

@@ -1,0 +1,288 @@
+"""The difference from the published program to free flight, split over the assumptions that make it.
+
+    program --step size--> its limit --signs--> --roots--> --drag reference--> --gravity--> --origin--> --recoil--> free
+
+Mending the assumptions in this order gives one split (forward), in the reverse order another (backward); where the two
+differ, assumptions interact. The average over all orders (the Shapley value) is the only split that treats
+them alike: an assumption's fair share. Each of the three sums to the whole difference, which is asserted. A bar of one
+order, or the largest bar of any order, is no share: another order gives another number. The step size comes first in
+every order: only the program has one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from itertools import combinations
+from types import MappingProxyType
+from typing import Final, TypeVar
+
+from flipproof.frame.solvers import Run
+from flipproof.frame.throws import finer
+from flipproof.frame.twins import band, twins
+from ode_reference.switches import Switches
+from slicemodel import Scenario, Trajectory, observables
+from slicemodel.trajectory import FloatArray
+
+PROGRAM: Final = "published-python"
+
+NAMES: Final = MappingProxyType(
+    {
+        "signs": "signs of Eq. 9d: no damping",
+        "roots": "roots of Eq. 9a: γ ≪ ω",
+        "drag_on_centre": "drag against C_M",
+        "weightless": "gravity in Eq. 8",
+        "origin": "origin at rest, drag on the tube",
+        "recoil": "no recoil in impacts",
+    }
+)
+"""Switch -> the assumption it mends, in the order of the ladder."""
+
+Value = TypeVar("Value", float, FloatArray)
+
+STEP: Final = "finite step of the program"
+
+
+@dataclass(frozen=True, slots=True)
+class Observable:
+    """One number read off a trajectory."""
+
+    name: str
+    symbol: str
+    words: str
+    unit: str
+    of: Callable[[Trajectory], float]
+
+
+OBSERVABLES: Final = (
+    Observable(
+        "plateau",
+        "plateau",
+        "mean of ω/ω₀ over the second half",
+        "1",
+        lambda run: observables.plateau(run.t, run.omega, run.scenario.omega0),
+    ),
+    Observable("omega", "ω(T)/ω₀", "ω on landing / ω₀", "1", lambda run: float(run.omega[-1] / run.scenario.omega0)),
+    Observable("theta", "θ(T)", "θ on landing", "rad", lambda run: float(run.theta[-1])),
+    Observable(
+        "toppling",
+        "θ_c(T)",
+        "toppling angle on landing",
+        "rad",
+        lambda run: float(observables.toppling_angle(run.scenario, run.r_cm[-1])),
+    ),
+    Observable(
+        "v_cm",
+        "v_CM(T)",
+        "velocity of C_M in the bottle on landing",
+        "m/s",
+        lambda run: float(observables.centre_of_mass_velocity(run.scenario, run.v[-1])),
+    ),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bar:
+    """What mending one assumption changes, in the units of the observable; a band is what twins of the runs change.
+
+    ``forward`` in the order of the ladder, ``backward`` in reverse; ``average``, the fair share, is the mean over all
+    orders, between ``low`` and ``high`` in single ones; ``finer`` is the average at ``FINER`` times the slices, None if
+    that was not computed.
+    """
+
+    name: str
+    forward: float
+    backward: float
+    average: float
+    low: float
+    high: float
+    forward_band: float
+    average_band: float
+    finer: float | None = None
+
+    @property
+    def interaction(self) -> float:
+        """Largest difference between the three splits."""
+        return max(self.forward, self.backward, self.average) - min(self.forward, self.backward, self.average)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Waterfall:
+    """The split of one observable at ``slices``; ``residual`` is the largest |total - sum of bars| of the splits."""
+
+    observable: Observable
+    slices: int
+    start: float
+    end: float
+    end_band: float
+    bars: tuple[Bar, ...]
+    residual: float
+
+    @property
+    def total(self) -> float:
+        """Free flight minus published program."""
+        return self.end - self.start
+
+    @property
+    def largest(self) -> Bar:
+        """The bar whose average over orders is largest in size."""
+        return max(self.bars, key=lambda bar: abs(bar.average))
+
+    @property
+    def away(self) -> Bar | None:
+        """The bar that leads furthest away from free flight in the order of the ladder; None if none does."""
+        bars = [bar for bar in self.bars if bar.forward * self.total < 0.0]
+        return max(bars, key=lambda bar: abs(bar.forward), default=None)
+
+
+def canonical(switches: Switches) -> Switches:
+    """Return the one set that stands for all that make its equation: ``drag_on_centre`` off where it has no effect."""
+    idle = switches.origin or not switches.signs
+    return replace(switches, drag_on_centre=False) if idle else switches
+
+
+def program_run(throw: Scenario, steps: int) -> Run:
+    """Return the published program's run."""
+    return Run(PROGRAM, throw, {"steps": steps}, "waterfall, program")
+
+
+def equation_run(throw: Scenario, switches: Switches) -> Run:
+    """Return the run of the equation that a set of mended assumptions makes."""
+    name = canonical(switches).name
+    return Run(name, throw, {}, f"waterfall, {name}")
+
+
+def plan_waterfall(throw: Scenario, steps: int) -> list[Run]:
+    """Return the program's run, and every equation with its twins (121 runs)."""
+    equations = _plan_equations(throw)
+    return [program_run(throw, steps), *equations, *(twin for run in equations for twin in twins(run))]
+
+
+def _plan_equations(throw: Scenario) -> list[Run]:
+    # Recoil costs most: those runs first keep the workers evenly busy.
+    sets = sorted({canonical(s) for s in Switches.every()}, key=lambda s: (not s.recoil, s.name))
+    return [equation_run(throw, switches) for switches in sets]
+
+
+def plan_finer(throw: Scenario, steps: int) -> list[Run]:
+    """Return the runs without their twins again, at ``FINER`` times the slices (41 runs)."""
+    return [finer(run) for run in (program_run(throw, steps), *_plan_equations(throw))]
+
+
+def study_waterfall(program: Run, flights: Mapping[Run, Trajectory]) -> tuple[Waterfall, ...]:
+    """Split every observable.
+
+    Parameters
+    ----------
+    program : Run - the published program's
+    flights : mapping from run to trajectory - of ``plan_waterfall``, and all of ``plan_finer`` or none
+
+    Raises
+    ------
+    ArithmeticError
+        If a run is not whole, or a split does not sum to the whole difference within round-off.
+    """
+    for run, flight in flights.items():
+        if not flight.ok:
+            raise ArithmeticError(f"{run.name}: {flight.status}: {flight.message}")
+    return split_all(program, {run: {o.name: o.of(flight) for o in OBSERVABLES} for run, flight in flights.items()})
+
+
+def split_all(program: Run, observed: Mapping[Run, Mapping[str, float]]) -> tuple[Waterfall, ...]:
+    """Split every observable; ``observed`` maps the runs of ``plan_waterfall`` to their values by name.
+
+    Raises
+    ------
+    ArithmeticError
+        If a split does not sum to the whole difference within round-off.
+    """
+    return tuple(_split(o, program, {run: values[o.name] for run, values in observed.items()}) for o in OBSERVABLES)
+
+
+def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) -> Waterfall:
+    values: dict[Switches, float] = {}
+    bands: dict[Switches, float] = {}
+    more: dict[Switches, float] = {}
+    for switches in Switches.every():
+        run = equation_run(program.scenario, switches)
+        values[switches] = observed[run]
+        bands[switches] = band(run, observed)
+        if finer(run) in observed:
+            more[switches] = observed[finer(run)]
+    start = observed[program]
+    none, everything = Switches(), Switches(*[True] * len(NAMES))
+    step = values[none] - start
+    bars = [
+        Bar(
+            name=STEP,
+            forward=step,
+            backward=step,
+            average=step,
+            low=step,
+            high=step,
+            forward_band=bands[none],
+            average_band=bands[none],
+            finer=more[none] - observed[finer(program)] if more else None,
+        )
+    ]
+    order = [field.name for field in fields(Switches)]
+    for name in order:
+        before = order[: order.index(name)]
+        after = order[order.index(name) + 1 :]
+        changes = [_change(name, chosen, values) for chosen, _ in _others(name)]
+        bars.append(
+            Bar(
+                name=NAMES[name],
+                forward=_change(name, before, values),
+                backward=_change(name, after, values),
+                average=fair_share(name, values),
+                low=min(changes),
+                high=max(changes),
+                forward_band=bands[_with(before)] + bands[_with([*before, name])],
+                average_band=sum(
+                    weight * (bands[_with(chosen)] + bands[_with([*chosen, name])]) for chosen, weight in _others(name)
+                ),
+                finer=fair_share(name, more) if more else None,
+            )
+        )
+    total = values[everything] - start
+    residual = max(
+        abs(total - sum(getattr(bar, split) for bar in bars)) for split in ("forward", "backward", "average")
+    )
+    if not residual <= 1e-12 * (1.0 + abs(start) + sum(abs(bar.average) for bar in bars)):
+        raise ArithmeticError(f"{observable.name}: the bars miss the total by {residual:.3g} {observable.unit}")
+    return Waterfall(
+        observable=observable,
+        slices=program.scenario.n_slices,
+        start=start,
+        end=values[everything],
+        end_band=bands[everything],
+        bars=tuple(bars),
+        residual=residual,
+    )
+
+
+def _with(names: list[str] | tuple[str, ...]) -> Switches:
+    return Switches(**dict.fromkeys(names, True))
+
+
+def _change(name: str, others: list[str] | tuple[str, ...], values: Mapping[Switches, Value]) -> Value:
+    """Return what switching ``name`` on changes when ``others`` are on."""
+    return values[_with([*others, name])] - values[_with(others)]
+
+
+def _others(name: str) -> Iterator[tuple[tuple[str, ...], float]]:
+    """Yield every set of other assumptions with the share of all orders in which just these come before ``name``."""
+    others = [other for other in NAMES if other != name]
+    n = len(NAMES)
+    for size in range(n):
+        weight = math.factorial(size) * math.factorial(n - size - 1) / math.factorial(n)
+        for chosen in combinations(others, size):
+            yield chosen, weight
+
+
+def fair_share(name: str, values: Mapping[Switches, Value]) -> Value:
+    """Return what switching ``name`` on changes, as the mean over all orders (the Shapley value), of values by set."""
+    shares = [weight * _change(name, chosen, values) for chosen, weight in _others(name)]
+    return sum(shares[1:], shares[0])

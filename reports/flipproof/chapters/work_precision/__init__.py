@@ -1,0 +1,1 @@
+"""What a digit costs: error against cost, every contender against its own equation."""

@@ -1,0 +1,328 @@
+"""Who competes in the work-precision study, on which throws, with which settings, against which equation.
+
+Every scheme of the slice model, every method of the reference and every engine comes from its package's own registry:
+a new one appears by itself. Each is held against the equation *it* solves, never against the one we believe in: what
+lies between equations is model form, and stands elsewhere.
+
+==========  ============================================  ==========================================================
+family      refined by                                    work, in updates of one slice
+==========  ============================================  ==========================================================
+scheme      number of steps, doubled at each level        steps times slices; twice that if it predicts (midpoint)
+method      relative tolerance, cut at each level         right-hand sides times slices; linear algebra not counted
+engine      dt, halved at each level                      steps times slices times what one step does to a slice:
+                                                          iterations of an impulse solver, or 4 stages of RK4
+==========  ============================================  ==========================================================
+
+Grids of one level share ``COMMON`` intervals with all others, and errors are read there. A level of a scheme or an
+engine has several members: their impacts fall at other phases of the step, and a single one may be lucky.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from engine_check.solver import ENGINES
+from flipproof.chapters.frozen.study import LIMITS
+from ode_reference.models import MODELS
+from ode_reference.solver import REST_SPEED, REST_SPEED_WITH_RECOIL
+from slicemodel import Bottle, Scenario
+from slicemodel.schemes import SCHEMES
+from slicemodel.trajectory import FloatArray
+
+Family = Literal["scheme", "method", "engine"]
+
+METHODS: Final = ("DOP853", "LSODA", "Radau")
+"""The methods of ``ode_reference`` that compete."""
+
+COMMON: Final = 40
+"""Intervals that all runs of a throw share."""
+
+AT_REST: Final = "at rest"
+"""The limit of ``paper-typeset``: nothing moves, and omega is omega_0 for ever."""
+
+OWN_LIMIT: Final = "limit of "
+"""Leads the name of an equation that no model states: where the scheme itself goes on finer grids."""
+
+EQUATION_OF_SCHEME: Final[Mapping[str, str]] = {**LIMITS, "midpoint": "eq8", "paper-typeset": AT_REST}
+EQUATION_OF_FRAME: Final[Mapping[str, str]] = {"free": "free-flight", "rotating": "eq8"}
+
+ATOL_SHARE: Final = 1e-3
+"""Absolute tolerance of a method over its relative one: the numbers are of the order of 0.1 to 10."""
+
+RADAU_TURN: Final = 0.02
+"""Longest step of Radau in radians of the bottle at release. Its dense output has order 3: with steps as long as its
+tolerance allows, rests and releases chatter (627 402 right-hand sides at rtol 1e-4, where 10 071 suffice at 1e-8)."""
+
+FINEST_OWN: Final = 8
+"""How much finer than its last level the run is that stands for a scheme's own limit."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """A throw on which all compete."""
+
+    name: str
+    title: str
+    scenario: Scenario
+
+    @property
+    def times(self) -> FloatArray:
+        """The common times, shape (COMMON + 1,) [s]."""
+        return np.linspace(0.0, self.scenario.duration, COMMON + 1)
+
+
+SLICES: Final = 12
+"""With 20, ten times the rest speed moves free flight by 1.4e-3 omega_0 after 1251 impacts, and nothing finer than that
+could be told apart; with 12 by 1e-5."""
+
+CASES: Final[Mapping[str, Case]] = {
+    case.name: case
+    for case in (
+        Case(
+            name="smooth",
+            title="the paper's throw up to shortly before the first impact",
+            scenario=replace(Scenario().with_slices(SLICES), duration=0.03),
+        ),
+        Case(name="impacts", title="the paper's throw, with all its impacts", scenario=Scenario().with_slices(SLICES)),
+        Case(
+            name="other-bottle",
+            title="a smaller bottle, e = 0.35, less drag, slower spin",
+            scenario=Scenario(
+                bottle=Bottle(length=0.22, radius=0.033, mass=0.024, capacity=0.75),
+                water_mass=0.3,
+                n_slices=30,
+                drag=0.06,
+                restitution=0.35,
+                omega0=16.0,
+                theta0=1.1,
+                duration=0.45,
+            ).with_slices(SLICES),
+        ),
+    )
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """The relative tolerances of a method, and the equations that it is asked for; none: all that have a contender."""
+
+    rtol: tuple[float, ...]
+    equations: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effort:
+    """How much is run: throws, levels, members of a level as multiples of COMMON steps, and what methods are asked."""
+
+    name: str
+    cases: tuple[str, ...]
+    scheme_levels: int
+    scheme_members: tuple[int, ...]
+    engine_levels: int
+    engine_members: tuple[int, ...]
+    methods: Mapping[str, Asked]
+
+
+WITNESSED: Final = ("eq8", "free-flight")
+"""The equations on which a full report asks the implicit methods, without recoil and with it."""
+
+DECADES: Final = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
+
+COMPLETE: Final = Effort(
+    name="complete",
+    cases=tuple(CASES),
+    scheme_levels=10,
+    scheme_members=(4, 5, 6, 7),
+    engine_levels=7,
+    engine_members=(4, 5, 6, 7),
+    methods={name: Asked(rtol=DECADES) for name in METHODS},
+)
+"""By command only; a few minutes."""
+
+FULL: Final = replace(
+    COMPLETE,
+    name="full",
+    scheme_levels=7,
+    scheme_members=(4, 5, 6),
+    engine_levels=5,
+    engine_members=(4, 6),
+    methods={
+        "DOP853": Asked(rtol=(1e-3, 1e-6, 1e-9, 1e-11)),
+        "LSODA": Asked(rtol=(1e-3, 1e-6, 1e-9, 1e-11), equations=WITNESSED),
+        "Radau": Asked(rtol=(1e-5, 1e-8), equations=WITNESSED),
+    },
+)
+
+QUICK: Final = replace(
+    FULL,
+    name="quick",
+    cases=("impacts",),
+    scheme_levels=6,
+    scheme_members=(4, 6),
+    engine_levels=4,
+    engine_members=(4,),
+    methods={
+        name: Asked(rtol=(1e-3, 1e-5, 1e-7), equations=("eq8",) if name == "LSODA" else ())
+        for name in METHODS
+        if name != "Radau"
+    },
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contender:
+    """One curve of the diagram.
+
+    Parameters
+    ----------
+    name : str - as figures and tables print it
+    family : {"scheme", "method", "engine"}
+    solver : str - whose ``solve`` is asked: scheme, model or engine
+    equation : str - what it is held against: a model's name, AT_REST, or OWN_LIMIT and the scheme
+    fixed : mapping - settings of all its runs
+    levels : levels of members - the settings that are refined
+    """
+
+    name: str
+    family: Family
+    solver: str
+    equation: str
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+    levels: tuple[tuple[Mapping[str, Any], ...], ...]
+
+    @property
+    def key(self) -> str:
+        """Unique among the contenders of a throw: a method competes once for each equation."""
+        return f"{self.name} on {self.equation}"
+
+    @property
+    def refined(self) -> str:
+        """The setting that is refined, with its first and last value."""
+        name, first = next(iter(self.levels[0][0].items()))
+        return f"{name} {first:.3g} to {self.levels[-1][-1][name]:.3g}"
+
+
+def contenders(case: Case, effort: Effort) -> tuple[Contender, ...]:
+    """Return all who compete on a throw: schemes, engines, then methods for each equation that one of these solves."""
+    rivals = (*_schemes(effort), *_engines(case, effort))
+    solved = [model for model in MODELS if any(rival.equation == model for rival in rivals)]
+    return (*rivals, *_methods(case, effort, solved))
+
+
+def left_out(effort: Effort) -> dict[str, str]:
+    """Return what does not compete, each with the reason."""
+    reasons = {
+        f"{model}, all methods": "no scheme and no engine solves this equation: methods would only meet one another"
+        for model in MODELS
+        if model not in (*EQUATION_OF_SCHEME.values(), *EQUATION_OF_FRAME.values())
+    }
+    for method in METHODS:
+        if method not in effort.methods:
+            reasons[method] = f"its runs take longest; the size «{effort.name}» leaves it to the larger ones"
+        elif effort.methods[method].equations:
+            asked = " and ".join(effort.methods[method].equations)
+            reasons[f"{method}, equations but {asked}"] = (
+                f"left to benchmarks/work_precision.py for its time; the size «{effort.name}» asks where most compete"
+            )
+    for engine in ENGINES.values():
+        for frame in engine.frames:
+            if frame not in EQUATION_OF_FRAME:
+                reasons[f"{engine.name}, frame {frame}"] = "no model states the equation of this frame"
+        for contact in engine.contacts:
+            if contact != "overlap":
+                reasons[f"{engine.name}, slices = {contact}"] = (
+                    "slices that meet are another equation, to which no scheme and no method here converges"
+                )
+    for name in CASES:
+        if name not in effort.cases:
+            reasons[f"throw «{name}»"] = f"the size «{effort.name}» takes one throw"
+    return reasons
+
+
+def equation_of_scheme(name: str) -> str:
+    """Return the equation a scheme converges to; one that no model states is its own limit."""
+    return EQUATION_OF_SCHEME.get(name, OWN_LIMIT + name)
+
+
+def _doubled(members: tuple[int, ...], levels: int) -> Iterator[tuple[int, ...]]:
+    for level in range(levels):
+        yield tuple(COMMON * member * 2**level for member in members)
+
+
+def _schemes(effort: Effort) -> Iterator[Contender]:
+    for name in SCHEMES:
+        yield Contender(
+            name=name,
+            family="scheme",
+            solver=name,
+            equation=equation_of_scheme(name),
+            fixed={"store": "summary", "rebound": "in-step" if SCHEMES[name].form.in_step else "grid"},
+            # Points of the grid: one more than steps.
+            levels=tuple(
+                tuple({"steps": steps + 1} for steps in grids)
+                for grids in _doubled(effort.scheme_members, effort.scheme_levels)
+            ),
+        )
+
+
+def _engines(case: Case, effort: Effort) -> Iterator[Contender]:
+    for engine in ENGINES.values():
+        for frame in engine.frames:
+            if frame not in EQUATION_OF_FRAME:
+                continue
+            yield Contender(
+                name=engine.name if frame == "free" else f"{engine.name} {frame}",
+                family="engine",
+                solver=engine.name,
+                equation=EQUATION_OF_FRAME[frame],
+                fixed={"frame": frame, "times": case.times, **_iterations(case, engine.name, frame)},
+                levels=tuple(
+                    tuple({"dt": case.scenario.duration / steps} for steps in grids)
+                    for grids in _doubled(effort.engine_members, effort.engine_levels)
+                ),
+            )
+
+
+def _iterations(case: Case, engine: str, frame: str) -> dict[str, int]:
+    """Return the iterations by rule, where the engine's world iterates; they depend on the throw, not on dt."""
+    if engine != "pymunk":
+        return {}
+    if frame == "rotating":
+        from engine_check.pymunk_rotating import ITERATIONS
+
+        return {"iterations": ITERATIONS}
+    from engine_check.pymunk_settings import enough_iterations
+
+    return {"iterations": enough_iterations(case.scenario)}
+
+
+def _methods(case: Case, effort: Effort, solved: list[str]) -> Iterator[Contender]:
+    turn = RADAU_TURN / abs(case.scenario.omega0)
+    for model in solved:
+        for method, asked in effort.methods.items():
+            if asked.equations and model not in asked.equations:
+                continue
+            longest = min(turn, case.scenario.duration) if method == "Radau" else case.scenario.duration
+            yield Contender(
+                name=method,
+                family="method",
+                solver=model,
+                equation=model,
+                fixed={
+                    "method": method,
+                    "max_step": longest,
+                    "rest_speed": rest_speed(model),
+                    "impact_law": "simultaneous",
+                    "times": case.times,
+                },
+                levels=tuple(({"rtol": rtol, "atol": ATOL_SHARE * rtol},) for rtol in asked.rtol),
+            )
+
+
+def rest_speed(model: str) -> float:
+    """Return the rest speed that the reference takes unless told otherwise [m/s]."""
+    return REST_SPEED_WITH_RECOIL if MODELS[model].switches.recoil else REST_SPEED

@@ -1,0 +1,136 @@
+"""A chapter: one subject of a report, and what it gives the frame.
+
+    study     asks for runs, is sent what became of them, may ask for more, and returns what it found
+    claims    what was found -> findings
+    figures   what was found -> figures, each with caption, alternative text and table
+    template  what was found -> its part of the page
+
+Evidence is absent in one way only: whatever needs it raises Missing, and the frame says so in the chapter's own place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Generic, Literal, TypeVar
+
+from flipproof.frame.exhibit import Exhibit
+from flipproof.frame.findings import Finding, Kind
+from flipproof.frame.flights import Call, Flights, Outcome, attempt
+from flipproof.frame.solvers import Made, Missing, Run
+from flipproof.frame.throws import REFERENCE
+from slicemodel import Scenario
+
+__all__ = [
+    "Absent", "Ask", "Call", "Chapter", "Claims", "Exhibit", "Finding", "Flights", "Kind", "Made", "Missing", "Outcome",
+    "Part", "Run", "Size", "Study", "attempt", "judged",
+]  # fmt: skip
+"""All that a chapter is written with."""
+
+F = TypeVar("F")
+
+Size = Literal["check", "quick", "full"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ask:
+    """What a study is asked.
+
+    Parameters
+    ----------
+    scenario : Scenario - the throw as given
+    throw : Scenario - the same, cut into the slices at which solvers are compared
+    reference : Scenario - the throw of the regression claims, which what is observed on the user's cannot fail
+    size : {"check", "quick", "full"} - how much work is done
+    work : the chapter's own amount of work at this size
+    steps : int - points of a scheme's grid
+    solvers : name -> run - how each solver flies the throw; chapters that look at one flight ask for the same run
+    """
+
+    scenario: Scenario
+    throw: Scenario
+    size: Size
+    work: Any = None
+    steps: int = 1000
+    reference: Scenario = REFERENCE
+    solvers: Mapping[str, Run] = field(default_factory=dict)
+
+
+Study = Generator[Iterable[Run | Call], Flights, F]
+
+
+@dataclass(frozen=True, slots=True)
+class Absent:
+    """A claim that cannot be evaluated, and why."""
+
+    id: str
+    title: str
+    reason: str
+    kind: Kind = "regression"
+
+    @property
+    def finding(self) -> Finding:
+        """The finding that says so; a regression that is not evaluated fails."""
+        return Finding(id=self.id, title=self.title, value=None, unit="", kind=self.kind, note=self.reason)
+
+
+Claims = Iterator[Finding | Absent]
+
+
+def _nothing(_: Any) -> Iterator[Any]:
+    return iter(())
+
+
+def _no_part(_: Any) -> dict[str, Any]:
+    return {}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chapter(Generic[F]):
+    """One subject of a report.
+
+    Parameters
+    ----------
+    name : str - stable, without blanks
+    title : str
+    study : callable (Ask) -> generator that yields runs and calls, and returns what was found
+    claims : callable (found) -> findings
+    figures : callable (found) -> exhibits
+    template : file of the chapter's part of the page; None: its figures alone
+    work : size of a report -> amount of work that the study is asked for; a size that is missing leaves the chapter out
+    kind : {"regression", "observation"} - what it is if the study cannot be made at all; a regression fails the report
+    summary : callable (found) -> entries of ``summary.json``
+    tables : callable (found) -> path in the report folder -> text of a file
+    page : callable (found) -> what the template is given beside what was found
+    """
+
+    name: str
+    title: str
+    study: Callable[[Ask], Study[F]]
+    claims: Callable[[F], Claims] = _nothing
+    figures: Callable[[F], Iterable[Exhibit]] = _nothing
+    template: Path | None = None
+    work: Mapping[Size, Any] = field(default_factory=lambda: {"quick": None, "full": None})
+    kind: Kind = "observation"
+    summary: Callable[[F], Mapping[str, Any]] = _no_part
+    tables: Callable[[F], Mapping[str, str]] = _no_part
+    page: Callable[[F], Mapping[str, Any]] = _no_part
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A section of the page: its anchor, its title, in one sentence what it shows, and the chapters that it holds."""
+
+    id: str
+    title: str
+    sentence: str
+    chapters: tuple[Chapter[Any], ...]
+
+
+def judged(
+    claim: Callable[..., Finding], *about: Any, id: str, title: str, kind: Kind = "regression"
+) -> Finding | Absent:
+    """Return the finding of a claim of these arguments; if its evidence is missing, what says so under the same id."""
+    outcome = attempt(claim, *about)
+    return outcome.found if outcome.found is not None else Absent(id, title, outcome.reason, kind)

@@ -1,0 +1,82 @@
+"""What became of runs and calls: each is its own key, and what is not there says why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Generic, TypeVar
+
+from flipproof.frame.solvers import Made, Missing, Run
+from slicemodel import Trajectory
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class Call:
+    """A call that a worker makes for a study: a function of a module, and what it is called with.
+
+    ``timed`` says that it measures time: then its answer is of this report alone.
+    """
+
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...] = ()
+    label: str = ""
+    timed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome(Generic[T]):
+    """What was found, or the reason why nothing was."""
+
+    found: T | None
+    reason: str = ""
+
+    @property
+    def value(self) -> T:
+        """What was found; raises Missing with the reason if nothing was."""
+        if self.reason or self.found is None:
+            raise Missing(self.reason or "nothing was found")
+        return self.found
+
+
+class Flights(Mapping[Run, Made]):
+    """What became of runs and calls, by the run or call itself. ``flights[run]`` raises Missing if it was not made."""
+
+    def __init__(self, made: Mapping[Run, Made], called: Mapping[Call, Outcome[Any]] = MappingProxyType({})) -> None:
+        self._made, self._called = dict(made), dict(called)
+
+    def __getitem__(self, run: Run) -> Made:
+        if run not in self._made:
+            raise Missing(f"{run.name}: it was not run")
+        return self._made[run]
+
+    def answer(self, call: Call) -> Any:
+        """Return what a call returned; raises Missing if it failed."""
+        return self._called[call].value
+
+    def __iter__(self) -> Iterator[Run]:
+        return iter(self._made)
+
+    def __len__(self) -> int:
+        return len(self._made)
+
+    def trajectory(self, run: Run) -> Trajectory | None:
+        """Return the trajectory of a run, or None if there is none."""
+        return self._made[run].trajectory if run in self._made else None
+
+    def add(self, made: Mapping[Run, Made], called: Mapping[Call, Outcome[Any]]) -> None:
+        """Add what became of another wave."""
+        self._made |= made
+        self._called |= called
+
+
+def attempt(study: Callable[..., T], *about: Any) -> Outcome[T]:
+    """Return what a study of these arguments found, or the reason why it found nothing."""
+    try:
+        return Outcome(study(*about))
+    except Missing as why:
+        return Outcome(None, str(why))
+    except (ArithmeticError, ValueError, LookupError) as error:
+        return Outcome(None, f"{type(error).__name__}: {error}")

@@ -1,0 +1,145 @@
+"""What drives chapters: their runs in waves, each made once; then their findings, figures and notes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from typing import Any
+
+from flipproof.frame.chapter import Absent, Ask, Chapter, Part
+from flipproof.frame.exhibit import Exhibit
+from flipproof.frame.findings import Finding
+from flipproof.frame.flights import Call, Flights, Outcome, attempt
+from flipproof.frame.pool import Progress, make_all
+from flipproof.frame.solvers import Run
+from flipproof.frame.stages import Stages
+from flipproof.frame.store import RunStore
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gathered:
+    """What the studies of a report found, or why they found nothing, by chapter; and every run that was made."""
+
+    ask: Ask
+    parts: tuple[Part, ...]
+    outcomes: Mapping[str, Outcome[Any]]
+    flights: Flights
+    stages: Stages
+
+    def found(self, name: str) -> Any:
+        """Return what a chapter found, or None."""
+        return self.outcomes[name].found if name in self.outcomes else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Told:
+    """What a chapter tells: findings, figures, and ``notes``, each what is missing in its place and why."""
+
+    chapter: Chapter[Any]
+    found: Any
+    findings: tuple[Finding, ...]
+    figures: tuple[Exhibit, ...]
+    notes: tuple[tuple[str, str], ...]
+
+
+def _asked(parts: Iterable[Part], ask: Ask, work: Mapping[str, Any]) -> list[tuple[Chapter[Any], Any]]:
+    """Return the chapters that a report of this size has, in order, each with its amount of work."""
+    return [
+        (chapter, work.get(chapter.name, chapter.work.get(ask.size)))
+        for part in parts
+        for chapter in part.chapters
+        if ask.size in chapter.work or chapter.name in work
+    ]
+
+
+def gather(
+    parts: Iterable[Part],
+    ask: Ask,
+    pool: Executor,
+    progress: Progress = lambda *_: None,
+    *,
+    work: Mapping[str, Any] | None = None,
+    stages: Stages | None = None,
+    store: RunStore | None = None,
+) -> Gathered:
+    """Drive every study to its end, wave by wave; the runs of a wave are made together, equal ones once.
+
+    Parameters
+    ----------
+    parts : what the report has
+    ask : Ask
+    pool : executor of worker processes
+    progress : callable (made, planned, label)
+    work : chapter -> amount of work in place of that of the size, or although the size has none
+    stages : the stopwatch of the report, if somebody watches it
+    store : where slow runs and calls are looked for and kept
+    """
+    parts, stages, work = tuple(parts), stages or Stages(), work or {}
+    flights = Flights({})
+    outcomes: dict[str, Outcome[Any]] = {}
+    waiting: dict[str, tuple[Any, tuple[Run | Call, ...]]] = {}
+    for chapter, amount in _asked(parts, ask, work):
+        _advance(chapter.name, chapter.study(replace(ask, work=amount)), None, waiting, outcomes)
+    wave = 0
+    while waiting:
+        wave += 1
+        asked = dict.fromkeys(each for _, requests in waiting.values() for each in requests)
+        runs = [each for each in asked if isinstance(each, Run) and each not in flights]
+        with stages.lap(f"runs, wave {wave}"):
+            calls = [each for each in asked if isinstance(each, Call)]
+            flights.add(*make_all(pool, runs, progress, calls, store))
+        with stages.lap("studies"):
+            resumed, waiting = waiting, {}
+            for name, (study, _) in resumed.items():
+                _advance(name, study, flights, waiting, outcomes)
+    return Gathered(ask=ask, parts=parts, outcomes=outcomes, flights=flights, stages=stages)
+
+
+def _advance(name: str, study: Any, flights: Flights | None, waiting: dict[str, Any], outcomes: dict[str, Any]) -> None:
+    """Resume a study with what it asked for; note what it asks next, what it found, or why it ended."""
+    ended: list[Any] = []
+
+    def resumed() -> tuple[Run | Call, ...]:
+        try:
+            return tuple(study.send(flights))
+        except StopIteration as end:
+            ended.append(end.value)
+            return ()
+
+    outcome = attempt(resumed)
+    if ended:
+        outcomes[name] = Outcome(ended[0])
+    elif outcome.reason:
+        outcomes[name] = outcome
+    else:
+        waiting[name] = (study, outcome.value)
+
+
+def tell(gathered: Gathered) -> dict[str, Told]:
+    """Return what every chapter tells, by its name; no figure is drawn yet."""
+    return {
+        chapter.name: _told(chapter, gathered.outcomes[chapter.name])
+        for part in gathered.parts
+        for chapter in part.chapters
+        if chapter.name in gathered.outcomes
+    }
+
+
+def _told(chapter: Chapter[Any], outcome: Outcome[Any]) -> Told:
+    said: list[Finding | Absent] = []
+    drawn: list[Exhibit] = []
+    for what in (
+        lambda: said.extend(chapter.claims(outcome.value)),
+        lambda: drawn.extend(chapter.figures(outcome.value)),
+    ):
+        failure = attempt(lambda what: what() or True, what)
+        if failure.reason and not any(each.id == f"chapter-{chapter.name}" for each in said):
+            said.append(Absent(f"chapter-{chapter.name}", chapter.title, failure.reason, chapter.kind))
+    return Told(
+        chapter=chapter,
+        found=outcome.found,
+        findings=tuple(each.finding if isinstance(each, Absent) else each for each in said),
+        figures=tuple(drawn),
+        notes=tuple((each.title, each.reason) for each in said if isinstance(each, Absent)),
+    )

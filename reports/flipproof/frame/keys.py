@@ -1,0 +1,70 @@
+"""What decides a run or a call, as one key: what is asked, versions of what computes, and the sources that make it."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import pickle
+import platform
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+
+from flipproof.frame.solvers import Run, find
+from flipproof.frame.sources import fingerprint
+from flipproof.output.provenance import PACKAGES, version_of
+
+SOURCES: Final = MappingProxyType(
+    {
+        "slicemodel": ("slicemodel", "flipproof.frame.solvers"),
+        "ode_reference": ("ode_reference", "slicemodel", "flipproof.frame.solvers"),
+        "engine_check": ("engine_check", "slicemodel", "flipproof.frame.solvers"),
+    }
+)
+"""Package -> the sources that its runs are made by. Somebody else's solver is not among them and never kept."""
+
+COMPUTING: Final = ("flipproof", "numpy", "scipy", "numba", "pymunk", "mujoco-core")
+"""Packages whose versions a run depends on; a call depends on those that draw, too."""
+
+
+def key_of(run: Run) -> str | None:
+    """Return the SHA-256 of all that decides a run; None for a run that cannot be kept."""
+    sources = SOURCES.get(find(run.solver).package)
+    if sources is None:
+        return None
+    facts = {"solver": run.solver, "scenario": run.scenario.to_mapping(), "settings": dict(run.settings)}
+    try:
+        text = json.dumps(facts, sort_keys=True, default=_plain)
+    except (TypeError, ValueError):
+        return None
+    return _key(text.encode(), COMPUTING, sources)
+
+
+def key_of_call(fn: Callable[..., Any], args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> str | None:
+    """Return the SHA-256 of all that decides what a call returns; None for arguments that cannot be pickled.
+
+    Equal arguments may be pickled in two ways, and are then made twice; different ones never are in one.
+    """
+    given = io.BytesIO()
+    pickler = pickle.Pickler(given, protocol=pickle.HIGHEST_PROTOCOL)
+    pickler.fast = True  # without it what is pickled depends on which of two equal objects are one
+    try:
+        pickler.dump((fn, args, kwargs))
+    except Exception:  # whatever a class raises that cannot be pickled
+        return None
+    return _key(given.getvalue(), PACKAGES, (*SOURCES, "flipproof"))
+
+
+def _key(given: bytes, packages: tuple[str, ...], sources: tuple[str, ...]) -> str:
+    versions = {"Python": platform.python_version(), **{name: version_of(name) for name in packages}}
+    return hashlib.sha256(f"{versions}\n{fingerprint(*sources)}\n".encode() + given).hexdigest()
+
+
+def _plain(value: object) -> Any:
+    """Return a setting that JSON has no word for as one that it has, floats to the last bit."""
+    if isinstance(value, np.ndarray | np.generic):
+        return [str(value.dtype), value.tolist()]
+    raise TypeError(f"{type(value).__name__} has no key")

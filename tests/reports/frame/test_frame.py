@@ -1,0 +1,160 @@
+"""What drives chapters: waves, equal runs made once, what is missing, in what order all of it stands."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from made_up import Answers
+
+from flipproof.build import ask_of
+from flipproof.frame.chapter import Chapter, Part, judged
+from flipproof.frame.findings import Finding
+from flipproof.frame.flights import Call, attempt
+from flipproof.frame.gather import gather, tell
+from flipproof.frame.solvers import Made, Missing, Run
+from slicemodel import Scenario, Trajectory
+
+THROW = Scenario(n_slices=2)
+ASK = dataclasses.replace(ask_of(THROW, "quick"), solvers={})
+FIRST = Run("eq8", THROW, {"times": np.linspace(0.0, 0.5, 5)}, "the first")
+LOST = Run("eq8", THROW, {"rtol": 1e-3}, "the lost one")
+
+
+def fly(run, omega=10.0):
+    """Make a run up, but for the lost one."""
+    if run == LOST:
+        return Made(run, None, 0.0, "RuntimeError: no luck")
+    t = np.linspace(0.0, THROW.duration, 3)
+    none = np.zeros((0, 2))
+    flat = np.full(3, omega)
+    flight = Trajectory(
+        scenario=run.scenario, solver="made-up", method=run.solver, t=t, theta=t, omega=flat, r=none, v=none,
+        r_cm=np.full(3, 0.1), inertia=np.ones(3),
+    )  # fmt: skip
+    return Made(run, flight, 0.1)
+
+
+def value(id_, number, kind="observation"):
+    return Finding(id=id_, title=id_, value=number, unit="", kind=kind)
+
+
+def two_waves(ask):
+    """Ask for a run, then for another throw that follows from it, with a call beside it."""
+    flights = yield [FIRST]
+    found = flights[FIRST].flight.omega[-1]
+    later, call = Run("eq8", dataclasses.replace(ask.throw, omega0=found)), Call(max, (1, ask.work), "the larger")
+    flights = yield [later, call, FIRST]
+    return flights[later].flight.scenario.omega0, flights.answer(call)
+
+
+def lost(_):
+    flights = yield [FIRST, LOST]
+    return {run.label: attempt(lambda run: flights[run].flight.omega[0], run) for run in (FIRST, LOST)}
+
+
+def broken(_):
+    yield [LOST]
+    raise ValueError("no sense in it")
+
+
+def claims_of_lost(found):
+    for name, each in found.items():
+        yield judged(
+            lambda name, each: value(name, each.value, "regression"), name, each, id=name.replace(" ", "-"), title=name
+        )
+
+
+def chapter(name, study, **parts):
+    return Chapter(name=name, title=name, study=study, work={"quick": 7}, **parts)
+
+
+CHAPTERS = (
+    chapter("waves", two_waves, claims=lambda found: [value("omega", found[0]), value("larger", found[1])]),
+    chapter("lost", lost, claims=claims_of_lost),
+    chapter("broken", broken),
+    dataclasses.replace(chapter("large", two_waves), work={"full": 1}),
+)
+PARTS = (Part("one", "One", "The first.", CHAPTERS[:2]), Part("two", "Two", "The second.", CHAPTERS[2:]))
+
+
+@pytest.fixture
+def gathered():
+    answers = Answers(fly)
+    return answers, gather(PARTS, ASK, answers)
+
+
+def test_a_study_may_ask_for_more_after_it_has_seen(gathered):
+    _, found = gathered
+    assert found.found("waves") == (10.0, 7)
+    assert list(found.stages.seconds) == ["runs, wave 1", "studies", "runs, wave 2"]
+
+
+def test_equal_runs_are_made_once_whoever_asks_for_them(gathered):
+    answers, found = gathered
+    assert len(answers.asked) == len(set(answers.asked)) == len(found.flights) == 3
+    again = dataclasses.replace(FIRST, label="another name", settings={"times": np.linspace(0.0, 0.5, 5)})
+    assert again == FIRST
+    assert found.flights[again].flight.ok
+    assert Run("eq8", THROW, {"steps": 1}) != Run("eq8", THROW, {"steps": True}) != Run("eq8", THROW, {"steps": 1.0})
+
+
+def test_what_is_missing_is_not_evaluated_and_stands_in_its_own_place(gathered):
+    told = tell(gathered[1])
+    assert [(f.id, f.verdict, f.failed) for f in told["lost"].findings] == [
+        ("the first", "pass", False),
+        ("the-lost-one", "not evaluated", True),
+    ]
+    assert told["lost"].notes == (("the lost one", "the lost one: RuntimeError: no luck"),)
+
+
+def test_a_study_that_breaks_is_a_note_and_an_observation_and_stops_no_other(gathered):
+    told = tell(gathered[1])
+    (finding,) = told["broken"].findings
+    assert (finding.id, finding.verdict, finding.failed) == ("chapter-broken", "not evaluated", False)
+    assert told["broken"].notes == (("broken", "ValueError: no sense in it"),)
+    assert [finding.value for finding in told["waves"].findings] == [10.0, 7.0]
+
+
+def test_a_study_of_regressions_that_breaks_fails_the_report():
+    must = dataclasses.replace(CHAPTERS[2], kind="regression")
+    (told,) = tell(gather((Part("one", "One", "", (must,)),), ASK, Answers(fly))).values()
+    assert told.findings[0].failed
+
+
+def test_a_size_that_a_chapter_does_not_name_leaves_it_out_and_order_is_that_of_the_parts(gathered):
+    assert list(tell(gathered[1])) == ["waves", "lost", "broken"]
+
+
+def test_what_was_not_asked_for_is_missing(gathered):
+    flights = gathered[1].flights
+    stranger = Run("eq8", THROW, {"rtol": 1.0}, "a stranger")
+    with pytest.raises(Missing, match=r"^a stranger: it was not run$"):
+        flights[stranger]
+    assert flights.get(stranger) is None
+    assert flights.trajectory(LOST) is None
+
+
+def test_a_call_that_fails_or_finds_nothing_says_so():
+    def study(_):
+        call = Call(int, ("x",), "a call")
+        flights = yield [call]
+        return flights.answer(call)
+
+    found = gather((Part("one", "One", "", (chapter("call", study),)),), ASK, Answers(fly))
+    assert "invalid literal" in found.outcomes["call"].reason
+    with pytest.raises(Missing, match="invalid literal"):
+        _ = found.outcomes["call"].value
+
+
+def test_figures_or_claims_that_break_are_noted():
+    def study(_):
+        return 1
+        yield
+
+    def bad(_):
+        raise Missing("no curve")
+
+    found = gather((Part("one", "One", "", (chapter("bad", study, claims=bad, figures=bad),)),), ASK, Answers(fly))
+    (told,) = tell(found).values()
+    assert told.notes == (("bad", "no curve"),)
+    assert [finding.id for finding in told.findings] == ["chapter-bad"]
