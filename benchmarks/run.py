@@ -1,7 +1,7 @@
 """Everything that is measured of speed, in one run: the loop, batches, the reference, the engines, the report.
 
     python benchmarks/run.py                 prints, writes benchmarks/results/benchmarks.json and .png, five minutes
-    python benchmarks/run.py --record        the same into docs/, and the table into the README
+    python benchmarks/run.py --record        the same into docs/, with its table
     python benchmarks/run.py --no-report     leaves out the two reports, which take most of the wall time
 
 Numbers on a busy machine are worth little: what is compared is measured in turns, and processor time is taken where one
@@ -80,7 +80,7 @@ def rows(facts: dict[str, Any]) -> list[tuple[str, str, str]]:
 
 
 def markdown(facts: dict[str, Any]) -> str:
-    """Return the table as the README shows it."""
+    """Return the table as docs/measurements.md shows it."""
     on = facts["machine"]
     lines = ["| what | measured | asked |", "|---|---|---|"]
     lines += [f"| {what} | {value} | {asked} |" for what, value, asked in rows(facts)]
@@ -98,7 +98,7 @@ def put_into(readme: Path, table: str) -> None:
 def main() -> int:
     """Measure, print, write, draw."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--record", action="store_true", help="write into docs/ and the README")
+    parser.add_argument("--record", action="store_true", help="write into docs/")
     parser.add_argument("--no-report", action="store_true", help="leave out the two reports")
     parser.add_argument("--throws", type=int, default=10_000, help="throws of the batch")
     arguments = parser.parse_args()
@@ -114,7 +114,7 @@ def main() -> int:
     (place / "benchmarks.json").write_text(json.dumps(facts, indent=1) + "\n")
     kernel.draw(facts["kernel"], place / "benchmarks.png")
     if arguments.record:
-        put_into(ROOT / "README.md", markdown(facts))
+        put_into(ROOT / "docs" / "measurements.md", markdown(facts))
     return 0
 
 

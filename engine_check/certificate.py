@@ -40,7 +40,7 @@ ROUND_OFF: Final = 1e-10
 """Changes below this fraction of omega_0 show no order."""
 
 ORDERS: Final = (0.5, 2.5)
-"""An order observed outside is none: the changes do not shrink by a law."""
+"""An order observed outside is none: the changes do not fall as a power of the step."""
 
 STATUSES: Final[Mapping[str, str]] = {
     "certified": "every change is below the tolerance, and every rebound has the restitution asked for",
@@ -273,7 +273,7 @@ def _observed_order(runs: Runs, at: Verdict) -> tuple[float, str]:
         return math.nan, f"the change of {narrow:.1g} omega_0 is round-off"
     order = math.log2(wide / narrow) if wide > 0.0 else -math.inf
     if not ORDERS[0] <= order <= ORDERS[1]:
-        return math.nan, f"the changes {wide:.2g} and {narrow:.2g} omega_0 do not shrink by a law"
+        return math.nan, f"the changes {wide:.2g} and {narrow:.2g} omega_0 of two halvings of the step show no order"
     return order, ""
 
 

@@ -53,6 +53,20 @@ def test_the_reference_is_built_without_a_warning(tmp_path):
     assert all(f'id="{name}"' in page for name in slicemodel.__all__)
 
 
+def test_the_site_is_built_by_one_command_and_its_links_lead_somewhere(tmp_path):
+    command = [sys.executable, str(ROOT / "docs" / "build.py"), "--out", str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    pages = list(tmp_path.glob("*.html"))
+    assert {path.stem for path in pages} >= {Path(page).stem for page in PAGES if page.startswith("docs/")}
+    for path in pages:
+        text = path.read_text(encoding="utf-8")
+        assert not re.search(r'src="https?:|href="https?:', text)
+        for target in re.findall(r'(?:href|src)="([^"#]+)"', text):
+            assert (tmp_path / target).exists(), f"{path.name}: {target}"
+    assert "ω<sup>2</sup>" in (tmp_path / "theory.html").read_text(encoding="utf-8")
+
+
 def test_the_example_is_the_default_throw():
     assert Scenario.from_toml(ROOT / "examples" / "half_full.toml") == Scenario()
 

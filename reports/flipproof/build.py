@@ -20,7 +20,6 @@ from flipproof.frame.stages import Stages
 from flipproof.frame.store import RunStore
 from flipproof.output.junit import junit_text
 from flipproof.output.summary import SCHEMA_NAME, schema_text, summarise, summary_text
-from flipproof.page.explore import page_data
 from flipproof.page.render import render
 from slicemodel import Scenario
 
@@ -113,14 +112,16 @@ def build(
         name: replace(each, figures=tuple(by_name[figure.name] for figure in each.figures))
         for name, each in told.items()
     }
+    summary = summarise(gathered, told, provenance)
     with gathered.stages.lap("page"):
-        html = render(gathered, told, provenance, explore=page_data())
+        html = render(gathered, told, provenance, summary)
+    summary["stages"]["page"] = round(gathered.stages.seconds["page"], 3)
     made = [each for each in told.values() if each.found is not None]
     return Report(
         findings=tuple(finding for each in told.values() for finding in each.findings),
         exhibits=exhibits,
         html=html,
-        summary=summarise(gathered, told, provenance),
+        summary=summary,
         tables={path: text for each in made for path, text in each.chapter.tables(each.found).items()},
     )
 

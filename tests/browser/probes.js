@@ -38,7 +38,7 @@ window.probes = (() => {
     const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
     for (let node = walker.nextNode(); node; node = walker.nextNode()) {
       const element = node.parentElement;
-      if (!node.data.trim() || element.closest("script, style, noscript, title, desc, option, canvas, .skip") || !seen(element)) continue;
+      if (!node.data.trim() || element.closest("script, style, noscript, title, desc, option, canvas, math, .skip") || !seen(element)) continue;
       const range = document.createRange();
       range.selectNodeContents(node);
       let clip = { left: -Infinity, right: Infinity, top: -Infinity, bottom: Infinity };

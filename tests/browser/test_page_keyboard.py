@@ -6,6 +6,8 @@ import pytest
 @pytest.mark.parametrize("size", [(1440, 900), (390, 844)], ids=["wide", "phone"])
 def test_tab_reaches_everything_and_shows_where_it_is(visit, size):
     with visit(size) as visited:
+        visited.page.locator(".unfold").click()
+        visited.page.evaluate("document.activeElement.blur()")
         count = visited.probe("watchFocus")
         assert count > 100
         # A scrolling box is a stop of its own in some browsers.
@@ -36,7 +38,7 @@ def test_the_contents_of_a_phone_work_from_the_keyboard(visit):
 
 
 def test_findings_are_filtered_by_what_is_typed(visit, report):
-    with visit() as visited:
+    with visit(fragment="#findings") as visited:
         status = visited.page.locator(".filter [role=status]")
         everything = len(report.findings)
         assert status.inner_text() == f"{everything} of {everything} findings"

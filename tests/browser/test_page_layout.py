@@ -60,7 +60,7 @@ def test_on_a_phone_the_contents_fold_into_a_bar_that_stays(visit):
         assert button.get_attribute("aria-expanded") == "true"
         visited.page.locator('#contents a[href="#errata"]').click()
         assert first.is_hidden()
-        heading = visited.page.locator("#errata h2").bounding_box()
+        heading = visited.page.locator("#errata summary").bounding_box()
         bar = button.bounding_box()
         assert bar["y"] == pytest.approx(0.0, abs=1.0)
         assert heading["y"] >= bar["y"] + bar["height"]

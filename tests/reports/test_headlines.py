@@ -17,8 +17,7 @@ from flipproof.chapters.waterfall.study import STEP
 from flipproof.frame.throws import FINER
 from flipproof.output.snapshot import BEGIN, END, PLACE, README, front_page, write_front_page
 from flipproof.page.headlines import MEASURES, Headline, headlines
-from flipproof.page.lead import amount, lead_words, sentences, signed
-from flipproof.page.verdict import LABELS, answer, tiles
+from flipproof.page.lead import amount, answer, lead_words, sentences, signed
 
 pytestmark = pytest.mark.xdist_group("evidence")
 
@@ -101,7 +100,7 @@ def test_every_number_stands_at_two_numbers_of_slices(kept, id_):
     assert amount(headline).endswith(f" at N = {headline.finer_slices})")
 
 
-# ---------------------------------------------------------------------- lead, tiles and front page follow from them
+# ---------------------------------------------------------------------- lead and front page follow from them
 
 
 def test_the_lead_is_made_of_the_headlines(kept, report):
@@ -116,27 +115,22 @@ def numbers_allowed(headline):
     return {text(headline.value), *moved, *band, signed(headline.low), signed(headline.high), signed(headline.value)}
 
 
-def test_every_percentage_of_lead_tiles_and_front_page_is_a_headline(kept, report):
+def test_every_percentage_of_lead_and_front_page_is_a_headline(kept, report):
     """1 % is the limit that the answer is held against; nothing else may stand there."""
     for summary in (kept, report.summary):
         found = list(of(summary).values())
         allowed = {"1 %"} | {number for headline in found for number in numbers_allowed(headline)}
-        shown = [tile.value for tile in tiles(found)]
-        texts = [summary["lead"], front_page(summary), *(tile.words for tile in tiles(found))]
-        for text in texts:
+        shown = []
+        for text in (summary["lead"], front_page(summary)):
             shown += re.findall(r"[+−]?\d[\d.e+-]* %", " ".join(text.split()))
         assert len(shown) > 20
         assert {number for number in shown if number not in allowed} == set()
 
 
-def test_the_page_shows_the_same_tiles_and_lead(report):
+def test_the_page_shows_the_same_answer_and_lead(report):
     found = list(of(report.summary).values())
     text = re.sub(r"\s+", " ", html.unescape(report.html).replace("\N{NO-BREAK SPACE}", " "))
     assert answer(found) in text
-    for tile in tiles(found):
-        assert tile.value in text
-        assert tile.label in text
-        assert tile.words in text
     for sentence in sentences(found):
         assert sentence in text
 
@@ -210,7 +204,6 @@ def test_two_shares_that_the_slices_move_by_more_than_they_differ_are_not_ranked
     second = replace(first, id="share-2", what="recoil", value=0.063, finer=0.0631)
     words = lead_words([made_up(), first, second])
     assert ("is not settled" not in words) == settled
-    assert ("Not told apart from “recoil”, +6.3 %." in tiles([first, second])[0].words) != settled
 
 
 def test_the_lead_knows_ice_divergence_and_nothing_at_all():
@@ -236,25 +229,6 @@ def test_the_answer_follows_from_step_and_equation(step, equation, words):
     assert answer([made_up("step", step), made_up("eq8-free", equation)]) == words
     assert answer([made_up("step", step)]).startswith("No verdict")
     assert answer([]).startswith("No verdict")
-
-
-def test_tiles_lead_with_the_fair_share_and_name_each_number():
-    shown = tiles(
-        [
-            made_up("engine", 0.0011),
-            made_up("whole", 0.13, time=0.344, finer=0.12, finer_slices=100),
-            made_up("share", -0.065, measure="share", low=-0.2, high=0.01),
-            made_up("step", 0.0047, note="1000 steps"),
-        ]
-    )
-    assert [(tile.value, tile.state) for tile in shown] == [
-        ("−6.5 %", ""), ("13 %", "fail"), ("0.47 %", "pass"), ("0.11 %", "pass"),
-    ]  # fmt: skip
-    assert "fair share" in shown[0].label
-    assert "−20 % to +1 % in single orders" in shown[0].words
-    assert shown[1].words.endswith("at t = 344 ms. N = 50; 1 % of ω₀ less at N = 100.")
-    assert tiles([]) == ()
-    assert set(LABELS) == {"share", "eq8-free", "whole", "held-through", "step", "engine"}
 
 
 # ---------------------------------------------------------------------- the finite step

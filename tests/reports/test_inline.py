@@ -29,6 +29,13 @@ def structure(text):
     places = {e.get("id"): f"name {k}" for k, e in enumerate(e for e in tree.iter() if e.get("id") in used)}
     assert used == set(places)
     for element in tree.iter():
+        if (
+            "rdf" in element.tag
+            or "purl" in element.tag
+            or "creativecommons" in element.tag
+            or "metadata" in element.tag
+        ):
+            continue
         words.append(element.tag)
         for name, value in element.attrib.items():
             if name == "id" and value not in used:
@@ -38,7 +45,9 @@ def structure(text):
             value = places.get(value, value) if name == "id" else value
             if name in ("d", "x", "y", "points"):
                 numbers += [float(number) for number in re.findall(r"-?[\d.]+(?:e[-+]?\d+)?", value)]
-                value = re.sub(r"[-\d.\s]+(?:e[-+]?\d+)?", " ", value).strip()
+                value = re.sub(r"[-\d.\s]+(?:e[-+]?\d+)?", "", value)
+            if name == "style":
+                value = value.replace(": ", ":").replace("; ", ";")
             words.append((name, " ".join(value.split())))
     return words, numbers
 
@@ -55,7 +64,7 @@ def test_only_digits_nobody_sees_are_gone(svg):
 def test_a_name_is_short_and_only_there_if_it_is_used():
     drawn = '<svg><g id="axes"/><path id="curve" style="fill: #curve"/><use xlink:href="#curve" clip-path="url(#box)"/>'
     assert compact_svg(f'{drawn}<clipPath id="box"/></svg>') == (
-        '<svg><g/><path id="i0" style="fill: #curve"/><use href="#i0" clip-path="url(#i1)"/><clipPath id="i1"/></svg>'
+        '<svg><g/><path id="i0" style="fill:#curve"/><use href="#i0" clip-path="url(#i1)"/><clipPath id="i1"/></svg>'
     )
 
 
@@ -68,7 +77,7 @@ def test_the_address_holds_the_picture_and_nothing_that_ends_it(svg):
     address = data_uri(svg)
     head, picture = address.split(",", 1)
     assert head == "data:image/svg+xml"
-    assert not set('"<>#&\n') & set(picture)
+    assert not set('"<#&\n') & set(picture)
     assert structure(unquote(picture)) == structure(compact_svg(svg))
     quoted = data_uri('<svg><text x="1">it\'s</text></svg>').split(",", 1)[1]
     assert unquote(quoted) == '<svg><text x="1">it\'s</text></svg>'
@@ -79,7 +88,7 @@ def test_the_address_holds_the_picture_and_nothing_that_ends_it(svg):
     ("number", "short"), [("1.23456", "1.23"), ("-0.00012", "0"), ("12.999", "13"), ("5.0001", "5"), ("1.25", "1.25")]
 )
 def test_numbers_are_rounded_not_cut(number, short):
-    assert compact_svg(f'<path d="M {number} 7"/>') == f'<path d="M {short} 7"/>'
+    assert compact_svg(f'<path d="M {number} 7"/>') == f'<path d="M{short} 7"/>'
 
 
 def test_the_place_of_a_figure_is_known_before_it_is_drawn(svg):

@@ -1,7 +1,6 @@
 """The page's words: the answer, its numbers, the bars of the waterfall, and failures where they belong."""
 
 import re
-from types import SimpleNamespace
 
 import pytest
 from made_up import spoiled
@@ -12,33 +11,14 @@ from flipproof.frame.gather import tell
 from flipproof.output.provenance import provenance
 from flipproof.page.pdf import VARIABLE, PrintError, find_browser, print_page, require_browser
 from flipproof.page.render import read_assets, render, unbroken
-from flipproof.page.verdict import strips
 
 pytestmark = pytest.mark.xdist_group("evidence")
 
 
-def waterfall(start, end, *shares):
-    bars = tuple(SimpleNamespace(name=f"part {k}", average=value) for k, value in enumerate(shares))
-    return SimpleNamespace(start=start, end=end, bars=bars)
-
-
-def test_bars_of_the_waterfall_join_and_fill_the_drawing():
-    made = strips(waterfall(0.3, 0.2, -0.1, +0.3, -0.3))
-    edges = [(round(strip.left, 6), round(strip.left + strip.width, 6)) for strip in made]
-    assert edges == [(0, 60), (40, 60), (40, 100), (40, 100), (0, 40)]
-    assert [strip.kind for strip in made] == ["whole", "down", "up", "down", "whole"]
-    assert [strip.text for strip in made] == ["0.300", "−0.100", "+0.300", "−0.300", "0.200"]
-
-
-def test_bars_below_zero_stay_inside_and_values_that_are_not_finite_draw_nothing():
-    made = strips(waterfall(-0.1, 0.3, 0.4))
-    assert all(strip.left >= 0 and strip.left + strip.width <= 100 + 1e-9 for strip in made)
-    assert strips(waterfall(float("nan"), 0.2, 0.1)) == ()
-    assert all(strip.width == 0 for strip in strips(waterfall(0.0, 0.0, 0.0)))
-
-
 def section_of(page, name):
-    return re.search(rf'<section id="{name}">.*?</section>', page, re.S).group()
+    """Return a section without its links to the glossary."""
+    section = re.search(rf'<section id="{name}"[^>]*>.*?</section>', page, re.S).group()
+    return re.sub(r'<a class="term"[^>]*>(.*?)</a>', r"\1", section)
 
 
 def test_a_failed_solver_and_a_failed_study_stand_where_their_results_would(gathered):
@@ -50,9 +30,9 @@ def test_a_failed_solver_and_a_failed_study_stand_where_their_results_would(gath
     assert "✗ failed" in row
     assert "SetupError: the world is &lt;not&gt; the one that was meant" in row
     assert "trajectories/pymunk/" not in page
-    assert "solvers failed on this throw" in section_of(page, "verdict")
+    assert "solvers failed on this throw" in section_of(page, "answer")
     assert "the world is &lt;not&gt;" in section_of(page, "assumptions")
-    assert 'class="strips"' not in page
+    assert 'id="shares"' not in page
 
 
 def test_the_flights_of_a_sound_report_are_all_marked_ok(report):

@@ -179,6 +179,10 @@ def parser() -> argparse.ArgumentParser:
         "that it fails is a claim that fails",
     )
     report.add_argument("--timeout", type=count, metavar="S", help="seconds one run of a --with solver may take")
+    report.add_argument(
+        "--measured", type=Path, metavar="TRACK.csv", help="a measured flight to hold beside the solvers: a track of "
+        "'flipproof track', or a CSV with t and theta or omega from release to landing",
+    )  # fmt: skip
     report.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
     add_no_cache(report)
     report.add_argument("--png", action="store_true", help="also write every figure as PNG, beside the SVG")
@@ -229,12 +233,19 @@ def command_report(options: argparse.Namespace) -> int:
 
     check_replaceable(options.out, "report")
     _check_guests(options.guests)
+    measurement = None
+    if options.measured is not None:
+        from flipproof.film.measured import read_measured
+
+        measurement = read_measured(options.measured)
     if options.pdf:
         require_browser()
 
     from tqdm import tqdm
 
     from flipproof.build import ask_of, build, gather_report, write
+    from flipproof.chapters import parts
+    from flipproof.chapters.measured.chapter import part_measured
     from flipproof.frame.pool import workers
     from flipproof.frame.stages import Stages
     from flipproof.frame.store import RunStore, default_place
@@ -261,8 +272,11 @@ def command_report(options: argparse.Namespace) -> int:
                 bar.set_postfix_str(label, refresh=False)
                 bar.update(made - bar.n)
 
+            contents = parts() if measurement is None else (part_measured(measurement), *parts())
             work = {"guests": (tuple(options.guests), options.timeout)} if options.guests else {}
-            gathered = gather_report(ask, progress, options.jobs, Stages(say), store, pool, work=work)
+            gathered = gather_report(
+                ask, progress, options.jobs, Stages(say), store, pool, contents=contents, work=work
+            )
             facts = provenance(command) | store.facts()
             report = build(gathered, facts, pool=store.remembering(pool), png=options.png)
         write(report, folder)
@@ -295,6 +309,9 @@ def _print_report(report: Any, out: Path, seconds: float) -> None:
     regressions = [finding for finding in report.findings if finding.kind == "regression"]
     for finding in report.failed:
         print(f"FAIL  {finding.title}: {finding.value_text} (threshold {finding.threshold_text}) {finding.note}")
+    for finding in report.findings:
+        if finding.id.startswith("measured-fit-"):
+            print(f"{finding.title}: {finding.value_text} root mean square")
     print(f"{len(regressions) - len(report.failed)} of {len(regressions)} regression claims hold.")
     print(f"Report: {out / 'index.html'} ({seconds:.0f} s)")
 

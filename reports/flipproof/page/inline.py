@@ -14,20 +14,25 @@ DIGITS = 2
 """Digits kept after the point of a coordinate, in points of 1/72 inch."""
 
 COORDINATES = re.compile(r'(?<= )(?:d|x|y|points)="[^"]*"')
+PATHS = re.compile(r'(?<= )d="[^"]*"')
+COMMANDS = re.compile(r" ?([MLHVCSQTAZmlhvcsqtaz]) ?")
+STYLES = re.compile(r'(?<= )style="[^"]*"')
 NUMBER = re.compile(rf"-?\d+\.\d{{{DIGITS + 1},}}(?:e[-+]?\d+)?")
 SPACES = re.compile(r"\s*\n\s*")
-COMMENTS = re.compile(r"<!--.*?-->", re.S)
+UNSEEN = re.compile(r"<!--.*?-->|<metadata>.*?</metadata>", re.S)
 GROUP_NAMES = re.compile(r'<g id="([^"]*)"')
 SIZE = re.compile(r'<svg[^>]*? width="([\d.]+)pt" height="([\d.]+)pt"')
 REFERENCES = re.compile(r"#([\w.-]+)")
 IDS = re.compile(r'(?<= id=")[^"]*')
 TARGETS = re.compile(r'(?<=href="#)[^"]*|(?<=url\(#)[^)]*')
-ESCAPES = str.maketrans({"%": "%25", "#": "%23", "<": "%3C", ">": "%3E", "&": "%26"})
+ESCAPES = str.maketrans({"%": "%25", "#": "%23", "<": "%3C", "&": "%26"})
 
 
 def compact_svg(svg: str) -> str:
-    """Return the same picture in fewer characters: no comments, no long names, shorter coordinates."""
-    svg = COORDINATES.sub(lambda found: NUMBER.sub(_rounded, found.group()), COMMENTS.sub("", svg))
+    """Return the same picture in fewer characters: no comments, blanks or long names, shorter coordinates."""
+    svg = COORDINATES.sub(lambda found: NUMBER.sub(_rounded, found.group()), UNSEEN.sub("", svg))
+    svg = PATHS.sub(lambda found: 'd="' + COMMANDS.sub(r"\1", found.group()[3:]), svg)
+    svg = STYLES.sub(lambda found: 'style="' + found.group()[7:].replace(": ", ":").replace("; ", ";"), svg)
     used = set(REFERENCES.findall(svg))
     svg = GROUP_NAMES.sub(lambda found: found.group() if found.group(1) in used else "<g", svg)
     svg = svg.replace("xlink:href", "href")

@@ -11,6 +11,23 @@ NOTHING = 1e-6
 """Fraction of omega_0 below which two solvers are said to agree."""
 
 
+def answer(headlines: Sequence[Headline]) -> str:
+    """Return the verdict in one sentence: whether the step is short enough, and whether Eq. 8 is free flight.
+
+    Either holds if no curve of omega moves by more than PARTING_BAND of omega_0.
+    """
+    found = {headline.id: headline for headline in headlines}
+    if not {"step", "eq8-free"} <= set(found):
+        return "No verdict: what it needs could not be computed; the reasons stand below."
+    within = percent(PARTING_BAND)
+    return {
+        (True, False): "The step is short enough. Eq. 8 is not free flight.",
+        (True, True): f"On this throw the step is short enough, and Eq. 8 is free flight within {within} of ω₀.",
+        (False, True): f"On this throw Eq. 8 is free flight within {within} of ω₀. The step is too long.",
+        (False, False): "On this throw the step is too long, and Eq. 8 is not free flight.",
+    }[found["step"].value <= PARTING_BAND, found["eq8-free"].value <= PARTING_BAND]
+
+
 def lead_words(headlines: Sequence[Headline]) -> str:
     """Return the verdict in a few sentences of plain text."""
     return " ".join(sentences(headlines))

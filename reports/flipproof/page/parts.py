@@ -11,8 +11,10 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from flipproof.frame.chapter import Part
+from flipproof.frame.findings import Finding
 from flipproof.frame.gather import Gathered, Told
 from flipproof.frame.throws import FINER
+from flipproof.page.glossary import linked
 
 MACROS: Final = '{% from "macros.html.j2" import anchor, draw, minus, missing, scroll, status with context %}\n'
 
@@ -36,7 +38,7 @@ class Section:
     ----------
     id, title, sentence : str - anchor, heading, and in one sentence what it shows
     html : Markup - its content, without heading and sentence
-    counts : verdict -> number of its findings
+    findings : tuple of Finding - those that must hold first
     figure : name of its first figure, "" if it has none
     """
 
@@ -44,8 +46,29 @@ class Section:
     title: str
     sentence: str
     html: Markup
-    counts: Mapping[str, int]
+    findings: tuple[Finding, ...] = ()
     figure: str = ""
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Verdict -> number of its findings."""
+        return Counter(finding.verdict for finding in self.findings)
+
+    @property
+    def count_words(self) -> str:
+        """The findings in words, as in "12 claims hold, 3 observations"; nothing if there are none."""
+        counts = self.counts
+        words = (
+            ("pass", "claim holds", "claims hold"),
+            ("fail", "claim fails", "claims fail"),
+            ("observed", "observation", "observations"),
+            ("not evaluated", "not evaluated", "not evaluated"),
+        )
+        return ", ".join(
+            f"{counts[verdict]} {one if counts[verdict] == 1 else many}"
+            for verdict, one, many in words
+            if verdict in counts
+        )
 
 
 def sections(gathered: Gathered, told: Mapping[str, Told], templates: Environment) -> tuple[Section, ...]:
@@ -62,8 +85,13 @@ def _section(gathered: Gathered, part: Part, chapters: Sequence[Told], templates
         id=part.id,
         title=part.title,
         sentence=part.sentence,
-        html=Markup("\n").join(_chapter(gathered, each, templates) for each in chapters),
-        counts=Counter(finding.verdict for each in chapters for finding in each.findings),
+        html=linked("\n".join(_chapter(gathered, each, templates) for each in chapters)),
+        findings=tuple(
+            sorted(
+                (finding for each in chapters for finding in each.findings),
+                key=lambda finding: finding.kind != "regression",
+            )
+        ),
         figure=next((figure.name for each in chapters for figure in each.figures), ""),
     )
 

@@ -12,12 +12,16 @@ from markupsafe import Markup
 
 from flipproof.chapters.differences.study import Difference, moved, percent
 from flipproof.frame.gather import Gathered, Told
+from flipproof.output.summary import summarise
+from flipproof.page.glossary import TERMS, anchor
 from flipproof.page.headlines import headlines
 from flipproof.page.inline import data_uri, shape
-from flipproof.page.lead import answers, lead_words
+from flipproof.page.lead import answer, answers, lead_words
 from flipproof.page.parts import sections
+from flipproof.page.sections import STORY, behind
+from flipproof.page.story.facts import story
+from flipproof.page.story.live import live_data, sliders
 from flipproof.page.templating import environment
-from flipproof.page.verdict import answer, strips, tiles
 
 SYMBOLS = {
     "omega_0": "ω₀", "omega0": "ω₀", "omega": "ω", "theta": "θ", "gamma": "γ", "alpha": "α", "epsilon": "ε",
@@ -75,48 +79,57 @@ def read_assets() -> dict[str, Markup]:
     }
 
 
-def render(gathered: Gathered, told: Mapping[str, Told], provenance: Mapping[str, str], *, explore: Any = None) -> str:
-    """Return the whole page; ``explore`` is what its template draws from, and a part that is None is left out."""
+def render(
+    gathered: Gathered,
+    told: Mapping[str, Told],
+    provenance: Mapping[str, str],
+    summary: Mapping[str, Any] | None = None,
+) -> str:
+    """Return the whole page; ``summary``, which its story is told from, is that of the report, made here if None."""
+    summary = summary or summarise(gathered, told, provenance)
     templates = page_environment()
-    body = sections(gathered, told, templates)
     verdict = headlines(gathered)
-    waterfalls = gathered.found("waterfall")
     findings = [finding for each in told.values() for finding in each.findings]
     regressions = [finding for finding in findings if finding.kind == "regression"]
     flown = gathered.found("flights")
-    ahead = [("verdict", "Verdict"), *((section.id, section.title) for section in body)]
-    behind = [("findings", "All findings"), ("solvers", "Every solver"), ("provenance", "Settings and provenance")]
-    return templates.get_template("report.html.j2").render(
+    motion = flown.motion if flown is not None else None
+    facts = story(summary, {figure.name: figure.table for each in told.values() for figure in each.figures})
+    context = dict(
         scenario=gathered.ask.scenario,
         throw=gathered.ask.throw,
-        contents=[*ahead, *([("throws", "Explore other throws")] if explore else []), *behind],
-        sections=body,
         answer=answer(verdict),
-        tiles=tiles(verdict),
-        waterfall=waterfalls[0] if waterfalls else None,
-        strips=strips(waterfalls[0]) if waterfalls else (),
         lead=lead_words(verdict),
         answers=tuple(answers(verdict)),
         regressions=regressions,
-        observations=[finding for finding in findings if finding.kind == "observation"],
         failed=[finding for finding in regressions if finding.failed],
         solvers=flown.rows if flown is not None else [],
         problems=[made for made in gathered.flights.values() if made.trajectory is None],
         notes=[note for each in told.values() for note in each.notes],
-        explore=explore,
-        assets=read_assets(),
+        motion=motion,
+        measured=gathered.found("measured"),
         provenance=provenance,
         settings=gathered.ask.scenario.to_toml(),
+        terms=TERMS,
+        story=facts,
+        story_ids=STORY,
+        sliders=sliders(gathered.ask.throw),
+        live=live_data(gathered.ask.throw),
+    )
+    parts = sections(gathered, told, templates)
+    body = (*parts, *behind(parts, templates, context))
+    left_out = {"motion-story": not motion, "shares": not facts.shares, "bottles": not facts.map}
+    screens = [(id_, words) for id_, words in STORY.items() if not left_out.get(id_)]
+    return templates.get_template("report.html.j2").render(
+        context, contents=[*screens, *((section.id, section.title) for section in body)], sections=body
     )
 
 
 def page_environment() -> Environment:
     """Return the environment of the page's templates, with the filters that they and the chapters' parts use."""
     templates = environment()
-    templates.tests["about_the_paper"] = lambda id_: id_.startswith("paper-")
     templates.filters |= {
         "typeset": typeset, "unbroken": unbroken, "amount": amount, "percent": percent, "data_uri": data_uri,
-        "shape": shape, "short": short, "restitution_error": restitution_error,
+        "shape": shape, "short": short, "restitution_error": restitution_error, "term_anchor": anchor,
     }  # fmt: skip
     templates.globals["assets"] = read_assets()
     return templates

@@ -186,7 +186,8 @@ class Alignment:
         forks = f"{len(self.forks)} of {self.n_slices} slices fork"
         if self.forks:
             before, after = map(len, self.after_fork)
-            forks += f", the first being {self.forks[0].words}; {before} and {after} impacts after forks not aligned"
+            forks += f", the first being {self.forks[0].words}"
+            forks += f"; {before} and {after} later impacts of those were not compared"
         words = f"{', '.join(parts)}; {forks}; {self.tail[0]} and {self.tail[1]} slower than {self.least_speed:g} m/s"
         return words + (f", {self.undecided} cut off by the end" if self.undecided else "")
 

@@ -78,7 +78,7 @@ class Difference:
         """The parting in words."""
         if self.parting_time is None:
             return f"stay within {percent(PARTING_BAND)} of ω₀"
-        words = f"part at t = {self.parting_time * 1e3:.1f} ms"
+        words = f"differ by more than {percent(PARTING_BAND)} of ω₀ from t = {self.parting_time * 1e3:.1f} ms on"
         if self.parting_impact is not None:
             impact = self.parting_impact
             words += f", after slice {impact.slice} hit the {impact.end} at {impact.time * 1e3:.1f} ms"

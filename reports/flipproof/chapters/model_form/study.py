@@ -205,10 +205,9 @@ def _verdict(
     if fit.scatter > math.log(PHASE_FACTOR):
         return "failure", f"errors scatter {math.exp(fit.scatter):.1f}-fold about C Δt^p + F: they do not follow it"
     if floor_low > band and floor_high > CURVATURE * finest:
-        return (
-            "model form",
-            f"{floor_low:.2g} to {floor_high:.2g} of the error stays as Δt goes to zero (band {band:.1g})",
-        )
+        low, high = f"{floor_low:.2g}", f"{floor_high:.2g}"
+        left = low if low == high else f"{low} to {high}"
+        return "model form", f"an error of {left} remains as Δt goes to zero (band {band:.1g})"
     if order_low > expected + tolerance:
         return "failure", f"order too high: {order_low:.2f} to {order_high:.2f}, not {expected:g}"
     if order_high < expected - tolerance:

@@ -50,13 +50,25 @@ window.flipproofChart ??= (() => {
     return `var(--solver-${name}, var(--solver-other))`;
   }
 
-  // Draws {title, x: {low, high, label}, y: {low, high, label}, lines: [{name, x, y}]} and returns the two scales.
+  // Writes the labels of lines beside their ends, none over another.
+  function labelEnds(svg, lines, x, y, bottom) {
+    const ends = lines.filter((line) => line.label && line.y.length).map((line) => ({ line, at: y(line.y.at(-1)) }));
+    ends.sort((a, b) => a.at - b.at);
+    ends.forEach((end, k) => { if (k) end.at = Math.max(end.at, ends[k - 1].at + 15); });
+    const over = Math.max(0, (ends.at(-1)?.at ?? 0) - bottom);
+    for (const { line, at } of ends) {
+      words(line.label, { class: "chart-label", x: x + 6, y: at - over + 4, style: `fill: ${colour(line.name)}` }, svg);
+    }
+  }
+
+  // Draws {x: {low, high, label}, y: {low, high, label}, right, lines: [{name, x, y, label, faint}]}; returns both scales.
   function draw(svg, height, plot) {
+    const right = plot.right ?? MARGIN.right;
     const width = Math.max(240, Math.round(svg.clientWidth || svg.parentElement.clientWidth));
     svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     svg.setAttribute("height", height);
     svg.replaceChildren();
-    const inner = { width: width - MARGIN.left - MARGIN.right, height: height - MARGIN.top - MARGIN.bottom };
+    const inner = { width: width - MARGIN.left - right, height: height - MARGIN.top - MARGIN.bottom };
     const x = (value) => MARGIN.left + ((value - plot.x.low) / (plot.x.high - plot.x.low)) * inner.width;
     const y = (value) => MARGIN.top + (1 - (value - plot.y.low) / (plot.y.high - plot.y.low)) * inner.height;
     const bottom = MARGIN.top + inner.height;
@@ -81,10 +93,11 @@ window.flipproofChart ??= (() => {
         if (Number.isFinite(line.y[k])) path += `${path ? "L" : "M"}${x(line.x[k]).toFixed(1)} ${y(line.y[k]).toFixed(1)}`;
       }
       element("path", {
-        class: "chart-line", d: path, "data-line": line.name, "stroke-dasharray": DASHES[line.name] ?? OTHER_DASH,
+        class: line.faint ? "chart-line chart-faint" : "chart-line", d: path, "data-line": line.name, "stroke-dasharray": DASHES[line.name] ?? OTHER_DASH,
         style: `stroke: ${colour(line.name)}`,
       }, svg);
     }
+    labelEnds(svg, plot.lines, MARGIN.left + inner.width, y, bottom);
     return { x, y, top: MARGIN.top, bottom, left: MARGIN.left, right: MARGIN.left + inner.width };
   }
 

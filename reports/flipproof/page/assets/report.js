@@ -1,8 +1,21 @@
 "use strict";
+/* What survives a reload: in the address, as #place?name=value, and, for what is open, in the entry of the history. */
+window.flipproofState = (() => {
+  const asked = () => location.hash.slice(1).split("?");
+  return {
+    place: () => decodeURIComponent(asked()[0]),
+    linked: (place) => Object.fromEntries(asked()[0] === place ? new URLSearchParams(asked()[1] ?? "") : []),
+    link: (place, values) => {
+      const text = new URLSearchParams(values).toString();
+      history.replaceState(history.state, "", `#${place}${text && `?${text}`}`);
+    },
+    kept: (name) => history.state?.[name],
+    keep: (name, value) => history.replaceState({ ...history.state, [name]: value }, "", location.hash || undefined),
+  };
+})();
 /* Contents that say where the reader is, a filter for the findings, and no idle stops for the keyboard.
    The page is whole without it. */
 (() => {
-  document.documentElement.classList.add("scripted");
   const rail = document.querySelector(".rail");
   const button = rail.querySelector("button");
   const links = new Map([...rail.querySelectorAll("a")].map((link) => [link.hash.slice(1), link]));
@@ -74,29 +87,88 @@
     setTimeout(showNext, 50);
   });
 
+  /* Folds: closed but for those that were open, opened by a link into them, all of them on paper. */
+  const state = window.flipproofState;
+  const folds = [...document.querySelectorAll(".fold > details")];
+  const id = (fold) => fold.parentElement.id;
+  const wereOpen = new Set(state.kept("open") ?? []);
+  const all = document.querySelector(".unfold");
+  const keep = () => {
+    state.keep("open", folds.filter((fold) => fold.open).map(id));
+    all.textContent = folds.every((fold) => fold.open) ? "Close all" : "Open all";
+  };
+  for (const fold of folds) {
+    fold.open = wereOpen.has(id(fold));
+    fold.addEventListener("toggle", keep);
+    const figure = fold.querySelector(".fold-thumb");
+    const original = figure.dataset.figure && fold.querySelector(`#figure-${CSS.escape(figure.dataset.figure)} img`);
+    if (original) {
+      const small = document.createElement("img");
+      small.alt = "";
+      pictures.set(small, pictures.get(original));
+      figure.append(small);
+    }
+  }
+  all.hidden = false;
+  all.addEventListener("click", () => {
+    const open = !folds.every((fold) => fold.open);
+    for (const fold of folds) fold.open = open;
+  });
+  const reveal = () => {
+    const target = document.getElementById(state.place());
+    if (!target) return;
+    for (let fold = target.closest("details"); fold; fold = fold.parentElement.closest("details")) fold.open = true;
+    const own = target.querySelector(":scope > details");
+    if (own && target.matches(".fold")) own.open = true;
+    target.scrollIntoView({ behavior: "instant" });
+  };
+  let closed = [];
+  window.addEventListener("beforeprint", () => {
+    closed = [...document.querySelectorAll("details:not([open])")];
+    for (const fold of closed) fold.open = true;
+  });
+  window.addEventListener("afterprint", () => closed.forEach((fold) => { fold.open = false; }));
+
   const box = document.querySelector(".filter");
   const field = box.querySelector("input");
+  const choices = [...box.querySelectorAll("select")];
   const rows = [...document.querySelectorAll(".findings tbody tr")];
-  const folds = [...document.querySelectorAll("#findings details")];
+  const chapters = rows.map((row) => row.closest(".group").dataset.chapter);
   const words = rows.map((row) => `${row.id} ${row.textContent}`.toLowerCase());
+  const title = (row) => [...row.querySelector("th").childNodes].filter((node) => !node.classList?.contains("soft"));
+  const names = rows.map((row) => `${row.id} ${title(row).map((node) => node.textContent).join("")}`.toLowerCase());
   const filter = () => {
     const wanted = field.value.toLowerCase().split(/\s+/).filter(Boolean);
+    const [chapter, verdict, solver] = choices.map((choice) => choice.value);
     let shown = 0;
     rows.forEach((row, k) => {
-      row.hidden = !wanted.every((word) => words[k].includes(word));
+      row.hidden = !(wanted.every((word) => words[k].includes(word)) && (!chapter || chapters[k] === chapter)
+        && (!verdict || row.dataset.verdict === verdict) && (!solver || names[k].includes(solver.toLowerCase())));
       shown += row.hidden ? 0 : 1;
     });
-    folds.forEach((fold) => { fold.open = fold.open || wanted.length > 0; });
+    for (const group of document.querySelectorAll(".group")) group.hidden = !group.querySelector("tbody tr:not([hidden])");
     box.querySelector("[role=status]").textContent = `${shown} of ${rows.length} findings`;
   };
-  field.addEventListener("input", filter);
+  const asFilter = () => Object.fromEntries([["text", field.value], ...choices.map((choice) => [choice.dataset.filter, choice.value])].filter(([, value]) => value));
+  const setFilter = (values) => {
+    field.value = values.text ?? "";
+    for (const choice of choices) choice.value = values[choice.dataset.filter] ?? "";
+    filter();
+  };
+  for (const control of [field, ...choices]) {
+    control.addEventListener("input", () => { filter(); state.link("findings", asFilter()); });
+  }
   box.hidden = false;
-  filter();
+  setFilter(state.linked("findings"));
   /* Whoever follows a link to a finding that is filtered away wants to see it. */
   window.addEventListener("hashchange", () => {
-    const row = document.getElementById(decodeURIComponent(location.hash.slice(1)));
-    if (row && row.hidden) { field.value = ""; filter(); row.scrollIntoView(); }
+    const row = document.getElementById(state.place());
+    if (row && row.closest(".findings") && (row.hidden || row.closest(".group").hidden)) setFilter({});
+    else if (location.hash.startsWith("#findings?")) setFilter(state.linked("findings"));
+    reveal();
   });
+  document.documentElement.classList.add("ready");
+  if (location.hash) reveal();
 
   /* What does not scroll need not be stopped at by those who go from place to place with the keyboard. */
   const scrollers = new ResizeObserver((entries) => {

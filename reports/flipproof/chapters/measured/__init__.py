@@ -1,0 +1,1 @@
+"""A measured flight beside the solvers."""

@@ -1,0 +1,114 @@
+"""The words of the page: every solver name, symbol and term in one plain sentence, and links to them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+from markupsafe import Markup, escape
+
+TERMS: Final[Mapping[str, str]] = {
+    "ω": "Angular velocity of the bottle: by how many radians it turns in a second.",
+    "ω₀": "Angular velocity at release. The page gives differences in ω as a share of ω₀.",
+    "θ": "Angle between the axis of the bottle, from cap to base, and the downward vertical; zero for a bottle "
+    "that stands upright.",
+    "γ": "Damping rate α/2m: how fast drag slows a slice that slides along the bottle.",
+    "α": "Drag coefficient of one slice, in kg/s: the force of drag is α times its speed.",
+    "C_M": "Centre of mass of bottle and water together.",
+    "r_CM": "Distance of the centre of mass from the cap, along the axis of the bottle.",
+    "v_CM": "Speed of the centre of mass along the axis of the bottle, as seen from the bottle.",
+    "N": "Number of slices that the water is cut into.",
+    "M̃": "Filling: mass of the water divided by the mass that fills the bottle.",
+    "restitution": "Speed of a slice after it strikes an end, divided by its speed before; e = 0 sticks, e = 1 "
+    "bounces without loss.",
+    "slice": "One of N equal parts of the water, treated as a point that slides along the axis; slices pass "
+    "through one another.",
+    "time step": "A short piece of the flight over which a program holds ω and the centre of mass constant.",
+    "Eq. 8": "The paper's equation for one slice: thrown outward from the centre of mass, slowed by drag, "
+    "pulled by its weight.",
+    "Eq. 9": "The paper's formulas for one time step, meant to be the solution of Eq. 8 with ω held constant.",
+    "free flight": "Newton's equations for the same slices in a bottle that moves freely; weight drops out, "
+    "because everything falls together.",
+    "published program": "The Python program in the supplement of the paper: 1000 time steps by its formulas of Eq. 9.",
+    "published-python": "Name of the published program in tables: the paper's Python supplement.",
+    "published-matlab": "Name of the paper's MATLAB supplement in tables.",
+    "paper-typeset": "The formulas of Eq. 9c and 9d exactly as they are printed.",
+    "signs-corrected": "The published step with the signs of Eq. 9d put right.",
+    "roots-corrected": "The published step with its signs right and its exponents exact for any drag.",
+    "exact-step": "The step that solves Eq. 8 exactly while ω, θ, the centre of mass and its speed are held constant.",
+    "midpoint": "A step like exact-step, with what is held constant taken from the middle of the step.",
+    "published-limit": "The equation that the published program solves as its time step goes to zero.",
+    "signs-limit": "The equation that the step with corrected signs solves as its time step goes to zero.",
+    "eq8": "Name of Eq. 8 in tables, solved impact by impact.",
+    "eq8-wall": "Eq. 8 with drag measured against the wall of the bottle.",
+    "eq8-weightless": "Eq. 8 without weight.",
+    "accelerating-origin": "Eq. 8 without weight, with the motion of the centre of mass along the bottle, "
+    "without recoil.",
+    "free-flight": "Name of free flight in tables, solved impact by impact.",
+    "pymunk": "A physics engine for games: bodies, joints and contacts, advanced by impulses in small steps.",
+    "mujoco": "A physics engine for robotics: motion in joint coordinates; here the law and the times of impact "
+    "are ours.",
+    "pymunk rotating": "The engine pymunk moving slices in the turning bottle under the forces of Eq. 8, which "
+    "we give it.",
+    "engine": "A program by others that moves bodies by the laws of mechanics and knows nothing of Eq. 8 or of "
+    "our equations.",
+    "fair share": "What a change does to a result, as the mean over all orders in which all the changes can be "
+    "made; the fair shares sum to the whole.",
+    "band": "How far a number could move by numerical causes alone: tighter settings, or a release changed in "
+    "the eleventh digit.",
+    "recoil": "The kick that the bottle gets when a slice strikes one of its ends.",
+    "certified": "Neither half the step nor twice the iterations moves ω by more than the tolerance, and "
+    "rebounds are as asked.",
+    "regression claim": "A statement that must hold in every report; if one fails, the report's exit status is 1.",
+    "observation": "A number that was measured and is reported; it cannot fail.",
+    "ice": "Frozen water: no slice may move, so ω must stay constant.",
+    "impact": "A slice strikes an end of the bottle.",
+}  # fmt: skip
+
+_PLACES: Final = {
+    "ω₀": "omega-at-release",
+    "M̃": "filling",
+    "Eq. 8": "equation-8",
+    "free-flight": "free-flight-in-tables",
+}
+"""Term -> its place, where the term itself makes none."""
+
+_WORD: Final = re.compile(
+    r"(?<![\w₀])(" + "|".join(re.escape(term) for term in sorted(TERMS, key=len, reverse=True)) + r")(?![\w₀-])"
+)
+_TAG: Final = re.compile(r"(<script.*?</script>|<style.*?</style>|<[^>]*>)", re.DOTALL)
+_CLOSED: Final = frozenset(
+    ("a", "svg", "math", "code", "pre", "button", "label", "select", "h2", "h3", "summary",
+     "noscript", "thead", "legend", "caption")
+)  # fmt: skip
+"""Elements inside which no term becomes a link."""
+
+
+def anchor(term: str) -> str:
+    """Return the id of a term's place in the glossary."""
+    return "term-" + _PLACES.get(term, re.sub(r"\W+", "-", term))
+
+
+def linked(html: str) -> Markup:
+    """Return a section in which the first appearance of every term is a link to the glossary with a tooltip."""
+    return Markup("".join(_linked(html, set())))
+
+
+def _linked(html: str, seen: set[str]) -> Iterator[str]:
+    depth = 0
+    for piece in _TAG.split(html):
+        if piece.startswith("<"):
+            name = piece.strip("</> ").split(" ", 1)[0].split("\n", 1)[0].lower()
+            if name in _CLOSED and not piece.endswith(("/>", "</script>", "</style>")):
+                depth += -1 if piece.startswith("</") else 1
+            yield piece
+        else:
+            yield piece if depth else _WORD.sub(lambda found: _link(found.group(), seen), piece)
+
+
+def _link(term: str, seen: set[str]) -> str:
+    if term in seen:
+        return term
+    seen.add(term)
+    return f'<a class="term" href="#{anchor(term)}" title="{escape(TERMS[term])}">{term}</a>'

@@ -1,0 +1,156 @@
+"""The sliders: what the browser solves is what the Python solvers solve; gravity moves Eq. 8 and not free flight."""
+
+import json
+import math
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import ode_reference
+import slicemodel
+from flipproof.page.render import read_assets
+from slicemodel import Scenario
+
+SETTINGS = 40
+STEPS = 1000
+
+ADMISSIBLE = {"eq8": 2e-3, "free-flight": 3e-3}
+"""Share of omega_0 by which an equation may differ from Python's; of free flight the band that the report states."""
+
+TWINS = 40
+"""Flights of Python by which the band of a chaotic throw is known."""
+
+
+def drawn_at_random():
+    """Return throws as the script takes them, over the whole range of the sliders."""
+    chance = random.Random(20261122)
+    return [
+        {
+            "bottle": {"length": 0.28, "radius": 0.04, "mass": 0.028, "capacity": 1.0},
+            "slices": 50 if k % 4 else chance.randint(2, 49),
+            "duration": 0.5,
+            "g": round(chance.uniform(0.0, 20.0), 2),
+            "theta0": round(chance.uniform(-math.pi, math.pi), 3),
+            "fill": round(chance.uniform(0.1, 1.0), 2),
+            "gamma": round(chance.uniform(0.0, 20.0), 1),
+            "e": round(chance.uniform(0.0, 0.8), 2),
+            "omega0": round(chance.uniform(5.0, 25.0), 1),
+        }
+        for k in range(SETTINGS)
+    ]
+
+
+def scenario_of(thrown):
+    made = Scenario(
+        water_mass=thrown["fill"], n_slices=thrown["slices"], restitution=thrown["e"], omega0=thrown["omega0"],
+        theta0=thrown["theta0"], duration=thrown["duration"], gravity=thrown["g"],
+    )  # fmt: skip
+    return replace(made, drag=2 * made.slice_mass * thrown["gamma"])
+
+
+def apart(one, other, scenario):
+    return float(np.max(np.abs(np.asarray(one) - np.asarray(other)))) / scenario.omega0
+
+
+def band(scenario, model, usual):
+    """Return the width of omega among flights that should be one: inputs changed by 1e-11 to 1e-6, and rest speeds."""
+    flights = [usual.omega]
+    for k in range(TWINS):
+        name = ("restitution", "drag", "omega0", "theta0")[k % 4]
+        change = 1 + (-1) ** (k // 4) * 10.0 ** (-11 + 5 * k / TWINS)
+        rest = usual.settings["rest_speed"] * (1.0, 0.1)[k % 2]
+        twin = replace(scenario, **{name: getattr(scenario, name) * change})
+        flights.append(ode_reference.solve(twin, model=model, rest_speed=rest).omega)
+    return float(np.max(np.ptp(flights, axis=0))) / scenario.omega0
+
+
+@pytest.fixture(scope="module")
+def solved(browser):
+    """The curves of all settings as a browser solves them, with the time each took."""
+    page = browser.new_page()
+    page.add_script_tag(content=str(read_assets()["live.js"]))
+    throws = drawn_at_random()
+    curves = page.evaluate(
+        "throws => throws.map(thrown => Object.fromEntries(['program', 'eq8', 'free'].map("
+        "name => [name, Array.from(flipproofLive[name](thrown))])))",
+        throws,
+    )
+    page.close()
+    return list(zip(throws, curves, strict=True))
+
+
+def test_the_program_in_the_browser_is_the_program(solved):
+    for thrown, curves in solved:
+        scenario = scenario_of(thrown)
+        expected = slicemodel.solve(scenario, scheme="published-python", steps=STEPS)
+        assert apart(curves["program"], expected.omega, scenario) < 1e-9, thrown
+
+
+@pytest.mark.parametrize(("name", "model"), [("eq8", "eq8"), ("free", "free-flight")])
+def test_the_equations_in_the_browser_are_those_of_the_reference(solved, name, model):
+    for thrown, curves in solved:
+        scenario = scenario_of(thrown)
+        expected = ode_reference.solve(scenario, model=model)
+        difference = apart(curves[name], expected.omega, scenario)
+        assert difference < ADMISSIBLE[model] or difference <= band(scenario, model, expected), (thrown, difference)
+
+
+def test_a_wrong_sign_in_the_script_is_seen(browser):
+    """The comparison has teeth: a script whose weight points the wrong way is not within the band."""
+    page = browser.new_page()
+    script = str(read_assets()["live.js"])
+    assert "g * Math.cos(angle)" in script
+    page.add_script_tag(content=script.replace("g * Math.cos(angle) +", "-g * Math.cos(angle) +"))
+    thrown = drawn_at_random()[1] | {"g": 9.81, "fill": 0.5}
+    scenario = scenario_of(thrown)
+    curve = page.evaluate("thrown => Array.from(flipproofLive.eq8(thrown))", thrown)
+    page.close()
+    assert apart(curve, ode_reference.solve(scenario, model="eq8").omega, scenario) > 10 * ADMISSIBLE["eq8"]
+
+
+def line(visited, name):
+    """Return the heights of a curve as it stands in the drawing."""
+    path = visited.page.evaluate(
+        f"[...document.querySelectorAll('[data-testid=live-omega] [data-line=\"{name}\"]:not(.chart-faint)')].map("
+        "path => path.getAttribute('d'))"
+    )
+    (text,) = path
+    return [float(point.split()[1]) for point in text[1:].split("L")]
+
+
+def test_gravity_moves_eq8_and_not_free_flight(visit):
+    """Asserted from what is drawn: the points of the curves with g = 9.81 m/s^2 and with none."""
+    with visit(fragment="#live") as visited:
+        before = {name: line(visited, name) for name in ("eq8", "free-flight", "published-python")}
+        visited.page.get_by_test_id("live-weightless").click()
+        visited.page.wait_for_function(
+            "() => document.querySelector('[data-testid=live-said]').textContent.startsWith('With g = 0')"
+        )
+        after = {name: line(visited, name) for name in before}
+        assert after["free-flight"] == before["free-flight"]
+        assert max(abs(a - b) for a, b in zip(after["eq8"], before["eq8"], strict=True)) > 50
+        assert max(abs(a - b) for a, b in zip(after["published-python"], before["published-python"], strict=True)) > 10
+        assert "0 % in free flight" in visited.page.get_by_test_id("live-said").inner_text()
+        assert visited.console == []
+
+
+def test_sliders_work_from_the_keyboard_and_survive_a_reload(visit):
+    with visit(fragment="#live") as visited:
+        slider = visited.page.get_by_test_id("live-fill")
+        slider.focus()
+        was = line(visited, "eq8")
+        for _ in range(5):
+            visited.page.keyboard.press("ArrowRight")
+        visited.page.wait_for_timeout(200)
+        now = line(visited, "eq8")
+        assert now != was
+        assert "fill=" in visited.page.url
+        visited.page.reload(wait_until="load")
+        visited.page.wait_for_function("() => window.flipproofSliders.drawn().thrown?.fill > 0.54")
+        assert line(visited, "eq8") == now
+        visited.page.get_by_test_id("live-reset").click()
+        visited.page.wait_for_timeout(200)
+        assert line(visited, "eq8") == was
+        assert json.loads(visited.page.evaluate("JSON.stringify(flipproofSliders.drawn().thrown.slices)")) <= 50

@@ -1,0 +1,68 @@
+"""A measurement beside the solvers: the film of a lesson names the equation that made it."""
+
+import numpy as np
+import pytest
+
+import ode_reference
+from flipproof.cli.main import main
+from flipproof.film.measured import HELD, figure_measured, hold, read_measured
+from flipproof.output.tables import trajectory_csv
+from slicemodel import Scenario
+
+THROW = Scenario(water_mass=0.33, n_slices=20, drag=0.165, restitution=0.5, omega0=20.0, theta0=1.5, duration=0.5)
+
+
+def filmed(path, model, quantity="theta", noise=6e-3):
+    """Write a flight of an equation as somebody would measure it; return its path."""
+    run = ode_reference.solve(THROW, model=model, times=np.linspace(0.0, 0.5, 121))
+    values = getattr(run, quantity) + noise * np.random.default_rng(3).standard_normal(len(run.t))
+    rows = [f"{t:.6f},{value:.6f}" for t, value in zip(run.t, values, strict=True)]
+    path.write_text("\n".join([f"t,{quantity}", *rows]) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(("model", "named"), [("free-flight", "free-flight"), ("eq8", "midpoint")])
+def test_the_equation_that_made_a_film_is_named(tmp_path, model, named):
+    measured = hold(read_measured(filmed(tmp_path / "flight.csv", model)), THROW)
+    assert measured.fits[0].solver == named
+    assert next(iter(measured.misfits)) == named
+    assert measured.fits[0].fits
+    assert not any(one.fits for one in measured.fits[1:])
+    assert f"{HELD[named]} is nearest" in measured.words
+    assert measured.noise == pytest.approx(6e-3, rel=0.4)
+    drag = measured.fits[0].intervals[0]
+    assert drag.low < 0.165 < drag.high
+    ids = [finding.id for finding in measured.findings()]
+    assert len(set(ids)) == len(ids) == 2 * len(HELD)
+    exhibit = measured.exhibit()
+    assert exhibit.table.splitlines()[0].count(",") == 1 + 2 * len(HELD)
+    assert len(figure_measured(*exhibit.data).axes) == 4
+
+
+def test_a_measured_omega_is_held_too(tmp_path):
+    measurement = read_measured(filmed(tmp_path / "flight.csv", "free-flight", "omega", 0.05))
+    assert (measurement.quantity, measurement.unit, len(measurement.t)) == ("omega", "rad/s", 121)
+
+
+def test_a_simulation_is_a_measurement(tmp_path):
+    path = tmp_path / "simulated.csv"
+    path.write_text(trajectory_csv(ode_reference.solve(THROW, model="eq8")), encoding="utf-8")
+    assert read_measured(path).quantity == "theta"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("t,x\n0,1\n1,2\n", "has no column"),
+        ("t,r_cm\n0,1\n1,2\n", "has neither theta nor omega"),
+        ("t,theta\n0,1\n0,2\n1,3\n", "t does not increase"),
+        ("t,theta\n0,1\n1,2\n", "12 are needed"),
+    ],
+)
+def test_what_cannot_be_held_is_refused_in_one_line(tmp_path, capsys, text, words):
+    path = tmp_path / "flight.csv"
+    path.write_text(text, encoding="utf-8")
+    assert main(["report", "--measured", str(path), "--out", str(tmp_path / "out")]) == 2
+    message = capsys.readouterr().err
+    assert words in message
+    assert message.count("\n") == 1

@@ -1,0 +1,208 @@
+"""The story: every number of it stands in summary.json, and no other number does; the words link to the glossary."""
+
+import html
+import json
+import re
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from flipproof.chapters.waterfall.study import NAMES
+from flipproof.frame.gather import tell
+from flipproof.page.glossary import TERMS, anchor, linked
+from flipproof.page.sections import STORY
+from flipproof.page.story.facts import CHANGES, EXPERIMENTS, story
+from flipproof.page.story.live import sliders
+from flipproof.page.story.numbers import Summary
+from slicemodel import Scenario
+
+pytestmark = pytest.mark.xdist_group("evidence")
+SOLVERS = ("published-python", "eq8", "free-flight")
+KEPT = Path(__file__).parents[2] / "reports" / "snapshot" / "summary.json"
+NAMED = re.compile(
+    r"Eqs?\. \d+[a-z]?|Fig\. \d\w*|1000 (?:<em>)?time steps|r_CM|M_w|≤ 1e-9|up to 1 % we call small|1000 steps"
+)
+"""Digits that are names: of equations and figures, of the published program's steps, and limits that we set."""
+
+
+def screens(page):
+    """Return the sections of the story as HTML."""
+    wanted = [name for name in STORY if f'<section id="{name}"' in page]
+    return {
+        name: re.search(rf'<section id="{name}" class="screen">(.*?)</section>', page, re.S).group(1) for name in wanted
+    }
+
+
+def looked_up(summary, place):
+    found = summary
+    for key in place.split("/"):
+        if isinstance(found, list):
+            (found,) = [entry for entry in found if key in (entry.get("id"), entry.get("name"))]
+        else:
+            found = found[key]
+    return found
+
+
+def again(summary, source):
+    """Compute the value of a source a second time, by other code than the page's."""
+    words = source.split()
+    if words[0] == "length":
+        return len(looked_up(summary, words[1]))
+    if words[0] == "count":
+        place, field, wanted = words[1], words[2], words[3]
+        total = 0
+        for entry in looked_up(summary, place):
+            value = looked_up(entry, field)
+            if isinstance(value, list):
+                total += wanted in value
+            elif wanted.endswith("*"):
+                total += value.startswith(wanted.rstrip("*"))
+            else:
+                total += value == wanted
+        return total
+    if ":" in words:
+        return looked_up(summary, words[0]) / looked_up(summary, words[2])
+    return looked_up(summary, source)
+
+
+def as_printed(text):
+    """Return the number that a reader reads, and half a unit of its last digit."""
+    clean = text.replace("−", "-").replace("+", "").replace("°", "").strip()
+    share = clean.endswith("%")
+    clean = clean.removesuffix("%").strip()
+    value = float(clean)
+    mantissa, _, exponent = clean.partition("e")
+    digits = len(mantissa.partition(".")[2])
+    unit = 0.5 * 10.0 ** (int(exponent or 0) - digits)
+    if "." not in mantissa and not exponent:
+        unit = max(unit, 0.5 * 10 ** max(0, len(mantissa.lstrip("-")) - 2))
+    return (value / 100, unit / 100) if share else (value, unit)
+
+
+@pytest.fixture
+def marked(report):
+    summary = json.loads(json.dumps(report.summary))
+    found = re.findall(
+        r'<data value="([^"]*)" data-source="([^"]*)">([^<]*)</data>', "".join(screens(report.html).values())
+    )
+    return summary, [(float(value), html.unescape(source), html.unescape(text)) for value, source, text in found]
+
+
+def test_every_number_of_the_story_is_computed_again_from_the_summary(marked):
+    summary, numbers = marked
+    assert len(numbers) > 25
+    for value, source, text in numbers:
+        assert again(summary, source) == value, source
+        printed, half = as_printed(text)
+        assert abs(printed - value) <= half * 1.001, (source, text, value)
+
+
+def test_no_other_number_stands_in_the_story(report):
+    for name, screen in screens(report.html).items():
+        if name == "verdict":
+            screen = screen.partition("<h1")[2]
+        for part in ("svg", "script", "math", "data", "style", "details", "fieldset", "output"):
+            screen = re.sub(rf"<{part}\b.*?</{part}>", "", screen, flags=re.S)
+        screen = re.sub(r'<span class="soft">The throw: .*?</span>', "", screen, flags=re.S)
+        screen = re.sub(r'<table class="chapters">.*?</table>', "", screen, flags=re.S)
+        words = NAMED.sub(
+            "", html.unescape(re.sub(r"<[^>]*>", "", NAMED.sub("", screen))).replace("\N{NO-BREAK SPACE}", " ")
+        )
+        words = NAMED.sub("", re.sub(r"\s+", " ", words))
+        assert re.findall(r"[^ ]*\d[^ ]*", words) == [], name
+
+
+def test_the_counts_by_chapter_are_those_of_the_findings(report, gathered):
+    told = tell(gathered)
+    counts = {
+        part.id: Counter(f.verdict for chapter in part.chapters if chapter.name in told
+                         for f in told[chapter.name].findings)
+        for part in gathered.parts
+    }  # fmt: skip
+    table = re.search(r'<table class="chapters">.*?</table>', report.html, re.S).group()
+    rows = re.findall(r'href="#([\w-]+)">[^<]*</a></th>' + r'<td class="number">([^<]*)</td>' * 3, table)
+    assert [row[0] for row in rows] == [part for part in counts if counts[part]]
+    for part, *shown in rows:
+        expected = [counts[part][verdict] for verdict in ("pass", "fail", "observed")]
+        assert [0 if text == "–" else int(text) for text in shown] == expected
+    assert sum(map(Counter.total, counts.values())) == len(report.findings)
+
+
+def test_what_the_snapshot_found_is_told_in_full():
+    """The snapshot is a full report's summary without its solvers and the paper: those are made up."""
+    experiment = [
+        {
+            "id": id_,
+            "closest": ["free-flight"],
+            "equations": {solver: {"value": 0.3, "verdict": "fails"} for solver in SOLVERS},
+        }
+        for id_ in EXPERIMENTS.values()
+    ]
+    solvers = [{"name": solver, "plateau": 0.3} for solver in SOLVERS]
+    kept = json.loads(KEPT.read_text(encoding="utf-8")) | {"solvers": solvers, "paper": {"experiment": experiment}}
+    told = story(kept, {})
+    assert [name for name, number in vars(told.n).items() if number is None] == []
+    assert [layer.name for layer in told.layers] == ["The time step", "The algebra of Eq. 9", "The physics of Eq. 8"]
+    assert [layer.within for layer in told.layers] == [True, False, False]
+    assert len(told.shares) == len(NAMES) == len(CHANGES)
+    assert {share.name for share in told.shares} == set(CHANGES) == set(NAMES.values())
+    assert told.nearest[0].name == "free flight"
+    for name, experiment in told.experiments.items():
+        assert all(experiment.values.values()), name
+    assert set(told.experiments["landing"].verdicts.values()) == {"fails"}
+    assert told.n.threshold.text == "0.1417"
+
+
+def test_a_summary_with_nothing_in_it_tells_no_numbers():
+    told = story({}, {})
+    assert told.layers == told.shares == told.nearest == []
+    assert told.map is None
+    assert [number for name, number in vars(told.n).items() if number is not None and number.value] == []
+
+
+def test_sources_find_entries_and_say_when_there_are_none():
+    summary = Summary({"a": [{"id": "x", "b": 2.0, "c": ["p", "q"]}, {"name": "y", "b": "nan", "c": ["q"]}]})
+    assert summary.evaluate("a/x/b") == 2.0
+    assert summary.evaluate("a/y/b") is None
+    assert summary.evaluate("a/z/b") is None
+    assert summary.evaluate("a/x/b : a/x/b") == 1.0
+    assert summary.evaluate("a/x/b : a/y/b") is None
+    assert summary.evaluate("count a c q") == 2
+    assert summary.evaluate("count a c p") == 1
+    assert summary.evaluate("length a") == 2
+
+
+def test_sliders_reach_the_throw_they_begin_at():
+    for throw in (Scenario(), Scenario(omega0=45.0, gravity=0.0, restitution=0.97, water_mass=0.05)):
+        for slider in sliders(throw):
+            assert slider.low <= slider.value <= slider.high
+
+
+# ---------------------------------------------------------------------- glossary
+
+
+def test_every_term_has_a_sentence_and_a_place_of_its_own(report):
+    places = [anchor(term) for term in TERMS]
+    assert len(set(places)) == len(places)
+    for term, words in TERMS.items():
+        assert words.endswith("."), term
+        assert f'<dt id="{anchor(term)}">' in report.html
+    for row in report.summary["solvers"]:
+        assert row["name"] in TERMS, row["name"]
+
+
+def test_the_first_appearance_of_a_term_is_a_link_and_nothing_inside_a_link_or_a_script():
+    made = linked(
+        '<p>recoil and <a href="#x">free flight</a> and recoil</p><script>if (a < recoil) b</script><p>ice</p>'
+    )
+    assert made.count('href="#term-recoil"') == 1
+    assert "term-free-flight" not in made
+    assert "a < recoil) b</script>" in made
+    assert 'href="#term-ice"' in made
+    assert linked("<p>ω₀ is not ω</p>").count('class="term"') == 2
+
+
+def test_evidence_links_its_words(report):
+    body = re.search(r'<section id="steps".*?</section>', report.html, re.S).group()
+    assert body.count('class="term"') > 3
