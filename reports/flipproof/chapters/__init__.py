@@ -43,7 +43,8 @@ CONTENTS: Final[tuple[tuple[str, str, str, tuple[str, ...]], ...]] = (
 )  # fmt: skip
 """Anchor, title, what it shows in one sentence, and the folders of its chapters; in the order of the page.
 
-A name with a dot is a module elsewhere that holds a ``CHAPTER``.
+A name with a dot is a module elsewhere that holds a ``CHAPTER``. A report that is given a measured flight has a part
+more, ``measured``, before these.
 """
 
 
