@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 import ode_reference
+from flipproof.build import ask_of, build, gather_report
+from flipproof.chapters.measured.chapter import part_measured
 from flipproof.cli.main import main
 from flipproof.film.measured import HELD, figure_measured, hold, read_measured
+from flipproof.output.provenance import provenance
 from flipproof.output.tables import trajectory_csv
 from slicemodel import Scenario
 
@@ -37,6 +40,20 @@ def test_the_equation_that_made_a_film_is_named(tmp_path, model, named):
     exhibit = measured.exhibit()
     assert exhibit.table.splitlines()[0].count(",") == 1 + 2 * len(HELD)
     assert len(figure_measured(*exhibit.data).axes) == 4
+
+
+def test_a_report_that_is_given_a_measurement_has_a_section_of_it(tmp_path):
+    part = part_measured(read_measured(filmed(tmp_path / "flight.csv", "free-flight")))
+    report = build(
+        gather_report(ask_of(THROW, "quick"), jobs=1, contents=(part,)), provenance("flipproof report"), jobs=1
+    )
+    assert '<section id="measured" class="fold">' in report.html
+    assert '<figure id="figure-measured">' in report.html
+    assert "Your measurement is nearest to free flight" in report.html
+    assert [figure["section"] for figure in report.summary["figures"]] == ["measured"]
+    assert {finding.id for finding in report.findings} == {
+        f"measured{fit}-{name}" for fit in ("", "-fit") for name in HELD
+    }
 
 
 def test_a_measured_omega_is_held_too(tmp_path):

@@ -183,7 +183,7 @@ def with_a_stand_in(exhibits, jobs=None, *, pool=None, png=False):
 
 
 def run_report(monkeypatch, gathered, folder, *arguments):
-    monkeypatch.setattr(build_module, "gather_report", lambda *_: gathered)
+    monkeypatch.setattr(build_module, "gather_report", lambda *_, **__: gathered)
     # Drawn before: what these tests ask about is what is made of the figures.
     monkeypatch.setattr(build_module, "drawn", with_a_stand_in)
     return cli.main(["report", "--out", str(folder), *arguments])

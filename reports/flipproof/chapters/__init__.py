@@ -31,6 +31,9 @@ CONTENTS: Final[tuple[tuple[str, str, str, tuple[str, ...]], ...]] = (
     ("engines", "The engines",
      "What each physics engine computes by itself, how far its result can be trusted, and where it fails.",
      ("certificates", "agreement", "stability", "engine_facts", "horizon", "overlap")),
+    ("landing", "Does it stand?",
+     "Scattered throws of water and of ice are landed on a table, and the share that ends upright is counted.",
+     ("landing",)),
     ("work-precision", "What a digit costs",
      "How much computing one more correct digit of ω costs, solver by solver.", ("work_precision",)),
     ("maps", "Maps of validity", "Over filling and damping, step size or restitution: how wrong an approximation is, "
@@ -46,7 +49,8 @@ CONTENTS: Final[tuple[tuple[str, str, str, tuple[str, ...]], ...]] = (
 )  # fmt: skip
 """Anchor, title, what it shows in one sentence, and the folders of its chapters; in the order of the page.
 
-A name with a dot is a module elsewhere that holds a ``CHAPTER``.
+A name with a dot is a module elsewhere that holds a ``CHAPTER``. A report that is given a measured flight has a part
+more, ``measured``, before these.
 """
 
 

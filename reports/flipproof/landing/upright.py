@@ -86,19 +86,6 @@ def drive(throw: Scenario, size: Size, make: Callable[[Wave], Rows]) -> Found:
             return found
 
 
-def drive_in_processes(throw: Scenario, size: Size, jobs: int | None = None) -> Found:
-    """Run the study in worker processes and keep no rows; the same to the last bit."""
-    from flipproof.frame.pool import workers
-
-    with workers(jobs) as pool:
-
-        def make(wave: Wave) -> Rows:
-            pending = [pool.submit(make_case, case, size.seed) for case in wave.cases]
-            return [future.result() for future in pending]
-
-        return drive(throw, size, make)
-
-
 def make_case(case: Case, seed: int) -> list[Landed]:
     """Make the throws of one case in this process, numbered as in its own design."""
     design = Throws(cases=(case,), seed=seed, text="")

@@ -7,7 +7,7 @@ import io
 import json
 from collections.abc import Mapping
 from importlib import resources
-from typing import Any, Final
+from typing import Any
 
 from flipproof.chapters.landing import drawings
 from flipproof.chapters.landing.study import Found
@@ -19,8 +19,6 @@ from flipproof.chapters.landing.tables import (
     static_csv,
 )
 from flipproof.frame.exhibit import Exhibit
-
-SECTION: Final = "landing"
 
 
 def witnesses() -> Mapping[str, Any]:
@@ -39,7 +37,6 @@ def figures(found: Found) -> list[Exhibit]:
     return [
         Exhibit(
             name="landing-shares",
-            section=SECTION,
             title="Does it stand? Water and ice over the filling",
             caption=(
                 f"Share of throws that end upright, {size.throws} throws a point, with Wilson's 95 % interval; soft "
@@ -54,7 +51,6 @@ def figures(found: Found) -> list[Exhibit]:
         ),
         Exhibit(
             name="landing-map",
-            section=SECTION,
             title="Outcome over filling and omega_0",
             caption=(
                 "One throw a cell, without scatter, onto a table where the bottle would touch standing after the "
@@ -68,7 +64,6 @@ def figures(found: Found) -> list[Exhibit]:
         ),
         Exhibit(
             name="landing-axes",
-            section=SECTION,
             title="What the share depends on",
             caption=(
                 f"The share of figure landing-shares at filling {size.axis_filling:g}, along each assumption with the "
@@ -82,7 +77,6 @@ def figures(found: Found) -> list[Exhibit]:
         ),
         Exhibit(
             name="landing-static",
-            section=SECTION,
             title="Where the static criterion is right and wrong",
             caption=(
                 "The toppling angle of Eq. 13a, with the water where it is at the touch, says whether a bottle put "
@@ -97,7 +91,6 @@ def figures(found: Found) -> list[Exhibit]:
         ),
         Exhibit(
             name="landing-energy",
-            section=SECTION,
             title="Energy against the saddle",
             caption=(
                 f"The same throwers with water and with ice, filling {size.axis_filling:g}. Below 1 the energy does "
@@ -110,7 +103,6 @@ def figures(found: Found) -> list[Exhibit]:
         ),
         Exhibit(
             name="landing-witnesses",
-            section=SECTION,
             title="Programs that share no formula, from the same touches",
             caption=(
                 f"Rows: first program; columns: second. {stored['touches']} touches each, {stored['n_slices']} slices, "

@@ -98,7 +98,6 @@ def _csv(names: Iterable[str], rows: Iterable[Sequence[object]]) -> str:
 def page(found: Found) -> dict[str, object]:
     """Return what the chapter's template takes."""
     return {
-        "found": found,
         "assumed": found.assumed,
         "lines": [share_line(found, family) for family in found.size.families],
         "unaimed": sorted(set(found.unaimed.values())),
