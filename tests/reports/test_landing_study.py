@@ -7,11 +7,17 @@ from dataclasses import replace
 
 import pytest
 
+from flipproof.build import ask_of, gather_report
+from flipproof.chapters import chapters_named
+from flipproof.chapters.landing.chapter import chunks
 from flipproof.chapters.landing.claims import claims
 from flipproof.chapters.landing.figures import figures, witnesses
-from flipproof.chapters.landing.study import AIMING, Key, Size, filled, share_of, standing
+from flipproof.chapters.landing.study import AIMING, Key, Size, aiming, filled, share_of, standing
 from flipproof.chapters.landing.tables import page, shares_csv
 from flipproof.cli.main import main
+from flipproof.frame.gather import tell
+from flipproof.frame.pool import Here
+from flipproof.frame.store import RunStore
 from flipproof.landing.aim import aimed
 from flipproof.landing.design import Case, Throws
 from flipproof.landing.scatter import Scatter, Share, scattered, wilson
@@ -296,6 +302,38 @@ def test_the_sweep_makes_the_same_and_goes_on(found, tmp_path):
     rows.close()
     assert set(LANDING) <= set(names)
     assert outcomes <= {"upright", "lying", "cap", "undecided", None}
+
+
+def gathered(throw, store=None):
+    return gather_report(
+        ask_of(throw, "full"), store=store, pool=Here(), contents=chapters_named("landing"), work={"landing": SMALL}
+    )
+
+
+def test_the_chapter_makes_the_same_and_finds_it_in_the_store(found, tmp_path):
+    with RunStore(tmp_path / "runs.sqlite", slow=0.0) as store:
+        made = gathered(THROW, store).found("landing")
+        assert not store.found_calls
+        again = gathered(THROW, store).found("landing")
+        assert 2 * len(store.found_calls) == store.calls > 4
+    assert shares_csv(made) == shares_csv(found) == shares_csv(again)
+
+
+def test_calls_hold_every_case_once_and_are_worth_keeping():
+    wave, unaimed = aiming(THROW, SMALL)
+    assert unaimed == {}
+    many = chunks([case.repeated(throws=40) for case in wave.cases])
+    assert [case for some in many for case in some] == [case.repeated(throws=40) for case in wave.cases]
+    assert [sum(case.throws for case in some) for some in many] == [120, 120, 80]
+    assert chunks([]) == []
+
+
+def test_a_throw_that_cannot_land_fails_nothing():
+    told = tell(gathered(replace(THROW, gravity=0.0)))["landing"]
+    assert told.found.cells == {}
+    assert not [finding for finding in told.findings if finding.failed]
+    assert {finding.kind for finding in told.findings if finding.id == "landing-undecided"} == {"observation"}
+    assert all(figure.drawing.svg.startswith("<?xml") for figure in told.figures)
 
 
 def test_a_folder_that_is_not_the_studys_is_refused(tmp_path):
