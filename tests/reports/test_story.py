@@ -161,6 +161,14 @@ def test_a_summary_with_nothing_in_it_tells_no_numbers():
     assert [number for name, number in vars(told.n).items() if number is not None and number.value] == []
 
 
+@pytest.mark.parametrize(
+    ("names", "told"), [("free-flight, solve_ivp, pymunk, mujoco", True), ("free-flight, solve_ivp", False)]
+)
+def test_an_agreement_without_the_engines_is_not_told_as_theirs(names, told):
+    found = story({"findings": [{"id": "agreement", "title": f"{names}: all agree", "value": 3e-4}]}, {})
+    assert (found.n.agreement is not None) == told
+
+
 def test_sources_find_entries_and_say_when_there_are_none():
     summary = Summary({"a": [{"id": "x", "b": 2.0, "c": ["p", "q"]}, {"name": "y", "b": "nan", "c": ["q"]}]})
     assert summary.evaluate("a/x/b") == 2.0

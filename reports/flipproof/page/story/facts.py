@@ -77,6 +77,9 @@ PLAIN: Final[Mapping[str, str]] = {
 }
 """Name -> source of a number that is printed as it is."""
 
+ENGINES: Final = ("pymunk", "mujoco")
+"""Engines that the agreement on free flight must be between, to be told as theirs; a quick report certifies neither."""
+
 EXPERIMENTS: Final = {"minimum": "minimum", "change": "change-of-behaviour", "landing": "landing-angle"}
 
 
@@ -141,6 +144,8 @@ def story(content: Mapping[str, Any], tables: Mapping[str, str | None]) -> Simpl
     summary = Summary(content)
     numbers = {name: summary.number(source, small) for name, source in SOURCES.items()}
     numbers |= {name: summary.number(source, plain) for name, source in PLAIN.items()}
+    if not all(engine in (summary.at("findings/agreement/title") or "") for engine in ENGINES):
+        numbers["agreement"] = None
     if numbers["threshold"]:
         numbers["threshold"] = summary.number(PLAIN["threshold"], lambda value: f"{value:.4f}")
     return SimpleNamespace(
