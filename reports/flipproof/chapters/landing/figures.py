@@ -34,15 +34,16 @@ def figures(found: Found) -> list[Exhibit]:
     upright = {kind: int((outcomes.outcome == "upright").sum()) for kind, outcomes in found.maps.items()}
     cells = len(found.fillings) * len(found.omegas)
     stored = witnesses()
+    soft = f" (soft contacts {size.engine_throws})" if size.engine_throws else ""
     return [
         Exhibit(
             name="landing-shares",
             title="Does it stand? Water and ice over the filling",
             caption=(
-                f"Share of throws that end upright, {size.throws} throws a point, with Wilson's 95 % interval; soft "
-                f"contacts with {size.engine_throws}. The three laws of the impact are three models of one landing and "
-                "are not averaged. The shaded fillings are those that the paper calls optimal. In family A ice that "
-                f"does not reach the table from above counts as not upright. {found.assumed.capitalize()}."
+                f"Share of throws that end upright, {size.throws} throws a point{soft}, with Wilson's 95 % interval. "
+                "The laws of the impact are models of one landing and are not averaged. The shaded fillings "
+                "are those that the paper calls optimal. In family A ice that does not reach the table from above "
+                f"counts as not upright. {found.assumed.capitalize()}."
             ),
             alt=shares,
             maker=drawings.figure_shares,
