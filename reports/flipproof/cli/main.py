@@ -245,7 +245,7 @@ def command_report(options: argparse.Namespace) -> int:
 
     from flipproof.build import ask_of, build, gather_report, write
     from flipproof.chapters import parts
-    from flipproof.chapters.measured.chapter import part_measured
+    from flipproof.film.measured import part_measured
     from flipproof.frame.pool import workers
     from flipproof.frame.stages import Stages
     from flipproof.frame.store import RunStore, default_place

@@ -16,6 +16,7 @@ from flipproof.film.fit.estimate import estimate
 from flipproof.film.fit.figures import MEASURED
 from flipproof.film.fit.problem import ALSO, SLICES, Measurement, Quantity, pose, predict
 from flipproof.film.fit.reading import QUANTITIES
+from flipproof.frame.chapter import Ask, Call, Chapter, Part, Study
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding
 from flipproof.output.columns import columns_csv
@@ -151,6 +152,27 @@ def hold(measurement: Measurement, scenario: Scenario, tick: Callable[[int], obj
         predicted={name: predict([throw], name, measurement)[0] for name in HELD},
         fits=compare([estimate(problem, tick=tick) for problem in problems]),
     )
+
+
+def part_measured(measurement: Measurement) -> Part:
+    """Return the part of a report that holds a measurement beside its solvers; it stands before the others."""
+
+    def study(ask: Ask) -> Study[Measured]:
+        call = Call(hold, (measurement, ask.scenario), "fits of the measurement")
+        flights = yield (call,)
+        found: Measured = flights.answer(call)
+        return found
+
+    chapter = Chapter(
+        name="measured",
+        title="Your measurement",
+        study=study,
+        claims=lambda found: iter(found.findings()),
+        figures=lambda found: (found.exhibit(),),
+        template=Path(__file__).with_name("measured.html.j2"),
+    )
+    sentence = "The flight that was measured, over the solvers and fitted by them: which equation is nearest."
+    return Part("measured", chapter.title, sentence, (chapter,))
 
 
 @styled

@@ -1,1 +1,0 @@
-"""A measured flight beside the solvers."""
