@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Patch, PathPatch, Rectangle
+from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from flipproof.chapters.maps.study import LABELS, RUNGS, SCHEMES, Measure, ValidityMap
@@ -56,13 +56,15 @@ def figure_map(study: ValidityMap, approximation: str = "published-python", meas
     shown = errors(study, approximation, measure)
     words, error = shown[0]
     shade = axes.pcolormesh(
-        x, y, np.ma.masked_invalid(np.clip(error, *RANGE)), cmap=SHADES, norm=LogNorm(*RANGE), rasterized=False
+        x, y, np.ma.masked_invalid(np.clip(error, *RANGE)), cmap=SHADES, norm=LogNorm(*RANGE), rasterized=True
     )
     bar = figure.colorbar(shade, ax=axes, label=f"{words} [of ω₀]", extend="min", ticks=[1e-3, 1e-2, 1e-1, 1.0])
     bar.ax.set_yticklabels(["0.1%", "1%", "10%", "100%"])
     for k, colour in enumerate(COLOURS):
         outline = _outline(study.dominant == k, x, y, logarithmic=logarithmic)
-        axes.add_collection(LineCollection(outline, colors=colour, linewidths=2.2, capstyle="projecting"))
+        if outline:
+            border = Path.make_compound_path(*map(Path, outline))
+            axes.add_patch(PathPatch(border, fill=False, edgecolor=colour, linewidth=2.2, capstyle="projecting"))
     for row, column in zip(*np.nonzero(study.dominant < 0), strict=True):
         corner = (x[column], y[row])
         size = (x[column + 1] - x[column], y[row + 1] - y[row])
