@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flipproof.build import ask_of
+from flipproof.chapters import chapters_named
 from flipproof.chapters.guests.claims import claim_guests
 from flipproof.chapters.guests.figures import draw_guests
 from flipproof.chapters.guests.study import SPARSE, Guests, energy_of, received, study_guests, visit
@@ -18,8 +20,10 @@ from flipproof.foreign import certify as suite
 from flipproof.foreign.specs import load
 from flipproof.frame.exhibit import drawn
 from flipproof.frame.flights import Call, Flights
-from flipproof.frame.pool import make_all, workers
+from flipproof.frame.gather import gather, tell
+from flipproof.frame.pool import Here, make_all, workers
 from flipproof.frame.solvers import solve
+from flipproof.frame.store import RunStore
 from slicemodel import Scenario
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -123,6 +127,27 @@ def test_a_solver_that_is_late_twice_is_not_asked_again(tmp_path):
     shutil.copy(HOSTILE, tmp_path)
     found = visit(f"{tmp_path / 'hostile.py'}:hangs", THROW, TIMES, 0.5)
     assert found.problems["flight"] == "not asked: 2 runs in a row gave no answer in time"
+
+
+def test_a_guest_is_asked_anew_though_the_store_has_the_ladder(tmp_path):
+    shutil.copy(RK4.rpartition(":")[0], tmp_path)
+    file = tmp_path / "rk4.py"
+    ask = ask_of(THROW, "quick", certified=())
+    labels, kept = [], []
+    for name in ("one", "other"):
+        file.write_text(file.read_text().replace("naive RK4" if name == "one" else "one", name))
+        with RunStore(tmp_path / "runs.sqlite", slow=0.0) as store:
+            work = {"guests": ((f"{file}:Eq8",), None)}
+            found = gather(chapters_named("guests"), ask, Here(), work=work, store=store).found("guests")
+            labels += [guest.label for guest in found.guests]
+            kept.append(len(store.found))
+    assert labels == ["one", "other"]
+    assert kept[0] == 0 < kept[1]
+
+
+def test_a_report_without_guests_has_no_such_chapter():
+    gathered = gather(chapters_named("guests"), ask_of(THROW, "quick", certified=()), Here())
+    assert not tell(gathered)
 
 
 def test_a_dead_worker_costs_its_guest(ladder):
