@@ -163,7 +163,7 @@ def test_a_missing_mujoco_says_what_to_install():
     code = (
         "import sys; sys.modules['mujoco'] = None\n"
         "from flipproof.frame.solvers import Run, make; from slicemodel import Scenario\n"
-        "made = make(Run('m', 'mujoco', Scenario().with_slices(2), {'dt': 1e-4}))\n"
+        "made = make(Run('mujoco', Scenario().with_slices(2), {'dt': 1e-4}))\n"
         "assert made.trajectory is None; print(made.reason)"
     )
     said = subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, capture_output=True, text=True).stdout
