@@ -81,7 +81,10 @@ def tipping(scenario: Scenario, tilt: float, r: FloatArray, r_cm: float) -> Pose
 def _draw_bottle(axes: Axes, pose: Pose, scenario: Scenario) -> None:
     bottle, half = scenario.bottle, scenario.slice_height / 2
     slices = [pose.box(r - half, r + half, bottle.radius) for r in pose.r]
-    axes.add_collection(PolyCollection(slices, facecolors=WATER, edgecolors="none", alpha=0.4))
+    # Hundreds of slices as one picture: as shapes of their own they would be a twelfth of the page.
+    axes.add_collection(
+        PolyCollection(slices, facecolors=WATER, edgecolors="none", alpha=0.4, rasterized=len(slices) > 100)
+    )
     if len(slices) <= 20:
         axes.add_collection(PolyCollection(slices, facecolors="none", edgecolors="#1B4F72", linewidths=0.6))
     outline = [pose.box(0.0, bottle.length, bottle.radius)]
