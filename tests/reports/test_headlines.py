@@ -184,7 +184,7 @@ def test_the_lead_says_what_the_numbers_say():
     assert "differ in ω by up to 42 % of ω₀ (N = 50)." in words
     assert "3.2 times as far from Eq. 8 as from free flight." in words
     assert "mean over all orders of making them: “gravity in Eq. 8” −6.5 % of ω₀ (N = 50)." in words
-    assert "In single orders the same changes move that mean by −20 % to +1 % of ω₀ (N = 50)." in words
+    assert "In single orders these six changes move that mean by −20 % to +1 % of ω₀ (N = 50)." in words
     assert "on landing the program differs" not in words
     assert "not settled" not in words
     assert "costs 0.5 % of ω₀ (N = 50) at 1000 steps" in words
