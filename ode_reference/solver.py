@@ -143,12 +143,8 @@ def solve(
             )
     from ode_reference.flow import api
 
-    # Overflow is a result here, reported as a status: it must not also appear as a warning.
-    with np.errstate(all="ignore"):
-        ask = api.Ask(
-            model=chosen.name, switches=chosen.switches, rest_speed=speed, impact_law=impact_law, energy=energy
-        )
-        return api.trajectory(api.fly(scenario, moments, ask))
+    settings = {"rest_speed": speed, "impact_law": impact_law, "energy": energy}
+    return api.fly(scenario, moments, chosen, settings)
 
 
 def solve_batch(
@@ -204,15 +200,8 @@ def solve_batch(
         except ValueError as error:
             raise ValueError(f"throws[{k}]: {error}") from None
     moments = np.array(rows).reshape(len(throws), len(rows[0]) if rows else 0)
-    ask = api.Ask(
-        model=chosen.name,
-        switches=chosen.switches,
-        rest_speed=_rest_speed(rest_speed, chosen),
-        impact_law=impact_law,
-        energy=energy,
-        states=states,
-    )
-    return api.fly_all(throws, moments, ask, jobs)
+    settings = {"rest_speed": _rest_speed(rest_speed, chosen), "impact_law": impact_law, "energy": energy}
+    return api.fly_all(throws, moments, chosen, settings, states=states, jobs=jobs)
 
 
 def _rest_speed(given: float | None, model: Model) -> float:

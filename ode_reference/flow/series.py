@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from slicemodel.compiled import inner
-from slicemodel.trajectory import FloatArray
 
 MOST = 30
 """Highest order; a step whose terms do not vanish by then is made shorter."""
@@ -20,7 +18,7 @@ A, B, Z, THETA, OMEGA, SQUARE, J, FORCE, PULL, U_A, V_B, COS, SIN, SHARE = range
 
 
 @inner
-def product(table: FloatArray, first: int, second: int, k: int) -> float:
+def product(table, first, second, k):
     """Return the coefficient k of the product of two rows."""
     found = 0.0
     for j in range(k + 1):
@@ -29,7 +27,7 @@ def product(table: FloatArray, first: int, second: int, k: int) -> float:
 
 
 @inner
-def inertia_term(now: Any, table: FloatArray, k: int) -> None:
+def inertia_term(now, table, k):
     """Write the coefficient k of J, omega = L/J and k^2 = omega^2 - kappa."""
     table[U_A, k] = now.U * table[A, k] + now.P * table[B, k]
     table[V_B, k] = now.P * table[A, k] + now.V * table[B, k]
@@ -45,7 +43,7 @@ def inertia_term(now: Any, table: FloatArray, k: int) -> None:
 
 
 @inner
-def force_term(now: Any, table: FloatArray, k: int) -> None:
+def force_term(now, table, k):
     """Write the coefficient k of f = (1 - kappa J^2/L^2) g cos(theta)."""
     if k == 0:
         table[COS, 0], table[SIN, 0] = math.cos(table[THETA, 0]), math.sin(table[THETA, 0])
@@ -65,80 +63,57 @@ def force_term(now: Any, table: FloatArray, k: int) -> None:
 
 
 @inner
-def expand(now: Any, table: FloatArray, h: float) -> None:
-    """Fill the table with Taylor coefficients times h^k; sets ``order`` and the step ``h`` for which they hold."""
+def expand(now, table, h):
+    """Fill the table with Taylor coefficients times h^k; set ``order``; return whether the series ends before MOST."""
     table[A, 0], table[A, 1] = now.A, h * now.dA
     table[B, 0], table[B, 1] = now.B, h * now.dB
     table[Z, 0], table[Z, 1] = now.y_mean - now.centre, h * now.dy_mean
     table[THETA, 0] = now.theta
     weight = now.weight if now.free > 0 else 0.0
-    small = 0
-    now.h = h
+    small, now.h = 0, h
     for k in range(MOST - 1):
         inertia_term(now, table, k)
         table[THETA, k + 1] = h * table[OMEGA, k] / (k + 1)
         table[FORCE, k] = 0.0
         if now.gravity != 0.0:
             force_term(now, table, k)
-        pull = product(table, SQUARE, Z, k)
-        table[PULL, k] = pull
-        share, drag = h * h / ((k + 1) * (k + 2)), h / (k + 2)
-        table[A, k + 2] = share * product(table, SQUARE, A, k) - drag * now.drag_rate * table[A, k + 1]
-        table[B, k + 2] = share * product(table, SQUARE, B, k) - drag * now.drag_rate * table[B, k + 1]
-        table[Z, k + 2] = share * (now.spring * pull + weight * table[FORCE, k]) - drag * now.damping * table[Z, k + 1]
-        small = small + 1 if size(now, table, k + 2) < TRUNCATION else 0
+        table[PULL, k] = product(table, SQUARE, Z, k)
+        share, drag, p = h * h / ((k + 1) * (k + 2)), h / (k + 2), k + 2
+        table[A, p] = share * product(table, SQUARE, A, k) - drag * now.drag_rate * table[A, k + 1]
+        table[B, p] = share * product(table, SQUARE, B, k) - drag * now.drag_rate * table[B, k + 1]
+        pull = now.spring * table[PULL, k] + weight * table[FORCE, k]
+        table[Z, p] = share * pull - drag * now.damping * table[Z, k + 1]
+        size = max(abs(table[A, p]), now.rate * abs(table[B, p]))
+        size = max(size, abs(table[Z, p]) / now.wall, abs(table[THETA, k + 1]))
+        small = small + 1 if size < TRUNCATION else 0
+        now.order = p
         if small == 2:
-            now.order = k + 2
-            return
-    now.order = MOST
-    worst = 0.0
-    for k in range(MOST - 1, MOST + 1):
-        worst = max(worst, (size(now, table, k) / TRUNCATION) ** (1.0 / k))
-    shorten(now, table, 0.9 / worst)
+            return True
+    return False
 
 
 @inner
-def size(now: Any, table: FloatArray, k: int) -> float:
-    """Return how large the terms of order k are, without dimension."""
-    turned = max(abs(table[A, k]), now.rate * abs(table[B, k]))
-    return max(turned, abs(table[Z, k]) / now.wall, abs(table[THETA, k - 1]))  # type: ignore[no-any-return]
-
-
-@inner
-def shorten(now: Any, table: FloatArray, factor: float) -> None:
-    """Let the coefficients serve a step that is shorter by ``factor``."""
-    power = 1.0
-    for k in range(MOST + 1):
-        for row in range(ROWS):
-            table[row, k] *= power
-        power *= factor
-    now.h *= factor
-
-
-@inner
-def value(table: FloatArray, row: int, order: int, x: float) -> float:
+def value(table, row, order, x):
     """Return the polynomial in a row at ``x``, a fraction of the step."""
     found = table[row, order]
     for k in range(order - 1, -1, -1):
         found = found * x + table[row, k]
-    return found  # type: ignore[no-any-return]
+    return found
 
 
 @inner
-def slope(table: FloatArray, row: int, order: int, x: float) -> float:
+def slope(table, row, order, x):
     """Return its derivative with respect to ``x``."""
     found = order * table[row, order]
     for k in range(order - 1, 0, -1):
         found = found * x + k * table[row, k]
-    return found  # type: ignore[no-any-return]
+    return found
 
 
 @inner
-def advance(now: Any, table: FloatArray, x: float) -> None:
-    """Move the state to the fraction ``x`` of the step."""
+def state_at(now, table, x):
+    """Return theta, A, B, z and the derivatives in time of the last three at the fraction ``x`` of the step."""
     p, h = now.order, now.h
-    now.theta = value(table, THETA, p - 1, x)
-    now.A, now.dA = value(table, A, p, x), slope(table, A, p, x) / h
-    now.B, now.dB = value(table, B, p, x), slope(table, B, p, x) / h
-    if now.free > 0:
-        now.y_mean, now.dy_mean = now.centre + value(table, Z, p, x), slope(table, Z, p, x) / h
+    a, b, z = value(table, A, p, x), value(table, B, p, x), value(table, Z, p, x)
+    da, db, dz = slope(table, A, p, x) / h, slope(table, B, p, x) / h, slope(table, Z, p, x) / h
+    return value(table, THETA, p - 1, x), a, b, z, da, db, dz

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import pairwise
@@ -23,7 +26,8 @@ FULL = replace(Scenario(water_mass=1.0).with_slices(20), drag=0.0)
 
 
 def record_of(scenario, switches, free, on_base, on_cap):
-    now, _ = layout.prepare(scenario, switches, 1e-5, sequential=False, ledger=False)
+    flight, *_ = layout.prepare(scenario, switches, {"rest_speed": 1e-5, "impact_law": "", "energy": False})
+    now = flight[0]
     now.free, now.on_base, now.on_cap = free, on_base, on_cap
     layout.set_body(now)
     return now
@@ -222,14 +226,28 @@ def test_a_flight_in_which_time_stops_passing_is_stalled(monkeypatch):
     ("status", "words"),
     [(layout.WRONSKIAN, "A B' - A' B"), (layout.INERTIA, "J of the moments"), (layout.ESCAPED, "outside the bottle")],
 )
-def test_a_broken_check_is_a_status_that_says_which(status, words):
-    ask = api.Ask(model="eq8", switches=MODELS["eq8"].switches, rest_speed=1e-5)
-    flown = api.fly(HALF, np.array([0.1]), ask)
-    flown.record["status"] = status
-    found = api.trajectory(flown)
-    assert found.status == "diverged"
-    assert words in found.message
-    assert "eq8" in found.message
+def test_a_broken_check_says_which(status, words):
+    flight, *_ = layout.prepare(HALF, MODELS["eq8"].switches, {"rest_speed": 1e-5, "impact_law": "", "energy": False})
+    flight[0].status = status
+    found = api.message(flight[0], HALF, "eq8", solve(HALF).impacts)
+    assert words in found
+    assert "eq8" in found
+
+
+@pytest.mark.parametrize("admissible", [-1.0, 1e-20])
+def test_a_broken_check_is_a_status(admissible):
+    """The program says what no flight keeps to: its checks are at rounding, not at nothing."""
+    code = (
+        "from ode_reference.flow import points\n"
+        f"points.ADMISSIBLE = {admissible}\n"
+        "from ode_reference import solve; from slicemodel.scenario import Scenario\n"
+        "run = solve(Scenario(n_slices=3)); assert run.message.startswith('eq8: '); print(run.status, len(run.t))"
+    )
+    settings = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run([sys.executable, "-c", code], env=settings, capture_output=True, text=True, check=True)
+    status, reached = done.stdout.split()
+    assert status == "diverged"
+    assert int(reached) < 1000
 
 
 def test_its_own_checks_are_at_rounding():

@@ -29,7 +29,6 @@ from slicemodel.trajectory import STATUSES, FloatArray, Trajectory
 
 if TYPE_CHECKING:
     from flipproof.landing.work import Landed
-    from ode_reference.flow.api import Flown
 
 WHOLE: Final = ("ok", "escaped")
 """Statuses of a trajectory that reached the end of the flight."""
@@ -221,7 +220,7 @@ def curves_of(flight: Trajectory, points: int) -> FloatArray:
 
 def _read(
     number: int,
-    flight: Trajectory | Flown,
+    flight: Trajectory,
     seconds: float,
     arrays: Arrays | None = None,
     curves: FloatArray | None = None,
@@ -241,7 +240,7 @@ def _read(
             }
         values = {name: value if math.isfinite(value) else None for name, value in found.items()}
         reasons += [f"{name} is not finite" for name, value in values.items() if value is None]
-        if isinstance(flight, Trajectory) and "r_cm" in flight.diagnostics.get("not_given", ()):
+        if "r_cm" in flight.diagnostics.get("not_given", ()):
             values["r_cm_end"] = None
             reasons.append(f"{flight.method} gives no r_cm")
     else:
