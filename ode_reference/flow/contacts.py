@@ -13,11 +13,11 @@ from __future__ import annotations
 
 import math
 
-from ode_reference.flow.laws import strike
+from ode_reference.flow.laws import sequential, simultaneous
 from ode_reference.flow.layout import AFTER, APPROACH, COUNT, END, NEAR, SIDE, WHO
 from ode_reference.flow.ledger import book_jump, speeds_of
-from ode_reference.flow.points import enter, leave, set_body, set_scales, where
-from ode_reference.flow.search import ROUNDING, STANDING, watch
+from ode_reference.flow.points import count, enter, set_body, set_scales, where
+from ode_reference.flow.search import ROUNDING, STANDING
 from slicemodel.compiled import inner
 
 CHOICES = ((1, 1), (1, 0), (0, 1))
@@ -54,10 +54,10 @@ def touch(now, points, marks):
 
 
 @inner
-def add(now, points, marks, who, end, count, approach):
+def add(now, points, marks, who, end, slices, approach):
     """List one contact."""
     k = now.hits
-    marks[WHO, k], points[END, k], points[COUNT, k] = who, end, count
+    marks[WHO, k], points[END, k], points[COUNT, k] = who, end, slices
     points[APPROACH, k], points[AFTER, k] = approach, 0.0
     now.hits = k + 1
 
@@ -68,11 +68,14 @@ def meet(now, points, marks, impacts):
     at_rest = now.wall * (now.on_base - now.on_cap)
     now.y_cm = now.slice_mass * (now.free * now.y_mean + at_rest) / now.total_mass
     before = speeds_of(now, points, marks)
-    now.dy_mean -= strike(now, points, marks)
+    if now.sequential:
+        now.dy_mean -= sequential(now, points, marks)
+    else:
+        now.dy_mean -= simultaneous(now, points, APPROACH, now.restitution)
     for k in range(now.hits):
         j, end = marks[WHO, k], points[END, k]
         if j >= 0:
-            leave(now, points, j)
+            count(now, points, j, -1)
             enter(now, points, j, end * now.wall, end * points[AFTER, k])
     rebounded = speeds_of(now, points, marks)
     choose(now, points, marks)
@@ -96,7 +99,6 @@ def slow_on(now, points, end):
 @inner
 def choose(now, points, marks):
     """Set ``on_base``, ``on_cap``: who stays there; and ``shift``, what all others then lose."""
-    ratio = now.recoil * now.slice_mass / now.bottle_mass
     base, base_sum, base_one = slow_on(now, points, 1.0)
     cap, cap_sum, cap_one = slow_on(now, points, -1.0)
     free, everyone = now.free, now.free + now.on_base + now.on_cap
@@ -110,7 +112,7 @@ def choose(now, points, marks):
         now.free = everyone - now.on_base - now.on_cap
         set_body(now)
         loose = on_base * base_sum + on_cap * cap_sum
-        shift = ratio * loose / (1.0 + ratio * (now.on_base + now.on_cap))
+        shift = now.ratio * loose / (1.0 + now.ratio * (now.on_base + now.on_cap))
         moving = total - loose - now.free * shift
         press_base = is_pressed(now, 1.0, 0.0 if on_base else base_one - shift, moving)
         press_cap = is_pressed(now, -1.0, 0.0 if on_cap else cap_one - shift, moving)
@@ -151,7 +153,7 @@ def settle(now, points, marks, impacts):
             row[3], row[4], row[5] = end, points[APPROACH, k], abs(v)
             now.impacts += 1
         if j >= 0 and stays:
-            leave(now, points, j)
+            count(now, points, j, -1)
             now.rests += marks[SIDE, j] == 0
             marks[SIDE, j] = int(end)
         elif j >= 0 and marks[SIDE, j] != 0:
@@ -175,7 +177,8 @@ def settle(now, points, marks, impacts):
 
 @inner
 def let_go(now, marks, i):
-    """Let a slice go that rested."""
+    """Let a slice go that rested; it is watched from now on."""
     marks[SIDE, i] = 0
-    watch(now, marks, i)
+    marks[NEAR, now.near] = i
+    now.near += 1
     now.releases += 1

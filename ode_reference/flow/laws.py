@@ -1,8 +1,8 @@
 """Which impulses act when slices strike the ends at one instant, x = end * velocity > 0 approaching.
 
 A law reads end, number of slices and approach speed of every contact, writes the speeds ``AFTER``, and returns the
-velocity V that the tube gains. To the simultaneous law all slices at rest on one end are one contact; to the sequential
-law each is its own, for it may leave at a speed of its own.
+velocity V that the tube gains: none where ``ratio``, m / M_b or 0 without recoil, is 0. To the simultaneous law all
+slices at rest on one end are one contact; to the sequential law each is its own, for it may leave at its own speed.
 """
 
 from __future__ import annotations
@@ -25,20 +25,7 @@ MOST_PIECES = 200
 
 
 @inner
-def strike(now, points, marks):
-    """Write ``AFTER`` by the law of this flight; return V [m/s]."""
-    ratio = now.slice_mass / now.bottle_mass
-    if now.sequential:
-        return sequential(now, points, marks, ratio)
-    if now.recoil:
-        return simultaneous(now, points, APPROACH, now.restitution, ratio)
-    for k in range(now.hits):
-        points[AFTER, k] = -now.restitution * points[APPROACH, k]
-    return 0.0
-
-
-@inner
-def simultaneous(now, points, row, e, ratio):
+def simultaneous(now, points, row, e):
     """Write ``AFTER`` from the approach speeds in ``row`` by the law of Newton and Moreau; return V.
 
     With p_i = m max(0, (1 + e) x_i - s_i V) and V = sum s_i p_i / M_b, a slice that is pushed leaves at -e x_i, and
@@ -56,7 +43,7 @@ def simultaneous(now, points, row, e, ratio):
             if (1.0 + e) * x - end * gained > 0.0:
                 total += points[COUNT, k] * end * (1.0 + e) * x
                 pushed += points[COUNT, k]
-        found = ratio * total / (1.0 + ratio * pushed)
+        found = now.ratio * total / (1.0 + now.ratio * pushed)
         if found == gained:
             break
         low, high = (gained, high) if found > gained else (low, gained)
@@ -68,7 +55,7 @@ def simultaneous(now, points, row, e, ratio):
 
 
 @inner
-def sequential(now, points, marks, ratio):
+def sequential(now, points, marks):
     """Return V after binary impacts, the fastest approach first, until nothing approaches.
 
     Between mirror images rounding must not choose: of slices that approach equally fast the first one comes first.
@@ -87,12 +74,12 @@ def sequential(now, points, marks, ratio):
             if after[k] >= (1.0 - TIE) * highest and (first < 0 or marks[WHO, k] < marks[WHO, first]):
                 first = k
         speed = after[first]
-        step = points[END, first] * (1.0 + e) * speed * ratio / (1.0 + ratio)
+        step = points[END, first] * (1.0 + e) * speed * now.ratio / (1.0 + now.ratio)
         for k in range(now.hits):
             after[k] -= points[END, k] * step
         after[first] = -e * speed
         gained += step
     if np.max(after) > 0.0:
         # All of them, for an end that moves on may catch up with a slice that was leaving.
-        gained += simultaneous(now, points, AFTER, 0.0, ratio)
+        gained += simultaneous(now, points, AFTER, 0.0)
     return gained

@@ -33,7 +33,7 @@ WORKS: Final = ("drag", "weight", "negative_spring", "missing_origin", "impacts"
 """What changes the energy; the record keeps each as ``work_`` and its name."""
 
 _REAL = (
-    "slice_mass bottle_mass total_mass bottle_inertia momentum gravity drag_rate kappa wall restitution rest_speed "
+    "slice_mass bottle_mass total_mass bottle_inertia momentum ratio gravity drag_rate kappa wall restitution rest_speed "
     "tolerance duration centre body_inertia reduced_mass spring damping weight push_z push_dz "
     "t theta A dA B dB y_mean dy_mean mu mw U P V "
     "base_time span pace clear fastest rate thrust omega rest_A rest_B rest_z h root y_cm shift "
@@ -91,6 +91,7 @@ def prepare(
     for name in ("slice_mass", "bottle_mass", "total_mass", "bottle_inertia"):
         now[name] = getattr(throw, name)
     now.momentum = throw.angular_momentum
+    now.ratio = switches.recoil * throw.slice_mass / throw.bottle_mass
     now.gravity = 0.0 if switches.weightless else throw.gravity
     now.drag_rate = throw.drag_rate if switches.signs else 0.0
     now.kappa = 0.0 if switches.roots else (throw.drag_rate / 2) ** 2
@@ -100,7 +101,7 @@ def prepare(
     now.origin, now.drag_on_centre, now.recoil = switches.origin, switches.drag_on_centre, switches.recoil
     now.sequential = settings["impact_law"] == "sequential" and switches.recoil
     now.ledger, now.step_limit, now.watch = settings["energy"], STEP_LIMIT, WATCH
-    now.theta = scenario.theta0
+    now.theta, now.A, now.dB = scenario.theta0, 1.0, 1.0
     points, marks = np.zeros((6, n)), np.zeros((3, n), dtype=np.int64)
     # A full bottle is mirror symmetric to the last digit: its stack is as high as the tube is long.
     empty = (1.0 - scenario.fill_fraction) * scenario.bottle.length / 2

@@ -10,7 +10,7 @@ from ode_reference.flow.contacts import meet, touch
 from ode_reference.flow.layout import OVERFLOW, PLACE, SIDE, SPEED, STALLED
 from ode_reference.flow.ledger import book_step, energy_of
 from ode_reference.flow.points import enter, inertia_at, inertia_of, rebase, set_body, set_scales
-from ode_reference.flow.search import find, flock_is_clear, gather, sum_rests
+from ode_reference.flow.search import find, flock_is_clear, gather
 from ode_reference.flow.series import MOST, ROWS, expand, state_at
 from slicemodel.compiled import inner, kept_on_disk
 
@@ -83,7 +83,6 @@ def step(now, points, marks, table, out):
     left = now.duration - now.t
     h = min(now.pace, now.base_time + 0.95 * now.span - now.t, left)
     ended = expand(now, table, h)
-    sum_rests(now, table)
     if not math.isfinite(now.rest_A + now.rest_B + now.rest_z + h * now.omega) or not h > 0.0:
         now.status = OVERFLOW
         return

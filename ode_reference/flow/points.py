@@ -44,15 +44,6 @@ def set_scales(now):
 
 
 @inner
-def start_map(now):
-    """Let the map start here, A = 1, A' = 0, B = 0, B' = 1, with no points."""
-    now.A, now.dA, now.B, now.dB = 1.0, 0.0, 0.0, 1.0
-    now.base_time = now.t
-    now.free = 0
-    now.U = now.P = now.V = 0.0
-
-
-@inner
 def rebase(now, points, marks):
     """Move every free slice to where it is, make the moments anew and start the map here.
 
@@ -64,7 +55,8 @@ def rebase(now, points, marks):
         if marks[SIDE, i] == 0:
             points[PLACE, i], points[SPEED, i] = where(now, points, i)
             outermost = max(outermost, abs(points[PLACE, i]))
-    start_map(now)
+    now.A, now.dA, now.B, now.dB = 1.0, 0.0, 0.0, 1.0
+    now.base_time, now.free = now.t, 0
     for i in range(points.shape[1]):
         if marks[SIDE, i] == 0:
             enter(now, points, i, points[PLACE, i], points[SPEED, i])
@@ -79,11 +71,11 @@ def rebase(now, points, marks):
 
 
 @inner
-def count(now, sign, a, b):
-    """Add (+1) to the moments, or take out of them (-1), a point that is (a, b) away from their mean."""
-    n = now.free
+def count(now, points, j, sign):
+    """Add slice j to the mean and the moments of the free ones (+1), or take it out of them (-1)."""
+    n, a, b = now.free, points[PLACE, j] - now.mu, points[SPEED, j] - now.mw
     now.free += sign
-    if now.free == 0:
+    if n == 0 or now.free == 0:
         now.U = now.P = now.V = 0.0
         return
     share = sign / now.free
@@ -97,21 +89,12 @@ def count(now, sign, a, b):
 
 
 @inner
-def leave(now, points, j):
-    """Take slice j out of the moments of the free ones."""
-    count(now, -1, points[PLACE, j] - now.mu, points[SPEED, j] - now.mw)
-
-
-@inner
 def enter(now, points, j, y, v):
-    """Give slice j the point (u, w) that the map takes to place y and speed v now, and add it to the moments."""
+    """Give slice j the point (u, w) that the map takes to place y and speed v now, and add it to the free ones."""
     if now.free == 0:
-        start_map(now)
-        now.y_mean = now.mu = y
-        now.dy_mean = now.mw = v
+        now.y_mean, now.dy_mean, now.mu, now.mw = y, v, y, v
     dy, dv = y - now.y_mean, v - now.dy_mean
     wronskian = now.A * now.dB - now.dA * now.B
-    a = (now.dB * dy - now.B * dv) / wronskian
-    b = (now.A * dv - now.dA * dy) / wronskian
-    points[PLACE, j], points[SPEED, j] = now.mu + a, now.mw + b
-    count(now, 1, a, b)
+    points[PLACE, j] = now.mu + (now.dB * dy - now.B * dv) / wronskian
+    points[SPEED, j] = now.mw + (now.A * dv - now.dA * dy) / wronskian
+    count(now, points, j, 1)

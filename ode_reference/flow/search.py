@@ -139,23 +139,6 @@ def find(now, table, points, marks):
 
 
 @inner
-def sum_rests(now, table):
-    """Sum the magnitudes of the terms beyond the straight line: what A, B and z can add in this step."""
-    now.rest_A = now.rest_B = now.rest_z = 0.0
-    for k in range(2, now.order + 1):
-        now.rest_A += abs(table[A, k])
-        now.rest_B += abs(table[B, k])
-        now.rest_z += abs(table[Z, k])
-
-
-@inner
-def watch(now, marks, i):
-    """Put slice i on the list of those that are looked at one by one."""
-    marks[NEAR, now.near] = i
-    now.near += 1
-
-
-@inner
 def gather(now, points, marks):
     """List the slices that may come near an end within the span; the others are the flock."""
     now.clear = now.wall - now.thrust * now.span * now.span - 1e-6 * now.wall
@@ -164,7 +147,8 @@ def gather(now, points, marks):
         if marks[SIDE, i] == 0:
             u, w = points[PLACE, i], points[SPEED, i]
             if max(abs(u), abs(u + now.span * w)) > now.clear:
-                watch(now, marks, i)
+                marks[NEAR, now.near] = i
+                now.near += 1
             else:
                 now.fastest = max(now.fastest, abs(w))
 
