@@ -34,25 +34,23 @@ def fly(
     """
     n, points = scenario.n_slices, len(moments)
     frozen = scenario.frozen or 2 * (scenario.r_max - scenario.bottle.length / 2) <= layout.TOLERANCE
-    out = layout.Output(moments, np.empty((3, points)), *np.empty((2, points * states, n)))
+    rows, (y, v) = np.empty((3, points)), np.empty((2, points * states, n))
     # Overflow is a result here, reported as a status: it must not also appear as a warning.
     with np.errstate(all="ignore"):
         flight, places, marks = layout.prepare(scenario, model.switches, settings)
         if frozen:
-            hits = _hold(flight[0], places[layout.PLACE], out)
+            hits = _hold(flight[0], places[layout.PLACE], moments, rows, y, v)
         else:
             from ode_reference.flow.loop import fly as loop
 
-            hits = loop(flight, places, marks, out)
+            hits = loop(flight, places, marks, moments, rows, y, v)
         now = flight[0]
         reached, hits = int(now.recorded), hits[: int(now.impacts)]
-        theta, inertia, y_cm = out.rows[:, :reached]
+        theta, inertia, y_cm = rows[:, :reached]
         omega = now.momentum / inertia
     # Impacts of one instant in the order of the slices.
     hits = hits[np.lexsort((hits[:, 2], hits[:, 0]))]
-    r = out.r[:reached]
-    r += scenario.bottle.length / 2
-    r[r == np.inf], r[r == -np.inf] = scenario.r_max, scenario.r_min
+    r = np.clip(scenario.bottle.length / 2 + y[:reached], scenario.r_min, scenario.r_max)
     if len(r) and moments[0] == 0.0:
         r[0] = scenario.initial_positions()  # to the last digit, as output at release
     impacts = Impacts(*hits.T[1:])  # type: ignore[arg-type]
@@ -64,7 +62,7 @@ def fly(
         theta=theta,
         omega=omega,
         r=r,
-        v=out.v[:reached],
+        v=v[:reached],
         r_cm=scenario.bottle.length / 2 + y_cm,
         inertia=inertia,
         impacts=impacts,
@@ -75,16 +73,18 @@ def fly(
     )
 
 
-def _hold(now: Any, y: FloatArray, out: layout.Output) -> FloatArray:
+def _hold(
+    now: Any, places: FloatArray, moments: FloatArray, rows: FloatArray, y: FloatArray, v: FloatArray
+) -> FloatArray:
     """Write the flight of a bottle in which nothing moves: theta is linear; return its impacts, none."""
-    y_cm = now.slice_mass * y.sum() / now.total_mass
-    inertia = now.bottle_inertia + now.slice_mass * y.dot(y) - now.total_mass * y_cm * y_cm
+    y_cm = now.slice_mass * places.sum() / now.total_mass
+    inertia = now.bottle_inertia + now.slice_mass * places.dot(places) - now.total_mass * y_cm * y_cm
     omega = now.momentum / inertia
-    out.rows[:] = now.theta + omega * out.moments, np.full(len(out.moments), inertia), np.full(len(out.moments), y_cm)
-    out.r[:], out.v[:] = y, 0.0
+    rows[0], rows[1], rows[2] = now.theta + omega * moments, inertia, y_cm
+    y[:], v[:] = places, 0.0
     now.initial = now.final = now.momentum * omega / 2
-    finite = np.isfinite(now.initial) and np.isfinite(out.rows).all()
-    now.recorded, now.status = (len(out.moments), OK) if finite else (0, OVERFLOW)
+    finite = np.isfinite(now.initial) and np.isfinite(rows).all()
+    now.recorded, now.status = (len(moments), OK) if finite else (0, OVERFLOW)
     return np.empty((0, 6))
 
 

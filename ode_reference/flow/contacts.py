@@ -86,10 +86,10 @@ def meet(now, points, marks, impacts):
 
 @inner
 def slow_on(now, points, end):
-    """Return how many of the slices on an end are slow, their speeds summed up, and one of them."""
-    slow, total, one = 0.0, 0.0, 0.0
+    """Return how many slices may stay on an end, which is none if it lets go; their speeds summed up; one of them."""
+    slow = total = one = 0.0
     for k in range(now.hits):
-        if points[END, k] == end and abs(points[AFTER, k]) < now.rest_speed:
+        if points[END, k] == end != now.released and abs(points[AFTER, k]) < now.rest_speed:
             one = end * points[AFTER, k]
             slow += points[COUNT, k]
             total += points[COUNT, k] * one
@@ -103,10 +103,11 @@ def choose(now, points, marks):
     cap, cap_sum, cap_one = slow_on(now, points, -1.0)
     free, everyone = now.free, now.free + now.on_base + now.on_cap
     total = speeds_of(now, points, marks)[0]
-    best = stay_base = stay_cap = 0
+    best, stays = 0, (0, 0)
     now.shift = 0.0
-    for on_base, on_cap in CHOICES:
-        if (on_base and (base == 0 or now.released > 0)) or (on_cap and (cap == 0 or now.released < 0)):
+    for choice in CHOICES:
+        on_base, on_cap = choice
+        if on_base > base or on_cap > cap:
             continue
         now.on_base, now.on_cap = int(on_base * base), int(on_cap * cap)
         now.free = everyone - now.on_base - now.on_cap
@@ -114,14 +115,15 @@ def choose(now, points, marks):
         loose = on_base * base_sum + on_cap * cap_sum
         shift = now.ratio * loose / (1.0 + now.ratio * (now.on_base + now.on_cap))
         moving = total - loose - now.free * shift
-        press_base = is_pressed(now, 1.0, 0.0 if on_base else base_one - shift, moving)
-        press_cap = is_pressed(now, -1.0, 0.0 if on_cap else cap_one - shift, moving)
-        right = press_base >= on_base and press_cap >= on_cap
-        strict = (base == 0 or press_base == on_base) and (cap == 0 or press_cap == on_cap)
-        # Rounding at a group that is neither pressed nor pulled can spoil every strict choice.
-        if right and best < 1 + strict:
-            best, stay_base, stay_cap, now.shift = 1 + strict, on_base, on_cap, shift
-    now.free, now.on_base, now.on_cap = free, int(stay_base * base), int(stay_cap * cap)
+        # Who is pressed: of those that stay at no speed, of those that leave at theirs.
+        base_pressed = base > 0 and is_pressed(now, 1.0, (1 - on_base) * (base_one - shift), moving)
+        cap_pressed = cap > 0 and is_pressed(now, -1.0, (1 - on_cap) * (cap_one - shift), moving)
+        right = base_pressed >= on_base and cap_pressed >= on_cap
+        # Rounding at a group that is neither pressed nor pulled can spoil every choice in which all who leave are not.
+        rank = right + (right and base_pressed == on_base and cap_pressed == on_cap)
+        if rank > best:
+            best, stays, now.shift = rank, choice, shift
+    now.free, now.on_base, now.on_cap = free, int(stays[0] * base), int(stays[1] * cap)
 
 
 @inner
@@ -136,7 +138,7 @@ def is_pressed(now, end, v, moving):
     thrown = (now.omega * now.omega - now.kappa) * (end * now.wall - now.centre - now.push_z * z)
     force = now.gravity * math.cos(now.theta) * (1.0 - now.kappa / now.omega / now.omega)
     push = thrown + now.push_dz * dz + now.weight * force - now.drag_rate * v
-    return int(end * push >= -ROUNDING * now.thrust)
+    return end * push >= -ROUNDING * now.thrust
 
 
 @inner

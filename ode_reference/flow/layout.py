@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,22 +63,6 @@ their approach speed and their speed after."""
 SIDE, NEAR, WHO = range(3)
 """Rows of ``marks``: the end a slice rests on, or 0; the list of watched slices; for each contact its slice, or -1 for
 all that rest on its end."""
-
-
-class Output(NamedTuple):
-    """What a flight writes into: states at its output times, up to the last that it reaches.
-
-    Parameters
-    ----------
-    moments : array, shape (P,) - output times [s]
-    rows : array, shape (3, P) - theta, J and y_CM
-    r, v : array, shape (P, N) - y, infinite at rest, and y' [m], [m/s]; of shape (0, N) if they are not asked for
-    """
-
-    moments: FloatArray
-    rows: FloatArray
-    r: FloatArray
-    v: FloatArray
 
 
 def prepare(

@@ -14,22 +14,21 @@ from ode_reference.flow.search import find, flock_is_clear, gather
 from ode_reference.flow.series import MOST, ROWS, expand, state_at
 from slicemodel.compiled import inner, kept_on_disk
 
-TURN = 0.2
-"""Longest span in units of 1/|omega|, 1/d and 1/gamma: the map starts anew before B/A has grown much."""
-
 LEAST_ADVANCE = 1e-7
 """Of the duration: what time must advance by in as many steps as ``watch`` says."""
 
 
 @kept_on_disk()
-def fly(flight, points, marks, out):
+def fly(flight, points, marks, moments, rows, r, v):
     """Advance a flight to its duration, or to where it must stop; return its impacts, more rows than there are: step,
     time, slice, end, speed before and after.
 
     Parameters
     ----------
     flight, points, marks - as ``layout.prepare`` makes them
-    out : Output
+    moments : array, shape (P,) - output times [s]
+    rows : array, shape (3, P) - here go theta, J and y_CM up to the last output time that the flight reaches
+    r, v : array, shape (P, N) - here go y, infinite at rest, and y' [m], [m/s]; of shape (0, N) if they are not asked for
     """
     now = flight[0]
     impacts, table = np.empty((64, 6)), np.zeros((ROWS + 1, MOST + 1))
@@ -40,7 +39,7 @@ def fly(flight, points, marks, out):
         now.status = OVERFLOW
     now.initial = energy_of(now, points, marks)
     now.pace = now.duration
-    new_base(now, points, marks, now.duration)
+    gather(now, points, marks, now.duration)
     # Who touches an end at release is in contact, though it has no speed.
     now.struck = -1
     touch(now, points, marks)
@@ -51,7 +50,7 @@ def fly(flight, points, marks, out):
             meet(now, points, marks, impacts)
         if now.duration - now.t <= 4.0 * 2.3e-16 * now.duration:
             break
-        step(now, points, marks, table, out)
+        step(now, points, marks, table, moments, rows, r, v)
     if now.status == 0:
         rebase(now, points, marks)
         now.t = now.duration
@@ -60,16 +59,7 @@ def fly(flight, points, marks, out):
 
 
 @inner
-def new_base(now, points, marks, longest):
-    """Start the map here and choose for how long, and so which, slices are watched: some sqrt(N) of many."""
-    rebase(now, points, marks)
-    set_scales(now)
-    now.span = min(longest, TURN / now.rate / math.sqrt(1.0 + points.shape[1] / 100.0))
-    gather(now, points, marks)
-
-
-@inner
-def step(now, points, marks, table, out):
+def step(now, points, marks, table, moments, rows, r, v):
     """Advance to the next event, or as far as the map, the series or the duration let it."""
     now.steps += 1
     if now.steps % now.watch == 0:
@@ -78,7 +68,7 @@ def step(now, points, marks, table, out):
             return
         now.watched_from = now.t
     if now.t - now.base_time > 0.7 * now.span or 0.75 * now.A * now.span < now.B:
-        new_base(now, points, marks, now.duration)
+        gather(now, points, marks, now.duration)
     set_scales(now)
     left = now.duration - now.t
     h = min(now.pace, now.base_time + 0.95 * now.span - now.t, left)
@@ -90,12 +80,13 @@ def step(now, points, marks, table, out):
         now.pace = 0.3 * h
         return
     if not flock_is_clear(now, table):
-        new_base(now, points, marks, 0.5 * now.span if now.t == now.base_time else now.duration)
+        gather(now, points, marks, 0.5 * now.span if now.t == now.base_time else now.duration)
         return
     find(now, table, points, marks)
     x = min(now.root, 1.0)
     end = now.duration if x == 1.0 and h >= left else now.t + x * h
-    record(now, table, points, marks, out, end)
+    while now.recorded < len(moments) and moments[now.recorded] <= end:
+        record(now, table, points, marks, (moments[now.recorded] - now.t) / h, rows, r, v)
     if now.ledger:
         book_step(now, table, x)
     now.theta, now.A, now.B, z, now.dA, now.dB, now.dy_mean = state_at(now, table, x)
@@ -106,19 +97,15 @@ def step(now, points, marks, table, out):
 
 
 @inner
-def record(now, table, points, marks, out, until):
-    """Write the states at the output times up to ``until``."""
-    moments, rows, r, v = out
-    while now.recorded < len(moments) and moments[now.recorded] <= until:
-        q = now.recorded
-        theta, a, b, z, da, db, dz = state_at(now, table, (moments[q] - now.t) / now.h)
-        rows[0, q], rows[1, q] = theta, inertia_at(now, a, b, z)
-        rows[2, q] = now.centre + now.slice_mass * now.free / now.total_mass * z
-        if len(r) > 0:
-            for i in range(points.shape[1]):
-                if marks[SIDE, i] == 0:
-                    u, w = points[PLACE, i] - now.mu, points[SPEED, i] - now.mw
-                    r[q, i], v[q, i] = now.centre + z + a * u + b * w, dz + da * u + db * w
-                else:
-                    r[q, i], v[q, i] = marks[SIDE, i] * np.inf, 0.0
-        now.recorded += 1
+def record(now, table, points, marks, x, rows, r, v):
+    """Write the state at the fraction ``x`` of the step."""
+    q = now.recorded
+    theta, a, b, z, da, db, dz = state_at(now, table, x)
+    rows[0, q], rows[1, q] = theta, inertia_at(now, a, b, z)
+    rows[2, q] = now.centre + now.slice_mass * now.free / now.total_mass * z
+    for i in range(points.shape[1] if len(r) > 0 else 0):
+        u, w = points[PLACE, i] - now.mu, points[SPEED, i] - now.mw
+        r[q, i], v[q, i] = now.centre + z + a * u + b * w, dz + da * u + db * w
+        if marks[SIDE, i] != 0:
+            r[q, i], v[q, i] = marks[SIDE, i] * np.inf, 0.0
+    now.recorded += 1

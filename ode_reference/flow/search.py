@@ -14,7 +14,8 @@ from __future__ import annotations
 import math
 
 from ode_reference.flow.layout import NEAR, PLACE, SIDE, SPEED, STALLED
-from ode_reference.flow.series import FORCE, PULL, ROWS, SQUARE, A, B, Z, slope, value
+from ode_reference.flow.points import rebase, set_scales
+from ode_reference.flow.series import FORCE, PULL, ROWS, SQUARE, A, B, Z, value
 from slicemodel.compiled import inner
 
 POLYNOMIAL = ROWS
@@ -25,6 +26,9 @@ NONE = 2.0
 
 MOST_PARABOLAS = 1000
 """Parabolas of one search, of which some ten are needed; a flight that needs more is stalled."""
+
+TURN = 0.2
+"""Longest span in units of 1/|omega|, 1/d and 1/gamma: the map starts anew before B/A has grown much."""
 
 MARGIN = 1e-13
 """Room that the bound leaves for rounding, in units of the wall's distance."""
@@ -47,7 +51,7 @@ def first_zero(now, table, order):
     for k in range(2, order + 1):
         bend += k * (k - 1) * abs(table[POLYNOMIAL, k])
     for _ in range(MOST_PARABOLAS):
-        gap, rate = value(table, POLYNOMIAL, order, x), slope(table, POLYNOMIAL, order, x)
+        gap, rate = value(table, POLYNOMIAL, order, x)
         if gap <= 0.0 and rate <= 0.0:
             return x
         root = math.sqrt(max(rate * rate + 2.0 * bend * gap, 0.0))
@@ -139,8 +143,14 @@ def find(now, table, points, marks):
 
 
 @inner
-def gather(now, points, marks):
-    """List the slices that may come near an end within the span; the others are the flock."""
+def gather(now, points, marks, longest):
+    """Start the map anew and list the slices that may come near an end within its span; the others are the flock.
+
+    The span falls as 1/sqrt(N), and with it how many are watched, while starting anew costs N: so do both sqrt(N).
+    """
+    rebase(now, points, marks)
+    set_scales(now)
+    now.span = min(longest, TURN / now.rate / math.sqrt(1.0 + points.shape[1] / 100.0))
     now.clear = now.wall - now.thrust * now.span * now.span - 1e-6 * now.wall
     now.near, now.fastest = 0, 0.0
     for i in range(points.shape[1]):

@@ -79,26 +79,18 @@ def expand(now, table, h):
 
 @inner
 def value(table, row, order, x):
-    """Return the polynomial in a row at ``x``, a fraction of the step."""
-    found = table[row, order]
-    for k in range(order - 1, -1, -1):
+    """Return the polynomial in a row at ``x``, a fraction of the step, and its derivative with respect to ``x``."""
+    found = slope = 0.0
+    for k in range(order, -1, -1):
+        slope = slope * x + found
         found = found * x + table[row, k]
-    return found
-
-
-@inner
-def slope(table, row, order, x):
-    """Return its derivative with respect to ``x``."""
-    found = order * table[row, order]
-    for k in range(order - 1, 0, -1):
-        found = found * x + k * table[row, k]
-    return found
+    return found, slope
 
 
 @inner
 def state_at(now, table, x):
     """Return theta, A, B, z and the derivatives in time of the last three at the fraction ``x`` of the step."""
-    p, h = now.order, now.h
-    a, b, z = value(table, A, p, x), value(table, B, p, x), value(table, Z, p, x)
-    da, db, dz = slope(table, A, p, x) / h, slope(table, B, p, x) / h, slope(table, Z, p, x) / h
-    return value(table, THETA, p - 1, x), a, b, z, da, db, dz
+    a, da = value(table, A, now.order, x)
+    b, db = value(table, B, now.order, x)
+    z, dz = value(table, Z, now.order, x)
+    return value(table, THETA, now.order - 1, x)[0], a, b, z, da / now.h, db / now.h, dz / now.h
