@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -143,8 +143,7 @@ def solve(
             )
     from ode_reference.flow import api
 
-    settings = {"rest_speed": speed, "impact_law": impact_law, "energy": energy}
-    return api.fly(scenario, moments, chosen, settings)
+    return api.fly(scenario, moments, chosen.switches, _settings(chosen, speed, impact_law, energy))
 
 
 def solve_batch(
@@ -200,8 +199,15 @@ def solve_batch(
         except ValueError as error:
             raise ValueError(f"throws[{k}]: {error}") from None
     moments = np.array(rows).reshape(len(throws), len(rows[0]) if rows else 0)
-    settings = {"rest_speed": _rest_speed(rest_speed, chosen), "impact_law": impact_law, "energy": energy}
-    return api.fly_all(throws, moments, chosen, settings, states=states, jobs=jobs)
+    settings = _settings(chosen, _rest_speed(rest_speed, chosen), impact_law, energy)
+    return api.fly_all(throws, moments, jobs, chosen.switches, settings, states=states)
+
+
+def _settings(model: Model, rest_speed: float, impact_law: str, energy: bool) -> dict[str, Any]:
+    """Return the settings that repeat a run by "taylor"."""
+    return {
+        "model": model.name, "method": TAYLOR, "rest_speed": rest_speed, "impact_law": impact_law, "energy": energy,
+    }  # fmt: skip
 
 
 def _rest_speed(given: float | None, model: Model) -> float:

@@ -10,9 +10,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from ode_reference import messages
 from ode_reference.flow import layout
 from ode_reference.flow.layout import ESCAPED, INERTIA, OK, OVERFLOW, STALLED, WRONSKIAN
-from ode_reference.motion import Model
+from ode_reference.switches import Switches
 from slicemodel.observables import grazes, opposite_hits
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray, Impacts, Trajectory
@@ -22,108 +23,92 @@ STATUSES: Final = {OK: "ok", OVERFLOW: "overflow", STALLED: "stalled"}
 
 
 def fly(
-    scenario: Scenario, moments: FloatArray, model: Model, settings: Mapping[str, Any], *, states: bool = True
+    scenario: Scenario, moments: FloatArray, switches: Switches, settings: Mapping[str, Any], *, states: bool = True
 ) -> Trajectory:
     """Fly one scenario.
 
     Parameters
     ----------
     moments : array, shape (P,) - output times [s]
-    settings : mapping - "rest_speed" [m/s], "impact_law", "energy", and what else the trajectory is to say of itself
+    settings : mapping - "model", the name of the equation; "rest_speed" [m/s], "impact_law", "energy"
     states : bool - whether r and v are kept
     """
-    n, points = scenario.n_slices, len(moments)
-    frozen = scenario.frozen or 2 * (scenario.r_max - scenario.bottle.length / 2) <= layout.TOLERANCE
-    rows, (y, v) = np.empty((3, points)), np.empty((2, points * states, n))
+    half, points = scenario.bottle.length / 2, len(moments)
+    rows, (y, v) = np.empty((3, points)), np.empty((2, points * states, scenario.n_slices))
     # Overflow is a result here, reported as a status: it must not also appear as a warning.
     with np.errstate(all="ignore"):
-        flight, places, marks = layout.prepare(scenario, model.switches, settings)
-        if frozen:
-            hits = _hold(flight[0], places[layout.PLACE], moments, rows, y, v)
+        flight, places, marks = layout.prepare(scenario, switches, settings)
+        now = flight[0]
+        if scenario.frozen or 2 * (scenario.r_max - half) <= layout.TOLERANCE:
+            hits = _hold(now, places[layout.PLACE], moments, rows)
+            y[:], v[:] = places[layout.PLACE], 0.0
         else:
             from ode_reference.flow.loop import fly as loop
 
             hits = loop(flight, places, marks, moments, rows, y, v)
-        now = flight[0]
         reached, hits = int(now.recorded), hits[: int(now.impacts)]
         theta, inertia, y_cm = rows[:, :reached]
         omega = now.momentum / inertia
-    # Impacts of one instant in the order of the slices.
-    hits = hits[np.lexsort((hits[:, 2], hits[:, 0]))]
-    r = np.clip(scenario.bottle.length / 2 + y[:reached], scenario.r_min, scenario.r_max)
+    r = np.clip(half + y[:reached], scenario.r_min, scenario.r_max)
     if len(r) and moments[0] == 0.0:
         r[0] = scenario.initial_positions()  # to the last digit, as output at release
-    impacts = Impacts(*hits.T[1:])  # type: ignore[arg-type]
+    # Impacts of one instant in the order of the slices.
+    impacts = Impacts(*hits[np.lexsort((hits[:, 2], hits[:, 0]))].T[1:])
+    found: dict[str, Any] = {name: int(now[name]) for name in ("steps", "impacts", "rests", "releases")}
+    found |= {"evaluations": found["steps"], "grazes": grazes(impacts, float(now.rest_speed))}
+    found["opposite_hits"] = opposite_hits(impacts)
+    found |= {name: float(now[name]) for name in ("largest_snap", "wronskian_error", "inertia_error")}
+    if now.ledger:
+        ledger = {name: float(now[f"work_{name}"]) for name in layout.WORKS}
+        initial, final = float(now.initial), float(now.final)
+        residual = final - initial - sum(ledger.values())
+        found["energy"] = {"initial": initial, "final": final, **ledger, "residual": residual}
     return Trajectory(
         scenario=scenario,
         solver="ode_reference",
-        method=model.name,
+        method=settings["model"],
         t=moments[:reached],
         theta=theta,
         omega=omega,
         r=r,
         v=v[:reached],
-        r_cm=scenario.bottle.length / 2 + y_cm,
+        r_cm=half + y_cm,
         inertia=inertia,
         impacts=impacts,
         status=STATUSES.get(int(now.status), "diverged"),
-        message="" if now.status == OK else message(now, scenario, model.name, impacts),
-        settings={"model": model.name, "method": "taylor", **settings},
-        diagnostics=_diagnostics(now, impacts),
+        message=message(now, scenario, settings["model"], impacts),
+        settings=settings,
+        diagnostics=found,
     )
 
 
-def _hold(
-    now: Any, places: FloatArray, moments: FloatArray, rows: FloatArray, y: FloatArray, v: FloatArray
-) -> FloatArray:
+def _hold(now: Any, y: FloatArray, moments: FloatArray, rows: FloatArray) -> FloatArray:
     """Write the flight of a bottle in which nothing moves: theta is linear; return its impacts, none."""
-    y_cm = now.slice_mass * places.sum() / now.total_mass
-    inertia = now.bottle_inertia + now.slice_mass * places.dot(places) - now.total_mass * y_cm * y_cm
+    y_cm = now.slice_mass * y.sum() / now.total_mass
+    inertia = now.bottle_inertia + now.slice_mass * y.dot(y) - now.total_mass * y_cm * y_cm
     omega = now.momentum / inertia
     rows[0], rows[1], rows[2] = now.theta + omega * moments, inertia, y_cm
-    y[:], v[:] = places, 0.0
     now.initial = now.final = now.momentum * omega / 2
     finite = np.isfinite(now.initial) and np.isfinite(rows).all()
     now.recorded, now.status = (len(moments), OK) if finite else (0, OVERFLOW)
     return np.empty((0, 6))
 
 
-def _diagnostics(now: Any, impacts: Impacts) -> dict[str, Any]:
-    """Return counts, and what the flight's own checks measured."""
-    found: dict[str, Any] = {name: int(now[name]) for name in ("steps", "impacts", "rests", "releases")}
-    found["evaluations"] = found["steps"]
-    found["grazes"] = grazes(impacts, float(now.rest_speed))
-    found["opposite_hits"] = opposite_hits(impacts)
-    for name in ("largest_snap", "wronskian_error", "inertia_error"):
-        found[name] = float(now[name])
-    if now.ledger:
-        works = {name: float(now[f"work_{name}"]) for name in layout.WORKS}
-        initial, final = float(now.initial), float(now.final)
-        residual = final - initial - sum(works.values())
-        found["energy"] = {"initial": initial, "final": final, **works, "residual": residual}
-    return found
-
-
 def message(now: Any, scenario: Scenario, model: str, impacts: Impacts) -> str:
-    """Return why a flight stopped, where and when; ``now`` is its record."""
-    at = f"t = {now.t:.9g} s"
+    """Return why a flight stopped, where and when, if it did; ``now`` is its record."""
+    if now.status == OK:
+        return ""
     if now.status == OVERFLOW:
-        return (
-            f"{model}: a number exceeded the floating-point range after {at}; omega0 = {scenario.omega0:g} rad/s, "
-            f"drag = {scenario.drag:g} kg/s and gravity = {scenario.gravity:g} m/s^2 cannot be computed together"
-        )
+        return messages.overflow(model, scenario, now.t)
     if now.status == STALLED:
-        who = ", ".join(str(i) for i in np.unique(impacts.slice[-20:])) or "none"
-        return (
-            f"{model}: time hardly passes after {now.steps} steps at {at}; slices of the last impacts: {who}; "
-            f"if they chatter, raise rest_speed (now {now.rest_speed:g} m/s), else check omega0, gravity and drag"
-        )
+        why = f"time hardly passes after {now.steps} steps"
+        return messages.stalled(model, why, now.t, impacts.slice[-20:], now.rest_speed)
     broken = {
         WRONSKIAN: f"A B' - A' B differs from exp(-d t) by {now.wronskian_error:.1e} of it",
         INERTIA: f"J of the moments differs from J of the slices by {now.inertia_error:.1e} of it",
         ESCAPED: "a slice is outside the bottle",
     }[int(now.status)]
-    return f"{model}: {broken} at {at}; the run is given up, report it with its scenario"
+    return f"{model}: {broken} at t = {now.t:.9g} s; the run is given up, report it with its scenario"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,19 +135,17 @@ class Batch(Sequence[Trajectory]):
         return self.flights[k]
 
 
-def fly_all(
-    throws: Sequence[Scenario],
-    moments: FloatArray,
-    model: Model,
-    settings: Mapping[str, Any],
-    *,
-    states: bool,
-    jobs: int | None,
-) -> Batch:
-    """Fly all throws by so many threads, one per core if not said; ``moments`` are output times, shape (K, P) [s]."""
+def fly_all(throws: Sequence[Scenario], moments: FloatArray, jobs: int | None, *ask: Any, states: bool) -> Batch:
+    """Fly all throws by so many threads, one per core if not said.
+
+    Parameters
+    ----------
+    moments : array, shape (K, P) - output times of each [s]
+    ask, states - as of ``fly``
+    """
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     with ThreadPoolExecutor(jobs or cores) as pool:
-        flights = tuple(pool.map(lambda *throw: fly(*throw, model, settings, states=states), throws, moments))
+        flights = tuple(pool.map(lambda *throw: fly(*throw, *ask, states=states), throws, moments))
     theta, omega = np.full(moments.shape, np.nan), np.full(moments.shape, np.nan)
     for k, flight in enumerate(flights):
         theta[k, : len(flight.t)], omega[k, : len(flight.t)] = flight.theta, flight.omega

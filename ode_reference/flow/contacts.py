@@ -40,9 +40,9 @@ def touch(now, points, marks):
                 enter(now, points, i, marks[SIDE, i] * now.wall, 0.0)
                 add(now, points, marks, i, marks[SIDE, i], 1, 0.0)
         now.on_base = now.on_cap = 0
-    for end, resting in ((1, now.on_base), (-1, now.on_cap)):
+    for side, resting in ((1, now.on_base), (-1, now.on_cap)):
         if resting > 0:
-            add(now, points, marks, -1, end, resting, 0.0)
+            add(now, points, marks, -1, side, resting, 0.0)
     for k in range(now.near):
         j = marks[NEAR, k]
         y, v = where(now, points, j)

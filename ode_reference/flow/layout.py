@@ -33,18 +33,21 @@ WORKS: Final = ("drag", "weight", "negative_spring", "missing_origin", "impacts"
 """What changes the energy; the record keeps each as ``work_`` and its name."""
 
 _REAL = (
-    "slice_mass bottle_mass total_mass bottle_inertia momentum ratio gravity drag_rate kappa wall restitution rest_speed "
-    "tolerance duration centre body_inertia reduced_mass spring damping weight push_z push_dz "
+    "slice_mass bottle_mass total_mass bottle_inertia momentum ratio gravity drag_rate kappa wall restitution "
+    "rest_speed tolerance duration centre body_inertia reduced_mass spring damping weight push_z push_dz "
     "t theta A dA B dB y_mean dy_mean mu mw U P V "
     "base_time span pace clear fastest rate thrust omega rest_A rest_B rest_z h root y_cm shift "
     "largest_snap wronskian_error inertia_error watched_from initial final"
-).split() + [f"work_{name}" for name in WORKS]
+)
 _WHOLE = (
     "origin drag_on_centre recoil sequential ledger free on_base on_cap near order struck released hits "
     "steps impacts rests releases recorded status step_limit watch"
-).split()
+)
 
-RECORD: Final = np.dtype([(name, np.float64) for name in _REAL] + [(name, np.int64) for name in _WHOLE])
+RECORD: Final = np.dtype(
+    [(name, np.float64) for name in (*_REAL.split(), *(f"work_{name}" for name in WORKS))]
+    + [(name, np.int64) for name in _WHOLE.split()]
+)
 """One flight: throw, switches, body of tube and resting slices, state, search, ledger and counts; SI units.
 
 state     t; theta; the map A, B and its derivatives; mean place and speed of the free slices; mean and central moments

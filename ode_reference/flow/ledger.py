@@ -33,8 +33,7 @@ _NODES, _WEIGHTS = (0.5 * numbers for numbers in np.polynomial.legendre.leggauss
 
 @inner
 def speeds_of(now, points, marks):
-    """Return the sums of the velocities [m/s] and of their squares, those of slices that rested before this instant
-    included."""
+    """Return the sums of all velocities [m/s] and of their squares; slices at rest may have one within an instant."""
     total = now.free * now.dy_mean
     squares = total * now.dy_mean + now.dA * now.dA * now.U + 2.0 * now.dA * now.dB * now.P + now.dB * now.dB * now.V
     for k in range(now.hits):

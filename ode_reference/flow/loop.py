@@ -20,15 +20,16 @@ LEAST_ADVANCE = 1e-7
 
 @kept_on_disk()
 def fly(flight, points, marks, moments, rows, r, v):
-    """Advance a flight to its duration, or to where it must stop; return its impacts, more rows than there are: step,
-    time, slice, end, speed before and after.
+    """Advance a flight to its duration, or to where it must stop; return its impacts, more rows than there are.
+
+    The columns of an impact: number of the step, time, slice, end, speed before and after.
 
     Parameters
     ----------
     flight, points, marks - as ``layout.prepare`` makes them
     moments : array, shape (P,) - output times [s]
     rows : array, shape (3, P) - here go theta, J and y_CM up to the last output time that the flight reaches
-    r, v : array, shape (P, N) - here go y, infinite at rest, and y' [m], [m/s]; of shape (0, N) if they are not asked for
+    r, v : array, shape (P, N) - here go y, infinite at rest, and y' [m], [m/s]; (0, N) if they are not asked for
     """
     now = flight[0]
     impacts, table = np.empty((64, 6)), np.zeros((ROWS + 1, MOST + 1))
