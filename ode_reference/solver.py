@@ -15,7 +15,7 @@ from ode_reference.models import MODELS
 from ode_reference.motion import Model
 from ode_reference.switches import PREFIX, Switches
 from slicemodel.scenario import Scenario, not_whole
-from slicemodel.trajectory import FloatArray, Trajectory, output_times
+from slicemodel.trajectory import Trajectory, output_times
 
 if TYPE_CHECKING:
     from ode_reference.flow.api import Batch
@@ -131,8 +131,10 @@ def solve(
     speed = _rest_speed(rest_speed, chosen)
     moments = output_times(scenario, times)
     if method != TAYLOR:
-        return _integrate(
-            scenario, chosen, moments, speed, method=method, rtol=rtol, atol=atol, max_step=max_step,
+        from ode_reference import witness
+
+        return witness.integrate(
+            scenario, chosen, moments, method=method, rtol=rtol, atol=atol, max_step=max_step, rest_speed=speed,
             impact_law=impact_law, energy=energy,
         )  # fmt: skip
     for name, value in (("rtol", rtol), ("atol", atol), ("max_step", max_step)):
@@ -215,36 +217,6 @@ def _rest_speed(given: float | None, model: Model) -> float:
     if given is None:
         return REST_SPEED_WITH_RECOIL if model.switches.recoil else REST_SPEED
     return number_within("rest_speed", given, 1e-8, 0.1, unit=" m/s")
-
-
-def _integrate(
-    scenario: Scenario,
-    chosen: Model,
-    moments: FloatArray,
-    rest_speed: float,
-    *,
-    method: str,
-    rtol: float | None,
-    atol: float | None,
-    max_step: float | None,
-    impact_law: str,
-    energy: bool,
-) -> Trajectory:
-    """Integrate the 2N + 1 equations with one of SciPy's methods."""
-    from ode_reference import witness
-
-    return witness.integrate(
-        scenario,
-        chosen,
-        method=method,
-        rtol=rtol,
-        atol=atol,
-        max_step=max_step,
-        rest_speed=rest_speed,
-        impact_law=impact_law,
-        energy=energy,
-        moments=moments,
-    )
 
 
 def _model(model: str | Switches) -> Model:
