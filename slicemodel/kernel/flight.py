@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slicemodel.compiled import compiled, kept_on_disk, merged
-from slicemodel.kernel.closed_form import Map, coefficients, cosine, growth_rate_squared, moved
+from slicemodel.kernel.closed_form import Map, coefficients, growth_rate_squared, moved
 from slicemodel.kernel.flock import NO_STEP, bring_up_to_date, dissolved, foreseen, gathered, room_to_turn, sums_of
 from slicemodel.kernel.rebound import Step, Watched, predicted, step_in_step, step_on_grid
 from slicemodel.schemes import form as schemes_form
@@ -118,7 +118,7 @@ def fly(form, constants, frame, r0, t, dt, record, rebounds) -> Run:
             record.r[0, i], record.v[0, i] = r0[i], 0.0
     offset = water_share * first
     spin, angle = frame.omega0, frame.theta0
-    weight = constants.gravity * cosine(angle)
+    weight = constants.gravity * math.cos(angle)
     moment = inertia_about(frame, n, first, second, offset)
     momentum = moment * spin
     theta[0], omega[0], r_cm[0], inertia[0] = angle, spin, middle + offset, moment
@@ -142,7 +142,7 @@ def fly(form, constants, frame, r0, t, dt, record, rebounds) -> Run:
             if form.midpoint:
                 # A step as the exact step would make it predicts the end. Means over the step are then known up to
                 # second order, that of v_CM from the way of C_M, because v_CM itself jumps at an impact.
-                weight = constants.gravity * cosine(angle + 0.5 * dt * w)
+                weight = constants.gravity * math.cos(angle + 0.5 * dt * w)
                 one = Step(way, reach, w, centre, dt, t[k])
                 after, clear = foreseen(form, flock, since, one)
                 if not clear:
@@ -154,7 +154,7 @@ def fly(form, constants, frame, r0, t, dt, record, rebounds) -> Run:
                 w = 0.5 * (w + momentum / inertia_about(frame, n, end_first, end_second, water_share * end_first))
                 centre = centre_of_repulsion(form, constants, offset + 0.5 * shift, shift / dt, weight, w)
                 way = step_map(form, constants, fade_minus_1, fade, w, centre, dt)
-            weight = constants.gravity * cosine(angle + w * dt)
+            weight = constants.gravity * math.cos(angle + w * dt)
             one = Step(way, reach, w, centre, dt, t[k])
             after, clear = foreseen(form, flock, since, one)
             if not clear:
