@@ -17,6 +17,7 @@ SERIES = 0.5
 ROUNDING = 4e-16
 """Rounding of a sum of two numbers, in units of the larger."""
 
+
 class Map(NamedTuple):
     """The affine map of one step or several: y' = y + ((a - 1) y + b v + push), v' = c y + d v + pull.
 
