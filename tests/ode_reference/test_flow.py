@@ -200,6 +200,20 @@ def test_water_that_nothing_pushes_stays_where_it_is(switches, omega0):
         assert found.r == pytest.approx(np.tile(scenario.initial_positions(), (11, 1)), abs=1e-12)
 
 
+@pytest.mark.parametrize("change", np.linspace(-1e-13, 1e-13, 5))
+def test_a_slice_that_stands_on_an_end_is_struck_by_it(change):
+    """k^2 < 0 and e = 0 with recoil: slices stand unpressed on both ends, and the tube throws these at them."""
+    scenario = Scenario(
+        bottle=Bottle(mass=0.028), water_mass=0.565, n_slices=70, drag=0.0517, restitution=0.0,
+        omega0=13.06 * (1 + change), theta0=0.0534, duration=0.35,
+    )  # fmt: skip
+    found = solve(scenario, "switches:000111")
+    assert found.ok, found.message
+    assert found.diagnostics["opposite_hits"] > 10
+    assert found.diagnostics["largest_snap"] < 1e-14
+    assert abs(found.r - scenario.bottle.length / 2).max() <= scenario.r_max - scenario.bottle.length / 2 + 1e-15
+
+
 @pytest.mark.parametrize("share", [1 - 1e-9, 1 + 1e-9, 1 - 1e-14, 1 + 1e-14])
 @pytest.mark.parametrize("name", ["switches:100110", "switches:101011"])
 def test_water_that_is_hardly_pushed_does_not_stall(share, name):
