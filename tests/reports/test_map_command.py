@@ -241,7 +241,7 @@ def test_a_waterfall_from_rows_is_that_of_direct_runs_to_the_last_bit(split):
     direct = study_waterfall(runs[0], made)
     assert [part.observable.name for part in direct] == [observable.name for observable in OBSERVABLES]
     assert split_rows(rows) == direct
-    assert len(waterfall_csv(direct).splitlines()) == 1 + len(direct) * (2 + len(direct[0].bars))
+    assert len(waterfall_csv(direct).splitlines()) == 1 + len(direct) * (3 + len(direct[0].bars))
 
 
 def test_a_waterfall_s_run_that_is_not_whole_is_named(split):

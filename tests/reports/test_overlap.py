@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flipproof.chapters.overlap.chapter import claim_column, draw_overlap
 from flipproof.chapters.overlap.figure import figure_overlap
 from flipproof.chapters.overlap.study import CHECK, COARSER, COLUMN, EXCLUDE, PASS, plan_overlap, study_overlap
 from flipproof.figures.style import draw
@@ -72,6 +73,10 @@ def test_levels_bands_cost_and_distance_from_ice_are_read_off():
     assert study.cost == pytest.approx([-0.04, -0.596])
     assert study.check == pytest.approx([0.001, 0.002])
     assert study.cost_to_column == pytest.approx([-0.139, -0.598])
+    claim = claim_column(study)
+    assert claim.value == pytest.approx(-0.598)
+    assert "no share; free flight at N = 4" in claim.note
+    assert "at most -0.598, at filling 100%" in draw_overlap(study).caption
     assert study.missing_from_ice(EXCLUDE) == pytest.approx(0.004)
     assert study.missing_from_ice(PASS) == pytest.approx(0.6)
     assert study.restitution == 0.5

@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 
 import slicemodel
-from flipproof.chapters.waterfall.study import NAMES, PROGRAM, STEP, plan_waterfall, program_run, study_waterfall
+from flipproof.chapters.waterfall.study import (
+    COLUMN,
+    NAMES,
+    PROGRAM,
+    STEP,
+    plan_waterfall,
+    program_run,
+    study_waterfall,
+)
 from flipproof.frame.solvers import make
 from ode_reference import combinations, contact, motion, witness
 from slicemodel import Scenario
@@ -129,7 +137,7 @@ def bars():
     """Return the plateau's bars in the order of the ladder, every run made here by the method that faults spoil."""
     runs = {}
     for planned in plan_waterfall(THROW, STEPS):
-        how = {} if planned.solver == PROGRAM else {"method": "DOP853", "rtol": 1e-9}
+        how = {} if planned.solver in (PROGRAM, COLUMN) else {"method": "DOP853", "rtol": 1e-9}
         trajectory = make(dataclasses.replace(planned, settings={**planned.settings, **how})).trajectory
         assert trajectory is not None, planned.label
         runs[planned] = trajectory

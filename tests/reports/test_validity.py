@@ -7,8 +7,10 @@ import pytest
 from made_up import study_map
 
 import ode_reference
+from flipproof.chapters.maps.chapter import _beyond
 from flipproof.chapters.maps.figure import figure_map
 from flipproof.chapters.maps.study import (
+    COLUMN,
     EXTRA,
     LADDER,
     POINTS,
@@ -94,9 +96,20 @@ def test_a_model_runs_once_per_fill_along_the_step_axis():
     runs = plan_map(THROW, "step", FILLS, (0.01, 0.1, 0.5))
     solvers = [run.solver for run in runs]
     assert {solvers.count(name) for name in SCHEMES} == {6}
-    assert {solvers.count(name) for name in LADDER[1:]} == {2}
+    assert {solvers.count(name) for name in (*LADDER[1:], COLUMN)} == {2}
     steps = [run.settings["steps"] for run in runs if run.solver == "exact-step"]
     assert steps == [1001, 1001, 101, 101, 21, 21]  # omega_0 T = 10
+
+
+def test_the_column_runs_once_per_fill_along_the_restitution_that_it_does_not_know():
+    values = (0.1, 0.5, 0.9)
+    runs = plan_map(THROW, "restitution", FILLS, values)
+    assert [run.solver for run in runs].count(COLUMN) == 2
+    study = made_up("restitution", values, lambda run: 0.7 if run.solver == COLUMN else run.scenario.restitution)
+    assert study.level[COLUMN] == pytest.approx(0.7)
+    assert study.overlap == pytest.approx(np.array([[-0.6, -0.6], [-0.2, -0.2], [0.2, 0.2]]))
+    assert "In 0 of 0 cells" not in _beyond(study)
+    assert "N = 6" in _beyond(study)
 
 
 def test_cells_have_the_throw_that_their_axes_say():
@@ -143,7 +156,7 @@ def test_fair_shares_colour_a_map_where_every_set_was_flown():
     """In the order of the ladder the interaction is all recoil's; a fair share gives each of the two half of it."""
     worth = {"signs": 0.06, "roots": -0.02, "weightless": 0.05, "origin": 0.01, "recoil": -0.01}
     runs = plan_map(THROW, "gamma", FILLS, (0.1, 0.2))
-    assert len(runs) == 4 * (2 + 40)
+    assert len(runs) == 4 * (2 + 40 + 1)
     made = {run: flat(run, by_set(worth)(run)) for run in runs}
     study = study_map(THROW, "gamma", FILLS, (0.1, 0.2), made)
     assert study.shares[:, 1, 0] == pytest.approx([0.1, 0.11, -0.02, 0.0, 0.05, 0.01, 0.04], abs=1e-12)
@@ -192,7 +205,7 @@ def test_figures_name_their_axes_with_units_and_their_levels(axis):
     assert axes.get_ylabel().endswith("[1]")
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert set(RUNGS) <= set(labels)
-    assert sum("10%" in label for label in labels) == (2 if axis == "step" else 1)
+    assert sum("10%" in label for label in labels) == 2
     assert draw(figure).svg.startswith("<?xml")
 
 
@@ -202,7 +215,7 @@ def test_a_real_map_agrees_with_the_reference_and_has_a_band():
     study = study_map(THROW, "gamma", FILLS, values, made)
     assert (study.reason == "").all()
     for column, fill in enumerate(FILLS):
-        for name in ("eq8", "free-flight"):
+        for name in ("eq8", "free-flight", COLUMN):
             run = ode_reference.solve(vary(THROW, fill=fill), name)
             assert study.level[name][0, column] == pytest.approx(plateau(run.t, run.omega, THROW.omega0), abs=1e-4)
     assert set(study.level) == {*LADDER, *EXTRA}

@@ -100,7 +100,8 @@ def errors(
     """Return what the contours show, with its name."""
     if study.axis == "step":
         return [(f"step error of {scheme}", study.step_error[scheme]) for scheme in SCHEMES]
-    return [(f"error of {approximation}", study.error(approximation, measure))]
+    overlap = np.abs(study.overlap)
+    return [(f"error of {approximation}", study.error(approximation, measure)), ("change by overlap", overlap)]
 
 
 def _contours(axes: Axes, study: ValidityMap, error: FloatArray, words: str, colour: str) -> list[Line2D]:
