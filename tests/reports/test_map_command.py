@@ -161,10 +161,10 @@ def test_a_finished_map_is_only_drawn_again(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("flipproof.sweep.command.local_workers", None)
     status, out, err = run(capsys, *options, "--export", tmp_path / "out" / "rows.csv")
     assert (status, err) == (0, "")
-    assert "; 168 were there" in out
+    assert "; 172 were there" in out
     assert (tmp_path / "out" / "map.svg").read_bytes() == drawn
     assert (tmp_path / "out" / "map.png").read_bytes().startswith(b"\x89PNG")
-    assert len((tmp_path / "out" / "rows.csv").read_text().splitlines()) == 169
+    assert len((tmp_path / "out" / "rows.csv").read_text().splitlines()) == 173
 
 
 def test_table_and_contours_say_what_the_map_holds(tmp_path):
@@ -176,14 +176,18 @@ def test_table_and_contours_say_what_the_map_holds(tmp_path):
         assert float(row["fill_fraction"]) == study.fills[at[1]]
         assert float(row["gamma/omega0"]) == study.values[at[0]]
         assert float(row["plateau eq8"]) == study.level["eq8"][at]
+        assert float(row["plateau column"]) == study.level["column"][at]
         assert float(row["fair share of gravity"]) == study.shares[RUNGS.index("gravity")][at]
         assert row["largest fair share"] == RUNGS[study.dominant[at]]
         assert row["reason"] == ""
     facts = json.loads(json.dumps(map_facts(study, THROW), allow_nan=False))
     assert sum(facts["cells by largest fair share"].values()) == 9
-    assert [contour["level"] for contour in facts["contours"]] == [0.01, 0.1]
-    error = study.error("published-python")
+    assert [(contour["of"], contour["level"]) for contour in facts["contours"]] == [
+        (of, level) for of in ("error of published-python", "change by overlap") for level in (0.01, 0.1)
+    ]
+    shown = {"error of published-python": study.error("published-python"), "change by overlap": abs(study.overlap)}
     for contour in facts["contours"]:
+        error = shown[contour["of"]]
         assert contour["cells above"] == (error >= contour["level"]).sum()
         for line in contour["lines"]:
             for fill, value in line:
@@ -261,11 +265,11 @@ def test_the_waterfall_command_draws_every_observable(capsys, tmp_path, monkeypa
     status, out, err = run(capsys, *options, "--quiet")
     assert (status, err) == (0, "")
     assert "published program" in out
-    assert "162 points" in out
+    assert "164 points" in out
     for observable in OBSERVABLES:
         assert (tmp_path / "out" / f"waterfall-{observable.name}.png").stat().st_size > 10_000
     status, out, _ = run(capsys, *options)
-    assert "; 162 were there" in out
+    assert "; 164 were there" in out
 
 
 @pytest.mark.parametrize(
