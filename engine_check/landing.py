@@ -26,11 +26,15 @@ class Lander:
     reason: str
 
 
+STEP: Final = 2e-5
+"""Step of rigid contacts [s]. Whatever closes within a step strikes at once, which hits in a cascade do not: with steps
+of 1e-4 s some 4 % of the touches of moving water end otherwise than event by event (docs/landing.md, section 3)."""
+
 LANDERS: Final[Mapping[str, Lander]] = MappingProxyType(
     {
         "pymunk": Lander(
             module="engine_check.landing_pymunk",
-            dt=1e-4,
+            dt=STEP,
             laws=("together",),
             slices=("exclude", "staggered"),
             rise=ENERGY_RISE,
@@ -38,7 +42,7 @@ LANDERS: Final[Mapping[str, Lander]] = MappingProxyType(
         ),
         "mujoco": Lander(
             module="engine_check.landing_mujoco",
-            dt=1e-4,
+            dt=STEP,
             laws=("together", "in-turn"),
             slices=("exclude", "staggered"),
             rise=ENERGY_RISE,
