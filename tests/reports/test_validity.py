@@ -206,6 +206,8 @@ def test_figures_name_their_axes_with_units_and_their_levels(axis):
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert set(RUNGS) <= set(labels)
     assert sum("10%" in label for label in labels) == 2
+    shaded = "step error of published-python" if axis == "step" else "error of published-python"
+    assert f": {shaded} (shade)" in axes.get_title(loc="left")
     assert draw(figure).svg.startswith("<?xml")
 
 

@@ -54,11 +54,11 @@ def figure_map(study: ValidityMap, approximation: str = "published-python", meas
     logarithmic = study.axis != "restitution"
     x, y = _edges(study.fills, logarithmic=False), _edges(study.values, logarithmic=logarithmic)
     shown = errors(study, approximation, measure)
-    words, error = shown[0]
+    shaded, error = shown[0]
     shade = axes.pcolormesh(
         x, y, np.ma.masked_invalid(np.clip(error, *RANGE)), cmap=SHADES, norm=LogNorm(*RANGE), rasterized=True
     )
-    bar = figure.colorbar(shade, ax=axes, label=f"{words} [of ω₀]", extend="min", ticks=[1e-3, 1e-2, 1e-1, 1.0])
+    bar = figure.colorbar(shade, ax=axes, label=f"{shaded} [of ω₀]", extend="min", ticks=[1e-3, 1e-2, 1e-1, 1.0])
     bar.ax.set_yticklabels(["0.1%", "1%", "10%", "100%"])
     for k, colour in enumerate(COLOURS):
         outline = _outline(study.dominant == k, x, y, logarithmic=logarithmic)
@@ -83,7 +83,7 @@ def figure_map(study: ValidityMap, approximation: str = "published-python", meas
     axes.set_xlabel("fill fraction M_w / M_max [1]")
     axes.set_ylabel(LABELS[study.axis])
     axes.set_title(
-        f"Plateau of ω / ω₀ at N = {study.slices}: {words} (shade), largest fair share (outline)",
+        f"Plateau of ω / ω₀ at N = {study.slices}: {shaded} (shade), largest fair share (outline)",
         fontsize=10,
         loc="left",
     )
