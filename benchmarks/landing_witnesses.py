@@ -127,8 +127,9 @@ def landed(name: str, found: list[Touch], case: Case, dt: float | None) -> list[
             # Soft contacts have stops of their own for every slice, which rods keep, too.
             kind = slices if slices in lander.slices else lander.slices[-1]
             outcome = engine_check.land(touch, table, name, dt, law=law if lander.laws else None, slices=kind)
-        halves = (str(outcome.diagnostics[part]) for part in ("coarse", "fine"))
-        rows.append(Row(outcome.outcome, outcome.certified, *halves, outcome.reason, time.process_time() - began))
+        ends = outcome.diagnostics.get("outcomes") or [outcome.diagnostics[part] for part in ("coarse", "fine")]
+        seconds = time.process_time() - began
+        rows.append(Row(outcome.outcome, outcome.certified, str(ends[0]), str(ends[1]), outcome.reason, seconds))
     return rows
 
 

@@ -8,8 +8,8 @@ import pytest
 
 import engine_check
 import ode_reference
-from engine_check import landing_compliant, landing_mujoco, landing_pymunk
-from engine_check.landing import Watch, landed
+from engine_check import landing, landing_compliant, landing_mujoco, landing_pymunk
+from engine_check.landing import Run, Watch, landed
 from ode_reference.landing import world_of
 from slicemodel import Scenario, Table, Touch
 
@@ -148,6 +148,39 @@ def test_a_mirrored_touch_lands_as_its_mirror_image(law):
         right, left = found
         assert (left.outcome, left.time) == (right.outcome, right.time)
         assert left.slid == pytest.approx(-right.slid, rel=1e-7, abs=0)
+
+
+def certified(monkeypatch, ends, rises=None, engine="mujoco"):
+    """The outcome of an engine whose landing with the n-th half of its step ends so and gives so much energy."""
+    steps = []
+
+    def end(_body, _scenario, dt):
+        k = len(steps)
+        steps.append(dt)
+        return Run(
+            outcome=ends[k], time=0.1, margin=0.2, bounces=k, slid=0.0, rise=(rises or [0.0] * len(ends))[k],
+            reason="it left its band" if ends[k] == "undecided" else "", setup={}, settings={},
+        )  # fmt: skip
+
+    monkeypatch.setattr(landing, "landed", end)
+    outcome = engine_check.land(at_rest(WATER), FLAT, engine)
+    assert steps == [landing.LANDERS[engine].dt / 2**k for k in range(len(steps))]
+    assert outcome.settings["dt"] == steps[-1]
+    assert outcome.diagnostics["outcomes"] == ends[: len(steps)]
+    return outcome.outcome, len(steps), outcome.reason
+
+
+def test_the_step_is_halved_until_half_of_it_ends_alike_and_gives_no_energy(monkeypatch):
+    up, down = "upright", "lying"
+    assert certified(monkeypatch, [up, up, down]) == (up, 2, "")
+    assert certified(monkeypatch, [up, down, down, up]) == (down, 3, "")
+    assert certified(monkeypatch, [up, up, up, down], [0.0, 1e-3, 0.0, 0.0]) == (up, 3, "")
+    assert certified(monkeypatch, [up, down, up, down, up]) == (
+        "undecided", 5, "half the step ends upright instead of lying"
+    )  # fmt: skip
+    assert certified(monkeypatch, [up] * 5, [2e-6] * 5)[:2] == ("undecided", 5)
+    assert certified(monkeypatch, [up, "undecided", up]) == ("undecided", 2, "it left its band")
+    assert certified(monkeypatch, [up, down, down], engine="mujoco-compliant")[:2] == ("undecided", 2)
 
 
 # ---------------------------------------------------------------------- set-up and input
