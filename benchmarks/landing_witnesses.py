@@ -161,7 +161,8 @@ def land_all(
         missing = [k for k, key in enumerate(of_touches) if key not in rows.made]
         for begin in range(0, len(missing), CHUNK):
             some = missing[begin : begin + CHUNK]
-            future = pool.submit(landed, name, [found[k] for k in some], case, None if name == REFERENCE else dt)
+            given = dt if name != REFERENCE and LANDERS[name].laws else None  # soft contacts need their own
+            future = pool.submit(landed, name, [found[k] for k in some], case, given)
             pending[future] = [of_touches[k] for k in some]
     for future in as_completed(pending):
         for key, row in zip(pending[future], future.result(), strict=True):
@@ -195,6 +196,7 @@ def compare(programs: dict[str, list[Row]], found: list[Touch], case: Case) -> l
                     "touches": len(pairs),
                     "decided by both": both,
                     "differ": len(differ),
+                    "flipped": [sum(row.flips for row in programs[name]) for name in (one, other)],
                     "saddle missed by": [round(least, 6) for least in near],
                 }
             )
@@ -212,7 +214,7 @@ def main() -> int:
     parser.add_argument("--engines", nargs="+", choices=list(LANDERS), default=list(LANDERS))
     parser.add_argument("--cases", nargs="+", choices=list(CASES), default=list(CASES))
     parser.add_argument("--jobs", type=int, default=1, help="worker processes (%(default)s)")
-    parser.add_argument("--dt", type=float, help="step of the engines [s]; default: that of each")
+    parser.add_argument("--dt", type=float, help="step of rigid contacts [s]; default: the engines' own")
     parser.add_argument("--rows", type=Path, metavar="FILE", help="keep every landing there, and go on from it")
     options = parser.parse_args()
     total, compared = 0, 0
@@ -232,7 +234,7 @@ def main() -> int:
                 matrices = compare(programs, found, CASES[name])
                 total += sum(m["differ"] for m in matrices if "mujoco-compliant" not in m["programs"])
                 compared += len(found)
-                cases.append({"filling": filling, "slices": slices, "law": law, "matrices": matrices})
+                cases.append({"filling": filling, "slices": slices, "law": law, "dt": options.dt, "matrices": matrices})
                 if options.json:
                     facts: dict[str, Any] = {"command": shlex.join(["python", *sys.argv])}
                     facts |= {"touches": options.touches, "n_slices": options.n_slices, "cases": cases}

@@ -108,7 +108,7 @@ def figures(found: Found) -> list[Exhibit]:
             caption=(
                 f"Rows: first program; columns: second. {stored['touches']} touches each, {stored['n_slices']} slices, "
                 f"filling {stored['cases'][0]['filling']:g}. Off the diagonal they differ; '?' is undecided. "
-                f"Stored; made by: {stored['command']}"
+                f"{_steps(stored)}Stored; made by: {stored['command']}"
             ),
             alt=_witness_words(stored),
             maker=drawings.figure_witnesses,
@@ -146,6 +146,12 @@ def _energy_words(found: Found) -> str:
             stand = sum(run.outcome == "upright" for run in runs)
             words.append(f"{kind}: {len(runs)} landings, {stand} upright, {start:.1f} E_s after the first impact")
     return "; ".join(words)
+
+
+def _steps(stored: Mapping[str, Any]) -> str:
+    """Return which cases had another step than the engines' own, as sentences."""
+    others = [f"{case['law']} with steps of {case['dt']:g} s" for case in stored["cases"] if case["dt"] is not None]
+    return f"Engines landed {', '.join(others)}, else with their own. " if others else ""
 
 
 def _witness_words(stored: Mapping[str, Any]) -> str:
