@@ -24,6 +24,7 @@ from flipproof.frame.gather import gather, tell
 from flipproof.frame.pool import Here, make_all, workers
 from flipproof.frame.solvers import solve
 from flipproof.frame.store import RunStore
+from flipproof.output.summary import summary_text
 from slicemodel import Scenario
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -173,3 +174,51 @@ def die():
 def test_a_spec_that_names_nothing_is_refused_before_the_work(capsys, tmp_path, arguments, said):
     assert cli.main(["report", "--out", str(tmp_path / "r"), *arguments]) == 2
     assert said in capsys.readouterr().err
+
+
+def checked(tmp_path, *arguments):
+    (tmp_path / "throw.toml").write_text(THROW.to_toml())
+    command = ["check", tmp_path / "throw.toml", "--only", "ice", "--no-cache", *arguments]
+    return cli.main([str(argument) for argument in command])
+
+
+def test_check_certifies_guests_too_and_fails_with_them(tmp_path, capsys):
+    shutil.copy(HOSTILE, tmp_path)
+    assert checked(tmp_path, "--with", RK4) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-3:-1] == [f"PASS  guest-naive-rk4-certify-{name}: 1; threshold 1 to 1" for name in ("shape", "ice")]
+    bad = f"{tmp_path / 'hostile.py'}:raises"
+    assert checked(tmp_path, "--with", RK4, "--with", bad, "--timeout", "5") == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert any(one.startswith("PASS  guest-naive-rk4-") for one in lines)
+    failed = [one for one in lines if one.startswith("FAIL  guest-")]
+    assert all(any(f"-certify-{name}: 0; " in one for one in failed) for name in ("shape", "ice"))
+
+
+def test_check_holds_a_guest_to_what_the_baseline_found_of_it(tmp_path, capsys, ladder):
+    shutil.copy(RK4.rpartition(":")[0], tmp_path)
+    file, spec = tmp_path / "rk4.py", f"{tmp_path / 'rk4.py'}:Eq8"
+    found = study_guests([visit(spec, THROW, TIMES)], ladder, dict.fromkeys(RUNGS, 1e-9))
+    findings = [one.to_mapping() for one in claim_guests(found)]
+    (old,) = [one["value"] for one in findings if one["id"] == "guest-naive-rk4-eq8"]
+    summary = {"version": 2, "scenario": THROW.to_mapping(), "slices": 5, "size": "quick", "findings": findings}
+    (tmp_path / "summary.json").write_text(summary_text(summary))
+    given = ("--with", spec, "--baseline", tmp_path)
+    assert checked(tmp_path, *given) == 0
+    lines = capsys.readouterr().out.splitlines()
+    (line,) = [one for one in lines if one.startswith("PASS  guest-naive-rk4-eq8:")]
+    assert f"baseline {old:.6g} ±" in line
+    assert "guest" not in lines[-1]
+    file.write_text(file.read_text().replace("restitution = 1.0", "restitution = 0.9"))
+    assert checked(tmp_path, *given) == 1
+    assert any(one.startswith("FAIL  guest-naive-rk4-eq8: ") for one in capsys.readouterr().out.splitlines())
+
+
+def test_check_refuses_a_guest_that_is_a_curve_or_named_twice(tmp_path, capsys):
+    (tmp_path / "mine.csv").write_text("t,theta,omega\n0,1,1\n")
+    for arguments, words in (
+        (("--with", f"csv:{tmp_path / 'mine.csv'}"), "a curve cannot be asked"),
+        (("--with", RK4, "--with", RK4), "is there twice"),
+    ):
+        assert checked(tmp_path, *arguments) == 2
+        assert words in capsys.readouterr().err

@@ -64,6 +64,8 @@ def check(
     tolerance: float = TOLERANCE,
     say: Callable[[str], None] = lambda _: None,
     store: RunStore | None = None,
+    guests: Sequence[str] = (),
+    timeout: float | None = None,
 ) -> Checked:
     """Check a throw.
 
@@ -80,6 +82,11 @@ def check(
         Called with a line for each claim, as soon as it is known.
     store : RunStore or None
         Slow runs are looked for and kept there.
+    guests : sequence of str
+        Specs of foreign solvers: their certificates are among the claims, and what a report of them found in the
+        baseline is found again.
+    timeout : float or None
+        Seconds one of their runs may take; None: as each declares.
 
     Raises
     ------
@@ -107,6 +114,16 @@ def check(
                 held, needs = _held_to(finding, was, tolerance, moves=group == "thresholds")
             found.append(held)
             say(line(held, needs))
+    for finding in findings_of("guests", throw, store, (tuple(guests), timeout)) if guests else ():
+        was = known.get(finding.id)
+        moves = finding.kind != "regression"
+        if moves and (was is None or was["value"] is None):
+            continue
+        held, needs = (
+            (finding, _interval(finding.admissible)) if was is None else _held_to(finding, was, tolerance, moves=moves)
+        )
+        found.append(held)
+        say(line(held, needs))
     if "thresholds" in groups:
         left_out = tuple(name for name in known if name not in {finding.id for finding in found})
     else:
@@ -178,9 +195,12 @@ def groups() -> dict[str, tuple[str, ...]]:
     )
 
 
-def findings_of(group: str, throw: Scenario, store: RunStore | None = None) -> Iterator[Finding]:
-    """Yield the findings of a group's chapters on a throw; runs are made in this process."""
+def findings_of(group: str, throw: Scenario, store: RunStore | None = None, work: Any = None) -> Iterator[Finding]:
+    """Yield the findings of a group's chapters, or of a chapter given its ``work``; runs are made in this process."""
     ask = ask_of(throw, "check", throw.n_slices)
-    told = tell(gather(chapters_named(*groups()[group]), ask, Here(), store=store))
+    if work is None:
+        told = tell(gather(chapters_named(*groups()[group]), ask, Here(), store=store))
+    else:
+        told = tell(gather(chapters_named(group), ask, Here(), work={group: work}, store=store))
     for each in told.values():
         yield from each.findings

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
@@ -38,6 +38,34 @@ def add_no_cache(command: argparse.ArgumentParser) -> None:
         action="store_true",
         help="make every run anew, and keep none (else slow runs are kept in the user's cache folder)",
     )
+
+
+def add_guests(command: argparse.ArgumentParser, what: str) -> None:
+    """Add ``--with SPEC``, which may be repeated, and ``--timeout``."""
+    command.add_argument(
+        "--with",
+        dest="guests",
+        action="append",
+        default=[],
+        metavar="SPEC",
+        help=f"{what}, such as mine.py:solve; may be repeated",
+    )
+    command.add_argument("--timeout", type=count, metavar="S", help="seconds one run of a --with solver may take")
+
+
+def check_guests(specs: Sequence[str]) -> None:
+    """Refuse, before the work begins, a spec that names nothing or is there twice; no foreign code runs.
+
+    Raises
+    ------
+    ValueError
+    """
+    from flipproof.frame.solvers import find
+
+    for spec in specs:
+        find(spec)
+        if specs.count(spec) > 1:
+            raise ValueError(f"--with {spec} is there twice")
 
 
 def count(text: str) -> int:

@@ -26,7 +26,9 @@ from flipproof.cli.arguments import (
     SCENARIO_HELP,
     OneLineParser,
     add_command,
+    add_guests,
     add_no_cache,
+    check_guests,
     count,
     read_scenario,
 )
@@ -169,16 +171,9 @@ def parser() -> argparse.ArgumentParser:
         "--slices", type=count, metavar="N", help="slices at which solvers are compared (default 50, or the file's "
         "number if smaller)",
     )  # fmt: skip
-    report.add_argument(
-        "--with",
-        dest="guests",
-        action="append",
-        default=[],
-        metavar="SPEC",
-        help="certify another solver, such as mine.py:solve, and hold it against all others; may be repeated; a check "
-        "that it fails is a claim that fails",
+    add_guests(
+        report, "certify another solver and hold it against all others; a check that it fails is a claim that fails"
     )
-    report.add_argument("--timeout", type=count, metavar="S", help="seconds one run of a --with solver may take")
     report.add_argument(
         "--measured", type=Path, metavar="TRACK.csv", help="a measured flight to hold beside the solvers: a track of "
         "'flipproof track', or a CSV with t and theta or omega from release to landing",
@@ -232,7 +227,7 @@ def command_report(options: argparse.Namespace) -> int:
     from flipproof.page.pdf import print_page, require_browser
 
     check_replaceable(options.out, "report")
-    _check_guests(options.guests)
+    check_guests(options.guests)
     measurement = None
     if options.measured is not None:
         from flipproof.film.measured import read_measured
@@ -288,16 +283,6 @@ def command_report(options: argparse.Namespace) -> int:
         print(f"{guest.label}: {found.conclusion if found else '; '.join(guest.visit.problems.values())}")
     _print_report(report, options.out, time.perf_counter() - began)
     return 1 if report.failed else 0
-
-
-def _check_guests(specs: Sequence[str]) -> None:
-    """Refuse, before the work begins, a spec that names nothing or is there twice; no foreign code runs."""
-    from flipproof.frame.solvers import find
-
-    for spec in specs:
-        find(spec)
-        if specs.count(spec) > 1:
-            raise ValueError(f"--with {spec} is there twice")
 
 
 def _print_report(report: Any, out: Path, seconds: float) -> None:
