@@ -272,12 +272,12 @@ def command_report(options: argparse.Namespace) -> int:
             gathered = gather_report(
                 ask, progress, options.jobs, Stages(say), store, pool, contents=contents, work=work
             )
-            facts = provenance(command) | store.facts()
+            guests = gathered.found("guests")
+            facts = provenance(command) | store.facts() | ({} if guests is None else guests.facts)
             report = build(gathered, facts, pool=store.remembering(pool), png=options.png)
         write(report, folder)
         if options.pdf:
             print_page(folder / "index.html", folder / "report.pdf")
-    guests = gathered.found("guests")
     for guest in guests.guests if guests is not None else ():
         found = guest.visit.certificate
         print(f"{guest.label}: {found.conclusion if found else '; '.join(guest.visit.problems.values())}")
