@@ -254,10 +254,11 @@ def test_a_report_splits_what_leads_from_a_guest_to_free_flight():
 
 
 def test_a_guest_without_an_equation_or_with_the_wrong_one_has_its_rest(ladder):
-    declared = switches_made(Traits(name="mine", equation="exact-step"), None)
+    declared = switches_made(Traits(name="mine", equation="exact-step"), None, "free-flight")
     assert declared == MODELS["eq8"].switches
-    assert switches_made(Traits(name="mine", equation="paper-typeset"), None) is None
-    assert switches_made(Traits(name="mine"), None) is None
+    assert switches_made(Traits(name="mine", equation="paper-typeset"), None, "eq8") is None
+    assert switches_made(Traits(name="mine"), None, None) is None
+    assert switches_made(Traits(name="mine"), None, "eq8") == declared
     # A guest of Eq. 8 that declares free flight: all of the difference is the rest.
     run = ladder["eq8"]
     made = Made(equation_run(THROW, FREE), ladder["free-flight"], 0.0)

@@ -20,7 +20,7 @@ def findings_of(certificate: Certificate, id_: str = "certify-", title: str = ""
         found.append(
             Finding(
                 id=f"{id_}{result.check}",
-                title=f"{title}{result.title}",
+                title=f"{title}{result.title.rstrip('.')}",
                 value=None if result.verdict == IDLE else float(result.verdict != FAILED),
                 unit="",
                 kind="observation" if idle else "regression",

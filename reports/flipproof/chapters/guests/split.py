@@ -46,8 +46,11 @@ class Split:
         return {"equation": self.equation, "guest": self.start, "free-flight": self.end, **parts}
 
 
-def switches_made(traits: Traits | None, certificate: Certificate | None) -> Switches | None:
-    """Return the switches of the equation that a guest declares, else of the nearest; None if neither is known."""
+def switches_made(traits: Traits | None, certificate: Certificate | None, nearest: str | None) -> Switches | None:
+    """Return the switches of the equation that a guest declares, else of its place, else of the ``nearest`` rung.
+
+    None if nothing is known of it, or if what it declares converges to no equation of the ladder.
+    """
     if traits is not None and traits.equation is not None:
         try:
             return switches_of(traits.equation)
@@ -55,7 +58,9 @@ def switches_made(traits: Traits | None, certificate: Certificate | None) -> Swi
             return None
     results = () if certificate is None else certificate.results
     places = [r.found.facts["place"] for r in results if r.found is not None and "place" in r.found.facts]
-    return Switches.from_name(places[0]["switches"]) if places else None
+    if places:
+        return Switches.from_name(places[0]["switches"])
+    return None if nearest is None else switches_of(nearest)
 
 
 def sets_to_free(start: Switches) -> tuple[Switches, ...]:

@@ -186,7 +186,7 @@ def study(ask: Ask) -> Study[Guests]:
     rungs = {rung: flown[rung] for rung in LADDER if rung in flown}
     others = {name: run for name, run in flown.items() if name not in rungs}
     found = study_guests(received(calls, flights), rungs, run_bands(ask.solvers, flights), others)
-    starts = {guest.label: switches_made(guest.visit.traits, guest.visit.certificate) for guest in found.guests}
+    starts = {g.label: switches_made(g.visit.traits, g.visit.certificate, g.equation) for g in found.guests}
     flights = yield plan_splits([start for start in starts.values() if start is not None], ask.throw)
     guests = tuple(_with_split(guest, starts[guest.label], flights) for guest in found.guests)
     return replace(found, guests=guests)
