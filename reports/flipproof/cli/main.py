@@ -34,6 +34,7 @@ from flipproof.cli.arguments import (
 )
 from flipproof.cli.check import add_checks
 from flipproof.cli.compare import add_compare
+from flipproof.cli.completion import add_completion
 from flipproof.cli.console import readable, speak_plainly
 from flipproof.cli.fit import add_fit
 from flipproof.cli.foreign import add_foreign, print_offered, print_offered_json
@@ -206,6 +207,7 @@ def parser() -> argparse.ArgumentParser:
     add_animate(commands)
     add_landing(commands)
     add_foreign(commands)
+    add_completion(commands)
     models = add_command(commands, "models", "List every scheme, model and engine.", command_models)
     models.add_argument("--json", action="store_true", help="print JSON")
     return top
