@@ -25,14 +25,17 @@ def content_of(spec: str) -> str:
     Raises
     ------
     ValueError
-        If the spec names nothing.
+        If the spec names nothing, or a file cannot be read.
     """
     if not is_foreign(spec):
         return ""
     found = hashlib.sha256()
-    for name, file in sorted(_files(spec)):
-        found.update(f"{name}\0".encode())
-        found.update(hashlib.sha256(file.read_bytes()).digest())
+    try:
+        for name, file in sorted(_files(spec)):
+            found.update(f"{name}\0".encode())
+            found.update(hashlib.sha256(file.read_bytes()).digest())
+    except OSError as error:
+        raise ValueError(f"solver {spec!r}: {error.filename} cannot be read ({error.strerror or error})") from None
     return found.hexdigest()
 
 
@@ -42,7 +45,11 @@ def _files(spec: str) -> Iterator[tuple[str, Path]]:
         yield "", Path(spec.removeprefix(CSV))
         return
     if spec.startswith(COMMAND):
-        for k, word in enumerate(shlex.split(spec.removeprefix(COMMAND))):
+        try:
+            words = shlex.split(spec.removeprefix(COMMAND))
+        except ValueError as error:
+            raise ValueError(f"solver {spec!r}: {error}") from None
+        for k, word in enumerate(words):
             file = Path(word.rpartition("=")[2])
             if file.is_file():
                 yield str(k), file

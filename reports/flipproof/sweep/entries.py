@@ -59,7 +59,7 @@ def _entry(table: dict[str, Any], where: str) -> Entry:
         solver = find(name)
         check_asked(name)
         content = content_of(name)
-    except (ValueError, OSError) as error:
+    except ValueError as error:
         raise SweepError(f"{where}: {error}") from None
     where = f"{where} ({name})"
     known, open_ended = _settings_of(solver)

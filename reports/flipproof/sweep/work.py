@@ -173,7 +173,7 @@ def _changed(points: Sequence[Point]) -> str:
     for solver, content in {(point.solver, point.content) for point in points if point.content}:
         try:
             same = content_of(solver) == content
-        except (ValueError, OSError):
+        except ValueError:
             same = False
         if not same:
             return solver

@@ -166,3 +166,14 @@ def test_a_file_that_is_no_python_has_a_content(tmp_path):
     file = tmp_path / "broken.py"
     file.write_bytes(b"def (\0")
     assert content_of(f"{file}:solve")
+
+
+def test_what_cannot_be_read_is_said_in_one_line(tmp_path):
+    for spec, words in (
+        (f"csv:{tmp_path / 'nowhere.csv'}", "nowhere.csv cannot be read"),
+        ("cmd:'open", "No closing quotation"),
+        (f"{tmp_path / 'nowhere.py'}:solve", "there is no file"),
+    ):
+        with pytest.raises(ValueError, match=words) as caught:
+            solve(spec, Scenario(n_slices=3, duration=0.02))
+        assert "\n" not in str(caught.value)

@@ -219,7 +219,7 @@ def visit(spec: str, throw: Scenario, times: FloatArray, timeout: float | None =
     def tried(name: str, make: Callable[[], Any]) -> Any:
         try:
             return make()
-        except (ValueError, ArithmeticError, MemoryError, OSError) as error:
+        except (ValueError, ArithmeticError, MemoryError) as error:
             problems[name] = str(error)
             return None
 
