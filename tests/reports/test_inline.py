@@ -92,5 +92,6 @@ def test_numbers_are_rounded_not_cut(number, short):
 
 
 def test_the_place_of_a_figure_is_known_before_it_is_drawn(svg):
-    assert shape(svg) == ' width="288" height="216"'
+    assert shape(svg) == ' width="288" height="216" style="--least:259px"'  # letters of 10 points
+    assert shape('<svg width="100pt" height="50pt"></svg>') == ' width="100" height="50" style="--least:100px"'
     assert shape("<svg></svg>") == ""
