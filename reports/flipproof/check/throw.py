@@ -14,9 +14,10 @@ their values are round-off, which differs between machines. What is not computed
 from __future__ import annotations
 
 import math
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -35,10 +36,14 @@ SLICES: Final = 50
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Checked:
-    """The claims that were checked, and the baseline's findings that were not."""
+    """The claims that were checked, and the baseline's findings that were not.
+
+    ``seconds`` are the wall times that the claims took [s], by their ids; the first of a group has that of its runs.
+    """
 
     findings: tuple[Finding, ...]
     left_out: tuple[str, ...]
+    seconds: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def failed(self) -> tuple[Finding, ...]:
@@ -96,9 +101,12 @@ def check(
     if not isinstance(slices, int) or isinstance(slices, bool) or slices < 1:
         raise ValueError(f"{baseline}: slices = {slices!r} must be a whole number of at least 1")
     throw = scenario.with_slices(slices)
-    found = []
+    found: list[Finding] = []
+    seconds: dict[str, float] = {}
+    began = time.perf_counter()
     for group in groups:
         for finding in findings_of(group, throw, store):
+            began, seconds[finding.id] = time.perf_counter(), time.perf_counter() - began
             was = known.get(finding.id)
             if was is None and group == "thresholds":
                 continue
@@ -111,7 +119,7 @@ def check(
         left_out = tuple(name for name in known if name not in {finding.id for finding in found})
     else:
         left_out = ()
-    return Checked(findings=tuple(found), left_out=left_out)
+    return Checked(findings=tuple(found), left_out=left_out, seconds=seconds)
 
 
 def line(finding: Finding, needs: str) -> str:

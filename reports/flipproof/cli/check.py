@@ -91,7 +91,7 @@ def command_check(options: argparse.Namespace) -> int:
         from flipproof.output.folder import write_text
         from flipproof.output.junit import junit_text
 
-        write_text(options.junit, junit_text(found.findings, "flipproof check"))
+        write_text(options.junit, junit_text(found.findings, "flipproof check", found.seconds))
     write_json(options.json, {"findings": [one.to_mapping() for one in found.findings], "conclusion": found.conclusion})
     say(found.conclusion)
     return 1 if found.failed else 0
