@@ -74,6 +74,8 @@ def test_letters_of_figures_can_be_read_on_a_phone(visit, report):
             )
         )
     for exhibit in report.exhibits:
+        if exhibit.touch is not None and not exhibit.touch.beside:
+            continue  # drawn anew at the width that there is
         width, _ = (float(side) for side in SIZE.search(exhibit.drawing.svg).groups())
         letters = [100.0 * float(scale) for scale in LETTERS.findall(exhibit.drawing.svg)]
         assert min(letters) * widths[exhibit.name] / width >= 8.99, exhibit.name

@@ -22,6 +22,7 @@ from flipproof.page.sections import STORY, behind
 from flipproof.page.story.facts import story
 from flipproof.page.story.live import live_data, sliders
 from flipproof.page.templating import environment
+from flipproof.page.touch import touch_data
 
 SYMBOLS = {
     "omega_0": "ω₀", "omega0": "ω₀", "omega": "ω", "theta": "θ", "gamma": "γ", "alpha": "α", "epsilon": "ε",
@@ -129,7 +130,8 @@ def page_environment() -> Environment:
     templates = environment()
     templates.filters |= {
         "typeset": typeset, "unbroken": unbroken, "amount": amount, "percent": percent, "data_uri": data_uri,
-        "shape": shape, "short": short, "restitution_error": restitution_error, "term_anchor": anchor,
+        "shape": shape, "touch_data": touch_data, "short": short,
+        "restitution_error": restitution_error, "term_anchor": anchor,
     }  # fmt: skip
     templates.globals["assets"] = read_assets()
     return templates
