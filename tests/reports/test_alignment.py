@@ -149,7 +149,7 @@ def test_no_impacts_at_all():
     nothing = align([], [])
     assert np.isnan(nothing.share)
     assert nothing.first_disagreement is None
-    assert nothing.words.startswith("0 impacts matched")
+    assert nothing.words.startswith("0 impacts are in both flights; 0 are in the first")
 
 
 def test_rests_need_two_times_in_a_row_and_count_what_is_beyond_the_end():

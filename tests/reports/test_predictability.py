@@ -138,7 +138,7 @@ def test_a_flight_without_growth_is_predictable_to_the_end():
     study = study_predictability(flight(), members(lambda size: size))
     assert study.horizons == (None,) * 4
     assert study.horizon is None
-    assert "predictable to the end" in study.words
+    assert "predictable to its end" in study.words
     assert study.spread.shape == (4, len(T))
 
 

@@ -78,6 +78,13 @@ _WORD: Final = re.compile(
     r"(?<![\w₀])(" + "|".join(re.escape(term) for term in sorted(TERMS, key=len, reverse=True)) + r")(?![\w₀-])"
 )
 _TAG: Final = re.compile(r"(<script.*?</script>|<style.*?</style>|<[^>]*>)", re.DOTALL)
+_PLAIN: Final = {"omega_0": "ω₀", "theta_0": "θ₀"}
+_SYMBOL: Final = re.compile(r"(?<![\w/.])(?:(omega_0|theta_0)|([rvCMeJHθt])_(CM|M|w|max|b|table|c|i|j))(?![\w'])")
+"""A symbol with its index, in plain text."""
+
+_AS_IT_IS: Final = frozenset(("svg", "math", "code", "pre", "noscript", "select"))
+"""Elements whose text is not typeset."""
+
 _CLOSED: Final = frozenset(
     ("a", "svg", "math", "code", "pre", "button", "label", "select", "h2", "h3", "summary",
      "noscript", "thead", "legend", "caption")
@@ -91,20 +98,35 @@ def anchor(term: str) -> str:
 
 
 def linked(html: str) -> Markup:
-    """Return a section in which the first appearance of every term is a link to the glossary with a tooltip."""
+    """Return a section with its symbols typeset and a link to the glossary where a term appears first."""
     return Markup("".join(_linked(html, set())))
 
 
 def _linked(html: str, seen: set[str]) -> Iterator[str]:
-    depth = 0
+    depth = kept = 0
     for piece in _TAG.split(html):
         if piece.startswith("<"):
             name = piece.strip("</> ").split(" ", 1)[0].split("\n", 1)[0].lower()
-            if name in _CLOSED and not piece.endswith(("/>", "</script>", "</style>")):
-                depth += -1 if piece.startswith("</") else 1
+            if not piece.endswith(("/>", "</script>", "</style>")):
+                step = -1 if piece.startswith("</") else 1
+                depth += step * (name in _CLOSED)
+                kept += step * (name in _AS_IT_IS)
+            yield piece
+        elif kept:
             yield piece
         else:
-            yield piece if depth else _WORD.sub(lambda found: _link(found.group(), seen), piece)
+            yield from _typeset(piece if depth else _WORD.sub(lambda found: _link(found.group(), seen), piece))
+
+
+def _typeset(html: str) -> Iterator[str]:
+    """Yield text, which may have links, with its symbols typeset: r_CM as r with a lower index."""
+    for piece in _TAG.split(html):
+        yield piece if piece.startswith("<") else _SYMBOL.sub(_indexed, piece)
+
+
+def _indexed(found: re.Match[str]) -> str:
+    plain, letter, index = found.groups()
+    return _PLAIN[plain] if plain else f"<i>{letter}</i><sub>{index}</sub>"
 
 
 def _link(term: str, seen: set[str]) -> str:

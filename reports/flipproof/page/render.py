@@ -13,6 +13,8 @@ from markupsafe import Markup
 from flipproof.chapters.differences.study import Difference, moved, percent
 from flipproof.frame.gather import Gathered, Told
 from flipproof.output.summary import summarise
+from flipproof.page.captions import shared
+from flipproof.page.equations import equation, typeset
 from flipproof.page.glossary import TERMS, anchor
 from flipproof.page.headlines import headlines
 from flipproof.page.inline import data_uri, shape
@@ -23,18 +25,6 @@ from flipproof.page.story.facts import story
 from flipproof.page.story.live import live_data, sliders
 from flipproof.page.templating import environment
 from flipproof.page.touch import touch_data
-
-SYMBOLS = {
-    "omega_0": "ω₀", "omega0": "ω₀", "omega": "ω", "theta": "θ", "gamma": "γ", "alpha": "α", "epsilon": "ε",
-    "dt -> 0": "Δt → 0", "sum_free ": "Σ_free ", "beta = -": "β = −", "sqrt(": "√(", "^2": "²", " +- ": " ± ",
-    "<<": "≪", " - ": " − ", "-gamma": "−γ",
-}  # fmt: skip
-
-
-def typeset(text: str) -> str:
-    """Return plain-text mathematics with Greek letters and signs; the command line prints it as it is."""
-    pattern = "|".join(re.escape(word) for word in sorted(SYMBOLS, key=len, reverse=True))
-    return re.sub(pattern, lambda match: SYMBOLS[match.group()], text)
 
 
 def unbroken(text: str) -> str:
@@ -131,7 +121,7 @@ def page_environment() -> Environment:
     templates.filters |= {
         "typeset": typeset, "unbroken": unbroken, "amount": amount, "percent": percent, "data_uri": data_uri,
         "shape": shape, "touch_data": touch_data, "short": short,
-        "restitution_error": restitution_error, "term_anchor": anchor,
+        "restitution_error": restitution_error, "term_anchor": anchor, "equation": equation, "shared": shared,
     }  # fmt: skip
     templates.globals["assets"] = read_assets()
     return templates

@@ -90,7 +90,8 @@ def figures(found: Events) -> Iterator[Exhibit]:
             caption=(
                 "One row per slice. Bars are contacts, ticks are impacts; the upper lane of a row is the first "
                 "solver, the lower the second. Where the two lanes of a row look alike, both solvers have the same "
-                "contacts and impacts of that slice."
+                "contacts and impacts of that slice. At a fork the slice strikes one end in the first flight and the "
+                "other end in the second."
             ),
             alt=f"Contacts and impacts of {first} above those of {second}, one row per slice. "
             f"{alignment.words}.".replace("ω₀", "omega_0"),

@@ -175,21 +175,24 @@ class Alignment:
     def words(self) -> str:
         """What agrees, what does not and what was not compared, in one sentence with the numbers."""
         shifted = int(self.shifted.sum())
-        parts = [f"{len(self.matched)} impacts matched"]
+        words = f"{len(self.matched)} impacts are in both flights"
         if len(self.matched):
             size = np.abs(self.shift) * 1e3
-            parts[0] += f" (shift: median {np.median(size):.3g} ms, largest {size.max():.3g} ms)"
-        parts += [
-            f"{len(self.matched) - shifted} of them within {self.shift_band * 1e3:g} ms and {shifted} shifted further",
-            f"{len(self.swapped)} swapped, {len(self.missing)} missing, {len(self.extra)} extra",
-        ]
-        forks = f"{len(self.forks)} of {self.n_slices} slices fork"
+            words += (
+                f", {len(self.matched) - shifted} of them within {self.shift_band * 1e3:g} ms of each other (median "
+                f"{np.median(size):.3g} ms, largest {size.max():.3g} ms), {len(self.swapped)} in another order"
+            )
+        words += f"; {len(self.missing)} are in the first flight alone, {len(self.extra)} in the second alone; "
         if self.forks:
             before, after = map(len, self.after_fork)
-            forks += f", the first being {self.forks[0].words}"
-            forks += f"; {before} and {after} later impacts of those were not compared"
-        words = f"{', '.join(parts)}; {forks}; {self.tail[0]} and {self.tail[1]} slower than {self.least_speed:g} m/s"
-        return words + (f", {self.undecided} cut off by the end" if self.undecided else "")
+            words += (
+                f"{len(self.forks)} of {self.n_slices} slices strike different ends in the two flights, "
+                f"first {self.forks[0].words}; their {before} and {after} later impacts are not compared"
+            )
+        else:
+            words += f"none of {self.n_slices} slices strikes different ends in the two flights"
+        words += f"; {self.tail[0]} and {self.tail[1]} impacts slower than {self.least_speed:g} m/s are not compared"
+        return words + (f"; {self.undecided} come too near the end of the flight to tell" if self.undecided else "")
 
 
 def _of(keyed: Keyed, i: int, kind: str, shift: FloatArray | None = None) -> Disagreement:

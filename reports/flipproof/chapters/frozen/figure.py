@@ -45,7 +45,7 @@ def figure_frozen(study: Frozen) -> Figure:
         if quantity == JUMPS:
             t, least, most = envelope(study.t, values)
             label += f" (range within {1e3 * (t[1] - t[0]):.2g} ms)"
-            defects.fill_between(t, least, most, color=colour, alpha=0.35, linewidth=0.0, label=label)
+            defects.fill_between(t, least, most, color=colour, alpha=0.35, linewidth=0.0, step="mid", label=label)
         else:
             defects.semilogy(study.t, _shown(values), color=colour, linewidth=1.4, label=label)
         defects.plot(time, peak, MARKERS[k], color=colour, markeredgecolor="white", markersize=8)

@@ -226,20 +226,20 @@ class Predictability:
     def words(self) -> str:
         """Amplification of every size, horizon, growth and smoothness in words."""
         factors = zip(self.sizes, self.largest_amplification, strict=True)
-        each = ", ".join(f"{factor:.3g} (a change of {size:.0e})" for size, factor in factors)
-        words = f"{self.solver}: a change of the release is amplified at most by a factor of {each}"
+        each = " and ".join(f"a change of {size:.0e} by at most a factor of {factor:.3g}" for size, factor in factors)
+        words = f"{self.solver}: the flight amplifies {each}"
         if self.horizon is None:
-            words += f"; none leaves {self.band:g} of ω₀: predictable to the end"
+            words += f"; none of these moves ω by {self.band:g} of ω₀, so that the flight is predictable to its end"
         for size, time in zip(self.sizes, self.horizons, strict=True):
-            words += "" if time is None else f"; {size:.0e} leaves {self.band:g} of ω₀ at {time * 1e3:.1f} ms"
-        words += f"; the effect of {self.sizes[0]:.0e} {self.growths[0].words}"
+            words += "" if time is None else f"; {size:.0e} moves ω by {self.band:g} of ω₀ at {time * 1e3:.1f} ms"
+        words += f"; the effect of a change of {self.sizes[0]:.0e} {self.growths[0].words}"
         if self.rough_from is not None:
             words += (
-                f" and reaches {self.spread[0].max():.1e} of ω₀; the factor depends on the size from "
-                f"{self.rough_from * 1e3:.1f} ms on, so nothing is extrapolated to round-off"
+                f" and reaches {self.spread[0].max():.1e} of ω₀; from {self.rough_from * 1e3:.1f} ms on the factor "
+                "depends on the size of the change, so that the effect of round-off cannot be extrapolated"
             )
         elif self.round_off_horizon is not None:
-            words += f"; even round-off would leave the band at {self.round_off_horizon * 1e3:.1f} ms"
+            words += f"; even round-off would move ω by that much at {self.round_off_horizon * 1e3:.1f} ms"
         return words + (f"; the run ends at {self.ended * 1e3:.1f} ms" if self.ended is not None else "")
 
 
