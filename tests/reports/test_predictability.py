@@ -146,7 +146,7 @@ def test_a_jump_that_does_not_care_for_the_size_is_said_so():
     study = study_predictability(flight(), members(lambda size: np.where(T < 0.2, size, 3e-4)))
     assert study.rough_from == pytest.approx(0.2, abs=1e-3)
     assert study.largest_amplification == pytest.approx([3e5, 3e4, 3e3, 3e2], rel=1e-3, abs=0.0)
-    assert "nothing is extrapolated" in study.words
+    assert "cannot be extrapolated" in study.words
 
 
 def test_a_member_that_ends_early_is_a_horizon_and_not_a_cut():

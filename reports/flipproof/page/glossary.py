@@ -79,8 +79,11 @@ _WORD: Final = re.compile(
 )
 _TAG: Final = re.compile(r"(<script.*?</script>|<style.*?</style>|<[^>]*>)", re.DOTALL)
 _PLAIN: Final = {"omega_0": "ω₀", "theta_0": "θ₀"}
-_SYMBOL: Final = re.compile(r"(?<![\w/.])(?:(omega_0|theta_0)|([rvCMeJHθt])_(CM|M|w|max|b|table|c|i|j))(?![\w'])")
-"""A symbol with its index, in plain text."""
+_SYMBOL: Final = re.compile(
+    r"(?<![\w/.])(?:(?P<plain>omega_0|theta_0)|e\^\((?P<power>[^()]*)\)"
+    r"|(?P<d>d?)(?P<letter>[rvCMeJHNθt])(?P<primes>'{0,2})_(?P<index>CM|M|w|W|max|b|table|c|i|j|t))(?![\w'])"
+)
+"""A symbol with its index, or a power of e, in plain text."""
 
 _AS_IT_IS: Final = frozenset(("svg", "math", "code", "pre", "noscript", "select"))
 """Elements whose text is not typeset."""
@@ -125,8 +128,11 @@ def _typeset(html: str) -> Iterator[str]:
 
 
 def _indexed(found: re.Match[str]) -> str:
-    plain, letter, index = found.groups()
-    return _PLAIN[plain] if plain else f"<i>{letter}</i><sub>{index}</sub>"
+    if found["plain"]:
+        return _PLAIN[found["plain"]]
+    if found["power"]:
+        return f"<i>e</i><sup>{found['power']}</sup>"
+    return f"{found['d']}<i>{found['letter']}</i>{found['primes']}<sub>{found['index']}</sub>"
 
 
 def _link(term: str, seen: set[str]) -> str:

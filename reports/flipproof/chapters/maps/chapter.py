@@ -94,7 +94,8 @@ def _exhibit(study: ValidityMap) -> Exhibit:
     return Exhibit(
         name=f"map-{study.axis}",
         title=f"Validity over filling and {AXES[study.axis]}",
-        caption=f"Every cell is a throw. Its shade is {shade} in the plateau, the mean of ω/ω₀ over the second half. "
+        caption=f"Every cell is a throw. The shade of a cell is {shade} in the plateau, the mean of "
+        "ω/ω₀ over the second half. "
         f"The outline around cells names the assumption with the largest {which} in the plateau. "
         f"The contours are where {contours}. Hatched cells could not be computed."
         f"{_band_words(study)}",

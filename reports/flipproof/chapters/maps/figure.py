@@ -73,8 +73,8 @@ def figure_map(study: ValidityMap, approximation: str = "published-python", meas
         Patch(facecolor="none", edgecolor=colour, linewidth=2.2, label=name)
         for colour, name in zip(COLOURS, RUNGS, strict=True)
     ]
-    for (words, error), colour in zip(shown, LINES, strict=False):
-        handles += _contours(axes, study, error, words, colour)
+    for (name, error), colour in zip(shown, LINES, strict=False):
+        handles += _contours(axes, study, error, name, colour)
     if logarithmic:
         axes.set_yscale("log")
     axes.set_xlim(x[0], x[-1])
