@@ -13,7 +13,7 @@ from markupsafe import Markup
 DIGITS = 2
 """Digits kept after the point of a coordinate, in points of 1/72 inch."""
 
-COORDINATES = re.compile(r'(?<= )(?:d|x|y|points)="[^"]*"')
+COORDINATES = re.compile(r'(?<= )(?:d|x|y|points)="[^"]*"|translate\([^)]*\)')
 PATHS = re.compile(r'(?<= )d="[^"]*"')
 COMMANDS = re.compile(r" ?([MLHVCSQTAZmlhvcsqtaz]) ?")
 STYLES = re.compile(r'(?<= )style="[^"]*"')
