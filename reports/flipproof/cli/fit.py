@@ -181,9 +181,9 @@ def _fit_lines(one: Any) -> list[str]:
         f"{one.root_mean_square:.3g} {estimate.problem.measured.unit} (root mean square)"
     )
     levels = estimate.minima[:, -1]
-    ends = ", ".join(f"{level:.0f}" for level in levels[:4]) + (" ..." if len(levels) > 4 else "")
+    same = int((levels < levels.min() + 1.0).sum())
     lines.append(
-        f"  search       {estimate.flights} flights; {len(levels)} descents to chi^2 of {ends}; intervals "
+        f"  search       {estimate.flights} flights; {same} of {len(levels)} descents end there; intervals "
         f"{math.sqrt(max(1.0, estimate.temperature)):.2f} times wider for misfit or shared noise, "
         f"{math.sqrt(estimate.roughness):.2f} for roughness"
     )

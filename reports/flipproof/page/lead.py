@@ -21,7 +21,7 @@ def answer(headlines: Sequence[Headline]) -> str:
         return "No verdict: what it needs could not be computed; the reasons stand below."
     within = percent(PARTING_BAND)
     return {
-        (True, False): "The step is short enough. Eq. 8 is not free flight.",
+        (True, False): "Not as it stands: its time step is short enough, but its Eq. 8 is not free flight.",
         (True, True): f"On this throw the step is short enough, and Eq. 8 is free flight within {within} of ω₀.",
         (False, True): f"On this throw Eq. 8 is free flight within {within} of ω₀. The step is too long.",
         (False, False): "On this throw the step is too long, and Eq. 8 is not free flight.",

@@ -180,7 +180,7 @@ def figure_witnesses(cases: Sequence[Mapping[str, Any]]) -> Figure:
         axes.set_xticks(range(4), names, fontsize=8, rotation=90)
         axes.set_yticks(range(4), names, fontsize=8)
         axes.grid(visible=False)
-        kind = "ice" if case["law"] is None else f"water: {case['slices']}, {case['law']}"
+        kind = "ice" if case["law"] is None else f"water, {case['law']}\nslices {case['slices']}"
         axes.set_title(kind, fontsize=8)
         axes.set_ylabel(matrix["programs"][0], fontsize=8)
         axes.set_xlabel(matrix["programs"][1], fontsize=8)

@@ -21,7 +21,7 @@
   }
   const percent = (one, other) => {
     const most = one.reduce((far, value, k) => Math.max(far, Math.abs(value - other[k])), 0) / thrown.omega0;
-    return `${Number((100 * most).toPrecision(2))} % of ω₀`;
+    return `${Number((100 * most).toPrecision(2))} %`;
   };
 
   function draw() {
@@ -41,8 +41,8 @@
     }
     find("weightless").textContent = thrown.g === 0 ? "Gravity on" : "Gravity off";
     find("said").textContent = changed
-      ? `With g = ${chart.shown(thrown.g, 2)} instead of ${chart.shown(start.g, 2)} m/s², ω moves by up to ${percent(now.eq8, before.eq8)} by Eq. 8, ${percent(now["published-python"], before["published-python"])} by the program, and ${percent(now["free-flight"], before["free-flight"])} in free flight.`
-      : `Eq. 8 and free flight differ by up to ${percent(now.eq8, now["free-flight"])}, the program and free flight by ${percent(now["published-python"], now["free-flight"])}. Now switch gravity off.`;
+      ? `With g = ${chart.shown(thrown.g, 2)} instead of ${chart.shown(start.g, 2)} m/s², ω moves by up to ${percent(now.eq8, before.eq8)} of ω₀ by Eq. 8, ${percent(now["published-python"], before["published-python"])} by the program, and ${percent(now["free-flight"], before["free-flight"])} in free flight.`
+      : `Eq. 8 and free flight differ by up to ${percent(now.eq8, now["free-flight"])} of ω₀, the program and free flight by ${percent(now["published-python"], now["free-flight"])}. Now switch gravity off.`;
     drawn = { thrown: { ...fixed, ...thrown }, curves: now, before, milliseconds: performance.now() - began };
   }
   function set(change, remember = true) {

@@ -160,13 +160,18 @@ window.flipproofTouch = (() => {
       lines: lines.map((line, k) => ({ ...line, tint: k, x: times, y: numbers(line.values, range).map((value) => (y.log ? 10 ** value : value)) })),
     });
   }
-  const waiting = new IntersectionObserver((entries) => {
-    for (const { isIntersecting, target } of entries) {
-      if (!isIntersecting) continue;
-      waiting.unobserve(target);
-      figure(target.querySelector("script"));
+  // Drawn as soon as it is unfolded.
+  window.addEventListener("load", () => {
+    for (const source of document.querySelectorAll(".touch > script")) {
+      const fold = source.closest("details");
+      const open = () => {
+        if (!fold.open) return;
+        fold.removeEventListener("toggle", open);
+        figure(source);
+      };
+      fold.addEventListener("toggle", open);
+      open();
     }
-  }, { rootMargin: "50% 0px" });
-  window.addEventListener("load", () => document.querySelectorAll(".touch").forEach((box) => waiting.observe(box)));
+  });
   return { touch, valueAt };
 })();

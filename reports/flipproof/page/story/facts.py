@@ -135,8 +135,8 @@ def degrees(value: float) -> str:
 
 
 def small(value: float) -> str:
-    """Return a fraction in percent, tiny ones as a bound of a power of ten."""
-    return percent(value) if value >= 1e-5 or value == 0.0 else f"{value:.0e}"
+    """Return a fraction in percent, a tiny one as a power of ten."""
+    return percent(value) if value >= 1e-5 or value == 0.0 else f"{100 * value:.0e} %"
 
 
 def story(content: Mapping[str, Any], tables: Mapping[str, str | None]) -> SimpleNamespace:
