@@ -66,6 +66,11 @@ TERMS: Final[Mapping[str, str]] = {
     "impact": "A slice strikes an end of the bottle.",
 }  # fmt: skip
 
+EQUATIONS: Final[Mapping[str, str]] = {"Eq. 8": "eq8", "free flight": "free-flight"} | {
+    name: name for name in ("published-limit", "signs-limit", "eq8-wall", "eq8-weightless", "accelerating-origin")
+}
+"""Term -> the solver whose equation stands with it."""
+
 _PLACES: Final = {
     "ω₀": "omega-at-release",
     "M̃": "filling",
@@ -133,6 +138,11 @@ def _indexed(found: re.Match[str]) -> str:
     if found["power"]:
         return f"<i>e</i><sup>{found['power']}</sup>"
     return f"{found['d']}<i>{found['letter']}</i>{found['primes']}<sub>{found['index']}</sub>"
+
+
+def indexed(html: str) -> Markup:
+    """Return a section with its symbols typeset, without links: the glossary itself."""
+    return Markup("".join(_typeset(html)))
 
 
 def _link(term: str, seen: set[str]) -> str:

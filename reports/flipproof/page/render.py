@@ -12,10 +12,11 @@ from markupsafe import Markup
 
 from flipproof.chapters.differences.study import Difference, moved, percent
 from flipproof.frame.gather import Gathered, Told
+from flipproof.frame.solvers import find
 from flipproof.output.summary import summarise
 from flipproof.page.captions import shared
 from flipproof.page.equations import equation, typeset
-from flipproof.page.glossary import TERMS, anchor
+from flipproof.page.glossary import EQUATIONS, TERMS, anchor
 from flipproof.page.headlines import headlines
 from flipproof.page.inline import data_uri, shape
 from flipproof.page.lead import answer, answers, lead_words
@@ -101,6 +102,7 @@ def render(
         provenance=provenance,
         settings=gathered.ask.scenario.to_toml(),
         terms=TERMS,
+        formulas={term: find(solver).equation for term, solver in EQUATIONS.items()},
         story=facts,
         story_ids=STORY,
         sliders=sliders(gathered.ask.throw),

@@ -41,7 +41,7 @@ def exhibits_5a(runs: PaperRuns) -> Iterator[Exhibit]:
             runs,
             f"5a{suffix}",
             f"what the rebound β does to ten slices ({words})",
-            "Dark lines start on the base, light ones on top of the water. Look at the ends: with β = 0 slices stay "
+            "Slice 1 starts on the base, slice 10 on top of the water. Look at the ends: with β = 0 slices stay "
             "where they hit until something pulls them off. In free flight nothing does; in the other two it is "
             "gravity, which Eq. 8 keeps.",
             rows,
