@@ -162,7 +162,7 @@ def exhibits_2b(runs: PaperRuns) -> Iterator[Exhibit]:
     yield _exhibit(
         "2b", "the bottle at rest and in motion",
         "Half full, ten slices of the water, each drawn with its own height across the bottle; where they overlap the "
-        "blue is stronger. The paper's sketch names neither filling nor moment: both are chosen here. Ten slices at the "
+        "blue is fuller. The paper's sketch names neither filling nor moment: both are chosen here. Ten slices at the "
         "usual damping rate of 5 /s for every solver.",
         f"Sketches of the bottle at rest and {MOMENT:g} s after release for three solvers. {words}.",
         figure_rest_and_motion, (tuple(panels),),
