@@ -17,7 +17,7 @@ def chart(visit):
 
 def ticks(chart):
     """Return the marks of the time axis."""
-    words = chart.page.locator("#figure-omega .chart-touched text").all_text_contents()
+    words = chart.page.locator("#figure-omega .chart-touched text[text-anchor=middle]").all_text_contents()
     return [float(word) for word in words if re.fullmatch(r"0\.\d+", word)]
 
 
