@@ -34,7 +34,7 @@ def draw(differences: Sequence[Difference]) -> Figure:
         axes.set_title(words, fontsize=9, loc="left")
         axes.margins(x=0.02)
     for axes in grid.flat[len(differences) :]:
-        axes.set_axis_off()
+        axes.remove()
     grid[0, 0].set_yscale("log")
     grid[0, 0].set_ylim(LEAST, MOST)
     for axes in grid[:, 0]:
