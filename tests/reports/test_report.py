@@ -33,7 +33,7 @@ from flipproof.frame.pool import make_all, workers
 from flipproof.frame.solvers import Run, make
 from flipproof.frame.throws import REFERENCE
 from flipproof.output.ownership import MARKER, marker_text
-from flipproof.page.render import typeset
+from flipproof.page.equations import typeset
 from slicemodel import Scenario
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -262,7 +262,7 @@ def test_a_report_that_cannot_be_written_whole_leaves_the_one_before(monkeypatch
     (folder / "summary.json").write_text("the old one")
     (folder / MARKER).write_text(marker_text("report", ["summary.json"]))
 
-    def break_off(*_):
+    def break_off(*_, **__):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(build_module, "junit_text", break_off)
