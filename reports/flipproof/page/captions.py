@@ -9,7 +9,7 @@ from typing import Final
 
 from flipproof.frame.exhibit import Exhibit
 
-SENTENCE: Final = re.compile(r"(?<=[.?!]) (?=[A-ZΑ-Ω“])")
+SENTENCE: Final = re.compile(r"(?<=[.?!]) (?=[A-Z“])")
 FEWEST: Final = 3
 """Figures that share a sentence before it is told once."""
 

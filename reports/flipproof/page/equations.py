@@ -28,7 +28,7 @@ TOKEN: Final = re.compile(
     r"\((?P<above>\w+)/(?P<below>\w+)\)|(?P<base>[A-Za-z]+)(?P<first>'*)(?:_(?P<sub>[A-Za-z]+))?(?P<last>'*)"
     r"(?:\^(?P<power>\d))?|(?P<number>\d+)|(?P<sign>[-+=/()])"
 )
-GREEK: Final = {"omega": "ω", "gamma": "γ", "alpha": "α", "theta": "θ", "sum": "∑"}
+GREEK: Final = {"omega": "ω", "gamma": "γ", "alpha": "α", "theta": "θ", "sum": "\N{N-ARY SUMMATION}"}
 DOTS: Final = {"'": "˙", "''": "¨"}
 """Primes are derivatives with respect to time."""
 
