@@ -17,10 +17,10 @@ from flipproof.output.folder import OutputError
 from flipproof.paper import gallery
 from flipproof.paper.cases import HALF_FULL, family
 from flipproof.paper.costs import Cost
-from flipproof.paper.figures import FIGURES, ORDER, check_figures, exhibits_paper, keys_of
+from flipproof.paper.figures import FIGURES, ORDER, TIMED, check_figures, exhibits_paper, keys_of
 from flipproof.paper.figures_bottle import tipping
 from flipproof.paper.figures_panels import Axis, Grid, Line, Panel, figure_grid, ranked, stretched, table_grid
-from flipproof.paper.runs import PUBLISHED, SOLVERS, gather_paper
+from flipproof.paper.runs import PUBLISHED, SOLVERS
 from slicemodel.observables import plateau_of_points, static_toppling_angle, toppling_angle
 
 pytestmark = pytest.mark.xdist_group("paper-figures")
@@ -44,7 +44,7 @@ class Here(Executor):
 
 @pytest.fixture(scope="module")
 def runs():
-    return replace(gather_paper(Here(), lambda *_: None, costs=False), costs=COSTS)
+    return replace(gallery.gather_figures([name for name in ORDER if name not in TIMED], Here()), costs=COSTS)
 
 
 @pytest.fixture(scope="module")
