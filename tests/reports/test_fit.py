@@ -15,7 +15,7 @@ from flipproof.film.fit.estimate import estimate, scan
 from flipproof.film.fit.landscape import HUBER, Landscape, loss
 from flipproof.film.fit.problem import ALWAYS, FAR, Measurement, Problem, first_frames, noise_of, pose, predict
 from flipproof.film.fit.reading import Averaged, read_flight
-from flipproof.film.fit.sampling import Effort, Points, cool, roughness
+from flipproof.film.fit.region import Points, explored, roughness
 from flipproof.film.fit.temperature import autocovariance, temperature
 from flipproof.film.fit.twins import film
 from flipproof.film.fit.uncertainty import correlation, intervals
@@ -23,7 +23,7 @@ from flipproof.film.tracker.kinematics import angle
 from slicemodel import Scenario
 
 CUT = Scenario().with_slices(20)
-LIGHT = Effort(drags=6, restitutions=4, starts=2, points=60, moves=1, keep=6)
+LIGHT = {"starts": 2, "points": 150}
 SIGMA = 1e-3 * math.sqrt(2) / CUT.bottle.length
 
 
@@ -126,7 +126,7 @@ def test_difference_quotients_are_exact_on_a_plane_and_at_its_bounds():
     problem = plane()
     land = Landscape(problem)
     for x in (np.array([0.0, 1.0]), problem.bounds()[0], problem.bounds()[1]):
-        found = land.jacobian(x, problem.coarse_steps(), np.array([0, 1]))
+        found = land.jacobian(x, problem.coarse_steps())
         assert found == pytest.approx(-problem.slopes, abs=1e-9)
 
 
@@ -135,7 +135,7 @@ def test_on_a_plane_estimate_and_intervals_are_those_of_the_textbook(seed):
     problem = plane(seed=seed)
     exact = np.linalg.lstsq(problem.slopes, problem.measured.values, rcond=None)[0]
     covariance = np.linalg.inv(problem.slopes.T @ problem.slopes)
-    found = estimate(problem, Effort(points=200))
+    found = estimate(problem)
     # A few residuals lie beyond Huber's three deviations.
     assert found.x == pytest.approx(exact, abs=0.15 * np.sqrt(covariance.diagonal()).min())
     assert found.roughness == pytest.approx(1.0, abs=0.05)
@@ -148,24 +148,41 @@ def test_on_a_plane_estimate_and_intervals_are_those_of_the_textbook(seed):
     assert pairs[0, 1] == pytest.approx(covariance[0, 1] / math.sqrt(covariance[0, 0] * covariance[1, 1]), abs=0.1)
 
 
-def test_a_population_has_the_spread_of_its_temperature():
+def seeds(land):
+    return Points.flown(land, scan(land))
+
+
+@pytest.mark.parametrize("temperature_", [1.0, 9.0])
+def test_what_is_drawn_from_a_region_has_the_spread_of_its_temperature(temperature_):
     problem = plane()
     land = Landscape(problem)
-    seeds = Points.flown(land, scan(land, Effort()))
     spread = np.sqrt(np.linalg.inv(problem.slopes.T @ problem.slopes).diagonal())
-    for temperature_ in (1.0, 9.0):
-        cloud = cool(land, seeds, temperature_, Effort(points=200, keep=12), seed=1)
-        assert cloud.likely.x.std(axis=0) == pytest.approx(math.sqrt(temperature_) * spread, rel=0.15, abs=0.0)
-        assert 0.1 < cloud.accepted < 0.7
+    region = explored(land, seeds(land), 15.0 * temperature_, 400)
+    assert region.chi2.max() <= region.chi2.min() + 15.0 * temperature_
+    drawn = region.x[region.drawn(temperature_, 2000)]
+    assert drawn.std(axis=0) == pytest.approx(math.sqrt(temperature_) * spread, rel=0.1, abs=0.0)
+
+
+@pytest.mark.parametrize("shift", [0.0, 12.0])
+def test_a_region_of_two_parts_is_filled_in_both(shift):
+    class Valleys(Landscape):
+        def residuals(self, points):
+            first, second = points[:, :1], points[:, :1] - shift
+            deep = np.where(np.abs(first) < np.abs(second), first, second)
+            return np.column_stack((deep, points[:, 1:]))
+
+    land = Valleys(plane())
+    region = explored(land, seeds(land), 15.0, 400)
+    assert (np.abs(region.x[:, 0]) < 4.0).sum() == pytest.approx(len(region.x) / (2 if shift else 1), rel=0.1, abs=0.0)
 
 
 def test_folds_in_a_landscape_are_noticed():
-    clouds = []
-    for folds in (0.0, 0.25):
+    regions = []
+    for folds in (0.0, 0.5):
         land = Landscape(plane(folds))
-        clouds.append(cool(land, Points.flown(land, scan(land, Effort())), 1.0, Effort(), seed=1))
-    assert roughness(clouds[0], 1.0, seed=0) < 1.02
-    assert roughness(clouds[1], 1.0, seed=0) > 1.05
+        regions.append(explored(land, seeds(land), 15.0, 400))
+    assert roughness(regions[0], 1.0, seed=0) < 1.02
+    assert roughness(regions[1], 1.0, seed=0) > 1.1
 
 
 def test_shared_noise_widens_and_independent_noise_does_not():
@@ -191,15 +208,15 @@ def test_a_slipped_marker_moves_nothing():
     measured = filmed(throw, seed=5)
     slipped = measured.values.copy()
     slipped[[20, 60, 61, 90]] += (0.4, -0.5, -0.5, 0.3)
-    clean = estimate(pose(measured, throw, "midpoint", slices=20), LIGHT)
-    dirty = estimate(pose(replace(measured, values=slipped), throw, "midpoint", slices=20), LIGHT)
+    clean = estimate(pose(measured, throw, "midpoint", slices=20), **LIGHT)
+    dirty = estimate(pose(replace(measured, values=slipped), throw, "midpoint", slices=20), **LIGHT)
     for one, other in zip(intervals(clean), intervals(dirty), strict=True):
         assert one.low <= other.value <= one.high
 
 
 def test_ice_tells_neither_drag_nor_restitution():
     throw = replace(CUT, frozen=True)
-    found = intervals(estimate(pose(filmed(throw, solver="midpoint"), throw, "midpoint", slices=20), LIGHT))
+    found = intervals(estimate(pose(filmed(throw, solver="midpoint"), throw, "midpoint", slices=20), **LIGHT))
     assert [interval.verdict for interval in found] == ["not told", "not told"]
     assert all("cannot tell" in told(interval) for interval in found)
     assert (found[1].low, found[1].high) == (0.0, 1.0)
@@ -216,7 +233,7 @@ def test_what_intervals_are_worth_is_promised_only_where_it_was_measured():
 def test_restitution_is_not_told_where_nothing_rebounds():
     # A tenth of the water and strong drag: the slices creep, and none reaches the cap in the time.
     throw = replace(Scenario(water_mass=0.3, duration=0.16).with_slices(20), drag=1.2)
-    drag, restitution = intervals(estimate(pose(filmed(throw), throw, "midpoint", slices=20), LIGHT))
+    drag, restitution = intervals(estimate(pose(filmed(throw), throw, "midpoint", slices=20), **LIGHT))
     assert drag.verdict == "told"
     assert drag.low < throw.drag < drag.high
     assert restitution.verdict == "not told"
@@ -233,7 +250,7 @@ def test_the_equation_that_made_the_data_explains_them_and_another_does_not():
     throw = replace(CUT, theta0=1.3)
     measured = filmed(throw, seed=2)
     found = compare(
-        [estimate(pose(measured, throw, name, slices=20), LIGHT) for name in ("published-python", "midpoint")]
+        [estimate(pose(measured, throw, name, slices=20), **LIGHT) for name in ("published-python", "midpoint")]
     )
     assert [one.solver for one in found] == ["midpoint", "published-python"]
     assert found[0].fits
@@ -248,7 +265,7 @@ def test_the_equation_that_made_the_data_explains_them_and_another_does_not():
 
 
 def test_fits_of_different_data_are_not_compared():
-    one, other = (estimate(plane(seed=seed), LIGHT) for seed in (1, 2))
+    one, other = (estimate(plane(seed=seed), **LIGHT) for seed in (1, 2))
     with pytest.raises(ValueError, match="one measurement"):
         compare([one, other])
 

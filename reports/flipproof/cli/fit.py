@@ -123,19 +123,15 @@ def _disagreements(problem: Any, throw: Any, also: tuple[str, ...]) -> list[str]
 
 def _estimates(problems: Sequence[Any], starts: int | None) -> list[Any]:
     """Fit one problem after the other under a bar that counts flights."""
-    from dataclasses import replace
-
     from tqdm import tqdm
 
-    from flipproof.film.fit.estimate import estimate
-    from flipproof.film.fit.sampling import USUAL
+    from flipproof.film.fit.estimate import STARTS, estimate
 
-    effort = replace(USUAL, starts=starts) if starts else USUAL
     with tqdm(unit="flight", disable=None, leave=False) as bar:
         estimates = []
         for problem in problems:
             bar.set_description(problem.solver)
-            estimates.append(estimate(problem, effort, tick=bar.update))
+            estimates.append(estimate(problem, starts or STARTS, tick=bar.update))
         return estimates
 
 

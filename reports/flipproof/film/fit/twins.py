@@ -14,7 +14,6 @@ from flipproof.film.fit.estimate import Estimate, estimate
 from flipproof.film.fit.landscape import loss
 from flipproof.film.fit.problem import Measurement, Quantity, flights, pose
 from flipproof.film.fit.reading import Averaged
-from flipproof.film.fit.sampling import USUAL, Effort
 from flipproof.film.fit.uncertainty import Interval, intervals
 from flipproof.film.tracker.kinematics import angle
 from slicemodel import Scenario
@@ -145,18 +144,16 @@ def fit_twin(
     slices: int,
     also: tuple[str, ...] = (),
     quantity: Quantity = "theta",
-    effort: Effort = USUAL,
 ) -> Twin:
     """Draw a truth, film it, forget it, and fit the film with the equation that made it.
 
     Parameters
     ----------
-    seed : int - of truth, camera and population
+    seed : int - of truth and camera
     solver : str
     slices : int
     also : names from ``ALSO`` that are fitted; others are known exactly
     quantity : "theta" from Eq. 1, or "omega" as the paper makes it of theta
-    effort : Effort - as ``estimate``
     """
     truth = draw_truth(seed, slices)
     t, cap, base = film(truth, solver, seed)
@@ -172,7 +169,7 @@ def fit_twin(
     # What is fitted must not be known: the fit starts from a throw that says nothing of it.
     known = replace(truth, drag=0.0, restitution=0.5)
     problem = pose(measured, known, solver, also=also, slices=slices)
-    found = estimate(problem, effort, seed=seed)
+    found = estimate(problem, seed=seed)
     here = np.array([problem.coordinate(name, getattr(truth, name)) for name in problem.free])
     return Twin(
         seed=seed,
