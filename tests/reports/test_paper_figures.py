@@ -17,7 +17,7 @@ from flipproof.output.folder import OutputError
 from flipproof.paper import gallery
 from flipproof.paper.cases import HALF_FULL, family
 from flipproof.paper.costs import Cost
-from flipproof.paper.figures import FIGURES, ORDER, TIMED, check_figures, exhibits_paper, keys_of
+from flipproof.paper.figures import ORDER, RECIPES, TIMED, check_figures, exhibits_paper, keys_of
 from flipproof.paper.figures_bottle import tipping
 from flipproof.paper.figures_panels import Axis, Grid, Line, Panel, figure_grid, ranked, stretched, table_grid
 from flipproof.paper.runs import PUBLISHED, SOLVERS
@@ -67,7 +67,7 @@ def _is_number(cell):
 
 
 def test_every_figure_is_there(exhibits):
-    assert set(ORDER) == set(FIGURES)
+    assert set(ORDER) == set(RECIPES)
     assert [name.removeprefix("paper-").partition("-")[0] for name in exhibits] == [
         name for name in ORDER for _ in range(2 if name == "5a" else 1)
     ]

@@ -7,8 +7,17 @@ from typing import Final
 
 from flipproof.frame.exhibit import Exhibit
 from flipproof.paper.cases import Case, family
-from flipproof.paper.figures_panels import DASHED, Axis, Grid, Line, Panel, every_third, figure_grid, ranked, table_grid
-from flipproof.paper.figures_words import listed, settings_words
+from flipproof.paper.figures_panels import (
+    DASHED,
+    Axis,
+    Grid,
+    Line,
+    Panel,
+    every_third,
+    exhibit_grid,
+    listed,
+    ranked,
+)
 from flipproof.paper.parameters import number
 from flipproof.paper.runs import SOLVERS, PaperRuns
 from slicemodel import Trajectory
@@ -80,17 +89,14 @@ def _exhibit(
             for solver in SOLVERS
         }
     )
-    settings = settings_words()
     symbol = "alpha" if family_name == "drag" else "beta"
-    return Exhibit(
-        name=f"paper-{name}",
-        title=f"Fig. {name.partition('-')[0]}: {title}",
-        caption=f"Cap on top, base below, the centre of mass dashed. {caption} {settings}",
-        alt=f"Line plots of slice positions against time, a row for each {symbol}, a column for each solver. Centre of "
+    return exhibit_grid(
+        name,
+        title,
+        f"Cap on top, base below, the centre of mass dashed. {caption}",
+        f"Line plots of slice positions against time, a row for each {symbol}, a column for each solver. Centre of "
         f"mass from the cap at the end, as a fraction of the length, by {symbol}: {ends}.",
-        maker=figure_grid,
-        data=(grid,),
-        table=table_grid(grid),
+        grid,
     )
 
 
