@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
 from flipproof.frame.findings import Finding
-from flipproof.paper.claim import Claim, judge
+from flipproof.paper.claim import judge
 from flipproof.paper.claim_runs import STEADY_FILLING, WEIGHTLESS, WEIGHTLESS_KEY, ClaimRuns
 from flipproof.paper.observe import Flights
 from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS
@@ -28,7 +28,7 @@ CLAIMS: Final = (*OF_MODEL, *OF_THROWS, *OF_LANDING)
 """All statements, in the order of the paper."""
 
 
-def judge_all(runs: ClaimRuns, claims: Iterable[Claim] = CLAIMS) -> tuple[Statement, ...]:
+def judge_all(runs: ClaimRuns) -> tuple[Statement, ...]:
     """Return every statement with its judgements, in the order of the paper."""
     flights = [runs.flights(solver) for solver in SOLVERS]
     nothing = Flights(solver=GEOMETRY, runs={}, reasons={})
@@ -43,7 +43,7 @@ def judge_all(runs: ClaimRuns, claims: Iterable[Claim] = CLAIMS) -> tuple[Statem
             kind=claim.kind,
             judgements=tuple(judge(claim, each) for each in ([nothing] if claim.of_geometry else flights)),
         )
-        for claim in claims
+        for claim in CLAIMS
     )
 
 

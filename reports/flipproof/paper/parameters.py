@@ -46,11 +46,6 @@ class Parameter:
     words: str
     doubt: str = ""
 
-    @property
-    def stated(self) -> bool:
-        """Whether the text gives the value, as opposed to leaving it to the reader."""
-        return self.source != CHOSEN
-
 
 CHOSEN: Final = "chosen here"
 

@@ -68,25 +68,6 @@ class Fork:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Disagreement:
-    """One impact on which the two runs disagree; ``kind`` is fork, missing, extra, swapped or shifted."""
-
-    kind: str
-    time: float
-    slice: int
-    end: int
-    k: int
-
-    @property
-    def words(self) -> str:
-        """The disagreement in words."""
-        return (
-            f"{self.kind} at {self.time * 1e3:.1f} ms: slice {self.slice}, {end_name(self.end)}, "
-            f"{ordinal(self.k)} impact there"
-        )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Rests:
     """Contiguous times at which a slice is in contact with an end; arrays of shape (K,), times in [s]."""
 
@@ -160,18 +141,6 @@ class Alignment:
         return float((~self.shifted).sum()) / several if several else float("nan")
 
     @property
-    def first_disagreement(self) -> Disagreement | None:
-        """The earliest fork, missing, extra, swapped or shifted impact; None if the sequences agree."""
-        candidates = [_of(self.missing, k, "missing") for k in range(len(self.missing))]
-        candidates += [_of(self.extra, k, "extra") for k in range(len(self.extra))]
-        candidates += [
-            Disagreement(kind="fork", time=f.time, slice=f.slice, end=f.first_end, k=f.k) for f in self.forks
-        ]
-        candidates += [_of(self.matched, int(k), "swapped", self.shift) for k in self.swapped[:, 0]]
-        candidates += [_of(self.matched, int(k), "shifted", self.shift) for k in np.flatnonzero(self.shifted)]
-        return min(candidates, key=lambda candidate: candidate.time, default=None)
-
-    @property
     def words(self) -> str:
         """What agrees, what does not and what was not compared, in one sentence with the numbers."""
         shifted = int(self.shifted.sum())
@@ -190,18 +159,6 @@ class Alignment:
             forks += f"; {before} and {after} later impacts of those were not compared"
         words = f"{', '.join(parts)}; {forks}; {self.tail[0]} and {self.tail[1]} slower than {self.least_speed:g} m/s"
         return words + (f", {self.undecided} cut off by the end" if self.undecided else "")
-
-
-def _of(keyed: Keyed, i: int, kind: str, shift: FloatArray | None = None) -> Disagreement:
-    """Return the disagreement about one impact; a matched one shows at the earlier of its two times."""
-    early = 0.0 if shift is None else min(0.0, float(shift[i]))
-    return Disagreement(
-        kind=kind,
-        time=float(keyed.time[i]) + early,
-        slice=int(keyed.slice[i]),
-        end=int(keyed.end[i]),
-        k=int(keyed.k[i]),
-    )
 
 
 def count_key(impacts: Impacts, index: int, least_speed: float = 0.0) -> int:

@@ -58,10 +58,6 @@ class Differences:
     missing: Mapping[tuple[str, str, str], str]
     band_words: str = BAND_WORDS
 
-    def named(self, name: str) -> Difference | None:
-        """Return the difference of that name, or None."""
-        return next((difference for difference in self.pairs if difference.name == name), None)
-
 
 def study(ask: Ask) -> Study[Differences]:
     """Compare the pairs; a size that is asked for cheap solvers only does without bands and finer cuts."""

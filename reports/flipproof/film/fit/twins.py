@@ -39,9 +39,9 @@ RANGES: Final = {
 """Where truths are drawn from; the damping rate [1/s] evenly in its logarithm, everything else evenly."""
 
 
-def draw_truth(seed: int, slices: int, bottle_of: Scenario | None = None) -> Scenario:
+def draw_truth(seed: int, slices: int) -> Scenario:
     """Return a throw drawn at random from ``RANGES``."""
-    base = bottle_of or Scenario()
+    base = Scenario()
     share = np.random.default_rng([seed, 0]).uniform(size=len(RANGES))
     drawn = {name: low + (high - low) * u for (name, (low, high)), u in zip(RANGES.items(), share, strict=True)}
     low, high = RANGES["damping_rate"]
@@ -58,34 +58,19 @@ def draw_truth(seed: int, slices: int, bottle_of: Scenario | None = None) -> Sce
     return replace(throw, drag=2.0 * throw.slice_mass * gamma)
 
 
-def film(
-    throw: Scenario,
-    solver: str,
-    seed: int,
-    *,
-    noise: float = CAMERA_NOISE,
-    rate: float = RATE,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return what a camera sees of a simulated throw.
-
-    Parameters
-    ----------
-    throw : Scenario
-    solver : str
-    seed : int
-    noise : float - standard deviation of one coordinate [m]
-    rate : float - frames per second
+def film(throw: Scenario, solver: str, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return what a camera of ``RATE`` and ``CAMERA_NOISE`` sees of a simulated throw.
 
     Returns
     -------
     t : (P,) - [s]
     cap, base : (P, 2) - x and y of the markers [m], the centre of the bottle at rest (Eq. 1 takes differences only)
     """
-    t = np.arange(int(np.floor(throw.duration * rate)) + 1) / rate
+    t = np.arange(int(np.floor(throw.duration * RATE)) + 1) / RATE
     whole = replace(throw, duration=float(t[-1]))
     theta = flights([whole], solver, t)[0][0]
     half = 0.5 * throw.bottle.length * np.column_stack((np.sin(theta), -np.cos(theta)))
-    grain = np.random.default_rng([seed, 1]).normal(0.0, noise, (2, len(t), 2))
+    grain = np.random.default_rng([seed, 1]).normal(0.0, CAMERA_NOISE, (2, len(t), 2))
     return t, -half + grain[0], half + grain[1]
 
 
