@@ -10,13 +10,13 @@ import pytest
 from flipproof.chapters.paper.chapter import CHAPTER
 from flipproof.frame.solvers import Run, make
 from flipproof.page.templating import environment
-from flipproof.paper import claim, claim_runs, claims_landing, claims_throw, observe
+from flipproof.paper import claim, claim_runs, claims_filling, claims_landing, observe
 from flipproof.paper.cases import FAMILIES, all_cases, family
 from flipproof.paper.claim import Claim, judge
 from flipproof.paper.claim_runs import ClaimRuns, plan_claims, plan_further, plan_halved, plan_published
 from flipproof.paper.claims import CLAIMS, STEADY, claim_weight_slows_the_tenth, judge_all
 from flipproof.paper.claims_cost import many_steps_key, same_steps_key
-from flipproof.paper.claims_model import finest_key
+from flipproof.paper.claims_slices import finest_key
 from flipproof.paper.observe import Flights, MissingFlightError
 from flipproof.paper.parameters import numbers, paper_throw
 from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS, PaperRuns, make_thinned, plan_groups, scenario_of
@@ -468,8 +468,8 @@ def test_the_senses_of_non_monotonic_angles():
 
 
 def test_the_filling_of_the_slow_down_is_interpolated():
-    assert claims_throw.filling_of_slow_down(of_filling(slowing(0.125))) == pytest.approx(0.125, abs=1e-3)
-    assert math.isnan(claims_throw.filling_of_slow_down(of_filling(always(0.5))))
+    assert claims_filling.filling_of_slow_down(of_filling(slowing(0.125))) == pytest.approx(0.125, abs=1e-3)
+    assert math.isnan(claims_filling.filling_of_slow_down(of_filling(always(0.5))))
 
 
 # ---------------------------------------------------------------------- bands and missing flights

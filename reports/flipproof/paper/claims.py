@@ -9,10 +9,14 @@ from typing import Final
 from flipproof.frame.findings import Finding
 from flipproof.paper.claim import judge
 from flipproof.paper.claim_runs import STEADY_FILLING, WEIGHTLESS, WEIGHTLESS_KEY, ClaimRuns
+from flipproof.paper.claims_cost import OF_COST
+from flipproof.paper.claims_drag import OF_DRAG
+from flipproof.paper.claims_filling import OF_FILLINGS
+from flipproof.paper.claims_landing import OF_LANDING
+from flipproof.paper.claims_slices import OF_SLICES
+from flipproof.paper.claims_throw import OF_RELEASE, OF_THROWS
 from flipproof.paper.observe import Flights
 from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS
-from flipproof.paper.said_of_model import OF_MODEL
-from flipproof.paper.said_of_throws import OF_LANDING, OF_THROWS
 from flipproof.paper.statements import OMEGA, Statement
 from slicemodel.observables import plateau
 
@@ -24,7 +28,7 @@ STEADY: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
 )
 """Mean of omega / omega_0 over the second half of the flight of a bottle filled to 0.1: without weight, and with."""
 
-CLAIMS: Final = (*OF_MODEL, *OF_THROWS, *OF_LANDING)
+CLAIMS: Final = (*OF_RELEASE, *OF_SLICES, *OF_COST, *OF_DRAG, *OF_FILLINGS, *OF_THROWS, *OF_LANDING)
 """All statements, in the order of the paper."""
 
 
