@@ -54,15 +54,8 @@ def study(ask: Ask) -> Study[Events]:
 def claims(found: Events) -> Claims:
     """Yield the share of the time that each second curve spends in the tube around the first."""
     for (first, second), tube in found.tubes.items():
-        yield judged(
-            lambda first, second, tube: claim_tube(first, second, tube.value),
-            first,
-            second,
-            tube,
-            id=f"tube-{first}-{second}",
-            title=f"tube of {first} and {second}",
-            kind="observation",
-        )
+        title = f"tube of {first} and {second}"
+        yield judged(claim_tube, first, second, tube, id=f"tube-{first}-{second}", title=title, kind="observation")
     for (first, second), each in found.alignments.items():
         if each.found is None:
             title = f"alignment of {first} and {second}"

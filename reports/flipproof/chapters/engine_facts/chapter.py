@@ -46,11 +46,8 @@ def study(ask: Ask) -> Study[EngineFacts]:
 
 def claims(found: EngineFacts) -> Claims:
     """Yield that gravity cancels, and every fact."""
-    yield judged(
-        lambda: claim_gravity_cancels(found.usual.flight, found.weightless.flight),
-        id="engine-gravity",
-        title=f"{ENGINE}: free flight is the same with g = 0",
-    )
+    title = f"{ENGINE}: free flight is the same with g = 0"
+    yield judged(claim_gravity_cancels, found.usual, found.weightless, id="engine-gravity", title=title)
     yield from found.facts
 
 

@@ -84,19 +84,13 @@ def measure(label: str, run: Trajectory) -> Drift:
 def claims(found: Ice) -> Claims:
     """Yield that every solver keeps omega, and that welded masses drift at the engine's printed order."""
     for label, made in found.rigid.items():
-        yield judged(
-            lambda label, made: claim_ice(measure(label, made.flight)),
-            label,
-            made,
-            id=f"ice-{label.replace(' ', '-')}",
-            title=f"ice: {label} keeps ω constant",
-        )
+        id_, title = f"ice-{label.replace(' ', '-')}", f"ice: {label} keeps ω constant"
+        yield judged(lambda label, flight: claim_ice(measure(label, flight)), label, made, id=id_, title=title)
     if found.welded:
         yield judged(
-            lambda: claim_welded_order([made.flight for made in found.welded.values()]),
-            id="ice-welded-order",
+            lambda *flights: claim_welded_order(flights), *found.welded.values(), id="ice-welded-order",
             title="drift of welded ice",
-        )
+        )  # fmt: skip
 
 
 def claim_ice(drift: Drift) -> Finding:

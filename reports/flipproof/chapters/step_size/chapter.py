@@ -130,7 +130,7 @@ def claims(found: Orders) -> Claims:
             (found.check_flights, "across impacts"),
         ):
             yield judged(
-                lambda each, where: claim_order(each.value, where),
+                claim_order,
                 studies[scheme],
                 where,
                 id=f"order-{scheme}-{where.replace(' ', '-')}",
