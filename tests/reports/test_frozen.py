@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from flipproof.chapters.frozen.figure import figure_frozen
-from flipproof.chapters.frozen.study import LIMITS, QUANTITIES, plan_frozen, study_frozen
+from flipproof.chapters.frozen.study import FREEZING, QUANTITIES, plan_frozen, study_frozen
+from flipproof.chapters.solvers import LIMITS
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import make
 from slicemodel import Bottle, Scenario
@@ -25,9 +26,9 @@ def study():
 
 
 def test_plans_a_full_run_and_its_own_equation_at_the_same_times():
-    for scheme, model in LIMITS.items():
+    for scheme in FREEZING:
         run, reference = plan_frozen(THROW, scheme, 101)
-        assert (run.solver, run.settings["store"], reference.solver) == (scheme, "full", model)
+        assert (run.solver, run.settings["store"], reference.solver) == (scheme, "full", LIMITS[scheme])
         assert len(reference.settings["times"]) == run.settings["steps"]
         assert run.label != reference.label
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 from flipproof.chapters.differences.figure import draw
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, study_difference
 from flipproof.chapters.predictability.study import PartingGrowth, study_parting_growth
-from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, WITNESSES
+from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, WITNESSES
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Flights, Run, Study, attempt
 from flipproof.frame.solvers import find
@@ -37,7 +37,7 @@ PAIRS: Final = (
 )
 """Name, first, second: down the ladder one assumption at a time, then the engine, then several together."""
 
-REFINED: Final = (*LIMITS, *LADDER)
+REFINED: Final = (*SCHEMES, *LADDER)
 """Solvers that fly the throw again at ``FINER`` times the slices; a full report adds the engine, its slowest run."""
 
 MODEL_FLOOR: Final = 1e-9
@@ -113,7 +113,7 @@ def run_bands(runs: Mapping[str, Run], flights: Flights) -> dict[str, float]:
     band is zero. For a model it is the largest change of omega in its twins (another release in the eleventh digit, a
     tenth of the rest speed), and never less than MODEL_FLOOR; for an engine that of its certificate.
     """
-    bands = dict.fromkeys(LIMITS, 0.0)
+    bands = dict.fromkeys(SCHEMES, 0.0)
     for model in LADDER:
         usual = flights.trajectory(runs[model])
         for other in map(flights.trajectory, twins(runs[model])):

@@ -13,7 +13,7 @@ import numpy as np
 
 from engine_check.witness import witness_of
 from flipproof.chapters.flights import figures as pictures
-from flipproof.chapters.solvers import FLIGHTS, LIMITS, OTHERS
+from flipproof.chapters.solvers import FLIGHTS, LIMITS, OTHERS, SCHEMES
 from flipproof.frame.chapter import Ask, Chapter, Exhibit, Made, Study
 from flipproof.frame.solvers import find
 from flipproof.output.columns import curves_csv, json_ready
@@ -166,7 +166,7 @@ def _apart(ends: Mapping[str, float], unit: str, digits: str) -> str:
         return ""
     low, high = min(finite, key=lambda name: finite[name]), max(finite, key=lambda name: finite[name])
     words = f"They end up to {finite[high] - finite[low]:{digits}}{unit} apart ({low} to {high})"
-    pairs = [(s, m) for s, m in LIMITS.items() if s in finite and m in finite]
+    pairs = [(s, LIMITS[s]) for s in SCHEMES if s in finite and LIMITS[s] in finite]
     if pairs:
         words += ", a scheme and its own equation up to " + (
             f"{max(abs(finite[s] - finite[m]) for s, m in pairs):{digits}}{unit}"

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from typing import Final
 
 from flipproof.chapters.frozen.figure import figure_frozen
-from flipproof.chapters.frozen.study import LIMITS, QUANTITIES, Frozen, plan_frozen, study_frozen
+from flipproof.chapters.frozen.study import QUANTITIES, Frozen, plan_frozen, study_frozen
+from flipproof.chapters.solvers import LIMITS
 from flipproof.frame.chapter import Ask, Chapter, Exhibit, Run, Study
 from flipproof.output.columns import TIME, columns_csv
 
