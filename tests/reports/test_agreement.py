@@ -2,30 +2,17 @@
 
 import numpy as np
 import pytest
+from made_up import trajectory_of
 
 from flipproof.chapters.agreement.study import study_agreement
-from slicemodel import Scenario, Trajectory
+from slicemodel import Scenario
 
 SCENARIO = Scenario(n_slices=1)
 T = np.linspace(0.0, 0.5, 101)
 
 
 def curve(shift, t=T, scenario=SCENARIO):
-    points = len(t)
-    return Trajectory(
-        scenario=scenario,
-        solver="ode_reference",
-        method="made-up",
-        t=t,
-        theta=np.zeros(points),
-        omega=20.0 + shift * np.ones(points),
-        r=np.full((points, 1), 0.1),
-        v=np.zeros((points, 1)),
-        r_cm=np.full(points, 0.1),
-        inertia=np.ones(points),
-        impacts=None,
-        status="ok",
-    )
+    return trajectory_of(scenario, t, omega=20.0 + shift, keeps_slices=True)
 
 
 def matrix(*shifts, band=1e-3, **options):

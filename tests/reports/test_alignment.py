@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_up import trajectory_of
 
 import ode_reference
 import slicemodel
@@ -23,19 +24,9 @@ def flight(*events, n=3, until=0.5, r=None, t=None, method="made-up", known=True
     events = sorted(((*event, 1.0)[:4] for event in events), key=lambda event: event[0])
     t = np.array([0.0, until]) if t is None else t
     columns = list(zip(*events, strict=True)) if events else [[]] * 4
-    return Trajectory(
-        scenario=Scenario(n_slices=n),
-        solver="slicemodel",
-        method=method,
-        t=t,
-        theta=np.zeros(len(t)),
-        omega=np.ones(len(t)),
-        r=np.zeros((0, n)) if r is None else r,
-        v=np.zeros((0, n)) if r is None else np.zeros_like(r),
-        r_cm=np.ones(len(t)),
-        inertia=np.ones(len(t)),
-        impacts=Impacts(columns[0], columns[1], columns[2], columns[3], columns[3]) if known else None,
-    )
+    impacts = Impacts(columns[0], columns[1], columns[2], columns[3], columns[3]) if known else None
+    told = {} if r is None else {"r": r}
+    return trajectory_of(Scenario(n_slices=n), t, method=method, impacts=impacts, **told)
 
 
 USUAL = ((0.1, 0, BASE), (0.2, 1, BASE), (0.21, 0, CAP), (0.3, 0, BASE), (0.4, 2, CAP))

@@ -3,17 +3,9 @@
 import re
 
 import pytest
+from made_up import command as run
 
 from flipproof.cli import main as cli
-
-
-def run(capsys, *arguments):
-    try:
-        status = cli.main(arguments)
-    except SystemExit as end:
-        status = end.code
-    out, err = capsys.readouterr()
-    return status, out, err
 
 
 def test_help_reads_like_a_manual(capsys):

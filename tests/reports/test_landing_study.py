@@ -6,6 +6,7 @@ import sqlite3
 from dataclasses import replace
 
 import pytest
+from made_up import command
 
 from flipproof.build import ask_of, gather_report
 from flipproof.chapters import chapters_named
@@ -392,11 +393,7 @@ def test_an_outcome_that_no_program_certifies_is_told_with_its_reason():
 )
 def test_bad_input_is_one_line_that_names_it(arguments, words, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    try:
-        status = main(arguments)
-    except SystemExit as end:
-        status = end.code
-    said = capsys.readouterr().err
+    status, _, said = command(capsys, *arguments)
     assert status == 2
     assert words in said
     assert said.count("\n") == 1

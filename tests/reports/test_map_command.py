@@ -6,18 +6,18 @@ import sqlite3
 import subprocess
 import sys
 import time
-from concurrent.futures import Executor, Future
 from contextlib import closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from made_up import command as run
 from made_up import study_map
 
 from flipproof.chapters.maps.study import CURVE, LADDER, RUNGS
 from flipproof.chapters.waterfall.study import OBSERVABLES, study_waterfall
-from flipproof.cli import main as cli
+from flipproof.frame.pool import Here
 from flipproof.frame.solvers import make
 from flipproof.sweep.design import design_of
 from flipproof.sweep.errors import SweepError
@@ -36,24 +36,7 @@ THROW = Scenario(duration=0.3).with_slices(3)
 AXES = ("gamma", "step", "restitution")
 
 
-def run(capsys, *arguments):
-    try:
-        status = cli.main([*map(str, arguments)])
-    except SystemExit as end:
-        status = end.code
-    out, err = capsys.readouterr()
-    return status, out, err
-
-
-class Here(Executor):
-    """Makes every call in this process: a worker's start costs more than all of a small map."""
-
-    def submit(self, fn, /, *arguments):
-        future = Future()
-        future.set_result(fn(*arguments))
-        return future
-
-
+# In this process: a worker's start costs more than all of a small map.
 HERE = {"executor": Here(), "capacity": lambda: 1, "died": ()}
 
 

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_up import trajectory_of
 
 from flipproof.chapters.overlap.figure import figure_overlap
 from flipproof.chapters.overlap.study import CHECK, COARSER, COLUMN, EXCLUDE, PASS, plan_overlap, study_overlap
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import Made, make
-from slicemodel import Scenario, Trajectory
+from slicemodel import Scenario
 
 THROW = Scenario().with_slices(50)
 FILLS = (0.5, 1.0)
@@ -17,22 +18,8 @@ FILLS = (0.5, 1.0)
 
 def flat(run, level, status="ok", message=""):
     """A run whose omega is a level of omega_0 from the start."""
-    points = len(run.settings["times"])
-    trajectory = Trajectory(
-        scenario=run.scenario,
-        solver="made-up",
-        method=run.solver,
-        t=run.settings["times"],
-        theta=np.zeros(points),
-        omega=np.full(points, level * run.scenario.omega0),
-        r=np.zeros((0, run.scenario.n_slices)),
-        v=np.zeros((0, run.scenario.n_slices)),
-        r_cm=np.zeros(points),
-        inertia=np.ones(points),
-        status=status,
-        message=message,
-    )
-    return Made(run, trajectory, 0.0)
+    told = {"omega": level * run.scenario.omega0, "status": status, "message": message}
+    return Made(run, trajectory_of(run.scenario, run.settings["times"], **told), 0.0)
 
 
 LEVELS = {EXCLUDE: (0.23, 0.996), COARSER: (0.22, 0.99), PASS: (0.19, 0.4), CHECK: (0.191, 0.402), COLUMN: (0.33, 1.0)}

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_up import trajectory_of
 
 from flipproof.chapters.paper.chapter import CHAPTER
 from flipproof.frame.solvers import Run, make
@@ -22,7 +23,6 @@ from flipproof.paper.parameters import numbers, paper_throw
 from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS, PaperRuns, make_thinned, plan_groups, scenario_of
 from flipproof.paper.statements import OMEGA, Reading
 from flipproof.paper.verdicts import judge_paper
-from slicemodel import Trajectory
 from slicemodel.observables import centre_of_mass, plateau
 
 THROW = paper_throw().with_slices(2)
@@ -31,26 +31,14 @@ BY_ID = {claim.id: claim for claim in CLAIMS}
 # ---------------------------------------------------------------------- flights made up
 
 
-def flight(scenario, curve, *, points=1001, r=None, theta=None, r_cm=None, v=None):
+def flight(scenario, curve, *, points=1001, theta=None, **told):
     """Return a flight whose omega / omega_0 is ``curve`` of t / T, with whatever else is told."""
     t = np.linspace(0.0, scenario.duration, points)
     omega = scenario.omega0 * np.broadcast_to(np.asarray(curve(t / scenario.duration), dtype=float), t.shape)
     if theta is None:
         theta = scenario.theta0 + np.concatenate(([0.0], np.cumsum(np.diff(t) * (omega[1:] + omega[:-1]) / 2)))
-    none = np.empty((0, scenario.n_slices))
-    return Trajectory(
-        scenario=scenario,
-        solver="made up",
-        method="made up",
-        t=t,
-        theta=theta,
-        omega=omega,
-        r=none if r is None else r,
-        v=none if v is None else v,
-        r_cm=np.full_like(t, 0.2) if r_cm is None else r_cm,
-        inertia=np.ones_like(t),
-        diagnostics={"evaluations": 1000},
-    )
+    known = {"theta": theta, "omega": omega, "r_cm": 0.2, "diagnostics": {"evaluations": 1000}}
+    return trajectory_of(scenario, t, **known | told)
 
 
 def always(answer):

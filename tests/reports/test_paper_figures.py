@@ -6,13 +6,13 @@ import io
 import json
 import math
 import re
-from concurrent.futures import Executor, Future
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from flipproof.cli import paper as cli_paper
+from flipproof.frame.pool import Here
 from flipproof.output.folder import OutputError
 from flipproof.paper import gallery
 from flipproof.paper.cases import HALF_FULL, family
@@ -31,15 +31,6 @@ COSTS = tuple(
     for slices in (10, 100)
     for steps in (10, 1000)
 )
-
-
-class Here(Executor):
-    """Makes every call in this process: a worker's start costs more than these runs."""
-
-    def submit(self, fn, /, *arguments):
-        future = Future()
-        future.set_result(fn(*arguments))
-        return future
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_up import trajectory_of
 
 from flipproof.chapters.differences.study import study_difference
 from flipproof.chapters.predictability.figure import figure_predictability
@@ -25,21 +26,8 @@ THROW = Scenario(n_slices=1)
 
 def flight(change=0.0, *, scenario=THROW, t=T, method="made-up", status="ok", impacts=None) -> Trajectory:
     """Return a run with omega = omega_0 (1 + change)."""
-    points = len(t)
-    return Trajectory(
-        scenario=scenario,
-        solver="slicemodel",
-        method=method,
-        t=t,
-        theta=np.zeros(points),
-        omega=20.0 * (1 + np.broadcast_to(change, (points,))),
-        r=np.zeros((0, 1)),
-        v=np.zeros((0, 1)),
-        r_cm=np.ones(points),
-        inertia=np.ones(points),
-        status=status,
-        impacts=impacts,
-    )
+    known = {"solver": "slicemodel", "method": method, "status": status, "impacts": impacts}
+    return trajectory_of(scenario, t, omega=20.0 * (1 + change), **known)
 
 
 def members(law, **options):

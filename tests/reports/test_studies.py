@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from made_up import trajectory_of
 
 from flipproof.build import ask_of
 from flipproof.chapters.differences.chapter import run_bands
@@ -27,23 +28,8 @@ pytestmark = pytest.mark.xdist_group("evidence")
 
 
 def curve(omega, *, method="made-up", solver="slicemodel", impacts=None, t=None, status="ok", **settings) -> Trajectory:
-    omega = np.asarray(omega, dtype=float)
-    points = len(omega)
-    return Trajectory(
-        scenario=SCENARIO,
-        solver=solver,
-        method=method,
-        t=np.linspace(0.0, 0.5, points) if t is None else t,
-        theta=np.zeros(points),
-        omega=omega,
-        r=np.full((points, 1), 0.1),
-        v=np.zeros((points, 1)),
-        r_cm=np.full(points, 0.1),
-        inertia=np.ones(points),
-        impacts=impacts,
-        status=status,
-        settings=settings,
-    )
+    known = {"method": method, "solver": solver, "impacts": impacts, "status": status, "settings": settings}
+    return trajectory_of(SCENARIO, len(omega) if t is None else t, omega=omega, keeps_slices=True, **known)
 
 
 def test_parting_is_interpolated_and_follows_the_last_impact():

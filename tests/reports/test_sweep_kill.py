@@ -11,8 +11,8 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+from made_up import command
 
-from flipproof.cli import main as cli
 from flipproof.frame.solvers import solve
 from flipproof.sweep.design import from_parameters, read_design
 from slicemodel.observables import plateau
@@ -155,12 +155,7 @@ def test_a_disk_that_takes_no_more_ends_the_sweep_in_one_line(undisturbed, tmp_p
 
 
 def run(capsys, *arguments):
-    try:
-        status = cli.main(["sweep", *map(str, arguments)])
-    except SystemExit as end:
-        status = end.code
-    out, err = capsys.readouterr()
-    return status, out, err
+    return command(capsys, "sweep", *arguments)
 
 
 def test_a_complete_sweep_is_not_made_again_and_is_exported(undisturbed, capsys):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_up import study_map
+from made_up import study_map, trajectory_of
 
 import ode_reference
 from flipproof.chapters.maps.figure import figure_map
@@ -24,7 +24,7 @@ from flipproof.chapters.maps.study import (
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import Made, Run, make
-from slicemodel import Scenario, Trajectory
+from slicemodel import Scenario
 from slicemodel.observables import plateau
 
 THROW = Scenario().with_slices(6)
@@ -34,21 +34,7 @@ FILLS = (0.3, 0.6)
 def flat(run: Run, level: float, status: str = "ok") -> Made:
     """A run whose omega jumps from omega_0 to a level at once."""
     points = run.settings.get("steps", 201)
-    omega = np.full(points, level * run.scenario.omega0)
-    trajectory = Trajectory(
-        scenario=run.scenario,
-        solver="made-up",
-        method=run.solver,
-        t=np.linspace(0.0, run.scenario.duration, points),
-        theta=np.zeros(points),
-        omega=omega,
-        r=np.zeros((0, 6)),
-        v=np.zeros((0, 6)),
-        r_cm=np.zeros(points),
-        inertia=np.ones(points),
-        status=status,
-    )
-    return Made(run, trajectory, 0.0)
+    return Made(run, trajectory_of(run.scenario, points, omega=level * run.scenario.omega0, status=status), 0.0)
 
 
 def made_up(axis, values, level_of, spoil=None):

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from made_up import trajectory_of
 
 import ode_reference
 from flipproof.chapters.waterfall import study as waterfall
@@ -19,19 +20,8 @@ NAME_OF = {switch: words for switch, words in NAMES.items()}
 
 def made_up(value: float) -> Trajectory:
     """A run whose plateau is ``value`` and whose other observables follow from it."""
-    t = np.linspace(0.0, THROW.duration, 5)
-    return Trajectory(
-        scenario=THROW,
-        solver="made-up",
-        method="made-up",
-        t=t,
-        theta=np.full(5, value),
-        omega=np.full(5, THROW.omega0 * value),
-        r=np.full((5, 1), 0.1),
-        v=np.full((5, 1), value),
-        r_cm=np.full(5, 0.1),
-        inertia=np.ones(5),
-    )
+    known = {"theta": value, "omega": THROW.omega0 * value, "r": np.full((5, 1), 0.1), "v": np.full((5, 1), value)}
+    return trajectory_of(THROW, 5, **known)
 
 
 def split(value_of, *, program=0.0, moved=0.0, kind="twin in release"):
