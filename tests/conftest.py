@@ -20,9 +20,19 @@ def cache_of_these_tests(tmp_path_factory):
         yield
 
 
+def pytest_collection_modifyitems(items):
+    """Keep in one process, with ``--dist loadgroup``, the tests of the one report, and those that share runs."""
+    for item in items:
+        made = item._fixtureinfo.name2fixturedefs
+        if not made.keys().isdisjoint(("gathered", "folder", "browser")):
+            item.add_marker(pytest.mark.xdist_group("evidence"))
+        elif any(found[-1].scope == "module" for found in made.values()):
+            item.add_marker(pytest.mark.xdist_group(item.path.stem))
+
+
 @pytest.fixture(scope="session")
 def gathered() -> Gathered:
-    """Gathered once per process: tests that use it belong to the xdist group "evidence"."""
+    """Gathered once per process."""
     ask = ask_of(Scenario(), "quick", 20, tuple(WITNESSES))
     return gather_report(ask, work={"work-precision": contenders.QUICK})
 

@@ -32,7 +32,6 @@ def test_the_noise_of_a_filmed_angle_is_that_of_two_markers():
     assert abs(np.corrcoef(off[1:], off[:-1])[0, 1]) < 0.12
 
 
-@pytest.mark.xdist_group("twins")
 def test_intervals_hold_the_truth_and_are_not_overlong():
     twins = [fit_twin(seed, "midpoint", slices=20) for seed in range(300, 308)]
     held = sum(twin.covers("drag") and twin.covers("restitution") for twin in twins)

@@ -19,8 +19,6 @@ from flipproof.output.snapshot import BEGIN, END, PLACE, README, front_page, wri
 from flipproof.page.headlines import MEASURES, Headline, headlines
 from flipproof.page.lead import amount, answer, lead_words, sentences, signed
 
-pytestmark = pytest.mark.xdist_group("evidence")
-
 PAIRS = {"whole": TOTAL, "program-eq8": PROGRAM_EQ8, "eq8-free": EQ8_FREE, "engine": BY_ENGINE}
 
 

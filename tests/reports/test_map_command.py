@@ -29,8 +29,6 @@ from flipproof.sweep.validity_map import Plan, map_csv, map_facts
 from flipproof.sweep.work import code_identity, make_batch
 from slicemodel import Scenario
 
-pytestmark = pytest.mark.xdist_group("map")
-
 ROOT = Path(__file__).resolve().parents[2]
 THROW = Scenario(duration=0.3).with_slices(3)
 AXES = ("gamma", "step", "restitution")

@@ -579,8 +579,6 @@ def test_gathering_keeps_what_belongs_together(monkeypatch):
 
 # ---------------------------------------------------------------------- the published program, and weight
 
-pytestmark = pytest.mark.xdist_group("paper-claims")
-
 
 @pytest.fixture(scope="module")
 def runs():

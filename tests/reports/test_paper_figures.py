@@ -23,8 +23,6 @@ from flipproof.paper.figures_panels import Axis, Grid, Line, Panel, figure_grid,
 from flipproof.paper.runs import PUBLISHED, SOLVERS, gather_paper
 from slicemodel.observables import plateau_of_points, static_toppling_angle, toppling_angle
 
-pytestmark = pytest.mark.xdist_group("paper-figures")
-
 COSTS = tuple(
     Cost(solver=solver, slices=slices, steps=steps, work=slices * steps, seconds=1e-6 * slices * steps)
     for solver in SOLVERS

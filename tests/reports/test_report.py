@@ -37,7 +37,6 @@ from flipproof.page.render import typeset
 from slicemodel import Scenario
 
 ROOT = Path(__file__).resolve().parents[2]
-pytestmark = pytest.mark.xdist_group("evidence")
 
 
 def findings_of(gathered):

@@ -17,7 +17,6 @@ from flipproof.page.story.live import sliders
 from flipproof.page.story.numbers import Summary
 from slicemodel import Scenario
 
-pytestmark = pytest.mark.xdist_group("evidence")
 SOLVERS = ("published-python", "eq8", "free-flight")
 KEPT = Path(__file__).parents[2] / "reports" / "snapshot" / "summary.json"
 NAMED = re.compile(

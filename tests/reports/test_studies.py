@@ -24,7 +24,6 @@ from flipproof.frame.twins import twins
 from slicemodel import Impacts, Scenario, Trajectory
 
 SCENARIO = Scenario(n_slices=1)
-pytestmark = pytest.mark.xdist_group("evidence")
 
 
 def curve(omega, *, method="made-up", solver="slicemodel", impacts=None, t=None, status="ok", **settings) -> Trajectory:

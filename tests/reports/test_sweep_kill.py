@@ -24,8 +24,6 @@ SPEC = importlib.util.spec_from_file_location("sweep_kill", ROOT / "benchmarks" 
 sweep_kill = importlib.util.module_from_spec(SPEC)
 SPEC.loader.exec_module(sweep_kill)
 
-pytestmark = pytest.mark.xdist_group("sweep")
-
 
 @pytest.fixture(scope="module", autouse=True)
 def _path():
