@@ -153,6 +153,7 @@ def test_impacts_that_share_a_step_are_not_certified_away():
     assert "moves omega" in found.reason
 
 
+@pytest.mark.slow
 def test_located_hits_put_those_impacts_in_order_and_are_certified():
     """On the grid this throw is certified at 7.8e-6 s and off by 1e-2 omega_0."""
     dry = replace(Scenario(restitution=0.35).with_slices(20), drag=0.0)

@@ -331,13 +331,17 @@ def test_typeset():
     assert typeset("v' = (omega^2 - gamma^2) X - 2 gamma v, gamma << omega_0") == ("v' = (ω² − γ²) X − 2 γ v, γ ≪ ω₀")
 
 
-def test_the_real_command_from_a_cold_start(tmp_path):
+@pytest.mark.parametrize("kernels", ["compiled", pytest.param("to be compiled", marks=pytest.mark.slow)])
+def test_the_real_command(tmp_path, kernels):
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    if kernels == "to be compiled":
+        environment["NUMBA_CACHE_DIR"] = str(tmp_path / "cache")
     scenario = tmp_path / "throw.toml"
     scenario.write_text("[scenario]\nwater_mass = 0.3\nn_slices = 12\ndrag = 0.25\nrestitution = 0.4\n")
     result = subprocess.run(
         [sys.executable, "-m", "flipproof", "report", str(scenario), "--quick", "--out", str(tmp_path / "out")],
         cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+        env=environment,
         capture_output=True,
         text=True,
         check=False,
