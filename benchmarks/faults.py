@@ -58,7 +58,7 @@ FAULTS = (
     ("engine_check/pymunk_rods.py", "np.max(scenario.slice_height - apart", "np.max(apart - scenario.slice_height",
      "test_pymunk_exclude.py"),
     ("engine_check/restitution.py", "measured=leaving / arriving", "measured=arriving / leaving",
-     "test_engine_contact.py"),
+     "test_certificate.py"),
     ("engine_check/refinement.py", "beyond = ~(found < limit)", "beyond = found > limit", "test_certificate.py"),
     ("engine_check/refinement.py", "horizon=min(verdict.horizon, before)", "horizon=verdict.horizon",
      "test_certificate.py"),

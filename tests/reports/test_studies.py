@@ -48,6 +48,13 @@ def test_parting_is_interpolated_and_follows_the_last_impact():
     assert difference.final == pytest.approx(-0.04)
 
 
+def test_an_impact_at_the_very_moment_of_parting_counts():
+    impacts = Impacts(time=[0.0, 0.2], slice=[4, 5], end=[1, 1], speed_before=[1] * 2, speed_after=[1] * 2)
+    apart = curve(np.full(6, 15.0), impacts=impacts)
+    difference = study_difference("x", curve(np.full(6, 20.0)), apart, impacts_of=apart)
+    assert (difference.parting_time, difference.parting_impact.slice) == (0.0, 4)
+
+
 def test_no_parting_is_said_so():
     difference = study_difference("x", curve([20, 20]), curve([20, 20.1]))
     assert difference.parting_time is None
