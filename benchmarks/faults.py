@@ -1,4 +1,4 @@
-"""Single-line faults in all four packages, each against the tests of its folder: which are caught?
+"""Plant single-line faults in all four packages and hold each against the tests of its folder.
 
     python benchmarks/faults.py                # all of them
     python benchmarks/faults.py flow scatter   # those whose file or fault contains a word
@@ -26,7 +26,7 @@ FAULTS = (
     ("slicemodel/kernel/flock.py", "margin >= 0.0 and 0.0 <= way.b <= (1.0 + way.a_minus_1) * flock.horizon",
      "margin >= 0.0", "test_flock.py"),
     ("slicemodel/observables.py", "middle = (times[0] + times[-1]) / 2", "middle = times[-1] / 2",
-     "test_observables_plateau.py"),
+     "test_observables.py"),
     ("slicemodel/observables.py", "left > 2 * rest_speed", "left > rest_speed", "test_observables.py"),
     ("slicemodel/landing.py", "base, cap = motion.base[:, 1] - rim", "base, cap = motion.base[:, 1] + rim",
      "test_observables_landing.py"),
@@ -45,8 +45,8 @@ FAULTS = (
     ("ode_reference/column.py", "return self.water * h / 6 - self.reduced", "return self.water * h / 3 - self.reduced",
      "test_column.py"),
     ("ode_reference/landing_core/impulses.py", "abs(along) <= friction * normal", "abs(along) <= normal",
-     "test_landing.py"),
-    ("ode_reference/landing_core/motion.py", "side, turn = -2 * m * mean * rate1 * h", "side, turn = -m * mean * rate1 * h",
+     "test_coulomb.py"),
+    ("ode_reference/landing_core/motion.py", "side, turn = -2 * m * mean * rate1", "side, turn = -m * mean * rate1",
      "test_landing.py"),
     ("ode_reference/landing_core/motion.py", "(1.0 + world.e_water) * w[i]", "world.e_water * w[i]", "test_landing.py"),
     ("engine_check/mujoco_impacts.py", "2.0 * u < (1.0 - self.restitution)", "2.0 * u < (1.0 + self.restitution)",
