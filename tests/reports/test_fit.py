@@ -148,6 +148,13 @@ def test_on_a_plane_estimate_and_intervals_are_those_of_the_textbook(seed):
     assert pairs[0, 1] == pytest.approx(covariance[0, 1] / math.sqrt(covariance[0, 0] * covariance[1, 1]), abs=0.1)
 
 
+def test_an_interval_is_wider_by_the_root_of_the_roughness():
+    found = estimate(plane(), LIGHT)
+    smooth = replace(found, roughness=1.0, reach=np.array([found.x, found.x]))
+    for one, other in zip(intervals(smooth), intervals(replace(smooth, roughness=4.0)), strict=True):
+        assert other.high - other.low == pytest.approx(2.0 * (one.high - one.low), rel=1e-9, abs=0.0)
+
+
 def test_a_population_has_the_spread_of_its_temperature():
     problem = plane()
     land = Landscape(problem)
