@@ -112,7 +112,9 @@ def solve(
     exception is "accelerating-origin" with 1e-4 omega_0, since there only a slice at rest pushes the tube. With recoil
     the band is 3e-3 omega_0 on the paper's throw, and 4e-3 has been seen on another bottle with 50 slices: which slice
     rests when decides the order of all later impacts. Where gamma = |omega0| exactly and ``roots`` are off, nothing
-    pushes the water and it stays where it is.
+    pushes the water and it stays where it is. A full bottle that no weight pulls along its axis is its own mirror image
+    for ever, by the simultaneous law: all methods hold it to that, since rounding would part the two halves as
+    exp(theta) grows, and the hits of a pair with them. Water a hair short of full does part, after some turns.
     The other methods add the error of their steps: at their default tolerances they agree with "taylor" to the same
     band over half a second. An error grows as slices fly apart, and rests end it: with e = 1 and without drag none
     comes to rest, and Eq. 8 at N = 20 is off by 1e-9 omega_0 after half a second and by 1e-4 omega_0 after three;

@@ -126,6 +126,9 @@ class _Flight:
         self.ends = Ends.of(scenario, recoil=recoil)
         # Ice, or a single slice as long as the tube: nothing can move.
         self.immobile = scenario.frozen or self.ends.high - self.ends.low <= self.ends.reach
+        # Nothing tells the ends of a full bottle apart if no weight pulls along it and impacts do not come one by one.
+        weightless = model.switches.weightless or scenario.gravity == 0.0
+        self.mirrored = scenario.fill_fraction == 1.0 and weightless and self.law is not LAWS["sequential"]
         self.t = 0.0
         self.y = np.concatenate([[scenario.theta0], scenario.initial_positions(), np.zeros(n)])
         self.resting: SideArray = np.zeros(n, dtype=np.int64)
@@ -179,7 +182,7 @@ class _Flight:
             for begin, stop in zip(leg.t[:-1], np.minimum(leg.t[1:], end), strict=True):
                 if stop > begin:
                     self.ledger.smooth(begin, stop, path(nodes(begin, stop)))
-        self.t, self.y = end, y
+        self.t, self.y = end, self._mirrored(y) if self.mirrored else y
         found = [name for (name, _), times in zip(watch, leg.t_events or [], strict=False) if len(times)]
         if missed is not None:
             self._meet(self._struck([missed[1]]))
@@ -210,6 +213,17 @@ class _Flight:
                 raise _StandstillError
             self.watched = (self.motion.evaluations, t)
         return self.motion(t, y)
+
+    def _mirrored(self, y: FloatArray) -> FloatArray:
+        """Return the state in which each slice and its image at the other end have one distance from it and one speed.
+
+        What rounding parts them by grows as exp(theta), until their hits, which are one impact, become two.
+        """
+        if not np.array_equal(self.resting, -self.resting[::-1]):
+            return y
+        r, v = y[1 : self.n + 1], y[self.n + 1 :]
+        image = self.scenario.bottle.length - r[::-1]
+        return np.concatenate([y[:1], (r + image) / 2, (v - v[::-1]) / 2])
 
     # ------------------------------------------------------------------ events
 

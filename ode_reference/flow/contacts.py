@@ -14,6 +14,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from ode_reference.flow.laws import sort, strike
 from ode_reference.flow.layout import (
     AFTER,
@@ -44,7 +46,7 @@ def touch(now: Any, points: FloatArray, marks: IntArray) -> None:
     """List the slices that strike at this instant: the one that was located, and who reaches an end with it.
 
     Two slices that strike at the same time are located at times that differ by rounding: contact is also what a slice
-    reaches within four units in the last place of the time.
+    reaches within four units in the last place of the time. In a full bottle a slice and its image strike together.
     """
     now.hits = 0
     for k in range(now.near):
@@ -55,6 +57,12 @@ def touch(now: Any, points: FloatArray, marks: IntArray) -> None:
         if (strikes and marks[STILL, j] == 0) or j == now.struck:
             marks[HIT, now.hits] = j
             now.hits += 1
+    if now.mirrored:
+        for k in range(now.hits):
+            j = points.shape[1] - 1 - marks[HIT, k]
+            if marks[SIDE, j] == 0 and not np.any(marks[HIT, : now.hits] == j):
+                marks[HIT, now.hits] = j
+                now.hits += 1
     sort(marks[HIT], marks[RANK], now.hits)
 
 
@@ -76,6 +84,12 @@ def meet(now: Any, points: FloatArray, marks: IntArray, impacts: FloatArray) -> 
         if marks[SIDE, j] != 0 or marks[STILL, j] != 0 or now.t == 0.0:
             points[APPROACH, k] = 0.0
         now.largest_snap = max(now.largest_snap, abs(abs(y) - now.wall))
+    if now.mirrored:
+        # In the order of the slices the images of the first hits are the last ones.
+        for k in range(now.hits // 2):
+            image = now.hits - 1 - k
+            points[APPROACH, k] = (points[APPROACH, k] + points[APPROACH, image]) / 2.0
+            points[APPROACH, image] = points[APPROACH, k]
     rebound(now, points, marks)
     book_jump(now, 1)
     choose(now, points)

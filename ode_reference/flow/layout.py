@@ -40,7 +40,7 @@ _REAL = {
     "ledger": "work_drag work_weight work_spring work_origin work_impacts work_rests work_recoil initial final",
 }
 _WHOLE = {
-    "switches": "origin drag_on_centre recoil sequential ledger",
+    "switches": "origin drag_on_centre recoil sequential ledger mirrored",
     "body": "free on_base on_cap",
     "search": "near order fresh stale since",
     "event": "event hits struck struck_end released stay_base stay_cap",
@@ -134,6 +134,8 @@ def prepare(
     now.tolerance = TOLERANCE * scenario.bottle.length
     now.origin, now.drag_on_centre, now.recoil = switches.origin, switches.drag_on_centre, switches.recoil
     now.sequential, now.ledger = sequential and switches.recoil, ledger
+    # Nothing tells the ends of a full bottle apart if no weight pulls along it and impacts do not come one by one.
+    now.mirrored = scenario.fill_fraction == 1.0 and now.gravity == 0.0 and not now.sequential
     now.theta, now.free = scenario.theta0, n
     set_body(now)
     # A full bottle is mirror symmetric to the last digit: its stack is as high as the tube is long.

@@ -53,6 +53,21 @@ def start_map(now: Any) -> None:
 
 
 @inner
+def mirror(points: FloatArray, marks: IntArray) -> None:
+    """Give each free slice and its image at the other end one distance from the middle and one speed.
+
+    What rounding parts them by grows as exp(theta), until their hits, which are one impact, become two.
+    """
+    n = points.shape[1]
+    for i in range((n + 1) // 2):
+        j = n - 1 - i
+        if marks[SIDE, i] == 0 and marks[SIDE, j] == 0:
+            for row in (PLACE, SPEED):
+                points[row, i] = (points[row, i] - points[row, j]) / 2.0
+                points[row, j] = -points[row, i]
+
+
+@inner
 def rebase(now: Any, points: FloatArray, marks: IntArray) -> None:
     """Move every free slice to where it is, make the moments anew and start the map here.
 
@@ -69,6 +84,9 @@ def rebase(now: Any, points: FloatArray, marks: IntArray) -> None:
             sum_u += y
             sum_w += v
             outermost = max(outermost, abs(y))
+    if now.mirrored and now.on_base == now.on_cap:
+        mirror(points, marks)
+        sum_u = sum_w = 0.0
     expected = math.exp(-now.drag_rate * (now.t - now.base_time))
     wronskian = abs((now.A * now.dB - now.dA * now.B) / expected - 1.0)
     start_map(now)

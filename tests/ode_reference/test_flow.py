@@ -96,7 +96,7 @@ def test_a_full_bottle_in_free_flight_stays_mirror_symmetric(n, e, gamma):
 
 
 def test_no_loss_and_no_drag_keep_the_energy_over_many_impacts():
-    scenario = replace(Scenario(water_mass=1.0, duration=2.0).with_slices(100), drag=0.0, restitution=1.0)
+    scenario = replace(Scenario(water_mass=0.98, duration=2.0).with_slices(100), drag=0.0, restitution=1.0)
     found = solve(scenario, "free-flight", [2.0], rest_speed=1e-8, energy=True)
     ledger = found.diagnostics["energy"]
     assert len(found.impacts) > 1500
