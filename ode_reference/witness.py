@@ -25,7 +25,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from ode_reference.arguments import known_name, number_above, number_within
 from ode_reference.contact import FREE, TOUCH, Ends, SideArray, resolve
@@ -185,8 +185,8 @@ class _Flight:
         self.t, self.y = end, self._mirrored(y) if self.mirrored else y
         found = [name for (name, _), times in zip(watch, leg.t_events or [], strict=False) if len(times)]
         if missed is not None:
-            self._meet(self._struck([missed[1]]))
-        elif found:
+            found = [missed[1]]
+        if found:
             self._meet(self._struck(found), *(side for kind, side, _ in found if kind == "release"))
         elif leg.status < 0 and not self._overflowed():
             self._stall(leg.message)
@@ -280,6 +280,8 @@ class _Flight:
     def _first_missed(self, t: FloatArray, path: Callable[[Any], FloatArray]) -> tuple[float, Found] | None:
         """Return the first time before the end of the leg at which a slice passed an end unseen, and which did.
 
+        Or at which an end ceased to press unseen, and which.
+
         ``solve_ivp`` looks at events where its steps end. A slice that passes an end and is back inside by then, or
         behind which another passes, shows between: it is beyond the end where one part of a step ends, or it turns
         back within a part. The turning point is then located, and the passage before it.
@@ -305,7 +307,33 @@ class _Flight:
                 found = self._passage(side, i, float(times[k]), float(times[k + 1]), path)
                 if found is not None and found < t[-1] and (first is None or found < first[0]):
                     first = found, ("wall", side, i)
+            found = self._lost_push(side, times, states, path)
+            if found is not None and found < t[-1] and (first is None or found < first[0]):
+                first = found, ("release", side, None)
         return first
+
+    def _lost_push(
+        self, side: int, times: FloatArray, states: FloatArray, path: Callable[[Any], FloatArray]
+    ) -> float | None:
+        """Return when the end ``side`` first ceases to press on what rests there, if only for a part of a step."""
+        members = np.flatnonzero(self.resting == side)
+        if not members.size:
+            return None
+        push = self._push(side, int(members[0]))
+        values = np.array([push(t, y) for t, y in zip(times, states.T, strict=True)])
+        before, after = values[np.r_[0, : len(values) - 1]], values[np.r_[1 : len(values), -1]]
+        lowest = (values <= before) & (values <= after) & (values <= np.maximum(before, after) - values)
+        for k in np.flatnonzero(lowest).tolist():
+            begin, stop = max(k - 1, 0), min(k + 1, len(times) - 1)
+            while begin > 0 and values[begin] <= 0:
+                begin -= 1
+            low, high = float(times[begin]), float(times[stop])
+            dip = minimize_scalar(
+                lambda t: push(t, path(t)), bounds=(low, high), method="bounded", options={"xatol": 1e-8 * (high - low)}
+            )
+            if values[begin] > 0 > float(dip.fun):
+                return _root(lambda t: push(t, path(t)), low, float(dip.x))
+        return None
 
     def _passage(self, side: int, i: int, a: float, b: float, path: Callable[[Any], FloatArray]) -> float | None:
         """Return when slice ``i`` passes the end ``side`` between ``a`` and ``b``, or None if it turns back inside."""
