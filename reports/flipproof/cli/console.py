@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import os
 import sys
 import unicodedata
 from typing import Any, Final
@@ -34,7 +35,13 @@ def _cut(text: str, most: int) -> str:
 
 
 def speak_plainly() -> None:
-    """Let standard output and error write in ASCII what their encoding cannot show, instead of raising."""
+    """Let standard output and error write in ASCII what their encoding cannot show, instead of raising.
+
+    Where one is closed, Python has None; what is written there then goes nowhere, as whoever closed it asked.
+    """
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
     codecs.register_error(HANDLER, _in_ascii)
     for stream in (sys.stdout, sys.stderr):
         reconfigure: Any = getattr(stream, "reconfigure", None)

@@ -29,6 +29,7 @@ from flipproof.cli.arguments import (
     add_no_cache,
     count,
     read_scenario,
+    refuse_overwriting,
 )
 from flipproof.cli.check import add_checks
 from flipproof.cli.compare import add_compare
@@ -93,6 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         signal.signal(number, _interrupt)
     try:
         options = parser().parse_args(arguments)
+        refuse_overwriting(options)
         status = options.action(options)
         sys.stdout.flush()
         return int(status)
@@ -103,7 +105,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(INTERRUPTED_WORDS, file=sys.stderr)
         return INTERRUPTED
-    except (ValueError, OSError, MemoryError) as error:
+    except OSError as error:
+        return _complain(_words_of(error), BAD_INPUT)
+    except (ValueError, MemoryError) as error:
         return _complain(str(error) or type(error).__name__, BAD_INPUT)
     except Exception as error:
         # Nobody is helped by a traceback at the command line; whoever wants to mend the cause asks for it.
@@ -146,6 +150,15 @@ def _unraisable(what: sys.UnraisableHookArgs) -> None:
         _thread.interrupt_main()
     else:
         sys.__unraisablehook__(what)
+
+
+def _words_of(error: OSError) -> str:
+    """Return what an error of the operating system says, and of what if it does not say that."""
+    if error.filename is not None:
+        return str(error)
+    if isinstance(error, FileNotFoundError):
+        return "the current folder has been removed; go to another"
+    return f"standard output or a file cannot be read or written ({error.strerror or error})"
 
 
 def _complain(words: str, status: int) -> int:
