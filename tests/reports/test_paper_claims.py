@@ -660,13 +660,13 @@ def test_what_the_published_program_says_of_the_paper(statements):
         ("tenth-slows", 0.543, 1e-3),
         ("no-drag-rises", 0.160, 1e-3),
         ("steps-enough", 0.0026, 2e-4),
-        ("dynamic-lower", -2.3, 0.1),
+        ("dynamic-lower", -7.1, 0.1),
         ("beta-0-sticks", 9.3, 0.1),
         ("aspect-ratio", 0.0497, 1e-4),
         ("release-angle", 0.0432, 1e-4),
         ("alpha-sensitive", 0.0669, 2e-4),
         ("beta-angle-alike", 0.0105, 1e-4),
-        ("low-filling-change", 0.0677, 2e-4),
+        ("low-filling-change", 0.0926, 2e-4),  # flown at each gram it is between 0.093 and 0.094
     ],
 )
 def test_numbers_behind_those_verdicts(statements, id_, value, within):

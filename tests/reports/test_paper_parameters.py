@@ -60,7 +60,7 @@ def test_the_table_of_words_is_whole():
 
 @pytest.mark.parametrize(("ask", "words"), [
     (lambda: number("lenght"), "did you mean 'length'"),
-    (lambda: number("figure-7-filling"), "has 12 values"),
+    (lambda: number("figure-7-filling"), "has 17 values"),
     (lambda: numbers("figure-9"), "parameter 'figure-9' is unknown"),
     (lambda: family("beta at 4 /s"), "did you mean 'beta at 5 /s'"),
 ])  # fmt: skip

@@ -152,7 +152,7 @@ def claim_change_at_low_filling(flights: Flights) -> tuple[Reading, ...]:
             value=filling_of_slow_down(flights),
             unit="",
             admissible=(LITTLE, TENTH),
-            note="interpolated between the fillings flown: 0.05, 0.1, 0.15, 0.2",
+            note="interpolated between the fillings flown: 0.05, 0.09, 0.095, 0.1, 0.13, 0.135, 0.14, 0.15, 0.2",
         ),
     )
 
