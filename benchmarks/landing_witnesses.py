@@ -4,11 +4,13 @@
     python benchmarks/landing_witnesses.py --touches 200      as many as the claim asks for
     python benchmarks/landing_witnesses.py --engines pymunk   one engine only
     python benchmarks/landing_witnesses.py --touches 200 --cases ice together in-turn --jobs 2 --json FILE
+    python benchmarks/landing_witnesses.py --touches 200 --dt 1e-4 --rows FILE    another step; FILE goes on if killed
 
 Throws are scattered widely in omega_0 and table height and kept if they come down within 35 degrees of upright, where
 outcomes are open. The flight is the event-driven one for all. A disagreement is counted only between certified
-outcomes; undecided ones are counted by themselves. Prints, for each pair that differs, how near the reference passed by
-the saddle: a bottle that almost balances on its rim ends on either side by its last digits.
+outcomes; undecided ones are counted by themselves, and so are touches that half the step ends otherwise. Prints, for
+each pair that differs, how near the reference passed by the saddle: a bottle that almost balances on its rim ends on
+either side by its last digits.
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ import shlex
 import sys
 import time
 from collections import Counter
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +33,9 @@ import engine_check
 import ode_reference
 from engine_check.landing import LANDERS
 from ode_reference.landing import path
-from slicemodel import Outcome, Scenario, Table, Touch
+from slicemodel import Scenario, Table, Touch
+
+REFERENCE = "event-driven"
 
 CHUNK = 5
 """Touches that a worker lands at a time."""
@@ -79,39 +84,101 @@ CASES: dict[str, Case] = {
 """Kinds of slices and law by name; ice has neither."""
 
 
-def landed(name: str, found: list[Touch], law: str | None, slices: str | None) -> tuple[list[Outcome], float] | None:
-    """Return the outcomes by one program, and its process time; None if it has not this law or these slices."""
-    table, lander = Table(height=0.0), LANDERS.get(name)
-    began = time.process_time()
-    if lander is None:
-        outcomes = [ode_reference.land(t, table, law, slices or "exclude") for t in found]
-    elif (slices and (slices not in lander.slices and lander.laws)) or (law == "in-turn" and law not in lander.laws):
-        return None
-    else:
-        # Soft contacts have stops of their own for every slice, which rods keep, too.
-        kind = slices if slices in lander.slices else lander.slices[-1]
-        given = law if lander.laws else None
-        outcomes = [engine_check.land(t, table, name, law=given, slices=kind) for t in found]
-    return outcomes, time.process_time() - began
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One landing; ``coarse`` and ``fine`` are the outcomes with the step and with half of it."""
+
+    outcome: str
+    certified: float | None
+    coarse: str
+    fine: str
+    reason: str
+    seconds: float
+
+    @property
+    def decided(self) -> bool:
+        """True if the outcome is certified."""
+        return self.certified is not None
+
+    @property
+    def flips(self) -> bool:
+        """True if half the step ends otherwise, both being certain of their outcome."""
+        return self.coarse != self.fine and not {self.coarse, self.fine} & {"", "undecided"}
 
 
-def compare(pool: Executor, found: list[Touch], case: Case, engines: list[str]) -> list[dict[str, Any]]:
-    """Print outcomes and disagreements of all programs that have this law; return the matrix of every pair."""
+def has(name: str, case: Case) -> bool:
+    """Return whether a program has the law and the slices of a case; soft contacts are a law of their own."""
     slices, law = case
-    chunks = [found[k : k + CHUNK] for k in range(0, len(found), CHUNK)]
-    names = ["event-driven", *engines]
-    pending = {name: [pool.submit(landed, name, chunk, law, slices) for chunk in chunks] for name in names}
-    programs: dict[str, list[Outcome]] = {}
-    seconds = {}
-    for name in names:
-        parts = [part for future in pending[name] if (part := future.result()) is not None]
-        if parts:
-            programs[name] = [outcome for outcomes, _ in parts for outcome in outcomes]
-            seconds[name] = sum(spent for _, spent in parts) / len(found)
+    if name == REFERENCE or slices is None or not LANDERS[name].laws:
+        return True
+    return slices in LANDERS[name].slices and law in LANDERS[name].laws
+
+
+def landed(name: str, found: list[Touch], case: Case, dt: float | None) -> list[Row]:
+    """Return the outcomes by one program."""
+    table, (slices, law) = Table(height=0.0), case
+    rows = []
+    for touch in found:
+        began = time.process_time()
+        if name == REFERENCE:
+            outcome = ode_reference.land(touch, table, law, slices or "exclude")
+        else:
+            lander = LANDERS[name]
+            # Soft contacts have stops of their own for every slice, which rods keep, too.
+            kind = slices if slices in lander.slices else lander.slices[-1]
+            outcome = engine_check.land(touch, table, name, dt, law=law if lander.laws else None, slices=kind)
+        ends = outcome.diagnostics.get("outcomes") or [outcome.diagnostics[part] for part in ("coarse", "fine")]
+        seconds = time.process_time() - began
+        rows.append(Row(outcome.outcome, outcome.certified, str(ends[0]), str(ends[1]), outcome.reason, seconds))
+    return rows
+
+
+class Rows:
+    """The rows that are made, by what they are about; kept in a file, a line each, if there is one."""
+
+    def __init__(self, file: Path | None) -> None:
+        self.file, self.made = file, dict[str, Row]()
+        if file and file.exists():
+            for line in file.read_text(encoding="utf-8").splitlines():
+                key, row = json.loads(line)
+                self.made[key] = Row(**row)
+
+    def add(self, key: str, row: Row) -> None:
+        """Keep a row."""
+        self.made[key] = row
+        if self.file:
+            with self.file.open("a", encoding="utf-8") as file:
+                file.write(json.dumps([key, asdict(row)]) + "\n")
+
+
+def land_all(
+    pool: Executor, rows: Rows, about: str, found: list[Touch], case: Case, names: list[str], dt: float | None
+) -> dict[str, list[Row]]:
+    """Return the rows of every program that has this case, making those that are not there."""
+    keys = {name: [f"{about}, {name}, {k}" for k in range(len(found))] for name in names if has(name, case)}
+    pending = {}
+    for name, of_touches in keys.items():
+        missing = [k for k, key in enumerate(of_touches) if key not in rows.made]
+        for begin in range(0, len(missing), CHUNK):
+            some = missing[begin : begin + CHUNK]
+            given = dt if name != REFERENCE and LANDERS[name].laws else None  # soft contacts need their own
+            future = pool.submit(landed, name, [found[k] for k in some], case, given)
+            pending[future] = [of_touches[k] for k in some]
+    for future in as_completed(pending):
+        for key, row in zip(pending[future], future.result(), strict=True):
+            rows.add(key, row)
+    return {name: [rows.made[key] for key in of_touches] for name, of_touches in keys.items()}
+
+
+def compare(programs: dict[str, list[Row]], found: list[Touch], case: Case) -> list[dict[str, Any]]:
+    """Print outcomes and disagreements of all programs; return the matrix of every pair."""
+    slices, law = case
     table, slices = Table(height=0.0), slices or "exclude"
-    for name, outcomes in programs.items():
-        reasons = dict(Counter(outcome.reason for outcome in outcomes if outcome.reason))
-        print(f"    {name:17} {dict(Counter(o.outcome for o in outcomes))} {seconds[name]:.3f} s each {reasons or ''}")
+    for name, rows in programs.items():
+        reasons = dict(Counter(row.reason for row in rows if row.reason))
+        seconds = sum(row.seconds for row in rows) / len(rows)
+        outcomes, flips = dict(Counter(row.outcome for row in rows)), sum(row.flips for row in rows)
+        print(f"    {name:17} {outcomes}, {flips} flipped by half the step, {seconds:.3f} s each {reasons or ''}")
     names = list(programs)
     matrices = []
     for i, one in enumerate(names):
@@ -120,7 +187,7 @@ def compare(pool: Executor, found: list[Touch], case: Case, engines: list[str]) 
             differ = [k for k, (a, b) in enumerate(pairs) if a.decided and b.decided and a.outcome != b.outcome]
             both = sum(a.decided and b.decided for a, b in pairs)
             near = [closest_to_saddle(found[k], table, law, slices) for k in differ]
-            missed = f", saddle missed by {[f'{least:.1e}' for least in near]}" if near else ""
+            missed = f", touches {differ}, saddle missed by {[f'{least:.1e}' for least in near]}" if near else ""
             print(f"      {one} / {other}: {len(differ)} of {both} differ{missed}", flush=True)
             matrices.append(
                 {
@@ -129,6 +196,7 @@ def compare(pool: Executor, found: list[Touch], case: Case, engines: list[str]) 
                     "touches": len(pairs),
                     "decided by both": both,
                     "differ": len(differ),
+                    "flipped": [sum(row.flips for row in programs[name]) for name in (one, other)],
                     "saddle missed by": [round(least, 6) for least in near],
                 }
             )
@@ -146,9 +214,12 @@ def main() -> int:
     parser.add_argument("--engines", nargs="+", choices=list(LANDERS), default=list(LANDERS))
     parser.add_argument("--cases", nargs="+", choices=list(CASES), default=list(CASES))
     parser.add_argument("--jobs", type=int, default=1, help="worker processes (%(default)s)")
+    parser.add_argument("--dt", type=float, help="step of rigid contacts [s]; default: the engines' own")
+    parser.add_argument("--rows", type=Path, metavar="FILE", help="keep every landing there, and go on from it")
     options = parser.parse_args()
     total, compared = 0, 0
-    cases = []
+    cases, rows = [], Rows(options.rows)
+    step = "" if options.dt is None else f", dt {options.dt:g}"
     with ProcessPoolExecutor(options.jobs) as pool:
         for filling in options.fillings:
             for name in options.cases:
@@ -157,10 +228,13 @@ def main() -> int:
                     options.touches, options.n_slices, filling, slices is None, slices or "exclude", options.seed
                 )
                 print(f"filling {filling:g}, {name}", flush=True)
-                matrices = compare(pool, found, CASES[name], options.engines)
+                about = f"{name}, filling {filling:g}, N {options.n_slices}, seed {options.seed}{step}"
+                names = [REFERENCE, *options.engines]
+                programs = land_all(pool, rows, about, found, CASES[name], names, options.dt)
+                matrices = compare(programs, found, CASES[name])
                 total += sum(m["differ"] for m in matrices if "mujoco-compliant" not in m["programs"])
                 compared += len(found)
-                cases.append({"filling": filling, "slices": slices, "law": law, "matrices": matrices})
+                cases.append({"filling": filling, "slices": slices, "law": law, "dt": options.dt, "matrices": matrices})
                 if options.json:
                     facts: dict[str, Any] = {"command": shlex.join(["python", *sys.argv])}
                     facts |= {"touches": options.touches, "n_slices": options.n_slices, "cases": cases}

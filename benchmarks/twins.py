@@ -72,7 +72,7 @@ def main() -> int:
     if options.out:
         rows = [
             {"seed": twin.seed, "chi2": twin.estimate.chi2, "chi2_of_truth": twin.chi2_of_truth,
-             "temperature": twin.estimate.temperature, "accepted": twin.estimate.accepted,
+             "temperature": twin.estimate.temperature,
              "roughness": twin.estimate.roughness,
              **{i.name: [getattr(twin.truth, i.name), i.value, i.low, i.high] for i in twin.intervals}}
             for twin in twins

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Final
 
 import mujoco
 import numpy as np
@@ -31,8 +32,11 @@ from engine_check.readback import differences, matched
 from slicemodel.table import Table, Touch
 from slicemodel.trajectory import FloatArray
 
-CLOSED = 1e-9
+CLOSED: Final = 1e-9
 """Gap up to which a slice rests or a corner touches [L]."""
+
+SLOWEST_IMPACT: Final = 0.05
+"""Speed at which a corner comes down [m/s] from which on the law "in-turn" takes it for an impact."""
 
 
 def build(touch: Touch, table: Table, dt: float, law: str | None, slices: str) -> World:
@@ -63,8 +67,7 @@ class World:
             self.data.qvel[TUBE_DOFS:] = touch.v
         elif scenario.frozen:
             self._refuse_moved_ice()
-        low, high = stops(scenario)
-        self.low, self.high = np.array(low), np.array(high)
+        self.gradient, self.offset = self._gaps()
         half, radius = bottle.length / 2, bottle.radius
         self.corners = np.array([[x, y, 0.0] for y in (-half, half) for x in (-radius, radius)])
         self.jacobian = np.zeros((3, self.model.nv))
@@ -72,7 +75,7 @@ class World:
         meant = {"lowest_corner": 0.0, "velocity_x": touch.velocity[0], "velocity_y": touch.velocity[1]}
         mujoco.mj_forward(self.model, self.data)
         held = {
-            "lowest_corner": min(self._corner(c)[0] for c in range(4)),
+            "lowest_corner": float(self._heights().min()),
             "velocity_x": self._middle_velocity()[0],
             "velocity_y": self._middle_velocity()[1],
         }
@@ -87,40 +90,34 @@ class World:
         mujoco.mj_jac(self.model, self.data, self.jacobian, None, self.data.xpos[TUBE], TUBE)
         return np.asarray(self.jacobian @ self.data.qvel)
 
-    def _corner(self, c: int) -> tuple[float, FloatArray]:
-        """Return the height of a corner [m] and the rows of its Jacobian upwards and along x, shape (2, nv)."""
+    def _heights(self) -> FloatArray:
+        """Return the heights of the corners [m]."""
+        return np.asarray(self.data.xpos[TUBE, 1] + self.corners @ self.data.xmat[TUBE, 3:6])
+
+    def _corner(self, c: int) -> FloatArray:
+        """Return the rows of a corner's Jacobian upwards and along x, shape (2, nv)."""
         place = self.data.xpos[TUBE] + self.data.xmat[TUBE].reshape(3, 3) @ self.corners[c]
         mujoco.mj_jac(self.model, self.data, self.jacobian, None, place, TUBE)
-        return float(place[1]), self.jacobian[[1, 0]].copy()
+        return self.jacobian[[1, 0]]
 
-    def _contacts(self) -> tuple[FloatArray, list[int]]:
+    def _gaps(self) -> tuple[FloatArray, FloatArray]:
+        """Return matrix and vector by which the gaps of the slices [m] follow from q."""
+        n = 0 if self.rigid else self.scenario.n_slices
+        unit = np.eye(self.model.nv)[TUBE_DOFS:]
+        low, high = (np.array(places[:n]) for places in stops(self.scenario))
+        if not self.chain or not n:
+            return np.concatenate([-unit, unit]), np.concatenate([high, -low])
+        between = np.full(n - 1, -self.scenario.slice_height)
+        gradient = np.concatenate([-unit[:1], unit[:-1] - unit[1:], unit[-1:]])
+        return gradient, np.concatenate([high[:1], between, -low[-1:]])
+
+    def _contacts(self) -> tuple[FloatArray, FloatArray]:
         """Return the Jacobian of all contacts, and their kinds: 1 a corner (two rows), 0 a slice (one row)."""
-        rows: list[FloatArray] = []
-        kinds: list[int] = []
         slack = CLOSED * self.scenario.bottle.length
-        for c in range(4):
-            height, both = self._corner(c)
-            if height <= slack:
-                rows += [both[0], both[1]]
-                kinds.append(1)
-        if not self.rigid:
-            for gap, row in self._gaps():
-                if gap <= slack:
-                    rows.append(row)
-                    kinds.append(0)
-        return np.array(rows).reshape(-1, self.model.nv), kinds
-
-    def _gaps(self) -> list[tuple[float, FloatArray]]:
-        """Return every gap of a slice [m] with its gradient."""
-        r, n, nv = self.data.qpos[TUBE_DOFS:], len(self.low), self.model.nv
-        unit = np.eye(nv)[TUBE_DOFS:]
-        if not self.chain:
-            return [(self.high[i] - r[i], -unit[i]) for i in range(n)] + [
-                (r[i] - self.low[i], unit[i]) for i in range(n)
-            ]
-        rod = self.scenario.slice_height
-        between = [(r[i - 1] - r[i] - rod, unit[i - 1] - unit[i]) for i in range(1, n)]
-        return [(self.high[0] - r[0], -unit[0]), *between, (r[n - 1] - self.low[n - 1], unit[n - 1])]
+        corners = [self._corner(c) for c in np.flatnonzero(self._heights() <= slack).tolist()]
+        slices = self.gradient[self.gradient @ self.data.qpos + self.offset <= slack]
+        kinds = np.repeat([1, 0], [len(corners), len(slices)])
+        return np.concatenate([*corners, slices]), kinds
 
     def advance(self) -> str:
         """Make one step; return what left its band, or an empty string."""
@@ -133,28 +130,26 @@ class World:
         mujoco.mj_forward(model, data)
         free = before + data.qacc * dt
         rows, kinds = self._contacts()
-        if kinds:
+        if len(kinds):
             solved = np.zeros_like(rows)
             mujoco.mj_solveM(model, data, solved, rows)
             response = rows @ solved.T
-            corners = np.repeat([kind == 1 for kind in kinds], [1 + kind for kind in kinds])
-            restitution = np.where(corners, self.table.restitution, self.scenario.restitution)
-            for part in [corners, np.ones_like(corners)] if self.in_turn else [np.ones_like(corners)]:
-                if not part.any():
-                    continue
-                # The corners alone take part in an impact of theirs, not in standing on the table.
-                if self.in_turn and not part.all() and (rows @ before)[corners].min() > -0.05:
-                    continue
-                chosen = [kind for kind in kinds if kind == 1] if not part.all() else kinds
-                bound = np.maximum(-restitution * (rows @ before), 0.0)[part]
-                p, ok = impulses(
-                    response[np.ix_(part, part)], (rows @ free)[part], bound, np.array(chosen), self.table.friction
-                )
+            stages = [(len(rows), kinds)]
+            corners = 2 * int(kinds.sum())
+            restitution = np.full(len(rows), self.scenario.restitution)
+            restitution[:corners] = self.table.restitution
+            # The corners alone take part in an impact of theirs, not in standing or sliding on the table.
+            if self.in_turn and corners and (rows[:corners:2] @ before).min() <= -SLOWEST_IMPACT:
+                stages.insert(0, (corners, kinds[kinds == 1]))
+            for part, chosen in stages:
+                bound = np.maximum(-restitution * (rows @ before), 0.0)[:part]
+                own = np.ascontiguousarray(response[:part, :part])
+                p, ok = impulses(own, (rows @ free)[:part], bound, chosen, self.table.friction)
                 if not ok:
                     return "the impulses of a step have not converged"
-                change = p @ solved[part]
+                change = p @ solved[:part]
                 # The work of impulses: their product with the mean of the velocities before and after.
-                work = p @ (rows[part] @ (free + change / 2))
+                work = p @ (rows[:part] @ (free + change / 2))
                 self.ledger = max(self.ledger, float(work) / self.saddle)
                 free = free + change
                 before = before + change

@@ -23,7 +23,8 @@ End. The front stops at the cap, h = L. The law there is the perfectly inelastic
 energy (1/2) m_e h'^2 is lost, and the water stays spread because dJ/dh = M_w L/6 > 0 there. No restitution enters: it
 would be that of the whole column, while only its front meets the cap. omega_f = J_0 omega_0 / J(L), whatever the drag.
 
-The foot stays on the base: the base pushes with (mu/2) (omega^2 (L - h) + h''), which is positive while h'' >= 0.
+The foot stays on the base: the base pushes with (mu/2) (omega^2 (L - h) + h'') + (N alpha/2) h', which is positive:
+h'' >= -(N alpha/3) h' / m_e, and mu < 3 m_e.
 A full bottle has no room, h_0 = L, and turns like ice.
 """
 
@@ -40,10 +41,10 @@ from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray, Impacts, Trajectory, output_times
 
 NAME: Final = "column"
+"""The model of this module, as ``ode_reference.solve`` knows it."""
 
 RTOL: Final = 1e-12
 ATOL: Final = 1e-14
-"""The model of this module, as ``ode_reference.solve`` knows it."""
 
 LONGEST_TURN: Final = 0.02
 """Longest step, as the angle by which the bottle turns in it at release [rad]: it keeps the dense output accurate."""

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,8 +81,7 @@ class Ends:
         return np.where(self.high - r <= self.reach, BASE, np.where(r - self.low <= self.reach, CAP, FREE))
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
+class Outcome(NamedTuple):
     """The state after an event: ``y``, and the end that each slice rests on (``resting``).
 
     ``rebounded`` is the state after the impacts, before anything came to rest.
@@ -128,22 +127,31 @@ def resolve(
     ratio = motion.throw.slice_mass / motion.throw.bottle_mass
     y = y.copy()
     r, v = y[1 : n + 1], y[n + 1 :]
-    contact = struck + resting
-    touching = np.flatnonzero(contact)
-    side = contact[touching]
+    touching = np.flatnonzero(struck + resting)
+    side = (struck + resting)[touching]
     r[touching] = np.where(side == BASE, ends.high, ends.low)
     if struck.any():
         after, gained = law(np.maximum(side * v[touching], 0.0), side, restitution, ratio, rest_speed)
         v -= gained
         v[touching] = side * after
-    mass_ratio = ratio if motion.model.switches.recoil else 0.0
-    slow = np.abs(v[touching]) < rest_speed
-    if not slow.any():
-        return Outcome(y, y, np.zeros(n, dtype=np.int64))
-    stays = _staying(motion, y, np.where(slow, side, FREE), touching, mass_ratio, lets_go)
-    settled = y.copy()
-    settled[n + 1 :] = _stuck(v, stays, mass_ratio)
-    return Outcome(settled, y, stays)
+    slow = np.where(np.abs(v[touching]) < rest_speed, side, FREE)
+    groups = [(end, touching[slow == end]) for end in (BASE, CAP) if end != lets_go and (slow == end).any()]
+    none_stays = Outcome(y, y, np.zeros(n, dtype=np.int64))
+    found: Outcome | None = None
+    for choice in list(product((True, False), repeat=len(groups)))[:-1]:
+        stays: SideArray = np.zeros(n, dtype=np.int64)
+        for (end, members), stay in zip(groups, choice, strict=True):
+            stays[members] = end if stay else FREE
+        settled = y.copy()
+        settled[n + 1 :] = _stuck(v, stays, ratio if motion.model.switches.recoil else 0.0)
+        _, a = motion.acceleration(settled, np.where(stays == FREE, 1.0, 0.0))
+        pressed = [end * float(a[members[0]]) >= 0 for end, members in groups]
+        if all(push for push, stay in zip(pressed, choice, strict=True) if stay):
+            # Rounding at a group that is neither pressed nor pulled can spoil every choice in which all is right.
+            found = found or Outcome(settled, y, stays)
+            if pressed == list(choice):
+                return Outcome(settled, y, stays)
+    return found or none_stays
 
 
 def _stuck(v: FloatArray, stays: SideArray, mass_ratio: float) -> FloatArray:
@@ -153,44 +161,6 @@ def _stuck(v: FloatArray, stays: SideArray, mass_ratio: float) -> FloatArray:
     """
     sticking = stays != FREE
     loose = v[sticking]
-    v = v.copy()
-    if loose.any():
-        v -= mass_ratio * float(loose.sum()) / (1.0 + mass_ratio * len(loose))
+    v = v - mass_ratio * float(loose.sum()) / (1.0 + mass_ratio * len(loose))
     v[sticking] = 0.0
     return v
-
-
-def _staying(
-    motion: Motion, y: FloatArray, slow: SideArray, touching: NDArray[np.int64], mass_ratio: float, lets_go: int
-) -> SideArray:
-    """Return the end on which each of the slow touching slices stays, 0 where none; shape (N,).
-
-    Parameters
-    ----------
-    y : array, shape (2N + 1,) - the state after the impact
-    slow : array, shape (K,) - for each touching slice its side if it is slow, else 0
-    touching : array, shape (K,)
-    mass_ratio : float - m / M_b, 0 without recoil
-    lets_go : int - as in ``resolve``
-    """
-    n = (len(y) - 1) // 2
-    groups = [(side, touching[slow == side]) for side in (BASE, CAP)]
-    groups = [(side, members) for side, members in groups if members.size and side != lets_go]
-    pressed_only: SideArray | None = None
-    for choice in product((True, False), repeat=len(groups)):
-        stays: SideArray = np.zeros(n, dtype=np.int64)
-        for (side, members), stay in zip(groups, choice, strict=True):
-            if stay:
-                stays[members] = side
-        if not any(choice):
-            break
-        trial = y.copy()
-        trial[n + 1 :] = _stuck(y[n + 1 :], stays, mass_ratio)
-        _, a = motion.acceleration(trial, np.where(stays == FREE, 1.0, 0.0))
-        push = [side * float(a[members[0]]) for side, members in groups]
-        if all(force >= 0 for force, stay in zip(push, choice, strict=True) if stay):
-            if all(force < 0 for force, stay in zip(push, choice, strict=True) if not stay):
-                return stays
-            pressed_only = stays if pressed_only is None else pressed_only
-    # Rounding at a group that is neither pressed nor pulled can spoil every strict choice.
-    return np.zeros(n, dtype=np.int64) if pressed_only is None else pressed_only

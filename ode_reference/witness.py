@@ -25,8 +25,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
+from ode_reference import messages
 from ode_reference.arguments import known_name, number_above, number_within
 from ode_reference.contact import FREE, TOUCH, Ends, SideArray, resolve
 from ode_reference.energy import Ledger, nodes
@@ -61,19 +62,21 @@ LEAST_ADVANCE: Final = 1e-7
 PARTS: Final = 4
 """Parts of one step between which a leg is looked through; a slice that turns twice within one part is not seen."""
 
+EPS, LEAST = float(np.finfo(np.float64).eps), float(np.finfo(np.float64).tiny)
+
 
 def integrate(
     scenario: Scenario,
     model: Model,
-    *,
-    method: str = "DOP853",
-    rtol: float | None = None,
-    atol: float | None = None,
-    max_step: float | None = None,
-    rest_speed: float,
-    impact_law: str = "simultaneous",
-    energy: bool = False,
     moments: FloatArray,
+    *,
+    method: str,
+    rtol: float | None,
+    atol: float | None,
+    max_step: float | None,
+    rest_speed: float,
+    impact_law: str,
+    energy: bool,
 ) -> Trajectory:
     """Return the run of ``model``; parameters and accuracy as in ``ode_reference.solve``, whose defaults these are.
 
@@ -85,8 +88,6 @@ def integrate(
     duration = scenario.duration
     if max_step is None:
         max_step = min(max(LONGEST_TURN / abs(scenario.omega0), 1e-5 * duration), duration)
-    else:
-        max_step = number_within("max_step", max_step, duration / STEP_LIMIT, unit=" s")
     settings = {
         "model": model.name,
         "rtol": number_within("rtol", RTOL if rtol is None else rtol, 1e-13, 1e-2),
@@ -94,7 +95,7 @@ def integrate(
         "rest_speed": rest_speed,
         "impact_law": impact_law,
         "method": known_name("method", method, METHODS),
-        "max_step": max_step,
+        "max_step": number_within("max_step", max_step, duration / STEP_LIMIT, unit=" s"),
         "energy": energy,
     }
     # Overflow is a result here, reported as a status: it must not also appear as a warning.
@@ -106,8 +107,8 @@ def integrate(
 
 Event = Callable[[float, FloatArray], float]
 
-Found = tuple[str, int, int | None]
-"""What ends a leg: "wall" or "release", the end, and the slice if it is known."""
+Found = tuple[str, int]
+"""What ends a leg: "wall" or "release", and the end."""
 
 
 class _StandstillError(Exception):
@@ -126,12 +127,14 @@ class _Flight:
         self.ends = Ends.of(scenario, recoil=recoil)
         # Ice, or a single slice as long as the tube: nothing can move.
         self.immobile = scenario.frozen or self.ends.high - self.ends.low <= self.ends.reach
+        # Nothing tells the ends of a full bottle apart if no weight pulls along it and impacts do not come one by one.
+        weightless = model.switches.weightless or scenario.gravity == 0.0
+        self.mirrored = scenario.fill_fraction == 1.0 and weightless and self.law is not LAWS["sequential"]
         self.t = 0.0
         self.y = np.concatenate([[scenario.theta0], scenario.initial_positions(), np.zeros(n)])
         self.resting: SideArray = np.zeros(n, dtype=np.int64)
         self.length: float | None = None
-        self.states = np.empty((len(moments), 2 * n + 1))
-        self.recorded = 0
+        self.states: list[FloatArray] = []
         self.impacts: list[tuple[NDArray[Any], ...]] = []
         self.counts = {"steps": 0, "impacts": 0, "rests": 0, "releases": 0}
         self.largest_snap = 0.0
@@ -154,12 +157,11 @@ class _Flight:
             if not self._overflowed():
                 self._leg()
         if self.status == "ok":
-            self.states[self.recorded :] = self.y
-            self.recorded = len(self.moments)
+            self._record(duration, None)
 
     def _leg(self) -> None:
         """Integrate up to the first event, the duration or a failure, and resolve the event."""
-        watch = [] if self.immobile else self._events()
+        watch = self._events()
         leg = self._solved([event for _, event in watch])
         if leg is None:
             return
@@ -169,22 +171,20 @@ class _Flight:
             # What the last step would have been without the event; one step a leg says nothing of how long it may be.
             last = path.interpolants[-1]
             self.length = float(last.t - last.t_old) * (1.5 if len(leg.t) == 2 else 1.0)
-        missed = None if self.immobile else self._first_missed(leg.t, path)
-        if missed is None:
-            end, y = float(leg.t[-1]), leg.y[:, -1].copy()
-        else:
-            end, y = missed[0], path(missed[0])
+        found = [name for (name, _), times in zip(watch, leg.t_events, strict=True) if len(times)]
+        end, y = float(leg.t[-1]), leg.y[:, -1].copy()
+        missed = self._first_missed(leg.t, path)
+        if missed is not None:
+            end, found = missed[0], [missed[1]]
+            y = path(end)
         self._record(end, path)
         if self.ledger is not None:
             for begin, stop in zip(leg.t[:-1], np.minimum(leg.t[1:], end), strict=True):
                 if stop > begin:
                     self.ledger.smooth(begin, stop, path(nodes(begin, stop)))
-        self.t, self.y = end, y
-        found = [name for (name, _), times in zip(watch, leg.t_events or [], strict=False) if len(times)]
-        if missed is not None:
-            self._meet(self._struck([missed[1]]))
-        elif found:
-            self._meet(self._struck(found), *(side for kind, side, _ in found if kind == "release"))
+        self.t, self.y = end, self._mirrored(y) if self.mirrored else y
+        if found:
+            self._meet(self._struck(found), *(side for kind, side in found if kind == "release"))
         elif leg.status < 0 and not self._overflowed():
             self._stall(leg.message)
 
@@ -195,7 +195,7 @@ class _Flight:
             options["first_step"] = min(self.length, options["max_step"], self.scenario.duration - self.t)
         span = self.t, self.scenario.duration
         try:
-            return solve_ivp(self._slope, span, self.y, events=events or None, dense_output=True, **options)
+            return solve_ivp(self._slope, span, self.y, events=events, dense_output=True, **options)
         except _StandstillError:
             self._stall(f"time hardly passes after {self.motion.evaluations} evaluations")
         except ValueError as error:  # the linear algebra of an implicit method refuses inf and NaN
@@ -211,39 +211,49 @@ class _Flight:
             self.watched = (self.motion.evaluations, t)
         return self.motion(t, y)
 
+    def _mirrored(self, y: FloatArray) -> FloatArray:
+        """Return the state in which each slice and its image at the other end have one distance from it and one speed.
+
+        What rounding parts them by grows as exp(theta), until their hits, which are one impact, become two.
+        """
+        if not np.array_equal(self.resting, -self.resting[::-1]):
+            return y
+        r, v = y[1 : self.n + 1], y[self.n + 1 :]
+        image = self.scenario.bottle.length - r[::-1]
+        return np.concatenate([y[:1], (r + image) / 2, (v - v[::-1]) / 2])
+
     # ------------------------------------------------------------------ events
 
     def _events(self) -> list[tuple[Found, Event]]:
         """Return what ends a leg that starts now: what it is called, and a function that changes sign there."""
-        r, v = self.y[1 : self.n + 1], self.y[self.n + 1 :]
         events: list[tuple[Found, Event]] = []
         for side in (BASE, CAP):
-            leaves = ~self.motion.held & (np.abs(self.ends.beyond(side, r)) <= self.ends.reach) & (side * v <= 0)
-            events.append((("wall", side, None), self._foremost(side, np.flatnonzero(leaves))))
+            events.append((("wall", side), self._foremost(side)))
             members = np.flatnonzero(self.resting == side)
             if members.size:
-                events.append((("release", side, None), self._push(side, int(members[0]))))
-        for (kind, *_), event in events:
+                events.append((("release", side), self._push(side, int(members[0]))))
+        for (kind, _), event in events:
             event.terminal, event.direction = True, 1.0 if kind == "wall" else -1.0  # type: ignore[attr-defined]
         return events
 
-    def _foremost(self, side: int, leaves: NDArray[np.int64]) -> Event:
-        """Return what rises through zero when the first free slice passes the end ``side``.
+    def _foremost(self, side: int, who: int | None = None) -> Event:
+        """Return what rises through zero when the first free slice, or slice ``who``, passes the end ``side``.
 
-        It is the largest distance beyond that end, of the slices ``leaves`` divided by the time since they were on it;
-        while round-off cannot tell whether such a slice has left, its velocity does.
+        It is the largest distance beyond that end. That of a slice that leaves the end now is divided by the time
+        since; while round-off cannot tell whether such a slice has left, its velocity does.
         """
-        begin, held, n = self.t, self.motion.held_speeds - self.n - 1, self.n
-        blurred, least = TOUCH * self.scenario.bottle.length, float(np.finfo(np.float64).tiny)
+        begin, n, r, v = self.t, self.n, self.y[1 : self.n + 1], self.y[self.n + 1 :]
+        near = np.abs(self.ends.beyond(side, r)) <= self.ends.reach
+        leaves = np.flatnonzero(~self.motion.held & near & (side * v <= 0))
+        asked = ~self.motion.held if who is None else np.arange(n) == who
 
         def foremost(t: float, y: FloatArray) -> float:
             beyond = self.ends.beyond(side, y[1 : n + 1])
             if leaves.size:
                 distance, speed = beyond[leaves], side * y[n + 1 :][leaves]
-                still = (speed <= 0) & (distance <= blurred)
-                beyond[leaves] = np.where(still, np.minimum(speed, -least), distance / max(t - begin, least))
-            beyond[held] = -1.0
-            return float(beyond.max())
+                still = (speed <= 0) & (distance <= TOUCH * self.scenario.bottle.length)
+                beyond[leaves] = np.where(still, np.minimum(speed, -LEAST), distance / max(t - begin, LEAST))
+            return float(beyond.max(where=asked, initial=-1.0))
 
         return foremost
 
@@ -253,34 +263,30 @@ class _Flight:
 
     def _struck(self, found: list[Found]) -> SideArray:
         """Return the end that each free slice strikes now, the one that has been found included."""
-        free = ~self.motion.held
-        r, v = self.y[1 : self.n + 1], self.y[self.n + 1 :]
-        struck = self.ends.struck(self.t, r, v, free)
-        for kind, side, who in found:
+        free, r = ~self.motion.held, self.y[1 : self.n + 1]
+        struck = self.ends.struck(self.t, r, self.y[self.n + 1 :], free)
+        for kind, side in found:
             if kind == "wall" and not (struck == side).any():
                 # Located there, even if round-off now calls it a hair away from contact or from approach.
-                foremost = int(np.argmax(np.where(free, self.ends.beyond(side, r), -np.inf)))
-                struck[foremost if who is None else who] = side
+                struck[np.argmax(np.where(free, self.ends.beyond(side, r), -np.inf))] = side
         return struck
 
     def _first_missed(self, t: FloatArray, path: Callable[[Any], FloatArray]) -> tuple[float, Found] | None:
-        """Return the first time before the end of the leg at which a slice passed an end unseen, and which did.
+        """Return the first time before the end of the leg of a passage or a release that no event reported, and which.
 
         ``solve_ivp`` looks at events where its steps end. A slice that passes an end and is back inside by then, or
         behind which another passes, shows between: it is beyond the end where one part of a step ends, or it turns
-        back within a part. The turning point is then located, and the passage before it.
+        back within a part. The turning point is then located, and the passage before it. So is a push that is lost for
+        a part of a step.
         """
         n, free = self.n, ~self.motion.held
-        share = np.arange(PARTS) / PARTS
-        times = np.append((t[:-1, None] + share * np.diff(t)[:, None]).ravel(), t[-1])
+        times = np.append((t[:-1, None] + np.arange(PARTS) / PARTS * np.diff(t)[:, None]).ravel(), t[-1])
         if len(times) < 2 or not times[-1] > times[0]:
             return None
-        states = path(times)
-        first: tuple[float, Found] | None = None
-        dt = np.diff(times)
+        states, dt = path(times), np.diff(times)
+        passages: list[tuple[float, Found]] = []
         for side in (BASE, CAP):
-            beyond = self.ends.beyond(side, states[1 : n + 1])
-            speed = side * states[n + 1 :]
+            beyond, speed = self.ends.beyond(side, states[1 : n + 1]), side * states[n + 1 :]
             # One that turns back within a part rises by less than its first speed times the part, if it bends inward
             # all the while; twice that is on the safe side.
             top = beyond[:, :-1] + 2 * dt * np.maximum(speed[:, :-1], 0.0)
@@ -289,36 +295,57 @@ class _Flight:
             out[:, :-1] = beyond[:, 1:-1] > self.ends.reach
             for i, k in np.argwhere((turns | out) & free[:, None]).tolist():
                 found = self._passage(side, i, float(times[k]), float(times[k + 1]), path)
-                if found is not None and found < t[-1] and (first is None or found < first[0]):
-                    first = found, ("wall", side, i)
-        return first
+                passages.append((found, ("wall", side)))
+            passages.append((self._lost_push(side, times, states, path), ("release", side)))
+        passages = [passage for passage in passages if passage[0] < t[-1]]
+        return min(passages, default=None)
 
-    def _passage(self, side: int, i: int, a: float, b: float, path: Callable[[Any], FloatArray]) -> float | None:
-        """Return when slice ``i`` passes the end ``side`` between ``a`` and ``b``, or None if it turns back inside."""
-        foremost = self._foremost(side, np.flatnonzero(self.ends.beyond(side, self.y[1 : self.n + 1]) >= 0))
-        others = np.arange(self.n) != i
+    def _lost_push(self, side: int, times: FloatArray, states: FloatArray, path: Callable[[Any], FloatArray]) -> float:
+        """Return when the end ``side`` first ceases to press on what rests there, if for a part of a step; else inf."""
+        members = np.flatnonzero(self.resting == side)
+        if not members.size:
+            return np.inf
+        push = self._push(side, int(members[0]))
+        values = np.array([push(t, y) for t, y in zip(times, states.T, strict=True)])
+        before, after = values[np.r_[0, : len(values) - 1]], values[np.r_[1 : len(values), -1]]
+        # A dip to zero between three values stands below the middle one by no more than that does below the others.
+        lowest = (values <= before) & (values <= after) & (values <= np.maximum(before, after) - values)
+        for k in np.flatnonzero(lowest).tolist():
+            begin, stop = max(k - 1, 0), min(k + 1, len(times) - 1)
+            while begin > 0 and values[begin] <= 0:
+                begin -= 1
+            low, high = float(times[begin]), float(times[stop])
+            dip = minimize_scalar(
+                lambda t: push(t, path(t)), bounds=(low, high), method="bounded", options={"xatol": 1e-8 * (high - low)}
+            )
+            if values[begin] > 0 > float(dip.fun):
+                zero = brentq(lambda t: push(t, path(t)), low, dip.x, xtol=float(np.spacing(high)), rtol=4 * EPS)
+                return float(zero)
+        return np.inf
+
+    def _passage(self, side: int, i: int, a: float, b: float, path: Callable[[Any], FloatArray]) -> float:
+        """Return when slice ``i`` passes the end ``side`` between ``a`` and ``b``; inf if it turns back inside."""
+        foremost = self._foremost(side, i)
 
         def beyond(t: float) -> float:
-            y = self.y.copy() if t == self.t else np.asarray(path(t))
-            y[1 : self.n + 1][others] = (self.ends.low + self.ends.high) / 2
-            return foremost(t, y)
+            return foremost(t, self.y if t == self.t else path(t))
 
         def speed(t: float) -> float:
             return side * float(path(t)[self.n + 1 + i])
 
+        xtol = float(np.spacing(b))
         if speed(a) > 0 > speed(b):
-            b = _root(speed, a, b)
+            b = float(brentq(speed, a, b, xtol=xtol, rtol=4 * EPS))
         if beyond(b) <= self.ends.reach or beyond(a) >= 0:
-            return None
-        return _root(beyond, a, b)
+            return np.inf
+        return float(brentq(beyond, a, b, xtol=xtol, rtol=4 * EPS))
 
     # ------------------------------------------------------------------ contacts and bookkeeping
 
     def _meet(self, struck: SideArray, lets_go: int = FREE) -> None:
         """Resolve the contacts of this instant and take over the state after them."""
         hits = np.flatnonzero(struck)
-        r, v = self.y[1 : self.n + 1], self.y[self.n + 1 :]
-        side = struck[hits]
+        r, v, side = self.y[1 : self.n + 1], self.y[self.n + 1 :], struck[hits]
         snaps = np.abs(r[hits] - np.where(side == BASE, self.ends.high, self.ends.low))
         self.largest_snap = max(self.largest_snap, float(snaps.max(initial=0.0)))
         outcome = resolve(
@@ -339,38 +366,26 @@ class _Flight:
 
     def _record(self, until: float, path: Callable[[Any], FloatArray] | None) -> None:
         """Keep the states at the output times up to ``until``; without a path the present state."""
-        stop = int(np.searchsorted(self.moments, until, side="right"))
-        if stop > self.recorded:
-            chosen = slice(self.recorded, stop)
-            self.states[chosen] = self.y if path is None else path(self.moments[chosen]).T
-            self.recorded = stop
+        chosen = self.moments[len(self.states) : np.searchsorted(self.moments, until, side="right")]
+        if len(chosen):
+            self.states += [self.y] * len(chosen) if path is None else list(path(chosen).T)
 
     def _overflowed(self) -> bool:
         """Note and return whether the state or its acceleration has left the floating-point range."""
         if np.isfinite(self.y).all() and np.isfinite(self.motion.acceleration(self.y, self.motion.free)[1]).all():
             return False
-        self.status = "overflow"
-        self.message = (
-            f"{self.motion.model.name}: a number exceeded the floating-point range after t = {self.t:.9g} s; "
-            f"omega0 = {self.scenario.omega0:g} rad/s, drag = {self.scenario.drag:g} kg/s and "
-            f"gravity = {self.scenario.gravity:g} m/s^2 cannot be computed together"
-        )
+        self.status, self.message = "overflow", messages.overflow(self.motion.model.name, self.scenario, self.t)
         return True
 
     def _stall(self, why: str) -> None:
-        recent = np.concatenate([slices for _, slices, *_ in self.impacts[-20:]]) if self.impacts else np.zeros(0)
-        who = ", ".join(str(int(i)) for i in np.unique(recent)) or "none"
-        self.status = "stalled"
-        self.message = (
-            f"{self.motion.model.name}: {why.rstrip('.')} at t = {self.t:.9g} s; slices of the last impacts: {who}; "
-            f"if they chatter, raise rest_speed (now {self.settings['rest_speed']:g} m/s), else check omega0, gravity "
-            "and drag"
-        )
+        recent = np.concatenate([np.zeros(0, dtype=np.int64), *(slices for _, slices, *_ in self.impacts[-20:])])
+        name, rest_speed = self.motion.model.name, self.settings["rest_speed"]
+        self.status, self.message = "stalled", messages.stalled(name, why, self.t, recent, rest_speed)
 
     def trajectory(self) -> Trajectory:
         """Return what has been recorded, with omega, r_CM and J of each recorded state."""
         n, throw = self.n, self.motion.throw
-        states = self.states[: self.recorded]
+        states = np.array(self.states).reshape(-1, 2 * n + 1)
         axis = [throw.about_centre_of_mass(y[1 : n + 1]) for y in states]
         inertia = np.array([j for _, _, j in axis])
         columns = zip(*self.impacts, strict=True) if self.impacts else [()] * 5
@@ -379,7 +394,7 @@ class _Flight:
             scenario=self.scenario,
             solver="ode_reference",
             method=self.motion.model.name,
-            t=self.moments[: self.recorded],
+            t=self.moments[: len(states)],
             theta=states[:, 0],
             omega=throw.angular_momentum / inertia,
             r=states[:, 1 : n + 1],
@@ -399,8 +414,3 @@ class _Flight:
                 **({} if self.ledger is None else {"energy": self.ledger.closed(self.y)}),
             },
         )
-
-
-def _root(function: Callable[[float], float], low: float, high: float) -> float:
-    """Return the zero of ``function`` between two times at which it has opposite signs, to round-off [s]."""
-    return float(brentq(function, low, high, xtol=float(np.spacing(high)), rtol=4 * float(np.finfo(np.float64).eps)))

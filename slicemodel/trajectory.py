@@ -275,9 +275,13 @@ def output_times(scenario: Scenario, times: ArrayLike | None, default_points: in
         raise ValueError(f"times has shape {values.shape}; a non-empty one-dimensional list of seconds is needed")
     outside = ~((values >= 0.0) & (values <= scenario.duration))
     if outside.any():
-        raise ValueError(f"times = {values[outside][0]!r} s is outside [0, {scenario.duration:g}] s (the duration)")
+        raise ValueError(
+            f"times = {float(values[outside][0])!r} s is outside [0, {scenario.duration:g}] s (the duration)"
+        )
     late = np.flatnonzero(~(np.diff(values) > 0))
     if late.size:
         k = int(late[0])
-        raise ValueError(f"times must increase: times[{k + 1}] = {values[k + 1]!r} s follows {values[k]!r} s")
+        raise ValueError(
+            f"times must increase: times[{k + 1}] = {float(values[k + 1])!r} s follows {float(values[k])!r} s"
+        )
     return values

@@ -1,5 +1,9 @@
 """One small report, gathered and built once for all tests of what is made from it."""
 
+import os
+import subprocess
+import sys
+
 import matplotlib
 import pytest
 
@@ -9,6 +13,23 @@ from flipproof.chapters.work_precision import contenders
 from flipproof.frame.gather import Gathered
 from flipproof.output.provenance import provenance
 from slicemodel import Scenario
+
+LOOPS = (
+    "from slicemodel import Scenario, solve; solve(Scenario(n_slices=2), steps=10)",
+    "from slicemodel import Scenario; from ode_reference import solve; solve(Scenario(n_slices=2))",
+    "from slicemodel import Scenario, Table, Touch; from ode_reference import land; throw = Scenario(n_slices=2); "
+    "still = {'theta': 0.1, 'omega': 0.0, 'velocity': (0.0, -1.0), 'v': [0.0, 0.0]}; "
+    "land(Touch(scenario=throw, r=throw.initial_positions(), **still), Table(height=0.0))",
+)
+"""A call of each compiled loop."""
+
+
+def pytest_sessionstart(session):
+    """Before there are workers, have the loops compiled once, side by side: every worker would compile all of them."""
+    if getattr(session.config.option, "numprocesses", None):
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of every worker: two with two threads each wait
+        compiling = [subprocess.Popen([sys.executable, "-c", call]) for call in LOOPS]
+        assert [each.wait() for each in compiling] == [0] * len(LOOPS)
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -20,9 +41,19 @@ def cache_of_these_tests(tmp_path_factory):
         yield
 
 
+def pytest_collection_modifyitems(items):
+    """Keep in one process, with ``--dist loadgroup``, the tests of the one report, and those that share runs."""
+    for item in items:
+        made = item._fixtureinfo.name2fixturedefs
+        if not made.keys().isdisjoint(("gathered", "folder", "browser")):
+            item.add_marker(pytest.mark.xdist_group("evidence"))
+        elif any(found[-1].scope == "module" for found in made.values()):
+            item.add_marker(pytest.mark.xdist_group(item.path.stem))
+
+
 @pytest.fixture(scope="session")
 def gathered() -> Gathered:
-    """Gathered once per process: tests that use it belong to the xdist group "evidence"."""
+    """Gathered once per process."""
     ask = ask_of(Scenario(), "quick", 20, tuple(WITNESSES))
     return gather_report(ask, work={"work-precision": contenders.QUICK})
 

@@ -1,15 +1,44 @@
-"""Flights that were not made: runs answered from a table, and reports some of whose runs failed."""
+"""Flights that were not made: trajectories as told, runs answered from a table, reports some of whose runs failed."""
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor, Future
 from dataclasses import replace
 
+import numpy as np
+
 from flipproof.chapters import chapters_named
 from flipproof.chapters.maps.study import read_flight, study_readings
+from flipproof.cli import main as cli
 from flipproof.frame.flights import Flights
 from flipproof.frame.gather import Gathered, gather
 from flipproof.frame.pool import Here, make_each
 from flipproof.frame.solvers import Made, Run
+from slicemodel import Scenario, Trajectory
+
+
+def trajectory_of(scenario: Scenario, t=None, *, keeps_slices=False, **told) -> Trajectory:
+    """Return a trajectory that is as told and else constant; ``t`` is an array, or a number of points over the throw.
+
+    Without ``r`` it keeps no slices, unless asked to: then all lie 0.1 m from the cap.
+    """
+    if t is None or isinstance(t, int):
+        t = np.linspace(0.0, scenario.duration, t or 101)
+    fields = {"solver": "made-up", "method": "made-up"} | told
+    for name, value in {"theta": 0.0, "omega": scenario.omega0, "r_cm": 0.1, "inertia": 1.0}.items():
+        fields[name] = np.broadcast_to(np.asarray(fields.get(name, value), dtype=float), np.shape(t))
+    r = fields.setdefault("r", np.full((len(t) if keeps_slices else 0, scenario.n_slices), 0.1))
+    fields.setdefault("v", np.zeros_like(r))
+    return Trajectory(scenario=scenario, t=t, **fields)
+
+
+def command(capsys, *arguments):
+    """Run the command line in this process; return its status, what it printed and what it said of errors."""
+    try:
+        status = cli.main([str(argument) for argument in arguments])
+    except SystemExit as end:
+        status = end.code
+    printed, said = capsys.readouterr()
+    return status, printed, said
 
 
 class Answers(Executor):

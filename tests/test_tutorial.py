@@ -34,7 +34,6 @@ def lesson(tmp_path_factory):
     return folder
 
 
-@pytest.mark.xdist_group("tutorial")
 def test_every_step_leaves_what_the_page_says(lesson):
     for name in (
         "free.csv",
@@ -47,7 +46,6 @@ def test_every_step_leaves_what_the_page_says(lesson):
         assert (lesson / name).stat().st_size > 1000, name
 
 
-@pytest.mark.xdist_group("tutorial")
 def test_the_fit_finds_the_throw_and_the_equation(lesson):
     summary = json.loads((lesson / "my-fit" / "summary.json").read_text(encoding="utf-8"))
     best, other = summary["fits"]
@@ -60,7 +58,6 @@ def test_the_fit_finds_the_throw_and_the_equation(lesson):
     assert found["omega0"]["value"] == pytest.approx(20.0, rel=0.05, abs=0.0)
 
 
-@pytest.mark.xdist_group("tutorial")
 def test_the_track_of_the_lesson_names_free_flight_beside_a_report(lesson):
     """What ``report --measured my-track/track.csv`` shows."""
     from flipproof.film.measured import hold, read_measured

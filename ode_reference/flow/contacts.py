@@ -12,234 +12,192 @@ With recoil, coming to rest is a perfectly inelastic impact of its own, which ev
 from __future__ import annotations
 
 import math
-from typing import Any
 
-from ode_reference.flow.laws import sort, strike
-from ode_reference.flow.layout import (
-    AFTER,
-    APPROACH,
-    END,
-    HIT,
-    NEAR,
-    PLACE,
-    RANK,
-    SIDE,
-    SPEED,
-    STILL,
-    WATCHED,
-    IntArray,
-)
-from ode_reference.flow.ledger import book_jump
-from ode_reference.flow.points import enter, leave, place_of, set_body, set_scales, speed_of
-from ode_reference.flow.search import ROUNDING, watch
+from ode_reference.flow.laws import sequential, simultaneous
+from ode_reference.flow.layout import AFTER, APPROACH, COUNT, END, NEAR, SIDE, WHO
+from ode_reference.flow.ledger import book_jump, speeds_of
+from ode_reference.flow.points import count, enter, set_body, set_scales, where
+from ode_reference.flow.search import ROUNDING, STANDING
 from slicemodel.compiled import inner
-from slicemodel.trajectory import FloatArray
 
-STANDING = 1e-14
-"""Speed that rounding makes of none, in units of wall * |omega|."""
+CHOICES = ((1, 1), (1, 0), (0, 1))
+"""Whether the slow slices stay on the base and on the cap."""
 
 
 @inner
-def touch(now: Any, points: FloatArray, marks: IntArray) -> None:
-    """List the slices that strike at this instant: the one that was located, and who reaches an end with it.
+def touch(now, points, marks):
+    """List the contacts of this instant: slices that strike, at release those that touch, and the slices at rest.
 
     Two slices that strike at the same time are located at times that differ by rounding: contact is also what a slice
-    reaches within four units in the last place of the time.
+    reaches within four units in the last place of the time. To the sequential law each slice at rest is free. In a full
+    bottle a slice and its image strike together.
     """
-    now.hits = 0
+    # Nothing moves in an instant: omega and the centre of mass belong to all that follows.
+    set_scales(now)
+    now.hits, standing = 0, STANDING * now.wall * abs(now.omega)
+    if now.sequential:
+        for i in range(points.shape[1]):
+            if marks[SIDE, i] != 0:
+                enter(now, points, i, marks[SIDE, i] * now.wall, 0.0)
+                add(now, points, marks, i, marks[SIDE, i], 1, 0.0)
+        now.on_base = now.on_cap = 0
+    for side, resting in ((1, now.on_base), (-1, now.on_cap)):
+        if resting > 0:
+            add(now, points, marks, -1, side, resting, 0.0)
     for k in range(now.near):
         j = marks[NEAR, k]
-        y, v = place_of(now, points[PLACE, j], points[SPEED, j]), speed_of(now, points[PLACE, j], points[SPEED, j])
-        reach = max(now.tolerance, 9e-16 * now.t * abs(v))
-        strikes = (v > 0.0 and now.wall - y <= reach) or (v < 0.0 and now.wall + y <= reach)
-        if (strikes and marks[STILL, j] == 0) or j == now.struck:
-            marks[HIT, now.hits] = j
-            now.hits += 1
-    sort(marks[HIT], marks[RANK], now.hits)
+        y, v = where(now, points, j)
+        end, gap = math.copysign(1.0, y), now.wall - abs(y)
+        strikes = (end * v > standing or now.steps == 0) and gap <= max(now.tolerance, 9e-16 * now.t * abs(v))
+        if strikes or j == now.struck:
+            add(now, points, marks, j, end, 1, end * v if end * v > standing else 0.0)
+            now.largest_snap = max(now.largest_snap, abs(gap))
+    if now.mirrored:
+        for k in range(now.hits):
+            pair(now, points, marks, k)
 
 
 @inner
-def meet(now: Any, points: FloatArray, marks: IntArray, impacts: FloatArray) -> None:
+def pair(now, points, marks, k):
+    """List the image of contact k, or give it the same approach speed."""
+    image = points.shape[1] - 1 - marks[WHO, k]
+    if marks[WHO, k] < 0 or marks[SIDE, image] != 0:
+        return
+    for m in range(now.hits):
+        if marks[WHO, m] == image:
+            points[APPROACH, m] = points[APPROACH, k]
+            return
+    add(now, points, marks, image, -points[END, k], 1, points[APPROACH, k])
+
+
+@inner
+def add(now, points, marks, who, end, slices, approach):
+    """List one contact."""
+    k = now.hits
+    marks[WHO, k], points[END, k], points[COUNT, k] = who, end, slices
+    points[APPROACH, k], points[AFTER, k] = approach, 0.0
+    now.hits = k + 1
+
+
+@inner
+def meet(now, points, marks, impacts):
     """Resolve all contacts of this instant together; impacts that have a speed are listed."""
-    # Nothing moves in an instant: omega and the centre of mass belong to all that follows.
-    m = now.slice_mass
-    set_scales(now)
-    now.y_cm = m * (now.free * now.y_mean + now.wall * (now.on_base - now.on_cap)) / now.total_mass
-    book_jump(now, 0)
-    if now.sequential == 1 and now.hits > 0 and now.on_base + now.on_cap > 0:
-        wake(now, points, marks)
-    for k in range(now.hits):
-        j = marks[HIT, k]
-        y = place_of(now, points[PLACE, j], points[SPEED, j])
-        points[END, k] = 1.0 if y > 0.0 else -1.0
-        points[APPROACH, k] = points[END, k] * speed_of(now, points[PLACE, j], points[SPEED, j])
-        if marks[SIDE, j] != 0 or marks[STILL, j] != 0 or now.t == 0.0:
-            points[APPROACH, k] = 0.0
-        now.largest_snap = max(now.largest_snap, abs(abs(y) - now.wall))
-    rebound(now, points, marks)
-    book_jump(now, 1)
-    choose(now, points)
-    settle(now, points, marks, impacts)
-    book_jump(now, 2)
-    now.instants += 1
-
-
-@inner
-def wake(now: Any, points: FloatArray, marks: IntArray) -> None:
-    """Let every resting slice take part as one that touches its end with no speed; ``side`` says where it rested."""
-    for i in range(points.shape[1]):
-        if marks[SIDE, i] != 0:
-            enter(now, points, i, marks[SIDE, i] * now.wall, 0.0)
-            marks[HIT, now.hits] = i
-            now.hits += 1
-    now.on_base = now.on_cap = 0
-    sort(marks[HIT], marks[RANK], now.hits)
-
-
-@inner
-def rebound(now: Any, points: FloatArray, marks: IntArray) -> None:
-    """Apply the impact law: to the touching points, marks, to the groups at rest, and by V to every velocity."""
-    gained = strike(now, points, marks) if now.hits > 0 else 0.0
-    now.dy_mean -= gained
-    now.base_speed, now.cap_speed = min(-gained, 0.0), max(-gained, 0.0)
-    for k in range(now.hits):
-        j = marks[HIT, k]
-        leave(now, points[PLACE, j], points[SPEED, j])
-        enter(now, points, j, points[END, k] * now.wall, points[END, k] * points[AFTER, k])
-
-
-@inner
-def choose(now: Any, points: FloatArray) -> None:
-    """Set ``stay_base``, ``stay_cap``: which ends keep their slow slices; and ``shift``, what all others then lose."""
-    rest, ratio = now.rest_speed, now.recoil * now.slice_mass / now.bottle_mass
-    base = now.on_base if abs(now.base_speed) < rest else 0
-    cap = now.on_cap if abs(now.cap_speed) < rest else 0
-    base_sum, cap_sum = base * now.base_speed, cap * now.cap_speed
-    base_one, cap_one = now.base_speed, now.cap_speed
-    for k in range(now.hits):
-        if abs(points[AFTER, k]) < rest:
-            v = points[END, k] * points[AFTER, k]
-            if points[END, k] > 0.0:
-                base_one = v if base == 0 else base_one
-                base, base_sum = base + 1, base_sum + v
-            else:
-                cap_one = v if cap == 0 else cap_one
-                cap, cap_sum = cap + 1, cap_sum + v
-    now.stay_base = now.stay_cap = 0
-    now.shift = 0.0
-    total = now.free * now.dy_mean + now.on_base * now.base_speed + now.on_cap * now.cap_speed
-    everyone = now.free + now.on_base + now.on_cap
-    for choice in range(3):
-        on_base = base if choice != 2 else 0
-        on_cap = cap if choice != 1 else 0
-        if (choice != 2 and (base == 0 or now.released > 0)) or (choice != 1 and (cap == 0 or now.released < 0)):
-            continue
-        loose = (base_sum if on_base > 0 else 0.0) + (cap_sum if on_cap > 0 else 0.0)
-        shift = ratio * loose / (1.0 + ratio * (on_base + on_cap))
-        moving = total - loose - (everyone - on_base - on_cap) * shift
-        right = strict = True
-        if base > 0:
-            pressed = is_pressed(now, 1.0, 0.0 if on_base > 0 else base_one - shift, on_base, on_cap, moving)
-            right, strict = right and (pressed or on_base == 0), strict and (pressed == (on_base > 0))
-        if cap > 0:
-            pressed = is_pressed(now, -1.0, 0.0 if on_cap > 0 else cap_one - shift, on_base, on_cap, moving)
-            right, strict = right and (pressed or on_cap == 0), strict and (pressed == (on_cap > 0))
-        # Rounding at a group that is neither pressed nor pulled can spoil every strict choice.
-        if right and (strict or now.stay_base + now.stay_cap == 0):
-            now.stay_base, now.stay_cap, now.shift = int(on_base > 0), int(on_cap > 0), shift
-            if strict:
-                return
-
-
-@inner
-def is_pressed(now: Any, end: float, v: float, on_base: int, on_cap: int, moving: float) -> bool:
-    """Return whether ``end`` presses on a slice that moves at v, with so many at rest and ``moving`` = sum of speeds.
-
-    The acceleration is that of the equations, from sums over all slices: k^2 (y - y_CM) + f - d (v - u) - a_c. Where
-    rounding hides its sign the slice counts as pressed: the series of the next step knows what comes of it.
-    """
-    m, d, place = now.slice_mass, now.drag_rate, end * now.wall
-    square = now.omega * now.omega - now.kappa
-    force = now.gravity * math.cos(now.theta) * (1.0 - now.kappa / now.omega / now.omega)
-    body = now.bottle_mass + m * (on_base + on_cap)
-    if now.origin:
-        thrown = square * (place - m * now.wall * (on_base - on_cap) / body)
-        force, drag = force * now.bottle_mass / body, d * v + d * m * moving / body
+    at_rest = now.wall * (now.on_base - now.on_cap)
+    now.y_cm = now.slice_mass * (now.free * now.y_mean + at_rest) / now.total_mass
+    before = speeds_of(now, points, marks)
+    if now.sequential:
+        now.dy_mean -= sequential(now, points, marks)
     else:
-        thrown = square * (place - now.y_cm)
-        drag = d * v - now.drag_on_centre * d * m * moving / now.total_mass
-    return end * (thrown + force - drag) >= -ROUNDING * now.thrust  # type: ignore[no-any-return]
+        now.dy_mean -= simultaneous(now, points, APPROACH, now.restitution)
+    for k in range(now.hits):
+        j, end = marks[WHO, k], points[END, k]
+        if j >= 0:
+            count(now, points, j, -1)
+            enter(now, points, j, end * now.wall, end * points[AFTER, k])
+    rebounded = speeds_of(now, points, marks)
+    choose(now, points, marks)
+    settle(now, points, marks, impacts)
+    now.work_impacts += book_jump(now, before, rebounded)
+    now.work_rests += book_jump(now, rebounded, speeds_of(now, points, marks))
 
 
 @inner
-def settle(now: Any, points: FloatArray, marks: IntArray, impacts: FloatArray) -> None:
-    """Take over who stays and who leaves: speeds, moments, lists, counts, and the record of the impacts."""
-    rest = now.rest_speed
-    free_base = now.on_base > 0 and not (now.stay_base == 1 and abs(now.base_speed) < rest)
-    free_cap = now.on_cap > 0 and not (now.stay_cap == 1 and abs(now.cap_speed) < rest)
-    now.dy_mean -= now.shift
-    if free_base:
-        now.releases += now.on_base
-        now.on_base = 0
-        free_group(now, points, marks, 1, now.base_speed - now.shift)
-    if free_cap:
-        now.releases += now.on_cap
-        now.on_cap = 0
-        free_group(now, points, marks, -1, now.cap_speed - now.shift)
-    now.base_speed = now.cap_speed = 0.0
+def slow_on(now, points, end):
+    """Return how many slices may stay on an end, which is none if it lets go; their speeds summed up; one of them."""
+    slow = total = one = 0.0
     for k in range(now.hits):
-        j, base = marks[HIT, k], points[END, k] > 0.0
-        stays = abs(points[AFTER, k]) < rest and (now.stay_base if base else now.stay_cap) == 1
-        v = 0.0 if stays else points[END, k] * points[AFTER, k] - now.shift
+        if points[END, k] == end != now.released and abs(points[AFTER, k]) < now.rest_speed:
+            one = end * points[AFTER, k]
+            slow += points[COUNT, k]
+            total += points[COUNT, k] * one
+    return slow, total, one
+
+
+@inner
+def choose(now, points, marks):
+    """Set ``on_base``, ``on_cap``: who stays there; and ``shift``, what all others then lose."""
+    base, base_sum, base_one = slow_on(now, points, 1.0)
+    cap, cap_sum, cap_one = slow_on(now, points, -1.0)
+    free, everyone = now.free, now.free + now.on_base + now.on_cap
+    total = speeds_of(now, points, marks)[0]
+    best, stays = 0, (0, 0)
+    now.shift = 0.0
+    for choice in CHOICES:
+        on_base, on_cap = choice
+        if on_base > base or on_cap > cap:
+            continue
+        now.on_base, now.on_cap = int(on_base * base), int(on_cap * cap)
+        now.free = everyone - now.on_base - now.on_cap
+        set_body(now)
+        loose = on_base * base_sum + on_cap * cap_sum
+        shift = now.ratio * loose / (1.0 + now.ratio * (now.on_base + now.on_cap))
+        moving = total - loose - now.free * shift
+        # Who is pressed: of those that stay at no speed, of those that leave at theirs.
+        base_pressed = base > 0 and is_pressed(now, 1.0, (1 - on_base) * (base_one - shift), moving)
+        cap_pressed = cap > 0 and is_pressed(now, -1.0, (1 - on_cap) * (cap_one - shift), moving)
+        right = base_pressed >= on_base and cap_pressed >= on_cap
+        # Rounding at a group that is neither pressed nor pulled can spoil every choice in which all who leave are not.
+        rank = right + (right and base_pressed == on_base and cap_pressed == on_cap)
+        if rank > best:
+            best, stays, now.shift = rank, choice, shift
+    now.free, now.on_base, now.on_cap = free, int(stays[0] * base), int(stays[1] * cap)
+
+
+@inner
+def is_pressed(now, end, v, moving):
+    """Return whether ``end`` presses on a slice that moves at v; ``moving`` is the sum of speeds of all that are free.
+
+    This is ``push`` of ``layout.set_body``. Where rounding hides its sign the slice counts as pressed: the series of
+    the next step knows what comes of it.
+    """
+    share = 1.0 / max(now.free, 1)
+    z, dz = (now.y_cm - now.centre) * now.total_mass / now.slice_mass * share, moving * share
+    thrown = (now.omega * now.omega - now.kappa) * (end * now.wall - now.centre - now.push_z * z)
+    force = now.gravity * math.cos(now.theta) * (1.0 - now.kappa / now.omega / now.omega)
+    push = thrown + now.push_dz * dz + now.weight * force - now.drag_rate * v
+    return end * push >= -ROUNDING * now.thrust
+
+
+@inner
+def settle(now, points, marks, impacts):
+    """Take over who stays and who leaves: speeds, moments, lists, counts, and the record of the impacts."""
+    now.dy_mean -= now.shift
+    for k in range(now.hits):
+        j, end, after = marks[WHO, k], points[END, k], points[AFTER, k]
+        stays = abs(after) < now.rest_speed and (now.on_base if end > 0.0 else now.on_cap) > 0
+        v = 0.0 if stays else end * after - now.shift
         if points[APPROACH, k] > 0.0:
-            row = now.impacts
-            impacts[row, 0], impacts[row, 1], impacts[row, 2] = now.t, j, points[END, k]
-            impacts[row, 3], impacts[row, 4] = points[APPROACH, k], abs(v)
+            row = impacts[now.impacts]
+            row[0], row[1], row[2] = now.steps, now.t, j
+            row[3], row[4], row[5] = end, points[APPROACH, k], abs(v)
             now.impacts += 1
-        rested = marks[SIDE, j] != 0
-        now.rests += int(stays and not rested)
-        now.releases += int(rested and not stays)
-        marks[SIDE, j] = 0
-        if stays:
-            leave(now, points[PLACE, j], points[SPEED, j])
-            marks[SIDE, j] = 1 if base else -1
-            now.on_base, now.on_cap = now.on_base + int(base), now.on_cap + int(not base)
-        else:
-            set_off(now, marks, j, 1 if base else -1, v)
-    if now.free == 0:
-        now.dy_mean = 0.0
+        if j >= 0 and stays:
+            count(now, points, j, -1)
+            now.rests += marks[SIDE, j] == 0
+            marks[SIDE, j] = int(end)
+        elif j >= 0 and marks[SIDE, j] != 0:
+            let_go(now, marks, j)
+        elif j < 0 and not stays:
+            for i in range(points.shape[1]):
+                if marks[SIDE, i] == end:
+                    enter(now, points, i, end * now.wall, v)
+                    let_go(now, marks, i)
+    now.hits = now.released = 0
     set_body(now)
     if now.free == 0:
-        now.y_mean = now.centre
-    forget_resting(now, marks)
-
-
-@inner
-def free_group(now: Any, points: FloatArray, marks: IntArray, side: int, v: float) -> None:
-    """Let all slices that rest on one side go, at speed v."""
-    for i in range(points.shape[1]):
-        if marks[SIDE, i] == side:
-            marks[SIDE, i] = 0
-            enter(now, points, i, side * now.wall, v)
-            set_off(now, marks, i, side, v)
-
-
-@inner
-def set_off(now: Any, marks: IntArray, i: int, side: int, v: float) -> None:
-    """Watch a free slice on an end; note whether it stands still there."""
-    watch(now, marks, i)
-    marks[STILL, i] = side if abs(v) <= STANDING * now.wall * abs(now.omega) else 0
-
-
-@inner
-def forget_resting(now: Any, marks: IntArray) -> None:
-    """Take slices at rest off the list of those that are watched; the others keep their order."""
+        now.y_mean, now.dy_mean = now.centre, 0.0
     kept = 0
     for k in range(now.near):
         i = marks[NEAR, k]
-        if marks[SIDE, i] == 0:
-            marks[NEAR, kept] = i
-            kept += 1
-        else:
-            marks[WATCHED, i] = 0
+        marks[NEAR, kept] = i
+        kept += marks[SIDE, i] == 0
     now.near = kept
+
+
+@inner
+def let_go(now, marks, i):
+    """Let a slice go that rested; it is watched from now on."""
+    marks[SIDE, i] = 0
+    marks[NEAR, now.near] = i
+    now.near += 1
+    now.releases += 1

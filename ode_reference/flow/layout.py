@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any, Final, NamedTuple
+from collections.abc import Mapping
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,123 +29,73 @@ WATCH: Final = 10_000
 OK, OVERFLOW, STALLED, WRONSKIAN, INERTIA, ESCAPED = range(6)
 """How a flight ended."""
 
-_REAL = {
-    "throw": "slice_mass bottle_mass total_mass bottle_inertia momentum gravity drag_rate kappa wall restitution "
-    "rest_speed tolerance duration",
-    "body": "centre body_inertia reduced_mass spring damping weight push_z push_dz",
-    "state": "t theta A dA B dB y_mean dy_mean mu mw U P V",
-    "search": "base_time span low_u high_u low_far high_far fastest rate thrust rest_A rest_B rest_z h root",
-    "contacts": "omega y_cm base_speed cap_speed shift squares speeds",
-    "checks": "largest_snap wronskian_error inertia_error watched_from",
-    "ledger": "work_drag work_weight work_spring work_origin work_impacts work_rests work_recoil initial final",
-}
-_WHOLE = {
-    "switches": "origin drag_on_centre recoil sequential ledger",
-    "body": "free on_base on_cap",
-    "search": "near order fresh stale since",
-    "event": "event hits struck struck_end released stay_base stay_cap",
-    "counts": "steps series rebases impacts instants rests releases recorded status step_limit watch",
-}
+WORKS: Final = ("drag", "weight", "negative_spring", "missing_origin", "impacts", "rests", "missing_recoil")
+"""What changes the energy; the record keeps each as ``work_`` and its name."""
+
+_REAL = (
+    "slice_mass bottle_mass total_mass bottle_inertia momentum ratio gravity drag_rate kappa wall restitution "
+    "rest_speed tolerance duration centre body_inertia reduced_mass spring damping weight push_z push_dz "
+    "t theta A dA B dB y_mean dy_mean mu mw U P V "
+    "base_time span pace clear fastest rate thrust omega rest_A rest_B rest_z h root y_cm shift "
+    "largest_snap wronskian_error inertia_error watched_from initial final"
+)
+_WHOLE = (
+    "origin drag_on_centre recoil sequential mirrored ledger free on_base on_cap near order struck released hits "
+    "steps impacts rests releases recorded status step_limit watch"
+)
 
 RECORD: Final = np.dtype(
-    [(name, np.float64) for names in _REAL.values() for name in names.split()]
-    + [(name, np.int64) for names in _WHOLE.values() for name in names.split()]
+    [(name, np.float64) for name in (*_REAL.split(), *(f"work_{name}" for name in WORKS))]
+    + [(name, np.int64) for name in _WHOLE.split()]
 )
 """One flight: throw, switches, body of tube and resting slices, state, search, ledger and counts; SI units.
 
 state     t; theta; the map A, B and its derivatives; mean place and speed of the free slices; mean and central moments
           of (u, w): mu, mw, U = sum (u - mu)^2, P = sum (u - mu)(w - mw), V = sum (w - mw)^2
 body      y_c, J_c, a M_c/M, and c, d_z, W of z'' = c k^2 z - d_z z' + W f; ``push`` gives the other two
-search    time the map starts from and span for which slices are watched; extremes of u and of u + span w, and the
-          largest |w|, of those not watched; sums of the Taylor terms beyond the straight line; step length; root
+search    time the map starts from, span for which slices are watched, length to try next; ``clear`` and ``fastest``
+          bound u, u + span w and w of those not watched; sums of the Taylor terms beyond the straight line; step; root
 """
-
-
-WORKS: Final = {
-    "drag": "work_drag",
-    "weight": "work_weight",
-    "negative_spring": "work_spring",
-    "missing_origin": "work_origin",
-    "impacts": "work_impacts",
-    "rests": "work_rests",
-    "missing_recoil": "work_recoil",
-}
-"""What changes the energy, and where the record of a flight keeps it."""
-
-FIELDS: Final = RECORD.names or ()
 
 IntArray = NDArray[np.int64]
 
-PLACE, SPEED, END, APPROACH, AFTER, CORNER = range(6)
-"""Rows of ``points``: (u, w) of each slice; for each hit of an instant its end, its approach speed, its speed after."""
+PLACE, SPEED, END, COUNT, APPROACH, AFTER = range(6)
+"""Rows of ``points``: (u, w) of each slice; for each contact of an instant its end, how many slices it stands for,
+their approach speed and their speed after."""
 
-SIDE, NEAR, WATCHED, STILL, HIT, RANK = range(6)
-"""Rows of ``marks``: the end a slice rests on, or 0; the list of watched slices, and who is on it; the end on which a
-free slice stands still; the list of slices that strike at one instant."""
-
-
-class Output(NamedTuple):
-    """What a flight writes into: states at its output times, up to the last that it reaches.
-
-    Parameters
-    ----------
-    moments : array, shape (P,) - output times [s]
-    rows : array, shape (3, P) - theta, J and y_CM
-    r, v : array, shape (P, N) - y, infinite at rest, and y' [m], [m/s]; of shape (0, N) if they are not asked for
-    """
-
-    moments: FloatArray
-    rows: FloatArray
-    r: FloatArray
-    v: FloatArray
-
-
-def points_at(y: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return ``points`` and ``marks``, shape (6, N), of free slices at rest at ``y`` [m]."""
-    points = np.zeros((6, len(y)))
-    points[PLACE] = y
-    return points, np.zeros((6, len(y)), dtype=np.int64)
-
-
-def pack(now: SimpleNamespace) -> NDArray[Any]:
-    """Return the numbers of a flight as the record that the compiled loop takes, shape (1,)."""
-    return np.array([tuple(map(vars(now).__getitem__, FIELDS))], dtype=RECORD)
-
-
-def unpack(record: NDArray[Any]) -> SimpleNamespace:
-    """Return the numbers of a record as attributes: Python reads those many times faster than its fields."""
-    return SimpleNamespace(**dict(zip(FIELDS, record[0].item(), strict=True)))
+SIDE, NEAR, WHO = range(3)
+"""Rows of ``marks``: the end a slice rests on, or 0; the list of watched slices; for each contact its slice, or -1 for
+all that rest on its end."""
 
 
 def prepare(
-    scenario: Scenario, switches: Switches, rest_speed: float, *, sequential: bool, ledger: bool
-) -> tuple[SimpleNamespace, FloatArray]:
-    """Return the numbers of a flight at its release, and the places y of its slices, shape (N,) [m]."""
+    scenario: Scenario, switches: Switches, settings: Mapping[str, Any]
+) -> tuple[NDArray[Any], FloatArray, IntArray]:
+    """Return the record of a flight at its release, shape (1,), with ``points``, (6, N), and ``marks``, (3, N)."""
     throw, n = Throw.of(scenario), scenario.n_slices
-    now = SimpleNamespace(**dict.fromkeys(FIELDS, 0))
-    gamma = throw.drag_rate / 2
-    now.slice_mass, now.bottle_mass, now.total_mass = throw.slice_mass, throw.bottle_mass, throw.total_mass
-    now.bottle_inertia = throw.bottle_inertia
+    flight = np.zeros(1, dtype=RECORD).view(np.recarray)
+    now = flight[0]
+    for name in ("slice_mass", "bottle_mass", "total_mass", "bottle_inertia"):
+        now[name] = getattr(throw, name)
+    now.momentum = throw.angular_momentum
+    now.ratio = switches.recoil * throw.slice_mass / throw.bottle_mass
     now.gravity = 0.0 if switches.weightless else throw.gravity
     now.drag_rate = throw.drag_rate if switches.signs else 0.0
-    now.kappa = 0.0 if switches.roots else gamma * gamma
+    now.kappa = 0.0 if switches.roots else (throw.drag_rate / 2) ** 2
     now.wall = (scenario.r_max - scenario.r_min) / 2
-    now.restitution, now.rest_speed, now.duration = scenario.restitution, rest_speed, scenario.duration
+    now.restitution, now.rest_speed, now.duration = scenario.restitution, settings["rest_speed"], scenario.duration
     now.tolerance = TOLERANCE * scenario.bottle.length
     now.origin, now.drag_on_centre, now.recoil = switches.origin, switches.drag_on_centre, switches.recoil
-    now.sequential, now.ledger = sequential and switches.recoil, ledger
-    now.theta, now.free = scenario.theta0, n
-    set_body(now)
+    now.sequential = settings["impact_law"] == "sequential" and switches.recoil
+    # Nothing tells the ends of a full bottle apart if no weight pulls along it and impacts do not come one by one.
+    now.mirrored = scenario.fill_fraction == 1.0 and now.gravity == 0.0 and not now.sequential
+    now.ledger, now.step_limit, now.watch = settings["energy"], STEP_LIMIT, WATCH
+    now.theta, now.A, now.dB = scenario.theta0, 1.0, 1.0
+    points, marks = np.zeros((6, n)), np.zeros((3, n), dtype=np.int64)
     # A full bottle is mirror symmetric to the last digit: its stack is as high as the tube is long.
     empty = (1.0 - scenario.fill_fraction) * scenario.bottle.length / 2
-    y: FloatArray = empty + ((n - 1) / 2 - np.arange(n, dtype=np.float64)) * scenario.slice_height
-    now.A = now.dB = 1.0
-    now.y_mean = now.mu = y.mean()
-    now.U = ((y - now.mu) ** 2).sum()
-    inertia = now.body_inertia + now.slice_mass * now.U + now.reduced_mass * now.y_mean**2
-    now.momentum = inertia * scenario.omega0
-    now.step_limit, now.watch = STEP_LIMIT, WATCH
-    return now, y
+    points[PLACE] = empty + ((n - 1) / 2 - np.arange(n, dtype=np.float64)) * scenario.slice_height
+    return flight, points, marks
 
 
 def set_body(now: Any) -> None:
@@ -165,7 +115,8 @@ def set_body(now: Any) -> None:
     neither                         M_c / M  d            1          a / M  0
     ==============================  =======  ===========  =========  =====  ============
 
-    ``push`` is the acceleration of a slice that rests at ``place``; it stays while that points out of the bottle.
+    ``push`` is the acceleration of a slice that rests at ``place``; it stays while that points out of the bottle. One
+    that moves there has -d y' besides.
     """
     m, total, d = now.slice_mass, now.total_mass, now.drag_rate
     resting = now.on_base + now.on_cap

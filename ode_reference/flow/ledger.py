@@ -20,79 +20,62 @@ what the momentum of the tube left out adds to that is ``missing_recoil``.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
-from ode_reference.flow.points import inertia_of
-from ode_reference.flow.series import THETA, A, B, Z, slope, value
+from ode_reference.flow.layout import AFTER, COUNT, END, WHO
+from ode_reference.flow.points import inertia_at, inertia_of
+from ode_reference.flow.series import state_at
 from slicemodel.compiled import inner
-from slicemodel.trajectory import FloatArray
 
 _NODES, _WEIGHTS = (0.5 * numbers for numbers in np.polynomial.legendre.leggauss(6))
 
 
 @inner
-def squares_of(now: Any) -> float:
-    """Return the sum of the squared velocities [m^2/s^2]."""
-    groups = now.on_base * now.base_speed * now.base_speed + now.on_cap * now.cap_speed * now.cap_speed
-    inner = now.dA * now.dA * now.U + 2.0 * now.dA * now.dB * now.P + now.dB * now.dB * now.V
-    return groups + now.free * now.dy_mean * now.dy_mean + inner  # type: ignore[no-any-return]
+def speeds_of(now, points, marks):
+    """Return the sums of all velocities [m/s] and of their squares; slices at rest may have one within an instant."""
+    total = now.free * now.dy_mean
+    squares = total * now.dy_mean + now.dA * now.dA * now.U + 2.0 * now.dA * now.dB * now.P + now.dB * now.dB * now.V
+    for k in range(now.hits):
+        if marks[WHO, k] < 0:
+            total += points[COUNT, k] * points[END, k] * points[AFTER, k]
+            squares += points[COUNT, k] * points[AFTER, k] * points[AFTER, k]
+    return total, squares
 
 
 @inner
-def energy_of(now: Any) -> float:
-    """Return E [J]; no slice at rest may have a speed."""
-    m, drift = now.slice_mass, now.slice_mass * now.free * now.dy_mean / now.total_mass
-    axial = m * squares_of(now) - now.total_mass * drift * drift
-    return (axial + now.momentum * now.momentum / inertia_of(now)) / 2.0  # type: ignore[no-any-return]
+def energy_of(now, points, marks):
+    """Return E [J]."""
+    total, squares = speeds_of(now, points, marks)
+    axial = now.slice_mass * (squares - now.slice_mass * total * total / now.total_mass)
+    return (axial + now.momentum * now.momentum / inertia_of(now)) / 2.0
 
 
 @inner
-def book_jump(now: Any, stage: int) -> None:
-    """Book the change of energy since the last call: 0 nothing, 1 the impacts, 2 the slices that came to rest."""
-    if now.ledger == 0:
-        return
-    m, squares = now.slice_mass, squares_of(now)
-    total = now.free * now.dy_mean + now.on_base * now.base_speed + now.on_cap * now.cap_speed
-    if stage > 0:
-        lost = m / 2.0 * (squares - now.squares)
-        carried = -m * m / 2.0 / now.total_mass * (total * total - now.speeds * now.speeds)
-        if now.recoil == 0:
-            now.work_recoil += carried
-        else:
-            lost += carried
-        if stage == 1:
-            now.work_impacts += lost
-        else:
-            now.work_rests += lost
-    now.squares, now.speeds = squares, total
+def book_jump(now, before, after):
+    """Return what an instant does to the energy; without recoil, book what the momentum of the tube would add."""
+    lost = now.slice_mass / 2.0 * (after[1] - before[1])
+    carried = now.slice_mass * now.slice_mass / 2.0 / now.total_mass * (before[0] * before[0] - after[0] * after[0])
+    if now.recoil:
+        return lost + carried
+    now.work_missing_recoil += carried
+    return lost
 
 
 @inner
-def book_step(now: Any, table: FloatArray, x: float) -> None:
+def book_step(now, table, x):
     """Book the works of the terms from the start of the step to its fraction ``x``, by Gauss's rule of order 12."""
-    if now.ledger == 0 or x == 0.0:
-        return
-    m, p, n, total = now.slice_mass, now.order, now.free, now.total_mass
-    body = total - m * n
+    m, n, total = now.slice_mass, now.free, now.total_mass
+    body, loose = total - m * n, 0.0 if now.origin else 1.0
     for k in range(len(_NODES)):
-        at, weight = x * (0.5 + _NODES[k]), x * now.h * _WEIGHTS[k]
-        a, b, z = value(table, A, p, at), value(table, B, p, at), value(table, Z, p, at)
-        da, db, dz = slope(table, A, p, at) / now.h, slope(table, B, p, at) / now.h, slope(table, Z, p, at) / now.h
-        spread = a * a * now.U + 2.0 * a * b * now.P + b * b * now.V
-        omega = now.momentum / (now.body_inertia + m * spread + now.reduced_mass * z * z)
+        theta, a, b, z, da, db, dz = state_at(now, table, x * (0.5 + _NODES[k]))
+        omega = now.momentum / inertia_at(now, a, b, z)
         K = m * (n * dz * dz + da * da * now.U + 2.0 * da * db * now.P + db * db * now.V)
         Q = m * (a * da * now.U + (a * db + da * b) * now.P + b * db * now.V) + now.reduced_mass * z * dz
         D, S = m * n / total * dz, n * body / total * z
-        force = now.gravity * math.cos(value(table, THETA, p - 1, at)) * (1.0 - now.kappa / omega / omega)
-        if now.origin:
-            now.work_drag -= weight * now.drag_rate * K
-            now.work_weight += weight * force * D * now.bottle_mass
-            now.work_spring -= weight * now.kappa * Q
-        else:
-            u = now.drag_on_centre * D
-            now.work_drag -= weight * now.drag_rate * (K - total * D * D - u * D * body)
-            now.work_weight += weight * force * D * body
-            now.work_spring -= weight * now.kappa * (Q - m * D * S)
-            now.work_origin -= weight * omega * omega * m * D * S
+        F = now.gravity * math.cos(theta) * (1.0 - now.kappa / omega / omega)
+        weight, u = x * now.h * _WEIGHTS[k], now.drag_on_centre * D
+        now.work_drag -= weight * now.drag_rate * (K - loose * D * (total * D + u * body))
+        now.work_weight += weight * F * D * (body if loose else now.bottle_mass)
+        now.work_negative_spring -= weight * now.kappa * (Q - loose * m * D * S)
+        now.work_missing_origin -= weight * omega * omega * loose * m * D * S

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from slicemodel.compiled import inner
-from slicemodel.trajectory import FloatArray
 
 MOST = 30
 """Highest order; a step whose terms do not vanish by then is made shorter."""
@@ -20,7 +18,7 @@ A, B, Z, THETA, OMEGA, SQUARE, J, FORCE, PULL, U_A, V_B, COS, SIN, SHARE = range
 
 
 @inner
-def product(table: FloatArray, first: int, second: int, k: int) -> float:
+def product(table, first, second, k):
     """Return the coefficient k of the product of two rows."""
     found = 0.0
     for j in range(k + 1):
@@ -29,116 +27,70 @@ def product(table: FloatArray, first: int, second: int, k: int) -> float:
 
 
 @inner
-def inertia_term(now: Any, table: FloatArray, k: int) -> None:
-    """Write the coefficient k of J, omega = L/J and k^2 = omega^2 - kappa."""
-    table[U_A, k] = now.U * table[A, k] + now.P * table[B, k]
-    table[V_B, k] = now.P * table[A, k] + now.V * table[B, k]
-    spread = product(table, A, U_A, k) + product(table, B, V_B, k)
-    inertia = now.slice_mass * spread + now.reduced_mass * product(table, Z, Z, k)
-    if k == 0:
-        inertia += now.body_inertia
-        table[J, 0], table[OMEGA, 0] = inertia, now.momentum / inertia
-    else:
-        table[J, k], table[OMEGA, k] = inertia, 0.0
-        table[OMEGA, k] = -product(table, J, OMEGA, k) / table[J, 0]
-    table[SQUARE, k] = product(table, OMEGA, OMEGA, k) - (now.kappa if k == 0 else 0.0)
+def expand(now, table, h):
+    """Fill the table with Taylor coefficients times h^k; return whether the series ends before MOST.
 
-
-@inner
-def force_term(now: Any, table: FloatArray, k: int) -> None:
-    """Write the coefficient k of f = (1 - kappa J^2/L^2) g cos(theta)."""
-    if k == 0:
-        table[COS, 0], table[SIN, 0] = math.cos(table[THETA, 0]), math.sin(table[THETA, 0])
-    else:
-        cosine = sine = 0.0
-        for j in range(1, k + 1):
-            rate = j * table[THETA, j]
-            cosine -= rate * table[SIN, k - j]
-            sine += rate * table[COS, k - j]
-        table[COS, k], table[SIN, k] = cosine / k, sine / k
-    if now.kappa == 0.0:
-        table[FORCE, k] = now.gravity * table[COS, k]
-    else:
-        ratio = now.kappa / now.momentum / now.momentum
-        table[SHARE, k] = (1.0 if k == 0 else 0.0) - ratio * product(table, J, J, k)
-        table[FORCE, k] = now.gravity * product(table, SHARE, COS, k)
-
-
-@inner
-def expand(now: Any, table: FloatArray, h: float) -> None:
-    """Fill the table with Taylor coefficients times h^k; sets ``order`` and the step ``h`` for which they hold."""
+    Sets ``order``, and the sums of the magnitudes of what A, B and z have beyond the straight line.
+    """
     table[A, 0], table[A, 1] = now.A, h * now.dA
     table[B, 0], table[B, 1] = now.B, h * now.dB
     table[Z, 0], table[Z, 1] = now.y_mean - now.centre, h * now.dy_mean
-    table[THETA, 0] = now.theta
+    table[THETA, 0], table[COS, 0], table[SIN, 0] = now.theta, math.cos(now.theta), math.sin(now.theta)
     weight = now.weight if now.free > 0 else 0.0
-    small = 0
-    now.h = h
+    small, now.h = 0, h
+    now.rest_A = now.rest_B = now.rest_z = 0.0
     for k in range(MOST - 1):
-        inertia_term(now, table, k)
-        table[THETA, k + 1] = h * table[OMEGA, k] / (k + 1)
-        table[FORCE, k] = 0.0
+        one, p = 1.0 if k == 0 else 0.0, k + 1
+        # J, omega = L/J and k^2 = omega^2 - kappa.
+        table[U_A, k] = now.U * table[A, k] + now.P * table[B, k]
+        table[V_B, k] = now.P * table[A, k] + now.V * table[B, k]
+        spread = product(table, A, U_A, k) + product(table, B, V_B, k)
+        table[J, k] = now.slice_mass * spread + now.reduced_mass * product(table, Z, Z, k) + one * now.body_inertia
+        table[OMEGA, k] = 0.0
+        table[OMEGA, k] = (one * now.momentum - product(table, J, OMEGA, k)) / table[J, 0]
+        table[SQUARE, k] = product(table, OMEGA, OMEGA, k) - one * now.kappa
+        table[THETA, p] = h * table[OMEGA, k] / p
+        # f = (1 - kappa J^2/L^2) g cos(theta), and cos(theta) by the rate of theta.
+        table[FORCE, k] = table[COS, p] = table[SIN, p] = 0.0
         if now.gravity != 0.0:
-            force_term(now, table, k)
-        pull = product(table, SQUARE, Z, k)
-        table[PULL, k] = pull
-        share, drag = h * h / ((k + 1) * (k + 2)), h / (k + 2)
-        table[A, k + 2] = share * product(table, SQUARE, A, k) - drag * now.drag_rate * table[A, k + 1]
-        table[B, k + 2] = share * product(table, SQUARE, B, k) - drag * now.drag_rate * table[B, k + 1]
-        table[Z, k + 2] = share * (now.spring * pull + weight * table[FORCE, k]) - drag * now.damping * table[Z, k + 1]
-        small = small + 1 if size(now, table, k + 2) < TRUNCATION else 0
+            table[SHARE, k] = one - now.kappa / now.momentum / now.momentum * product(table, J, J, k)
+            table[FORCE, k] = now.gravity * product(table, SHARE, COS, k)
+            for j in range(1, p + 1):
+                table[COS, p] -= j * table[THETA, j] * table[SIN, p - j] / p
+                table[SIN, p] += j * table[THETA, j] * table[COS, p - j] / p
+        # A'' = k^2 A - d A', B likewise, z'' = c k^2 z - d_z z' + W f.
+        table[PULL, k] = product(table, SQUARE, Z, k)
+        share, drag, p = h * h / (p * (p + 1)), h / (p + 1), p + 1
+        table[A, p] = share * product(table, SQUARE, A, k) - drag * now.drag_rate * table[A, p - 1]
+        table[B, p] = share * product(table, SQUARE, B, k) - drag * now.drag_rate * table[B, p - 1]
+        pull = now.spring * table[PULL, k] + weight * table[FORCE, k]
+        table[Z, p] = share * pull - drag * now.damping * table[Z, p - 1]
+        now.order = p
+        now.rest_A += abs(table[A, p])
+        now.rest_B += abs(table[B, p])
+        now.rest_z += abs(table[Z, p])
+        size = max(abs(table[A, p]), now.rate * abs(table[B, p]))
+        size = max(size, abs(table[Z, p]) / now.wall, abs(table[THETA, p - 1]))
+        small = small + 1 if size < TRUNCATION else 0
         if small == 2:
-            now.order = k + 2
-            return
-    now.order = MOST
-    worst = 0.0
-    for k in range(MOST - 1, MOST + 1):
-        worst = max(worst, (size(now, table, k) / TRUNCATION) ** (1.0 / k))
-    shorten(now, table, 0.9 / worst)
+            return True
+    return False
 
 
 @inner
-def size(now: Any, table: FloatArray, k: int) -> float:
-    """Return how large the terms of order k are, without dimension."""
-    turned = max(abs(table[A, k]), now.rate * abs(table[B, k]))
-    return max(turned, abs(table[Z, k]) / now.wall, abs(table[THETA, k - 1]))  # type: ignore[no-any-return]
-
-
-@inner
-def shorten(now: Any, table: FloatArray, factor: float) -> None:
-    """Let the coefficients serve a step that is shorter by ``factor``."""
-    power = 1.0
-    for k in range(MOST + 1):
-        for row in range(ROWS):
-            table[row, k] *= power
-        power *= factor
-    now.h *= factor
-
-
-@inner
-def value(table: FloatArray, row: int, order: int, x: float) -> float:
-    """Return the polynomial in a row at ``x``, a fraction of the step."""
-    found = table[row, order]
-    for k in range(order - 1, -1, -1):
+def value(table, row, order, x):
+    """Return the polynomial in a row at ``x``, a fraction of the step, and its derivative with respect to ``x``."""
+    found = slope = 0.0
+    for k in range(order, -1, -1):
+        slope = slope * x + found
         found = found * x + table[row, k]
-    return found  # type: ignore[no-any-return]
+    return found, slope
 
 
 @inner
-def slope(table: FloatArray, row: int, order: int, x: float) -> float:
-    """Return its derivative with respect to ``x``."""
-    found = order * table[row, order]
-    for k in range(order - 1, 0, -1):
-        found = found * x + k * table[row, k]
-    return found  # type: ignore[no-any-return]
-
-
-@inner
-def advance(now: Any, table: FloatArray, x: float) -> None:
-    """Move the state to the fraction ``x`` of the step."""
-    p, h = now.order, now.h
-    now.theta = value(table, THETA, p - 1, x)
-    now.A, now.dA = value(table, A, p, x), slope(table, A, p, x) / h
-    now.B, now.dB = value(table, B, p, x), slope(table, B, p, x) / h
-    if now.free > 0:
-        now.y_mean, now.dy_mean = now.centre + value(table, Z, p, x), slope(table, Z, p, x) / h
+def state_at(now, table, x):
+    """Return theta, A, B, z and the derivatives in time of the last three at the fraction ``x`` of the step."""
+    a, da = value(table, A, now.order, x)
+    b, db = value(table, B, now.order, x)
+    z, dz = value(table, Z, now.order, x)
+    return value(table, THETA, now.order - 1, x)[0], a, b, z, da / now.h, db / now.h, dz / now.h

@@ -43,11 +43,11 @@ def respond(x, tube, start, s1, s2, sine, cosine, angle, closed, target, world, 
     m_all = world.tube + world.m * world.n
     a12, a22 = world.m * s1, world.own + world.m * s2
     det = m_all * a22 - a12 * a12
-    touches = False
+    corners = 0
     for c in range(4):
         pn[c] = 0.0
         pt[c] = 0.0
-        touches = touches or closed[c]
+        corners += closed[c]
     axial, across, torque = 0.0, 0.0, 0.0
     expected = 0.0
     for outer in range(MOST_POOLS):
@@ -59,7 +59,7 @@ def respond(x, tube, start, s1, s2, sine, cosine, angle, closed, target, world, 
             at, pooled = pool_stops(x, tube + axial / world.tube, closed, world, y)
         v_t = free[0] + (across * a22 - a12 * torque) / det
         omega = free[1] + (m_all * torque - a12 * across) / det
-        if not touches or (outer > 0 and abs(at - expected) <= 1e-12 * (1.0 + abs(at))):
+        if corners == 0 or (outer > 0 and abs(at - expected) <= 1e-12 * (1.0 + abs(at))):
             return at, v_t, omega, True
         v_r = start + at
         largest = 0.0
@@ -88,6 +88,8 @@ def respond(x, tube, start, s1, s2, sine, cosine, angle, closed, target, world, 
                 across += sine * more_n + cosine * more_t
                 torque += up * more_n + on * more_t
                 largest = max(largest, abs(more_n) * nn, abs(more_t) * tt)
+            if corners == 1:
+                largest = 0.0  # its closed form is exact
             if largest < 1e-13:
                 break
         if not largest < CREEPING:

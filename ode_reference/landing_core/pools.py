@@ -28,49 +28,49 @@ def pool_chain(x, tube, closed, world, y, total, weight, count):
     slices resting on the base make one, slices that touch neither end the others.
     """
     n = world.n
+    for i in range(n):
+        y[i] = x[i]  # stays so for slices that are pooled with nothing
     on_base = 0
     while on_base < n and closed[4 + on_base]:
         on_base += 1
     on_cap = n
     while on_cap > on_base and closed[4 + on_cap]:
         on_cap -= 1
-    blocks = 0
-    for i in range(on_cap, n):
-        blocks = join(x[i], world.m, blocks, total, weight, count)
-    blocks = join(tube, world.tube, blocks, total, weight, count)
-    for i in range(on_base):
-        blocks = join(x[i], world.m, blocks, total, weight, count)
     at, pooled = tube, world.tube
-    k, behind = 0, n - on_cap
-    for block in range(blocks):
-        alone = count[block] == 1
-        value = total[block] / weight[block]
-        for _ in range(int(count[block])):
-            if k < behind:
-                y[on_cap + k] = x[on_cap + k] if alone else value
-            elif k > behind:
-                y[k - behind - 1] = x[k - behind - 1] if alone else value
-            elif not alone:
-                at, pooled = value, weight[block]
-            k += 1
-    begin = on_base
-    while begin < on_cap:
-        end = begin + 1
-        while end < on_cap and closed[4 + end]:
-            end += 1
-        y[begin] = x[begin]
-        if end > begin + 1:
-            blocks = 0
-            for i in range(begin, end):
-                blocks = join(x[i], world.m, blocks, total, weight, count)
-            k = begin
-            for block in range(blocks):
-                alone = count[block] == 1
+    if on_base > 0 or on_cap < n:
+        blocks = 0
+        for i in range(on_cap, n):
+            blocks = join(x[i], world.m, blocks, total, weight, count)
+        blocks = join(tube, world.tube, blocks, total, weight, count)
+        for i in range(on_base):
+            blocks = join(x[i], world.m, blocks, total, weight, count)
+        k, behind = 0, n - on_cap
+        for block in range(blocks):
+            end = k + int(count[block])
+            if end > k + 1:
                 value = total[block] / weight[block]
-                for _ in range(int(count[block])):
-                    y[k] = x[k] if alone else value
-                    k += 1
-        begin = end
+                for j in range(k, end):
+                    if j == behind:
+                        at, pooled = value, weight[block]
+                    else:
+                        y[on_cap + j if j < behind else j - behind - 1] = value
+            k = end
+    j = on_base + 1
+    while j < on_cap:
+        if closed[4 + j]:
+            k = j - 1
+            blocks = join(x[k], world.m, 0, total, weight, count)
+            while j < on_cap and closed[4 + j]:
+                blocks = join(x[j], world.m, blocks, total, weight, count)
+                j += 1
+            for block in range(blocks):
+                end = k + int(count[block])
+                if end > k + 1:
+                    value = total[block] / weight[block]
+                    for i in range(k, end):
+                        y[i] = value
+                k = end
+        j += 1
     return at, pooled
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -32,13 +32,18 @@ STEPS: Final = 1000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
-    """A finished report in memory; ``tables`` maps paths in its folder to the text of files."""
+    """A finished report in memory; ``tables`` maps paths in its folder to the text of files.
+
+    ``seconds`` are wall times [s]: of every claim, by its finding's id; ``whole`` is that of everything.
+    """
 
     findings: tuple[Finding, ...]
     exhibits: tuple[Exhibit, ...]
     html: str
     summary: dict[str, Any]
     tables: dict[str, str]
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    whole: float | None = None
 
     @property
     def failed(self) -> tuple[Finding, ...]:
@@ -123,6 +128,8 @@ def build(
         html=html,
         summary=summary,
         tables={path: text for each in made for path, text in each.chapter.tables(each.found).items()},
+        seconds={id_: seconds for each in told.values() for id_, seconds in each.seconds.items()},
+        whole=sum(gathered.stages.seconds.values()),
     )
 
 
@@ -132,7 +139,7 @@ def write(report: Report, folder: Path) -> None:
         "index.html": report.html,
         "summary.json": summary_text(report.summary),
         SCHEMA_NAME: schema_text(),
-        "junit.xml": junit_text(report.findings),
+        "junit.xml": junit_text(report.findings, seconds=report.seconds, whole=report.whole),
         **report.tables,
     }
     for exhibit in report.exhibits:

@@ -9,24 +9,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from slicemodel.compiled import compiled, merged
-
-SHORT_SERIES = 0.03
-"""Arguments below which four terms of sinh and cosh do: the next is 2e-18 of the sum."""
 
 SERIES = 0.5
 """Arguments below which sinh and cosh are summed up from their series; the first term left out is 5e-17 of the sum."""
 
 ROUNDING = 4e-16
 """Rounding of a sum of two numbers, in units of the larger."""
-
-PI_IN_PARTS = (3.140625, 0.0009676535846665502, 5.126688303189038e-12)
-"""Three numbers whose sum is pi to 1e-27; the first two are so short that their products with n < 2^27 are exact."""
-
-MOST_RADIANS = 4e8
-"""Angle up to which multiples of pi are taken off in parts."""
 
 
 class Map(NamedTuple):
@@ -49,29 +38,6 @@ def moved(way, y, v):
     return y + (way.push + way.a_minus_1 * y + way.b * v), way.pull + way.c * y + way.d * v
 
 
-@compiled
-def cosine(x):
-    """Return cos x to 3e-16: as (-1)^n cos(x - n pi) with the nearest n, by its series.
-
-    The library's own takes longer, and its last digit may be another one on another machine.
-    """
-    if not abs(x) < MOST_RADIANS:
-        return math.cos(x)
-    n = np.floor(x * (1.0 / math.pi) + 0.5)
-    x = ((x - n * PI_IN_PARTS[0]) - n * PI_IN_PARTS[1]) - n * PI_IN_PARTS[2]
-    y = x * x
-    z = y * y
-    high = (1.0 / 20922789888000.0 - y * (1.0 / 6402373705728000.0)) + z * (
-        1.0 / 2432902008176640000.0 - y * (1.0 / 1124000727777607680000.0)
-    )
-    middle = (1.0 / 40320.0 - y * (1.0 / 3628800.0)) + z * (1.0 / 479001600.0 - y * (1.0 / 87178291200.0))
-    low = (1.0 / 24.0 - y * (1.0 / 720.0)) + z * (middle + z * z * high)
-    near = 1.0 - 0.5 * y
-    # What is lost of 1 - y/2 is added with the rest.
-    value = near + (((1.0 - near) - 0.5 * y) + z * low)
-    return value if n == 2.0 * np.floor(0.5 * n) else -value
-
-
 @merged
 def growth_rate_squared(form, constants, omega):
     """Return k^2 (module docstring of ``schemes.form``)."""
@@ -81,14 +47,11 @@ def growth_rate_squared(form, constants, omega):
 @compiled
 def hyperbolic(y):
     """Return sinh(x) / x and (cosh(x) - 1) / x^2 of y = x^2, for small x by their series: no root and no quotient."""
-    if y < SHORT_SERIES * SHORT_SERIES:
-        odd, even = 1.0 / 120.0 + y * (1.0 / 5040.0), 1.0 / 720.0 + y * (1.0 / 40320.0)
-        return 1.0 + y * (1.0 / 6.0 + y * odd), 0.5 + y * (1.0 / 24.0 + y * even)
     if y < SERIES * SERIES:
         odd = 1.0 / 5040.0 + y * (1.0 / 362880.0 + y * (1.0 / 39916800.0 + y * (1.0 / 6227020800.0)))
         even = 1.0 / 40320.0 + y * (1.0 / 3628800.0 + y * (1.0 / 479001600.0 + y * (1.0 / 87178291200.0)))
-        odd, even = 1.0 / 120.0 + y * odd, 1.0 / 720.0 + y * even
-        return 1.0 + y * (1.0 / 6.0 + y * odd), 0.5 + y * (1.0 / 24.0 + y * even)
+        odd, even = 1.0 / 6.0 + y * (1.0 / 120.0 + y * odd), 1.0 / 24.0 + y * (1.0 / 720.0 + y * even)
+        return 1.0 + y * odd, 0.5 + y * even
     x = math.sqrt(y)
     half = math.sinh(0.5 * x) / x
     return math.sinh(x) / x, 2.0 * half * half

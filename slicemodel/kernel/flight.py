@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from slicemodel.compiled import compiled, kept_on_disk, merged
-from slicemodel.kernel.closed_form import Map, coefficients, cosine, growth_rate_squared, moved
-from slicemodel.kernel.flock import NO_STEP, bring_up_to_date, dissolved, foreseen, gathered, room_to_turn, sums_of
+from slicemodel.kernel.closed_form import Map, coefficients, growth_rate_squared, moved
+from slicemodel.kernel.flock import FEWEST_STEPS, NO_STEP, NOTHING, foreseen, gathered, room_for, room_to_turn, sums_of
 from slicemodel.kernel.rebound import Step, Watched, predicted, step_in_step, step_on_grid
 from slicemodel.schemes import form as schemes_form
 from slicemodel.trajectory import FloatArray
@@ -118,13 +118,13 @@ def fly(form, constants, frame, r0, t, dt, record, rebounds) -> Run:
             record.r[0, i], record.v[0, i] = r0[i], 0.0
     offset = water_share * first
     spin, angle = frame.omega0, frame.theta0
-    weight = constants.gravity * cosine(angle)
+    weight = constants.gravity * math.cos(angle)
     moment = inertia_about(frame, n, first, second, offset)
     momentum = moment * spin
     theta[0], omega[0], r_cm[0], inertia[0] = angle, spin, middle + offset, moment
     hits, points, escape_step, escape_slice = 0, 1, -1, -1
-    flock, many, _ = dissolved(NO_STEP, y, v, 0, watched)
-    since, steps_left = NO_STEP, 0
+    since, steps_left, many = NO_STEP, 0, 0
+    flock, many = gathered(since, y, v, many, watched, NOTHING, -NOTHING, 0.0)
 
     for k in range(1, len(t)):
         w = spin
@@ -134,19 +134,20 @@ def fly(form, constants, frame, r0, t, dt, record, rebounds) -> Run:
             centre = centre_of_repulsion(form, constants, offset, water_share * speed, weight, w)
             way = step_map(form, constants, fade_minus_1, fade, w, centre, dt)
             if steps_left == 0:
-                bring_up_to_date(since, y, v, many, watched)
                 margin = room_to_turn(way, reach, centre, dt) if form.in_step else 0.0
-                flock, many, steps_left = gathered(form, constants, reach, w, centre, dt, margin, y, v, watched)
+                steps_left, low, high, horizon = room_for(form, constants, reach, w, centre, dt, margin)
+                flock, many = gathered(since, y, v, many, watched, low, high, horizon)
                 since = NO_STEP
             steps_left -= 1
             if form.midpoint:
                 # A step as the exact step would make it predicts the end. Means over the step are then known up to
                 # second order, that of v_CM from the way of C_M, because v_CM itself jumps at an impact.
-                weight = constants.gravity * cosine(angle + 0.5 * dt * w)
+                weight = constants.gravity * math.cos(angle + 0.5 * dt * w)
                 one = Step(way, reach, w, centre, dt, t[k])
                 after, clear = foreseen(form, flock, since, one)
                 if not clear:
-                    flock, many, steps_left = dissolved(since, y, v, many, watched)
+                    steps_left = FEWEST_STEPS
+                    flock, many = gathered(since, y, v, many, watched, NOTHING, -NOTHING, 0.0)
                 seen = predicted(form, constants.restitution, one, watched, many)
                 more = sums_of(flock, after)
                 end_first, end_second = seen[0] + more[0], seen[1] + more[1]
@@ -154,11 +155,12 @@ def fly(form, constants, frame, r0, t, dt, record, rebounds) -> Run:
                 w = 0.5 * (w + momentum / inertia_about(frame, n, end_first, end_second, water_share * end_first))
                 centre = centre_of_repulsion(form, constants, offset + 0.5 * shift, shift / dt, weight, w)
                 way = step_map(form, constants, fade_minus_1, fade, w, centre, dt)
-            weight = constants.gravity * cosine(angle + w * dt)
+            weight = constants.gravity * math.cos(angle + w * dt)
             one = Step(way, reach, w, centre, dt, t[k])
             after, clear = foreseen(form, flock, since, one)
             if not clear:
-                flock, many, steps_left = dissolved(since, y, v, many, watched)
+                steps_left = FEWEST_STEPS
+                flock, many = gathered(since, y, v, many, watched, NOTHING, -NOTHING, 0.0)
             since = after
             if form.in_step:
                 seen = step_in_step(form, constants, one, watched, many, rebounds, hits)

@@ -52,6 +52,9 @@ class Flock(NamedTuple):
 
 EMPTY = Flock(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
+NOTHING = math.inf
+"""Between this and its negative lies no slice: so a flock is dissolved."""
+
 
 @merged
 def followed(first, then):
@@ -117,32 +120,41 @@ def foreseen(form, flock, since, one):
     return after, clear
 
 
-@compiled
-def gathered(form, constants, reach, omega, centre, dt, margin, y, v, watched):
-    """Return a flock of slices that should stay clear of the ends, how many are watched, and for how many steps.
+@merged
+def room_for(form, constants, reach, omega, centre, dt, margin):
+    """Return for how many steps to gather a flock, and ``low``, ``high`` and ``horizon`` of what it may hold.
 
     Where slices will be is only estimated here; ``clear_of_ends`` looks after it at every step.
     """
-    i, near_y, near_v, _, _ = watched
     k_squared = growth_rate_squared(form, constants, omega)
     force = k_squared * (reach + abs(centre))
     lasting = math.sqrt(2.0 * PUSHED * reach / force)
     steps = int(lasting / dt) if lasting < MOST_STEPS * dt else MOST_STEPS
+    if steps < FEWEST_STEPS or form.cosh_sign < 0.0:
+        return MOST_STEPS, NOTHING, -NOTHING, 0.0
     horizon = steps * dt * (1.0 + CLEAR)
     # What cosh(k horizon) is at most, and a tenth more; the centre of repulsion and omega change on the way, for which
     # some room is left. A slice at ``high`` is then carried from the centre to ``room``.
     growth = 1.0 + 0.55 * k_squared * horizon * horizon
     room = (1.0 - SPARE) * reach - margin
-    high = min(room, centre + (room - centre) / growth)
-    low = max(-room, centre - (room + centre) / growth)
-    middle, half_width = 0.5 * (low + high), 0.5 * (high - low)
-    if steps < FEWEST_STEPS or form.cosh_sign < 0.0:
-        steps, half_width = MOST_STEPS, -1.0
+    low, high = max(-room, centre - (room + centre) / growth), min(room, centre + (room - centre) / growth)
+    return steps, low, high, horizon
+
+
+@compiled
+def gathered(since, y, v, many, watched, low, high, horizon):
+    """Bring all slices up to date; return a flock of those between ``low`` and ``high``, and how many are watched."""
+    i, near_y, near_v, _, _ = watched
+    for k in range(len(y) if many < len(y) else 0):
+        y[k], v[k] = moved(since, y[k], v[k])
+    for j in range(many):
+        y[i[j]], v[i[j]] = near_y[j], near_v[j]
     many = 0
     s_y = s_v = s_y_y = s_y_v = s_v_v = 0.0
     for k in range(len(y)):
         y_k, v_k = y[k], v[k]
-        if abs(y_k - middle) <= half_width and abs(y_k + horizon * v_k - middle) <= half_width:
+        ahead = y_k + horizon * v_k
+        if low <= y_k <= high and low <= ahead <= high:
             s_y += y_k
             s_v += v_k
             s_y_y += y_k * y_k
@@ -151,25 +163,4 @@ def gathered(form, constants, reach, omega, centre, dt, margin, y, v, watched):
         else:
             i[many], near_y[many], near_v[many] = k, y_k, v_k
             many += 1
-    return Flock(float(len(y) - many), s_y, s_v, s_y_y, s_y_v, s_v_v, low, high, horizon), many, steps
-
-
-@merged
-def bring_up_to_date(since, y, v, many, watched):
-    """Move all slices by what the flock has done ``since``, then put the watched ones where they are."""
-    i, near_y, near_v, _, _ = watched
-    if many < len(y):
-        for k in range(len(y)):
-            y[k], v[k] = moved(since, y[k], v[k])
-    for j in range(many):
-        y[i[j]], v[i[j]] = near_y[j], near_v[j]
-
-
-@compiled
-def dissolved(since, y, v, many, watched):
-    """Watch all slices; return an empty flock, how many are watched, and after how many steps to gather a new one."""
-    i, near_y, near_v, _, _ = watched
-    bring_up_to_date(since, y, v, many, watched)
-    for k in range(len(y)):
-        i[k], near_y[k], near_v[k] = k, y[k], v[k]
-    return EMPTY, len(y), FEWEST_STEPS
+    return Flock(float(len(y) - many), s_y, s_v, s_y_y, s_y_v, s_v_v, low, high, horizon), many

@@ -106,15 +106,15 @@ def step_in_step(form, constants, one, watched, many, log, count):
         y_new, v_new = moved(one.way, y_j, v_j)
         # A slice that passes an end and comes back within the step leaves no other trace than its reversed velocity.
         if abs(y_new) >= one.reach or v_j * v_new < 0.0:
-            elapsed, hits, end = 0.0, 0, 1
-            while end != 0 and hits < MOST_HITS:
-                end, tau, y_new, v_new = next_hit(form, constants, one, y_j, v_j, y_new, v_new, elapsed, hits)
-                if end != 0:
-                    elapsed += tau
-                    list_rebound(log, count, one.end - one.dt + elapsed, i[j], end, v_new)
-                    count += 1
-                    hits += 1
-                    y_j, v_j = y_new, -constants.restitution * v_new
+            elapsed, end = 0.0, 0
+            for _ in range(MOST_HITS):
+                end, tau, y_new, v_new = next_hit(form, constants, one, y_j, v_j, elapsed)
+                if end == 0:
+                    break
+                elapsed += tau
+                list_rebound(log, count, one.end - one.dt + elapsed, i[j], end, v_new)
+                count += 1
+                y_j, v_j = y_new, -constants.restitution * v_new
             if end != 0:
                 v_new = 0.0
         y[j], v[j] = y_new, v_new
@@ -152,18 +152,6 @@ def at_rest(one, y, v):
     return abs(v) <= REST_SPEED and abs(y) == one.reach and y * (y - one.centre) > 0.0
 
 
-@compiled
-def falls_back(gamma, omega, x, away, left, room):
-    """Return whether a slice that leaves its end with velocity ``away`` > 0 surely is back within ``left``.
-
-    x > 0 is how far the end is from the centre, which drives the slice back. On its hop it is never farther from the
-    end than ``away * left``, nor faster than ``away``: that bounds the force from below, and the time is at most
-    2 ``away`` / force.
-    """
-    force = omega * omega * (x - away * left) - 2.0 * gamma * away
-    return away > 0.0 and away * left < room and 2.0 * away < force * left
-
-
 @merged
 def end_ahead(form, constants, one, y, v, y_end, v_end, left):
     """Return the end (1 base, -1 cap, 0 none) that a slice hits first within ``left``, and a time when it is past it.
@@ -185,24 +173,18 @@ def end_ahead(form, constants, one, y, v, y_end, v_end, left):
 
 
 @merged
-def next_hit(form, constants, one, y, v, y_end, v_end, elapsed, hits):
-    """Return the end that a slice hits next in what is left of a step, or 0; when; and y and v there or at the end.
-
-    ``hits`` counts those before. Without any, ``y_end``, ``v_end`` is where the slice would be if there were no ends.
-    """
-    x = y - one.centre
-    left = one.dt - elapsed
-    k_squared = growth_rate_squared(form, constants, one.omega)
-    end, high, tau = (1 if x > 0.0 else -1), left, left
-    pushed_back = y == end * one.reach and x != 0.0
+def next_hit(form, constants, one, y, v, elapsed):
+    """Return the end that a slice hits next in what is left of a step, or 0; when; and y and v there or at the end."""
+    x, left = y - one.centre, one.dt - elapsed
     if at_rest(one, y, v):
-        end, y_end, v_end = 0, y, 0.0
-    elif not (pushed_back and falls_back(constants.gamma, one.omega, end * x, -end * v, left, 2.0 * one.reach)):
-        if hits > 0:
-            a_minus_1, b, c, d = coefficients_at(form, constants, k_squared, left)
-            y_end, v_end = y + (a_minus_1 * x + b * v), c * x + d * v
-        end, high = end_ahead(form, constants, one, y, v, y_end, v_end, left)
-    if end != 0:
-        tau, v_end = hit(form, constants, one.omega, k_squared, x, v, end * one.reach - y, end, high)
-        y_end = end * one.reach
-    return end, tau, y_end, v_end
+        return 0, left, y, 0.0
+    k_squared = growth_rate_squared(form, constants, one.omega)
+    y_end, v_end = moved(one.way, y, v)
+    if elapsed > 0.0:
+        a_minus_1, b, c, d = coefficients_at(form, constants, k_squared, left)
+        y_end, v_end = y + (a_minus_1 * x + b * v), c * x + d * v
+    end, high = end_ahead(form, constants, one, y, v, y_end, v_end, left)
+    if end == 0:
+        return 0, left, y_end, v_end
+    tau, v_end = hit(form, constants, one.omega, k_squared, x, v, end * one.reach - y, end, high)
+    return end, tau, end * one.reach, v_end

@@ -21,13 +21,6 @@ WIDE = (1440, 900)
 PHONE = (390, 844)
 
 
-def pytest_collection_modifyitems(items):
-    # With the other tests of the same evidence, so that it is gathered once.
-    for item in items:
-        if HERE in Path(item.path).parents:
-            item.add_marker(pytest.mark.xdist_group("evidence"))
-
-
 def unavailable(reason: str) -> None:
     """Skip, or fail where a browser is required."""
     if os.environ.get("FLIPPROOF_BROWSER") == "require":

@@ -3,7 +3,7 @@
 import pytest
 
 
-@pytest.mark.parametrize("size", [(1440, 900), (390, 844)], ids=["wide", "phone"])
+@pytest.mark.parametrize("size", [(1440, 900), pytest.param((390, 844), marks=pytest.mark.slow)], ids=["wide", "phone"])
 def test_tab_reaches_everything_and_shows_where_it_is(visit, size):
     with visit(size) as visited:
         visited.page.locator(".unfold").click()

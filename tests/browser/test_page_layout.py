@@ -1,9 +1,13 @@
 """Nothing overflows, nothing overlaps: on a desk, on a phone, in the dark, on paper."""
 
+import io
 import re
 
+import numpy as np
 import pytest
+from PIL import Image
 
+from flipproof.page.inline import LETTERS, SIZE
 from flipproof.page.pdf import print_page
 
 PAPER = (695, 1013)
@@ -38,16 +42,43 @@ def test_no_text_is_cut_off(opened):
     assert opened.probe("cut") == []
 
 
-def test_the_dark_page_is_dark_and_its_figures_lie_on_paper(visit):
-    def brightness(visited, selector):
-        colour = visited.page.evaluate(f"getComputedStyle(document.querySelector('{selector}')).backgroundColor")
-        return sum(float(part) for part in re.findall(r"[\d.]+", colour)[:3]) / 3
+def brightness(picture):
+    """Return the mean and the largest brightness of a picture, 0 to 255."""
+    grey = np.asarray(Image.open(io.BytesIO(picture)).convert("L"))
+    return float(grey.mean()), int(grey.max())
 
+
+def test_figures_are_dark_in_the_dark_and_light_on_paper(visit):
     with visit(scheme="dark") as visited:
-        assert brightness(visited, "body") < 40
-        assert brightness(visited, ".plate") > 200
-    with visit(scheme="light") as visited:
-        assert brightness(visited, "body") > 240
+        visited.page.evaluate("location.hash = '#figure-slices'")
+        visited.page.wait_for_function("() => document.querySelector('#flights > details').open")
+        body = visited.page.evaluate("getComputedStyle(document.body).backgroundColor")
+        assert max(map(int, re.findall(r"\d+", body))) < 40
+        mean, largest = brightness(visited.page.locator("#figure-slices .plate").screenshot())
+        assert mean < 60
+        assert largest > 180
+        visited.page.emulate_media(media="print", color_scheme="dark")
+        assert brightness(visited.page.locator("#figure-slices .plate").screenshot())[0] > 200
+    with visit(fragment="#figure-slices") as visited:
+        assert brightness(visited.page.locator("#figure-slices .plate").screenshot())[0] > 200
+
+
+def test_letters_of_figures_can_be_read_on_a_phone(visit, report):
+    """As wide as its smallest letters need, a figure scrolls inside its own plate."""
+    with visit((390, 844)) as visited:
+        visited.page.evaluate("document.querySelectorAll('details').forEach(details => { details.open = true; })")
+        widths = dict(
+            visited.page.evaluate(
+                "[...document.querySelectorAll('figure[id] img')].map(image => "
+                "[image.closest('figure').id.slice(7), image.clientWidth])"
+            )
+        )
+    for exhibit in report.exhibits:
+        if exhibit.touch is not None and not exhibit.touch.beside:
+            continue  # drawn anew at the width that there is
+        width, _ = (float(side) for side in SIZE.search(exhibit.drawing.svg).groups())
+        letters = [100.0 * float(scale) for scale in LETTERS.findall(exhibit.drawing.svg)]
+        assert min(letters) * widths[exhibit.name] / width >= 8.99, exhibit.name
 
 
 def test_on_a_phone_the_contents_fold_into_a_bar_that_stays(visit):

@@ -97,6 +97,10 @@ def test_the_equations_in_the_browser_are_those_of_the_reference(solved, name, m
         assert difference < ADMISSIBLE[model] or difference <= band(scenario, model, expected), (thrown, difference)
 
 
+def test_solvers_and_sliders_can_be_read_in_one_sitting():
+    assert sum(str(read_assets()[name]).count("\n") for name in ("live.js", "sliders.js")) <= 250
+
+
 def test_a_wrong_sign_in_the_script_is_seen(browser):
     """The comparison has teeth: a script whose weight points the wrong way is not within the band."""
     page = browser.new_page()

@@ -5,10 +5,25 @@ import pytest
 POSITIONS = "Object.values(flipproofMotion.positions()).map(bottle => bottle.pixel)"
 
 
-@pytest.fixture
-def player(visit):
+@pytest.fixture(scope="module")
+def opened(visit):
     with visit(fragment="#motion") as visited:
         yield Player(visited)
+
+
+@pytest.fixture
+def player(opened):
+    """The player as it stands when the page opens."""
+    if opened.playing:
+        opened.find("play").click()
+    if opened.view == "bottle":
+        opened.focus()
+        opened.page.keyboard.press("v")
+    opened.find("rate").select_option("9.6")
+    for bottle in opened.page.locator("[data-testid^=motion-solver-]").all():
+        bottle.check()
+    opened.find("scrub").fill("0")
+    return opened
 
 
 class Player:
@@ -25,6 +40,10 @@ class Player:
     @property
     def playing(self):
         return self.page.get_by_test_id("motion").get_attribute("data-playing") == "true"
+
+    @property
+    def view(self):
+        return self.page.get_by_test_id("motion").get_attribute("data-view")
 
     @property
     def positions(self):
@@ -144,7 +163,7 @@ def test_the_keyboard_alone_works_the_player(player):
     assert landing > second
     before = player.picture
     press("v")
-    assert player.page.get_by_test_id("motion").get_attribute("data-view") == "bottle"
+    assert player.view == "bottle"
     assert player.picture != before
     press("Home")
     assert player.time == 0.0

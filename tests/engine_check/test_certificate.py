@@ -11,7 +11,7 @@ import pytest
 import engine_check
 import ode_reference
 from engine_check import DEFAULT_DT, ENGINES, certificate, certify, engine_pymunk, measure_restitution
-from engine_check.refinement import BENT, COARSEST, DOUBLE, EARLIER, ITERATED, coarsest_step
+from engine_check.refinement import BENT, COARSEST, DOUBLE, EARLIER, ITERATED, Runs, coarsest_step
 from engine_check.witness import WITNESSES, witness_of
 from slicemodel.scenario import Bottle, Scenario
 from slicemodel.trajectory import output_times
@@ -153,6 +153,7 @@ def test_impacts_that_share_a_step_are_not_certified_away():
     assert "moves omega" in found.reason
 
 
+@pytest.mark.slow
 def test_located_hits_put_those_impacts_in_order_and_are_certified():
     """On the grid this throw is certified at 7.8e-6 s and off by 1e-2 omega_0."""
     dry = replace(Scenario(restitution=0.35).with_slices(20), drag=0.0)
@@ -174,6 +175,13 @@ def test_an_exchange_of_impacts_that_half_the_step_does_not_show_is_seen_by_anot
     assert half < 0.6 * np.max(error)
     assert np.max(error) <= 3e-3
     assert np.mean(error <= found.band + band) >= 0.95
+
+
+def test_a_change_that_is_not_a_number_is_not_below_the_tolerance(monkeypatch):
+    monkeypatch.setattr(Runs, "apart", lambda *_: np.array([math.nan]))
+    found = certify(SHORT, times=[0.0, 0.02], levels=1)
+    assert found.status == "not-converged"
+    assert "moves omega by nan" in found.reason
 
 
 def test_a_change_that_vanishes_faster_than_any_order_is_not_trusted():

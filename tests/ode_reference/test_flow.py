@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import pairwise
@@ -23,7 +26,8 @@ FULL = replace(Scenario(water_mass=1.0).with_slices(20), drag=0.0)
 
 
 def record_of(scenario, switches, free, on_base, on_cap):
-    now, _ = layout.prepare(scenario, switches, 1e-5, sequential=False, ledger=False)
+    flight, *_ = layout.prepare(scenario, switches, {"rest_speed": 1e-5, "impact_law": "", "energy": False})
+    now = flight[0]
     now.free, now.on_base, now.on_cap = free, on_base, on_cap
     layout.set_body(now)
     return now
@@ -96,7 +100,7 @@ def test_a_full_bottle_in_free_flight_stays_mirror_symmetric(n, e, gamma):
 
 
 def test_no_loss_and_no_drag_keep_the_energy_over_many_impacts():
-    scenario = replace(Scenario(water_mass=1.0, duration=2.0).with_slices(100), drag=0.0, restitution=1.0)
+    scenario = replace(Scenario(water_mass=0.98, duration=2.0).with_slices(100), drag=0.0, restitution=1.0)
     found = solve(scenario, "free-flight", [2.0], rest_speed=1e-8, energy=True)
     ledger = found.diagnostics["energy"]
     assert len(found.impacts) > 1500
@@ -196,6 +200,20 @@ def test_water_that_nothing_pushes_stays_where_it_is(switches, omega0):
         assert found.r == pytest.approx(np.tile(scenario.initial_positions(), (11, 1)), abs=1e-12)
 
 
+@pytest.mark.parametrize("change", np.linspace(-1e-13, 1e-13, 5))
+def test_a_slice_that_stands_on_an_end_is_struck_by_it(change):
+    """k^2 < 0 and e = 0 with recoil: slices stand unpressed on both ends, and the tube throws these at them."""
+    scenario = Scenario(
+        bottle=Bottle(mass=0.028), water_mass=0.565, n_slices=70, drag=0.0517, restitution=0.0,
+        omega0=13.06 * (1 + change), theta0=0.0534, duration=0.35,
+    )  # fmt: skip
+    found = solve(scenario, "switches:000111")
+    assert found.ok, found.message
+    assert found.diagnostics["opposite_hits"] > 10
+    assert found.diagnostics["largest_snap"] < 1e-14
+    assert abs(found.r - scenario.bottle.length / 2).max() <= scenario.r_max - scenario.bottle.length / 2 + 1e-15
+
+
 @pytest.mark.parametrize("share", [1 - 1e-9, 1 + 1e-9, 1 - 1e-14, 1 + 1e-14])
 @pytest.mark.parametrize("name", ["switches:100110", "switches:101011"])
 def test_water_that_is_hardly_pushed_does_not_stall(share, name):
@@ -222,14 +240,28 @@ def test_a_flight_in_which_time_stops_passing_is_stalled(monkeypatch):
     ("status", "words"),
     [(layout.WRONSKIAN, "A B' - A' B"), (layout.INERTIA, "J of the moments"), (layout.ESCAPED, "outside the bottle")],
 )
-def test_a_broken_check_is_a_status_that_says_which(status, words):
-    ask = api.Ask(model="eq8", switches=MODELS["eq8"].switches, rest_speed=1e-5)
-    flown = api.fly(HALF, np.array([0.1]), ask)
-    flown.record["status"] = status
-    found = api.trajectory(flown)
-    assert found.status == "diverged"
-    assert words in found.message
-    assert "eq8" in found.message
+def test_a_broken_check_says_which(status, words):
+    flight, *_ = layout.prepare(HALF, MODELS["eq8"].switches, {"rest_speed": 1e-5, "impact_law": "", "energy": False})
+    flight[0].status = status
+    found = api.message(flight[0], HALF, "eq8", solve(HALF).impacts)
+    assert words in found
+    assert "eq8" in found
+
+
+@pytest.mark.parametrize("admissible", [-1.0, 1e-20])
+def test_a_broken_check_is_a_status(admissible):
+    """The program says what no flight keeps to: its checks are at rounding, not at nothing."""
+    code = (
+        "from ode_reference.flow import points\n"
+        f"points.ADMISSIBLE = {admissible}\n"
+        "from ode_reference import solve; from slicemodel.scenario import Scenario\n"
+        "run = solve(Scenario(n_slices=3)); assert run.message.startswith('eq8: '); print(run.status, len(run.t))"
+    )
+    settings = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run([sys.executable, "-c", code], env=settings, capture_output=True, text=True, check=True)
+    status, reached = done.stdout.split()
+    assert status == "diverged"
+    assert int(reached) < 1000
 
 
 def test_its_own_checks_are_at_rounding():

@@ -85,6 +85,14 @@ def test_a_release_and_a_rest_have_the_same_times(agreement):
         assert mine.diagnostics["releases"] > 0
 
 
+def test_a_slice_that_hops_within_one_step_has_the_same_impacts(agreement):
+    """Its end ceases to press at 0.275 s, for less than a step of the witness; then it hops 47 times."""
+    scenario = Scenario(water_mass=0.25, n_slices=5, drag=1.0, restitution=0.9, theta0=-1.1)
+    mine = assert_agree(agreement, agreement.Case(scenario, "published-limit"))
+    assert len(mine.impacts) == 51
+    assert mine.diagnostics["releases"] == 2
+
+
 def test_random_throws_have_the_same_impacts(agreement):
     rng = np.random.default_rng(20)
     calm = 0

@@ -30,16 +30,16 @@ from ode_reference import solve
 from ode_reference.flow import contacts, layout, loop, points, search
 from slicemodel.scenario import Scenario
 
-def nothing(*arguments):
-    return None
-
 def group_that_stays():
     '''An end that no longer presses keeps its slices.'''
-    search.note_release = nothing
+    search.release = lambda *arguments: search.NONE
 
 def released_and_not_watched():
     '''A released slice is missing from the watch list.'''
-    contacts.watch = nothing
+    def let_go(now, marks, i):
+        marks[layout.SIDE, i] = 0
+        now.releases += 1
+    contacts.let_go = let_go
 
 def stale_moment():
     '''P is not updated when a slice enters.'''
@@ -60,9 +60,12 @@ def miscounted_centre():
 
 def straight_lines():
     '''The search bounds leave out the terms beyond the straight line.'''
-    def sum_rests(now, table):
+    right = loop.expand
+    def expand(now, *arguments):
+        ended = right(now, *arguments)
         now.rest_A = now.rest_B = now.rest_z = 0.0
-    loop.sum_rests = sum_rests
+        return ended
+    loop.expand = expand
 
 def none():
     pass

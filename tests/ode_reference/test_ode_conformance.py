@@ -83,6 +83,7 @@ def test_a_slice_as_long_as_the_bottle_cannot_move(model):
     assert np.ptp(found.omega) == 0.0
 
 
+@pytest.mark.parametrize("watch", [500, pytest.param(5000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("method", ["taylor", "DOP853"])
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize(
@@ -97,8 +98,8 @@ def test_a_slice_as_long_as_the_bottle_cannot_move(model):
     ],
     ids=["omega0", "drag", "gravity", "length", "slow", "short"],
 )
-def test_extreme_scenarios_end_with_a_status_and_finite_numbers(model, scenario, method, monkeypatch):
-    monkeypatch.setattr(ode_reference.witness, "WATCH", 5000)
+def test_extreme_scenarios_end_with_a_status_and_finite_numbers(model, scenario, method, watch, monkeypatch):
+    monkeypatch.setattr(ode_reference.witness, "WATCH", watch)
     times = np.linspace(0, 1, 5) * scenario.duration if scenario.duration > 1e-9 else None
     found = solve(scenario, model, times, method=method)
     assert found.status in ("ok", "overflow", "stalled")

@@ -44,6 +44,19 @@ def test_ledger_closes_and_agrees_with_the_energy_by_definition(model, law):
         assert ledger["drag"] < 0.0
 
 
+@pytest.mark.parametrize("model", LADDER)
+def test_the_witness_keeps_the_same_books(model):
+    """Its ledger is integrated by Gauss's rule over the steps of DOP853, the flow's is summed from its series."""
+    scenario = Scenario(duration=0.2).with_slices(6)
+    flow, witness = (
+        solve(scenario, model, energy=True, **how).diagnostics["energy"]
+        for how in ({}, {"method": "DOP853", "rtol": 1e-11, "atol": 1e-13})
+    )
+    assert abs(witness["residual"]) < 1e-9 * witness["initial"]
+    for entry in set(flow) - {"residual"}:
+        assert witness[entry] == pytest.approx(flow[entry], rel=0.0, abs=1e-7 * flow["initial"]), entry
+
+
 def test_what_the_ladder_mends_is_what_the_ledger_no_longer_books():
     scenario = Scenario(duration=0.3).with_slices(20)
     wrong = {"weight", "negative_spring", "missing_origin", "missing_recoil"}

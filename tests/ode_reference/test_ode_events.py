@@ -139,6 +139,23 @@ def test_release_is_located_where_the_end_no_longer_presses():
     assert (short.t, short.counts["releases"]) == (0.36, 0)
 
 
+@pytest.mark.parametrize("parts", [1, 2, 3, 7])
+@pytest.mark.parametrize("middle", [0.1, 0.35, 0.5, 0.77])
+def test_push_that_vanishes_within_one_step_and_comes_back_is_found(middle, parts):
+    def flight(least):  # a = (t - middle)^2 + least
+        flight = flight_of(
+            [0.9, 0.0, (middle**2 + least) / 2, -middle / 3, 1 / 12], stop=1.0, parts=parts, on_base=True
+        )
+        flight._leg()
+        return flight
+
+    released = flight(-0.0025)
+    assert released.t == pytest.approx(middle - 0.05, abs=BLUR)
+    assert released.counts["releases"] == 1
+    pressed = flight(+0.0025)
+    assert (pressed.t, pressed.counts["releases"]) == (1.0, 0)
+
+
 def test_only_what_approaches_strikes():
     ends = Ends(0.1, 0.9, 1e-14)
     r = np.array([0.9, 0.9, 0.9, 0.1, 0.1, 0.1, 0.5, 0.9])

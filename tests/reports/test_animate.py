@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_up import trajectory_of
 from PIL import Image
 
 from flipproof.animate import HOLD, FilmError, check_target, film_of, frame_durations, plan_film, write_film
 from flipproof.cli.animate import add_animate, chosen_solvers
 from flipproof.figures.film import draw_frames, outline, slice_corners
 from flipproof.page.motion import FLOWN
-from slicemodel import Scenario, Trajectory
+from slicemodel import Scenario
 
 THROW = Scenario().with_slices(4)
 
@@ -21,18 +22,8 @@ THROW = Scenario().with_slices(4)
 def flown(name="eq8", end=THROW.duration, turning=True):
     t = np.linspace(0.0, end, 50)
     r = np.tile(THROW.initial_positions(), (50, 1))
-    return Trajectory(
-        scenario=THROW,
-        solver="made-up",
-        method=name,
-        t=t,
-        theta=THROW.theta0 + (9.0 * t if turning else 0.0 * t),
-        omega=np.full(50, 9.0),
-        r=r,
-        v=np.zeros_like(r),
-        r_cm=np.full(50, 0.2),
-        inertia=np.ones(50),
-    )
+    theta = THROW.theta0 + (9.0 * t if turning else 0.0)
+    return trajectory_of(THROW, t, method=name, theta=theta, omega=9.0, r=r, r_cm=0.2)
 
 
 def film(frames=3, runs=None, fps=25):

@@ -18,7 +18,6 @@ from flipproof.frame.solvers import make as really_make
 from flipproof.output.summary import summary_text
 from slicemodel import Scenario
 
-pytestmark = pytest.mark.xdist_group("check")
 THROW = Scenario(n_slices=6, drag=0.8, duration=0.2)
 
 

@@ -1,19 +1,15 @@
 """The command line as people meet it: help, results, and one line for every mistake."""
 
 import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
+from made_up import command as run
 
 from flipproof.cli import main as cli
-
-
-def run(capsys, *arguments):
-    try:
-        status = cli.main(arguments)
-    except SystemExit as end:
-        status = end.code
-    out, err = capsys.readouterr()
-    return status, out, err
 
 
 def test_help_reads_like_a_manual(capsys):
@@ -108,3 +104,46 @@ def test_a_wrong_argument_is_told_in_one_line(arguments, capsys):
     assert (ended.value.code, out) == (2, "")
     assert err.startswith("flipproof: error: ")
     assert err.count("\n") == 1
+
+
+def test_no_command_writes_over_what_it_reads(capsys, tmp_path):
+    throw, curve = tmp_path / "throw.toml", tmp_path / "curve.csv"
+    throw.write_text("[scenario]\nn_slices = 3\n")
+    curve.write_text("t,omega\n0,20\n0.1,10\n")
+    link = tmp_path / "link.csv"
+    link.symlink_to(curve)
+    before = throw.read_text(), curve.read_text()
+    for option, arguments in (
+        ("--out", ("simulate", throw, "--out", throw)),
+        ("--out", ("simulate", "--solver", f"csv:{curve}", "--out", curve)),
+        ("--json", ("compare", curve, "eq8", "--json", link)),
+        ("--json", ("check", throw, "--only", "ice", "--json", throw)),
+        ("--out", ("export", throw, "--solver", "eq8", "--out", throw)),
+    ):
+        status, _, err = run(capsys, *map(str, arguments))
+        assert status == 2
+        assert re.fullmatch(rf"flipproof: error: {option} .* is a file that this command reads; name another\n", err)
+    assert (throw.read_text(), curve.read_text()) == before
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a shell that closes and feeds descriptors")
+def test_closed_output_a_full_disk_a_removed_folder_and_a_pipe(tmp_path):
+    def shell(command):
+        flipproof = f"{shlex.quote(sys.executable)} -m flipproof"
+        ran = subprocess.run(
+            ["bash", "-c", command.replace("flipproof", flipproof)], cwd=tmp_path, capture_output=True, text=True
+        )
+        return ran.returncode, ran.stdout, ran.stderr
+
+    (tmp_path / "throw.toml").write_text("[scenario]\nn_slices = 3\n")
+    assert shell("flipproof simulate throw.toml --steps 5 >&-") == (0, "", "")
+    if Path("/dev/full").exists():
+        status, _, err = shell("flipproof simulate throw.toml --steps 5 > /dev/full")
+        assert (status, err.count("\n")) == (2, 1)
+        assert "standard output or a file cannot be read or written (No space left on device)" in err
+    status, _, err = shell("mkdir gone && cd gone && rmdir ../gone && flipproof simulate ../throw.toml --out x.csv")
+    assert (status, err) == (2, "flipproof: error: the current folder has been removed; go to another\n")
+    one = "<(flipproof simulate throw.toml --solver eq8)"
+    status, out, err = shell(f"flipproof compare {one} {one}")
+    assert (status, err) == (0, "")
+    assert "apart: never" in out

@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from flipproof.chapters.engine_facts import worlds
-from flipproof.chapters.engine_facts.chapter import claim_engine_fact, draw_gallery
+from flipproof.chapters.engine_facts.chapter import draw_gallery
 from flipproof.chapters.engine_facts.figure import figure_gallery
-from flipproof.chapters.engine_facts.study import plan_engine_facts, study_engine_facts
+from flipproof.chapters.engine_facts.study import FACTS, plan_engine_facts
 from flipproof.frame.solvers import Made, make
 from slicemodel import Scenario
 
@@ -25,9 +25,13 @@ def made():
     return {words: make(run) for words, run in plan_engine_facts(Scenario()).items()}
 
 
+def measured(made):
+    return {fact.id: fact.found(made) for fact in FACTS}
+
+
 @pytest.fixture(scope="module")
 def facts(made):
-    return {fact.id: fact for fact in study_engine_facts(made)}
+    return measured(made)
 
 
 def test_the_plan_has_different_runs_and_explicit_steps():
@@ -39,17 +43,15 @@ def test_the_plan_has_different_runs_and_explicit_steps():
 
 @pytest.mark.parametrize("name", PYMUNK)
 def test_every_fact_about_pymunk_holds(facts, name):
-    fact = facts[name]
-    assert fact.holds, fact
-    assert claim_engine_fact(fact).verdict == "pass"
-    assert fact.note
+    assert facts[name].verdict == "pass", facts[name]
+    assert facts[name].note
 
 
 @pytest.mark.parametrize("name", MUJOCO)
 def test_every_fact_about_mujoco_holds_or_says_that_it_is_not_installed(facts, name):
     fact = facts[name]
-    assert fact.holds or (fact.absent and "not installed" in fact.note), fact
-    assert not claim_engine_fact(fact).failed
+    assert fact.verdict == "pass" or (fact.verdict == "not evaluated" and "not installed" in fact.note), fact
+    assert not fact.failed
 
 
 def test_there_is_no_other_fact(facts):
@@ -58,9 +60,7 @@ def test_there_is_no_other_fact(facts):
 
 def test_an_engine_that_is_missing_is_not_evaluated_and_no_failure(made, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    missing = {fact.id: fact for fact in study_engine_facts(made)}["mujoco-limit"]
-    assert (missing.value, missing.holds, missing.absent) == (None, None, True)
-    finding = claim_engine_fact(missing)
+    finding = measured(made)["mujoco-limit"]
     assert (finding.verdict, finding.failed) == ("not evaluated", False)
     assert "not installed" in finding.note
 
@@ -69,20 +69,19 @@ def test_a_fact_whose_run_is_missing_or_stopped_fails(made):
     broken = dict(made)
     usual = made["usual"]
     broken["usual"] = Made(usual.run, None, 0.0, "MemoryError: too much")
-    fact = study_engine_facts(broken)[0]
-    assert (fact.id, fact.value, fact.absent) == ("gravity", None, False)
-    assert "MemoryError" in fact.note
-    assert claim_engine_fact(fact).failed
+    finding = measured(broken)["gravity"]
+    assert (finding.id, finding.value, finding.failed) == ("engine-fact-gravity", None, True)
+    assert "MemoryError" in finding.note
     stopped = replace(usual.trajectory, status="diverged", message="diverged: joints")
-    assert study_engine_facts(made | {"usual": replace(usual, trajectory=stopped)})[0].value is None
+    assert measured(made | {"usual": replace(usual, trajectory=stopped)})["gravity"].value is None
     # A run that was to explode and did not is no evidence that it explodes sooner.
     calm = {words: replace(usual, run=m.run) if "few" in words else m for words, m in made.items()}
-    assert study_engine_facts(calm)[1].value is None
+    assert measured(calm)["smaller-step"].value is None
 
 
 def test_a_number_outside_its_interval_and_nan_fail(facts):
     for value in (facts["stagger"].value * -1, math.nan):
-        finding = claim_engine_fact(replace(facts["stagger"], value=value))
+        finding = replace(facts["stagger"], value=value)
         assert finding.verdict == "fail"
 
 
@@ -105,11 +104,14 @@ def test_without_slop_nothing_stays_sunk():
 
 
 def test_the_gallery_has_fact_number_threshold_and_sign(facts):
-    chosen = [facts["gravity"], replace(facts["stagger"], value=-0.5), replace(facts["mujoco-limit"], value=None)]
-    findings = [claim_engine_fact(fact) for fact in chosen]
-    texts = [text.get_text() for text in figure_gallery(findings, [f.engine for f in chosen]).axes[0].texts]
+    changed = facts | {
+        "stagger": replace(facts["stagger"], value=-0.5),
+        "mujoco-limit": replace(facts["mujoco-limit"], value=None),
+    }
+    findings = [changed[fact.id] for fact in FACTS]
+    texts = [text.get_text() for text in figure_gallery(findings, [f.engine for f in FACTS]).axes[0].texts]
     assert {"engine", "fact", "number", "threshold", "✓", "✗", "–", "≤ 1e-09", "-0.500 steps"} <= set(texts)
-    exhibit = draw_gallery(chosen)
-    assert "1 of 3" in exhibit.caption
+    exhibit = draw_gallery(findings)
+    assert "10 of 12" in exhibit.caption
     assert "-0.500 steps, threshold 0.49 to 0.51, fail" in exhibit.alt
     assert exhibit.drawing.svg.startswith("<?xml")

@@ -11,11 +11,11 @@ import pytest
 import ode_reference
 from flipproof.cli.fit import add_fit
 from flipproof.film.fit.compare import compare, promise, told, verdict
-from flipproof.film.fit.estimate import estimate, scan
+from flipproof.film.fit.estimate import Effort, estimate, scan
 from flipproof.film.fit.landscape import HUBER, Landscape, loss
 from flipproof.film.fit.problem import ALWAYS, FAR, Measurement, Problem, first_frames, noise_of, pose, predict
 from flipproof.film.fit.reading import Averaged, read_flight
-from flipproof.film.fit.sampling import Effort, Points, cool, roughness
+from flipproof.film.fit.region import Points, explored, roughness
 from flipproof.film.fit.temperature import autocovariance, temperature
 from flipproof.film.fit.twins import film
 from flipproof.film.fit.uncertainty import correlation, intervals
@@ -23,7 +23,7 @@ from flipproof.film.tracker.kinematics import angle
 from slicemodel import Scenario
 
 CUT = Scenario().with_slices(20)
-LIGHT = Effort(drags=6, restitutions=4, starts=2, points=60, moves=1, keep=6)
+LIGHT = Effort(starts=2, points=150)
 SIGMA = 1e-3 * math.sqrt(2) / CUT.bottle.length
 
 
@@ -126,7 +126,7 @@ def test_difference_quotients_are_exact_on_a_plane_and_at_its_bounds():
     problem = plane()
     land = Landscape(problem)
     for x in (np.array([0.0, 1.0]), problem.bounds()[0], problem.bounds()[1]):
-        found = land.jacobian(x, problem.coarse_steps(), np.array([0, 1]))
+        found = land.jacobian(x, problem.coarse_steps())
         assert found == pytest.approx(-problem.slopes, abs=1e-9)
 
 
@@ -135,7 +135,7 @@ def test_on_a_plane_estimate_and_intervals_are_those_of_the_textbook(seed):
     problem = plane(seed=seed)
     exact = np.linalg.lstsq(problem.slopes, problem.measured.values, rcond=None)[0]
     covariance = np.linalg.inv(problem.slopes.T @ problem.slopes)
-    found = estimate(problem, Effort(points=200))
+    found = estimate(problem)
     # A few residuals lie beyond Huber's three deviations.
     assert found.x == pytest.approx(exact, abs=0.15 * np.sqrt(covariance.diagonal()).min())
     assert found.roughness == pytest.approx(1.0, abs=0.05)
@@ -148,24 +148,48 @@ def test_on_a_plane_estimate_and_intervals_are_those_of_the_textbook(seed):
     assert pairs[0, 1] == pytest.approx(covariance[0, 1] / math.sqrt(covariance[0, 0] * covariance[1, 1]), abs=0.1)
 
 
-def test_a_population_has_the_spread_of_its_temperature():
+def test_an_interval_is_wider_by_the_root_of_the_roughness():
+    found = estimate(plane(), LIGHT)
+    smooth = replace(found, roughness=1.0, reach=np.array([found.x, found.x]))
+    for one, other in zip(intervals(smooth), intervals(replace(smooth, roughness=4.0)), strict=True):
+        assert other.high - other.low == pytest.approx(2.0 * (one.high - one.low), rel=1e-9, abs=0.0)
+
+
+def seeds(land):
+    return Points.flown(land, scan(land))
+
+
+@pytest.mark.parametrize("temperature_", [1.0, 9.0])
+def test_what_is_drawn_from_a_region_has_the_spread_of_its_temperature(temperature_):
     problem = plane()
     land = Landscape(problem)
-    seeds = Points.flown(land, scan(land, Effort()))
     spread = np.sqrt(np.linalg.inv(problem.slopes.T @ problem.slopes).diagonal())
-    for temperature_ in (1.0, 9.0):
-        cloud = cool(land, seeds, temperature_, Effort(points=200, keep=12), seed=1)
-        assert cloud.likely.x.std(axis=0) == pytest.approx(math.sqrt(temperature_) * spread, rel=0.15, abs=0.0)
-        assert 0.1 < cloud.accepted < 0.7
+    region = explored(land, seeds(land), 15.0 * temperature_, 400)
+    assert region.chi2.max() <= region.chi2.min() + 15.0 * temperature_
+    drawn = region.x[region.drawn(temperature_, 2000)]
+    assert drawn.std(axis=0) == pytest.approx(math.sqrt(temperature_) * spread, rel=0.1, abs=0.0)
+
+
+@pytest.mark.parametrize("shift", [0.0, 12.0])
+def test_a_region_of_two_parts_is_filled_in_both(shift):
+    class Valleys(Landscape):
+        def residuals(self, points):
+            first, second = points[:, :1], points[:, :1] - shift
+            deep = np.where(np.abs(first) < np.abs(second), first, second)
+            return np.column_stack((deep, points[:, 1:]))
+
+    land = Valleys(plane())
+    region = explored(land, seeds(land), 15.0, 400)
+    assert (np.abs(region.x[:, 0]) < 4.0).sum() == pytest.approx(len(region.x) / (2 if shift else 1), rel=0.1, abs=0.0)
 
 
 def test_folds_in_a_landscape_are_noticed():
-    clouds = []
-    for folds in (0.0, 0.25):
+    regions = []
+    for folds in (0.0, 0.5):
         land = Landscape(plane(folds))
-        clouds.append(cool(land, Points.flown(land, scan(land, Effort())), 1.0, Effort(), seed=1))
-    assert roughness(clouds[0], 1.0, seed=0) < 1.02
-    assert roughness(clouds[1], 1.0, seed=0) > 1.05
+        regions.append(explored(land, seeds(land), 15.0, 400))
+    assert roughness(regions[0], 1.0, seed=0) < 1.02
+    assert roughness(regions[1], 1.0, seed=0) > 1.1
 
 
 def test_shared_noise_widens_and_independent_noise_does_not():

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flipproof.chapters.frozen.figure import figure_frozen
-from flipproof.chapters.frozen.study import LIMITS, QUANTITIES, plan_frozen, study_frozen
+from flipproof.chapters.frozen.figure import WINDOWS, envelope, figure_frozen
+from flipproof.chapters.frozen.study import FREEZING, QUANTITIES, plan_frozen, study_frozen
+from flipproof.chapters.solvers import LIMITS
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import make
 from slicemodel import Bottle, Scenario
@@ -25,9 +26,9 @@ def study():
 
 
 def test_plans_a_full_run_and_its_own_equation_at_the_same_times():
-    for scheme, model in LIMITS.items():
+    for scheme in FREEZING:
         run, reference = plan_frozen(THROW, scheme, 101)
-        assert (run.solver, run.settings["store"], reference.solver) == (scheme, "full", model)
+        assert (run.solver, run.settings["store"], reference.solver) == (scheme, "full", LIMITS[scheme])
         assert len(reference.settings["times"]) == run.settings["steps"]
         assert run.label != reference.label
 
@@ -100,6 +101,18 @@ def test_what_cannot_be_studied_is_refused():
 def test_the_figure_says_which_quantity_leads(study):
     figure = figure_frozen(study)
     labels = [text.get_text() for axes in figure.axes for text in axes.get_legend().get_texts()]
-    assert any("leads" in label for label in labels)
+    assert any("largest in" in label and "of the steps" in label for label in labels)
     assert figure.axes[-1].get_xlabel() == "time t [s]"
     assert draw(figure).svg.startswith("<?xml")
+
+
+def test_the_envelope_holds_every_value_and_leaves_a_gap_where_there_is_none():
+    t = np.linspace(0.0, 1.0, 250)
+    values = np.abs(np.sin(40.0 * t))
+    values[:25] = 0.0
+    middle, least, most = envelope(t, values)
+    assert len(middle) == WINDOWS
+    assert np.isnan(least[:8]).all()
+    for moment, value in zip(t[25:], values[25:], strict=True):
+        k = int(np.abs(middle - moment).argmin())
+        assert np.nanmin(least[max(0, k - 1) : k + 2]) <= value <= np.nanmax(most[max(0, k - 1) : k + 2])

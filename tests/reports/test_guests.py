@@ -14,17 +14,24 @@ from flipproof.build import ask_of
 from flipproof.chapters import chapters_named
 from flipproof.chapters.guests.claims import claim_guests
 from flipproof.chapters.guests.figures import draw_guests
+from flipproof.chapters.guests.split import FREE, split, switches_made
 from flipproof.chapters.guests.study import SPARSE, Guests, energy_of, received, study_guests, visit
+from flipproof.chapters.waterfall.study import equation_run
 from flipproof.cli import main as cli
 from flipproof.foreign import certify as suite
+from flipproof.foreign.content import content_of
+from flipproof.foreign.contract import Traits
 from flipproof.foreign.specs import load
 from flipproof.frame.exhibit import drawn
 from flipproof.frame.flights import Call, Flights
 from flipproof.frame.gather import gather, tell
 from flipproof.frame.pool import Here, make_all, workers
-from flipproof.frame.solvers import solve
+from flipproof.frame.solvers import Made, Missing, solve
 from flipproof.frame.store import RunStore
+from flipproof.output.summary import summary_text
+from ode_reference.models import MODELS
 from slicemodel import Scenario
+from slicemodel.observables import plateau
 
 ROOT = Path(__file__).resolve().parents[2]
 RK4 = f"{ROOT / 'examples' / 'foreign' / 'rk4.py'}:Eq8"
@@ -173,3 +180,90 @@ def die():
 def test_a_spec_that_names_nothing_is_refused_before_the_work(capsys, tmp_path, arguments, said):
     assert cli.main(["report", "--out", str(tmp_path / "r"), *arguments]) == 2
     assert said in capsys.readouterr().err
+
+
+def checked(tmp_path, *arguments):
+    (tmp_path / "throw.toml").write_text(THROW.to_toml())
+    command = ["check", tmp_path / "throw.toml", "--only", "ice", "--no-cache", *arguments]
+    return cli.main([str(argument) for argument in command])
+
+
+def test_check_certifies_guests_too_and_fails_with_them(tmp_path, capsys):
+    shutil.copy(HOSTILE, tmp_path)
+    assert checked(tmp_path, "--with", RK4) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-3:-1] == [f"PASS  guest-naive-rk4-certify-{name}: 1; threshold 1 to 1" for name in ("shape", "ice")]
+    bad = f"{tmp_path / 'hostile.py'}:raises"
+    assert checked(tmp_path, "--with", RK4, "--with", bad, "--timeout", "5") == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert any(one.startswith("PASS  guest-naive-rk4-") for one in lines)
+    failed = [one for one in lines if one.startswith("FAIL  guest-")]
+    assert all(any(f"-certify-{name}: 0; " in one for one in failed) for name in ("shape", "ice"))
+
+
+def test_check_holds_a_guest_to_what_the_baseline_found_of_it(tmp_path, capsys, ladder):
+    shutil.copy(RK4.rpartition(":")[0], tmp_path)
+    file, spec = tmp_path / "rk4.py", f"{tmp_path / 'rk4.py'}:Eq8"
+    found = study_guests([visit(spec, THROW, TIMES)], ladder, dict.fromkeys(RUNGS, 1e-9))
+    findings = [one.to_mapping() for one in claim_guests(found)]
+    (old,) = [one["value"] for one in findings if one["id"] == "guest-naive-rk4-eq8"]
+    summary = {"version": 2, "scenario": THROW.to_mapping(), "slices": 5, "size": "quick", "findings": findings}
+    (tmp_path / "summary.json").write_text(summary_text(summary))
+    given = ("--with", spec, "--baseline", tmp_path)
+    assert checked(tmp_path, *given) == 0
+    lines = capsys.readouterr().out.splitlines()
+    (line,) = [one for one in lines if one.startswith("PASS  guest-naive-rk4-eq8:")]
+    assert f"baseline {old:.6g} ±" in line
+    assert "guest" not in lines[-1]
+    file.write_text(file.read_text().replace("restitution = 1.0", "restitution = 0.9"))
+    assert checked(tmp_path, *given) == 1
+    assert any(one.startswith("FAIL  guest-naive-rk4-eq8: ") for one in capsys.readouterr().out.splitlines())
+
+
+def test_check_refuses_a_guest_that_is_a_curve_or_named_twice(tmp_path, capsys):
+    (tmp_path / "mine.csv").write_text("t,theta,omega\n0,1,1\n")
+    for arguments, words in (
+        (("--with", f"csv:{tmp_path / 'mine.csv'}"), "a curve cannot be asked"),
+        (("--with", RK4, "--with", RK4), "is there twice"),
+    ):
+        assert checked(tmp_path, *arguments) == 2
+        assert words in capsys.readouterr().err
+
+
+def test_a_report_splits_what_leads_from_a_guest_to_free_flight():
+    specs = (RK4, RK4.replace(":Eq8", ":Weightless"))
+    ask = ask_of(THROW, "quick", certified=())
+    found = gather(chapters_named("guests"), ask, Here(), work={"guests": (specs, None)}).found("guests")
+    eq8, weightless = (guest.split for guest in found.guests)
+    assert set(eq8.bars) == {"weightless", "origin", "recoil"}
+    assert set(weightless.bars) == {"origin", "recoil"}
+    free = plateau(TIMES, solve("free-flight", THROW, times=TIMES).omega, THROW.omega0)
+    for one in (eq8, weightless):
+        assert one.end == pytest.approx(free, abs=1e-12)
+        assert one.start + sum(one.bars.values()) + one.rest == pytest.approx(one.end, abs=1e-15)
+        assert abs(one.rest) < 1e-3 < abs(one.end - one.start)
+    ids = {finding.id: finding for finding in claim_guests(found)}
+    assert ids["guest-naive-rk4-waterfall"].value == eq8.end - eq8.start
+    assert f"{eq8.bars['weightless']:+.3g}" in ids["guest-naive-rk4-waterfall"].note
+    # Schemes and engines are compared with the guests, too.
+    assert {"eq8", "free-flight", "published-python", "midpoint", "pymunk"} <= set(found.agreement.names)
+    assert found.agreement.pair("naive RK4", "exact-step").largest < 0.1
+    assert found.facts["naive RK4"] == f"{RK4}, files {content_of(RK4):.12}"
+    page = chapters_named("guests")[0].chapters[0].page(found)
+    assert [guest.label for guest in page["compared"]] == [guest.label for guest in page["splits"]]
+
+
+def test_a_guest_without_an_equation_or_with_the_wrong_one_has_its_rest(ladder):
+    declared = switches_made(Traits(name="mine", equation="exact-step"), None, "free-flight")
+    assert declared == MODELS["eq8"].switches
+    assert switches_made(Traits(name="mine", equation="paper-typeset"), None, "eq8") is None
+    assert switches_made(Traits(name="mine"), None, None) is None
+    assert switches_made(Traits(name="mine"), None, "eq8") == declared
+    # A guest of Eq. 8 that declares free flight: all of the difference is the rest.
+    run = ladder["eq8"]
+    made = Made(equation_run(THROW, FREE), ladder["free-flight"], 0.0)
+    found = split(run, FREE, Flights({made.run: made}))
+    assert found.bars == {}
+    assert found.rest == found.end - found.start
+    with pytest.raises(Missing):
+        split(run, MODELS["eq8"].switches, Flights({made.run: made}))

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_up import trajectory_of
 
 from engine_check import PymunkKnobs
 from engine_check.pymunk_settings import insertion_order
@@ -22,21 +23,8 @@ T = np.linspace(0.0, 0.1, 251)
 
 def flight(change, *, points=None, status="ok") -> Trajectory:
     """Return a run with omega = omega_0 (1 + change)."""
-    t = T[:points]
-    zero = np.zeros(len(t))
-    return Trajectory(
-        scenario=THROW,
-        solver="made-up",
-        method="made-up",
-        t=t,
-        theta=zero,
-        omega=20.0 * (1.0 + np.broadcast_to(change, T.shape)[:points]),
-        r=np.zeros((0, 500)),
-        v=np.zeros((0, 500)),
-        r_cm=zero,
-        inertia=zero + 1.0,
-        status=status,
-    )
+    omega = 20.0 * (1.0 + np.broadcast_to(change, T.shape)[:points])
+    return trajectory_of(THROW, T[:points], omega=omega, status=status)
 
 
 def ensemble(*members):

@@ -43,6 +43,10 @@ def structure(text):
             name = name.split("}")[-1]
             value = re.sub(r"(?<=url\(#)[^)]+|(?<=^#).+", lambda found: places.get(found.group(), found.group()), value)
             value = places.get(value, value) if name == "id" else value
+            if name == "transform":
+                moved = re.search(r"(?<=translate\()[^)]*", value)
+                numbers += map(float, moved.group().split()) if moved else ()
+                value = re.sub(r"translate\([^)]*\)", "translate", value)
             if name in ("d", "x", "y", "points"):
                 numbers += [float(number) for number in re.findall(r"-?[\d.]+(?:e[-+]?\d+)?", value)]
                 value = re.sub(r"[-\d.\s]+(?:e[-+]?\d+)?", "", value)
@@ -68,9 +72,9 @@ def test_a_name_is_short_and_only_there_if_it_is_used():
     )
 
 
-def test_transforms_keep_all_their_digits():
+def test_places_are_rounded_and_scales_are_not():
     drawn = '<use transform="translate(286.28125 0) scale(0.015625)" x="286.28125"/>'
-    assert compact_svg(drawn) == '<use transform="translate(286.28125 0) scale(0.015625)" x="286.28"/>'
+    assert compact_svg(drawn) == '<use transform="translate(286.28 0) scale(0.015625)" x="286.28"/>'
 
 
 def test_the_address_holds_the_picture_and_nothing_that_ends_it(svg):
@@ -92,5 +96,6 @@ def test_numbers_are_rounded_not_cut(number, short):
 
 
 def test_the_place_of_a_figure_is_known_before_it_is_drawn(svg):
-    assert shape(svg) == ' width="288" height="216"'
+    assert shape(svg) == ' width="288" height="216" style="--least:259px"'  # letters of 10 points
+    assert shape('<svg width="100pt" height="50pt"></svg>') == ' width="100" height="50" style="--least:100px"'
     assert shape("<svg></svg>") == ""

@@ -2,7 +2,6 @@
 
 import dataclasses
 
-import pytest
 from made_up import spoiled
 
 from engine_check.solver import DEFAULT_TOLERANCE
@@ -12,8 +11,6 @@ from flipproof.frame.gather import tell
 from flipproof.frame.solvers import make
 from flipproof.frame.throws import REFERENCE
 from flipproof.output.provenance import provenance
-
-pytestmark = pytest.mark.xdist_group("evidence")
 
 ENGINES = ("flights", "differences", "certificates", "agreement")
 

@@ -6,6 +6,8 @@ import sqlite3
 from dataclasses import replace
 
 import pytest
+from distributed import LocalCluster
+from made_up import command
 
 from flipproof.build import ask_of, gather_report
 from flipproof.chapters import chapters_named
@@ -23,7 +25,7 @@ from flipproof.landing.design import Case, Throws
 from flipproof.landing.scatter import Scatter, Share, scattered, wilson
 from flipproof.landing.throw import land_throw, told
 from flipproof.landing.upright import drive, make_case, make_upright
-from flipproof.landing.work import LANDING, make_landing, saddle, touch_readings
+from flipproof.landing.work import LANDING, flown, make_landing, saddle, touch_readings
 from flipproof.sweep.errors import SweepError
 from ode_reference import fly, land
 from ode_reference.landing_forms import Block
@@ -215,6 +217,17 @@ def test_a_row_that_cannot_be_has_a_status_and_a_reason(design, changes, status,
     assert share_of([row]) == Share(upright=0, undecided=status != "missed", throws=1)
 
 
+def test_a_flight_that_was_kept_is_the_flight(design):
+    """Laws and tables share it: the same row, whether the flight was just made or is there from another landing."""
+    flown.cache_clear()
+    alone = [make_landing(design.point(k)) for k in (0, 3)]
+    assert flown.cache_info().misses == flown.cache_info().hits == 1
+    for row in alone:
+        flown.cache_clear()
+        again = make_landing(design.point(row.number))
+        assert replace(again, seconds=0.0) == replace(row, seconds=0.0)
+
+
 # ---------------------------------------------------------------------- the study
 
 
@@ -304,6 +317,56 @@ def test_the_sweep_makes_the_same_and_goes_on(found, tmp_path):
     assert outcomes <= {"upright", "lying", "cap", "undecided", None}
 
 
+def spoil(file, begin):
+    """Flip a bit behind the last place of ``begin`` in a file, and one of its header: it is damaged."""
+    content = bytearray(file.read_bytes())
+    content[content.rindex(begin)] ^= 1
+    content[30] ^= 1
+    file.write_bytes(content)
+
+
+@pytest.mark.parametrize("named", ["", "throws/sweep.sqlite"])
+def test_a_damaged_study_is_salvaged_and_gone_on_with(found, named, tmp_path):
+    out, new = tmp_path / "study", tmp_path / "new"
+    make_upright(THROW, SMALL, out, quiet, lambda _: None, jobs=1)
+    spoil(out / "throws" / "sweep.sqlite", b"upright")
+    with pytest.raises(SweepError, match=rf"can be saved: the same command with --salvage {out}/throws/sweep\.sqlite"):
+        make_upright(THROW, SMALL, out, quiet, lambda _: None, jobs=1)
+    words = make_upright(THROW, SMALL, new, quiet, lambda _: None, jobs=1, damaged=out / named)
+    aims, throws = words.splitlines()
+    assert aims.endswith("none is missing")
+    assert throws.endswith("the same command without --salvage makes the other 1")
+    assert not (new / "upright.csv").exists()
+    with pytest.raises(SweepError, match="--salvage begins a new study"):
+        make_upright(THROW, SMALL, new, quiet, lambda _: None, jobs=1, damaged=out)
+    make_upright(THROW, SMALL, new, quiet, lambda _: None, jobs=1)
+    assert (new / "upright.csv").read_text(encoding="utf-8") == shares_csv(found)
+
+
+def test_a_study_is_salvaged_without_its_aims(tmp_path):
+    """Aims are made anew; which throws are counted is known only after them."""
+    out, new = tmp_path / "study", tmp_path / "new"
+    make_upright(THROW, SMALL, out, quiet, lambda _: None, jobs=1)
+    (out / "aims" / "sweep.sqlite").write_bytes(b"")
+    words = make_upright(THROW, SMALL, new, quiet, lambda _: None, jobs=1, damaged=out)
+    aims, throws = words.splitlines()
+    assert aims.startswith("aims: ")
+    assert throws.endswith("none is missing")
+    with pytest.raises(
+        SweepError, match=r"nothing is no part of a study, which is a folder that holds aims/sweep\.sql"
+    ):
+        make_upright(THROW, SMALL, tmp_path / "more", quiet, print, damaged=tmp_path / "nothing")
+    assert not (tmp_path / "more").exists()
+
+
+def test_workers_of_a_scheduler_make_the_same(found, tmp_path):
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, silence_logs=50
+    ) as cluster:
+        make_upright(THROW, SMALL, tmp_path / "study", quiet, lambda _: None, dask=cluster.scheduler_address)
+    assert (tmp_path / "study" / "upright.csv").read_text(encoding="utf-8") == shares_csv(found)
+
+
 def gathered(throw, store=None):
     return gather_report(
         ask_of(throw, "full"), store=store, pool=Here(), contents=chapters_named("landing"), work={"landing": SMALL}
@@ -322,9 +385,9 @@ def test_the_chapter_makes_the_same_and_finds_it_in_the_store(found, tmp_path):
 def test_calls_hold_every_case_once_and_are_worth_keeping():
     wave, unaimed = aiming(THROW, SMALL)
     assert unaimed == {}
-    many = chunks([case.repeated(throws=40) for case in wave.cases])
-    assert [case for some in many for case in some] == [case.repeated(throws=40) for case in wave.cases]
-    assert [sum(case.throws for case in some) for some in many] == [120, 120, 80]
+    many = chunks([case.repeated(throws=120) for case in wave.cases])
+    assert [case for some in many for case in some] == [case.repeated(throws=120) for case in wave.cases]
+    assert [sum(case.throws for case in some) for some in many] == [360, 360, 240]
     assert chunks([]) == []
 
 
@@ -388,15 +451,13 @@ def test_an_outcome_that_no_program_certifies_is_told_with_its_reason():
         (["upright", "--out", "x", "--scatter", "1,2"], "is not SPIN,DEGREES,SPEED"),
         (["upright", "--out", "x", "--restitution", "2"], "table.restitution = 2.0 is outside [0, 1]"),
         (["upright", "--out", "x", "--map", "1x5"], "is not COLUMNSxROWS"),
+        (["upright", "--out", "x", "--dask", "nonsense"], "is not tcp://HOST:PORT"),
+        (["upright", "--out", "x", "--salvage", "y"], "--salvage y is no part of a study"),
     ],
 )
 def test_bad_input_is_one_line_that_names_it(arguments, words, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    try:
-        status = main(arguments)
-    except SystemExit as end:
-        status = end.code
-    said = capsys.readouterr().err
+    status, _, said = command(capsys, *arguments)
     assert status == 2
     assert words in said
     assert said.count("\n") == 1

@@ -6,18 +6,18 @@ import sqlite3
 import subprocess
 import sys
 import time
-from concurrent.futures import Executor, Future
 from contextlib import closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from made_up import command as run
 from made_up import study_map
 
 from flipproof.chapters.maps.study import CURVE, LADDER, RUNGS
 from flipproof.chapters.waterfall.study import OBSERVABLES, study_waterfall
-from flipproof.cli import main as cli
+from flipproof.frame.pool import Here
 from flipproof.frame.solvers import make
 from flipproof.sweep.design import design_of
 from flipproof.sweep.errors import SweepError
@@ -29,31 +29,12 @@ from flipproof.sweep.validity_map import Plan, map_csv, map_facts
 from flipproof.sweep.work import code_identity, make_batch
 from slicemodel import Scenario
 
-pytestmark = pytest.mark.xdist_group("map")
-
 ROOT = Path(__file__).resolve().parents[2]
 THROW = Scenario(duration=0.3).with_slices(3)
 AXES = ("gamma", "step", "restitution")
 
 
-def run(capsys, *arguments):
-    try:
-        status = cli.main([*map(str, arguments)])
-    except SystemExit as end:
-        status = end.code
-    out, err = capsys.readouterr()
-    return status, out, err
-
-
-class Here(Executor):
-    """Makes every call in this process: a worker's start costs more than all of a small map."""
-
-    def submit(self, fn, /, *arguments):
-        future = Future()
-        future.set_result(fn(*arguments))
-        return future
-
-
+# In this process: a worker's start costs more than all of a small map.
 HERE = {"executor": Here(), "capacity": lambda: 1, "died": ()}
 
 
@@ -161,10 +142,10 @@ def test_a_finished_map_is_only_drawn_again(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("flipproof.sweep.command.local_workers", None)
     status, out, err = run(capsys, *options, "--export", tmp_path / "out" / "rows.csv")
     assert (status, err) == (0, "")
-    assert "; 168 were there" in out
+    assert "; 172 were there" in out
     assert (tmp_path / "out" / "map.svg").read_bytes() == drawn
     assert (tmp_path / "out" / "map.png").read_bytes().startswith(b"\x89PNG")
-    assert len((tmp_path / "out" / "rows.csv").read_text().splitlines()) == 169
+    assert len((tmp_path / "out" / "rows.csv").read_text().splitlines()) == 173
 
 
 def test_table_and_contours_say_what_the_map_holds(tmp_path):
@@ -176,14 +157,18 @@ def test_table_and_contours_say_what_the_map_holds(tmp_path):
         assert float(row["fill_fraction"]) == study.fills[at[1]]
         assert float(row["gamma/omega0"]) == study.values[at[0]]
         assert float(row["plateau eq8"]) == study.level["eq8"][at]
+        assert float(row["plateau column"]) == study.level["column"][at]
         assert float(row["fair share of gravity"]) == study.shares[RUNGS.index("gravity")][at]
         assert row["largest fair share"] == RUNGS[study.dominant[at]]
         assert row["reason"] == ""
     facts = json.loads(json.dumps(map_facts(study, THROW), allow_nan=False))
     assert sum(facts["cells by largest fair share"].values()) == 9
-    assert [contour["level"] for contour in facts["contours"]] == [0.01, 0.1]
-    error = study.error("published-python")
+    assert [(contour["of"], contour["level"]) for contour in facts["contours"]] == [
+        (of, level) for of in ("error of published-python", "change by overlap") for level in (0.01, 0.1)
+    ]
+    shown = {"error of published-python": study.error("published-python"), "change by overlap": abs(study.overlap)}
     for contour in facts["contours"]:
+        error = shown[contour["of"]]
         assert contour["cells above"] == (error >= contour["level"]).sum()
         for line in contour["lines"]:
             for fill, value in line:
@@ -241,7 +226,7 @@ def test_a_waterfall_from_rows_is_that_of_direct_runs_to_the_last_bit(split):
     direct = study_waterfall(runs[0], made)
     assert [part.observable.name for part in direct] == [observable.name for observable in OBSERVABLES]
     assert split_rows(rows) == direct
-    assert len(waterfall_csv(direct).splitlines()) == 1 + len(direct) * (2 + len(direct[0].bars))
+    assert len(waterfall_csv(direct).splitlines()) == 1 + len(direct) * (3 + len(direct[0].bars))
 
 
 def test_a_waterfall_s_run_that_is_not_whole_is_named(split):
@@ -261,11 +246,11 @@ def test_the_waterfall_command_draws_every_observable(capsys, tmp_path, monkeypa
     status, out, err = run(capsys, *options, "--quiet")
     assert (status, err) == (0, "")
     assert "published program" in out
-    assert "162 points" in out
+    assert "164 points" in out
     for observable in OBSERVABLES:
         assert (tmp_path / "out" / f"waterfall-{observable.name}.png").stat().st_size > 10_000
     status, out, _ = run(capsys, *options)
-    assert "; 162 were there" in out
+    assert "; 164 were there" in out
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from made_up import trajectory_of
 
 from flipproof.frame.solvers import Made, Run
 from flipproof.page.motion import (
@@ -21,7 +22,7 @@ from flipproof.page.motion import (
     motion_data,
 )
 from flipproof.page.templating import environment
-from slicemodel import Bottle, Scenario, Trajectory
+from slicemodel import Bottle, Scenario
 from slicemodel.trajectory import Impacts
 
 THROW = Scenario(theta0=0.7, launch_velocity=(0.6, 1.8), duration=0.4).with_slices(5)
@@ -33,17 +34,14 @@ def flown(name="eq8", scenario=THROW, points=400, end=None, status="ok", impacts
     t = np.linspace(0.0, end or scenario.duration, points)
     start = scenario.initial_positions()
     r = start - 0.1 * scenario.bottle.length * np.sin(6.0 * t)[:, np.newaxis] * np.arange(1, scenario.n_slices + 1) / 5
-    return Trajectory(
-        scenario=scenario,
-        solver="made-up",
+    return trajectory_of(
+        scenario,
+        t,
         method=name,
-        t=t,
         theta=scenario.theta0 + 9.0 * t - 3.0 * t * t,
         omega=9.0 - 6.0 * t,
         r=r,
-        v=np.zeros_like(r),
         r_cm=0.2 - 0.05 * t,
-        inertia=np.ones(points),
         impacts=impacts,
         status=status,
         message="" if status == "ok" else "broke",
@@ -177,7 +175,17 @@ def test_every_control_that_the_script_looks_for_is_in_the_template():
 
 
 def test_nothing_in_the_assets_asks_the_network():
-    for name in ("chart.js", "motion.js", "live.js", "sliders.js", "story.js", "chart.css", "motion.css", "story.css"):
+    for name in (
+        "chart.js",
+        "motion.js",
+        "live.js",
+        "sliders.js",
+        "touch.js",
+        "story.js",
+        "chart.css",
+        "motion.css",
+        "story.css",
+    ):
         text = (ASSETS / name).read_text(encoding="utf-8").replace("http://www.w3.org/2000/svg", "")
         assert not re.search(r"https?:|fetch\(|XMLHttpRequest|import\s|@import|url\(|</script", text), name
 

@@ -210,6 +210,22 @@ def test_a_parent_that_cannot_be_made_is_named(tmp_path):
         pass
 
 
+def test_a_place_where_no_folder_can_be_made_is_refused_and_not_tried_for_ever(tmp_path, monkeypatch):
+    (tmp_path / f"out{UNFINISHED}").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(OutputError, match="cannot be written"), replaced_folder(tmp_path / "out", "report"):
+        raise AssertionError
+    made = Path.mkdir
+
+    def mkdir(self, *arguments, **options):
+        if self.name == f"proc{UNFINISHED}":  # as /proc answers
+            raise FileNotFoundError(2, "No such file or directory")
+        made(self, *arguments, **options)
+
+    monkeypatch.setattr(Path, "mkdir", mkdir)
+    with pytest.raises(OutputError, match="cannot be written"), replaced_folder(tmp_path / "proc", "report"):
+        raise AssertionError
+
+
 def test_links_are_followed_and_folders_refused(tmp_path):
     (tmp_path / "real.csv").write_text("old")
     (tmp_path / "link.csv").symlink_to(tmp_path / "real.csv")

@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_up import trajectory_of
 
+from flipproof.chapters.overlap.chapter import claim_column, draw_overlap
 from flipproof.chapters.overlap.figure import figure_overlap
 from flipproof.chapters.overlap.study import CHECK, COARSER, COLUMN, EXCLUDE, PASS, plan_overlap, study_overlap
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import Made, make
-from slicemodel import Scenario, Trajectory
+from slicemodel import Scenario
 
 THROW = Scenario().with_slices(50)
 FILLS = (0.5, 1.0)
@@ -17,22 +19,8 @@ FILLS = (0.5, 1.0)
 
 def flat(run, level, status="ok", message=""):
     """A run whose omega is a level of omega_0 from the start."""
-    points = len(run.settings["times"])
-    trajectory = Trajectory(
-        scenario=run.scenario,
-        solver="made-up",
-        method=run.solver,
-        t=run.settings["times"],
-        theta=np.zeros(points),
-        omega=np.full(points, level * run.scenario.omega0),
-        r=np.zeros((0, run.scenario.n_slices)),
-        v=np.zeros((0, run.scenario.n_slices)),
-        r_cm=np.zeros(points),
-        inertia=np.ones(points),
-        status=status,
-        message=message,
-    )
-    return Made(run, trajectory, 0.0)
+    told = {"omega": level * run.scenario.omega0, "status": status, "message": message}
+    return Made(run, trajectory_of(run.scenario, run.settings["times"], **told), 0.0)
 
 
 LEVELS = {EXCLUDE: (0.23, 0.996), COARSER: (0.22, 0.99), PASS: (0.19, 0.4), CHECK: (0.191, 0.402), COLUMN: (0.33, 1.0)}
@@ -72,6 +60,10 @@ def test_levels_bands_cost_and_distance_from_ice_are_read_off():
     assert study.cost == pytest.approx([-0.04, -0.596])
     assert study.check == pytest.approx([0.001, 0.002])
     assert study.cost_to_column == pytest.approx([-0.139, -0.598])
+    claim = claim_column(study)
+    assert claim.value == pytest.approx(-0.598)
+    assert "no share; free flight at N = 4" in claim.note
+    assert "at most -0.598, at filling 100%" in draw_overlap(study).caption
     assert study.missing_from_ice(EXCLUDE) == pytest.approx(0.004)
     assert study.missing_from_ice(PASS) == pytest.approx(0.6)
     assert study.restitution == 0.5

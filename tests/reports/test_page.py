@@ -12,8 +12,6 @@ from flipproof.output.provenance import provenance
 from flipproof.page.pdf import VARIABLE, PrintError, find_browser, print_page, require_browser
 from flipproof.page.render import read_assets, render, unbroken
 
-pytestmark = pytest.mark.xdist_group("evidence")
-
 
 def section_of(page, name):
     """Return a section without its links to the glossary."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_up import trajectory_of
 
 from flipproof.frame.solvers import Made, Run
 from flipproof.paper import experiment
@@ -15,7 +16,6 @@ from flipproof.paper.observe import Flights
 from flipproof.paper.parameters import paper_throw
 from flipproof.paper.runs import PUBLISHED, SOLVERS, PaperRuns
 from flipproof.paper.statements import Reading
-from slicemodel import Trajectory
 
 BY_ID = {observation.id: observation for observation in OBSERVATIONS}
 
@@ -25,11 +25,7 @@ def flight(scenario, level, climb=0.0, lands=360.0):
     scenario = scenario.with_slices(1)
     t = np.linspace(0.0, scenario.duration, 101)
     omega = scenario.omega0 * (level + climb * np.clip(t / scenario.duration - 0.9, 0.0, None) * 10)
-    none = np.empty((0, 1))
-    return Trajectory(
-        scenario=scenario, solver="made up", method="made up", t=t, theta=np.radians(lands) * t / t[-1], omega=omega,
-        r=none, v=none, r_cm=np.full_like(t, 0.2), inertia=np.ones_like(t),
-    )  # fmt: skip
+    return trajectory_of(scenario, t, theta=np.radians(lands) * t / t[-1], omega=omega)
 
 
 def flights(level_of, *, ice=1.0, climb=0.0, lands=360.0):

@@ -6,24 +6,22 @@ import io
 import json
 import math
 import re
-from concurrent.futures import Executor, Future
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from flipproof.cli import paper as cli_paper
+from flipproof.frame.pool import Here
 from flipproof.output.folder import OutputError
 from flipproof.paper import gallery
 from flipproof.paper.cases import HALF_FULL, family
 from flipproof.paper.costs import Cost
-from flipproof.paper.figures import FIGURES, ORDER, check_figures, exhibits_paper, keys_of
+from flipproof.paper.figures import ORDER, RECIPES, TIMED, check_figures, exhibits_paper, keys_of
 from flipproof.paper.figures_bottle import tipping
 from flipproof.paper.figures_panels import Axis, Grid, Line, Panel, figure_grid, ranked, stretched, table_grid
-from flipproof.paper.runs import PUBLISHED, SOLVERS, gather_paper
+from flipproof.paper.runs import PUBLISHED, SOLVERS
 from slicemodel.observables import plateau_of_points, static_toppling_angle, toppling_angle
-
-pytestmark = pytest.mark.xdist_group("paper-figures")
 
 COSTS = tuple(
     Cost(solver=solver, slices=slices, steps=steps, work=slices * steps, seconds=1e-6 * slices * steps)
@@ -33,18 +31,9 @@ COSTS = tuple(
 )
 
 
-class Here(Executor):
-    """Makes every call in this process: a worker's start costs more than these runs."""
-
-    def submit(self, fn, /, *arguments):
-        future = Future()
-        future.set_result(fn(*arguments))
-        return future
-
-
 @pytest.fixture(scope="module")
 def runs():
-    return replace(gather_paper(Here(), lambda *_: None, costs=False), costs=COSTS)
+    return replace(gallery.gather_figures([name for name in ORDER if name not in TIMED], Here()), costs=COSTS)
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +56,7 @@ def _is_number(cell):
 
 
 def test_every_figure_is_there(exhibits):
-    assert set(ORDER) == set(FIGURES)
+    assert set(ORDER) == set(RECIPES)
     assert [name.removeprefix("paper-").partition("-")[0] for name in exhibits] == [
         name for name in ORDER for _ in range(2 if name == "5a" else 1)
     ]

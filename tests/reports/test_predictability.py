@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_up import trajectory_of
 
 from flipproof.chapters.differences.study import study_difference
 from flipproof.chapters.predictability.figure import figure_predictability
@@ -25,21 +26,8 @@ THROW = Scenario(n_slices=1)
 
 def flight(change=0.0, *, scenario=THROW, t=T, method="made-up", status="ok", impacts=None) -> Trajectory:
     """Return a run with omega = omega_0 (1 + change)."""
-    points = len(t)
-    return Trajectory(
-        scenario=scenario,
-        solver="slicemodel",
-        method=method,
-        t=t,
-        theta=np.zeros(points),
-        omega=20.0 * (1 + np.broadcast_to(change, (points,))),
-        r=np.zeros((0, 1)),
-        v=np.zeros((0, 1)),
-        r_cm=np.ones(points),
-        inertia=np.ones(points),
-        status=status,
-        impacts=impacts,
-    )
+    known = {"solver": "slicemodel", "method": method, "status": status, "impacts": impacts}
+    return trajectory_of(scenario, t, omega=20.0 * (1 + change), **known)
 
 
 def members(law, **options):
@@ -138,7 +126,7 @@ def test_a_flight_without_growth_is_predictable_to_the_end():
     study = study_predictability(flight(), members(lambda size: size))
     assert study.horizons == (None,) * 4
     assert study.horizon is None
-    assert "predictable to the end" in study.words
+    assert "predictable to its end" in study.words
     assert study.spread.shape == (4, len(T))
 
 
@@ -146,7 +134,7 @@ def test_a_jump_that_does_not_care_for_the_size_is_said_so():
     study = study_predictability(flight(), members(lambda size: np.where(T < 0.2, size, 3e-4)))
     assert study.rough_from == pytest.approx(0.2, abs=1e-3)
     assert study.largest_amplification == pytest.approx([3e5, 3e4, 3e3, 3e2], rel=1e-3, abs=0.0)
-    assert "nothing is extrapolated" in study.words
+    assert "cannot be extrapolated" in study.words
 
 
 def test_a_member_that_ends_early_is_a_horizon_and_not_a_cut():

@@ -33,11 +33,10 @@ from flipproof.frame.pool import make_all, workers
 from flipproof.frame.solvers import Run, make
 from flipproof.frame.throws import REFERENCE
 from flipproof.output.ownership import MARKER, marker_text
-from flipproof.page.render import typeset
+from flipproof.page.equations import typeset
 from slicemodel import Scenario
 
 ROOT = Path(__file__).resolve().parents[2]
-pytestmark = pytest.mark.xdist_group("evidence")
 
 
 def findings_of(gathered):
@@ -262,7 +261,7 @@ def test_a_report_that_cannot_be_written_whole_leaves_the_one_before(monkeypatch
     (folder / "summary.json").write_text("the old one")
     (folder / MARKER).write_text(marker_text("report", ["summary.json"]))
 
-    def break_off(*_):
+    def break_off(*_, **__):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(build_module, "junit_text", break_off)
@@ -332,13 +331,17 @@ def test_typeset():
     assert typeset("v' = (omega^2 - gamma^2) X - 2 gamma v, gamma << omega_0") == ("v' = (ω² − γ²) X − 2 γ v, γ ≪ ω₀")
 
 
-def test_the_real_command_from_a_cold_start(tmp_path):
+@pytest.mark.parametrize("kernels", ["compiled", pytest.param("to be compiled", marks=pytest.mark.slow)])
+def test_the_real_command(tmp_path, kernels):
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    if kernels == "to be compiled":
+        environment["NUMBA_CACHE_DIR"] = str(tmp_path / "cache")
     scenario = tmp_path / "throw.toml"
     scenario.write_text("[scenario]\nwater_mass = 0.3\nn_slices = 12\ndrag = 0.25\nrestitution = 0.4\n")
     result = subprocess.run(
         [sys.executable, "-m", "flipproof", "report", str(scenario), "--quick", "--out", str(tmp_path / "out")],
         cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+        env=environment,
         capture_output=True,
         text=True,
         check=False,

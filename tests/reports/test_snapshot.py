@@ -16,7 +16,6 @@ from slicemodel import Scenario
 
 ROOT = Path(__file__).resolve().parents[2]
 KEPT_FILES = {".flipproof", "summary.json", *(f"{name}.png" for name in PICTURES)}
-pytestmark = pytest.mark.xdist_group("check")
 
 
 @pytest.fixture(scope="module")

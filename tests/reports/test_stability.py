@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_up import trajectory_of
 
 from flipproof.chapters.stability.chapter import (
     claim_default_iterations_explode,
@@ -23,7 +24,7 @@ from flipproof.chapters.stability.study import (
     study_stability,
 )
 from flipproof.frame.solvers import Made, make
-from slicemodel import Scenario, Trajectory
+from slicemodel import Scenario
 
 THROW = Scenario()
 SMALL = Layout(panels=((6.0, 10),), dt=(2e-3, 2e-4), iterations=(5, 10, 60), duration=0.1, budget=2e5)
@@ -32,23 +33,9 @@ SMALL = Layout(panels=((6.0, 10),), dt=(2e-3, 2e-4), iterations=(5, 10, 60), dur
 def flight(run, error=0.0, message="", points=None, reason="") -> Made:
     """A run whose omega is off by a fraction of omega_0 from the middle on; stopped if there is a message."""
     t = run.settings["times"][:points]
-    zero = np.zeros(len(t))
-    trajectory = Trajectory(
-        scenario=run.scenario,
-        solver="made-up",
-        method=run.solver,
-        t=t,
-        theta=zero,
-        omega=run.scenario.omega0 * (1.0 + error * (t > SMALL.duration / 2)),
-        r=np.zeros((0, run.scenario.n_slices)),
-        v=np.zeros((0, run.scenario.n_slices)),
-        r_cm=zero,
-        inertia=zero + 1.0,
-        status="diverged" if message else "ok",
-        message=message,
-        reason=reason,
-    )
-    return Made(run, trajectory, 0.0)
+    omega = run.scenario.omega0 * (1.0 + error * (t > SMALL.duration / 2))
+    ended = {"status": "diverged" if message else "ok", "message": message, "reason": reason}
+    return Made(run, trajectory_of(run.scenario, t, omega=omega, **ended), 0.0)
 
 
 def chart(spoil, layout=SMALL):

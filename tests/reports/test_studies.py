@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from made_up import trajectory_of
 
 from flipproof.build import ask_of
 from flipproof.chapters.differences.chapter import run_bands
@@ -23,27 +24,11 @@ from flipproof.frame.twins import twins
 from slicemodel import Impacts, Scenario, Trajectory
 
 SCENARIO = Scenario(n_slices=1)
-pytestmark = pytest.mark.xdist_group("evidence")
 
 
 def curve(omega, *, method="made-up", solver="slicemodel", impacts=None, t=None, status="ok", **settings) -> Trajectory:
-    omega = np.asarray(omega, dtype=float)
-    points = len(omega)
-    return Trajectory(
-        scenario=SCENARIO,
-        solver=solver,
-        method=method,
-        t=np.linspace(0.0, 0.5, points) if t is None else t,
-        theta=np.zeros(points),
-        omega=omega,
-        r=np.full((points, 1), 0.1),
-        v=np.zeros((points, 1)),
-        r_cm=np.full(points, 0.1),
-        inertia=np.ones(points),
-        impacts=impacts,
-        status=status,
-        settings=settings,
-    )
+    known = {"method": method, "solver": solver, "impacts": impacts, "status": status, "settings": settings}
+    return trajectory_of(SCENARIO, len(omega) if t is None else t, omega=omega, keeps_slices=True, **known)
 
 
 def test_parting_is_interpolated_and_follows_the_last_impact():
@@ -61,6 +46,13 @@ def test_parting_is_interpolated_and_follows_the_last_impact():
     assert difference.largest == pytest.approx(0.04)
     assert difference.largest_time == t[-1]
     assert difference.final == pytest.approx(-0.04)
+
+
+def test_an_impact_at_the_very_moment_of_parting_counts():
+    impacts = Impacts(time=[0.0, 0.2], slice=[4, 5], end=[1, 1], speed_before=[1] * 2, speed_after=[1] * 2)
+    apart = curve(np.full(6, 15.0), impacts=impacts)
+    difference = study_difference("x", curve(np.full(6, 20.0)), apart, impacts_of=apart)
+    assert (difference.parting_time, difference.parting_impact.slice) == (0.0, 4)
 
 
 def test_no_parting_is_said_so():

@@ -11,8 +11,8 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+from made_up import command
 
-from flipproof.cli import main as cli
 from flipproof.frame.solvers import solve
 from flipproof.sweep.design import from_parameters, read_design
 from slicemodel.observables import plateau
@@ -23,8 +23,6 @@ POINTS = 160
 SPEC = importlib.util.spec_from_file_location("sweep_kill", ROOT / "benchmarks" / "sweep_kill.py")
 sweep_kill = importlib.util.module_from_spec(SPEC)
 SPEC.loader.exec_module(sweep_kill)
-
-pytestmark = pytest.mark.xdist_group("sweep")
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -155,12 +153,7 @@ def test_a_disk_that_takes_no_more_ends_the_sweep_in_one_line(undisturbed, tmp_p
 
 
 def run(capsys, *arguments):
-    try:
-        status = cli.main(["sweep", *map(str, arguments)])
-    except SystemExit as end:
-        status = end.code
-    out, err = capsys.readouterr()
-    return status, out, err
+    return command(capsys, "sweep", *arguments)
 
 
 def test_a_complete_sweep_is_not_made_again_and_is_exported(undisturbed, capsys):

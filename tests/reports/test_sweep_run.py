@@ -4,10 +4,11 @@ import os
 import signal
 import threading
 import time
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
+from flipproof.frame.pool import Here
 from flipproof.frame.processes import Processes, WorkerDiedError
 from flipproof.sweep import run
 from flipproof.sweep.design import design_of
@@ -40,21 +41,20 @@ def quick(code, points, keep, curves):
     return Returned(code, {}, outcomes, 0.001 * len(points))
 
 
-class Inline(Executor):
-    """Makes a call at once, unless ``fault`` has an exception for its points."""
+class Inline(Here):
+    """Makes a call in this process, unless ``fault`` has an exception for its points."""
 
     def __init__(self, fault=lambda points: None):  # noqa: ARG005
         self.fault, self.batches = fault, []
 
     def submit(self, fn, /, code, points, *kept):
         self.batches.append([point.number for point in points])
-        future = Future()
         error = self.fault(points)
-        if error:
-            future.set_exception(error)
-        else:
-            future.set_result(fn(code, points, *kept))
-        return future
+        return super().submit(fail, error) if error else super().submit(fn, code, points, *kept)
+
+
+def fail(error):
+    raise error
 
 
 def sweep(folder, executor, throws=50, capacity=lambda: 3, solvers=2):

@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_up import study_map
+from made_up import study_map, trajectory_of
 
 import ode_reference
+from flipproof.chapters.maps.chapter import _beyond
 from flipproof.chapters.maps.figure import figure_map
 from flipproof.chapters.maps.study import (
+    COLUMN,
     EXTRA,
     LADDER,
     POINTS,
@@ -24,7 +26,7 @@ from flipproof.chapters.maps.study import (
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import Made, Run, make
-from slicemodel import Scenario, Trajectory
+from slicemodel import Scenario
 from slicemodel.observables import plateau
 
 THROW = Scenario().with_slices(6)
@@ -34,21 +36,7 @@ FILLS = (0.3, 0.6)
 def flat(run: Run, level: float, status: str = "ok") -> Made:
     """A run whose omega jumps from omega_0 to a level at once."""
     points = run.settings.get("steps", 201)
-    omega = np.full(points, level * run.scenario.omega0)
-    trajectory = Trajectory(
-        scenario=run.scenario,
-        solver="made-up",
-        method=run.solver,
-        t=np.linspace(0.0, run.scenario.duration, points),
-        theta=np.zeros(points),
-        omega=omega,
-        r=np.zeros((0, 6)),
-        v=np.zeros((0, 6)),
-        r_cm=np.zeros(points),
-        inertia=np.ones(points),
-        status=status,
-    )
-    return Made(run, trajectory, 0.0)
+    return Made(run, trajectory_of(run.scenario, points, omega=level * run.scenario.omega0, status=status), 0.0)
 
 
 def made_up(axis, values, level_of, spoil=None):
@@ -94,9 +82,20 @@ def test_a_model_runs_once_per_fill_along_the_step_axis():
     runs = plan_map(THROW, "step", FILLS, (0.01, 0.1, 0.5))
     solvers = [run.solver for run in runs]
     assert {solvers.count(name) for name in SCHEMES} == {6}
-    assert {solvers.count(name) for name in LADDER[1:]} == {2}
+    assert {solvers.count(name) for name in (*LADDER[1:], COLUMN)} == {2}
     steps = [run.settings["steps"] for run in runs if run.solver == "exact-step"]
     assert steps == [1001, 1001, 101, 101, 21, 21]  # omega_0 T = 10
+
+
+def test_the_column_runs_once_per_fill_along_the_restitution_that_it_does_not_know():
+    values = (0.1, 0.5, 0.9)
+    runs = plan_map(THROW, "restitution", FILLS, values)
+    assert [run.solver for run in runs].count(COLUMN) == 2
+    study = made_up("restitution", values, lambda run: 0.7 if run.solver == COLUMN else run.scenario.restitution)
+    assert study.level[COLUMN] == pytest.approx(0.7)
+    assert study.overlap == pytest.approx(np.array([[-0.6, -0.6], [-0.2, -0.2], [0.2, 0.2]]))
+    assert "In 0 of 0 cells" not in _beyond(study)
+    assert "N = 6" in _beyond(study)
 
 
 def test_cells_have_the_throw_that_their_axes_say():
@@ -143,7 +142,7 @@ def test_fair_shares_colour_a_map_where_every_set_was_flown():
     """In the order of the ladder the interaction is all recoil's; a fair share gives each of the two half of it."""
     worth = {"signs": 0.06, "roots": -0.02, "weightless": 0.05, "origin": 0.01, "recoil": -0.01}
     runs = plan_map(THROW, "gamma", FILLS, (0.1, 0.2))
-    assert len(runs) == 4 * (2 + 40)
+    assert len(runs) == 4 * (2 + 40 + 1)
     made = {run: flat(run, by_set(worth)(run)) for run in runs}
     study = study_map(THROW, "gamma", FILLS, (0.1, 0.2), made)
     assert study.shares[:, 1, 0] == pytest.approx([0.1, 0.11, -0.02, 0.0, 0.05, 0.01, 0.04], abs=1e-12)
@@ -192,7 +191,9 @@ def test_figures_name_their_axes_with_units_and_their_levels(axis):
     assert axes.get_ylabel().endswith("[1]")
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert set(RUNGS) <= set(labels)
-    assert sum("10%" in label for label in labels) == (2 if axis == "step" else 1)
+    assert sum("10%" in label for label in labels) == 2
+    shaded = "step error of published-python" if axis == "step" else "error of published-python"
+    assert f": {shaded} (shade)" in axes.get_title(loc="left")
     assert draw(figure).svg.startswith("<?xml")
 
 
@@ -202,7 +203,7 @@ def test_a_real_map_agrees_with_the_reference_and_has_a_band():
     study = study_map(THROW, "gamma", FILLS, values, made)
     assert (study.reason == "").all()
     for column, fill in enumerate(FILLS):
-        for name in ("eq8", "free-flight"):
+        for name in ("eq8", "free-flight", COLUMN):
             run = ode_reference.solve(vary(THROW, fill=fill), name)
             assert study.level[name][0, column] == pytest.approx(plateau(run.t, run.omega, THROW.omega0), abs=1e-4)
     assert set(study.level) == {*LADDER, *EXTRA}

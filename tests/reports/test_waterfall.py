@@ -4,41 +4,42 @@ import dataclasses
 
 import numpy as np
 import pytest
+from made_up import trajectory_of
 
 import ode_reference
 from flipproof.chapters.waterfall import study as waterfall
-from flipproof.chapters.waterfall.study import NAMES, OBSERVABLES, canonical, plan_waterfall, study_waterfall
+from flipproof.chapters.waterfall.chapter import claim_overlap
+from flipproof.chapters.waterfall.figure import figure_waterfall
+from flipproof.chapters.waterfall.study import (
+    NAMES,
+    OBSERVABLES,
+    canonical,
+    plan_finer,
+    plan_waterfall,
+    study_waterfall,
+)
 from flipproof.frame import twins
+from flipproof.frame.solvers import make
 from ode_reference.switches import Switches
 from slicemodel import Scenario, Trajectory
 
 THROW = Scenario(n_slices=1)
+FREE = "free-flight"
 PROGRAM_RUN = waterfall.program_run(THROW, 1000)
 NAME_OF = {switch: words for switch, words in NAMES.items()}
 
 
 def made_up(value: float) -> Trajectory:
     """A run whose plateau is ``value`` and whose other observables follow from it."""
-    t = np.linspace(0.0, THROW.duration, 5)
-    return Trajectory(
-        scenario=THROW,
-        solver="made-up",
-        method="made-up",
-        t=t,
-        theta=np.full(5, value),
-        omega=np.full(5, THROW.omega0 * value),
-        r=np.full((5, 1), 0.1),
-        v=np.full((5, 1), value),
-        r_cm=np.full(5, 0.1),
-        inertia=np.ones(5),
-    )
+    known = {"theta": value, "omega": THROW.omega0 * value, "r": np.full((5, 1), 0.1), "v": np.full((5, 1), value)}
+    return trajectory_of(THROW, 5, **known)
 
 
 def split(value_of, *, program=0.0, moved=0.0, kind="twin in release"):
     runs = {}
     for run in plan_waterfall(THROW, 1000):
-        if run.solver == waterfall.PROGRAM:
-            runs[run] = made_up(program)
+        if run.solver in (waterfall.PROGRAM, waterfall.COLUMN):
+            runs[run] = made_up(program if run.solver == waterfall.PROGRAM else 5.0)
             continue
         value = value_of(Switches.from_name(run.solver))
         runs[run] = made_up(value + (moved if run.label.endswith(kind) else 0.0))
@@ -52,8 +53,9 @@ def plateau_bars(result):
 
 def test_the_plan_names_every_equation_once_and_gives_it_two_twins():
     runs = plan_waterfall(THROW, 1000)
-    assert len(set(runs)) == len(runs) == 121
-    for usual, release, rest in zip(runs[1:41], runs[41::2], runs[42::2], strict=True):
+    assert len(set(runs)) == len(runs) == 122
+    assert runs[-1] == waterfall.column_run(THROW)
+    for usual, release, rest in zip(runs[1:41], runs[41:121:2], runs[42:121:2], strict=True):
         assert usual.solver == release.solver == rest.solver
         assert (release, rest) == twins.twins(usual)
         assert usual.settings == release.settings == {}
@@ -61,7 +63,7 @@ def test_the_plan_names_every_equation_once_and_gives_it_two_twins():
         assert release.scenario.omega0 / THROW.omega0 - 1 == pytest.approx(twins.CHANGE, rel=1e-4, abs=0.0)
         own = ode_reference.solve(THROW, usual.solver).settings["rest_speed"]
         assert rest.settings == {"rest_speed": pytest.approx(own / twins.CUT)}
-    assert all(canonical(Switches.from_name(run.solver)).name == run.solver for run in runs[1:])
+    assert all(canonical(Switches.from_name(run.solver)).name == run.solver for run in runs[1:-1])
 
 
 def test_independent_assumptions_split_alike_in_every_order():
@@ -93,6 +95,29 @@ def test_every_split_of_every_observable_sums_to_the_whole():
             assert sum(getattr(bar, order) for bar in part.bars) == pytest.approx(part.total, abs=1e-12)
         assert part.residual <= 1e-12
         assert part.largest.name in {bar.name for bar in part.bars}
+
+
+def test_overlap_stands_in_the_margin_and_takes_no_part_in_the_split():
+    """The column is a made-up 5 in every observable of the waterfall, whatever free flight is."""
+    plateau = split(lambda s: 1.0 if s.recoil else 0.0)[0]
+    assert (plateau.total, plateau.column, plateau.overlap) == pytest.approx((1.0, 5.0, 4.0))
+    assert plateau.finer_overlap is None
+    claim = claim_overlap(plateau)
+    assert (claim.id, claim.value) == ("waterfall-overlap", pytest.approx(4.0))
+    assert "no share; free flight at N = 1" in claim.note
+    labels = [label.get_text() for label in figure_waterfall(plateau).axes[0].get_yticklabels()]
+    assert labels[-1] == "no overlap: column"
+
+
+def test_the_margin_is_that_of_direct_runs():
+    throw = Scenario(n_slices=2, duration=0.2)
+    runs = {run: make(run).flight for run in (*plan_waterfall(throw, 200), *plan_finer(throw, 200))}
+    found = study_waterfall(waterfall.program_run(throw, 200), runs)
+    column, few, many = (ode_reference.solve(throw.with_slices(n), m) for n, m in ((2, "column"), (2, FREE), (4, FREE)))
+    for part in found:
+        difference = part.observable.of(column) - part.observable.of(few)
+        assert part.overlap == pytest.approx(difference, abs=1e-12)
+        assert part.finer_overlap == pytest.approx(part.observable.of(column) - part.observable.of(many), abs=1e-12)
 
 
 @pytest.mark.parametrize("kind", ["twin in release", "twin in rest speed"])

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_up import trajectory_of
 
 import slicemodel
 from engine_check.solver import ENGINES
@@ -161,23 +162,10 @@ def test_nothing_strikes_in_the_smooth_throw():
 
 def curve(case: Case, error: float, *, status="ok", **settings) -> Trajectory:
     """Return a made-up run of one-slice schemes that ends ``error`` omega_0 too fast."""
-    n = case.scenario.n_slices
-    points = len(case.times)
-    return Trajectory(
-        scenario=case.scenario,
-        solver="slicemodel",
-        method="exact-step",
-        t=case.times,
-        theta=np.zeros(points),
-        omega=case.scenario.omega0 * (1.0 + error * np.linspace(0.0, 1.0, points)),
-        r=np.empty((0, n)),
-        v=np.empty((0, n)),
-        r_cm=np.full(points, 0.1),
-        inertia=np.ones(points),
-        status=status,
-        message="it burst at t = 0.1 s" if status != "ok" else "",
-        settings=settings,
-    )
+    omega = case.scenario.omega0 * (1.0 + error * np.linspace(0.0, 1.0, len(case.times)))
+    message = "it burst at t = 0.1 s" if status != "ok" else ""
+    known = {"solver": "slicemodel", "method": "exact-step", "settings": settings}
+    return trajectory_of(case.scenario, case.times, omega=omega, status=status, message=message, **known)
 
 
 CASE = Case(name="made-up", title="made up", scenario=Scenario(n_slices=2))

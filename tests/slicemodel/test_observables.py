@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from slicemodel import Bottle, Scenario, observables
+from slicemodel import Bottle, Impacts, Scenario, observables
 
 # Two slices of 0.2 kg in a tube of 0.1 kg and 1 m: everything by hand.
 TWO = Scenario(bottle=Bottle(length=1.0, radius=0.1, mass=0.1, capacity=0.8), water_mass=0.4, n_slices=2)
@@ -54,3 +54,16 @@ def test_plateau_by_hand():
     assert observables.plateau(t, np.full(3, 20.0), 20.0) == pytest.approx(1.0)
     # The middle need not be a grid point.
     assert observables.plateau(np.array([0.0, 3.0, 4.0]), np.array([0.0, 3.0, 4.0]), 1.0) == pytest.approx(3.0)
+    # Nor need the flight start at t = 0.
+    late = observables.plateau(np.array([5.0, 8.0, 9.0]), np.array([0.0, 3.0, 4.0]), 1.0)
+    assert late == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(("left", "counted"), [(1.9e-3, 0), (2.1e-3, 1)])
+def test_a_graze_comes_back_slower_than_the_rest_speed_having_left_at_twice_that(left, counted):
+    """Slice 0 comes back at half the rest speed from a contact that it had left at ``left``; slice 1 is fast."""
+    impacts = Impacts(
+        time=[0.1, 0.2, 0.3], slice=[0, 1, 0], end=[1, 1, -1],
+        speed_before=[4e-3, 2.0, 0.5e-3], speed_after=[left, 1.0, 0.0],
+    )  # fmt: skip
+    assert observables.grazes(impacts, 1e-3) == counted

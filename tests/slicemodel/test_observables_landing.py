@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_up import trajectory_of
 
-from slicemodel import Bottle, Scenario, ScenarioError, Trajectory
+from slicemodel import Bottle, Scenario, ScenarioError
 from slicemodel import landing as landings
 from slicemodel.observables import (
     centre_of_mass,
@@ -35,18 +36,7 @@ def flight(scenario=ONE, *, theta=None, t=None, v=0.0, stored=True):
     t = np.linspace(0.0, scenario.duration, 3001) if t is None else t
     theta = scenario.theta0 + scenario.omega0 * t if theta is None else theta
     kept = len(t) if stored else 0
-    return Trajectory(
-        scenario=scenario,
-        solver="slicemodel",
-        method="ice",
-        t=t,
-        theta=theta,
-        omega=np.full_like(t, scenario.omega0),
-        r=np.full((kept, 1), 0.75),
-        v=np.full((kept, 1), v),
-        r_cm=np.full_like(t, R_CM),
-        inertia=np.ones_like(t),
-    )
+    return trajectory_of(scenario, t, theta=theta, r=np.full((kept, 1), 0.75), v=np.full((kept, 1), v), r_cm=R_CM)
 
 
 # ------------------------------------------------------------------ at rest and at release

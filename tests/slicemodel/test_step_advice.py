@@ -35,5 +35,11 @@ def test_ice_needs_the_fewest():
     assert required_steps(Scenario(n_slices=3, frozen=True), 1e-6) == 65
 
 
+def test_the_worst_error_times_one_and_a_half_must_meet_the_tolerance_in_two_octaves(monkeypatch):
+    """Of errors 7 tolerances / octave the eighth would do without that margin; the first octave that has it is 16."""
+    monkeypatch.setattr("slicemodel.step_advice._worst_of_octave", lambda *ask: 7e-3 / ask[-1])
+    assert required_steps(SMALL, 1e-3) == 16 * 64 + 1
+
+
 def test_second_order_needs_fewer():
     assert required_steps(SMALL, 1e-3, "midpoint") * 4 <= required_steps(SMALL, 1e-3, "exact-step")

@@ -12,8 +12,17 @@ from slicemodel import Scenario
 
 ENGINE: Final = "pymunk"
 FREE: Final = LADDER[-1]
-LIMITS: Final = {"published-python": "published-limit", "exact-step": "eq8"}
-"""Scheme -> the model it converges to."""
+LIMITS: Final = {
+    "published-python": "published-limit",
+    "signs-corrected": "signs-limit",
+    "roots-corrected": "eq8-wall",
+    "exact-step": "eq8",
+    "midpoint": "eq8",
+}
+"""Scheme -> the model it converges to; the others converge to none of the ladder."""
+
+SCHEMES: Final = ("published-python", "exact-step")
+"""The schemes that are told of in words: the published program, and the exact step of Eq. 8."""
 
 LOCATED: Final = "pymunk located"
 """Name of the hybrid, which exists for throws without drag only."""
@@ -60,4 +69,4 @@ def solver_runs(throw: Scenario, steps: int, certified: tuple[str, ...]) -> dict
         accuracy = {"tolerance": TOLERANCE} if name in certified else {"dt": UNCERTIFIED_DT}
         runs[name] = Run(engine, throw, {**settings, **accuracy}, name)
     runs |= {model: Run(model, throw, {}, model) for model in reversed(LADDER)}
-    return runs | {scheme: Run(scheme, throw, {"steps": steps}, scheme) for scheme in (*LIMITS, *OTHER_SCHEMES)}
+    return runs | {scheme: Run(scheme, throw, {"steps": steps}, scheme) for scheme in (*SCHEMES, *OTHER_SCHEMES)}

@@ -14,9 +14,10 @@ their values are round-off, which differs between machines. What is not computed
 from __future__ import annotations
 
 import math
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -35,10 +36,14 @@ SLICES: Final = 50
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Checked:
-    """The claims that were checked, and the baseline's findings that were not."""
+    """The claims that were checked, and the baseline's findings that were not.
+
+    ``seconds`` are the wall times that the claims took [s], by their ids; the first of a group has that of its runs.
+    """
 
     findings: tuple[Finding, ...]
     left_out: tuple[str, ...]
+    seconds: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def failed(self) -> tuple[Finding, ...]:
@@ -64,6 +69,8 @@ def check(
     tolerance: float = TOLERANCE,
     say: Callable[[str], None] = lambda _: None,
     store: RunStore | None = None,
+    guests: Sequence[str] = (),
+    timeout: float | None = None,
 ) -> Checked:
     """Check a throw.
 
@@ -80,6 +87,11 @@ def check(
         Called with a line for each claim, as soon as it is known.
     store : RunStore or None
         Slow runs are looked for and kept there.
+    guests : sequence of str
+        Specs of foreign solvers: their certificates are among the claims, and what a report of them found in the
+        baseline is found again.
+    timeout : float or None
+        Seconds one of their runs may take; None: as each declares.
 
     Raises
     ------
@@ -96,9 +108,12 @@ def check(
     if not isinstance(slices, int) or isinstance(slices, bool) or slices < 1:
         raise ValueError(f"{baseline}: slices = {slices!r} must be a whole number of at least 1")
     throw = scenario.with_slices(slices)
-    found = []
+    found: list[Finding] = []
+    seconds: dict[str, float] = {}
+    began = time.perf_counter()
     for group in groups:
         for finding in findings_of(group, throw, store):
+            began, seconds[finding.id] = time.perf_counter(), time.perf_counter() - began
             was = known.get(finding.id)
             if was is None and group == "thresholds":
                 continue
@@ -107,11 +122,21 @@ def check(
                 held, needs = _held_to(finding, was, tolerance, moves=group == "thresholds")
             found.append(held)
             say(line(held, needs))
+    for finding in findings_of("guests", throw, store, (tuple(guests), timeout)) if guests else ():
+        was = known.get(finding.id)
+        moves = finding.kind != "regression"
+        if moves and (was is None or was["value"] is None):
+            continue
+        held, needs = (
+            (finding, _interval(finding.admissible)) if was is None else _held_to(finding, was, tolerance, moves=moves)
+        )
+        found.append(held)
+        say(line(held, needs))
     if "thresholds" in groups:
         left_out = tuple(name for name in known if name not in {finding.id for finding in found})
     else:
         left_out = ()
-    return Checked(findings=tuple(found), left_out=left_out)
+    return Checked(findings=tuple(found), left_out=left_out, seconds=seconds)
 
 
 def line(finding: Finding, needs: str) -> str:
@@ -178,9 +203,12 @@ def groups() -> dict[str, tuple[str, ...]]:
     )
 
 
-def findings_of(group: str, throw: Scenario, store: RunStore | None = None) -> Iterator[Finding]:
-    """Yield the findings of a group's chapters on a throw; runs are made in this process."""
+def findings_of(group: str, throw: Scenario, store: RunStore | None = None, work: Any = None) -> Iterator[Finding]:
+    """Yield the findings of a group's chapters, or of a chapter given its ``work``; runs are made in this process."""
     ask = ask_of(throw, "check", throw.n_slices)
-    told = tell(gather(chapters_named(*groups()[group]), ask, Here(), store=store))
+    if work is None:
+        told = tell(gather(chapters_named(*groups()[group]), ask, Here(), store=store))
+    else:
+        told = tell(gather(chapters_named(group), ask, Here(), work={group: work}, store=store))
     for each in told.values():
         yield from each.findings

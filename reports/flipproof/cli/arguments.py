@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Callable, Mapping
+import os
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
@@ -40,6 +41,34 @@ def add_no_cache(command: argparse.ArgumentParser) -> None:
     )
 
 
+def add_guests(command: argparse.ArgumentParser, what: str) -> None:
+    """Add ``--with SPEC``, which may be repeated, and ``--timeout``."""
+    command.add_argument(
+        "--with",
+        dest="guests",
+        action="append",
+        default=[],
+        metavar="SPEC",
+        help=f"{what}, such as mine.py:solve; may be repeated",
+    )
+    command.add_argument("--timeout", type=count, metavar="S", help="seconds one run of a --with solver may take")
+
+
+def check_guests(specs: Sequence[str]) -> None:
+    """Refuse, before the work begins, a spec that names nothing or is there twice; no foreign code runs.
+
+    Raises
+    ------
+    ValueError
+    """
+    from flipproof.frame.solvers import find
+
+    for spec in specs:
+        find(spec)
+        if specs.count(spec) > 1:
+            raise ValueError(f"--with {spec} is there twice")
+
+
 def count(text: str) -> int:
     """Return a whole number of at least 1."""
     if not text.isdecimal() or int(text) < 1:
@@ -70,6 +99,33 @@ def check_writable(option: str, path: Path) -> None:
         raise ValueError(f"{option} {path} is a folder; name a file")
     if not path.parent.is_dir():
         raise ValueError(f"{option} {path}: the folder {path.parent} does not exist")
+
+
+WRITTEN: Final = ("out", "json", "junit", "html", "export", "film")
+"""Options that name what a command writes."""
+
+
+def refuse_overwriting(options: argparse.Namespace) -> None:
+    """Refuse a command that would write over a file that it reads.
+
+    Raises
+    ------
+    ValueError
+        Naming the option and the file.
+    """
+    given = vars(options)
+    read = [each for name, value in given.items() if name not in WRITTEN for each in _each(value)]
+    # A spec such as mine.py:solve or csv:file.csv names a file, too.
+    read = [part for each in read for part in (each, *each.split(":")) if os.path.isfile(part)]
+    for name in WRITTEN:
+        path = given.get(name)
+        if isinstance(path, Path) and path.is_file() and any(path.samefile(part) for part in read):
+            raise ValueError(f"--{name} {path} is a file that this command reads; name another")
+
+
+def _each(value: object) -> list[str]:
+    """Return the texts and paths of an option as texts."""
+    return [str(each) for each in (value if isinstance(value, list) else [value]) if isinstance(each, str | Path)]
 
 
 def add_json(command: argparse.ArgumentParser, what: str) -> None:

@@ -6,7 +6,15 @@ import argparse
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.cli.arguments import add_command, add_json, add_no_cache, check_writable, write_json
+from flipproof.cli.arguments import (
+    add_command,
+    add_guests,
+    add_json,
+    add_no_cache,
+    check_guests,
+    check_writable,
+    write_json,
+)
 
 TOLERANCE_HELP: Final = (
     "what a finding may move beyond its bands, in its own unit (default 1e-6: round-off of another machine; 0 for the "
@@ -37,6 +45,7 @@ def add_checks(commands: Any) -> None:
         "--only", type=_groups, metavar="LIST", help="some of ice,vectors,convergence,reference,thresholds, "
         "and of other chapters that can be checked (default: all; thresholds only with --baseline)",
     )  # fmt: skip
+    add_guests(check, "certify another solver, too, and hold it to what the baseline knows of it")
     add_json(check, "the findings")
     add_no_cache(check)
     check.add_argument("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML, too")
@@ -64,9 +73,13 @@ def command_diff(options: argparse.Namespace) -> int:
 
 def command_check(options: argparse.Namespace) -> int:
     """Print one line per claim, the verdict first; return 1 if one fails."""
+    from flipproof.foreign.specs import check_asked
     from slicemodel import Scenario
 
     scenario = Scenario.from_toml(options.scenario)
+    check_guests(options.guests)
+    for spec in options.guests:
+        check_asked(spec)
     from flipproof.check.throw import groups as known
 
     groups = options.only or tuple(group for group in known() if options.baseline or group != "thresholds")
@@ -86,12 +99,15 @@ def command_check(options: argparse.Namespace) -> int:
         print(line, flush=True)
 
     with RunStore(None if options.no_cache else default_place()) as store:
-        found = check(scenario, groups, baseline=options.baseline, tolerance=allowed, say=say, store=store)
+        found = check(
+            scenario, groups, baseline=options.baseline, tolerance=allowed, say=say, store=store,
+            guests=options.guests, timeout=options.timeout,
+        )  # fmt: skip
     if options.junit:
         from flipproof.output.folder import write_text
         from flipproof.output.junit import junit_text
 
-        write_text(options.junit, junit_text(found.findings, "flipproof check"))
+        write_text(options.junit, junit_text(found.findings, "flipproof check", found.seconds))
     write_json(options.json, {"findings": [one.to_mapping() for one in found.findings], "conclusion": found.conclusion})
     say(found.conclusion)
     return 1 if found.failed else 0

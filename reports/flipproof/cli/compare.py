@@ -55,7 +55,7 @@ def command_compare(options: argparse.Namespace) -> int:
 
     def load(name: str) -> Curve:
         path = Path(name)
-        if path.is_file() or (path.suffix and ":" not in name):
+        if path.is_file() or ((path.suffix or "/" in name) and ":" not in name):
             return read_curve(path)
         run = solve(find(name).name, scenario)
         if len(run.t) < 2:

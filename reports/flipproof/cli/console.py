@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import codecs
+import os
 import sys
+import threading
 import unicodedata
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, Final
 
 ASCII: Final = {
@@ -33,8 +37,27 @@ def _cut(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 2 :]}"
 
 
+@contextmanager
+def patience(seconds: float = 5.0) -> Iterator[None]:
+    """Say on standard error why nothing is said, if what is done takes longer than this."""
+    words = "flipproof: at work; the first use of a new installation compiles the reference, a minute or two"
+    timer = threading.Timer(seconds, lambda: print(words, file=sys.stderr, flush=True))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
 def speak_plainly() -> None:
-    """Let standard output and error write in ASCII what their encoding cannot show, instead of raising."""
+    """Let standard output and error write in ASCII what their encoding cannot show, instead of raising.
+
+    Where one is closed, Python has None; what is written there then goes nowhere, as whoever closed it asked.
+    """
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
     codecs.register_error(HANDLER, _in_ascii)
     for stream in (sys.stdout, sys.stderr):
         reconfigure: Any = getattr(stream, "reconfigure", None)

@@ -6,13 +6,16 @@ import argparse
 import math
 import shlex
 import sys
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, number, read_scenario
 
 MODELS = ("midpoint",)
+LINE = 15.0
+"""Seconds between two lines of a log."""
 
 
 def add_fit(commands: Any) -> None:
@@ -32,6 +35,10 @@ def add_fit(commands: Any) -> None:
         "scenario",
     )  # fmt: skip
     fit.add_argument("--starts", type=count, metavar="K", help="descents from different starts (default 4)")
+    fit.add_argument(
+        "--minutes", type=_positive, metavar="M", help="time that a fit with another solver, such as mine.py:solve, "
+        "may take: it decides between the usual search, a coarse one and none (default 10)",
+    )  # fmt: skip
     fit.add_argument(
         "--slices", type=count, metavar="N", help="slices of every throw, alpha/2m unchanged (50)",
     )  # fmt: skip
@@ -72,7 +79,7 @@ def command_fit(options: argparse.Namespace) -> int:
     also = tuple(options.also)
     problems = [pose(measured, throw, name, also=also, slices=options.slices) for name in options.model]
     remarks += _disagreements(problems[0], throw, also)
-    contenders = compare(_estimates(problems, options.starts))
+    contenders = compare(_estimates(problems, options.starts, options.minutes))
     text = _report(contenders, remarks)
     if options.out is not None:
         from flipproof.film.fit.folder import write
@@ -121,22 +128,47 @@ def _disagreements(problem: Any, throw: Any, also: tuple[str, ...]) -> list[str]
     ]
 
 
-def _estimates(problems: Sequence[Any], starts: int | None) -> list[Any]:
-    """Fit one problem after the other under a bar that counts flights."""
+def _estimates(problems: Sequence[Any], starts: int | None, minutes: float | None) -> list[Any]:
+    """Fit one problem after the other under a bar that counts flights; a log gets a line now and then."""
     from dataclasses import replace
 
     from tqdm import tqdm
 
-    from flipproof.film.fit.estimate import estimate
-    from flipproof.film.fit.sampling import USUAL
+    from flipproof.film.fit.budget import MINUTES, affordable
+    from flipproof.film.fit.estimate import USUAL, estimate
+    from flipproof.foreign.specs import is_foreign
 
-    effort = replace(USUAL, starts=starts) if starts else USUAL
-    with tqdm(unit="flight", disable=None, leave=False) as bar:
-        estimates = []
-        for problem in problems:
-            bar.set_description(problem.solver)
-            estimates.append(estimate(problem, effort, tick=bar.update))
-        return estimates
+    efforts, planned = [], []
+    for problem in problems:
+        budget = affordable(problem, minutes or MINUTES) if is_foreign(problem.solver) else None
+        if budget is not None:
+            print(f"flipproof: {problem.solver}: {budget.words}", file=sys.stderr, flush=True)
+        effort = USUAL if budget is None else budget.effort
+        efforts.append(replace(effort, starts=starts) if starts else effort)
+        planned.append(None if budget is None else budget.flights)
+    estimates = []
+    for problem, effort, flights in zip(problems, efforts, planned, strict=True):
+        with tqdm(desc=problem.solver, total=flights, unit="flight", disable=None, leave=False) as bar:
+            estimates.append(estimate(problem, effort, tick=_ticker(bar, problem.solver, flights)))
+    return estimates
+
+
+def _ticker(bar: Any, solver: str, planned: int | None) -> Callable[[int], object]:
+    """Return what counts flights: the bar of a terminal, or lines in a log of a search that was estimated."""
+    if not bar.disable or planned is None:
+        return lambda count: bar.update(count)
+    made, due, began = 0, time.perf_counter() + LINE, time.perf_counter()
+
+    def tick(count: int) -> None:
+        nonlocal made, due
+        made += count
+        now = time.perf_counter()
+        if now >= due:
+            due = now + LINE
+            words = f"flipproof: {solver}: {made} of at most about {planned} flights in {now - began:.0f} s"
+            print(words, file=sys.stderr, flush=True)
+
+    return tick
 
 
 def _report(contenders: Sequence[Any], remarks: Sequence[str]) -> str:
@@ -181,9 +213,9 @@ def _fit_lines(one: Any) -> list[str]:
         f"{one.root_mean_square:.3g} {estimate.problem.measured.unit} (root mean square)"
     )
     levels = estimate.minima[:, -1]
-    ends = ", ".join(f"{level:.0f}" for level in levels[:4]) + (" ..." if len(levels) > 4 else "")
+    same = int((levels < levels.min() + 1.0).sum())
     lines.append(
-        f"  search       {estimate.flights} flights; {len(levels)} descents to chi^2 of {ends}; intervals "
+        f"  search       {estimate.flights} flights; {same} of {len(levels)} descents end there; intervals "
         f"{math.sqrt(max(1.0, estimate.temperature)):.2f} times wider for misfit or shared noise, "
         f"{math.sqrt(estimate.roughness):.2f} for roughness"
     )

@@ -19,6 +19,7 @@ from flipproof.cli.arguments import (
     read_scenario,
     write_json,
 )
+from flipproof.cli.console import patience
 
 SPEC_HELP = (
     "a name that flipproof models lists, package.module:name, file.py:name, csv:file.csv or "
@@ -108,7 +109,7 @@ def command_certify(options: argparse.Namespace) -> int:
     for name in ("json", "junit"):
         if getattr(options, name) is not None:
             check_writable(f"--{name}", getattr(options, name))
-    with closing(opened(options.spec, options.timeout)) as runner:
+    with closing(opened(options.spec, options.timeout)) as runner, patience(20.0):
         found = certify(runner, equation=options.equation, say=lambda result: print(result.line, flush=True))
     write_json(options.json, found.to_mapping())
     if options.junit is not None:
@@ -125,7 +126,7 @@ def command_place(options: argparse.Namespace) -> int:
     from flipproof.foreign.place import place
     from flipproof.foreign.specs import ForeignError, opened
 
-    with closing(opened(options.spec, options.timeout)) as runner:
+    with closing(opened(options.spec, options.timeout)) as runner, patience():
         try:
             found = place(runner)
         except ForeignError as error:
@@ -141,7 +142,7 @@ def command_explain(options: argparse.Namespace) -> int:
     from flipproof.foreign.specs import opened
 
     throw = read_scenario(options.scenario, options.slices)
-    with closing(opened(options.first)) as one, closing(opened(options.second)) as other:
+    with closing(opened(options.first)) as one, closing(opened(options.second)) as other, patience():
         print(explain(one, other, throw).text)
     return 0
 

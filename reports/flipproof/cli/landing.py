@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, number, read_scenario
-from flipproof.cli.sweeps import add_where, fill
+from flipproof.cli.sweeps import add_store, fill
 
 SLICES: Final = 20
 
@@ -56,7 +56,7 @@ def add_landing(commands: Any) -> None:
         "--engine", type=_seed, default=60, metavar="N", help="throws a point by soft contacts; 0: none (%(default)s)"
     )
     _add_table(upright)
-    add_where(upright)
+    add_store(upright)
 
 
 def _add_table(command: argparse.ArgumentParser) -> None:

@@ -26,12 +26,16 @@ from flipproof.cli.arguments import (
     SCENARIO_HELP,
     OneLineParser,
     add_command,
+    add_guests,
     add_no_cache,
+    check_guests,
     count,
     read_scenario,
+    refuse_overwriting,
 )
 from flipproof.cli.check import add_checks
 from flipproof.cli.compare import add_compare
+from flipproof.cli.completion import add_completion
 from flipproof.cli.console import readable, speak_plainly
 from flipproof.cli.fit import add_fit
 from flipproof.cli.foreign import add_foreign, print_offered, print_offered_json
@@ -93,6 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         signal.signal(number, _interrupt)
     try:
         options = parser().parse_args(arguments)
+        refuse_overwriting(options)
         status = options.action(options)
         sys.stdout.flush()
         return int(status)
@@ -103,7 +108,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(INTERRUPTED_WORDS, file=sys.stderr)
         return INTERRUPTED
-    except (ValueError, OSError, MemoryError) as error:
+    except OSError as error:
+        return _complain(_words_of(error), BAD_INPUT)
+    except (ValueError, MemoryError) as error:
         return _complain(str(error) or type(error).__name__, BAD_INPUT)
     except Exception as error:
         # Nobody is helped by a traceback at the command line; whoever wants to mend the cause asks for it.
@@ -148,6 +155,15 @@ def _unraisable(what: sys.UnraisableHookArgs) -> None:
         sys.__unraisablehook__(what)
 
 
+def _words_of(error: OSError) -> str:
+    """Return what an error of the operating system says, and of what if it does not say that."""
+    if error.filename is not None:
+        return str(error)
+    if isinstance(error, FileNotFoundError):
+        return "the current folder has been removed; go to another"
+    return f"standard output or a file cannot be read or written ({error.strerror or error})"
+
+
 def _complain(words: str, status: int) -> int:
     print(f"flipproof: error: {readable(words)}", file=sys.stderr)
     return status
@@ -169,16 +185,9 @@ def parser() -> argparse.ArgumentParser:
         "--slices", type=count, metavar="N", help="slices at which solvers are compared (default 50, or the file's "
         "number if smaller)",
     )  # fmt: skip
-    report.add_argument(
-        "--with",
-        dest="guests",
-        action="append",
-        default=[],
-        metavar="SPEC",
-        help="certify another solver, such as mine.py:solve, and hold it against all others; may be repeated; a check "
-        "that it fails is a claim that fails",
+    add_guests(
+        report, "certify another solver and hold it against all others; a check that it fails is a claim that fails"
     )
-    report.add_argument("--timeout", type=count, metavar="S", help="seconds one run of a --with solver may take")
     report.add_argument(
         "--measured", type=Path, metavar="TRACK.csv", help="a measured flight to hold beside the solvers: a track of "
         "'flipproof track', or a CSV with t and theta or omega from release to landing",
@@ -211,6 +220,7 @@ def parser() -> argparse.ArgumentParser:
     add_animate(commands)
     add_landing(commands)
     add_foreign(commands)
+    add_completion(commands)
     models = add_command(commands, "models", "List every scheme, model and engine.", command_models)
     models.add_argument("--json", action="store_true", help="print JSON")
     return top
@@ -232,7 +242,7 @@ def command_report(options: argparse.Namespace) -> int:
     from flipproof.page.pdf import print_page, require_browser
 
     check_replaceable(options.out, "report")
-    _check_guests(options.guests)
+    check_guests(options.guests)
     measurement = None
     if options.measured is not None:
         from flipproof.film.measured import read_measured
@@ -277,27 +287,17 @@ def command_report(options: argparse.Namespace) -> int:
             gathered = gather_report(
                 ask, progress, options.jobs, Stages(say), store, pool, contents=contents, work=work
             )
-            facts = provenance(command) | store.facts()
+            guests = gathered.found("guests")
+            facts = provenance(command) | store.facts() | ({} if guests is None else guests.facts)
             report = build(gathered, facts, pool=store.remembering(pool), png=options.png)
         write(report, folder)
         if options.pdf:
             print_page(folder / "index.html", folder / "report.pdf")
-    guests = gathered.found("guests")
     for guest in guests.guests if guests is not None else ():
         found = guest.visit.certificate
         print(f"{guest.label}: {found.conclusion if found else '; '.join(guest.visit.problems.values())}")
     _print_report(report, options.out, time.perf_counter() - began)
     return 1 if report.failed else 0
-
-
-def _check_guests(specs: Sequence[str]) -> None:
-    """Refuse, before the work begins, a spec that names nothing or is there twice; no foreign code runs."""
-    from flipproof.frame.solvers import find
-
-    for spec in specs:
-        find(spec)
-        if specs.count(spec) > 1:
-            raise ValueError(f"--with {spec} is there twice")
 
 
 def _print_report(report: Any, out: Path, seconds: float) -> None:

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.cli.arguments import add_command, count
+from flipproof.cli.arguments import add_command, add_no_cache, count
 
 DEFAULT_OUT: Final = Path("reports/latest.paper" if Path("reports/flipproof").is_dir() else "flipproof-paper")
 
@@ -21,6 +21,7 @@ def add_paper(commands: Any) -> None:
     )
     paper.add_argument("--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="folder to write (%(default)s)")
     paper.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
+    add_no_cache(paper)
 
 
 def command_paper(options: argparse.Namespace) -> int:
@@ -31,17 +32,21 @@ def command_paper(options: argparse.Namespace) -> int:
 
     from tqdm import tqdm
 
+    from flipproof.frame.store import RunStore, default_place
     from flipproof.output.provenance import provenance
     from flipproof.paper.gallery import make_gallery
 
     made_by = provenance(shlex.join(["flipproof", *sys.argv[1:]]))
-    with tqdm(desc="flights", unit="flight", disable=None, leave=False) as bar:
+    with (
+        RunStore(None if options.no_cache else default_place()) as store,
+        tqdm(desc="groups of flights", unit="group", disable=None, leave=False) as bar,
+    ):
 
         def progress(made: int, planned: int, label: str) -> None:
             bar.total = planned
             bar.set_postfix_str(label, refresh=False)
             bar.update(made - bar.n)
 
-        words = make_gallery(names, options.out, progress, made_by, jobs=options.jobs)
+        words = make_gallery(names, options.out, progress, made_by, jobs=options.jobs, store=store)
     print(words)
     return 0

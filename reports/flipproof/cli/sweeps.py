@@ -21,7 +21,7 @@ def add_sweeps(commands: Any) -> None:
     """Add the three commands."""
     sweep = add_command(commands, "sweep", "Run many throws by many solvers, or go on with them.", command_sweep)
     sweep.add_argument("design", type=Path, metavar="SWEEP.toml", help="which fields vary, and which solvers")
-    _add_store(sweep)
+    add_store(sweep)
 
     drawn = add_command(commands, "map", "Map which mistake matters where, or go on with it.", command_map)
     drawn.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
@@ -32,7 +32,7 @@ def add_sweeps(commands: Any) -> None:
         "--size", type=_size, default=(20, 20), metavar="CxR", help="fill fractions by values of the axis (20x20)"
     )
     drawn.add_argument("--slices", type=count, default=SLICES, metavar="N", help="slices of every throw (%(default)s)")
-    _add_store(drawn)
+    add_store(drawn)
 
     waterfall = add_command(
         commands, "waterfall", "Split the published program's error over its assumptions, or go on with it.",
@@ -40,7 +40,7 @@ def add_sweeps(commands: Any) -> None:
     )  # fmt: skip
     waterfall.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     waterfall.add_argument("--slices", type=count, default=SLICES, metavar="N", help="slices (%(default)s)")
-    _add_store(waterfall)
+    add_store(waterfall)
 
 
 def command_sweep(options: argparse.Namespace) -> int:
@@ -67,17 +67,9 @@ def command_waterfall(options: argparse.Namespace) -> int:
     return fill(options, lambda begin, where: make_split(throw, options.out, begin, **where))
 
 
-def _add_store(command: argparse.ArgumentParser) -> None:
-    add_where(command)
-    command.add_argument(
-        "--salvage", type=Path, metavar="FILE", help="begin DIR with the rows that are whole in a damaged sweep's "
-        "FILE, and end; the same command without it makes the others",
-    )  # fmt: skip
-
-
-def add_where(command: argparse.ArgumentParser) -> None:
-    """Add what every command takes that fills a folder: where its rows go, and who makes them."""
-    command.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder; holds one SQLite file of rows")
+def add_store(command: argparse.ArgumentParser) -> None:
+    """Add what every command takes that fills a folder: where its rows go, who makes them, what they begin with."""
+    command.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder; holds a SQLite file of rows")
     where = command.add_mutually_exclusive_group()
     where.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
     where.add_argument(
@@ -86,6 +78,10 @@ def add_where(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--export", type=Path, metavar="FILE", help="when complete, write all rows to a .csv or .parquet"
     )
+    command.add_argument(
+        "--salvage", type=Path, metavar="FILE", help="begin DIR with the rows that are whole in a damaged sweep's "
+        "FILE, and end; the same command without it makes the others",
+    )  # fmt: skip
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
@@ -136,9 +132,7 @@ def fill(options: argparse.Namespace, make: Callable[[Any, dict[str, Any]], str]
     try:
         with ExitStack() as bars:
             where = {"jobs": options.jobs, "dask": options.dask, "export_to": options.export}
-            if "salvage" in options:
-                where["damaged"] = options.salvage
-            words = make(begin, where)
+            words = make(begin, where | {"damaged": options.salvage})
     except KeyboardInterrupt:
         there = f"{stored[0]} of {stored[1]} points are stored; " if stored[1] else ""
         print(f"flipproof: interrupted; {there}the same command goes on from there", file=sys.stderr)

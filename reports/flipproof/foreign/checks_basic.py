@@ -98,10 +98,11 @@ def check_angle(traits: Traits) -> Making:
     offs = [np.abs(_integral(a.t, a.omega) - (a.theta - a.theta[0])) for a in answers]
     sizes = [float(off.max()) for off in offs]
     bound = max(ANGLE, 64 * traits.epsilon) * max(1.0, float(np.ptp(answers[0].theta)))
+    refined = f", {sizes[-1]:.2g} rad at a quarter of the step" if len(sizes) > 1 else ""
     return Found(
         holds=sizes[0] <= bound or (len(sizes) > 1 and sizes[-1] * FALL <= sizes[0] and sizes[-1] <= 100 * bound),
-        expected=f"theta - theta_0 = integral of omega within {bound:.1g} rad",
-        came=f"off by {sizes[0]:.2g} rad",
+        expected=f"theta - theta_0 = integral of omega within {bound:.1g} rad, or a change that falls with dt",
+        came=f"off by {sizes[0]:.2g} rad{refined}",
         where=when(asks[0].times, offs[0]),
         advice="theta is in radians and advances by omega dt, omega of the same instant",
         facts={"angle": sizes},

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from flipproof.chapters.vectors.published import Vector, load_all
@@ -37,17 +39,19 @@ def check_vectors(traits: Traits) -> Making:
 
 
 def _ask(vector: Vector, traits: Traits) -> Ask:
-    """Return the ask for a published run; a program that refines by steps takes as many as it was published with."""
+    """Return the ask for a published run, up to where its numbers are held to; the program takes its own steps."""
     times = np.linspace(0.0, vector.scenario.duration, vector.steps)
-    effort = {"steps": float(vector.steps - 1), "dt": float(times[1])}.get(traits.refined_by or "")
-    return Ask.of(vector.scenario, times, effort)
+    times = times[times <= vector.until]
+    effort = {"steps": float(len(times) - 1), "dt": float(times[1])}.get(traits.refined_by or "")
+    return Ask.of(replace(vector.scenario, duration=float(times[-1])), times, effort)
 
 
 def _off(vector: Vector, answer: Answer, column: str) -> float:
     printed = vector.columns[column]
-    rows = np.isfinite(printed) & (vector.columns["t"] <= vector.until)
-    ours = getattr(answer, column)
-    return float(np.max(np.abs(ours - printed)[rows] / np.maximum(np.abs(printed[rows]), 1e-300)))
+    printed = printed[: len(answer.t)]
+    rows = np.isfinite(printed)
+    off = np.abs(getattr(answer, column) - printed)[rows]
+    return float(np.max(off / np.maximum(np.abs(printed[rows]), 1e-300)))
 
 
 def check_equation(traits: Traits) -> Making:

@@ -108,7 +108,7 @@ def check_floor(traits: Traits) -> Making:
         holds=floor <= meant or not stopped,
         expected=f"changes fall below {meant:.0e} of omega_0, or still fall",
         came=f"{floor:.2g} after {len(changes)} refinements, {'no longer' if stopped else 'still'} falling"
-        + (f": {said}" if said else ""),
+        + (f", as in {said}" if said else ""),
         where="0.05 s before any impact",
         advice='declare precision = "float32", or look for a tolerance or a constant that does not refine',
         facts={"floor": floor, "floor_reached": stopped, "arithmetic": said or None, "changes": changes},

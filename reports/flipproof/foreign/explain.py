@@ -7,6 +7,7 @@ what no switch explains is the rest: the solvers' own errors, and what is no cho
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from itertools import combinations
 
@@ -82,14 +83,28 @@ def explain(one: Runner, other: Runner, throw: Scenario) -> Explanation:
 
 def shares(start: Switches, end: Switches, throw: Scenario) -> dict[str, float]:
     """Return the mean change of the plateau over all orders of turning the switches from ``start`` to ``end``."""
+
+    def of(switches: Switches) -> float:
+        found = curve(switches.name, throw, times_of(throw, POINTS))
+        return plateau(found.t, found.omega, throw.omega0)
+
+    return shares_of(start, end, of)
+
+
+def shares_of(start: Switches, end: Switches, of: Callable[[Switches], float]) -> dict[str, float]:
+    """Return the mean change of a number over all orders of turning the switches from ``start`` to ``end``.
+
+    Parameters
+    ----------
+    of : callable (switches) -> float - the number by the equation of a set of switches; asked for once each
+    """
     differing = [f.name for f in fields(Switches) if getattr(start, f.name) != getattr(end, f.name)]
     known: dict[Switches, float] = {}
 
     def value(turned: tuple[str, ...]) -> float:
         switches = canonical(replace(start, **{name: getattr(end, name) for name in turned}))
         if switches not in known:
-            found = curve(switches.name, throw, times_of(throw, POINTS))
-            known[switches] = plateau(found.t, found.omega, throw.omega0)
+            known[switches] = of(switches)
         return known[switches]
 
     n = len(differing)

@@ -8,6 +8,7 @@ from typing import Any
 
 from flipproof.foreign.answers import trajectory_of
 from flipproof.foreign.checking import effort_of
+from flipproof.foreign.content import content_of
 from flipproof.foreign.contract import Ask
 from flipproof.foreign.specs import ForeignError, Runner, opened
 from slicemodel import Scenario, Trajectory
@@ -32,7 +33,7 @@ def solve(
     ForeignError
         If it gives no answer.
     """
-    runner = _runner(spec)
+    runner = _runner(spec, content_of(spec))
     given = effort_of(runner.traits, scenario, 0) if effort is None else effort
     ask = Ask.of(scenario, output_times(scenario, times), given, **options)
     try:
@@ -42,7 +43,9 @@ def solve(
 
 
 @cache
-def _runner(spec: str) -> Runner:
+def _runner(spec: str, content: str) -> Runner:
+    """Return the process of a solver; one whose files have changed gets another, so that its old code runs no more."""
+    del content
     runner = opened(spec, curves=True)
     atexit.register(runner.close)
     return runner

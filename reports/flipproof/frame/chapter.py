@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
-from flipproof.frame.exhibit import Exhibit
+from flipproof.frame.exhibit import Exhibit, Touch
 from flipproof.frame.findings import Finding, Kind
 from flipproof.frame.flights import Call, Flights, Outcome, attempt
 from flipproof.frame.solvers import Made, Missing, Run
@@ -24,7 +24,7 @@ from slicemodel import Scenario
 
 __all__ = [
     "Absent", "Ask", "Call", "Chapter", "Claims", "Exhibit", "Finding", "Flights", "Kind", "Made", "Missing", "Outcome",
-    "Part", "Run", "Size", "Study", "attempt", "judged",
+    "Part", "Run", "Size", "Study", "Touch", "attempt", "judged",
 ]  # fmt: skip
 """All that a chapter is written with."""
 
@@ -131,6 +131,15 @@ class Part:
 def judged(
     claim: Callable[..., Finding], *about: Any, id: str, title: str, kind: Kind = "regression"
 ) -> Finding | Absent:
-    """Return the finding of a claim of these arguments; if its evidence is missing, what says so under the same id."""
-    outcome = attempt(claim, *about)
+    """Return the finding of a claim of these arguments; if its evidence is missing, what says so under the same id.
+
+    Of what was made the claim is given the flight, of an outcome what was found.
+    """
+    outcome = attempt(lambda: claim(*map(_evidence, about)))
     return outcome.found if outcome.found is not None else Absent(id, title, outcome.reason, kind)
+
+
+def _evidence(about: Any) -> Any:
+    if isinstance(about, Made):
+        return about.flight
+    return about.value if isinstance(about, Outcome) else about

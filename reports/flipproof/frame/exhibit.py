@@ -12,9 +12,32 @@ from matplotlib.figure import Figure
 
 from flipproof.figures.style import Drawing, draw
 from flipproof.frame.pool import workers
+from flipproof.output.columns import Curves
 
 FEW = 3
 """Figures that are sooner drawn here than workers are started."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Touch:
+    """How the page draws a figure over time so that a reader can touch it: values, curves by choice, a zoom.
+
+    Parameters
+    ----------
+    label : str - of the vertical axis, with its unit
+    curves : mapping - curve -> times [s] and values, of equal length
+    shown : tuple of str - curves that are shown at first; empty: all
+    digits : int - after the point of a value
+    limits : (float, float) or None - ends of a logarithmic axis, on which absolute values are drawn; None: linear
+    beside : bool - whether the figure stays in sight above it
+    """
+
+    label: str
+    curves: Curves
+    shown: tuple[str, ...] = ()
+    digits: int = 3
+    limits: tuple[float, float] | None = None
+    beside: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,6 +56,8 @@ class Exhibit:
         The numbers that are drawn, as CSV with a unit in every header.
     drawn : Drawing or None
         The finished figure; None if nobody has drawn it yet.
+    touch : Touch or None
+        How it is drawn to be touched; None if it is a picture only.
     """
 
     name: str
@@ -43,6 +68,7 @@ class Exhibit:
     data: tuple[Any, ...]
     table: str | None
     drawn: Drawing | None = None
+    touch: Touch | None = None
 
     @property
     def drawing(self) -> Drawing:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import time
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from flipproof.frame.chapter import Absent, Ask, Chapter, Part
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Part
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding
 from flipproof.frame.flights import Call, Flights, Outcome, attempt
@@ -34,13 +35,17 @@ class Gathered:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Told:
-    """What a chapter tells: findings, figures, and ``notes``, each what is missing in its place and why."""
+    """What a chapter tells: findings, figures, and ``notes``, each what is missing in its place and why.
+
+    ``seconds`` are the wall times that its claims took to evaluate [s], by the findings' ids.
+    """
 
     chapter: Chapter[Any]
     found: Any
     findings: tuple[Finding, ...]
     figures: tuple[Exhibit, ...]
     notes: tuple[tuple[str, str], ...]
+    seconds: Mapping[str, float] = field(default_factory=dict)
 
 
 def _asked(parts: Iterable[Part], ask: Ask, work: Mapping[str, Any]) -> list[tuple[Chapter[Any], Any]]:
@@ -129,8 +134,9 @@ def tell(gathered: Gathered) -> dict[str, Told]:
 def _told(chapter: Chapter[Any], outcome: Outcome[Any]) -> Told:
     said: list[Finding | Absent] = []
     drawn: list[Exhibit] = []
+    seconds: dict[str, float] = {}
     for what in (
-        lambda: said.extend(chapter.claims(outcome.value)),
+        lambda: said.extend(_clocked(chapter.claims, outcome, seconds)),
         lambda: drawn.extend(chapter.figures(outcome.value)),
     ):
         failure = attempt(lambda what: what() or True, what)
@@ -142,4 +148,14 @@ def _told(chapter: Chapter[Any], outcome: Outcome[Any]) -> Told:
         findings=tuple(each.finding if isinstance(each, Absent) else each for each in said),
         figures=tuple(drawn),
         notes=tuple((each.title, each.reason) for each in said if isinstance(each, Absent)),
+        seconds=seconds,
     )
+
+
+def _clocked(claims: Callable[[Any], Claims], outcome: Outcome[Any], seconds: dict[str, float]) -> Claims:
+    """Yield the claims on what was found, and note how long each took."""
+    began = time.perf_counter()
+    for each in claims(outcome.value):
+        seconds[each.id] = time.perf_counter() - began
+        yield each
+        began = time.perf_counter()

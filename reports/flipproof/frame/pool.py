@@ -14,7 +14,7 @@ from flipproof.frame.store import RunStore
 from slicemodel import Scenario
 
 Progress = Callable[[int, int, str], None]
-"""Called with runs made, runs planned and the last run's name."""
+"""Called with runs and calls made, those planned, and the last one's name."""
 
 GROUP = 8
 """Runs of a group: sending a quick one away alone would cost as much as making it."""
@@ -63,11 +63,11 @@ def make_all(
             for result in results:
                 store.keep(result)
                 made[result.run] = result
-                progress(len(made), len(runs), result.run.name)
+                progress(len(made), len(runs) + len(pending_calls), result.run.name)
     called: dict[Call, Outcome[Any]] = {}
     for call, answer in pending_calls.items():
-        progress(len(made), len(runs), call.label)
         called[call] = _answered(call, answer)
+        progress(len(made) + len(called), len(runs) + len(pending_calls), call.label)
     # In the order asked, whichever worker was faster: what is read off this table must not depend on load.
     return {run: made[run] for run in runs}, called
 

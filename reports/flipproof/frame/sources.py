@@ -22,13 +22,13 @@ def fingerprint(*names: str) -> str:
         assert spec.origin is not None
         origin = Path(spec.origin)
         package = spec.submodule_search_locations is not None
-        for file in sorted(_files(origin.parent)) if package else [origin]:
+        for file in sorted(files_in(origin.parent)) if package else [origin]:
             sources.update(f"{name}/{file.relative_to(origin.parent).as_posix()}\0".encode())
             sources.update(file.read_bytes())
     return sources.hexdigest()
 
 
-def _files(folder: Path) -> Iterator[Path]:
+def files_in(folder: Path) -> Iterator[Path]:
     """Yield the files of a folder, but for what Python and numba have compiled and for hidden ones."""
     for entry in folder.rglob("*"):
         parts = entry.relative_to(folder).parts

@@ -26,7 +26,9 @@ CHANGE: Final = 3e-11
 CUT: Final = 10.0
 """Usual rest speed over that of the twin in rest speed."""
 
-BAND_WORDS: Final = f"the larger change when ω₀ is {CHANGE:g} faster and when the rest speed is cut {CUT:g}-fold"
+BAND_WORDS: Final = (
+    f"the larger of two changes: with ω₀ larger by {CHANGE:g} of itself, and with a rest speed {CUT:g} times smaller"
+)
 
 
 def twins(run: Run) -> tuple[Run, Run]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Final
 
@@ -93,13 +94,9 @@ def _by_height(throw: Scenario, goal: float) -> Aim:
 
 
 def _by_spin(throw: Scenario, goal: float) -> Aim:
-    def end(omega0: float) -> tuple[float, float]:
-        _, theta, rim = turn(replace(throw, omega0=omega0), throw.duration)
-        return float(theta[-1]), float(rim[-1])
-
     slow, farthest = 0.0, -math.inf
     for fast in np.arange(GRID, FASTEST + GRID / 2, GRID).tolist():
-        angle = end(fast)[0]
+        angle = _end(throw, fast)[0]
         farthest = max(farthest, angle)
         if angle >= goal:
             break
@@ -111,7 +108,16 @@ def _by_spin(throw: Scenario, goal: float) -> Aim:
         )
     for _ in range(HALVINGS):
         middle = (slow + fast) / 2
-        slow, fast = (slow, middle) if end(middle)[0] >= goal else (middle, fast)
+        slow, fast = (slow, middle) if _end(throw, middle)[0] >= goal else (middle, fast)
     return Aim(
-        throw=replace(throw, omega0=fast, duration=throw.duration + SPARE), height=end(fast)[1], time=throw.duration
+        throw=replace(throw, omega0=fast, duration=throw.duration + SPARE),
+        height=_end(throw, fast)[1],
+        time=throw.duration,
     )
+
+
+@lru_cache(maxsize=256)
+def _end(throw: Scenario, omega0: float) -> tuple[float, float]:
+    """Return angle [rad] and height of the lowest rim [m] at the end of a flight; the grid's serve every offset."""
+    _, theta, rim = turn(replace(throw, omega0=omega0), throw.duration)
+    return float(theta[-1]), float(rim[-1])

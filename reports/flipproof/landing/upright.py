@@ -11,7 +11,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final
 
@@ -24,10 +24,16 @@ from flipproof.output.ownership import MARKER, OutputError, check_own, marker_te
 from flipproof.sweep.command import Begin, completed
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import write_whole
+from flipproof.sweep.salvage import salvage
+from flipproof.sweep.schema import FILE
 from flipproof.sweep.store import Store
+from flipproof.sweep.work import code_identity
 from slicemodel import Scenario
 
 KIND: Final = "landing"
+WAVES: Final = ("aims", "throws")
+"""Folders of the sweeps, one a wave."""
+
 COLUMNS: Final = ("number", "status", "message", "reason", "seconds", *LANDING)
 
 Say = Callable[[str], None]
@@ -43,25 +49,45 @@ def make_upright(
     jobs: int | None = None,
     dask: str | None = None,
     export_to: Path | None = None,
+    damaged: Path | None = None,
 ) -> str:
     """Make every throw of the study that has no row in ``out``, write tables and figures; return lines that tell them.
+
+    Parameters
+    ----------
+    jobs, dask, export_to : as for ``flipproof.sweep.command.sweep``
+    damaged : path or None
+        Folder of a damaged study, or a file of it: ``out`` is begun with its whole rows, and only throws that choose an
+        aim are made, for without the aims it is not known which throws are counted.
 
     Raises
     ------
     SweepError
         If the folder, the workers or the disk will not do; what was stored is kept.
     """
+    if damaged and any((out / wave / FILE).exists() for wave in WAVES):
+        raise SweepError(f"--salvage begins a new study, and {out} holds one; name a new --out, or leave --salvage out")
+    files = _whole_files(damaged) if damaged else {}
     _own(out)
     summaries = []
 
+    def designed(wave: Wave) -> Throws:
+        return Throws(cases=wave.cases, seed=size.seed, text=f"flipproof upright, {wave.name}")
+
     def make(wave: Wave) -> Rows:
-        design = Throws(cases=wave.cases, seed=size.seed, text=f"flipproof upright, {wave.name}")
+        design = designed(wave)
         say(f"{wave.name}: {design.size} throws")
-        last = export_to if wave.name == "throws" else None
+        last = export_to if wave.name == WAVES[-1] else None
         with completed(design, out / wave.name, begin, jobs=jobs, dask=dask, export_to=last) as (store, summary):
             summaries.append(summary)
             return read_rows(store, design)
 
+    if damaged:
+        steps = study(throw, size)
+        aims = next(steps)
+        lines = [_saved(files, out, aims.name, designed(aims))]
+        throws = steps.send(make(aims))
+        return "\n".join([*lines, _saved(files, out, throws.name, designed(throws))])
     found = drive(throw, size, make)
     say("figures")
     write_whole(out / "upright.csv", shares_csv(found).encode())
@@ -72,6 +98,26 @@ def make_upright(
         write_whole(out / f"{exhibit.name}.png", drawing.png)
     lines = [share_line(found, family) for family in size.families]
     return "\n".join([*lines, f"({found.assumed})", *summaries, f"Tables and figures: {out}"])
+
+
+def _whole_files(damaged: Path) -> dict[str, Path]:
+    """Return the file of each wave of the study that a path belongs to: its folder, one of a wave, or a file there."""
+    for folder in (damaged, *list(damaged.absolute().parents)[:2]):
+        found = {wave: folder / wave / FILE for wave in WAVES if (folder / wave / FILE).is_file()}
+        if found:
+            return found
+    holds = " and ".join(f"{wave}/{FILE}" for wave in WAVES)
+    raise SweepError(f"--salvage {damaged} is no part of a study, which is a folder that holds {holds}")
+
+
+def _saved(files: Mapping[str, Path], out: Path, wave: str, design: Throws) -> str:
+    """Begin the sweep of a wave with what is whole in its damaged file; say how much that is."""
+    if wave not in files:
+        return f"{wave}: the damaged study has none"
+    try:
+        return salvage(files[wave], out / wave, design, code_identity())
+    except SweepError as error:
+        return f"{wave}: {error}"
 
 
 def drive(throw: Scenario, size: Size, make: Callable[[Wave], Rows]) -> Found:

@@ -19,6 +19,9 @@ LOCK: Final = "lock"
 NEW: Final = "new"
 OLD: Final = "old"
 
+TRIES: Final = 1000
+"""How often a folder that others remove as they end is made again, before it counts as one that cannot be made."""
+
 
 def check_replaceable(target: Path, kind: str) -> None:
     """Refuse a target that is a file, or a folder with anything in it but what flipproof wrote there as this ``kind``.
@@ -89,7 +92,7 @@ def _plainly(place: Path) -> Iterator[None]:
 def _held(beside: Path, target: Path) -> Iterator[None]:
     """Make the unfinished folder and hold its lock; remove both at the end."""
     with ExitStack() as held:
-        while True:
+        for left in reversed(range(TRIES)):
             beside.parent.mkdir(parents=True, exist_ok=True)
             try:
                 beside.mkdir(exist_ok=True)
@@ -100,9 +103,10 @@ def _held(beside: Path, target: Path) -> Iterator[None]:
                 held.enter_context(sole_writer(beside / LOCK, target))
                 break
             except FileNotFoundError:
-                continue  # the program before has removed the folder just now
+                if not left:
+                    raise  # else the program before has removed the folder just now
             except FileExistsError:
-                if beside.exists() and not beside.is_dir():
+                if not left or (beside.exists() and not beside.is_dir()):
                     raise  # else the program before has removed it while it was looked at
         yield
 

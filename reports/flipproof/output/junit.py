@@ -2,13 +2,17 @@
 
 A regression claim is a test case: one that holds is bare, one that does not carries a failure, one that could not be
 evaluated carries an error with its reason. Observations cannot fail; they stand among the properties of the suite.
+
+The time of a case is what its claim took to evaluate, after the runs, which many claims share; the time of the suite is
+that of everything, runs included.
 """
 
 from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Final
 
 from flipproof.frame.findings import Finding
@@ -17,8 +21,24 @@ FORBIDDEN: Final = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U00
 """Characters that XML 1.0 cannot hold, not even escaped; the reason of a failed run may have any."""
 
 
-def junit_text(findings: Sequence[Finding], suite: str = "flipproof") -> str:
-    """Return the findings as one test suite; ``time`` is zero, since a claim is read off runs that it shares."""
+NO_TIMES: Final[Mapping[str, float]] = MappingProxyType({})
+
+
+def junit_text(
+    findings: Sequence[Finding],
+    suite: str = "flipproof",
+    seconds: Mapping[str, float] = NO_TIMES,
+    whole: float | None = None,
+) -> str:
+    """Return the findings as one test suite.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+    suite : str - its name
+    seconds : id of a finding -> wall time of its evaluation [s]; zero for one that is missing
+    whole : float or None - wall time of everything [s]; None: the sum of ``seconds``
+    """
     cases = [finding for finding in findings if finding.kind == "regression"]
     counts = {
         "name": suite,
@@ -26,7 +46,7 @@ def junit_text(findings: Sequence[Finding], suite: str = "flipproof") -> str:
         "failures": str(sum(finding.verdict == "fail" for finding in cases)),
         "errors": str(sum(finding.verdict == "not evaluated" for finding in cases)),
         "skipped": "0",
-        "time": "0",
+        "time": f"{sum(seconds.values()) if whole is None else whole:.3f}",
     }
     root = ElementTree.Element("testsuites", {key: value for key, value in counts.items() if key != "skipped"})
     tests = ElementTree.SubElement(root, "testsuite", counts)
@@ -37,15 +57,15 @@ def junit_text(findings: Sequence[Finding], suite: str = "flipproof") -> str:
             words = {"name": finding.id, "value": _clean(f"{_numbers(finding)}; {finding.title}")}
             ElementTree.SubElement(properties, "property", words)
     for finding in cases:
-        _add_case(tests, finding, suite)
+        _add_case(tests, finding, suite, seconds.get(finding.id, 0.0))
     ElementTree.indent(root, " ")
     text: str = ElementTree.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
 
 
-def _add_case(tests: ElementTree.Element, finding: Finding, suite: str) -> None:
-    group = finding.id.partition("-")[0]
-    case = ElementTree.SubElement(tests, "testcase", {"classname": f"{suite}.{group}", "name": finding.id, "time": "0"})
+def _add_case(tests: ElementTree.Element, finding: Finding, suite: str, seconds: float) -> None:
+    words = {"classname": f"{suite}.{finding.id.partition('-')[0]}", "name": finding.id, "time": f"{seconds:.6f}"}
+    case = ElementTree.SubElement(tests, "testcase", words)
     numbers = f"{_numbers(finding)}, threshold {finding.threshold_text}"
     if finding.verdict == "fail":
         failure = ElementTree.SubElement(case, "failure", {"message": _clean(numbers), "type": "threshold"})

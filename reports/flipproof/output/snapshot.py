@@ -22,7 +22,7 @@ from flipproof.check.diff import read_summary
 from flipproof.output.folder import replaced_folder
 from flipproof.output.summary import SCHEMA_NAME, SUMMARY_VERSION, summary_text
 from flipproof.page.headlines import Headline
-from flipproof.page.lead import answers
+from flipproof.page.lead import answered, asides, percent_at
 
 PLACE: Final = Path(__file__).resolve().parents[2] / "snapshot"
 
@@ -63,14 +63,18 @@ def take(report: Path, place: Path = PLACE) -> None:
 
 
 def front_page(summary: Mapping[str, Any]) -> str:
-    """Return what the README says that was found, from a summary alone."""
+    """Return what the README says that was found, from a summary alone: a table of answers, and what it leaves out."""
     found = [Headline.from_mapping(mapping) for mapping in summary["headlines"]]
-    parts = (f"- **{question}** {' '.join(said)}" for question, said in answers(found))
-    wrapped = (
-        fill(part.replace("ω₀", "omega_0").replace("ω", "omega").replace("θ", "theta"), 118, subsequent_indent="  ")
-        for part in parts
-    )
-    return "\n".join(wrapped) + "\n"
+    slices = sorted({n for h in found for n in (h.slices, h.finer_slices) if n is not None})
+    head = ("asked", "answer", "largest difference of ω of one pair, % of ω₀", *(f"N = {n}" for n in slices))
+    rows = [(a.question, a.verdict, a.words, *(percent_at(a.headline, n) for n in slices)) for a in answered(found)]
+    table = "".join(f"| {' | '.join(cells)} |\n" for cells in (head, ("---",) * len(head), *rows))
+    text = "\n".join(fill(_plain(f"- {said}"), 118, subsequent_indent="  ") for said in asides(found))
+    return f"{_plain(table)}\n{text}\n"
+
+
+def _plain(text: str) -> str:
+    return text.replace("ω₀", "omega_0").replace("ω", "omega").replace("θ", "theta")
 
 
 def write_front_page(summary: Mapping[str, Any], readme: Path) -> None:

@@ -66,6 +66,11 @@ TERMS: Final[Mapping[str, str]] = {
     "impact": "A slice strikes an end of the bottle.",
 }  # fmt: skip
 
+EQUATIONS: Final[Mapping[str, str]] = {"Eq. 8": "eq8", "free flight": "free-flight"} | {
+    name: name for name in ("published-limit", "signs-limit", "eq8-wall", "eq8-weightless", "accelerating-origin")
+}
+"""Term -> the solver whose equation stands with it."""
+
 _PLACES: Final = {
     "ω₀": "omega-at-release",
     "M̃": "filling",
@@ -78,6 +83,16 @@ _WORD: Final = re.compile(
     r"(?<![\w₀])(" + "|".join(re.escape(term) for term in sorted(TERMS, key=len, reverse=True)) + r")(?![\w₀-])"
 )
 _TAG: Final = re.compile(r"(<script.*?</script>|<style.*?</style>|<[^>]*>)", re.DOTALL)
+_PLAIN: Final = {"omega_0": "ω₀", "theta_0": "θ₀"}
+_SYMBOL: Final = re.compile(
+    r"(?<![\w/.])(?:(?P<plain>omega_0|theta_0)|e\^\((?P<power>[^()]*)\)"
+    r"|(?P<d>d?)(?P<letter>[rvCMeJHNθt])(?P<primes>'{0,2})_(?P<index>CM|M|w|W|max|b|table|c|i|j|t))(?![\w'])"
+)
+"""A symbol with its index, or a power of e, in plain text."""
+
+_AS_IT_IS: Final = frozenset(("svg", "math", "code", "pre", "noscript", "select"))
+"""Elements whose text is not typeset."""
+
 _CLOSED: Final = frozenset(
     ("a", "svg", "math", "code", "pre", "button", "label", "select", "h2", "h3", "summary",
      "noscript", "thead", "legend", "caption")
@@ -91,20 +106,43 @@ def anchor(term: str) -> str:
 
 
 def linked(html: str) -> Markup:
-    """Return a section in which the first appearance of every term is a link to the glossary with a tooltip."""
+    """Return a section with its symbols typeset and a link to the glossary where a term appears first."""
     return Markup("".join(_linked(html, set())))
 
 
 def _linked(html: str, seen: set[str]) -> Iterator[str]:
-    depth = 0
+    depth = kept = 0
     for piece in _TAG.split(html):
         if piece.startswith("<"):
             name = piece.strip("</> ").split(" ", 1)[0].split("\n", 1)[0].lower()
-            if name in _CLOSED and not piece.endswith(("/>", "</script>", "</style>")):
-                depth += -1 if piece.startswith("</") else 1
+            if not piece.endswith(("/>", "</script>", "</style>")):
+                step = -1 if piece.startswith("</") else 1
+                depth += step * (name in _CLOSED)
+                kept += step * (name in _AS_IT_IS)
+            yield piece
+        elif kept:
             yield piece
         else:
-            yield piece if depth else _WORD.sub(lambda found: _link(found.group(), seen), piece)
+            yield from _typeset(piece if depth else _WORD.sub(lambda found: _link(found.group(), seen), piece))
+
+
+def _typeset(html: str) -> Iterator[str]:
+    """Yield text, which may have links, with its symbols typeset: r_CM as r with a lower index."""
+    for piece in _TAG.split(html):
+        yield piece if piece.startswith("<") else _SYMBOL.sub(_indexed, piece)
+
+
+def _indexed(found: re.Match[str]) -> str:
+    if found["plain"]:
+        return _PLAIN[found["plain"]]
+    if found["power"]:
+        return f"<i>e</i><sup>{found['power']}</sup>"
+    return f"{found['d']}<i>{found['letter']}</i>{found['primes']}<sub>{found['index']}</sub>"
+
+
+def indexed(html: str) -> Markup:
+    """Return a section with its symbols typeset, without links: the glossary itself."""
+    return Markup("".join(_typeset(html)))
 
 
 def _link(term: str, seen: set[str]) -> str:

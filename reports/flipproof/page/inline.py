@@ -13,7 +13,7 @@ from markupsafe import Markup
 DIGITS = 2
 """Digits kept after the point of a coordinate, in points of 1/72 inch."""
 
-COORDINATES = re.compile(r'(?<= )(?:d|x|y|points)="[^"]*"')
+COORDINATES = re.compile(r'(?<= )(?:d|x|y|points)="[^"]*"|translate\([^)]*\)')
 PATHS = re.compile(r'(?<= )d="[^"]*"')
 COMMANDS = re.compile(r" ?([MLHVCSQTAZmlhvcsqtaz]) ?")
 STYLES = re.compile(r'(?<= )style="[^"]*"')
@@ -22,6 +22,12 @@ SPACES = re.compile(r"\s*\n\s*")
 UNSEEN = re.compile(r"<!--.*?-->|<metadata>.*?</metadata>", re.S)
 GROUP_NAMES = re.compile(r'<g id="([^"]*)"')
 SIZE = re.compile(r'<svg[^>]*? width="([\d.]+)pt" height="([\d.]+)pt"')
+LETTERS = re.compile(r"scale\((0?\.\d+) -0?\.\d+\)")
+"""Scale of a line of text, in hundredths of its size."""
+
+SMALLEST = 9.0
+"""Size of the smallest letters of a figure on a narrow screen, where it scrolls by itself [px]."""
+
 REFERENCES = re.compile(r"#([\w.-]+)")
 IDS = re.compile(r'(?<= id=")[^"]*')
 TARGETS = re.compile(r'(?<=href="#)[^"]*|(?<=url\(#)[^)]*')
@@ -49,13 +55,17 @@ def data_uri(svg: str) -> Markup:
 
 
 def shape(svg: str) -> Markup:
-    """Return width and height of an SVG as attributes of its image, so that its place is kept before it is drawn."""
+    """Return width and height of an SVG as attributes of its image, so that its place is kept before it is drawn.
+
+    With them the least width [px] at which its smallest letters can be read; Matplotlib draws letters as paths.
+    """
     found = SIZE.search(svg)
-    return (
-        Markup(' width="{}" height="{}"').format(*(round(float(side)) for side in found.groups()))
-        if found
-        else Markup("")
-    )
+    if found is None:
+        return Markup("")
+    width, height = map(float, found.groups())
+    letters = [100.0 * float(scale) for scale in LETTERS.findall(svg)]
+    least = width * SMALLEST / min(letters, default=SMALLEST)
+    return Markup(' width="{}" height="{}" style="--least:{}px"').format(round(width), round(height), round(least))
 
 
 def _rounded(found: re.Match[str]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 from flipproof.chapters.differences.study import PARTING_BAND, moved, percent
 from flipproof.page.headlines import Headline
@@ -21,7 +22,7 @@ def answer(headlines: Sequence[Headline]) -> str:
         return "No verdict: what it needs could not be computed; the reasons stand below."
     within = percent(PARTING_BAND)
     return {
-        (True, False): "The step is short enough. Eq. 8 is not free flight.",
+        (True, False): "Not as it stands: its time step is short enough, but its Eq. 8 is not free flight.",
         (True, True): f"On this throw the step is short enough, and Eq. 8 is free flight within {within} of ω₀.",
         (False, True): f"On this throw Eq. 8 is free flight within {within} of ω₀. The step is too long.",
         (False, False): "On this throw the step is too long, and Eq. 8 is not free flight.",
@@ -48,16 +49,54 @@ def answers(headlines: Sequence[Headline]) -> Iterator[tuple[str, list[str]]]:
     if "share" in found:
         yield "Which change matters most for the mean omega of the second half?", list(_shares(found))
     if "engine" in found:
-        engine = found["engine"]
-        band = "" if engine.band is None else f"; the numerical band of this difference is {percent(engine.band)} of ω₀"
-        yield (
-            f"Does a physics engine agree? {_verdict([engine.value])}",
-            [
-                "Free flight by event-driven integration and by pymunk, with its hits on the step's grid, differ in ω "
-                f"by up to {amount(engine)}{band}. This tests the solution of free flight, not whether slices describe "
-                "water."
-            ],
-        )
+        yield f"Does a physics engine agree? {_verdict([found['engine'].value])}", list(_engine(found["engine"]))
+
+
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """One line of the table of answers: a question, yes or no, and a number with what it is the difference of."""
+
+    question: str
+    verdict: str
+    words: str
+    headline: Headline
+
+
+def answered(headlines: Sequence[Headline]) -> Iterator[Answered]:
+    """Yield the lines of the table of answers; question and verdict stand in the first line of several."""
+    found = {headline.id: headline for headline in headlines}
+    steps = found["step"].note if "step" in found else "the steps"
+    asked = {
+        "Is it justified to hold ω constant over a step?": {
+            "held-through": "exact step of Eq. 8, with rebounds located inside the step, from Eq. 8; all impacts",
+            "held": "published program without its lag of one step, from its equation; before the first impact",
+        },
+        f"Are {steps} enough?": {
+            "step": (
+                "published program, with its lag of one step and rebounds on the grid, from its equation; all impacts"
+            )
+        },
+        "Is Eq. 8 free flight?": {
+            "eq8-free": "Eq. 8, from free flight",
+            "program-eq8": "published program, from Eq. 8",
+            "whole": "published program, from free flight",
+        },
+        "Does a physics engine agree?": {"engine": "pymunk, with its hits on the grid of its step, from free flight"},
+    }
+    for question, pairs in asked.items():
+        there = [(words, found[id_]) for id_, words in pairs.items() if id_ in found]
+        verdict = _verdict([headline.value for _, headline in there])
+        for k, (words, headline) in enumerate(there):
+            yield Answered(question if k == 0 else "", verdict if k == 0 else "", words, headline)
+
+
+def asides(headlines: Sequence[Headline]) -> Iterator[str]:
+    """Yield what the table of answers does not say, a paragraph each."""
+    found = {headline.id: headline for headline in headlines}
+    yield from _farther(found)
+    yield from _shares(found)
+    if "engine" in found:
+        yield " ".join(list(_engine(found["engine"]))[1:])
 
 
 def _verdict(values: Sequence[float]) -> str:
@@ -108,11 +147,14 @@ def _equations(found: Mapping[str, Headline]) -> Iterator[str]:
         yield f"The published program and free flight differ in ω by up to {amount(whole)}{until}."
     if eq8 is not None:
         yield f"The published program and Eq. 8 differ in ω by up to {amount(eq8)}."
-        if whole is not None and whole.value > 0.0:
-            times = f"{eq8.value / whole.value:.2g}"
-            yield (
-                f"By these two largest differences the program is {times} times as far from Eq. 8 as from free flight."
-            )
+    yield from _farther(found)
+
+
+def _farther(found: Mapping[str, Headline]) -> Iterator[str]:
+    whole, eq8 = found.get("whole"), found.get("program-eq8")
+    if whole is not None and eq8 is not None and whole.value > 0.0:
+        times = f"{eq8.value / whole.value:.2g}"
+        yield f"By their largest differences the program is {times} times as far from Eq. 8 as from free flight."
     ends = [found[id_] for id_ in ("program-eq8-landing", "whole-landing") if id_ in found]
     if len(ends) == 2:
         yield (
@@ -133,7 +175,7 @@ def _shares(found: Mapping[str, Headline]) -> Iterator[str]:
             f"change of the mean ω of the second half, as the mean over all orders of making them: {listed}."
         )
         yield (
-            f"In single orders the same changes move that mean by {signed(low)} to {signed(high)} of ω₀ "
+            f"In single orders these six changes move that mean by {signed(low)} to {signed(high)} of ω₀ "
             f"(N = {shares[0].slices}). For ω, θ and v_CM on landing the shares are others; the report has a table."
         )
     if len(shares) > 1 and tied(shares[0], shares[1]):
@@ -179,6 +221,16 @@ def _step(found: Mapping[str, Headline]) -> Iterator[str]:
         )
 
 
+def _engine(engine: Headline) -> Iterator[str]:
+    yield (
+        "Free flight by event-driven integration and by pymunk, with its hits on the step's grid, differ in ω by up to "
+        f"{amount(engine)}."
+    )
+    if engine.band is not None:
+        yield f"The numerical band of the difference between free flight and pymunk is {percent(engine.band)} of ω₀."
+    yield "Agreement with pymunk tests the solution of free flight, not whether slices describe water."
+
+
 def tied(first: Headline, second: Headline) -> bool:
     """Return whether two shares differ by less than either moves with the number of slices."""
     moved = [abs(h.finer - h.value) for h in (first, second) if h.finer is not None]
@@ -190,6 +242,12 @@ def amount(headline: Headline) -> str:
     share = headline.measure in ("share", "order")
     text = signed if share else percent
     return f"{text(headline.value)} of ω₀ ({at_slices(headline)})"
+
+
+def percent_at(headline: Headline, slices: int) -> str:
+    """Return a number at that many slices, a dash if it was not computed there."""
+    value = {headline.slices: headline.value, headline.finer_slices: headline.finer}.get(slices)
+    return "–" if value is None else percent(value)
 
 
 def at_slices(headline: Headline) -> str:

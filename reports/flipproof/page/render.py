@@ -12,8 +12,11 @@ from markupsafe import Markup
 
 from flipproof.chapters.differences.study import Difference, moved, percent
 from flipproof.frame.gather import Gathered, Told
+from flipproof.frame.solvers import find
 from flipproof.output.summary import summarise
-from flipproof.page.glossary import TERMS, anchor
+from flipproof.page.captions import shared
+from flipproof.page.equations import equation, typeset
+from flipproof.page.glossary import EQUATIONS, TERMS, anchor
 from flipproof.page.headlines import headlines
 from flipproof.page.inline import data_uri, shape
 from flipproof.page.lead import answer, answers, lead_words
@@ -22,18 +25,7 @@ from flipproof.page.sections import STORY, behind
 from flipproof.page.story.facts import story
 from flipproof.page.story.live import live_data, sliders
 from flipproof.page.templating import environment
-
-SYMBOLS = {
-    "omega_0": "ω₀", "omega0": "ω₀", "omega": "ω", "theta": "θ", "gamma": "γ", "alpha": "α", "epsilon": "ε",
-    "dt -> 0": "Δt → 0", "sum_free ": "Σ_free ", "beta = -": "β = −", "sqrt(": "√(", "^2": "²", " +- ": " ± ",
-    "<<": "≪", " - ": " − ", "-gamma": "−γ",
-}  # fmt: skip
-
-
-def typeset(text: str) -> str:
-    """Return plain-text mathematics with Greek letters and signs; the command line prints it as it is."""
-    pattern = "|".join(re.escape(word) for word in sorted(SYMBOLS, key=len, reverse=True))
-    return re.sub(pattern, lambda match: SYMBOLS[match.group()], text)
+from flipproof.page.touch import touch_data
 
 
 def unbroken(text: str) -> str:
@@ -110,6 +102,7 @@ def render(
         provenance=provenance,
         settings=gathered.ask.scenario.to_toml(),
         terms=TERMS,
+        formulas={term: find(solver).equation for term, solver in EQUATIONS.items()},
         story=facts,
         story_ids=STORY,
         sliders=sliders(gathered.ask.throw),
@@ -129,7 +122,8 @@ def page_environment() -> Environment:
     templates = environment()
     templates.filters |= {
         "typeset": typeset, "unbroken": unbroken, "amount": amount, "percent": percent, "data_uri": data_uri,
-        "shape": shape, "short": short, "restitution_error": restitution_error, "term_anchor": anchor,
+        "shape": shape, "touch_data": touch_data, "short": short,
+        "restitution_error": restitution_error, "term_anchor": anchor, "equation": equation, "shared": shared,
     }  # fmt: skip
     templates.globals["assets"] = read_assets()
     return templates

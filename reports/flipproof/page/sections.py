@@ -6,9 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from jinja2 import Environment
-from markupsafe import Markup
 
-from flipproof.page.glossary import linked
+from flipproof.page.glossary import indexed, linked
 from flipproof.page.parts import Section
 
 STORY: Final[Mapping[str, str]] = {
@@ -39,4 +38,4 @@ def behind(parts: Sequence[Section], templates: Environment, context: Mapping[st
     """Yield the sections that stand behind the parts of a report, with links to the glossary."""
     for id_, (title, sentence) in BEHIND.items():
         html = templates.get_template(f"{id_}.html.j2").render(context, parts=parts)
-        yield Section(id=id_, title=title, sentence=sentence, html=Markup(html) if id_ == "glossary" else linked(html))
+        yield Section(id=id_, title=title, sentence=sentence, html=(indexed if id_ == "glossary" else linked)(html))

@@ -6,14 +6,23 @@ choose its own; what that changes, and what tolerances change in omega, is the b
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
+from types import MappingProxyType
+from typing import Any, Final
 
 from flipproof.paper.observe import Flights, MissingFlightError
 from flipproof.paper.runs import BANDS
 from flipproof.paper.statements import OMEGA, Judgement, Kind, Reading
 
-Read = Callable[[Flights], tuple[Reading, ...]]
+Read = Callable[..., tuple[Reading, ...]]
+"""Flights of one equation -> what is read off them; options, if it has any, are other senses of the text."""
+
+FLAT_WHY: Final = "“Flat” is a word of ours for a rise of at most 0.1 ω₀: 2 rad/s of the 20 on the axis."
+SUPERIMPOSED_WHY: Final = (
+    "“Superimposed” is a word of ours for at most 0.05 ω₀ apart: 1 rad/s of 20, about the width of a drawn line."
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,6 +53,27 @@ class Claim:
     of_steps: bool = False
     judges: tuple[str, ...] = ()
     silent: str = ""
+
+
+def states(
+    id_: str, *, otherwise: Mapping[str, Mapping[str, Any] | Read] = MappingProxyType({}), **about: Any
+) -> Callable[[Read], Claim]:
+    """Return a decorator that makes a statement of what reads its numbers.
+
+    Parameters
+    ----------
+    otherwise : words -> another sense of the text: options of the same function, or another one
+    about : as in ``Claim``
+    """
+
+    def stated(read: Read) -> Claim:
+        senses = (
+            (words, partial(read, **sense) if isinstance(sense, Mapping) else sense)
+            for words, sense in otherwise.items()
+        )
+        return Claim(id=id_, read=read, otherwise=tuple(senses), **about)
+
+    return stated
 
 
 def judge(claim: Claim, flights: Flights) -> Judgement:

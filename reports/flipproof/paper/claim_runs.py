@@ -9,7 +9,7 @@ from typing import Any, Final
 from flipproof.frame.solvers import Made, Run
 from flipproof.paper.cases import Case, family
 from flipproof.paper.claims_cost import MANY_STEPS, many_steps_key, same_steps_key
-from flipproof.paper.claims_model import FINEST, MANY_SLICES, finest_key
+from flipproof.paper.claims_slices import FINEST, MANY_SLICES, finest_key
 from flipproof.paper.observe import Flights
 from flipproof.paper.parameters import numbers, paper_steps, paper_throw
 from flipproof.paper.runs import GROUP, PUBLISHED, SOLVERS, PaperRuns, scenario_of

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
 from flipproof.frame.findings import Finding
-from flipproof.paper.claim import Claim, judge
+from flipproof.paper.claim import judge
 from flipproof.paper.claim_runs import STEADY_FILLING, WEIGHTLESS, WEIGHTLESS_KEY, ClaimRuns
+from flipproof.paper.claims_cost import OF_COST
+from flipproof.paper.claims_drag import OF_DRAG
+from flipproof.paper.claims_filling import OF_FILLINGS
+from flipproof.paper.claims_landing import OF_LANDING
+from flipproof.paper.claims_slices import OF_SLICES
+from flipproof.paper.claims_throw import OF_RELEASE, OF_THROWS
 from flipproof.paper.observe import Flights
 from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS
-from flipproof.paper.said_of_model import OF_MODEL
-from flipproof.paper.said_of_throws import OF_LANDING, OF_THROWS
 from flipproof.paper.statements import OMEGA, Statement
 from slicemodel.observables import plateau
 
@@ -24,11 +28,11 @@ STEADY: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
 )
 """Mean of omega / omega_0 over the second half of the flight of a bottle filled to 0.1: without weight, and with."""
 
-CLAIMS: Final = (*OF_MODEL, *OF_THROWS, *OF_LANDING)
+CLAIMS: Final = (*OF_RELEASE, *OF_SLICES, *OF_COST, *OF_DRAG, *OF_FILLINGS, *OF_THROWS, *OF_LANDING)
 """All statements, in the order of the paper."""
 
 
-def judge_all(runs: ClaimRuns, claims: Iterable[Claim] = CLAIMS) -> tuple[Statement, ...]:
+def judge_all(runs: ClaimRuns) -> tuple[Statement, ...]:
     """Return every statement with its judgements, in the order of the paper."""
     flights = [runs.flights(solver) for solver in SOLVERS]
     nothing = Flights(solver=GEOMETRY, runs={}, reasons={})
@@ -43,7 +47,7 @@ def judge_all(runs: ClaimRuns, claims: Iterable[Claim] = CLAIMS) -> tuple[Statem
             kind=claim.kind,
             judgements=tuple(judge(claim, each) for each in ([nothing] if claim.of_geometry else flights)),
         )
-        for claim in claims
+        for claim in CLAIMS
     )
 
 

@@ -1,4 +1,4 @@
-"""What section 6 says about the landing: toppling angle and velocity of the centre of mass (Fig. 9)."""
+"""What section 6 says of the landing: toppling angle and velocity of the centre of mass (Fig. 9)."""
 
 from __future__ import annotations
 
@@ -9,12 +9,19 @@ from functools import cache
 from typing import Final
 
 from flipproof.frame.findings import Finding
-from flipproof.paper.observe import Flights, MissingFlightError
+from flipproof.paper.claim import states
+from flipproof.paper.observe import (
+    Flights,
+    MissingFlightError,
+)
 from flipproof.paper.parameters import paper_throw
 from flipproof.paper.statements import Reading
 from slicemodel import Bottle, Trajectory
 from slicemodel.landing import Moment, moment_at, next_upright
-from slicemodel.observables import centre_of_mass_at_rest, static_toppling_angle
+from slicemodel.observables import (
+    centre_of_mass_at_rest,
+    static_toppling_angle,
+)
 
 PEAK_DEGREES: Final = (44.9, 45.5)
 """The paper's 45 degrees: 45.2 within 0.3."""
@@ -31,6 +38,9 @@ FALLING: Final = 0.2
 """Speed of the centre of mass that counts [m/s]."""
 
 FALLING_FILLINGS: Final = (0.25, 0.6)
+
+LONG: Final = "throws of Fig. 7, flown on to 1.2 s"
+ON_LANDING: Final = "at t = 0.5 s instead of θ = 2π"
 
 When = Callable[[Trajectory], Moment]
 
@@ -69,8 +79,16 @@ def toppling_peak() -> tuple[float, float]:
     return float(found.x), -float(found.fun)
 
 
-def claim_toppling_peak(flights: Flights) -> tuple[Reading, ...]:
-    """At rest the toppling angle has its maximum of 45 degrees at a filling of 0.14."""
+@states(
+    "toppling-peak",
+    place="section 6, Eq. 13b, Fig. 9b",
+    says="At rest θ_c is largest, 45°, at M̃ = 0.14.",
+    means="The maximum of Eq. 13b is 45.2 ± 0.3° at 0.14 ± 0.01.",
+    throw="water at rest",
+    why="The last digits that the paper prints.",
+    of_geometry=True,
+)
+def _toppling_peak(flights: Flights) -> tuple[Reading, ...]:
     del flights
     filling, angle = toppling_peak()
     return (
@@ -84,8 +102,16 @@ def lowered_by(run: Trajectory, when: When = upright) -> float:
     return math.degrees(static_toppling_angle(run.scenario) - when(run).toppling_angle)
 
 
-def claim_dynamic_angle_is_lower(flights: Flights, when: When = upright) -> tuple[Reading, ...]:
-    """Up to a filling of 0.75 the bottle in flight topples at a smaller angle than at rest."""
+@states(
+    "dynamic-lower",
+    place="section 6, Fig. 9b",
+    says="In flight θ_c is lower than at rest, except above 0.75.",
+    means="With r_CM at θ = 2π it is, at all fillings up to 0.75.",
+    throw=LONG,
+    why="The sentence is a comparison: its threshold is zero.",
+    otherwise={ON_LANDING: {"when": at_landing_time}},
+)
+def _dynamic_angle_is_lower(flights: Flights, when: When = upright) -> tuple[Reading, ...]:
     lower = {case.value: lowered_by(run, when) for case, run in flights.members("long") if case.value <= ABOVE}
     least = min(lower, key=lambda filling: lower[filling])
     above = [f"{filling:g}" for filling, value in lower.items() if value <= 0.0]
@@ -100,8 +126,16 @@ def claim_dynamic_angle_is_lower(flights: Flights, when: When = upright) -> tupl
     )
 
 
-def claim_dynamic_angle_agrees_when_full(flights: Flights, when: When = upright) -> tuple[Reading, ...]:
-    """Above a filling of 0.75 the bottle in flight topples at the angle at rest."""
+@states(
+    "dynamic-agrees",
+    place="section 6, Fig. 9b",
+    says="Above 0.75 the two agree well.",
+    means="With r_CM at θ = 2π they differ by at most 3°.",
+    throw=f"{LONG}; M̃ = 0.9 and 1",
+    why="3° is a choice of ours: a twentieth of the axis of Fig. 9b.",
+    otherwise={ON_LANDING: {"when": at_landing_time}},
+)
+def _dynamic_angle_agrees_when_full(flights: Flights, when: When = upright) -> tuple[Reading, ...]:
     off = {case.value: abs(lowered_by(run, when)) for case, run in flights.members("long") if case.value > ABOVE}
     worst = max(off, key=lambda filling: off[filling])
     return (
@@ -115,12 +149,21 @@ def claim_dynamic_angle_agrees_when_full(flights: Flights, when: When = upright)
     )
 
 
-def claim_centre_of_mass_falls(flights: Flights, when: When = upright, base: float = 1.0) -> tuple[Reading, ...]:
-    """From a filling of 0.25 to 0.6 the centre of mass moves towards the base at more than 0.2 m/s.
-
-    v_CM = dr_CM/dt is positive towards the base, as in the figures. ``base`` is 1 if the paper's negative velocity
-    means towards the base, downwards in a bottle that stands, and -1 if it is dr_CM/dt itself.
-    """
+@states(
+    "landing-velocity",
+    place="section 6, Fig. 9c",
+    says="On landing v_CM is negative and beyond 0.2 m/s for M̃ from 0.25 to 0.6.",
+    means="At θ = 2π the centre of mass moves in the bottle towards its base at more than 0.2 m/s: downwards, as "
+    "the argument about descending water needs it. v_CM = dr_CM/dt, positive towards the base here and in Fig. 9c.",
+    throw=f"{LONG}; M̃ from 0.25 to 0.6",
+    why="Speed and range are the paper's.",
+    otherwise={
+        ON_LANDING: {"when": at_landing_time},
+        "as negative dr_CM/dt, towards the cap, at θ = 2π": {"base": -1.0},
+        "as negative dr_CM/dt at t = 0.5 s": {"base": -1.0, "when": at_landing_time},
+    },
+)
+def _centre_of_mass_falls(flights: Flights, when: When = upright, base: float = 1.0) -> tuple[Reading, ...]:
     low, high = FALLING_FILLINGS
     velocity = {case.value: when(run).v_cm for case, run in flights.members("long") if low <= case.value <= high}
     worst = min(velocity, key=lambda filling: base * velocity[filling])
@@ -134,6 +177,10 @@ def claim_centre_of_mass_falls(flights: Flights, when: When = upright, base: flo
             + ", ".join(f"{v:+.2f} at {filling:g}" for filling, v in velocity.items()).replace("-", "\N{MINUS SIGN}"),
         ),
     )
+
+
+OF_LANDING: Final = (_toppling_peak, _dynamic_angle_is_lower, _dynamic_angle_agrees_when_full, _centre_of_mass_falls)
+"""Statements on Fig. 9, in the order of the paper."""
 
 
 # ---------------------------------------------------------------------- from which filling on water leaves the base

@@ -15,7 +15,7 @@ import numpy as np
 from flipproof.paper.cases import ICE
 from flipproof.paper.claim import banded
 from flipproof.paper.claim_runs import ClaimRuns
-from flipproof.paper.claims_throw import CLEAR, filling_of_slow_down
+from flipproof.paper.claims_filling import CLEAR, filling_of_slow_down
 from flipproof.paper.observe import FLAT, Flights, MissingFlightError, climb, normalised
 from flipproof.paper.parameters import paper_throw
 from flipproof.paper.runs import SOLVERS

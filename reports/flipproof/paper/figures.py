@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from types import MappingProxyType
+from collections.abc import Iterable, Iterator
 from typing import Final
 
 from flipproof.frame.exhibit import Exhibit
@@ -22,26 +20,8 @@ TIMED: Final = ("S1b", "S1c")
 """Figures that need the measured costs."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PaperFigure:
-    """One figure: its name, the families of throws that it shows, and what makes its exhibits."""
-
-    name: str
-    families: tuple[str, ...]
-    make: Callable[[PaperRuns], Iterator[Exhibit]]
-
-
-def _figures() -> dict[str, PaperFigure]:
-    recipes = {
-        **figures_bottle.RECIPES,
-        **figures_slices.RECIPES,
-        **figures_curves.RECIPES,
-        **figures_levels.RECIPES,
-    }
-    return {name: PaperFigure(name=name, families=recipes[name][0], make=recipes[name][1]) for name in ORDER}
-
-
-FIGURES: Final[Mapping[str, PaperFigure]] = MappingProxyType(_figures())
+RECIPES: Final = figures_bottle.RECIPES | figures_slices.RECIPES | figures_curves.RECIPES | figures_levels.RECIPES
+"""Figure -> the families of throws that it shows, and what makes its exhibits."""
 
 
 def check_figures(names: Iterable[str]) -> tuple[str, ...]:
@@ -64,7 +44,7 @@ def check_figures(names: Iterable[str]) -> tuple[str, ...]:
 
 def keys_of(names: Iterable[str]) -> set[str]:
     """Return the keys of the cases that these figures need."""
-    return {case.key for name in names for of in FIGURES[name].families for case in family(of)}
+    return {case.key for name in names for of in RECIPES[name][0] for case in family(of)}
 
 
 def exhibits_paper(runs: PaperRuns, names: Iterable[str] = ORDER) -> Iterator[Exhibit]:
@@ -74,4 +54,4 @@ def exhibits_paper(runs: PaperRuns, names: Iterable[str] = ORDER) -> Iterator[Ex
     """
     for name in check_figures(names):
         if runs.costs or name not in TIMED:
-            yield from FIGURES[name].make(runs)
+            yield from RECIPES[name][1](runs)

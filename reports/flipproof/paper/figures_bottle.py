@@ -19,8 +19,7 @@ from flipproof.figures.style import new_figure, styled
 from flipproof.frame.exhibit import Exhibit
 from flipproof.output.columns import rows_csv
 from flipproof.paper.cases import HALF_FULL, family
-from flipproof.paper.figures_panels import COLUMN, NAMES, head, legend_below
-from flipproof.paper.figures_words import listed, settings_words
+from flipproof.paper.figures_panels import COLUMN, NAMES, exhibit, head, legend_below, listed, settings_words
 from flipproof.paper.runs import SOLVERS, PaperRuns
 from slicemodel import Scenario, Trajectory
 from slicemodel.landing import lab_motion, moment_at
@@ -159,10 +158,10 @@ def exhibits_2b(runs: PaperRuns) -> Iterator[Exhibit]:
     words = listed(
         {p.solver: {"theta [rad]": p.theta, "centre of mass [m]": p.r_cm, "last slice [m]": p.r[-1]} for p in panels}
     )
-    yield _exhibit(
+    yield exhibit(
         "2b", "the bottle at rest and in motion",
         "Half full, ten slices of the water, each drawn with its own height across the bottle; where they overlap the "
-        "blue is darker. The paper's sketch names neither filling nor moment: both are chosen here. Ten slices at the "
+        "blue is fuller. The paper's sketch names neither filling nor moment: both are chosen here. Ten slices at the "
         "usual damping rate of 5 /s for every solver.",
         f"Sketches of the bottle at rest and {MOMENT:g} s after release for three solvers. {words}.",
         figure_rest_and_motion, (tuple(panels),),
@@ -246,7 +245,7 @@ def exhibits_3b(runs: PaperRuns) -> Iterator[Exhibit]:
         for t, cap, base, centre in zip(flight.t, flight.cap, flight.base, flight.centre, strict=True)
     ]
     header = ("solver", "bottle", "t [s]", "x_cap [m]", "y_cap [m]", "x_base [m]", "y_base [m]", "x_CM [m]", "y_CM [m]")
-    yield _exhibit(
+    yield exhibit(
         "3b", "the flight as vectors from cap to base",
         "An arrow every 20 ms, its tail the cap. The centre of mass (red) flies the same parabola whatever the solver; "
         "how often the bottle turns while it does so is what they differ in. The launch speed is the paper's 2 m/s, "
@@ -305,7 +304,7 @@ def exhibits_9a(runs: PaperRuns) -> Iterator[Exhibit]:
         panels.append(Tipping(run.method, run.scenario, moment.toppling_angle, run.r[-1], moment.r_cm))
     rows = [(panel.solver or "at rest", panel.r_cm, math.degrees(panel.tilt)) for panel in panels]
     words = ", ".join(f"{NAMES.get(panel.solver, 'at rest')} {math.degrees(panel.tilt):.1f}" for panel in panels)
-    yield _exhibit(
+    yield exhibit(
         "9a", "what the critical toppling angle θ_c is",
         "The half-full bottle on the rim of its base, tilted until its centre of mass (red) stands right above the "
         "rim: tilted further, it topples. The higher the water, the smaller the angle; water where each solver has it "
@@ -318,15 +317,6 @@ def exhibits_9a(runs: PaperRuns) -> Iterator[Exhibit]:
 def _resting(scenario: Scenario) -> Tipping:
     r = scenario.initial_positions()
     return Tipping("", scenario, static_toppling_angle(scenario), r, _centre(scenario, r))
-
-
-def _exhibit(
-    name: str, title: str, caption: str, alt: str, maker: Callable[..., Figure], data: tuple[Any, ...], table: str
-) -> Exhibit:
-    return Exhibit(
-        name=f"paper-{name}", title=f"Fig. {name}: {title}", caption=caption, alt=alt, maker=maker,
-        data=data, table=table,
-    )  # fmt: skip
 
 
 RECIPES: Final[dict[str, tuple[tuple[str, ...], Callable[[PaperRuns], Iterator[Exhibit]]]]] = {

@@ -17,13 +17,12 @@ from flipproof.paper.figures_panels import (
     Panel,
     dots,
     every_third,
-    figure_grid,
+    exhibit_grid,
+    listed,
     ramp,
     ranked,
     stretched,
-    table_grid,
 )
-from flipproof.paper.figures_words import listed, settings_words
 from flipproof.paper.parameters import number, numbers
 from flipproof.paper.runs import PUBLISHED, SOLVERS, PaperRuns
 from slicemodel import Trajectory
@@ -93,19 +92,6 @@ def turns(runs: PaperRuns, name: str, label: Label) -> str:
     )
 
 
-def _exhibit(name: str, title: str, caption: str, alt: str, grid: Grid) -> Exhibit:
-    settings = settings_words()
-    return Exhibit(
-        name=f"paper-{name}",
-        title=f"Fig. {name}: {title}",
-        caption=f"{caption} {settings}",
-        alt=alt,
-        maker=figure_grid,
-        data=(grid,),
-        table=table_grid(grid),
-    )
-
-
 def _of(symbol: str, unit: str = "") -> Label:
     return lambda case: f"{symbol} = {case.value:g}{unit}".replace("-", "−")
 
@@ -126,7 +112,7 @@ def exhibits_5b(runs: PaperRuns) -> Iterator[Exhibit]:
     """Yield the angle for three rebounds."""
     rows = tuple(row_of(runs, name, theta_over_time, BETA, heading) for name, heading in READINGS)
     grid = Grid(rows=rows, x=TIME, y=(THETA, THETA))
-    yield _exhibit(
+    yield exhibit_grid(
         "5b", "what the rebound β does to the angle θ(t)",
         f"{TWO_READINGS}Look at the end of the flight: does the elastic bottle (β = −1) turn ahead of the others?",
         f"Line plots of theta against time, two rows by three solvers. Theta at 0.5 s in rad with alpha 1: "
@@ -139,7 +125,7 @@ def exhibits_5c(runs: PaperRuns) -> Iterator[Exhibit]:
     """Yield the angular velocity for three rebounds."""
     rows = tuple(row_of(runs, name, omega_over_time, BETA, heading) for name, heading in READINGS)
     grid = Grid(rows=rows, x=TIME, y=tuple(stretched(OMEGA, row) for row in rows))
-    yield _exhibit(
+    yield exhibit_grid(
         "5c", "what the rebound β does to the angular velocity ω(t)",
         f"{TWO_READINGS}The paper has ω low and flat for β = −0.5 only, and bumpy for β = −1. In free flight no bottle "
         "speeds up late, whatever its β.",
@@ -157,7 +143,7 @@ def exhibits_5d(runs: PaperRuns) -> Iterator[Exhibit]:
         row_of(runs, "slices at alpha 1", omega_over_time, SLICES, "α = 1 kept"),
     )
     grid = Grid(rows=rows, x=TIME, y=tuple(stretched(OMEGA, row) for row in rows), legend_columns=7)
-    yield _exhibit(
+    yield exhibit_grid(
         "5d", "what the number of slices N does to ω(t)",
         "In the upper rows the damping rate α/2m is kept and the curves close up with N. With α itself kept (bottom "
         "row, another scale) the published program stands still at N = 20, where α/2m equals ω₀, and spins up beyond "
@@ -172,7 +158,7 @@ def exhibits_5d(runs: PaperRuns) -> Iterator[Exhibit]:
 def exhibits_6b(runs: PaperRuns) -> Iterator[Exhibit]:
     """Yield the angle for several drags."""
     grid = Grid(rows=(row_of(runs, "drag", theta_over_time, ALPHA),), x=TIME, y=(THETA,), height=3.0)
-    yield _exhibit(
+    yield exhibit_grid(
         "6b", "what the drag α does to the angle θ(t)",
         "The less a bottle has turned at the end, the longer its ω stayed low.",
         f"Line plots of theta against time by three solvers. Theta at 0.5 s in rad: {turns(runs, 'drag', ALPHA)}.",
@@ -183,7 +169,7 @@ def exhibits_6b(runs: PaperRuns) -> Iterator[Exhibit]:
 def exhibits_6c(runs: PaperRuns) -> Iterator[Exhibit]:
     """Yield the angular velocity for several drags."""
     grid = Grid(rows=(row_of(runs, "drag", omega_over_time, ALPHA),), x=TIME, y=(OMEGA,), height=3.0)
-    yield _exhibit(
+    yield exhibit_grid(
         "6c", "what the drag α does to the angular velocity ω(t)",
         "Is there one α whose curve drops and then stays flat? In the published program there is, near the paper's "
         "choice of 0.01, because its α weakens the centrifugal force instead of damping; in free flight every curve "
@@ -199,7 +185,7 @@ def exhibits_7a(runs: PaperRuns) -> Iterator[Exhibit]:
     grid = Grid(
         rows=(row_of(runs, "filling", relative_omega, FILLING),), x=RELATIVE_TIME, y=(RELATIVE_OMEGA,), height=3.2
     )
-    yield _exhibit(
+    yield exhibit_grid(
         "7a", "what the filling M̃ does to ω(t)",
         "Look at M̃ = 0.1, which the experiment leaves at ω₀: the published program and Eq. 8 slow it down, free flight "
         "hardly does. And at M̃ = 1, which no solver keeps, because slices may overlap.",
@@ -216,7 +202,7 @@ def _eight(runs: PaperRuns, name: str, family_name: str, label: Label, title: st
         "Line plots of omega over omega_0 against t over T by three solvers. Mean of the second half: "
         f"{plateaus(runs, family_name, label)}."
     )
-    yield _exhibit(name, title, caption, alt, Grid(rows=rows, x=RELATIVE_TIME, y=(axis,), height=3.0))
+    yield exhibit_grid(name, title, caption, alt, Grid(rows=rows, x=RELATIVE_TIME, y=(axis,), height=3.0))
 
 
 def exhibits_8a(runs: PaperRuns) -> Iterator[Exhibit]:
@@ -254,7 +240,7 @@ def exhibits_s1a(runs: PaperRuns) -> Iterator[Exhibit]:
         lines = [line for filling in numbers("figure-S1-filling") for line in _steps(runs, solver, filling)]
         panels.append(Panel(solver=solver, heading="", lines=tuple(lines)))
     grid = Grid(rows=(tuple(panels),), x=RELATIVE_TIME, y=(RELATIVE_OMEGA,), height=3.2, legend_columns=3)
-    yield _exhibit(
+    yield exhibit_grid(
         "S1a", "what the number of time steps P does",
         "How far does a curve of fewer steps lie from that of 1000? Eq. 8 and free flight choose their own steps; for "
         "them P is only the number of points given out, drawn as points on the same curve for the half-full bottle: 10 "

@@ -19,12 +19,11 @@ from flipproof.paper.figures_panels import (
     Line,
     Panel,
     dots,
-    figure_grid,
+    exhibit_grid,
+    listed,
     ranked,
     stretched,
-    table_grid,
 )
-from flipproof.paper.figures_words import listed, settings_words
 from flipproof.paper.parameters import paper_throw
 from flipproof.paper.runs import PUBLISHED, SOLVERS, PaperRuns
 from slicemodel import Trajectory
@@ -79,7 +78,7 @@ def exhibits_7b(runs: PaperRuns) -> Iterator[Exhibit]:
         rows=(_row(readings),), x=FILLING, y=(LEVEL,), height=3.2,
         bands=(Band(along="x", low=0.2, high=0.5, label="best filling as the paper has it"),),
     )  # fmt: skip
-    yield _exhibit(
+    yield exhibit_grid(
         "7b", "the level ω falls to, over the filling",
         "Filled: mean of the 21 points around the minimum. Open: mean of the second half of the flight; where the two "
         "part there is no plateau. Shaded: the paper's best filling.",
@@ -106,7 +105,7 @@ def exhibits_9b(runs: PaperRuns) -> Iterator[Exhibit]:
     best = int(rest.argmax())
     row = _row(readings, at_rest)
     grid = Grid(rows=(row,), x=FILLING, y=(stretched(ANGLE, row),), height=3.2)
-    yield _exhibit(
+    yield exhibit_grid(
         "9b", "critical toppling angle θ_c over the filling",
         f"Red: water at rest, highest ({rest[best]:.1f}°) at M̃ = {fine[best]:.2f}. Points: water where the solver has "
         "it, filled where the bottle stands upright again (θ = 2π, as the text says), open at T = 0.5 s (as the "
@@ -131,7 +130,7 @@ def exhibits_9c(runs: PaperRuns) -> Iterator[Exhibit]:
             Band(along="y", low=-0.2, high=0.2, label="slower than 0.2 m/s"),
         ),
     )  # fmt: skip
-    yield _exhibit(
+    yield exhibit_grid(
         "9c", "velocity of the centre of mass on landing",
         "Velocity dr_CM/dt along the bottle, positive towards the base as in the table of statements; the paper has it "
         "negative and does not say which way it counts, nor whether "
@@ -202,7 +201,7 @@ def _cost_exhibit(runs: PaperRuns, name: str, title: str, x: Axis, *, over: str)
     )
     grid = Grid(rows=rows, x=x, y=(WORK, SECONDS), height=2.5)
     exponent = _exponent(runs.costs, over)
-    return _exhibit(
+    return exhibit_grid(
         name, title,
         "Counted work above, processor time of this machine below. The published program's work is N P by "
         "construction, straight and of slope 1; its time is this program's compiled loop and bends where the fixed "
@@ -244,18 +243,6 @@ def _exponent(costs: Sequence[Cost], over: str) -> float:
 
 def _longest(costs: Sequence[Cost]) -> float:
     return max((cost.seconds for cost in costs if cost.solver == PUBLISHED), default=math.nan)
-
-
-def _exhibit(name: str, title: str, caption: str, alt: str, grid: Grid) -> Exhibit:
-    return Exhibit(
-        name=f"paper-{name}",
-        title=f"Fig. {name}: {title}",
-        caption=f"{caption} {settings_words()}",
-        alt=alt,
-        maker=figure_grid,
-        data=(grid,),
-        table=table_grid(grid),
-    )
 
 
 RECIPES: Final[dict[str, tuple[tuple[str, ...], Callable[[PaperRuns], Iterator[Exhibit]]]]] = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -12,7 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from flipproof.figures.style import new_figure, solver_style, styled
+from flipproof.frame.exhibit import Exhibit
 from flipproof.output.columns import columns_csv
+from flipproof.paper.runs import BANDS
 from slicemodel.trajectory import FloatArray
 
 COLUMN: Final = 3.2
@@ -193,6 +195,26 @@ def legend_below(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
         )  # fmt: skip
 
 
+def exhibit(
+    name: str, title: str, caption: str, alt: str, maker: Callable[..., Figure], data: tuple[Any, ...], table: str
+) -> Exhibit:
+    """Return what is shown as Fig. ``name`` of the paper; after a hyphen stands which of several it is."""
+    return Exhibit(
+        name=f"paper-{name}",
+        title=f"Fig. {name.partition('-')[0]}: {title}",
+        caption=caption,
+        alt=alt,
+        maker=maker,
+        data=data,
+        table=table,
+    )
+
+
+def exhibit_grid(name: str, title: str, caption: str, alt: str, grid: Grid) -> Exhibit:
+    """Return a grid of curves as Fig. ``name``, with its numbers and, in the caption, how the runs were made."""
+    return exhibit(name, title, f"{caption} {settings_words()}", alt, figure_grid, (grid,), table_grid(grid))
+
+
 def table_grid(grid: Grid) -> str:
     """Return what is drawn as CSV: a column for each curve, beside the abscissa that it shares with others."""
     abscissae: list[FloatArray] = []
@@ -220,3 +242,29 @@ def _header(y: Axis, panel: Panel, line: Line) -> str:
 def every_third(values: FloatArray) -> FloatArray:
     """Return every third value and both ends: what is drawn of a run of 1000 points."""
     return np.asarray(values[:: max(1, (len(values) - 1) // 333)])
+
+
+# ---------------------------------------------------------------------- words
+
+
+def settings_words() -> str:
+    """Return how the runs were made: slices and bands."""
+    own = ", ".join(f"{_plain(BANDS[solver])} ({NAMES[solver]})" for solver in BANDS)
+    return (
+        f"Every solver has the paper's own slices, and the published program its steps; Eq. 8 and free flight are "
+        f"solved exactly between impacts. As fractions of ω₀ the event-driven ω is certain to {own}."
+    )
+
+
+def listed(values: Mapping[str, Mapping[str, float]], digits: int = 3) -> str:
+    """Return solver -> label -> number as words."""
+    return "; ".join(
+        f"{NAMES[solver]}: " + ", ".join(f"{label} {value:.{digits}f}" for label, value in found.items())
+        for solver, found in values.items()
+        if found
+    )
+
+
+def _plain(value: float) -> str:
+    """Return a small number as "1e-7" or "0.003"."""
+    return f"{value:g}".replace("e-0", "e-")

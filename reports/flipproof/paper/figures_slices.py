@@ -7,8 +7,17 @@ from typing import Final
 
 from flipproof.frame.exhibit import Exhibit
 from flipproof.paper.cases import Case, family
-from flipproof.paper.figures_panels import DASHED, Axis, Grid, Line, Panel, every_third, figure_grid, ranked, table_grid
-from flipproof.paper.figures_words import listed, settings_words
+from flipproof.paper.figures_panels import (
+    DASHED,
+    Axis,
+    Grid,
+    Line,
+    Panel,
+    every_third,
+    exhibit_grid,
+    listed,
+    ranked,
+)
 from flipproof.paper.parameters import number
 from flipproof.paper.runs import SOLVERS, PaperRuns
 from slicemodel import Trajectory
@@ -41,7 +50,7 @@ def exhibits_5a(runs: PaperRuns) -> Iterator[Exhibit]:
             runs,
             f"5a{suffix}",
             f"what the rebound β does to ten slices ({words})",
-            "Dark lines start on the base, light ones on top of the water. Look at the ends: with β = 0 slices stay "
+            "Slice 1 starts on the base, slice 10 on top of the water. Look at the ends: with β = 0 slices stay "
             "where they hit until something pulls them off. In free flight nothing does; in the other two it is "
             "gravity, which Eq. 8 keeps.",
             rows,
@@ -80,17 +89,14 @@ def _exhibit(
             for solver in SOLVERS
         }
     )
-    settings = settings_words()
     symbol = "alpha" if family_name == "drag" else "beta"
-    return Exhibit(
-        name=f"paper-{name}",
-        title=f"Fig. {name.partition('-')[0]}: {title}",
-        caption=f"Cap on top, base below, the centre of mass dashed. {caption} {settings}",
-        alt=f"Line plots of slice positions against time, a row for each {symbol}, a column for each solver. Centre of "
+    return exhibit_grid(
+        name,
+        title,
+        f"Cap on top, base below, the centre of mass dashed. {caption}",
+        f"Line plots of slice positions against time, a row for each {symbol}, a column for each solver. Centre of "
         f"mass from the cap at the end, as a fraction of the length, by {symbol}: {ends}.",
-        maker=figure_grid,
-        data=(grid,),
-        table=table_grid(grid),
+        grid,
     )
 
 

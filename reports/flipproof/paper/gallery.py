@@ -5,14 +5,19 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from pathlib import Path
 
+from flipproof.frame.chapter import Ask, Chapter, Part, Study
 from flipproof.frame.exhibit import Exhibit, drawn
+from flipproof.frame.gather import gather
 from flipproof.frame.pool import Progress, workers
+from flipproof.frame.store import RunStore
 from flipproof.output.folder import check_replaceable, replaced_folder
 from flipproof.page.templating import environment
 from flipproof.paper.figures import ORDER, TIMED, check_figures, exhibits_paper, keys_of
-from flipproof.paper.runs import PaperRuns, gather_paper
+from flipproof.paper.parameters import paper_throw
+from flipproof.paper.runs import PaperRuns, cost_calls, figure_calls
 from flipproof.paper.tables import HEADER, parameter_rows, parameters_csv
 
 PAGE = "index.html"
@@ -25,6 +30,7 @@ def make_gallery(
     provenance: Mapping[str, str],
     *,
     jobs: int | None = None,
+    store: RunStore | None = None,
 ) -> str:
     """Make the figures and write them to ``out``; return one line that tells what is there.
 
@@ -38,6 +44,8 @@ def make_gallery(
     provenance : mapping
     jobs : int or None
         Worker processes; None: one per core.
+    store : RunStore or None
+        Where runs are looked for and kept, as those of a report are.
 
     Raises
     ------
@@ -47,16 +55,35 @@ def make_gallery(
     began = time.perf_counter()
     wanted = check_figures(names) or ORDER
     check_replaceable(out, "paper")
+    store = store or RunStore(None)
     with replaced_folder(out, "paper") as folder:
         with workers(jobs) as pool:
-            costs = any(name in TIMED for name in wanted)
-            runs = gather_paper(pool, progress, keys_of(wanted), costs=costs)
-        exhibits = drawn(list(exhibits_paper(runs, wanted)), jobs)
-        write_gallery(exhibits, runs, folder, provenance)
+            runs = gather_figures(wanted, pool, progress, store)
+            exhibits = drawn(list(exhibits_paper(runs, wanted)), pool=store.remembering(pool))
+        write_gallery(exhibits, runs, folder, {**provenance, **store.facts()})
     failed = f", {len(runs.failures())} flights failed" if runs.failures() else ""
     figures = f"{len(exhibits)} figure{'' if len(exhibits) == 1 else 's'}"
     seconds = time.perf_counter() - began
     return f"{figures} from {len(runs.made)} flights{failed}: {out / PAGE} ({seconds:.0f} s)"
+
+
+def gather_figures(
+    wanted: Sequence[str], pool: Executor, progress: Progress = lambda *_: None, store: RunStore | None = None
+) -> PaperRuns:
+    """Return the runs of some figures: a chapter of their own, driven as those of a report are."""
+
+    def study(_: Ask) -> Study[PaperRuns]:
+        figures, costs = figure_calls(keys_of(wanted)), cost_calls() if set(wanted) & set(TIMED) else []
+        flights = yield figures
+        flights = (yield costs) if costs else flights  # alone, so that no other run takes their time
+        return PaperRuns.of(flights, figures, costs)
+
+    chapter = Chapter(name="figures", title="The paper's figures", study=study)
+    part = Part(chapter.name, chapter.title, "", (chapter,))
+    throw = paper_throw()
+    gathered = gather((part,), Ask(scenario=throw, throw=throw, size="full"), pool, progress, store=store)
+    runs: PaperRuns = gathered.outcomes[chapter.name].value
+    return runs
 
 
 def write_gallery(exhibits: Sequence[Exhibit], runs: PaperRuns, folder: Path, provenance: Mapping[str, str]) -> None:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 
-from flipproof.frame.pool import Progress
+from flipproof.frame.flights import Call, Flights
 from flipproof.frame.solvers import Made, Run, make
 from flipproof.paper.cases import Case, all_cases, family
 from flipproof.paper.costs import Cost, measure_event_driven, measure_published
@@ -44,9 +43,10 @@ class PaperRuns:
     costs: tuple[Cost, ...]
 
     @classmethod
-    def of(cls, groups: Iterable[Mapping[tuple[str, str], Made]], costs: tuple[Cost, ...] = ()) -> PaperRuns:
-        """Return the runs of ``plan_groups``, made group by group."""
-        return cls(made={pair: made for group in groups for pair, made in group.items()}, costs=costs)
+    def of(cls, flights: Flights, figures: Iterable[Call], costs: Iterable[Call] = ()) -> PaperRuns:
+        """Return what became of ``figure_calls`` and ``cost_calls``."""
+        made = {pair: made for call in figures for pair, made in flights.answer(call).items()}
+        return cls(made=made, costs=tuple(cost for call in costs for cost in flights.answer(call)))
 
     def trajectory(self, solver: str, key: str) -> Trajectory | None:
         """Return the trajectory of a case, or None if it was not planned or failed."""
@@ -110,26 +110,16 @@ def _settings(solver: str, case: Case) -> dict[str, Any]:
     return {} if points == paper_steps() else {"times": np.linspace(0.0, case.scenario.duration, points)}
 
 
-def gather_paper(
-    pool: Executor, progress: Progress, keys: Iterable[str] | None = None, *, costs: bool = True
-) -> PaperRuns:
-    """Make the runs in a pool.
+def figure_calls(keys: Iterable[str] | None = None) -> list[Call]:
+    """Return the calls that make the runs of the figures; of the cases with these keys only, if any are given."""
+    return [Call(make_group, (group,), f"the paper's figures, {group[-1].case.key}") for group in plan_groups(keys)]
 
-    Parameters
-    ----------
-    pool : executor of worker processes
-    progress : callable (made, planned, label)
-    keys : keys of cases, optional
-        Only these.
-    costs : bool
-        Whether to measure what runs cost too, after everything else.
-    """
-    groups = plan_groups(keys)
-    made: list[dict[tuple[str, str], Made]] = []
-    for group, future in [(group, pool.submit(make_group, group)) for group in groups]:
-        made.append(future.result())
-        progress(sum(map(len, made)), sum(map(len, groups)), group[-1].pair[1])
-    return PaperRuns.of(made, _measure_costs(pool) if costs else ())
+
+def cost_calls() -> list[Call]:
+    """Return the calls that measure what runs cost."""
+    published = Call(measure_published, (PUBLISHED,), "the cost of the published program", timed=True)
+    others = (solver for solver in SOLVERS if solver != PUBLISHED)
+    return [published, *(Call(measure_event_driven, (name,), f"the cost of {name}", timed=True) for name in others)]
 
 
 def make_group(group: Iterable[Planned]) -> dict[tuple[str, str], Made]:
@@ -139,12 +129,6 @@ def make_group(group: Iterable[Planned]) -> dict[tuple[str, str], Made]:
         made = _thinned(make(each.run), each.case.thin if each.solver == PUBLISHED else 1)
         found[each.pair] = made if each.case.whole else _without_slices(made)
     return found
-
-
-def _measure_costs(pool: Executor) -> tuple[Cost, ...]:
-    pending = [pool.submit(measure_event_driven, solver) for solver in SOLVERS if solver != PUBLISHED]
-    pending.insert(0, pool.submit(measure_published, PUBLISHED))
-    return tuple(cost for future in pending for cost in future.result())
 
 
 def make_thinned(runs: Iterable[tuple[Run, int]]) -> list[Made]:

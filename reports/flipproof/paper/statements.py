@@ -289,19 +289,6 @@ class Statement:
         """Return a verdict as the class of a page's style sheet."""
         return "soft" if self.kind == "admitted limit" else CLASSES[judgement.verdict]
 
-    def by(self, solver: str) -> Judgement:
-        """Return the judgement of one equation.
-
-        Raises
-        ------
-        KeyError
-            If that equation has not judged.
-        """
-        for judgement in self.judgements:
-            if judgement.solver == solver:
-                return judgement
-        raise KeyError(f"{solver} has not judged {self.id}")
-
     def to_mapping(self) -> dict[str, Any]:
         """Return the statement as JSON-ready data."""
         return {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 from flipproof.output.columns import rows_csv
 from flipproof.paper.parameters import PARAMETERS, Parameter
@@ -10,9 +10,9 @@ from flipproof.paper.parameters import PARAMETERS, Parameter
 HEADER = ("name", "symbol", "value", "unit", "stated in", "in other words", "left open or contradicted")
 
 
-def parameter_rows(parameters: Mapping[str, Parameter] = PARAMETERS) -> Iterator[tuple[str, ...]]:
+def parameter_rows() -> Iterator[tuple[str, ...]]:
     """Yield one row of words for each parameter, as ``HEADER`` has them."""
-    for entry in parameters.values():
+    for entry in PARAMETERS.values():
         yield entry.name, entry.symbol, value_words(entry), entry.unit, entry.source, entry.words, entry.doubt
 
 

@@ -76,6 +76,7 @@ class Point:
     throw : {"bottle": {...}, "scenario": {...}} - every field, possible or not
     solver : str
     settings : mapping - what the solver is called with
+    content : str - fingerprint of somebody else's solver; empty for flipproof's own
     """
 
     number: int
@@ -83,6 +84,7 @@ class Point:
     throw: Mapping[str, Mapping[str, Any]]
     solver: str
     settings: Mapping[str, Any]
+    content: str = ""
 
     def scenario(self) -> Scenario:
         """Return the throw.
@@ -99,7 +101,8 @@ class Point:
 
     def parameters(self) -> dict[str, Any]:
         """Return all that makes this point; ``from_parameters`` reads it back to the last bit."""
-        return {**self.throw, "solver": self.solver, "settings": self.settings}
+        content = {"content": self.content} if self.content else {}
+        return {**self.throw, "solver": self.solver, "settings": self.settings, **content}
 
     def text(self) -> str:
         """Return the parameters as JSON, keys in order; it reads back to the last bit."""
@@ -119,7 +122,7 @@ def from_parameters(text: str) -> Point:
     """Return the point that a row's ``parameters`` describe, so that it can be made again alone."""
     stated = json.loads(text)
     throw = {"bottle": stated["bottle"], "scenario": stated["scenario"]}
-    return Point(0, (), throw, stated["solver"], stated["settings"])
+    return Point(0, (), throw, stated["solver"], stated["settings"], stated.get("content", ""))
 
 
 _dumps = json.JSONEncoder(sort_keys=True).encode
@@ -172,7 +175,7 @@ class Design:
         """Return the point of that number in [0, size)."""
         which, place = divmod(number, self.throws)
         entry, values = self.entries[which], self._values(place)
-        return Point(number, values, self._throw(values), entry.name, entry.settings)
+        return Point(number, values, self._throw(values), entry.name, entry.settings, entry.content)
 
     def _values(self, place: int) -> tuple[Value, ...]:
         if self.shares is not None:
@@ -206,6 +209,7 @@ class Design:
 
     def facts(self) -> dict[str, Any]:
         """Return what tells this design from another; comments and spelling do not."""
+        contents = {entry.name: entry.content for entry in self.entries if entry.content}
         return {
             **self.base,
             "design": GRID if self.shares is None else LATIN,
@@ -216,6 +220,7 @@ class Design:
             "fields": {axis.name: axis.facts() for axis in self.axes},
             "order of fields": [axis.name for axis in self.axes],
             "solvers": [{"name": entry.name, **entry.settings} for entry in self.entries],
+            **({"contents": contents} if contents else {}),
         }
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
+from flipproof.foreign.content import content_of
 from flipproof.foreign.specs import check_asked
 from flipproof.frame.solvers import Solver, find, solve
 from flipproof.sweep.errors import SweepError
@@ -18,11 +19,15 @@ from slicemodel.scenario import Scenario, unknown_name
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One ``[[solvers]]`` table: the solver's name, the settings it is called with, and where it stands in the file."""
+    """One ``[[solvers]]`` table: the solver's name, the settings it is called with, and where it stands in the file.
+
+    ``content`` is the fingerprint of somebody else's solver, which may change under its name; empty for flipproof's.
+    """
 
     name: str
     settings: Mapping[str, Any]
     where: str
+    content: str = ""
 
 
 def read_entries(tables: object, source: str) -> tuple[Entry, ...]:
@@ -53,6 +58,7 @@ def _entry(table: dict[str, Any], where: str) -> Entry:
     try:
         solver = find(name)
         check_asked(name)
+        content = content_of(name)
     except ValueError as error:
         raise SweepError(f"{where}: {error}") from None
     where = f"{where} ({name})"
@@ -64,7 +70,7 @@ def _entry(table: dict[str, Any], where: str) -> Entry:
             raise SweepError(f"{where} {key} = {value!r} is not a finite number, a word, true, false or a list of them")
     if solver.package == "slicemodel":
         table = {"store": "summary", **table}
-    return Entry(name, table, where)
+    return Entry(name, table, where, content)
 
 
 def _settings_of(solver: Solver) -> tuple[list[str], bool]:

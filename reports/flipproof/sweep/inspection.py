@@ -122,7 +122,8 @@ def _wrong_design(file: Path, connection: sqlite3.Connection, design: Plan, code
     if not intact(found[0], FACTS):
         return "its design does not match its checksum"
     began, _, facts, *_ = found[0]
-    difference = _difference(json.loads(facts), json.loads(json.dumps(design.facts())))
+    there, here = json.loads(facts), json.loads(json.dumps(design.facts()))
+    difference = _difference({**there, "contents": None}, {**here, "contents": None})
     if difference:
         raise SweepError(f"{file.parent} holds another design ({difference}); name another --out")
     if began != code:
@@ -130,6 +131,12 @@ def _wrong_design(file: Path, connection: sqlite3.Connection, design: Plan, code
             f"{file.parent} was begun by flipproof {began}, this is {code}; go on with that one, or name another "
             "--out: one sweep, one code"
         )
+    for solver, content in here.get("contents", {}).items():
+        if content != there.get("contents", {}).get(solver):
+            raise SweepError(
+                f"{file.parent} was begun with other code of {solver}; go on with the files as they were, or name "
+                "another --out: one sweep, one code"
+            )
     return ""
 
 

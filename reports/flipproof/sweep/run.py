@@ -195,6 +195,11 @@ def _after_death(batch: Batch, error: BaseException) -> tuple[list[Batch], list[
 
 
 def _other_code(code: str, returned: Returned) -> SweepError | None:
+    if returned.changed:
+        return SweepError(
+            f"the files of {returned.changed} are not those that the sweep was begun with; with them as they were the "
+            "same command goes on, or name another --out"
+        )
     if returned.code == code:
         return None
     return SweepError(f"a worker runs flipproof {returned.code}, this is {code}; install the same in both")

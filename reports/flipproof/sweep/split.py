@@ -120,6 +120,7 @@ def waterfall_csv(waterfalls: tuple[Waterfall, ...]) -> str:
             numbers = (bar.forward, bar.backward, bar.average, bar.forward_band, bar.average_band)
             writer.writerow([*what, bar.name, *map(repr, numbers)])
         writer.writerow([*what, "free flight", repr(waterfall.end), "", "", repr(waterfall.end_band), ""])
+        writer.writerow([*what, "column", repr(waterfall.column), "", "", "", ""])
     return text.getvalue()
 
 
@@ -134,5 +135,6 @@ def _table(waterfall: Waterfall) -> str:
                 for bar in waterfall.bars
             ),
             f"  {waterfall.end:+8.4f}                      free flight (+- {waterfall.end_band:.1g})",
+            f"  {waterfall.overlap:+8.4f}                      column minus free flight: no overlap, no share",
         ]
     )

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from flipproof.foreign.content import content_of
 from flipproof.frame.solvers import Run, find, make
 from flipproof.frame.sources import fingerprint
 from flipproof.output.provenance import provenance
@@ -29,7 +30,6 @@ from slicemodel.trajectory import STATUSES, FloatArray, Trajectory
 
 if TYPE_CHECKING:
     from flipproof.landing.work import Landed
-    from ode_reference.flow.api import Flown
 
 WHOLE: Final = ("ok", "escaped")
 """Statuses of a trajectory that reached the end of the flight."""
@@ -112,12 +112,16 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class Returned:
-    """What a worker sends home: code and versions that it ran, the points, and the seconds they took together."""
+    """What a worker sends home: code and versions that it ran, the points, and the seconds they took together.
+
+    ``changed`` names somebody else's solver whose files are not those of the design; then there are no points.
+    """
 
     code: str
     versions: Mapping[str, str]
     outcomes: Sequence[Outcome | Landed]
     seconds: float
+    changed: str = ""
 
 
 @functools.cache
@@ -137,7 +141,7 @@ def versions() -> Mapping[str, str]:
 
 
 def make_batch(code: str, points: Sequence[Point], keep: bool, curves: int = 0) -> Returned:
-    """Make points by one process; if the caller's ``code`` is not the code here, make none.
+    """Make points by one process; if the caller's ``code``, or that of the points' solver, is not that here, make none.
 
     Parameters
     ----------
@@ -152,11 +156,27 @@ def make_batch(code: str, points: Sequence[Point], keep: bool, curves: int = 0) 
         from flipproof.landing.work import make_landings
 
         return Returned(here, versions(), make_landings(points), time.perf_counter() - began)
+    if changed := _changed(points):
+        return Returned(here, versions(), (), time.perf_counter() - began, changed)
     for begin in range(0, len(points) if here == code else 0, TOGETHER):
         some = points[begin : begin + TOGETHER]
         made = None if keep or curves else make_together(some)
         outcomes += made or [make_point(point, keep, curves) for point in some]
+    if changed := _changed(points):  # while they were made: nobody knows by which
+        return Returned(here, versions(), (), time.perf_counter() - began, changed)
     return Returned(here, versions(), outcomes, time.perf_counter() - began)
+
+
+def _changed(points: Sequence[Point]) -> str:
+    """Return the name of a solver whose files here are not those that the points are to be made by, or nothing."""
+    for solver, content in {(point.solver, point.content) for point in points if point.content}:
+        try:
+            same = content_of(solver) == content
+        except ValueError:
+            same = False
+        if not same:
+            return solver
+    return ""
 
 
 def make_together(points: Sequence[Point]) -> list[Outcome] | None:
@@ -221,7 +241,7 @@ def curves_of(flight: Trajectory, points: int) -> FloatArray:
 
 def _read(
     number: int,
-    flight: Trajectory | Flown,
+    flight: Trajectory,
     seconds: float,
     arrays: Arrays | None = None,
     curves: FloatArray | None = None,
@@ -241,7 +261,7 @@ def _read(
             }
         values = {name: value if math.isfinite(value) else None for name, value in found.items()}
         reasons += [f"{name} is not finite" for name, value in values.items() if value is None]
-        if isinstance(flight, Trajectory) and "r_cm" in flight.diagnostics.get("not_given", ()):
+        if "r_cm" in flight.diagnostics.get("not_given", ()):
             values["r_cm_end"] = None
             reasons.append(f"{flight.method} gives no r_cm")
     else:

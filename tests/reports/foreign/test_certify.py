@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flipproof.foreign import checks_order
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, certify
 from flipproof.foreign.contract import Ask
 from flipproof.foreign.mistakes import MISTAKES
@@ -81,6 +82,20 @@ def test_errors_that_do_not_fall_across_impacts_are_seen():
 
     (result,) = certify(InProcess(Stuck(), "stuck"), ["order-across-impacts"]).results
     assert result.verdict == FAILED
+
+
+@pytest.mark.parametrize(("slices", "shorter"), [(4, 1.19), (4, 0.71), (5, 1.0)])
+def test_rebounds_on_the_grid_are_seen_at_other_steps_and_slices(monkeypatch, slices, shorter):
+    monkeypatch.setattr(checks_order, "THROW", checks_order.THROW.with_slices(slices))
+    kind = MISTAKES["GridRebounds"]
+
+    class AtOtherSteps(kind):
+        def steps(self, span, dt):
+            return super().steps(span, dt * shorter)
+
+    (result,) = certify(InProcess(AtOtherSteps(), "grid"), ["order-across-impacts"]).results
+    assert result.verdict == FAILED
+    assert result.found.facts["order_across_impacts"] < 0.3
 
 
 def test_the_published_numbers_are_kept_by_whose_they_are():

@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flipproof.foreign.certify import IDLE, PASSED, certify
+from flipproof.chapters.vectors.published import load_all
+from flipproof.foreign.certify import FAILED, IDLE, PASSED, certify
+from flipproof.foreign.checks_equation import _ask
 from flipproof.foreign.contract import Ask, Traits
 from flipproof.foreign.kit import Kit
 from flipproof.foreign.specs import opened
@@ -93,3 +95,33 @@ def test_the_example_in_javascript_passes_by_its_command_and_by_a_kit(tmp_path):
         subprocess.run(["node", str(script), str(kit.folder)], check=True, timeout=300)
         graded, waiting = Kit(kit.folder).grade()
     assert not graded.failed, graded.failed[0].line
+
+
+@pytest.mark.skipif(shutil.which("octave-cli") is None, reason="no octave")
+def test_the_papers_matlab_program_prints_its_numbers_in_octave(tmp_path):
+    script = EXAMPLES / "paper.m"
+    runner = opened(f"cmd:octave-cli -q {script} {{scenario}} {{times}} {{start}} {{effort}} {{out}}")
+    found = certify(runner, ["ice", "restitution", "published-vectors"], equation="published-matlab")
+    ice, restitution, vectors = found.results
+    assert [ice.verdict, vectors.verdict] == [PASSED, PASSED]
+    assert vectors.found.facts["vectors"] < 1e-10
+    assert restitution.verdict == FAILED  # slices that have passed an end stay outside
+    kit = Kit.made(tmp_path / "kit", Traits(name="paper.m", equation="published-matlab", refined_by="dt", order=1.0))
+    one = next(place for place in sorted((kit.folder / "asks").iterdir()) if "frozen = true" in
+               (place / "scenario.toml").read_text())  # fmt: skip
+    for place in (kit.folder / "asks").iterdir():
+        if place != one:
+            shutil.rmtree(place)
+    subprocess.run(["octave-cli", "-q", str(script), str(kit.folder)], check=True, timeout=300)
+    throw = Scenario.from_toml(one / "scenario.toml")
+    omega = np.genfromtxt(one / "answer.csv", delimiter=",", names=True)["omega"]
+    np.testing.assert_array_equal(omega, throw.omega0)
+
+
+def test_published_vectors_are_asked_for_as_far_as_they_are_held_to():
+    vector = next(vector for vector in load_all() if vector.name == "matlab_default")
+    assert vector.until < vector.scenario.duration
+    for refined_by, effort in (("dt", vector.columns["t"][1]), ("steps", 199.0)):
+        ask = _ask(vector, Traits(name="x", refined_by=refined_by))
+        assert ask.times[-1] == ask.scenario.duration <= vector.until < ask.times[-1] + ask.times[1]
+        assert ask.effort == pytest.approx(effort, rel=1e-12, abs=0.0)

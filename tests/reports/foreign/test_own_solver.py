@@ -7,22 +7,12 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from flipproof.cli import main as cli
+from made_up import command as run
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = (ROOT / "docs" / "own-solver.md").read_text(encoding="utf-8")
 RK4 = ROOT / "examples" / "foreign" / "rk4.py"
 BOX2D = ROOT / "examples" / "foreign" / "box2d"
-
-
-def run(capsys, *arguments):
-    try:
-        status = cli.main([str(argument) for argument in arguments])
-    except SystemExit as end:
-        status = end.code
-    out, err = capsys.readouterr()
-    return status, out, err
 
 
 @pytest.fixture

@@ -59,9 +59,7 @@ def broken(_):
 
 def claims_of_lost(found):
     for name, each in found.items():
-        yield judged(
-            lambda name, each: value(name, each.value, "regression"), name, each, id=name.replace(" ", "-"), title=name
-        )
+        yield judged(value, name, each, "regression", id=name.replace(" ", "-"), title=name)
 
 
 def chapter(name, study, **parts):

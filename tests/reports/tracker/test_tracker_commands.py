@@ -45,7 +45,6 @@ def made(make):
     return make.files()
 
 
-@pytest.mark.xdist_group("tracker examples")
 def test_examples_are_what_the_code_prints(made, tmp_path):
     """Text and every number but the last printed digit, which another processor may round otherwise."""
     assert sorted(made) == TRACKED
@@ -107,7 +106,6 @@ def test_ice_keeps_its_angular_velocity_and_its_centre(make):
     assert any("nearer to the base" in note for note in found.notes)
 
 
-@pytest.mark.xdist_group("tracker examples")
 def test_track_writes_a_folder(tmp_path, capsys):
     out = tmp_path / "out"
     assert run("track", EXAMPLES / "ice.txt", *BOTH, "--ice-top", "ice top", "--length", 0.28, "--out", out) == 0

@@ -50,7 +50,6 @@ def part_of(film, frames):
     return replace(film, **{name: getattr(film, name)[frames] for name in arrays})
 
 
-@pytest.mark.xdist_group("films")
 @pytest.mark.parametrize("name", THROWS)
 def test_release_and_landing_are_found_to_two_frames(films, name):
     film = films[name]
@@ -64,7 +63,6 @@ def test_release_and_landing_are_found_to_two_frames(films, name):
         assert "bend" in flight.landing_how or "leaves the parabola" in flight.landing_how
 
 
-@pytest.mark.xdist_group("films")
 @pytest.mark.parametrize("name", THROWS)
 def test_without_noise_the_release_is_exact(films, name):
     flight = find_flight(spin_of(films[name]), gravity=G)
@@ -72,7 +70,6 @@ def test_without_noise_the_release_is_exact(films, name):
     assert abs(flight.landing - films[name].landing) * 240 < 1.5
 
 
-@pytest.mark.xdist_group("films")
 def test_a_landing_is_seen_by_its_bend(films):
     flight = find_flight(spin_of(films["ice"], 1e-3), gravity=G)
     assert "the tracks bend" in flight.landing_how
@@ -82,7 +79,6 @@ def test_a_landing_is_seen_by_its_bend(films):
     assert abs(flight.landing - films["ice"].landing) * 240 <= 1.01
 
 
-@pytest.mark.xdist_group("films")
 def test_a_hand_that_swings_in_a_circle(films):
     """Another hand than the one that the onset assumes: a circle about a shoulder, ever faster, at the right speed."""
     film = films["ice"]
@@ -106,7 +102,6 @@ def test_a_hand_that_swings_in_a_circle(films):
     assert np.abs(off).max() <= 4.01
 
 
-@pytest.mark.xdist_group("films")
 def test_what_the_user_says_is_taken(films):
     spin = spin_of(films["ice"], 1e-3)
     flight = find_flight(spin, release=0.15, landing=0.5, gravity=G)
@@ -122,7 +117,6 @@ def test_what_the_user_says_is_taken(films):
         find_flight(spin, release=0.3, landing=0.305)
 
 
-@pytest.mark.xdist_group("films")
 def test_the_table_says_when_the_base_is_there(films):
     film = films["water"]
     spin = spin_of(film, 5e-4)
@@ -135,7 +129,6 @@ def test_the_table_says_when_the_base_is_there(films):
         find_flight(spin, table_height=-9.0, gravity=G)
 
 
-@pytest.mark.xdist_group("films")
 def test_a_record_of_flight_alone(films):
     film = films["ice"]
     inside = (film.t >= film.release) & (film.t <= film.landing)
@@ -147,7 +140,6 @@ def test_a_record_of_flight_alone(films):
     assert (flight.release_how, flight.landing_how) == ("the record begins in flight", "the record ends in flight")
 
 
-@pytest.mark.xdist_group("films")
 def test_a_bottle_at_rest_is_no_flight(films):
     film = films["ice"]
     still = film.t > film.landing + 0.02
@@ -156,7 +148,6 @@ def test_a_bottle_at_rest_is_no_flight(films):
         find_flight(spin_of(part, 1e-3), gravity=G)
 
 
-@pytest.mark.xdist_group("films")
 @pytest.mark.parametrize("name", THROWS)
 def test_the_axis_alone_gives_the_parabola(films, name):
     """Whatever moves inside: exact without noise, and within its stated deviation with 1 mm of it."""
@@ -178,7 +169,6 @@ def test_the_axis_alone_gives_the_parabola(films, name):
     assert 0.67 < np.sqrt(np.mean(np.square(pulls))) < 1.33
 
 
-@pytest.mark.xdist_group("films")
 def test_a_tracked_centre_of_mass_gives_eq_2(films):
     film = films["ice"]
     inside = (film.t >= film.release - 1e-9) & (film.t <= film.landing + 1e-9)
@@ -199,33 +189,28 @@ def calibration_of(film, length=0.28, unit=1.0, **options):
     return check(spin, find_flight(spin, gravity=G / unit), unit, length)
 
 
-@pytest.mark.xdist_group("films")
 @pytest.mark.parametrize("name", THROWS)
 def test_a_good_film_has_no_warnings(films, name):
     for seed in range(5):
         assert calibration_of(films[name], seed=seed).warnings == ()
 
 
-@pytest.mark.xdist_group("films")
 def test_lengths_in_centimetres(films):
     found = calibration_of(films["ice"], unit=0.01)
     assert found.length == pytest.approx(28, rel=1e-3, abs=0.0)
     assert found.warnings == ()
 
 
-@pytest.mark.xdist_group("films")
 def test_a_wrong_scale_is_said(films):
     (warning,) = calibration_of(films["ice"], length=0.30).warnings
     assert "0.28 m apart, not 0.3 m: every length is 0.933 times" in warning
 
 
-@pytest.mark.xdist_group("films")
 def test_a_squeezed_picture_is_said(films):
     warnings = calibration_of(films["ice"], scale=(1.0, 0.93), length=None).warnings
     assert any("with the angle: x and y have different scales" in warning for warning in warnings)
 
 
-@pytest.mark.xdist_group("films")
 @pytest.mark.parametrize(("squeezed", "said"), [(0.976, True), (0.984, False), (1.016, False), (1.024, True)])
 def test_a_pattern_of_one_per_cent_is_said_and_a_smaller_one_is_not(films, squeezed, said):
     """A picture squeezed by 2 e in one direction changes the distance by +- e of its mean with the angle."""
@@ -235,7 +220,6 @@ def test_a_pattern_of_one_per_cent_is_said_and_a_smaller_one_is_not(films, squee
     assert any("with the angle" in warning for warning in found.warnings) is said
 
 
-@pytest.mark.xdist_group("films")
 @pytest.mark.parametrize(("change", "said"), [(0.024, True), (0.016, False), (-0.016, False), (-0.024, True)])
 def test_a_drift_of_two_per_cent_is_said_and_a_smaller_one_is_not(films, change, said):
     film = films["ice"]
@@ -248,14 +232,12 @@ def test_a_drift_of_two_per_cent_is_said_and_a_smaller_one_is_not(films, change,
     assert any(words in warning for warning in found.warnings) is said
 
 
-@pytest.mark.xdist_group("films")
 @pytest.mark.parametrize(("length", "said"), [(0.285, False), (0.286, True), (0.275, False), (0.274, True)])
 def test_a_scale_that_is_two_per_cent_wrong_is_said_and_a_smaller_error_is_not(films, length, said):
     warnings = calibration_of(films["ice"], length=length).warnings
     assert any("every length is" in warning for warning in warnings) is said
 
 
-@pytest.mark.xdist_group("films")
 def test_wrong_points_are_named_by_their_lines(films):
     film = films["ice"]
     base = film.base.copy()
@@ -264,7 +246,6 @@ def test_wrong_points_are_named_by_their_lines(films):
     assert any("1 frames (lines 84)" in warning for warning in warnings)
 
 
-@pytest.mark.xdist_group("films")
 @pytest.mark.parametrize(("wrong", "named"), [(0.002, False), (0.01, True)])
 def test_a_point_is_wrong_beyond_six_standard_deviations(films, wrong, named):
     """The distance scatters by 0.7 mm here."""
@@ -274,7 +255,6 @@ def test_a_point_is_wrong_beyond_six_standard_deviations(films, wrong, named):
     assert (84 in calibration_of(replace(film, base=base)).lines) is named
 
 
-@pytest.mark.xdist_group("films")
 @pytest.mark.parametrize(("scatter", "said"), [(0.0016, False), (0.0024, True)])
 def test_a_length_that_scatters_by_twice_what_is_allowed_is_said(films, scatter, said):
     """Without noise a thousandth of the length is allowed: what printed digits and a bottle that bends leave."""

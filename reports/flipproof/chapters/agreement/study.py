@@ -123,6 +123,6 @@ def _words(apart: list[set[str]], odd: str | None) -> str:
     if not apart:
         return "all agree within their bands"
     if odd is not None:
-        return f"{odd} is the odd one out: without it all agree within their bands"
+        return f"all but {odd} agree within their bands"
     named = "; ".join(" and ".join(sorted(two)) for two in apart)
     return f"outside their bands: {named}; no single one of them explains it"

@@ -54,15 +54,8 @@ def study(ask: Ask) -> Study[Events]:
 def claims(found: Events) -> Claims:
     """Yield the share of the time that each second curve spends in the tube around the first."""
     for (first, second), tube in found.tubes.items():
-        yield judged(
-            lambda first, second, tube: claim_tube(first, second, tube.value),
-            first,
-            second,
-            tube,
-            id=f"tube-{first}-{second}",
-            title=f"tube of {first} and {second}",
-            kind="observation",
-        )
+        title = f"tube of {first} and {second}"
+        yield judged(claim_tube, first, second, tube, id=f"tube-{first}-{second}", title=title, kind="observation")
     for (first, second), each in found.alignments.items():
         if each.found is None:
             title = f"alignment of {first} and {second}"
@@ -90,7 +83,8 @@ def figures(found: Events) -> Iterator[Exhibit]:
             caption=(
                 "One row per slice. Bars are contacts, ticks are impacts; the upper lane of a row is the first "
                 "solver, the lower the second. Where the two lanes of a row look alike, both solvers have the same "
-                "contacts and impacts of that slice."
+                "contacts and impacts of that slice. At a fork the slice strikes one end in the first flight and the "
+                "other end in the second."
             ),
             alt=f"Contacts and impacts of {first} above those of {second}, one row per slice. "
             f"{alignment.words}.".replace("ω₀", "omega_0"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -29,16 +28,15 @@ IMPACTS: dict[str, dict[str, Any]] = {
 }
 
 
-def even_rows(n_slices: int, most: int = MOST_ROWS) -> list[int]:
-    """Return at most ``most`` slices, evenly chosen, the first and the last among them."""
-    return [int(i) for i in np.unique(np.linspace(0, n_slices - 1, min(most, n_slices)).round())]
+def even_rows(n_slices: int) -> list[int]:
+    """Return at most ``MOST_ROWS`` slices, evenly chosen, the first and the last among them."""
+    return [int(i) for i in np.unique(np.linspace(0, n_slices - 1, min(MOST_ROWS, n_slices)).round())]
 
 
 @styled
-def figure_gantt(alignment: Alignment, *, slices: Sequence[int] | None = None) -> Figure:
+def figure_gantt(alignment: Alignment) -> Figure:
     """Contacts and impacts of two runs, one row per slice: the first run above, the second paler below."""
-    chosen = even_rows(alignment.n_slices) if slices is None else list(slices)
-    rows = {i: row for row, i in enumerate(chosen)}
+    rows = {i: row for row, i in enumerate(even_rows(alignment.n_slices))}
     figure, axes = new_figure(size=(8.0, 1.9 + 0.36 * len(rows)))
     axes.grid(visible=False)
     for row in range(1, len(rows), 2):

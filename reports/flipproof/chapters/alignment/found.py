@@ -68,25 +68,6 @@ class Fork:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Disagreement:
-    """One impact on which the two runs disagree; ``kind`` is fork, missing, extra, swapped or shifted."""
-
-    kind: str
-    time: float
-    slice: int
-    end: int
-    k: int
-
-    @property
-    def words(self) -> str:
-        """The disagreement in words."""
-        return (
-            f"{self.kind} at {self.time * 1e3:.1f} ms: slice {self.slice}, {end_name(self.end)}, "
-            f"{ordinal(self.k)} impact there"
-        )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Rests:
     """Contiguous times at which a slice is in contact with an end; arrays of shape (K,), times in [s]."""
 
@@ -160,48 +141,27 @@ class Alignment:
         return float((~self.shifted).sum()) / several if several else float("nan")
 
     @property
-    def first_disagreement(self) -> Disagreement | None:
-        """The earliest fork, missing, extra, swapped or shifted impact; None if the sequences agree."""
-        candidates = [_of(self.missing, k, "missing") for k in range(len(self.missing))]
-        candidates += [_of(self.extra, k, "extra") for k in range(len(self.extra))]
-        candidates += [
-            Disagreement(kind="fork", time=f.time, slice=f.slice, end=f.first_end, k=f.k) for f in self.forks
-        ]
-        candidates += [_of(self.matched, int(k), "swapped", self.shift) for k in self.swapped[:, 0]]
-        candidates += [_of(self.matched, int(k), "shifted", self.shift) for k in np.flatnonzero(self.shifted)]
-        return min(candidates, key=lambda candidate: candidate.time, default=None)
-
-    @property
     def words(self) -> str:
         """What agrees, what does not and what was not compared, in one sentence with the numbers."""
         shifted = int(self.shifted.sum())
-        parts = [f"{len(self.matched)} impacts matched"]
+        words = f"{len(self.matched)} impacts are in both flights"
         if len(self.matched):
             size = np.abs(self.shift) * 1e3
-            parts[0] += f" (shift: median {np.median(size):.3g} ms, largest {size.max():.3g} ms)"
-        parts += [
-            f"{len(self.matched) - shifted} of them within {self.shift_band * 1e3:g} ms and {shifted} shifted further",
-            f"{len(self.swapped)} swapped, {len(self.missing)} missing, {len(self.extra)} extra",
-        ]
-        forks = f"{len(self.forks)} of {self.n_slices} slices fork"
+            words += (
+                f", {len(self.matched) - shifted} of them within {self.shift_band * 1e3:g} ms of each other (median "
+                f"{np.median(size):.3g} ms, largest {size.max():.3g} ms), {len(self.swapped)} in another order"
+            )
+        words += f"; {len(self.missing)} are in the first flight alone, {len(self.extra)} in the second alone; "
         if self.forks:
             before, after = map(len, self.after_fork)
-            forks += f", the first being {self.forks[0].words}"
-            forks += f"; {before} and {after} later impacts of those were not compared"
-        words = f"{', '.join(parts)}; {forks}; {self.tail[0]} and {self.tail[1]} slower than {self.least_speed:g} m/s"
-        return words + (f", {self.undecided} cut off by the end" if self.undecided else "")
-
-
-def _of(keyed: Keyed, i: int, kind: str, shift: FloatArray | None = None) -> Disagreement:
-    """Return the disagreement about one impact; a matched one shows at the earlier of its two times."""
-    early = 0.0 if shift is None else min(0.0, float(shift[i]))
-    return Disagreement(
-        kind=kind,
-        time=float(keyed.time[i]) + early,
-        slice=int(keyed.slice[i]),
-        end=int(keyed.end[i]),
-        k=int(keyed.k[i]),
-    )
+            words += (
+                f"{len(self.forks)} of {self.n_slices} slices strike different ends in the two flights, "
+                f"first {self.forks[0].words}; their {before} and {after} later impacts are not compared"
+            )
+        else:
+            words += f"none of {self.n_slices} slices strikes different ends in the two flights"
+        words += f"; {self.tail[0]} and {self.tail[1]} impacts slower than {self.least_speed:g} m/s are not compared"
+        return words + (f"; {self.undecided} come too near the end of the flight to tell" if self.undecided else "")
 
 
 def count_key(impacts: Impacts, index: int, least_speed: float = 0.0) -> int:

@@ -218,12 +218,12 @@ def _fork(a: _Sequence, b: _Sequence, at: tuple[int, int], k: IndexArray) -> For
     )
 
 
-def rest_intervals(run: Trajectory, tolerance: float = REST_TOLERANCE) -> Rests:
-    """Return when each slice is in contact with an end: at or beyond it, or closer than ``tolerance`` lengths.
+def rest_intervals(run: Trajectory) -> Rests:
+    """Return when each slice is in contact with an end: at or beyond it, or closer than ``REST_TOLERANCE`` lengths.
 
     A contact must hold at two output times in a row: at one alone, a slice may just be passing.
     """
-    reach = tolerance * run.scenario.bottle.length
+    reach = REST_TOLERANCE * run.scenario.bottle.length
     found = []
     for end in (BASE, -BASE):
         gap = run.scenario.r_max - run.r if end == BASE else run.r - run.scenario.r_min

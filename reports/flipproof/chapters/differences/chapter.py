@@ -7,12 +7,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.chapters.differences.figure import draw
+from flipproof.chapters.differences.figure import LEAST, MOST, draw
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, study_difference
 from flipproof.chapters.predictability.study import PartingGrowth, study_parting_growth
-from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, WITNESSES
+from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, WITNESSES
 from flipproof.chapters.waterfall.study import NAMES
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Flights, Run, Study, attempt
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Flights, Run, Study, Touch, attempt
 from flipproof.frame.solvers import find
 from flipproof.frame.throws import finer
 from flipproof.frame.twins import BAND_WORDS, twins
@@ -37,7 +37,7 @@ PAIRS: Final = (
 )
 """Name, first, second: down the ladder one assumption at a time, then the engine, then several together."""
 
-REFINED: Final = (*LIMITS, *LADDER)
+REFINED: Final = (*SCHEMES, *LADDER)
 """Solvers that fly the throw again at ``FINER`` times the slices; a full report adds the engine, its slowest run."""
 
 MODEL_FLOOR: Final = 1e-9
@@ -57,10 +57,6 @@ class Differences:
     ended: str
     missing: Mapping[tuple[str, str, str], str]
     band_words: str = BAND_WORDS
-
-    def named(self, name: str) -> Difference | None:
-        """Return the difference of that name, or None."""
-        return next((difference for difference in self.pairs if difference.name == name), None)
 
 
 def study(ask: Ask) -> Study[Differences]:
@@ -117,7 +113,7 @@ def run_bands(runs: Mapping[str, Run], flights: Flights) -> dict[str, float]:
     band is zero. For a model it is the largest change of omega in its twins (another release in the eleventh digit, a
     tenth of the rest speed), and never less than MODEL_FLOOR; for an engine that of its certificate.
     """
-    bands = dict.fromkeys(LIMITS, 0.0)
+    bands = dict.fromkeys(SCHEMES, 0.0)
     for model in LADDER:
         usual = flights.trajectory(runs[model])
         for other in map(flights.trajectory, twins(runs[model])):
@@ -172,17 +168,26 @@ def figures(found: Differences) -> Iterator[Exhibit]:
     """Yield the differences over time."""
     if not found.pairs:
         return
+    curves = {d.name: (d.t, d.omega) for d in found.pairs}
     words = "; ".join(f"{d.name}: at most {d.largest:.2g} of omega_0, {d.moment}" for d in found.pairs)
     yield Exhibit(
         name="differences",
         title="Where the solvers part",
-        caption="Each curve is the difference in ω of one pair of solvers. A marker on the dotted line is the moment "
-        "at which it first exceeds 1 % of ω₀. The largest value of a curve belongs to that pair. It is no share of the "
-        "difference between program and free flight: such shares stand in the waterfall.",
-        alt=f"Logarithmic line plot of the differences in omega. {words}.".replace("ω₀", "omega_0"),
+        caption="Each panel shows the difference in ω of one pair of solvers as a share of ω₀, on one logarithmic "
+        "scale for all. The dotted line stands at 1 % of ω₀, the point at the moment when the difference first exceeds "
+        "it. The largest value of a panel belongs to its pair. It is no share of the difference between program and "
+        "free flight: such shares stand in the waterfall.",
+        alt=f"Logarithmic line plots of the differences in omega, one panel a pair. {words}.".replace("ω₀", "omega_0"),
         maker=draw,
         data=(found.pairs,),
-        table=curves_csv({f"difference in omega/omega_0: {d.name} [1]": (d.t, d.omega) for d in found.pairs}),
+        table=curves_csv({f"difference in omega/omega_0: {name} [1]": curve for name, curve in curves.items()}),
+        touch=Touch(
+            label="|difference in ω| / ω₀ [1]",
+            curves=curves,
+            shown=(PROGRAM_EQ8, EQ8_FREE, TOTAL),
+            limits=(LEAST, MOST),
+            beside=True,
+        ),
     )
 
 

@@ -1,40 +1,46 @@
-"""Size of every difference over time."""
+"""Size of every difference over time, one panel a pair."""
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, percent
-from flipproof.figures.style import ASSUMPTIONS, MARKERS, new_figure, shared_legend, styled
+from flipproof.figures.style import new_figure, styled
+
+COLUMNS = 3
+LEAST, MOST = 1e-6, 2.0
+"""Ends of the axis, as shares of omega_0."""
+
+LINE, LIMIT = "#0072B2", "#B00020"
 
 
 @styled
 def draw(differences: Sequence[Difference]) -> Figure:
-    """Size of every difference over time on a logarithmic scale, with the parting band and moments."""
-    figure, axes = new_figure(size=(8.0, 5.4))
-    axes.axhline(PARTING_BAND, color="#444444", linewidth=1.0, linestyle=":")
-    axes.text(1.005, PARTING_BAND, percent(PARTING_BAND), transform=axes.get_yaxis_transform(), va="center", fontsize=9)
-    for k, difference in enumerate(differences):
-        colour = ASSUMPTIONS[k % len(ASSUMPTIONS)]
-        size = np.maximum(np.abs(difference.omega), 1e-12)
-        line = "-" if k < len(ASSUMPTIONS) else "--"  # the colours begin anew
-        axes.plot(difference.t, size, color=colour, linestyle=line, linewidth=1.4, label=difference.name)
+    """Draw a panel a pair on one logarithmic scale, with the parting band and when it is first passed."""
+    rows = -(-len(differences) // COLUMNS)
+    figure, grid = new_figure(
+        rows, COLUMNS, size=(8.0, 0.5 + 1.75 * rows), sharex=True, sharey=True, squeeze=False,
+    )  # fmt: skip
+    for axes, difference in zip(grid.flat, differences, strict=False):
+        axes.plot(difference.t, np.maximum(np.abs(difference.omega), LEAST / 10), color=LINE, linewidth=1.2)
+        axes.axhline(PARTING_BAND, color=LIMIT, linewidth=1.0, linestyle=":")
         if difference.parting_time is not None:
-            axes.plot(
-                difference.parting_time,
-                PARTING_BAND,
-                MARKERS[k % len(MARKERS)],
-                color=colour,
-                markeredgecolor="white",
-                markersize=8,
-            )
-    axes.set_yscale("log")
-    axes.set_ylim(1e-7, 2.0)
-    axes.set_xlabel("time t [s]")
-    axes.set_ylabel("|difference in ω| / ω₀ [1]")
-    axes.margins(x=0.01)
-    shared_legend(figure, axes, columns=2)
+            axes.plot(difference.parting_time, PARTING_BAND, "o", color=LIMIT, markeredgecolor="white", markersize=7)
+        words = f"{textwrap.fill(difference.name, 32)}\nat most {percent(difference.largest)}"
+        axes.set_title(words, fontsize=9, loc="left")
+        axes.margins(x=0.02)
+    for axes in grid.flat[len(differences) :]:
+        axes.remove()
+    grid[0, 0].set_yscale("log")
+    grid[0, 0].set_ylim(LEAST, MOST)
+    for axes in grid[:, 0]:
+        axes.set_ylabel("|difference| [1]")
+    for column in range(COLUMNS):
+        lowest = grid[(len(differences) - 1 - column) // COLUMNS, column]
+        lowest.set_xlabel("time t [s]")
+        lowest.tick_params(labelbottom=True)
     return figure

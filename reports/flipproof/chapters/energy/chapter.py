@@ -48,7 +48,7 @@ def claims(found: Energy) -> Claims:
     """Yield that every ledger closes on the paper's own throw."""
     for model, made in found.checks.items():
         title = f"{model}: the energy ledger closes"
-        yield judged(lambda made: claim_energy(made.flight), made, id=f"energy-{model}", title=title)
+        yield judged(claim_energy, made, id=f"energy-{model}", title=title)
     for model, each in found.ledgers.items():
         if each.found is None:
             yield Absent(f"ledger-{model}", f"ledger of {model}", each.reason, "observation")

@@ -8,7 +8,7 @@ from typing import Final
 
 from flipproof.chapters.differences.study import claim_change
 from flipproof.chapters.engine_facts.figure import figure_gallery
-from flipproof.chapters.engine_facts.study import EngineFact, plan_engine_facts, study_engine_facts
+from flipproof.chapters.engine_facts.study import FACTS, plan_engine_facts
 from flipproof.chapters.solvers import ENGINE
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged
 from flipproof.frame.findings import finite_or_none
@@ -27,7 +27,7 @@ GRAVITY_BAND: Final = 1e-9
 class EngineFacts:
     """The facts, and the engine's free flight of the paper's own throw with gravity and without."""
 
-    facts: tuple[EngineFact, ...]
+    facts: tuple[Finding, ...]
     usual: Made
     weightless: Made
 
@@ -40,19 +40,15 @@ def study(ask: Ask) -> Study[EngineFacts]:
         for throw in (ask.reference, without_gravity(ask.reference))
     )
     flights = yield [*runs.values(), usual, weightless]
-    facts = study_engine_facts({words: flights[run] for words, run in runs.items()})
-    return EngineFacts(facts, flights[usual], flights[weightless])
+    made = {words: flights[run] for words, run in runs.items()}
+    return EngineFacts(tuple(fact.found(made) for fact in FACTS), flights[usual], flights[weightless])
 
 
 def claims(found: EngineFacts) -> Claims:
     """Yield that gravity cancels, and every fact."""
-    yield judged(
-        lambda: claim_gravity_cancels(found.usual.flight, found.weightless.flight),
-        id="engine-gravity",
-        title=f"{ENGINE}: free flight is the same with g = 0",
-    )
-    for fact in found.facts:
-        yield claim_engine_fact(fact)
+    title = f"{ENGINE}: free flight is the same with g = 0"
+    yield judged(claim_gravity_cancels, found.usual, found.weightless, id="engine-gravity", title=title)
+    yield from found.facts
 
 
 def claim_gravity_cancels(with_gravity: Trajectory, without: Trajectory) -> Finding:
@@ -68,39 +64,24 @@ def claim_gravity_cancels(with_gravity: Trajectory, without: Trajectory) -> Find
     )
 
 
-def claim_engine_fact(fact: EngineFact) -> Finding:
-    """Every engine does what the gallery says of it; a fact about one that is not installed is not evaluated."""
-    return Finding(
-        id=f"engine-fact-{fact.id}",
-        title=fact.fact,
-        value=fact.value,
-        unit=fact.unit,
-        kind="observation" if fact.absent else "regression",
-        admissible=fact.admissible,
-        note=fact.note,
-    )
-
-
 def figures(found: EngineFacts) -> Iterator[Exhibit]:
     """Yield the table of facts."""
-    if found.facts:
-        yield draw_gallery(found.facts)
+    yield draw_gallery(found.facts)
 
 
-def draw_gallery(facts: Sequence[EngineFact]) -> Exhibit:
-    """Return the table of engine facts."""
-    findings = [claim_engine_fact(fact) for fact in facts]
-    engines = [fact.engine for fact in facts]
+def draw_gallery(findings: Sequence[Finding]) -> Exhibit:
+    """Return the findings of ``FACTS`` as a table."""
+    engines = [fact.engine for fact in FACTS]
     words = " ".join(
         f"{finding.title}: {finding.value_text}, threshold {finding.threshold_text}, {finding.verdict}."
         for finding in findings
     )
-    held = sum(fact.holds is True for fact in facts)
+    held = sum(finding.verdict == "pass" for finding in findings)
     return Exhibit(
         name="engine-facts",
         title="Engine behaviour that a user may not expect",
         caption=f"Each fact is measured anew with every report, and the sign says whether the number lies within its "
-        f"threshold: {held} of {len(facts)} do. The engine check is set so that none of them changes "
+        f"threshold: {held} of {len(findings)} do. The engine check is set so that none of them changes "
         "a result unnoticed; how each was measured stands with the findings.",
         alt=f"Table of facts about the engines. {words}".replace("ω₀", "omega_0"),
         maker=figure_gallery,

@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.chapters.engine_facts import worlds
+from flipproof.frame.findings import Finding, Kind
 from flipproof.frame.solvers import Made, Run, without_gravity
 from slicemodel import Scenario, Trajectory
 
@@ -38,6 +39,10 @@ DEFAULT_BIAS: Final = (1.0 - 0.1) ** 60
 """``error_bias`` of a joint unless told otherwise: a tenth of the error is removed at each of 60 steps a second."""
 
 
+Measured = Callable[[Mapping[str, Made]], tuple[float, str]]
+"""The runs by what is said of each -> the number that shows a fact, and how it was measured."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EngineFact:
     """One fact about an engine.
@@ -46,28 +51,46 @@ class EngineFact:
     ----------
     id : str - stable name
     engine : str
-    fact : str - what holds, in words
-    value : float or None, unit : str - the number that shows it; None if it could not be measured
-    admissible : (low, high) - closed interval that holds ``value`` if the fact holds
-    note : str - how it was measured; or why it was not
-    absent : bool - True if the engine is not installed and need not be
+    words : str - what holds
+    unit : str - of the number that shows it
+    admissible : (low, high) - closed interval that holds the number if the fact holds
+    measure : callable - raises LookupError, with the reason, if a run that it needs is not whole
     """
 
     id: str
     engine: str
-    fact: str
-    value: float | None
+    words: str
     unit: str
     admissible: tuple[float, float]
-    note: str = ""
-    absent: bool = False
+    measure: Measured
 
-    @property
-    def holds(self) -> bool | None:
-        """True if the number lies in its interval, None if there is none; NaN lies in no interval."""
-        if self.value is None:
-            return None
-        return self.admissible[0] <= self.value <= self.admissible[1]
+    def found(self, made: Mapping[str, Made]) -> Finding:
+        """Return the finding: that the number lies in its interval, or why there is none.
+
+        A fact about an engine that is not installed and need not be cannot fail.
+        """
+        value: float | None = None
+        kind: Kind = "regression"
+        try:
+            value, note = self.measure(made)
+        except ModuleNotFoundError as missing:
+            note = f"{self.engine} is not installed ({missing})"
+            kind = "observation" if self.engine != "pymunk" else kind
+        except LookupError as missing:
+            note = str(missing.args[0])
+        return Finding(
+            id=f"engine-fact-{self.id}", title=self.words, value=value, unit=self.unit, kind=kind,
+            admissible=self.admissible, note=note,
+        )  # fmt: skip
+
+
+def _fact(
+    id_: str, engine: str, words: str, unit: str, admissible: tuple[float, float]
+) -> Callable[[Measured], EngineFact]:
+    """Return a decorator that makes a fact of what measures it."""
+    return lambda measure: EngineFact(
+        id=id_, engine=engine, words=words, unit=unit, admissible=admissible, measure=measure
+    )
 
 
 # ---------------------------------------------------------------------- facts that need the bottle
@@ -99,25 +122,6 @@ def plan_engine_facts(throw: Scenario) -> dict[str, Run]:
     return {each.label: replace(each, label=f"engine fact, {each.label}") for each in runs}
 
 
-def study_engine_facts(made: Mapping[str, Made]) -> tuple[EngineFact, ...]:
-    """Read the runs of ``plan_engine_facts`` and measure the other facts in worlds of one or two bodies."""
-    facts: list[Callable[[], EngineFact]] = [
-        lambda: _fact_gravity(made),
-        lambda: _fact_smaller_step(made),
-        lambda: _fact_order(made),
-        lambda: _fact_order_forgotten(made),
-        lambda: _fact_joints(made),
-        _fact_elasticity,
-        _fact_groove_end,
-        _fact_stagger,
-        _fact_slop,
-        _fact_tunnel,
-        _fact_soft_limit,
-        _fact_soft_contact,
-    ]
-    return tuple(fact() for fact in facts)
-
-
 def _run(made: Mapping[str, Made], words: str) -> Trajectory:
     if words not in made:
         raise LookupError(f"{words}: not run")
@@ -131,68 +135,40 @@ def _whole(made: Mapping[str, Made], words: str) -> Trajectory:
     return flight
 
 
-def _fact(
-    measure: Callable[[], tuple[float, str]],
-    *,
-    id_: str,
-    engine: str,
-    fact: str,
-    unit: str,
-    admissible: tuple[float, float],
-) -> EngineFact:
-    """Return the fact with what ``measure`` returns, number and note; or without a number and with the reason."""
-    value, note, absent = None, "", False
-    try:
-        value, note = measure()
-    except ModuleNotFoundError as missing:
-        note, absent = f"{engine} is not installed ({missing})", engine != "pymunk"
-    except LookupError as missing:
-        note = str(missing.args[0])
-    return EngineFact(
-        id=id_, engine=engine, fact=fact, value=value, unit=unit, admissible=admissible, note=note, absent=absent
-    )
-
-
 def _apart(first: Trajectory, second: Trajectory) -> float:
     return float(np.abs(first.omega - second.omega).max() / abs(first.scenario.omega0))
 
 
-def _fact_gravity(made: Mapping[str, Made]) -> EngineFact:
-    def measure() -> tuple[float, str]:
-        usual, without = _whole(made, "usual"), _whole(made, "no gravity")
-        fallen = 0.5 * usual.scenario.gravity * float(usual.t[-1]) ** 2
-        return _apart(usual, without), f"the bottle falls by {fallen:.2f} m meanwhile"
-
-    return _fact(
-        measure,
-        id_="gravity",
-        engine="pymunk",
-        fact="gravity changes nothing in free flight: largest change of ω(t) when it is switched off",
-        unit="of ω₀",
-        admissible=(0.0, 1e-9),
-    )
+@_fact(
+    "gravity",
+    "pymunk",
+    "gravity changes nothing in free flight: largest change of ω(t) when it is switched off",
+    "of ω₀",
+    (0.0, 1e-9),
+)
+def _gravity(made: Mapping[str, Made]) -> tuple[float, str]:
+    usual, without = _whole(made, "usual"), _whole(made, "no gravity")
+    fallen = 0.5 * usual.scenario.gravity * float(usual.t[-1]) ** 2
+    return _apart(usual, without), f"the bottle falls by {fallen:.2f} m meanwhile"
 
 
-def _fact_smaller_step(made: Mapping[str, Made]) -> EngineFact:
-    def measure() -> tuple[float, str]:
-        held = {}
-        for dt in (LONG_DT, SHORT_DT):
-            run = _run(made, f"few iterations, dt {dt:g} s")
-            if run.ok:
-                raise LookupError(f"with {FEW_ITERATIONS} iterations and dt = {dt:g} s nothing explodes")
-            held[dt] = float(run.t[-1])
-        long, short = held[LONG_DT], held[SHORT_DT]
-        note = f"holds for {long * 1e3:g} ms at Δt = {LONG_DT:g} s, for {short * 1e3:g} ms at {SHORT_DT:g} s"
-        return (short / long if long else math.nan), note
-
-    return _fact(
-        measure,
-        id_="smaller-step",
-        engine="pymunk",
-        fact=f"with {FEW_ITERATIONS} iterations a tenth of the step explodes sooner: quotient of the times it holds",
-        unit="",
-        admissible=(0.0, 0.5),
-    )
+@_fact(
+    "smaller-step",
+    "pymunk",
+    f"with {FEW_ITERATIONS} iterations a tenth of the step explodes sooner: quotient of the times it holds",
+    "",
+    (0.0, 0.5),
+)
+def _smaller_step(made: Mapping[str, Made]) -> tuple[float, str]:
+    held = {}
+    for dt in (LONG_DT, SHORT_DT):
+        run = _run(made, f"few iterations, dt {dt:g} s")
+        if run.ok:
+            raise LookupError(f"with {FEW_ITERATIONS} iterations and dt = {dt:g} s nothing explodes")
+        held[dt] = float(run.t[-1])
+    long, short = held[LONG_DT], held[SHORT_DT]
+    note = f"holds for {long * 1e3:g} ms at Δt = {LONG_DT:g} s, for {short * 1e3:g} ms at {SHORT_DT:g} s"
+    return (short / long if long else math.nan), note
 
 
 def _order_widths(made: Mapping[str, Made]) -> list[float]:
@@ -204,161 +180,145 @@ def _order_widths(made: Mapping[str, Made]) -> list[float]:
     return widths
 
 
-def _fact_order(made: Mapping[str, Made]) -> EngineFact:
-    def measure() -> tuple[float, str]:
-        again = _apart(_whole(made, "usual"), _whole(made, f"order 0, {ITERATIONS} iterations"))
-        return _order_widths(made)[0], f"{len(SHUFFLES)} shuffled orders; the same order twice: {again:.1g}"
+@_fact(
+    "order",
+    "pymunk",
+    f"the order in which bodies enter matters: largest change of ω(t), {ORDER_ITERATIONS[0]} iterations",
+    "of ω₀",
+    (1e-9, 1e-2),
+)
+def _order(made: Mapping[str, Made]) -> tuple[float, str]:
+    again = _apart(_whole(made, "usual"), _whole(made, f"order 0, {ITERATIONS} iterations"))
+    return _order_widths(made)[0], f"{len(SHUFFLES)} shuffled orders; the same order twice: {again:.1g}"
 
-    return _fact(
-        measure,
-        id_="order",
-        engine="pymunk",
-        fact=f"the order in which bodies enter matters: largest change of ω(t), {ORDER_ITERATIONS[0]} iterations",
-        unit="of ω₀",
-        admissible=(1e-9, 1e-2),
+
+@_fact(
+    "order-forgotten",
+    "pymunk",
+    f"a solver that converges forgets the order: that change at {ORDER_ITERATIONS[1]} iterations "
+    f"over that at {ORDER_ITERATIONS[0]}",
+    "",
+    (0.0, 0.1),
+)
+def _order_forgotten(made: Mapping[str, Made]) -> tuple[float, str]:
+    few, many = _order_widths(made)
+    return (
+        many / few,
+        f"{few:.1e} to {many:.1e} of ω₀: what the order moves is what the solver has not iterated away",
     )
 
 
-def _fact_order_forgotten(made: Mapping[str, Made]) -> EngineFact:
-    def measure() -> tuple[float, str]:
-        few, many = _order_widths(made)
-        return (
-            many / few,
-            f"{few:.1e} to {many:.1e} of ω₀: what the order moves is what the solver has not iterated away",
-        )
-
-    few, many = ORDER_ITERATIONS
-    return _fact(
-        measure,
-        id_="order-forgotten",
-        engine="pymunk",
-        fact=f"a solver that converges forgets the order: that change at {many} iterations over that at {few}",
-        unit="",
-        admissible=(0.0, 0.1),
-    )
-
-
-def _fact_joints(made: Mapping[str, Made]) -> EngineFact:
-    def measure() -> tuple[float, str]:
-        default = _whole(made, "joints corrected as by default")
-        ours = _whole(made, "usual").diagnostics["constraint_drift"]
-        return float(default.diagnostics["constraint_drift"]), f"{ours:.1e} with errors removed within one step"
-
-    return _fact(
-        measure,
-        id_="joints",
-        engine="pymunk",
-        fact="joints give: how far a mass leaves the axis that a joint holds it on, default correction",
-        unit="of L",
-        admissible=(1e-5, 1e-2),
-    )
+@_fact(
+    "joints",
+    "pymunk",
+    "joints give: how far a mass leaves the axis that a joint holds it on, default correction",
+    "of L",
+    (1e-5, 1e-2),
+)
+def _joints(made: Mapping[str, Made]) -> tuple[float, str]:
+    default = _whole(made, "joints corrected as by default")
+    ours = _whole(made, "usual").diagnostics["constraint_drift"]
+    return float(default.diagnostics["constraint_drift"]), f"{ours:.1e} with errors removed within one step"
 
 
 # ---------------------------------------------------------------------- facts of one or two bodies
 
 
-def _fact_elasticity() -> EngineFact:
-    def measure() -> tuple[float, str]:
-        others = ", ".join(
-            f"{a:g} and {b:g} give {worlds.rebound_of_two(a, b):.2f}" for a, b in ((1.0, 0.5), (0.0, 1.0))
-        )
-        return worlds.rebound_of_two(0.5, 0.5), others
+@_fact(
+    "elasticity",
+    "pymunk",
+    "elasticities multiply: restitution of two shapes of 0.5 each",
+    "",
+    (0.249, 0.251),
+)
+def _elasticity(_: Mapping[str, Made]) -> tuple[float, str]:
+    others = ", ".join(f"{a:g} and {b:g} give {worlds.rebound_of_two(a, b):.2f}" for a, b in ((1.0, 0.5), (0.0, 1.0)))
+    return worlds.rebound_of_two(0.5, 0.5), others
 
-    return _fact(
-        measure,
-        id_="elasticity",
-        engine="pymunk",
-        fact="elasticities multiply: restitution of two shapes of 0.5 each",
-        unit="",
-        admissible=(0.249, 0.251),
+
+@_fact(
+    "groove-end",
+    "pymunk",
+    "the end of a groove is a dead stop whatever the elasticity: speed back over speed before",
+    "",
+    (0.0, 1e-3),
+)
+def _groove_end(_: Mapping[str, Made]) -> tuple[float, str]:
+    return (
+        worlds.speed_after_groove_end(),
+        "one mass with elasticity 1 in a groove; the set-up check refuses a groove that ends inside the bottle",
     )
 
 
-def _fact_groove_end() -> EngineFact:
-    return _fact(
-        lambda: (
-            worlds.speed_after_groove_end(),
-            "one mass with elasticity 1 in a groove; the set-up check refuses a groove that ends inside the bottle",
-        ),
-        id_="groove-end",
-        engine="pymunk",
-        fact="the end of a groove is a dead stop whatever the elasticity: speed back over speed before",
-        unit="",
-        admissible=(0.0, 1e-3),
+@_fact(
+    "stagger",
+    "pymunk",
+    "velocities stand half a step ahead of positions",
+    "steps",
+    (0.49, 0.51),
+)
+def _stagger(_: Mapping[str, Made]) -> tuple[float, str]:
+    return worlds.stagger(), "free fall: velocity against the slope of the positions; positive is ahead"
+
+
+@_fact(
+    "slop",
+    "pymunk",
+    "penetration is left alone up to collision_slop, by default a third of the bottle",
+    "m",
+    (0.099, 0.101),
+)
+def _slop(_: Mapping[str, Made]) -> tuple[float, str]:
+    (default, left), without = worlds.depth_left(None), worlds.depth_left(0.0)[1]
+    return default, (
+        f"a disc dropped at 2 m/s (Δt = 10 ms) stays {left * 1e3:.1f} mm deep in the floor, "
+        f"{without * 1e3:.1g} mm with slop 0"
     )
 
 
-def _fact_stagger() -> EngineFact:
-    return _fact(
-        lambda: (worlds.stagger(), "free fall: velocity against the slope of the positions; positive is ahead"),
-        id_="stagger",
-        engine="pymunk",
-        fact="velocities stand half a step ahead of positions",
-        unit="steps",
-        admissible=(0.49, 0.51),
-    )
-
-
-def _fact_slop() -> EngineFact:
-    def measure() -> tuple[float, str]:
-        (default, left), (_, without) = worlds.depth_left(None), worlds.depth_left(0.0)
-        return default, (
-            f"a disc dropped at 2 m/s (Δt = 10 ms) stays {left * 1e3:.1f} mm deep in the floor, "
-            f"{without * 1e3:.1g} mm with slop 0"
-        )
-
-    return _fact(
-        measure,
-        id_="slop",
-        engine="pymunk",
-        fact="penetration is left alone up to collision_slop, by default a third of the bottle",
-        unit="m",
-        admissible=(0.099, 0.101),
-    )
-
-
-def _fact_tunnel() -> EngineFact:
-    return _fact(
-        lambda: (
-            worlds.speed_through_wall(1e-2),
-            f"5 m/s and a wall of 10 mm at Δt = 10 ms; at 1 ms it comes back, {worlds.speed_through_wall(1e-3):.3g}",
-        ),
-        id_="tunnel",
-        engine="pymunk",
-        fact="no swept test: a wall thinner than one step is passed, speed after over speed before",
-        unit="",
-        admissible=(0.99, 1.01),
+@_fact(
+    "tunnel",
+    "pymunk",
+    "no swept test: a wall thinner than one step is passed, speed after over speed before",
+    "",
+    (0.99, 1.01),
+)
+def _tunnel(_: Mapping[str, Made]) -> tuple[float, str]:
+    return (
+        worlds.speed_through_wall(1e-2),
+        f"5 m/s and a wall of 10 mm at Δt = 10 ms; at 1 ms it comes back, {worlds.speed_through_wall(1e-3):.3g}",
     )
 
 
 # ---------------------------------------------------------------------- MuJoCo, if it is there
 
 
-def _fact_soft_limit() -> EngineFact:
-    def measure() -> tuple[float, str]:
-        back, beyond = worlds.rebound_of_limit()
-        return back, f"hit at 1 m/s; the mass goes {beyond * 1e3:.1f} mm beyond the limit first"
-
-    return _fact(
-        measure,
-        id_="mujoco-limit",
-        engine="mujoco",
-        fact="joint limits are soft and have no restitution: speed back over speed before (0.5 is meant)",
-        unit="",
-        admissible=(0.0, 0.3),
-    )
+@_fact(
+    "mujoco-limit",
+    "mujoco",
+    "joint limits are soft and have no restitution: speed back over speed before (0.5 is meant)",
+    "",
+    (0.0, 0.3),
+)
+def _soft_limit(_: Mapping[str, Made]) -> tuple[float, str]:
+    back, beyond = worlds.rebound_of_limit()
+    return back, f"hit at 1 m/s; the mass goes {beyond * 1e3:.1f} mm beyond the limit first"
 
 
-def _fact_soft_contact() -> EngineFact:
-    def measure() -> tuple[float, str]:
-        at_rest, deepest = worlds.depth_of_contact()
-        return at_rest * 1e3, f"1 kg at rest under its weight; {deepest * 1e3:.1f} mm when it lands at 1 m/s"
+@_fact(
+    "mujoco-contact",
+    "mujoco",
+    "contacts are soft: how deep a resting ball lies in the floor",
+    "mm",
+    (0.01, 10.0),
+)
+def _soft_contact(_: Mapping[str, Made]) -> tuple[float, str]:
+    at_rest, deepest = worlds.depth_of_contact()
+    return at_rest * 1e3, f"1 kg at rest under its weight; {deepest * 1e3:.1f} mm when it lands at 1 m/s"
 
-    return _fact(
-        measure,
-        id_="mujoco-contact",
-        engine="mujoco",
-        fact="contacts are soft: how deep a resting ball lies in the floor",
-        unit="mm",
-        admissible=(0.01, 10.0),
-    )
+
+FACTS: Final = (
+    _gravity, _smaller_step, _order, _order_forgotten, _joints, _elasticity, _groove_end, _stagger, _slop, _tunnel,
+    _soft_limit, _soft_contact,
+)  # fmt: skip
+"""Every fact, in the order of the table."""

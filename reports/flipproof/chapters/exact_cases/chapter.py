@@ -25,13 +25,7 @@ def study(ask: Ask) -> Study[Found]:
 def claims(found: Found) -> Claims:
     """Yield the largest error of every model."""
     for model, each in found.items():
-        yield judged(
-            lambda model, each: claim_exact_cases(model, each.value),
-            model,
-            each,
-            id=f"exact-cases-{model}",
-            title=f"exact cases of {model}",
-        )
+        yield judged(claim_exact_cases, model, each, id=f"exact-cases-{model}", title=f"exact cases of {model}")
 
 
 def claim_exact_cases(model: str, cases: Sequence[SharedDigits]) -> Finding:

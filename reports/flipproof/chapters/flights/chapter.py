@@ -13,8 +13,8 @@ import numpy as np
 
 from engine_check.witness import witness_of
 from flipproof.chapters.flights import figures as pictures
-from flipproof.chapters.solvers import FLIGHTS, LIMITS, OTHERS
-from flipproof.frame.chapter import Ask, Chapter, Exhibit, Made, Study
+from flipproof.chapters.solvers import FLIGHTS, LIMITS, OTHERS, SCHEMES
+from flipproof.frame.chapter import Ask, Chapter, Exhibit, Made, Study, Touch
 from flipproof.frame.solvers import find
 from flipproof.output.columns import curves_csv, json_ready
 from flipproof.output.tables import trajectory_csv
@@ -93,12 +93,12 @@ def figures(found: Flown) -> Iterator[Exhibit]:
     over_time = partial(_over_time, flights)
     yield over_time(
         "omega", "Angular velocity", pictures.figure_omega, "omega/omega_0", "[1]",
-        caption="A solid scheme and the dashed equation of the same hue differ by what a finite step does. Curves of "
-        "different hues solve different equations; free-flight and pymunk both solve free flight. All have "
-        f"N = {flights[0].scenario.n_slices} slices.",
+        caption="published-python and published-limit, and exact-step and eq8, are each a scheme and the equation that "
+        "it solves: they differ by what a finite time step does. free-flight and pymunk both solve free flight. Any "
+        f"other two curves solve different equations. All have N = {flights[0].scenario.n_slices} slices.",
         values={run.label: run.omega / run.scenario.omega0 for run in flights},
         alt="Line plot of omega over omega_0 against time, 1 at release. Values at the end: {ends}. {apart}",
-        digits=".3f", apart=".2g", unit=" of omega_0",
+        digits=".3f", apart=".2g", unit=" of omega_0", label="angular velocity ω / ω₀ [1]",
     )  # fmt: skip
     yield over_time(
         "theta", "Angle", pictures.figure_theta, "theta", "[degrees]",
@@ -106,7 +106,7 @@ def figures(found: Flown) -> Iterator[Exhibit]:
         "At 0° and at multiples of 360° the bottle stands upright.",
         values={run.label: np.degrees(run.theta) for run in flights},
         alt="Line plot of the angle theta in degrees against time. Values at the end: {ends} degrees. {apart}",
-        digits=".0f", apart=".1f", unit=" degrees",
+        digits=".0f", apart=".1f", unit=" degrees", label="angle θ [°]",
     )  # fmt: skip
     yield over_time(
         "centre-of-mass", "Centre of mass", pictures.figure_centre_of_mass, "r_CM/L", "[1]",
@@ -115,7 +115,7 @@ def figures(found: Flown) -> Iterator[Exhibit]:
         values={run.label: run.r_cm / length for run in flights},
         alt="Line plot of the centre of mass from the cap, as a fraction of the length, "
         f"{flights[0].r_cm[0] / length:.3f} at release. At the end: {{ends}}. {{apart}}",
-        digits=".3f", apart=".2g", unit=" of the length",
+        digits=".3f", apart=".2g", unit=" of the length", label="centre of mass from the cap, r_CM / L [1]",
     )  # fmt: skip
     chosen = pictures.chosen_slices(flights[0])
     whole = [run for run in flights if len(run.r)]
@@ -140,10 +140,11 @@ def figures(found: Flown) -> Iterator[Exhibit]:
 
 def _over_time(
     flights: Sequence[Trajectory], name: str, title: str, maker: Any, symbol: str, column_unit: str, *, caption: str,
-    values: Mapping[str, Any], alt: str, digits: str, apart: str, unit: str,
+    values: Mapping[str, Any], alt: str, digits: str, apart: str, unit: str, label: str,
 ) -> Exhibit:  # fmt: skip
     """Return the figure of one quantity; ``values`` is that of each flight by its label."""
-    ends = {label: float(curve[-1]) for label, curve in values.items()}
+    ends = {name: float(curve[-1]) for name, curve in values.items()}
+    curves = {run.label: (run.t, values[run.label]) for run in flights}
     return Exhibit(
         name=name,
         title=title,
@@ -151,7 +152,8 @@ def _over_time(
         alt=alt.format(ends=_listed(ends, digits), apart=_apart(ends, unit, apart)),
         maker=maker,
         data=(list(flights),),
-        table=curves_csv({f"{symbol} {run.label} {column_unit}": (run.t, values[run.label]) for run in flights}),
+        table=curves_csv({f"{symbol} {name} {column_unit}": curve for name, curve in curves.items()}),
+        touch=Touch(label=label, curves=curves, digits=1 if unit == " degrees" else 3),
     )
 
 
@@ -166,7 +168,7 @@ def _apart(ends: Mapping[str, float], unit: str, digits: str) -> str:
         return ""
     low, high = min(finite, key=lambda name: finite[name]), max(finite, key=lambda name: finite[name])
     words = f"They end up to {finite[high] - finite[low]:{digits}}{unit} apart ({low} to {high})"
-    pairs = [(s, m) for s, m in LIMITS.items() if s in finite and m in finite]
+    pairs = [(s, LIMITS[s]) for s in SCHEMES if s in finite and LIMITS[s] in finite]
     if pairs:
         words += ", a scheme and its own equation up to " + (
             f"{max(abs(finite[s] - finite[m]) for s, m in pairs):{digits}}{unit}"

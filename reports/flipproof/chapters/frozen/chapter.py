@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from typing import Final
 
 from flipproof.chapters.frozen.figure import figure_frozen
-from flipproof.chapters.frozen.study import LIMITS, QUANTITIES, Frozen, plan_frozen, study_frozen
+from flipproof.chapters.frozen.study import QUANTITIES, Frozen, plan_frozen, study_frozen
+from flipproof.chapters.solvers import LIMITS
 from flipproof.frame.chapter import Ask, Chapter, Exhibit, Run, Study
 from flipproof.output.columns import TIME, columns_csv
 
@@ -34,8 +35,9 @@ def figures(found: Frozen) -> Iterator[Exhibit]:
         title="What holding the coefficients constant costs, step by step",
         caption=(
             "Top: how much each quantity that is held constant changes within a step. Middle: the velocity that "
-            "holding it constant misses in that step. Bottom: these defects added up, beside the error of the velocity "
-            "and of ω that they lead to."
+            "holding it constant misses in that step, with a marker at the largest value of each; v_CM jumps at every "
+            "impact, so that a band shows the range of what holding it misses. Bottom: the missed velocities added up, "
+            "beside the error of the velocity and of ω that they lead to."
         ),
         alt=f"Curves over time for {found.scheme} at a step of {found.dt * 1e3:.2g} ms. Share of the steps in which "
         f"freezing costs most: {shares}. Largest velocity missed in one step: {peaks or 'none'}. Largest error of "

@@ -12,13 +12,16 @@ from slicemodel.trajectory import FloatArray
 WORDS = {"omega": "ω", "theta": "θ (gravity)", "r_cm": "r_CM", "v_cm": "v_CM (drag)"}
 COLOURS = dict(zip(QUANTITIES, ("#D55E00", "#0072B2", "#009E73", "#CC79A7"), strict=True))
 
-WIDTHS = {"omega": 1.4, "theta": 1.4, "r_cm": 1.4, "v_cm": 0.6}
-"""v_CM jumps at every impact: a thin line leaves the others to be seen."""
+JUMPS = "v_cm"
+"""What jumps at every impact: drawn as the range within a window, which leaves the others to be seen."""
+
+WINDOWS = 100
+"""Windows of a flight."""
 
 
 @styled
 def figure_frozen(study: Frozen) -> Figure:
-    """Change of every frozen coefficient in a step, the defect each causes, and what becomes of them."""
+    """Draw how every coefficient changes in a step, the defect that holding it causes, and what becomes of them."""
     figure, panels = new_figure(3, size=(8.0, 8.6), sharex=True)
     changes, defects, errors = panels
     for k, (words, values, colour) in enumerate((
@@ -37,10 +40,17 @@ def figure_frozen(study: Frozen) -> Figure:
         if not values.any():
             continue
         time, peak = study.peak[quantity]
-        label = f"{WORDS[quantity]}: largest at {time * 1e3:.0f} ms, leads {study.share[quantity]:.0%} of the steps"
-        defects.semilogy(study.t, _shown(values), color=COLOURS[quantity], linewidth=WIDTHS[quantity], label=label)
-        defects.plot(time, peak, MARKERS[k], color=COLOURS[quantity], markeredgecolor="white", markersize=8)
-    defects.set_title("velocity missed in one step because a coefficient is frozen", fontsize=10, loc="left")
+        label = f"{WORDS[quantity]}: largest in {study.share[quantity]:.0%} of the steps"
+        colour = COLOURS[quantity]
+        if quantity == JUMPS:
+            t, least, most = envelope(study.t, values)
+            label += f" (range within {1e3 * (t[1] - t[0]):.2g} ms)"
+            defects.fill_between(t, least, most, color=colour, alpha=0.35, linewidth=0.0, step="mid", label=label)
+        else:
+            defects.semilogy(study.t, _shown(values), color=colour, linewidth=1.4, label=label)
+        defects.plot(time, peak, MARKERS[k], color=colour, markeredgecolor="white", markersize=8)
+    defects.set_yscale("log")
+    defects.set_title("velocity missed in one step because a coefficient is held constant", fontsize=10, loc="left")
     defects.set_ylabel("rms over slices [m/s]")
     end = study.t + study.dt
     errors.semilogy(
@@ -58,6 +68,18 @@ def figure_frozen(study: Frozen) -> Figure:
         axes.margins(x=0.01)
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.3 if axes is errors else -0.06), ncols=2, fontsize=8.5)
     return figure
+
+
+def envelope(t: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the least and the largest positive value in each of ``WINDOWS`` windows, and its middle, shape (W,).
+
+    A window without any has NaN.
+    """
+    windows = np.array_split(np.arange(len(t)), min(WINDOWS, len(t)))
+    shown = _shown(values)
+    kept = [shown[window][np.isfinite(shown[window])] for window in windows]
+    least, most = (np.array([pick(each) if len(each) else np.nan for each in kept]) for pick in (np.min, np.max))
+    return np.array([t[window].mean() for window in windows]), least, most
 
 
 def _shown(values: FloatArray) -> FloatArray:

@@ -19,14 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipproof.chapters.differences.study import first_crossing
+from flipproof.chapters.solvers import LIMITS
 from flipproof.frame.solvers import Run
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import centre_of_mass, centre_of_mass_velocity, moment_of_inertia
 from slicemodel.trajectory import FloatArray
 
-LIMITS: Final = {"published-python": "published-limit", "signs-corrected": "signs-limit", "roots-corrected": "eq8-wall",
-                 "exact-step": "eq8"}  # fmt: skip
-"""Schemes that freeze at the start of the step -> the equation they solve as dt goes to zero."""
+FREEZING: Final = ("published-python", "signs-corrected", "roots-corrected", "exact-step")
+"""Schemes that freeze their coefficients at the start of the step."""
 
 QUANTITIES: Final = ("omega", "theta", "r_cm", "v_cm")
 
@@ -96,8 +96,10 @@ def study_frozen(run: Trajectory, reference: Trajectory) -> Frozen:
     ValueError
         If the scheme does not freeze at the start of the step, the run is a summary, or the two have different times.
     """
-    if run.method not in LIMITS:
-        raise ValueError(f"scheme = {run.method!r} does not freeze at the start of a step; known: {', '.join(LIMITS)}")
+    if run.method not in FREEZING:
+        raise ValueError(
+            f"scheme = {run.method!r} does not freeze at the start of a step; known: {', '.join(FREEZING)}"
+        )
     if len(run.r) == 0:
         raise ValueError("the run holds no slices; make it with store = 'full'")
     if len(run.t) != len(reference.t) or not np.allclose(run.t, reference.t, rtol=0.0, atol=1e-12):

@@ -8,6 +8,7 @@ from typing import Any, Final
 from flipproof.chapters.guests.claims import claim_guests
 from flipproof.chapters.guests.figures import draw_guests
 from flipproof.chapters.guests.study import Guests, study
+from flipproof.chapters.waterfall.study import NAMES
 from flipproof.frame.chapter import Chapter
 from flipproof.output.tables import trajectory_csv
 
@@ -15,6 +16,16 @@ from flipproof.output.tables import trajectory_csv
 def summary(found: Guests) -> dict[str, Any]:
     """Return every guest with its passport."""
     return {"guests": [guest.to_mapping() for guest in found.guests]}
+
+
+def page(found: Guests) -> dict[str, Any]:
+    """Return the guests of each table, and the words of every assumption."""
+    names = () if found.agreement is None else found.agreement.names
+    return {
+        "compared": [guest for guest in found.guests if guest.label in names],
+        "splits": [guest for guest in found.guests if guest.split is not None],
+        "assumptions": NAMES,
+    }
 
 
 def tables(found: Guests) -> dict[str, str]:
@@ -37,4 +48,5 @@ CHAPTER: Final = Chapter(
     work={},
     summary=summary,
     tables=tables,
+    page=page,
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from flipproof.chapters.guests.study import Guest, Guests
+from flipproof.chapters.waterfall.study import NAMES
 from flipproof.foreign.verdicts import findings_of
 from flipproof.frame.findings import Finding
 
@@ -38,6 +39,17 @@ def _claims(guest: Guest) -> Iterator[Finding]:
             kind="observation",
             band=difference.band,
             note=f"at t = {difference.largest_time:.4g} s",
+        )
+    if guest.split is not None:
+        parts = ", ".join(f"{NAMES[name]} {share:+.3g}" for name, share in guest.split.bars.items()) or "none"
+        yield Finding(
+            id=f"{head}-waterfall",
+            title=f"{guest.label}: mean of ω/ω₀ over the second half, free flight minus it",
+            value=guest.split.end - guest.split.start,
+            unit="",
+            kind="observation",
+            band=guest.band,
+            note=f"fair shares of what {guest.split.equation} assumes: {parts}; the rest {guest.split.rest:+.2g}",
         )
     if visit.ice is not None:
         yield _observed(f"{head}-ice", f"{guest.label}: drift of ω in ice on this throw", visit.ice.largest, "of ω₀")

@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import partial
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -25,16 +26,19 @@ import numpy as np
 from flipproof.chapters.agreement.study import Agreement, study_agreement
 from flipproof.chapters.differences.chapter import run_bands
 from flipproof.chapters.differences.study import Difference, study_difference
+from flipproof.chapters.guests.split import Split, plan_splits, split, switches_made
 from flipproof.chapters.ice.chapter import Drift, measure
 from flipproof.foreign import contract
 from flipproof.foreign.answers import trajectory_of
 from flipproof.foreign.certify import Certificate, certify
 from flipproof.foreign.checking import effort_of
+from flipproof.foreign.content import content_of
 from flipproof.foreign.contract import Traits
 from flipproof.foreign.specs import CSV, Runner, opened
 from flipproof.frame.chapter import Ask, Call, Flights, Study, attempt
 from flipproof.frame.twins import twins
 from ode_reference.models import LADDER
+from ode_reference.switches import Switches
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import centre_of_mass_velocity
 from slicemodel.trajectory import FloatArray, output_times
@@ -61,9 +65,10 @@ class Effort:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Visit:
-    """What a solver answered; ``problems`` maps what is missing to the reason."""
+    """What a solver answered; ``problems`` maps what is missing to the reason, ``content`` is of its files."""
 
     spec: str
+    content: str = ""
     traits: Traits | None = None
     certificate: Certificate | None = None
     flight: Trajectory | None = None
@@ -85,6 +90,7 @@ class Guest:
     errors : tuple of float - largest difference of each effort's run to ``equation``, fraction of omega_0
     equation : str or None - the rung that it declares, else the nearest
     energy : array or None - E(t) / E(0) of the flight; None without r and v
+    split : Split or None - of the difference to free flight
     """
 
     visit: Visit
@@ -95,6 +101,7 @@ class Guest:
     errors: tuple[float, ...]
     equation: str | None
     energy: FloatArray | None
+    split: Split | None = None
 
     @property
     def run(self) -> Trajectory | None:
@@ -116,6 +123,7 @@ class Guest:
         visit = self.visit
         return {
             "spec": visit.spec,
+            "content": visit.content,
             "name": self.label,
             "equation": self.equation,
             "passport": None if visit.certificate is None else visit.certificate.to_mapping(),
@@ -129,6 +137,7 @@ class Guest:
                 {"effort": one.effort, "seconds": round(one.seconds, 4), "error": error}
                 for one, error in zip(visit.efforts, self.errors, strict=True)
             ],
+            "waterfall": None if self.split is None else self.split.to_mapping(),
             "ice_drift": None if visit.ice is None else visit.ice.largest,
             "energy_rise": self.rise,
         }
@@ -136,11 +145,30 @@ class Guest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Guests:
-    """All guests of a report, the ladder they are held against, and who agrees with whom (None: fewer than two)."""
+    """All guests of a report, the ladder they are held against, and who agrees with whom (None: nobody to compare).
+
+    ``agreement`` is of guests, ladder, schemes and engines on the report's throw.
+    """
 
     guests: tuple[Guest, ...] = ()
     ladder: Mapping[str, Trajectory] = field(default_factory=dict)
     agreement: Agreement | None = None
+
+    @property
+    def facts(self) -> dict[str, str]:
+        """Which code each guest was, for the provenance."""
+        return {
+            guest.label: ", ".join(
+                part
+                for part in (
+                    guest.visit.spec,
+                    guest.visit.traits.distribution if guest.visit.traits is not None else "",
+                    f"files {guest.visit.content:.12}" if guest.visit.content else "",
+                )
+                if part
+            )
+            for guest in self.guests
+        }
 
 
 def study(ask: Ask) -> Study[Guests]:
@@ -151,10 +179,23 @@ def study(ask: Ask) -> Study[Guests]:
     specs, timeout = ask.work
     times = output_times(ask.throw, None)
     calls = {spec: Call(visit, (spec, ask.throw, times, timeout), f"guest {spec}", timed=True) for spec in specs}
-    ladder = {rung: ask.solvers[rung] for rung in LADDER}
-    flights = yield [*calls.values(), *ladder.values(), *(twin for run in ladder.values() for twin in twins(run))]
-    flown = {rung: run for rung, each in ladder.items() if (run := flights.trajectory(each)) is not None}
-    return study_guests(received(calls, flights), flown, run_bands(ask.solvers, flights))
+    solvers = {name: run for name, run in ask.solvers.items() if name in LADDER or ask.size != "check"}
+    ladder = {rung: solvers[rung] for rung in LADDER}
+    flights = yield [*calls.values(), *solvers.values(), *(twin for run in ladder.values() for twin in twins(run))]
+    flown = {name: run for name, each in solvers.items() if (run := flights.trajectory(each)) is not None and run.ok}
+    rungs = {rung: flown[rung] for rung in LADDER if rung in flown}
+    others = {name: run for name, run in flown.items() if name not in rungs}
+    found = study_guests(received(calls, flights), rungs, run_bands(ask.solvers, flights), others)
+    starts = {g.label: switches_made(g.visit.traits, g.visit.certificate, g.equation) for g in found.guests}
+    flights = yield plan_splits([start for start in starts.values() if start is not None], ask.throw)
+    guests = tuple(_with_split(guest, starts[guest.label], flights) for guest in found.guests)
+    return replace(found, guests=guests)
+
+
+def _with_split(guest: Guest, start: Switches | None, flights: Flights) -> Guest:
+    if guest.run is None or start is None:
+        return guest
+    return replace(guest, split=attempt(split, guest.run, start, flights).found)
 
 
 def received(calls: Mapping[str, Call], flights: Flights) -> tuple[Visit, ...]:
@@ -182,13 +223,14 @@ def visit(spec: str, throw: Scenario, times: FloatArray, timeout: float | None =
             problems[name] = str(error)
             return None
 
+    content = tried("content", lambda: content_of(spec)) or ""
     runner = tried("solver", lambda: opened(spec, timeout, curves=True))
     if runner is None:
-        return Visit(spec=spec, problems=problems)
+        return Visit(spec=spec, content=content, problems=problems)
     with closing(runner):
         traits = tried("solver", lambda: runner.traits)
         if traits is None:
-            return Visit(spec=spec, problems=problems)
+            return Visit(spec=spec, content=content, problems=problems)
         curve = spec.startswith(CSV)
         if curve:
             problems["certificate"] = "a curve in a file cannot be asked"
@@ -199,6 +241,7 @@ def visit(spec: str, throw: Scenario, times: FloatArray, timeout: float | None =
         ice = None if curve else tried("ice", lambda: _flight(runner, replace(throw, frozen=True), times, 0).run)
     return Visit(
         spec=spec,
+        content=content,
         traits=traits,
         certificate=certificate,
         flight=flight,
@@ -217,34 +260,45 @@ def _flight(runner: Runner, throw: Scenario, times: FloatArray, level: int) -> E
     return Effort(effort, seconds, trajectory_of(ask, answer, runner.traits))
 
 
-def study_guests(visits: Sequence[Visit], ladder: Mapping[str, Trajectory], bands: Mapping[str, float]) -> Guests:
+def study_guests(
+    visits: Sequence[Visit],
+    ladder: Mapping[str, Trajectory],
+    bands: Mapping[str, float],
+    others: Mapping[str, Trajectory] = MappingProxyType({}),
+) -> Guests:
     """Hold every visit against the ladder.
 
     Parameters
     ----------
     visits : sequence of Visit
     ladder : mapping rung -> Trajectory - of the same throw
-    bands : mapping rung -> float - how far omega may be off, fraction of omega_0
+    bands : mapping name -> float - how far omega may be off, fraction of omega_0; 0 for one that is missing
+    others : mapping name -> Trajectory - schemes and engines on the same throw, for who agrees with whom
     """
     taken = [one.traits.name if one.traits else one.spec for one in visits]
     guests: list[Guest] = []
     for k, (one, name) in enumerate(zip(visits, taken, strict=True)):
-        label = name if taken.count(name) == 1 and name not in ladder else f"{name} ({one.spec})"
+        label = name if taken.count(name) == 1 and name not in {**ladder, **others} else f"{name} ({one.spec})"
         slug = re.sub(r"[^a-z0-9]+", "-", label.lower()).strip("-")
         if not 0 < len(slug) <= LONGEST:
             slug = f"solver-{k + 1}"
         while any(guest.slug == slug for guest in guests):
             slug += f"-{k + 1}"
         guests.append(_guest(one, label, slug, ladder, bands))
-    runs = dict(ladder)
-    known = {rung: bands.get(rung, 0.0) for rung in ladder}
+    first = next(iter(ladder.values()), None)
+    same = {name: run for name, run in others.items() if first is not None and _same_times(run, first)}
+    runs = {**ladder, **same}
+    known = {name: bands.get(name, 0.0) for name in runs}
     for guest in guests:
-        first = next(iter(ladder.values()), None)
-        if guest.run is not None and first is not None and np.array_equal(guest.run.t, first.t):
+        if guest.run is not None and first is not None and _same_times(guest.run, first):
             runs[guest.label] = guest.run
             known[guest.label] = guest.band or 0.0
     agreement = study_agreement(runs, known) if guests and len(runs) > 1 else None
     return Guests(guests=tuple(guests), ladder=dict(ladder), agreement=agreement)
+
+
+def _same_times(one: Trajectory, other: Trajectory) -> bool:
+    return len(one.t) == len(other.t) and np.allclose(one.t, other.t, rtol=0.0, atol=1e-12 * other.scenario.duration)
 
 
 def _guest(one: Visit, label: str, slug: str, ladder: Mapping[str, Trajectory], bands: Mapping[str, float]) -> Guest:

@@ -103,10 +103,11 @@ def draw_horizon(horizons: Sequence[Horizon]) -> Exhibit:
     return Exhibit(
         name="horizon",
         title="Up to when an engine's ω(t) means anything",
-        caption="Flights that should be one flight, and how far apart they come. Top: only arithmetic differs, the "
-        "angle of release, which free flight does not feel, or the order in which bodies entered the engine. Bottom: "
-        "the release itself differs; curves that jump to one level whatever the change show impacts that just happen "
-        "or just do not, and below that level two curves cannot be told apart. "
+        caption="Each curve is the width of an ensemble: how far the ω of flights that should be one flight come "
+        "apart. Top: the flights differ in their arithmetic alone, by the angle of release, which free flight does not "
+        "feel, or by the order in which bodies entered the engine. Bottom: their release differs. Where curves of "
+        "different changes jump to one level, an impact happens in some of the flights and not in the others; "
+        "differences in ω below that level mean nothing. "
         f"Widest ensemble: {'; '.join(numbers)}.",
         alt=f"Logarithmic plots of the width of ensembles over time. {words}",
         maker=figure_horizon,

@@ -201,18 +201,16 @@ def _base(throw: Scenario, solver: str, reach: Reach) -> Run:
     return Run(solver, throw, _settings(throw, solver, reach), f"{_label(solver)}, as it is")
 
 
-def study_horizon(
-    throw: Scenario, reach: Reach, made: Mapping[Run, Made], *, band: float = HORIZON_BAND
-) -> tuple[Horizon, ...]:
+def study_horizon(throw: Scenario, reach: Reach, made: Mapping[Run, Made]) -> tuple[Horizon, ...]:
     """Read what ``plan_horizon`` planned with the same arguments.
 
     A solver that could not be run, such as an engine that is not installed, stays, with the reason.
     """
     few = throw.with_slices(reach.slices)
-    return tuple(_study(few, solver, reach, made, band) for solver in reach.solvers)
+    return tuple(_study(few, solver, reach, made) for solver in reach.solvers)
 
 
-def _study(throw: Scenario, solver: str, reach: Reach, made: Mapping[Run, Made], band: float) -> Horizon:
+def _study(throw: Scenario, solver: str, reach: Reach, made: Mapping[Run, Made]) -> Horizon:
     problems, ensembles = [], []
     try:
         base = made[_base(throw, solver, reach)].flight
@@ -224,7 +222,7 @@ def _study(throw: Scenario, solver: str, reach: Reach, made: Mapping[Run, Made],
         except Missing as missing:
             problems.append(str(missing.args[0]))
             continue
-        ensembles.append(study_ensemble(solver, kind, size, members, band=band))
+        ensembles.append(study_ensemble(solver, kind, size, members))
     return Horizon(solver=solver, ensembles=tuple(ensembles), problems=tuple(problems))
 
 

@@ -84,19 +84,13 @@ def measure(label: str, run: Trajectory) -> Drift:
 def claims(found: Ice) -> Claims:
     """Yield that every solver keeps omega, and that welded masses drift at the engine's printed order."""
     for label, made in found.rigid.items():
-        yield judged(
-            lambda label, made: claim_ice(measure(label, made.flight)),
-            label,
-            made,
-            id=f"ice-{label.replace(' ', '-')}",
-            title=f"ice: {label} keeps ω constant",
-        )
+        id_, title = f"ice-{label.replace(' ', '-')}", f"ice: {label} keeps ω constant"
+        yield judged(lambda label, flight: claim_ice(measure(label, flight)), label, made, id=id_, title=title)
     if found.welded:
         yield judged(
-            lambda: claim_welded_order([made.flight for made in found.welded.values()]),
-            id="ice-welded-order",
+            lambda *flights: claim_welded_order(flights), *found.welded.values(), id="ice-welded-order",
             title="drift of welded ice",
-        )
+        )  # fmt: skip
 
 
 def claim_ice(drift: Drift) -> Finding:
@@ -139,7 +133,8 @@ def figures(found: Ice) -> Iterator[Exhibit]:
         name="ice",
         title="Ice keeps its angular velocity",
         caption="Nothing moves in a bottle of ice, so that every drift is an error of the solver; the largest value "
-        "stands in the legend. Masses held by joints yield at the start, a quarter as much at half the step.",
+        "stands in the legend. In an engine the slices of ice are masses held by joints, which yield a little at the "
+        "start; at half the step they yield a quarter as much.",
         alt=f"Logarithmic plot of the drift of omega over omega_0 in a bottle of ice. Largest drift: {words}.",
         maker=draw,
         data=(drifts,),

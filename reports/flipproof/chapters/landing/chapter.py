@@ -16,8 +16,9 @@ from flipproof.landing.design import Case
 from flipproof.landing.upright import make_case
 from flipproof.landing.work import Landed
 
-CHUNK: Final = 100
-"""Throws of a call, at the least: a call of a few is as soon made again as read from the store."""
+CHUNK: Final = 300
+"""Throws of a call, at the least: a call of a few is as soon made again as read from the store, and the laws of one
+filling, one after the other, share their flights."""
 
 
 def study(ask: Ask) -> Study[Found]:

@@ -164,9 +164,9 @@ def _energy(axes: Axes, run: Energy) -> None:
 def figure_witnesses(cases: Sequence[Mapping[str, Any]]) -> Figure:
     """Outcomes of two programs from one touch, a matrix for each pair and law."""
     matrices = [(case, matrix) for case in cases for matrix in case["matrices"]]
-    columns = 5
+    columns = 4
     rows = -(-len(matrices) // columns)
-    figure, panels = new_figure(rows, columns, size=(8.6, 1.75 * rows + 0.3), squeeze=False)
+    figure, panels = new_figure(rows, columns, size=(8.6, 2.3 * rows), squeeze=False)
     names = ("upright", "lying", "cap", "undecided")
     for axes in panels.ravel()[len(matrices) :]:
         axes.set_axis_off()
@@ -176,12 +176,12 @@ def figure_witnesses(cases: Sequence[Mapping[str, Any]]) -> Figure:
         for (row, column), count in np.ndenumerate(counts):
             if count:
                 colour = "#B00020" if row != column else "black"
-                axes.text(column, row, str(count), ha="center", va="center", fontsize=7, color=colour)
-        axes.set_xticks(range(4), ["up", "ly", "cap", "?"], fontsize=6.5)
-        axes.set_yticks(range(4), ["up", "ly", "cap", "?"], fontsize=6.5)
+                axes.text(column, row, str(count), ha="center", va="center", fontsize=8, color=colour)
+        axes.set_xticks(range(4), names, fontsize=8, rotation=90)
+        axes.set_yticks(range(4), names, fontsize=8)
         axes.grid(visible=False)
-        kind = "ice" if case["law"] is None else f"{case['slices']}, {case['law']}"
-        axes.set_title(kind, fontsize=7)
-        axes.set_ylabel(matrix["programs"][0], fontsize=6.5)
-        axes.set_xlabel(matrix["programs"][1], fontsize=6.5)
+        kind = "ice" if case["law"] is None else f"water, {case['law']}\nslices {case['slices']}"
+        axes.set_title(kind, fontsize=8)
+        axes.set_ylabel(matrix["programs"][0], fontsize=8)
+        axes.set_xlabel(matrix["programs"][1], fontsize=8)
     return figure

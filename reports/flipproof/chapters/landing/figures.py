@@ -52,10 +52,11 @@ def figures(found: Found) -> list[Exhibit]:
         ),
         Exhibit(
             name="landing-map",
-            title="Outcome over filling and omega_0",
+            title="Outcome over filling and ω₀",
             caption=(
                 "One throw a cell, without scatter, onto a table where the bottle would touch standing after the "
-                "flight's duration. Lines: the bottle touches at 360 and at 720 degrees. Law: together. "
+                "flight's duration. On the lines the bottle touches at 360 and at 720 degrees. Bottle and water strike "
+                "the table together. "
                 f"{found.assumed.capitalize()}."
             ),
             alt=", ".join(f"{kind}: {count} of {cells} cells upright" for kind, count in upright.items()),
@@ -67,7 +68,7 @@ def figures(found: Found) -> list[Exhibit]:
             name="landing-axes",
             title="What the share depends on",
             caption=(
-                f"The share of figure landing-shares at filling {size.axis_filling:g}, along each assumption with the "
+                f"Share of throws that end upright at filling {size.axis_filling:g}, along each assumption, with the "
                 f"others as they are; {size.axis_throws} throws a point, the same for all points. "
                 f"{found.assumed.capitalize()}."
             ),
@@ -81,9 +82,8 @@ def figures(found: Found) -> list[Exhibit]:
             title="Where the static criterion is right and wrong",
             caption=(
                 "The toppling angle of Eq. 13a, with the water where it is at the touch, says whether a bottle put "
-                "down at rest would come upright. Of the throws it calls upright, and of the others, the share that "
-                "stands. "
-                f"All fillings. {found.assumed.capitalize()}."
+                "down at rest would come upright. Each bar is the share that does end upright, of all throws that the "
+                f"angle calls upright and of all others, at all fillings. {found.assumed.capitalize()}."
             ),
             alt=_static_words(found),
             maker=drawings.figure_static,
@@ -106,9 +106,11 @@ def figures(found: Found) -> list[Exhibit]:
             name="landing-witnesses",
             title="Programs that share no formula, from the same touches",
             caption=(
-                f"Rows: first program; columns: second. {stored['touches']} touches each, {stored['n_slices']} slices, "
-                f"filling {stored['cases'][0]['filling']:g}. Off the diagonal they differ; '?' is undecided. "
-                f"Stored; made by: {stored['command']}"
+                f"Two programs land the same {stored['touches']} touches, {stored['n_slices']} slices at filling "
+                f"{stored['cases'][0]['filling']:g}. Each matrix counts the touches by their outcome in the program "
+                "that stands beside it (rows) and in the one below it (columns); in red the two differ, and '?' is "
+                f"undecided. {_steps(stored)}The counts are stored with this program; this command made them: "
+                f"{stored['command']}"
             ),
             alt=_witness_words(stored),
             maker=drawings.figure_witnesses,
@@ -146,6 +148,12 @@ def _energy_words(found: Found) -> str:
             stand = sum(run.outcome == "upright" for run in runs)
             words.append(f"{kind}: {len(runs)} landings, {stand} upright, {start:.1f} E_s after the first impact")
     return "; ".join(words)
+
+
+def _steps(stored: Mapping[str, Any]) -> str:
+    """Return which cases had another step than the engines' own, as sentences."""
+    others = [f"{case['law']} with steps of {case['dt']:g} s" for case in stored["cases"] if case["dt"] is not None]
+    return f"Engines landed {', '.join(others)}, else with their own. " if others else ""
 
 
 def _witness_words(stored: Mapping[str, Any]) -> str:

@@ -54,11 +54,11 @@ def figure_map(study: ValidityMap, approximation: str = "published-python", meas
     logarithmic = study.axis != "restitution"
     x, y = _edges(study.fills, logarithmic=False), _edges(study.values, logarithmic=logarithmic)
     shown = errors(study, approximation, measure)
-    words, error = shown[0]
+    shaded, error = shown[0]
     shade = axes.pcolormesh(
         x, y, np.ma.masked_invalid(np.clip(error, *RANGE)), cmap=SHADES, norm=LogNorm(*RANGE), rasterized=True
     )
-    bar = figure.colorbar(shade, ax=axes, label=f"{words} [of ω₀]", extend="min", ticks=[1e-3, 1e-2, 1e-1, 1.0])
+    bar = figure.colorbar(shade, ax=axes, label=f"{shaded} [of ω₀]", extend="min", ticks=[1e-3, 1e-2, 1e-1, 1.0])
     bar.ax.set_yticklabels(["0.1%", "1%", "10%", "100%"])
     for k, colour in enumerate(COLOURS):
         outline = _outline(study.dominant == k, x, y, logarithmic=logarithmic)
@@ -73,8 +73,8 @@ def figure_map(study: ValidityMap, approximation: str = "published-python", meas
         Patch(facecolor="none", edgecolor=colour, linewidth=2.2, label=name)
         for colour, name in zip(COLOURS, RUNGS, strict=True)
     ]
-    for (words, error), colour in zip(shown, LINES, strict=False):
-        handles += _contours(axes, study, error, words, colour)
+    for (name, error), colour in zip(shown, LINES, strict=False):
+        handles += _contours(axes, study, error, name, colour)
     if logarithmic:
         axes.set_yscale("log")
     axes.set_xlim(x[0], x[-1])
@@ -83,7 +83,7 @@ def figure_map(study: ValidityMap, approximation: str = "published-python", meas
     axes.set_xlabel("fill fraction M_w / M_max [1]")
     axes.set_ylabel(LABELS[study.axis])
     axes.set_title(
-        f"Plateau of ω / ω₀ at N = {study.slices}: {words} (shade), largest fair share (outline)",
+        f"Plateau of ω / ω₀ at N = {study.slices}: {shaded} (shade), largest fair share (outline)",
         fontsize=10,
         loc="left",
     )
@@ -100,7 +100,8 @@ def errors(
     """Return what the contours show, with its name."""
     if study.axis == "step":
         return [(f"step error of {scheme}", study.step_error[scheme]) for scheme in SCHEMES]
-    return [(f"error of {approximation}", study.error(approximation, measure))]
+    overlap = np.abs(study.overlap)
+    return [(f"error of {approximation}", study.error(approximation, measure)), ("change by overlap", overlap)]
 
 
 def _contours(axes: Axes, study: ValidityMap, error: FloatArray, words: str, colour: str) -> list[Line2D]:

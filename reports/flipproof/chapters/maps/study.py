@@ -54,13 +54,16 @@ SETS: Final = {
 }
 """Every set of assumptions mended -> the model that flies it, a rung of the ladder where there is one."""
 
-EXTRA: Final = ("exact-step",)
-"""Held against its own equation, beside the ladder."""
+COLUMN: Final = "column"
+"""Water that cannot overlap. It has no switches of the ladder: what it changes is no fair share."""
+
+EXTRA: Final = ("exact-step", COLUMN)
+"""Beside the ladder: a scheme held against its own equation, and the column against free flight."""
 
 SCHEMES: Final = ("published-python", "exact-step")
 
 SOLVERS: Final = tuple(dict.fromkeys((*LADDER, *EXTRA, *SETS.values())))
-"""What flies every cell: two schemes and 40 models."""
+"""What flies every cell: two schemes, 40 models and the column."""
 
 LABELS: Final[Mapping[Axis, str]] = {
     "gamma": "damping rate γ / ω₀ [1]",
@@ -144,6 +147,11 @@ class ValidityMap:
         return np.abs(self.level[name] - self.level[LADDER[-1]])
 
     @property
+    def overlap(self) -> FloatArray:
+        """What overlap changes: plateau of free flight, whose slices overlap, minus that of the column."""
+        return self.level[LADDER[-1]] - self.level[COLUMN]
+
+    @property
     def dominant(self) -> NDArray[np.int64]:
         """Index into RUNGS of the largest fair share; -1 where any is missing."""
         missing = ~np.isfinite(self.shares).all(axis=0)
@@ -200,14 +208,15 @@ def plan_map(
 ) -> list[Run]:
     """Return the runs of one map.
 
-    A model does not know a step: along "step" it runs once per fill fraction. ``points`` are its output times; None:
+    A model does not know a step: along "step" it runs once per fill fraction, and so does the column along
+    "restitution", which it does not know. ``points`` are its output times; None:
     its own. ``banded`` gives free flight its twins.
     """
     usual = _usual(throw, points)
     runs = []
     for cell in cells(throw, axis, fills, values, steps):
         for name in SOLVERS:
-            if axis == "step" and cell.row > 0 and name not in SCHEMES:
+            if cell.row > 0 and (name == COLUMN if axis == "restitution" else axis == "step" and name not in SCHEMES):
                 continue
             run = _run(axis, cell, name, usual)
             runs += [run, *(twins(run) if banded and name == LADDER[-1] else ())]
@@ -221,7 +230,10 @@ def _usual(throw: Scenario, points: int | None) -> dict[str, Any]:
 def _run(axis: Axis, cell: Cell, name: str, usual: Mapping[str, Any]) -> Run:
     """Return the run that a cell has of a solver; ``usual`` are the settings of a model."""
     settings = {"steps": cell.steps, "store": "summary"} if name in SCHEMES else usual
-    return Run(name, cell.scenario, settings, f"map {axis}, row {cell.row}, column {cell.column}, {name}")
+    scenario = cell.scenario
+    if name == COLUMN and axis == "restitution":
+        scenario = replace(scenario, restitution=RANGES[axis][0])
+    return Run(name, scenario, settings, f"map {axis}, row {cell.row}, column {cell.column}, {name}")
 
 
 def make_readings(runs: Sequence[Run]) -> list[Reading]:

@@ -74,14 +74,7 @@ def _limit(levels: list[list[Trajectory]], omega0: float) -> Richardson:
 def claims(found: Forms) -> Claims:
     """Yield where every scheme goes, and what stays of its error against an equation."""
     for scheme, limit in found.limits.items():
-        yield judged(
-            lambda scheme, limit: claim_limit(scheme, limit.value),
-            scheme,
-            limit,
-            id=f"limit-{scheme}",
-            title=f"limit of {scheme}",
-            kind="observation",
-        )
+        yield judged(claim_limit, scheme, limit, id=f"limit-{scheme}", title=f"limit of {scheme}", kind="observation")
     for (scheme, model), form in found.forms.items():
         if form.found is not None:
             yield claim_model_form(scheme, model, form.found["omega"])

@@ -11,6 +11,9 @@ from scipy.optimize import brentq
 
 from slicemodel.trajectory import FloatArray
 
+ORDER_TOLERANCE = 0.5
+"""Difference from the expected order beyond which there is no limit."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Richardson:
@@ -32,15 +35,14 @@ class Richardson:
     reason: str
 
 
-def richardson(
-    dt: ArrayLike, values: ArrayLike, *, expected_order: float = 1.0, order_tolerance: float = 0.5
-) -> Richardson:
+def richardson(dt: ArrayLike, values: ArrayLike, *, expected_order: float = 1.0) -> Richardson:
     """Extrapolate a value to dt = 0 and give its grid-convergence index (ASME V&V 20).
 
         gci = S |f_2 - f_1| / (r^p - 1),   r = dt_2 / dt_1,   S = 1.25 for three or more grids, 3 for two
 
     p comes from the three finest grids, (f_3 - f_2) / (f_2 - f_1) = (dt_3^p - dt_2^p) / (dt_2^p - dt_1^p). Fails if a
-    value is not finite, if the values oscillate or part, or if p is off the expected order by more than the tolerance.
+    value is not finite, if the values oscillate or part, or if p is more than
+    ``ORDER_TOLERANCE`` off the expected order.
     """
     steps, found = np.asarray(dt, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if steps.shape != found.shape or steps.ndim != 1 or len(np.unique(steps)) < max(2, len(steps)):
@@ -59,14 +61,14 @@ def richardson(
                 "oscillation: the value turns back" if product < 0 else "the values do not approach a limit"
             )
     gap = (f[0] - f[1]) / ((h[1] / h[0]) ** p - 1.0)
-    if abs(p - expected_order) > order_tolerance:
+    if abs(p - expected_order) > ORDER_TOLERANCE:
         word = "high" if p > expected_order else "low"
         how = f"order too {word}: {p:.2f}, not {expected_order:g}"
     return Richardson(
         order=p,
         value=float(f[0] + gap),
         gci=float(safety * abs(gap)),
-        ok=abs(p - expected_order) <= order_tolerance,
+        ok=abs(p - expected_order) <= ORDER_TOLERANCE,
         reason=how,
     )
 

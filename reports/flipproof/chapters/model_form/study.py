@@ -64,7 +64,7 @@ class ModelForm:
     dt, error : arrays of one shape, (levels,) or (levels, members) - step [s] and error, as given
     coefficient, order, floor : float
         C [error / s^p], p and F of error = C dt^p + F; NaN if there is no fit.
-    coefficient_interval, order_interval, floor_interval : (low, high)
+    order_interval, floor_interval : (low, high)
         95 % profile intervals; NaN if there is no fit.
     scatter : float - standard deviation of the residuals of log(error), level by level
     expected_order, band : float - what the order was held against, and what F was
@@ -77,7 +77,6 @@ class ModelForm:
     coefficient: float
     order: float
     floor: float
-    coefficient_interval: Interval
     order_interval: Interval
     floor_interval: Interval
     scatter: float
@@ -97,7 +96,6 @@ def study_model_form(
     *,
     expected_order: float = 1.0,
     band: float = BAND,
-    order_tolerance: float = ORDER_TOLERANCE,
 ) -> ModelForm:
     """Decide whether an error is a matter of step size or of model form.
 
@@ -110,7 +108,6 @@ def study_model_form(
         Order that the scheme should have.
     band : float
         Numerical uncertainty of the reference, in the unit of ``error``; F below it is no difference.
-    order_tolerance : float
 
     Returns
     -------
@@ -130,22 +127,20 @@ def study_model_form(
     if fit is None:
         nan = (math.nan, math.nan)
         verdict, reason = refusal or ("failure", "no fit of C Δt^p + F was found")
-        parameters, intervals, scatter = (math.nan,) * 3, (nan, nan, nan), math.nan
+        parameters, intervals, scatter = (math.nan,) * 3, (nan, nan), math.nan
     else:
         parameters = (math.exp(fit.best[0]), float(fit.best[1]), float(fit.best[2]))
-        low, high = fit.interval(0)
-        intervals = ((math.exp(low), math.exp(min(high, 700.0))), fit.interval(1), fit.interval(2))
+        intervals = (fit.interval(1), fit.interval(2))
         scatter = fit.scatter
-        verdict, reason = _verdict(fit, intervals, levels, expected_order, order_tolerance, band)
+        verdict, reason = _verdict(fit, intervals, levels, expected_order, band)
     return ModelForm(
         dt=steps,
         error=errors,
         coefficient=parameters[0],
         order=parameters[1],
         floor=parameters[2],
-        coefficient_interval=intervals[0],
-        order_interval=intervals[1],
-        floor_interval=intervals[2],
+        order_interval=intervals[0],
+        floor_interval=intervals[1],
         scatter=scatter,
         expected_order=expected_order,
         band=band,
@@ -194,13 +189,12 @@ def _refusal(levels: _Levels) -> tuple[Verdict, str] | None:
 
 def _verdict(
     fit: _Fit,
-    intervals: tuple[Interval, Interval, Interval],
+    intervals: tuple[Interval, Interval],
     levels: _Levels,
     expected: float,
-    tolerance: float,
     band: float,
 ) -> tuple[Verdict, str]:
-    (order_low, order_high), (floor_low, floor_high) = intervals[1], intervals[2]
+    (order_low, order_high), (floor_low, floor_high) = intervals
     finest = float(levels.error[-1])
     if fit.scatter > math.log(PHASE_FACTOR):
         return "failure", f"errors scatter {math.exp(fit.scatter):.1f}-fold about C Δt^p + F: they do not follow it"
@@ -208,14 +202,14 @@ def _verdict(
         low, high = f"{floor_low:.2g}", f"{floor_high:.2g}"
         left = low if low == high else f"{low} to {high}"
         return "model form", f"an error of {left} remains as Δt goes to zero (band {band:.1g})"
-    if order_low > expected + tolerance:
+    if order_low > expected + ORDER_TOLERANCE:
         return "failure", f"order too high: {order_low:.2f} to {order_high:.2f}, not {expected:g}"
-    if order_high < expected - tolerance:
+    if order_high < expected - ORDER_TOLERANCE:
         return "failure", f"order too low: {order_low:.2f} to {order_high:.2f}, not {expected:g}"
     if floor_high > finest:
         return "undecided", f"F may be as large as {floor_high:.2g}, the finest error is {finest:.2g}: refine further"
     order = float(fit.best[1])
-    if abs(order - expected) > tolerance:
+    if abs(order - expected) > ORDER_TOLERANCE:
         return (
             "undecided",
             f"order {order:.2f} ({order_low:.2f} to {order_high:.2f}) instead of {expected:g}: add levels",

@@ -10,7 +10,7 @@ from typing import Final
 from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Exhibit, Study
 from flipproof.paper.claim_runs import ClaimRuns, plan_claims
 from flipproof.paper.figures import exhibits_paper
-from flipproof.paper.runs import PaperRuns, make_group, make_thinned, plan_groups
+from flipproof.paper.runs import PaperRuns, figure_calls, make_thinned
 from flipproof.paper.verdicts import PaperVerdicts, judge_paper
 
 
@@ -25,11 +25,11 @@ class Paper:
 def study(ask: Ask) -> Study[Paper]:
     """Make the throws of the figures, and those that statements need beside them; then judge in a worker."""
     del ask
-    figures = [Call(make_group, (group,), "the paper's figures") for group in plan_groups()]
+    figures = figure_calls()
     plan = plan_claims()
     halved = [Call(make_thinned, (group,), "the paper's statements") for group in plan.groups]
     flights = yield [*figures, *halved, *plan.runs]
-    runs = PaperRuns.of([flights.answer(call) for call in figures])
+    runs = PaperRuns.of(flights, figures)
     made = {each.run: each for call in halved for each in flights.answer(call)} | {
         run: flights[run] for run in plan.runs
     }

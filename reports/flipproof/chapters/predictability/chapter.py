@@ -39,14 +39,8 @@ def study(ask: Ask) -> Study[Found]:
 def claims(found: Found) -> Claims:
     """Yield the amplification of the smallest change."""
     for solver, each in found.items():
-        yield judged(
-            lambda solver, each: claim_predictability(solver, each.value),
-            solver,
-            each,
-            id=f"predictability-{solver}",
-            title=f"predictability of {solver}",
-            kind="observation",
-        )
+        id_, title = f"predictability-{solver}", f"predictability of {solver}"
+        yield judged(claim_predictability, solver, each, id=id_, title=title, kind="observation")
 
 
 def claim_predictability(solver: str, study: Predictability) -> Finding:

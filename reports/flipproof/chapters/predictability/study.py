@@ -132,40 +132,34 @@ class PartingGrowth:
         return f"{words}; the difference {self.before.words} before and {self.after.words} after"
 
 
-def study_parting_growth(
-    difference: Difference,
-    impacts: Impacts | None = None,
-    *,
-    window: float = GROWTH_WINDOW,
-    least_speed: float = LEAST_SPEED,
-) -> PartingGrowth:
-    """Fit the growth of a difference over ``window`` seconds before and after the parting.
+def study_parting_growth(difference: Difference, impacts: Impacts | None = None) -> PartingGrowth:
+    """Fit the growth of a difference over ``GROWTH_WINDOW`` seconds before and after the parting.
 
-    ``impacts`` is the record of the run whose impacts the parting is set against; those slower than ``least_speed``
-    [m/s] are passed over, because near rest there is always one.
+    ``impacts`` is the record of the run whose impacts the parting is set against; those slower than ``LEAST_SPEED`` are
+    passed over, because near rest there is always one.
     """
     time = difference.parting_time
     moment = math.nan if time is None else time
-    impact, k = _followed(time, impacts, least_speed)
+    impact, k = _followed(time, impacts)
     return PartingGrowth(
         first=difference.first,
         second=difference.second,
         time=time,
-        before=fit_growth(difference.t, difference.omega, moment - window, moment),
-        after=fit_growth(difference.t, difference.omega, moment, moment + window),
+        before=fit_growth(difference.t, difference.omega, moment - GROWTH_WINDOW, moment),
+        after=fit_growth(difference.t, difference.omega, moment, moment + GROWTH_WINDOW),
         impact=impact,
         k=k,
     )
 
 
-def _followed(time: float | None, impacts: Impacts | None, least_speed: float) -> tuple[Impact | None, int | None]:
+def _followed(time: float | None, impacts: Impacts | None) -> tuple[Impact | None, int | None]:
     """Return the last impact at or before ``time`` that is fast enough, and its k."""
     if time is None or impacts is None:
         return None, None
-    fast = np.flatnonzero((impacts.time <= time) & (impacts.speed_before >= least_speed))
+    fast = np.flatnonzero((impacts.time <= time) & (impacts.speed_before >= LEAST_SPEED))
     if not len(fast):
         return None, None
-    return impacts[int(fast[-1])], count_key(impacts, int(fast[-1]), least_speed)
+    return impacts[int(fast[-1])], count_key(impacts, int(fast[-1]), LEAST_SPEED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -226,20 +220,20 @@ class Predictability:
     def words(self) -> str:
         """Amplification of every size, horizon, growth and smoothness in words."""
         factors = zip(self.sizes, self.largest_amplification, strict=True)
-        each = ", ".join(f"{factor:.3g} (a change of {size:.0e})" for size, factor in factors)
-        words = f"{self.solver}: a change of the release is amplified at most by a factor of {each}"
+        each = " and ".join(f"a change of {size:.0e} by at most a factor of {factor:.3g}" for size, factor in factors)
+        words = f"{self.solver}: the flight amplifies {each}"
         if self.horizon is None:
-            words += f"; none leaves {self.band:g} of ω₀: predictable to the end"
+            words += f"; none of these moves ω by {self.band:g} of ω₀, so that the flight is predictable to its end"
         for size, time in zip(self.sizes, self.horizons, strict=True):
-            words += "" if time is None else f"; {size:.0e} leaves {self.band:g} of ω₀ at {time * 1e3:.1f} ms"
-        words += f"; the effect of {self.sizes[0]:.0e} {self.growths[0].words}"
+            words += "" if time is None else f"; {size:.0e} moves ω by {self.band:g} of ω₀ at {time * 1e3:.1f} ms"
+        words += f"; the effect of a change of {self.sizes[0]:.0e} {self.growths[0].words}"
         if self.rough_from is not None:
             words += (
-                f" and reaches {self.spread[0].max():.1e} of ω₀; the factor depends on the size from "
-                f"{self.rough_from * 1e3:.1f} ms on, so nothing is extrapolated to round-off"
+                f" and reaches {self.spread[0].max():.1e} of ω₀; from {self.rough_from * 1e3:.1f} ms on the factor "
+                "depends on the size of the change, so that the effect of round-off cannot be extrapolated"
             )
         elif self.round_off_horizon is not None:
-            words += f"; even round-off would leave the band at {self.round_off_horizon * 1e3:.1f} ms"
+            words += f"; even round-off would move ω by that much at {self.round_off_horizon * 1e3:.1f} ms"
         return words + (f"; the run ends at {self.ended * 1e3:.1f} ms" if self.ended is not None else "")
 
 
@@ -275,9 +269,7 @@ def plan_predictability(
     ]
 
 
-def study_predictability(
-    base: Trajectory, members: Sequence[Sequence[Trajectory]], *, band: float = HORIZON_BAND
-) -> Predictability:
+def study_predictability(base: Trajectory, members: Sequence[Sequence[Trajectory]]) -> Predictability:
     """Measure how far changed releases move the flight.
 
     Parameters
@@ -286,12 +278,10 @@ def study_predictability(
         The unchanged flight.
     members : sizes of members
         Trajectories of the runs of ``plan_predictability``, in its order.
-    band : float
-        Fraction of omega_0.
     """
     sizes = np.array([max(_size(base.scenario, run.scenario) for run in level) for level in members])
     spread = np.array([np.max([_apart(base, run) for run in level], axis=0) for level in members])
-    horizons = tuple(first_crossing(base.t, row, band) for row in spread)
+    horizons = tuple(first_crossing(base.t, row, HORIZON_BAND) for row in spread)
     stops = [math.inf if time is None else time for time in horizons]
     # A spread beyond saturation says nothing about smoothness: a larger change has merely less room.
     amplification = np.where(spread <= SATURATED, spread / sizes[:, np.newaxis], np.nan)
@@ -302,9 +292,9 @@ def study_predictability(
         sizes=sizes,
         t=base.t,
         spread=spread,
-        band=band,
+        band=HORIZON_BAND,
         horizons=horizons,
-        round_off_horizon=first_crossing(base.t, spread[0] / sizes[0] * ROUND_OFF, band),
+        round_off_horizon=first_crossing(base.t, spread[0] / sizes[0] * ROUND_OFF, HORIZON_BAND),
         growths=tuple(fit_growth(base.t, row, stop=stop) for row, stop in zip(spread, stops, strict=True)),
         rough_from=first_crossing(base.t, np.nan_to_num(ratio, nan=1.0), JUMP_FACTOR),
         ended=None if base.status in ("ok", "escaped") else float(base.t[-1]),

@@ -62,21 +62,11 @@ def witnessed(scenario: Scenario, model: str) -> dict[str, Any]:
 def claims(found: References) -> Claims:
     """Yield that every model is confirmed."""
     for model, made in found.usual.items():
-        yield judged(
-            lambda made, model: claim_reference_converged(made.flight, found.witness[model].flight),
-            made,
-            model,
-            id=f"reference-{model}",
-            title=f"{model} is converged",
-        )
+        id_, title = f"reference-{model}", f"{model} is converged"
+        yield judged(claim_reference_converged, made, found.witness[model], id=id_, title=title)
         if model in found.second:
-            yield judged(
-                lambda made, model: claim_second_method(made.flight, found.second[model].flight),
-                made,
-                model,
-                id=f"second-method-{model}",
-                title=f"{model} by a second method",
-            )
+            id_, title = f"second-method-{model}", f"{model} by a second method"
+            yield judged(claim_second_method, made, found.second[model], id=id_, title=title)
 
 
 def claim_reference_converged(usual: Trajectory, witness: Trajectory) -> Finding:

@@ -11,14 +11,13 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from flipproof.chapters.solvers import SCHEMES
 from flipproof.figures.style import new_figure, shared_legend, styled
 from flipproof.frame.chapter import Ask, Chapter, Exhibit, Run, Study, attempt
 from flipproof.frame.throws import FINER
 from flipproof.output.columns import curves_csv
 from slicemodel import Trajectory
 from slicemodel.trajectory import FloatArray
-
-SCHEMES: Final = ("published-python", "exact-step")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

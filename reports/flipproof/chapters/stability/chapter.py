@@ -126,13 +126,13 @@ def draw_stability(panels: Sequence[StabilityPanel]) -> Exhibit:
     default = np.concatenate([panel.at_default for panel in panels])
     missing = sorted({reason for panel in panels for reason in panel.reason[panel.grade == "not run"]})
     caption = (
-        f"Every cell is a flight of {panels[0].duration:g} s, held against event-driven free flight; a sign of its own "
-        f"stands for each colour. Of the {len(default)} flights with pymunk's own {DEFAULT_ITERATIONS} iterations "
-        f"(dashed) {int((default == 'explodes').sum())} explode; compare their times from left to right: a finer step "
-        "does not help. Where a column reads the same from some row upwards, iterations have bought stability, and "
-        f"only the step buys accuracy. {counts['wrong']} flights break no invariant and are wrong by more than 1 %; "
-        f"{counts['good'] + counts['excellent']} are good; {counts['explodes'] + counts['sinks in']} were stopped, at "
-        "the time they show."
+        f"Every cell is a flight of {panels[0].duration:g} s, held against event-driven free flight; the sign in it "
+        f"says the same as its colour. Of the {len(default)} flights with pymunk's own {DEFAULT_ITERATIONS} iterations "
+        f"(dashed) {int((default == 'explodes').sum())} explode; their times from left to right show that a finer step "
+        "does not help. Where a column reads the same from some row upwards, more iterations no longer change "
+        f"anything, and only a shorter step does. {counts['wrong']} flights break no invariant and are wrong by more "
+        f"than 1 %; {counts['good'] + counts['excellent']} are good; {counts['explodes'] + counts['sinks in']} were "
+        "stopped, at the time that their cell shows."
     )
     if missing:
         caption += f" Not run ({counts['not run']}): {'; '.join(missing)}."

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from flipproof.chapters.solvers import LIMITS
+from flipproof.chapters.solvers import LIMITS, SCHEMES
 from flipproof.chapters.step_size.figure import figure_step_size
 from flipproof.chapters.step_size.study import PHASES, StepSize, before_first_impact, plan_step_size, study_step_size
 from flipproof.frame.chapter import (
@@ -86,11 +86,11 @@ def study(ask: Ask) -> Study[Orders]:
     multiple = {"check": 108, "throw": 27}
     whole = {
         (where, scheme): Grids(
-            Run(model, throw, {}, model),
+            Run(LIMITS[scheme], throw, {}, LIMITS[scheme]),
             plan_step_size(throw, scheme, COMMON, multiple[where], levels[where]),
         )
         for where, throw in throws.items()
-        for scheme, model in LIMITS.items()
+        for scheme in SCHEMES
     }
     flights = yield [run for grids in whole.values() for run in grids.runs]
     starts = {
@@ -124,17 +124,17 @@ def _start(grids: Grids, flights: Flights, scheme: str, count: int) -> Grids:
 
 def claims(found: Orders) -> Claims:
     """Yield the order of every scheme: a regression on the paper's own throw, an observation on the report's."""
-    for scheme, model in LIMITS.items():
+    for scheme in SCHEMES:
         for studies, where in (
             (found.check_starts, "before the first impact"),
             (found.check_flights, "across impacts"),
         ):
             yield judged(
-                lambda each, where: claim_order(each.value, where),
+                claim_order,
                 studies[scheme],
                 where,
                 id=f"order-{scheme}-{where.replace(' ', '-')}",
-                title=f"{scheme} converges to {model}, {where}",
+                title=f"{scheme} converges to {LIMITS[scheme]}, {where}",
             )
         for studies, where in (
             (found.starts, "before the first impact of this throw"),

@@ -24,6 +24,9 @@ PHASES = 8
 ROUND_OFF = 1e-13
 """Errors below this fraction of omega_0 are not the step's."""
 
+BEFORE = 0.9
+"""Share of the time up to the first impact that is flown where none shall happen."""
+
 LEAST_COMMON = 8
 """Common times, less one, that a run and its reference must share at the least."""
 
@@ -138,7 +141,7 @@ def observed_order(dt: FloatArray, error: FloatArray) -> tuple[float, float]:
     return slope, float(np.sqrt(variance / (x @ x)))
 
 
-def before_first_impact(scenario: Scenario, reference: Trajectory, share: float = 0.9) -> Scenario | None:
+def before_first_impact(scenario: Scenario, reference: Trajectory) -> Scenario | None:
     """Return the throw cut off before any slice first strikes an end, or None if none ever does.
 
     A slice that rests on an end from the start does not strike it.
@@ -146,4 +149,4 @@ def before_first_impact(scenario: Scenario, reference: Trajectory, share: float 
     assert reference.impacts is not None
     if len(reference.impacts) == 0:
         return None
-    return replace(scenario, duration=share * float(reference.impacts.time[0]))
+    return replace(scenario, duration=BEFORE * float(reference.impacts.time[0]))

@@ -24,9 +24,10 @@ def study(ask: Ask) -> Study[tuple[Waterfall, ...]]:
 
 
 def claims(found: tuple[Waterfall, ...]) -> Claims:
-    """Yield the whole difference of every observable, with its largest share."""
+    """Yield the whole difference of every observable, with its largest share; and what overlap changes of the first."""
     for waterfall in found:
         yield claim_waterfall(waterfall)
+    yield claim_overlap(found[0])
 
 
 def claim_waterfall(waterfall: Waterfall) -> Finding:
@@ -47,6 +48,21 @@ def claim_waterfall(waterfall: Waterfall) -> Finding:
     )
 
 
+def claim_overlap(waterfall: Waterfall) -> Finding:
+    """From free flight, whose slices overlap, to the column, which cannot: the margin of the waterfall."""
+    finer = waterfall.finer_overlap
+    return Finding(
+        id="waterfall-overlap",
+        title=f"{waterfall.observable.words}: column minus free flight, what forbidding overlap changes",
+        value=waterfall.overlap,
+        unit="",
+        kind="observation",
+        band=waterfall.end_band,
+        note=f"a difference of two models, no share; free flight at N = {waterfall.slices}, the column has no slices"
+        + (f"; {finer:+.3g} at N = {FINER * waterfall.slices}" if finer is not None else ""),
+    )
+
+
 def figures(found: tuple[Waterfall, ...]) -> Iterator[Exhibit]:
     """Yield the split of the plateau."""
     waterfall = found[0]
@@ -58,10 +74,13 @@ def figures(found: tuple[Waterfall, ...]) -> Iterator[Exhibit]:
             f"At N = {waterfall.slices} slices. Left: each bar is the fair share of one assumption, the mean over all "
             "orders in which the assumptions can be mended; blue raises, orange lowers. Right: the same assumption in "
             "single orders. Where the marks lie apart the assumptions interact, and the bar of one order is not a "
-            "share. Error bars are numerical."
+            "share. Error bars are numerical. Below the dotted line, hatched: what forbidding overlap changes, from "
+            "free flight, whose slices overlap, to water as one column, which cannot. That is a difference of two "
+            "models and no share."
         ),
         alt=f"Waterfall of the mean of omega over omega_0 in the second half: from {waterfall.start:.3f} to "
-        f"{waterfall.end:.3f}. Means over all orders: {bars}. The largest is {waterfall.largest.name}.",
+        f"{waterfall.end:.3f}. Means over all orders: {bars}. The largest is {waterfall.largest.name}. "
+        f"From there to water as one column, which cannot overlap: {waterfall.overlap:+.3f}.",
         maker=figure_waterfall,
         data=(_without_reader(waterfall),),
         table=table(waterfall),
@@ -90,6 +109,8 @@ def table(waterfall: Waterfall) -> str:
               for b in waterfall.bars),
             ("(free flight)", waterfall.end, waterfall.end_band, waterfall.end, waterfall.end, waterfall.end_band,
              None, None),
+            ("(column, which cannot overlap)", waterfall.column, None, waterfall.column, waterfall.column, None, None,
+             None),
         ),
     )  # fmt: skip
 

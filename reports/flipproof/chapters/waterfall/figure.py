@@ -12,10 +12,13 @@ UP, DOWN, WHOLE = "#0072B2", "#D55E00", "#666666"
 
 @styled
 def figure_waterfall(waterfall: Waterfall) -> Figure:
-    """Left: the fair shares, each bar from the value before to the value after. Right: the same in single orders."""
-    figure, (ladder, orders) = new_figure(1, 2, size=(8.0, 4.6), sharey=True, width_ratios=(1.5, 1.0))
+    """Left: the fair shares, each bar from the value before to the value after. Right: the same in single orders.
+
+    Below, hatched: what forbidding overlap changes, from free flight to the column.
+    """
+    figure, (ladder, orders) = new_figure(1, 2, size=(8.0, 4.9), sharey=True, width_ratios=(1.5, 1.0))
     names = ["published program", *(bar.name for bar in waterfall.bars), "free flight"]
-    places = list(range(len(names) - 1, -1, -1))
+    places = list(range(len(names), 0, -1))
     ladder.barh(places[0], waterfall.start, color=WHOLE, height=0.6)
     ladder.barh(places[-1], waterfall.end, color=WHOLE, height=0.6, xerr=waterfall.end_band, capsize=3)
     level = waterfall.start
@@ -36,7 +39,15 @@ def figure_waterfall(waterfall: Waterfall) -> Figure:
         ladder.annotate(
             f"{value:.3f}", (0, place), xytext=(6, 0), textcoords="offset points", va="center", color="white"
         )
-    ladder.set_yticks(places, names)
+    ladder.barh(
+        0, waterfall.overlap, left=waterfall.end, color="none", edgecolor=UP if waterfall.overlap >= 0 else DOWN,
+        hatch="////", height=0.6, xerr=waterfall.end_band, capsize=3, ecolor="#222222",
+    )  # fmt: skip
+    ladder.axhline(0.5, color="#444444", linewidth=0.8, linestyle=":")
+    orders.axhline(0.5, color="#444444", linewidth=0.8, linestyle=":")
+    orders.annotate("a difference of two models,\nno share", (0.02, 0), xycoords=("axes fraction", "data"), va="center",
+                    fontsize=8)  # fmt: skip
+    ladder.set_yticks([*places, 0], [*names, "no overlap: column"])
     ladder.set_xlabel(f"{waterfall.observable.words} [{waterfall.observable.unit}]")
     ladder.set_title("fair shares: means over all orders", fontsize=10, loc="left")
     orders.axvline(0.0, color="#444444", linewidth=0.8)

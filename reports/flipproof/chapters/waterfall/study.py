@@ -7,6 +7,10 @@ differ, assumptions interact. The average over all orders (the Shapley value) is
 them alike: an assumption's fair share. Each of the three sums to the whole difference, which is asserted. A bar of one
 order, or the largest bar of any order, is no share: another order gives another number. The step size comes first in
 every order: only the program has one.
+
+In the margin stands what forbidding overlap changes: free flight still lets slices overlap, one stretching column of
+water cannot (``ode_reference.column``). The column has no switches, so that it takes no part in the orders: column
+minus free flight is a difference of two models.
 """
 
 from __future__ import annotations
@@ -26,6 +30,7 @@ from slicemodel import Scenario, Trajectory, observables
 from slicemodel.trajectory import FloatArray
 
 PROGRAM: Final = "published-python"
+COLUMN: Final = "column"
 
 NAMES: Final = MappingProxyType(
     {
@@ -109,7 +114,11 @@ class Bar:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Waterfall:
-    """The split of one observable at ``slices``; ``residual`` is the largest |total - sum of bars| of the splits."""
+    """The split of one observable at ``slices``; ``residual`` is the largest |total - sum of bars| of the splits.
+
+    ``column`` is the observable of water that cannot overlap, in the margin of the split; ``finer_end`` that of free
+    flight at ``FINER`` times the slices, None if that was not computed.
+    """
 
     observable: Observable
     slices: int
@@ -118,11 +127,23 @@ class Waterfall:
     end_band: float
     bars: tuple[Bar, ...]
     residual: float
+    column: float
+    finer_end: float | None = None
 
     @property
     def total(self) -> float:
         """Free flight minus published program."""
         return self.end - self.start
+
+    @property
+    def overlap(self) -> float:
+        """What forbidding overlap changes: column minus free flight, no share."""
+        return self.column - self.end
+
+    @property
+    def finer_overlap(self) -> float | None:
+        """The same at ``FINER`` times the slices; None if that was not computed."""
+        return None if self.finer_end is None else self.column - self.finer_end
 
     @property
     def largest(self) -> Bar:
@@ -153,10 +174,16 @@ def equation_run(throw: Scenario, switches: Switches) -> Run:
     return Run(name, throw, {}, f"waterfall, {name}")
 
 
+def column_run(throw: Scenario) -> Run:
+    """Return the run of water that cannot overlap."""
+    return Run(COLUMN, throw, {}, "waterfall, column")
+
+
 def plan_waterfall(throw: Scenario, steps: int) -> list[Run]:
-    """Return the program's run, and every equation with its twins (121 runs)."""
+    """Return the program's run, every equation with its twins, and the column's (122 runs)."""
     equations = _plan_equations(throw)
-    return [program_run(throw, steps), *equations, *(twin for run in equations for twin in twins(run))]
+    followers = [twin for run in equations for twin in twins(run)]
+    return [program_run(throw, steps), *equations, *followers, column_run(throw)]
 
 
 def _plan_equations(throw: Scenario) -> list[Run]:
@@ -260,6 +287,8 @@ def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) 
         end_band=bands[everything],
         bars=tuple(bars),
         residual=residual,
+        column=observed[column_run(program.scenario)],
+        finer_end=more[everything] if more else None,
     )
 
 

@@ -26,7 +26,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from engine_check.solver import ENGINES
-from flipproof.chapters.frozen.study import LIMITS
+from flipproof.chapters.solvers import LIMITS
 from ode_reference.models import MODELS
 from ode_reference.solver import REST_SPEED, REST_SPEED_WITH_RECOIL
 from slicemodel import Bottle, Scenario
@@ -47,7 +47,7 @@ AT_REST: Final = "at rest"
 OWN_LIMIT: Final = "limit of "
 """Leads the name of an equation that no model states: where the scheme itself goes on finer grids."""
 
-EQUATION_OF_SCHEME: Final[Mapping[str, str]] = {**LIMITS, "midpoint": "eq8", "paper-typeset": AT_REST}
+EQUATION_OF_SCHEME: Final[Mapping[str, str]] = {**LIMITS, "paper-typeset": AT_REST}
 EQUATION_OF_FRAME: Final[Mapping[str, str]] = {"free": "free-flight", "rotating": "eq8"}
 
 ATOL_SHARE: Final = 1e-3

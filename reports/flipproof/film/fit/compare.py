@@ -99,6 +99,11 @@ def verdict(contenders: Sequence[Contender]) -> str:
     if equal:
         words.append(f"The data cannot tell it from {_listed(equal)}.")
     words += [f"{one.solver} leaves {one.misfit:.3g} times the noise (AIC {one.aic:.0f} higher)." for one in worse]
+    if worse:
+        words.append(
+            "AIC is chi^2, divided by the misfit of the best if that is more than noise, plus two for every fitted "
+            f"number. The least is best; up to {INDISTINCT:g} more is no difference."
+        )
     return " ".join(words)
 
 

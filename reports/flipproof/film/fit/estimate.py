@@ -1,23 +1,22 @@
-"""Least squares on a rough landscape: a grid of starts, descents with wide difference quotients, a cooled population.
+"""Least squares on a rough landscape: a grid of starts, descents with wide difference quotients, an explored region.
 
 Each rebound puts a kink into theta(t) as a function of the parameters, and a rebound that waits for the grid a jump.
 Difference quotients therefore reach over many kinks: about half the standard error of the estimate, never the square
 root of round-off. Several starts, from a grid over drag and restitution, guard against side minima. What lies between
-and beyond them is left to a population of points (``sampling``), and the lowest point that any of the three has seen is
-descended from once more.
+and beyond them is left to an even filling of all that the data allow (``region``), and the lowest point that any of the
+three has seen is descended from once more.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from flipproof.film.fit.landscape import Landscape, Tick, loss
 from flipproof.film.fit.problem import Problem
-from flipproof.film.fit.profile import profile
-from flipproof.film.fit.sampling import USUAL, Cloud, Effort, Points, cool, roughness
+from flipproof.film.fit.region import Points, explored, roughness
 from flipproof.film.fit.temperature import fits, temperature
 from slicemodel.trajectory import FloatArray
 
@@ -27,8 +26,39 @@ MISFIT: Final = 2.0
 LIKELY: Final = 5.024
 """97.5 % point of chi^2 with one degree of freedom: two intervals that miss in 2.5 % each miss in 5 % together."""
 
+REACH: Final = 15.0
+"""chi^2 above the lowest up to which parameters are explored at the least: 0.06 % of two lie beyond, 0.5 % of four."""
+
 NEARLY: Final = 30.0
-"""chi^2 above the lowest up to which a descent's end seeds the population with its neighbourhood."""
+"""chi^2 above the lowest up to which the neighbourhood of a descent's end is explored from."""
+
+SPREAD: Final = 1.5
+"""Standard deviation of the points around a descent's end, in units of that of its estimate."""
+
+DRAWN: Final = 2000
+"""Points that the posterior is drawn with."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effort:
+    """How many flights a search may make.
+
+    Parameters
+    ----------
+    grid : pair of int - points of the scan along drag and restitution
+    starts : int - descents
+    points : int - of the explored region, at the least
+    again : bool - whether to start again from a finer scan if no descent explains the measurement
+    """
+
+    grid: tuple[int, int] = (9, 6)
+    starts: int = 4
+    points: int = 400
+    again: bool = True
+
+
+USUAL: Final = Effort()
+"""The search that is made unless another is asked for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,10 +73,9 @@ class Estimate:
     temperature : float - variance that the intervals rest on, in units of the noise's
     roughness : float - by what factor intervals are wider, squared, than on a smooth landscape
     minima : (M, K + 1) - end of each descent and Huber's loss there in units of the noise, best first
-    cloud : (S, K) - coordinates that the data allow, equally weighted
+    cloud : (S, K) - coordinates that the data allow, each as often as exp(-chi^2 / 2T) says
     reach : (2, K) - lowest and highest of each coordinate at which chi^2, all others fitted, exceeds the lowest by no
         more than ``LIKELY * temperature * roughness``
-    accepted : float - share of the population's last steps that were accepted
     flights : int - runs of the solver
     """
 
@@ -58,7 +87,6 @@ class Estimate:
     minima: FloatArray
     cloud: FloatArray
     reach: FloatArray
-    accepted: float
     flights: int
 
     @property
@@ -77,108 +105,98 @@ class Estimate:
         return self.problem.measured.values - self.problem.predicted(self.x)
 
 
-def estimate(
-    problem: Problem,
-    effort: Effort = USUAL,
-    *,
-    tick: Tick = lambda _: None,
-    seed: int = 0,
-) -> Estimate:
-    """Return the least-squares estimate and the cloud of what else the data allow.
+def estimate(problem: Problem, effort: Effort = USUAL, *, tick: Tick = lambda _: None, seed: int = 0) -> Estimate:
+    """Return the least-squares estimate and what else the data allow.
 
     Parameters
     ----------
     problem : Problem
-    effort : Effort
+    effort : Effort - how many flights the search may make
     tick : callable - called with the number of flights made
-    seed : int - of the population's random numbers
+    seed : int - of the noise that is simulated to correct intervals for roughness
     """
     land = Landscape(problem, tick=tick)
-    scanned, ends, residuals = _descents(land, effort)
-    if effort.again and not _explained(residuals, problem):
+    scanned, ends = _descents(land, effort.grid, effort.starts)
+    if effort.again and not fits(float(loss(land.residuals(ends)).min()), problem.points - len(problem.free)):
         # Either the equation is wrong, or every descent ended in a side minimum: look between the starts.
-        finer = replace(effort, drags=2 * effort.drags + 1, restitutions=2 * effort.restitutions + 1)
-        more = _descents(land, replace(finer, starts=4 * effort.starts))
-        scanned, ends, residuals = (np.concatenate(pair) for pair in zip((scanned, ends, residuals), more, strict=True))
+        drags, restitutions = effort.grid
+        more = _descents(land, (2 * drags + 1, 2 * restitutions + 1), 4 * effort.starts)
+        scanned, ends = (np.concatenate(pair) for pair in zip((scanned, ends), more, strict=True))
 
     # What no parameter explains must not be weighed as if it were noise: it would all be outliers.
     residuals = land.residuals(ends)
-    coarse = problem.coarse_steps()
+    steps = problem.coarse_steps()
     typical = float((1.4826 * np.median(np.abs(residuals), axis=1)).min())
     land = land.rescaled(typical if typical > MISFIT else 1.0)
     levels = loss(residuals / land.scale)
     order = np.argsort(levels)
-    minima = np.column_stack((ends, levels))[order]
-
-    best, lowest = minima[0, :-1], float(minima[0, -1])
-    variance = temperature(land, best, coarse)
-    cloud = cool(land, _seeds(land, minima, scanned, coarse), variance, effort, seed)
-    best, lowest, steps = _polished(land, cloud, best, lowest, coarse)
-    better = temperature(land, best, steps)
-    if not 0.8 <= better / variance <= 1.25:
-        variance = better
-        cloud = cool(land, cloud.edge, variance, effort, seed + 1)
-        best, lowest, steps = _polished(land, cloud, best, lowest, coarse)
-    rough = roughness(cloud, variance, seed)
-    reach, best, lowest = profile(land, cloud, best, lowest, LIKELY * variance * rough, steps, effort.pushes)
+    known = Points.flown(land, np.concatenate((scanned, ends, _around(land, ends[levels <= levels.min() + NEARLY]))))
+    best, lowest = ends[order[0]], float(levels[order[0]])
+    variance, rough, needed = temperature(land, best, steps), 1.0, REACH
+    for _ in range(4):
+        within = needed * variance
+        known = explored(land, known, within, effort.points)
+        cloud = known.x[known.drawn(variance, DRAWN)]
+        steps = np.clip(0.5 * cloud.std(axis=0), problem.coarse_steps() / 40.0, problem.coarse_steps())
+        best, lowest = _polished(land, known, best, lowest, steps)
+        variance = temperature(land, best, steps)
+        rough = roughness(known, variance, seed)
+        needed = max(REACH, 1.2 * LIKELY * rough)
+        if 0.8 * needed * variance <= within <= 1.25 * needed * variance:
+            break
+    likely = known.x[known.chi2 <= lowest + LIKELY * variance * rough]
+    if not len(likely):
+        likely = best[np.newaxis]
     return Estimate(
         problem=problem, x=best, chi2=float(loss(land.residual(best) * land.scale)),
         temperature=variance * land.scale**2, roughness=rough,
-        minima=np.column_stack((ends, loss(residuals)))[order], cloud=cloud.likely.x, reach=reach,
-        accepted=cloud.accepted, flights=land.flights,
+        minima=np.column_stack((ends, loss(residuals)))[order], cloud=known.x[known.drawn(variance, DRAWN)],
+        reach=np.array([likely.min(axis=0), likely.max(axis=0)]), flights=land.flights,
     )  # fmt: skip
 
 
-def _descents(land: Landscape, effort: Effort) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the points of a scan, where the descents from its best ended, and the residuals there."""
-    everything = np.arange(len(land.problem.free))
-    scanned = scan(land, effort)
+def _descents(land: Landscape, counts: tuple[int, int], starts: int) -> tuple[FloatArray, FloatArray]:
+    """Return the points of a scan, and where the descents from its best ended."""
+    scanned = scan(land, counts)
     coarse = land.problem.coarse_steps()
-    ends = np.array([land.descend(x, coarse, everything, 12)[0] for x in scanned[: effort.starts]])
-    return scanned, ends, land.residuals(ends)
+    return scanned, np.array([land.descend(x, coarse, 12)[0] for x in scanned[:starts]])
 
 
-def _explained(residuals: FloatArray, problem: Problem) -> bool:
-    """Return whether noise alone explains the lowest of some residuals (M, P)."""
-    return fits(float(loss(residuals).min()), problem.points - len(problem.free))
-
-
-def _seeds(land: Landscape, minima: FloatArray, scanned: FloatArray, coarse: FloatArray) -> Points:
-    """Return points to begin a population with: scan, descents, and what lies around the lowest of them."""
-    rng = np.random.default_rng(len(scanned))
-    points = [scanned, minima[:, :-1]]
-    for *x, level in minima:
-        if level <= minima[0, -1] + NEARLY:
-            around = np.array(x) + rng.normal(size=(8, len(x))) * coarse
-            points.append(np.clip(around, land.low, land.high))
-    return Points.flown(land, np.concatenate(points))
+def _around(land: Landscape, ends: FloatArray) -> FloatArray:
+    """Return points around the ends of descents, spread as far and as aslant as a smooth landscape would allow."""
+    rng = np.random.default_rng(len(ends))
+    found = []
+    for x in ends:
+        slopes = land.jacobian(x, land.problem.coarse_steps())
+        # A prior as wide as the bounds keeps the curvature invertible where the data say nothing.
+        curvature = slopes.T @ slopes + np.diag((land.high - land.low) ** -2.0)
+        found.append(rng.multivariate_normal(x, SPREAD**2 * np.linalg.inv(curvature), size=16 * len(x)))
+    return np.clip(np.concatenate(found), land.low, land.high)
 
 
 def _polished(
-    land: Landscape, cloud: Cloud, best: FloatArray, lowest: float, coarse: FloatArray
-) -> tuple[FloatArray, float, FloatArray]:
-    """Return the lowest point known after a descent from the cloud's lowest, its chi^2 and the steps used."""
-    steps = np.clip(0.5 * cloud.likely.x.std(axis=0), coarse / 40.0, coarse)
-    first = cloud.likely.lowest
-    if cloud.likely.chi2[first] < lowest:
-        best, lowest = cloud.likely.x[first], float(cloud.likely.chi2[first])
-    x, level = land.descend(best, steps, np.arange(len(best)), 8)
-    return (x, level, steps) if level < lowest else (best, lowest, steps)
+    land: Landscape, known: Points, best: FloatArray, lowest: float, steps: FloatArray
+) -> tuple[FloatArray, float]:
+    """Return the lowest point known after a descent from it, and its chi^2."""
+    first = int(np.argmin(known.chi2))
+    if known.chi2[first] < lowest:
+        best, lowest = known.x[first], float(known.chi2[first])
+    x, level = land.descend(best, steps, 8)
+    return (x, level) if level < lowest else (best, lowest)
 
 
-def scan(land: Landscape, effort: Effort) -> FloatArray:
+def scan(land: Landscape, counts: tuple[int, int] = USUAL.grid) -> FloatArray:
     """Return the points of a grid over drag and restitution (M, K), local minima of the grid first, then by chi^2.
 
     At each point the other coordinates have been fitted by two Gauss-Newton steps with one set of difference quotients.
     """
-    counts = (effort.drags, effort.restitutions)
+    from scipy.ndimage import minimum_filter
+
     axes = [np.linspace(land.low[k], land.high[k], count + 2)[1:-1] for k, count in enumerate(counts)]
     pairs = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     others = np.tile(land.problem.start()[2:], (len(pairs), 1))
     points, level = _levelled(land, np.column_stack((pairs, others)))
-    grid = np.pad(level.reshape(counts), 1, constant_values=np.inf)
-    shifts = [(i, j) for i in (0, 1, 2) for j in (0, 1, 2) if (i, j) != (1, 1)]
-    beside = np.min([grid[i : counts[0] + i, j : counts[1] + j] for i, j in shifts], axis=0).ravel()
+    beside = minimum_filter(level.reshape(counts), size=3, mode="nearest").ravel()
     return np.asarray(points[np.lexsort((level, level > beside))])
 
 

@@ -55,6 +55,5 @@ def _fit(one: Contender) -> dict[str, Any]:
         "temperature": estimate.temperature,
         "roughness": estimate.roughness,
         "descents": estimate.minima.tolist(),
-        "accepted": estimate.accepted,
         "flights": estimate.flights,
     }

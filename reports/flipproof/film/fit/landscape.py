@@ -59,51 +59,37 @@ class Landscape:
         """Return the sum of Huber's loss over the residuals at ``x``."""
         return float(loss(self.residual(x)))
 
-    def jacobian(self, x: FloatArray, steps: FloatArray, free: Index) -> FloatArray:
-        """Return d residual / d x[free] by central difference quotients over ``steps``, shape (P, F).
+    def jacobian(self, x: FloatArray, steps: FloatArray) -> FloatArray:
+        """Return d residual / d x by central difference quotients over ``steps``, shape (P, K).
 
         At a bound the quotient is one-sided.
         """
-        up, down = (np.tile(x, (len(free), 1)) for _ in range(2))
-        rows = np.arange(len(free))
-        up[rows, free] = np.minimum(x + steps, self.high)[free]
-        down[rows, free] = np.maximum(x - steps, self.low)[free]
-        residuals = self.residuals(np.concatenate((up, down)))
-        rises = residuals[: len(free)] - residuals[len(free) :]
-        return np.asarray(rises.T / (up - down)[rows, free])
+        up = np.minimum(x + np.diag(steps), self.high)
+        down = np.maximum(x - np.diag(steps), self.low)
+        above, below = np.split(self.residuals(np.concatenate((up, down))), 2)
+        return np.asarray((above - below).T / np.diag(up - down))
 
-    def descend(self, x: FloatArray, steps: FloatArray, free: Index, flights: int) -> tuple[FloatArray, float]:
-        """Minimise chi^2 over the coordinates ``free`` from ``x``; return where it ended, and chi^2 there.
+    def descend(self, x: FloatArray, steps: FloatArray, flights: int) -> tuple[FloatArray, float]:
+        """Minimise chi^2 from ``x``; return where it ended, and chi^2 there.
 
         Parameters
         ----------
         steps : (K,) - of the difference quotients
-        free : (F,) - indices of the coordinates that move
         flights : int - trial points at the most
         """
         from scipy.optimize import least_squares
 
-        def whole(part: FloatArray) -> FloatArray:
-            moved = x.copy()
-            moved[free] = part
-            return moved
+        def slopes(here: FloatArray) -> FloatArray:
+            return self.jacobian(here, steps)
 
         # The solver wants its start strictly inside.
-        margin = 1e-9 * (self.high - self.low)[free]
-        began = np.clip(x[free], self.low[free] + margin, self.high[free] - margin)
-
-        def rows(part: FloatArray) -> FloatArray:
-            return self.residual(whole(part))
-
-        def slopes(part: FloatArray) -> FloatArray:
-            return self.jacobian(whole(part), steps, free)
-
+        margin = 1e-9 * (self.high - self.low)
         found = least_squares(
-            rows,
-            began,
+            self.residual,
+            np.clip(x, self.low + margin, self.high - margin),
             jac=slopes,
-            bounds=(self.low[free], self.high[free]),
-            x_scale=steps[free],
+            bounds=(self.low, self.high),
+            x_scale=steps,
             loss="huber",
             f_scale=HUBER,
             ftol=1e-5,
@@ -111,7 +97,7 @@ class Landscape:
             gtol=1e-8,
             max_nfev=flights,
         )
-        return whole(found.x), 2.0 * float(found.cost)
+        return np.asarray(found.x), 2.0 * float(found.cost)
 
 
 def loss(residuals: FloatArray) -> FloatArray:

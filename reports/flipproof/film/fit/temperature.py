@@ -27,8 +27,7 @@ def temperature(land: Landscape, x: FloatArray, steps: FloatArray) -> float:
     correlated = land.problem.measured.quantity == "omega"
     if not correlated and fits(land.scale**2 * independent * freedom, freedom):
         return independent
-    everything = np.arange(len(x))
-    slopes = land.jacobian(x, steps, everything)
+    slopes = land.jacobian(x, steps)
     # A prior as wide as the bounds keeps the curvature invertible where the data say nothing.
     inverse = np.linalg.inv(slopes.T @ slopes + np.diag((land.high - land.low) ** -2.0))
     meat = slopes.T @ autocovariance(residual) @ slopes

@@ -14,7 +14,6 @@ from flipproof.film.fit.estimate import Estimate, estimate
 from flipproof.film.fit.landscape import loss
 from flipproof.film.fit.problem import Measurement, Quantity, flights, pose
 from flipproof.film.fit.reading import Averaged
-from flipproof.film.fit.sampling import USUAL, Effort
 from flipproof.film.fit.uncertainty import Interval, intervals
 from flipproof.film.tracker.kinematics import angle
 from slicemodel import Scenario
@@ -40,9 +39,9 @@ RANGES: Final = {
 """Where truths are drawn from; the damping rate [1/s] evenly in its logarithm, everything else evenly."""
 
 
-def draw_truth(seed: int, slices: int, bottle_of: Scenario | None = None) -> Scenario:
+def draw_truth(seed: int, slices: int) -> Scenario:
     """Return a throw drawn at random from ``RANGES``."""
-    base = bottle_of or Scenario()
+    base = Scenario()
     share = np.random.default_rng([seed, 0]).uniform(size=len(RANGES))
     drawn = {name: low + (high - low) * u for (name, (low, high)), u in zip(RANGES.items(), share, strict=True)}
     low, high = RANGES["damping_rate"]
@@ -59,34 +58,19 @@ def draw_truth(seed: int, slices: int, bottle_of: Scenario | None = None) -> Sce
     return replace(throw, drag=2.0 * throw.slice_mass * gamma)
 
 
-def film(
-    throw: Scenario,
-    solver: str,
-    seed: int,
-    *,
-    noise: float = CAMERA_NOISE,
-    rate: float = RATE,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return what a camera sees of a simulated throw.
-
-    Parameters
-    ----------
-    throw : Scenario
-    solver : str
-    seed : int
-    noise : float - standard deviation of one coordinate [m]
-    rate : float - frames per second
+def film(throw: Scenario, solver: str, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return what a camera of ``RATE`` and ``CAMERA_NOISE`` sees of a simulated throw.
 
     Returns
     -------
     t : (P,) - [s]
     cap, base : (P, 2) - x and y of the markers [m], the centre of the bottle at rest (Eq. 1 takes differences only)
     """
-    t = np.arange(int(np.floor(throw.duration * rate)) + 1) / rate
+    t = np.arange(int(np.floor(throw.duration * RATE)) + 1) / RATE
     whole = replace(throw, duration=float(t[-1]))
     theta = flights([whole], solver, t)[0][0]
     half = 0.5 * throw.bottle.length * np.column_stack((np.sin(theta), -np.cos(theta)))
-    grain = np.random.default_rng([seed, 1]).normal(0.0, noise, (2, len(t), 2))
+    grain = np.random.default_rng([seed, 1]).normal(0.0, CAMERA_NOISE, (2, len(t), 2))
     return t, -half + grain[0], half + grain[1]
 
 
@@ -145,18 +129,16 @@ def fit_twin(
     slices: int,
     also: tuple[str, ...] = (),
     quantity: Quantity = "theta",
-    effort: Effort = USUAL,
 ) -> Twin:
     """Draw a truth, film it, forget it, and fit the film with the equation that made it.
 
     Parameters
     ----------
-    seed : int - of truth, camera and population
+    seed : int - of truth and camera
     solver : str
     slices : int
     also : names from ``ALSO`` that are fitted; others are known exactly
     quantity : "theta" from Eq. 1, or "omega" as the paper makes it of theta
-    effort : Effort - as ``estimate``
     """
     truth = draw_truth(seed, slices)
     t, cap, base = film(truth, solver, seed)
@@ -172,7 +154,7 @@ def fit_twin(
     # What is fitted must not be known: the fit starts from a throw that says nothing of it.
     known = replace(truth, drag=0.0, restitution=0.5)
     problem = pose(measured, known, solver, also=also, slices=slices)
-    found = estimate(problem, effort, seed=seed)
+    found = estimate(problem, seed=seed)
     here = np.array([problem.coordinate(name, getattr(truth, name)) for name in problem.free])
     return Twin(
         seed=seed,

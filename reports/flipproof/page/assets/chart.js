@@ -2,8 +2,10 @@
 window.flipproofChart ??= (() => {
   "use strict";
   const NAMESPACE = "http://www.w3.org/2000/svg";
-  const DASHES = { "published-python": "9 3", "eq8": "9 3 2 3", "free-flight": "", "pymunk": "2 3" };
-  const OTHER_DASH = "5 5";
+  const DASHES = {
+    "published-python": "9 3", "eq8": "9 3 2 3", "free-flight": "", "pymunk": "2 3", "published-limit": "4 2", "exact-step": "12 2 1 2",
+  };
+  const OTHER_DASHES = ["5 5", "", "9 3", "2 3"], TINTS = 8;
   const MARGIN = { left: 46, right: 10, top: 22, bottom: 36 };
 
   function bytes(text) {
@@ -46,22 +48,45 @@ window.flipproofChart ??= (() => {
     return value.toFixed(digits).replace(/^-0(\.0*)?$/, "0$1").replace("-", "−");
   }
 
-  function colour(name) {
-    return `var(--solver-${name}, var(--solver-other))`;
+  // A line is a solver's, or the one of a number `tint`; colours repeat with another dash.
+  function colour({ name, tint }) {
+    return name in DASHES || tint === undefined ? `var(--solver-${name}, var(--solver-other))` : `var(--line-${tint % TINTS})`;
+  }
+
+  function dash({ name, tint }) {
+    return DASHES[name] ?? OTHER_DASHES[tint === undefined ? 0 : 1 + (Math.floor(tint / TINTS) % 3)];
+  }
+
+  const SUPERSCRIPTS = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+  function power(exponent) {
+    return `10${exponent < 0 ? "⁻" : ""}${[...String(Math.abs(exponent))].map((digit) => SUPERSCRIPTS[digit]).join("")}`;
+  }
+
+  // Marks of an axis as {at, words}: those of a logarithmic one stand at the powers of ten.
+  function marks({ low, high, log }, count) {
+    if (!log) {
+      const { found, digits } = ticks(low, high, count);
+      return found.map((at) => ({ at, words: shown(at, digits) }));
+    }
+    const found = [];
+    for (let k = Math.ceil(Math.log10(low) - 1e-9); k <= Math.log10(high) + 1e-9; k++) found.push({ at: 10 ** k, words: power(k) });
+    return found;
   }
 
   // Writes the labels of lines beside their ends, none over another.
-  function labelEnds(svg, lines, x, y, bottom) {
-    const ends = lines.filter((line) => line.label && line.y.length).map((line) => ({ line, at: y(line.y.at(-1)) }));
+  function labelEnds(svg, lines, x, y, top, bottom, last) {
+    const ends = lines.filter((line) => line.label && line.y.length).map((line) => ({ line, at: y(line.y[Math.min(last(line), line.y.length - 1)]) }));
+    for (const end of ends) end.at = Math.max(top, Math.min(bottom, Number.isFinite(end.at) ? end.at : bottom));
     ends.sort((a, b) => a.at - b.at);
     ends.forEach((end, k) => { if (k) end.at = Math.max(end.at, ends[k - 1].at + 15); });
     const over = Math.max(0, (ends.at(-1)?.at ?? 0) - bottom);
     for (const { line, at } of ends) {
-      words(line.label, { class: "chart-label", x: x + 6, y: at - over + 4, style: `fill: ${colour(line.name)}` }, svg);
+      words(line.label, { class: "chart-label", x: x + 6, y: at - over + 4, style: `fill: ${colour(line)}` }, svg);
     }
   }
 
-  // Draws {x: {low, high, label}, y: {low, high, label}, right, lines: [{name, x, y, label, faint}]}; returns both scales.
+  // Draws {x: {low, high, label}, y: {low, high, label, log}, right, lines: [{name, x, y, label, faint}]}; returns both
+  // scales. What lies outside of the axes is cut off.
   function draw(svg, height, plot) {
     const right = plot.right ?? MARGIN.right;
     const width = Math.max(240, Math.round(svg.clientWidth || svg.parentElement.clientWidth));
@@ -69,44 +94,50 @@ window.flipproofChart ??= (() => {
     svg.setAttribute("height", height);
     svg.replaceChildren();
     const inner = { width: width - MARGIN.left - right, height: height - MARGIN.top - MARGIN.bottom };
+    const bottom = MARGIN.top + inner.height, scale = plot.y.log ? Math.log10 : (value) => value;
     const x = (value) => MARGIN.left + ((value - plot.x.low) / (plot.x.high - plot.x.low)) * inner.width;
-    const y = (value) => MARGIN.top + (1 - (value - plot.y.low) / (plot.y.high - plot.y.low)) * inner.height;
-    const bottom = MARGIN.top + inner.height;
+    const y = (value) => MARGIN.top + (1 - (scale(value) - scale(plot.y.low)) / (scale(plot.y.high) - scale(plot.y.low))) * inner.height;
 
-    const down = ticks(plot.y.low, plot.y.high, Math.max(3, Math.floor(inner.height / 24)));
-    for (const value of down.found) {
-      element("path", { class: "chart-grid", d: `M${MARGIN.left} ${y(value)}h${inner.width}` }, svg);
-      words(shown(value, down.digits), { x: MARGIN.left - 6, y: y(value) + 4, "text-anchor": "end" }, svg);
+    for (const { at, words: text } of marks(plot.y, Math.max(3, Math.floor(inner.height / 24)))) {
+      element("path", { class: "chart-grid", d: `M${MARGIN.left} ${y(at)}h${inner.width}` }, svg);
+      words(text, { x: MARGIN.left - 6, y: y(at) + 4, "text-anchor": "end" }, svg);
     }
-    const along = ticks(plot.x.low, plot.x.high, Math.max(3, Math.floor(inner.width / 70)));
-    for (const value of along.found) {
-      element("path", { class: "chart-axis", d: `M${x(value)} ${bottom}v4` }, svg);
-      words(shown(value, along.digits), { x: x(value), y: bottom + 16, "text-anchor": "middle" }, svg);
+    for (const { at, words: text } of marks(plot.x, Math.max(3, Math.floor(inner.width / 70)))) {
+      element("path", { class: "chart-axis", d: `M${x(at)} ${bottom}v4` }, svg);
+      words(text, { x: x(at), y: bottom + 16, "text-anchor": "middle" }, svg);
     }
     element("path", { class: "chart-axis", d: `M${MARGIN.left} ${bottom}h${inner.width}` }, svg);
     words(plot.y.label, { x: 2, y: 12 }, svg);
     words(plot.x.label, { x: MARGIN.left + inner.width, y: height - 4, "text-anchor": "end" }, svg);
 
+    const place = { x: MARGIN.left, y: MARGIN.top - 2, width: inner.width, height: inner.height + 4 };
+    const window = element("svg", { ...place, viewBox: Object.values(place).join(" ") }, svg);
+    // One point beyond each end of the axis, so that lines reach it.
+    const first = (line) => Math.max(0, line.x.findIndex((value) => value >= plot.x.low) - 1);
+    const last = (line) => {
+      const beyond = line.x.findIndex((value) => value >= plot.x.high);
+      return beyond < 0 ? line.x.length - 1 : beyond;
+    };
     for (const line of plot.lines) {
       let path = "";
-      for (let k = 0; k < line.y.length; k++) {
+      for (let k = first(line), end = Math.min(last(line), line.y.length - 1); k <= end; k++) {
         if (Number.isFinite(line.y[k])) path += `${path ? "L" : "M"}${x(line.x[k]).toFixed(1)} ${y(line.y[k]).toFixed(1)}`;
       }
       element("path", {
-        class: line.faint ? "chart-line chart-faint" : "chart-line", d: path, "data-line": line.name, "stroke-dasharray": DASHES[line.name] ?? OTHER_DASH,
-        style: `stroke: ${colour(line.name)}`,
-      }, svg);
+        class: line.faint ? "chart-line chart-faint" : "chart-line", d: path, "data-line": line.name, "stroke-dasharray": dash(line),
+        style: `stroke: ${colour(line)}`,
+      }, window);
     }
-    labelEnds(svg, plot.lines, MARGIN.left + inner.width, y, bottom);
+    labelEnds(svg, plot.lines, MARGIN.left + inner.width, y, MARGIN.top, bottom, last);
     return { x, y, top: MARGIN.top, bottom, left: MARGIN.left, right: MARGIN.left + inner.width };
   }
 
-  // A sample of a solver's line, for legends.
-  function sample(name) {
+  // A sample of a line, for legends.
+  function sample(line) {
     const svg = element("svg", { width: 34, height: 10, viewBox: "0 0 34 10", "aria-hidden": "true", class: "chart-sample" });
     element("path", {
-      d: "M1 5h32", "stroke-width": 2.4, fill: "none", "stroke-dasharray": DASHES[name] ?? OTHER_DASH,
-      style: `stroke: ${colour(name)}`,
+      d: "M1 5h32", "stroke-width": 2.4, fill: "none", "stroke-dasharray": dash(line),
+      style: `stroke: ${colour(line)}`,
     }, svg);
     return svg;
   }

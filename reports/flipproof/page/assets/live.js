@@ -48,13 +48,21 @@ window.flipproofLive = (() => {
   // Omega of Eq. 8, or of free flight, at equal times. A slice slower than `rest` that its end presses on rests there.
   function flow(thrown, free, points = 1000, parts = free ? 2 : 1, rest = free ? 1e-3 : 1e-5) {
     const { n, m, M, mass, wall, y, v, inertia, momentum, gamma, g, e, theta0, duration } = prepared(thrown);
-    const side = new Int8Array(n), ratio = m / mass, drag = 2 * gamma, omega = new Float64Array(points);
+    const side = y.map((place) => (Math.abs(place) === wall ? Math.sign(place) : 0)), ratio = m / mass, drag = 2 * gamma;
     const rows = () => Array.from({ length: 5 }, () => new Float64Array(n)), [ys, vs, as] = [rows(), rows(), rows()];
-    const [y1, v1] = [ys[4], vs[4]], [va, vb, vc, vd] = vs, [aa, ab, ac, ad] = as;
-    let theta = theta0, spin = 0, began = 0, spring = 0, centre = 0, push = 0, resting = 0, sides = 0;
+    const omega = new Float64Array(points), y1 = ys[4], v1 = vs[4], every = [...y.keys()];
+    let theta = theta0, spin = 0, began = 0, spring = 0, centre = 0, push = 0;
 
     // Sets omega, and the acceleration (y - centre) spring + push - drag v of all free slices, from sums over all slices.
-    function balance(first, second, speed, angle) {
+    function weigh(at, speeds, angle) {
+      let first = 0, second = 0, speed = 0, resting = 0, sides = 0;
+      for (let i = 0; i < n; i++) {
+        first += at[i];
+        second += at[i] * at[i];
+        speed += speeds[i];
+        resting += side[i] * side[i];
+        sides += side[i];
+      }
       const body = mass + m * resting;
       spin = momentum / inertia(first, second, (m * first) / M);
       spring = spin * spin;
@@ -62,40 +70,23 @@ window.flipproofLive = (() => {
       push = free ? (-drag * m * speed) / body : g * Math.cos(angle) + (drag * m * speed) / M;
       return spin;
     }
-    function weigh(at, speeds, angle) {
-      let first = 0, second = 0, speed = 0;
-      resting = sides = 0;
-      for (let i = 0; i < n; i++) {
-        first += at[i];
-        second += at[i] * at[i];
-        speed += speeds[i];
-        resting += Math.abs(side[i]);
-        sides += side[i];
-      }
-      return balance(first, second, speed, angle);
-    }
-    const pressure = (end) => end * (spring * (end * wall - centre) + push), presses = (end) => pressure(end) >= 0;
+    const pressure = (end) => end * (spring * (end * wall - centre) + push);
     // Writes places and speeds after a time h to y1 and v1; returns the angle.
     function step(h) {
-      ys[0].set(y);
-      vs[0].set(v);
-      began = weigh(y, v, theta);
-      let angle = theta + WEIGHT[0] * h * spin;
+      let angle = theta;
       for (let k = 0; k < 4; k++) {
-        const at = ys[k], speeds = vs[k], a = as[k], nextY = ys[k + 1], nextV = vs[k + 1], part = PART[k] * h;
-        let first = 0, second = 0, speed = 0;
+        const at = k ? ys[k] : y, speeds = k ? vs[k] : v, a = as[k], nextY = ys[k + 1], nextV = vs[k + 1], part = PART[k] * h;
+        angle += WEIGHT[k] * h * weigh(at, speeds, k ? theta + PART[k - 1] * h * spin : theta);
+        if (!k) began = spin;
         for (let i = 0; i < n; i++) {
           a[i] = side[i] ? 0 : spring * (at[i] - centre) + push - drag * speeds[i];
-          const there = (nextY[i] = y[i] + part * speeds[i]);
-          first += there;
-          second += there * there;
-          speed += nextV[i] = v[i] + part * a[i];
+          nextY[i] = y[i] + part * speeds[i];
+          nextV[i] = v[i] + part * a[i];
         }
-        if (k < 3) angle += WEIGHT[k + 1] * h * balance(first, second, speed, theta + part * spin);
       }
       for (let i = 0; i < n; i++) {
-        y1[i] = y[i] + (h / 6) * (va[i] + 2 * (vb[i] + vc[i]) + vd[i]);
-        v1[i] = v[i] + (h / 6) * (aa[i] + 2 * (ab[i] + ac[i]) + ad[i]);
+        y1[i] = y[i] + (h / 6) * (v[i] + 2 * (vs[1][i] + vs[2][i]) + vs[3][i]);
+        v1[i] = v[i] + (h / 6) * (as[0][i] + 2 * (as[1][i] + as[2][i]) + as[3][i]);
       }
       return angle;
     }
@@ -103,76 +94,50 @@ window.flipproofLive = (() => {
     function crossing(i, h) {
       const end = Math.sign(y1[i]), from = end * y[i] - wall, to = end * y1[i] - wall, b = h * end * v[i], d = h * end * v1[i];
       if (side[i] || (to <= 0 && !(b > 0 && d < 0))) return 2;
-      const c2 = 3 * (to - from) - 2 * b - d, c3 = b + d - 2 * (to - from);
-      const path = (x) => from + x * (b + x * (c2 + x * c3));
+      const c2 = 3 * (to - from) - 2 * b - d, c3 = b + d - 2 * (to - from), beyond = (x) => from + x * (b + x * (c2 + x * c3)) > 0;
       // Who turns back within the step is farthest out where its speed is zero.
       let low = 0, high = to > 0 ? 1 : Math.min(1, b / (Math.sqrt(Math.max(0, c2 * c2 - 3 * c3 * b)) - c2));
-      if (!(path(high) > 0)) return 2;
+      if (!beyond(high)) return 2;
       for (let k = 0; k < 54; k++) {
         const middle = (low + high) / 2;
-        if (path(middle) > 0) high = middle;
+        if (beyond(middle)) high = middle;
         else low = middle;
       }
       // Who stands on its end and is hardly pushed is looked at again when the step is over.
       return high < 1e-9 && Math.abs(b) < 1e-9 * wall ? 1 : high;
     }
-    // Sets places and speeds to those of the cubics at the share x of a step h whose end is known.
-    function turnTo(x, h) {
-      for (let i = 0; i < n; i++) {
-        const b = h * v[i], d = h * v1[i], c2 = 3 * (y1[i] - y[i]) - 2 * b - d, c3 = b + d - 2 * (y1[i] - y[i]);
-        v[i] = (b + x * (2 * c2 + 3 * x * c3)) / h;
-        y[i] += x * (b + x * (c2 + x * c3));
+    // Slices that touch one end together rebound; the tube gains V toward it, and takes along who rests on the other end.
+    function rebound(hits, end) {
+      const speed = (i) => Math.abs(v[i]);
+      let sum = 0, weight = 1 + ratio * every.filter((i) => side[i] === -end).length, loose = 0;
+      for (const i of hits.sort((i, j) => speed(j) - speed(i))) {
+        if (free && (1 + e) * speed(i) * weight > ratio * sum) [sum, weight] = [sum + (1 + e) * speed(i), weight + ratio];
       }
-    }
-    // The velocity V that the tube gains: the zero of V - (m / M_b) sum s max(0, (1 + e) x - s V), x speeds of approach.
-    function gained(hits) {
-      const approach = (i) => (side[i] ? 0 : (1 + e) * Math.abs(v[i])), touching = [...hits];
-      for (let i = 0; i < n; i++) if (side[i]) touching.push(i);
-      let high = hits.reduce((sum, i) => sum + approach(i), 0), low = -high, V = 0;
-      for (let k = 0; k < 60; k++) {
-        let [off, slope] = [V, 1];
-        for (const i of touching) {
-          const s = Math.sign(y[i]), left = approach(i) - s * V;
-          if (left > 0) [off, slope] = [off - ratio * s * left, slope + ratio];
-        }
-        if (Math.abs(off) <= 1e-15 * high) break;
-        [low, high] = off > 0 ? [low, V] : [V, high];
-        V = V - off / slope > low && V - off / slope < high ? V - off / slope : (low + high) / 2;
+      const V = (ratio * sum) / weight;
+      for (const i of every) {
+        if (hits.includes(i)) v[i] = -end * ((1 + e) * speed(i) > V ? e * speed(i) : V - speed(i));
+        else if (!side[i]) v[i] -= end * V;
+        else if (side[i] === end && V) [side[i], v[i]] = [0, -end * V];
       }
-      return V;
-    }
-    // All that touch at one instant rebound together; who is slow and pressed on comes to rest, at the tube's expense.
-    function rebound(hits) {
-      const V = free ? gained(hits) : 0, before = hits.map((i) => Math.abs(v[i]));
-      let loose = 0, still = 0;
-      for (let i = 0; i < n; i++) {
-        if (!side[i]) v[i] -= V;
-        else if (side[i] * V > 0) [side[i], v[i]] = [0, -V];
-      }
-      hits.forEach((i, k) => {
-        const s = Math.sign(y[i]);
-        v[i] = -s * ((1 + e) * before[k] > s * V ? e * before[k] : Math.max(0, s * V - before[k]));
-      });
+      // Who is slow and pressed on comes to rest, at the expense of the tube.
       weigh(y, v, theta);
-      for (let i = 0; i < n; i++) {
-        if (!side[i] && Math.abs(y[i]) === wall && Math.abs(v[i]) < rest && presses(Math.sign(y[i]))) {
-          loose += v[i];
-          [side[i], v[i]] = [Math.sign(y[i]), 0];
-        }
-        still += Math.abs(side[i]);
+      for (const i of every) {
+        if (side[i] || Math.abs(y[i]) !== wall || Math.abs(v[i]) >= rest || pressure(Math.sign(y[i])) < 0) continue;
+        loose += v[i];
+        [side[i], v[i]] = [Math.sign(y[i]), 0];
       }
-      for (let i = 0; free && i < n; i++) if (!side[i]) v[i] -= (ratio * loose) / (1 + ratio * still);
+      const share = free ? (ratio * loose) / (1 + ratio * every.filter((i) => side[i]).length) : 0;
+      for (const i of every) if (!side[i]) v[i] -= share;
     }
     // Slices at rest leave when their end would have to pull them.
     function release() {
       for (const end of [1, -1]) {
         if (!side.includes(end)) continue;
         weigh(y, v, theta);
-        if (!presses(end)) for (let i = 0; i < n; i++) if (side[i] === end) side[i] = 0;
+        if (pressure(end) < 0) for (const i of every) if (side[i] === end) side[i] = 0;
       }
     }
 
-    for (let i = 0; i < n; i++) side[i] = Math.abs(y[i]) === wall ? Math.sign(y[i]) : 0;
     release();
     omega[0] = weigh(y, v, theta);
     for (let k = 1; k <= (points - 1) * parts; k++) {
@@ -184,21 +149,24 @@ window.flipproofLive = (() => {
         let when = 1, struck = -1;
         if (ends.length) weigh(y1, v1, angle);
         ends.forEach((end, k) => {
-          if (!presses(end)) when = Math.min(when, pressed[k] / (pressed[k] - pressure(end)) + 1e-6);
+          if (pressure(end) < 0) when = Math.min(when, pressed[k] / (pressed[k] - pressure(end)) + 1e-6);
         });
         for (let i = 0; i < n; i++) {
           const here = crossing(i, left);
           if (here < when || (here === when && struck < 0)) [when, struck] = [here, i];
         }
-        turnTo(when, left);
+        for (let i = 0; i < n; i++) {
+          const way = y1[i] - y[i], b = left * v[i], d = left * v1[i], c2 = 3 * way - 2 * b - d, c3 = b + d - 2 * way;
+          v[i] = (b + when * (2 * c2 + 3 * when * c3)) / left;
+          y[i] += when * (b + when * (c2 + when * c3));
+        }
         theta += when * (turn + when * (angle - theta - turn));
         left -= when * left;
-        const touches = (i) => i === struck || (!side[i] && Math.abs(y[i]) >= wall * (1 - 1e-9) && v[i] * y[i] > 0);
-        if (struck >= 0) {
-          const hits = [];
-          for (let i = 0; i < n; i++) if (touches(i)) hits.push(i);
-          for (const i of hits) y[i] = Math.sign(y[i]) * wall;
-          rebound(hits);
+        for (const end of struck < 0 ? [] : [1, -1]) {
+          const touches = (i) => end * y[i] > 0 && (i === struck || (!side[i] && end * y[i] >= wall * (1 - 1e-9) && end * v[i] > 0));
+          const hits = every.filter(touches);
+          for (const i of hits) y[i] = end * wall;
+          if (hits.length) rebound(hits, end);
         }
         release();
       }

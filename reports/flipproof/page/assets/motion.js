@@ -301,7 +301,7 @@
     });
     const cursor = chart.element("path", { class: "chart-cursor", d: `M0 ${scale.top}V${scale.bottom}`, "data-testid": "motion-cursor" }, svg);
     const dots = shown.map((flight) =>
-      chart.element("circle", { class: "chart-dot", r: 4.5, style: `fill: ${chart.colour(flight.name)}` }, svg));
+      chart.element("circle", { class: "chart-dot", r: 4.5, style: `fill: ${chart.colour(flight)}` }, svg));
     return { ...scale, svg, cursor, dots, shown, value: label.includes("θ") ? (now) => (now.theta * 180) / Math.PI : (now) => now.omega };
   }
 
@@ -343,7 +343,7 @@
         row.dataset.solver = flight.name;
         const name = row.insertCell();
         name.className = "name";
-        name.append(chart.sample(flight.name), ` ${flight.name}`);
+        name.append(chart.sample(flight), ` ${flight.name}`);
         for (let k = 0; k < 4; k++) row.insertCell().className = "number";
         return row;
       }));
@@ -518,7 +518,7 @@
 
   // ---------------------------------------------------------------- beginning
 
-  root.querySelectorAll("label[data-solver]").forEach((label) => label.append(chart.sample(label.dataset.solver)));
+  root.querySelectorAll("label[data-solver]").forEach((label) => label.append(chart.sample({ name: label.dataset.solver })));
   const knowing = flights.find((flight) => flight.moments);
   find("impacts-of").value = (flights.find((flight) => flight.name === "free-flight" && flight.moments) ?? knowing ?? flights[0]).name;
   for (const name of ["previous-impact", "next-impact"]) find(name).disabled = !knowing;

@@ -16,22 +16,18 @@
     const svg = find("ride-omega"), canvas = find("ride-bottles"), slider = find("ride-time"), button = find("ride-play");
     const time = (k) => (k * data.duration) / (data.frames - 1);
     const high = flights.reduce((most, { omega }) => omega.reduce((a, b) => Math.max(a, b), most), 0) / data.omega0;
-    let scales = null, cursor = null, playing = 0;
-
-    function drawChart() {
-      scales = chart.draw(svg, 330, {
-        x: { low: 0, high: data.duration, label: "time t [s]" },
-        y: { low: 0, high: Math.min(3, Math.max(1, high)), label: "angular velocity ω / ω₀ [1]" },
-        right: 84,
-        lines: flights.map(({ name, omega }) => ({
-          name, label: names[name] ?? name, x: Array.from(omega, (_, k) => time(k)), y: Array.from(omega, (value) => value / data.omega0),
-        })),
-      });
-      cursor = chart.element("g", {}, svg);
-      chart.element("path", { class: "chart-cursor", d: `M0 ${scales.top}V${scales.bottom}` }, cursor);
-      for (const { name } of flights) chart.element("circle", { class: "chart-dot", r: 5, style: `fill: ${chart.colour(name)}` }, cursor);
-      show();
-    }
+    let playing = 0;
+    const touched = window.flipproofTouch.touch(svg, 330, {
+      x: { low: 0, high: data.duration, label: "time t [s]" },
+      y: { low: 0, high: Math.min(3, Math.max(1, high)), label: "angular velocity ω / ω₀ [1]" },
+      right: 84,
+      lines: flights.map(({ name, omega }) => ({
+        name, label: names[name] ?? name, x: Array.from(omega, (_, k) => time(k)), y: Array.from(omega, (value) => value / data.omega0),
+      })),
+    }, (at) => {
+      slider.value = String(Math.round((at / data.duration) * (data.frames - 1)));
+      tell();
+    });
 
     function drawBottles(k) {
       const width = canvas.clientWidth, height = 330, ratio = window.devicePixelRatio || 1;
@@ -64,27 +60,17 @@
       });
     }
 
-    function show() {
-      const k = Number(slider.value);
-      if (!scales) return;
-      cursor.firstChild.setAttribute("transform", `translate(${scales.x(time(k))} 0)`);
-      flights.forEach(({ omega }, j) => {
-        const at = Math.min(k, omega.length - 1), dot = cursor.children[j + 1];
-        dot.setAttribute("cx", scales.x(time(at)));
-        dot.setAttribute("cy", scales.y(omega[at] / data.omega0));
-      });
+    function tell() {
+      const k = Number(slider.value), said = `t = ${time(k).toFixed(3)} s`;
       drawBottles(k);
-      const said = `t = ${time(k).toFixed(3)} s`;
       find("ride-said").textContent = said;
       slider.setAttribute("aria-valuetext", said);
     }
+    function show() {
+      touched.put(time(Number(slider.value)));
+      tell();
+    }
     slider.addEventListener("input", show);
-    svg.addEventListener("pointermove", (event) => {
-      if (!scales || playing) return;
-      const share = (event.clientX - svg.getBoundingClientRect().left - scales.left) / (scales.right - scales.left);
-      slider.value = String(Math.round(share * (data.frames - 1)));
-      show();
-    });
     button.addEventListener("click", () => {
       if (playing) { cancelAnimationFrame(playing); playing = 0; button.textContent = "Play"; return; }
       if (slider.value === slider.max) slider.value = "0";
@@ -98,8 +84,8 @@
       playing = requestAnimationFrame(next);
     });
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", show);
-    chart.onWidth(svg, drawChart);
-    drawChart();
+    chart.onWidth(canvas, tell);
+    show();
   }
 
   function map() {

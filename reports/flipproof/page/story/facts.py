@@ -135,8 +135,8 @@ def degrees(value: float) -> str:
 
 
 def small(value: float) -> str:
-    """Return a fraction in percent, tiny ones as a bound of a power of ten."""
-    return percent(value) if value >= 1e-5 or value == 0.0 else f"{value:.0e}"
+    """Return a fraction in percent, a tiny one as a power of ten."""
+    return percent(value) if value >= 1e-5 or value == 0.0 else f"{100 * value:.0e} %"
 
 
 def story(content: Mapping[str, Any], tables: Mapping[str, str | None]) -> SimpleNamespace:
@@ -163,7 +163,7 @@ def story(content: Mapping[str, Any], tables: Mapping[str, str | None]) -> Simpl
 def _layers(summary: Summary, n: Mapping[str, Number | None]) -> list[Layer]:
     steps = summary.at("headlines/step/note") or "the steps"
     asked = (
-        ("step", "The time step", f"Does it matter that the program holds ω constant over each of its {steps}?",
+        ("step", "The time step", f"Does it matter that the program makes {steps} and holds ω constant over each?",
          "largest difference in ω between the program and its own equation solved exactly", "steps", "step"),
         ("program_eq8", "The algebra of Eq. 9", "Does the program solve the paper's own equation, Eq. 8?",
          "largest difference in ω between the program and Eq. 8 solved exactly", "errata", "program-eq8"),

@@ -1,0 +1,136 @@
+"""Plant single-line faults in all four packages and hold each against the tests of its folder.
+
+    python benchmarks/faults.py                # all of them
+    python benchmarks/faults.py flow scatter   # those whose file or fault contains a word
+
+Every fault is planted in a scratch copy of the checkout. The test files that look after the line run first, then all
+others of the folder but the long forms of studies, until one fails. A fault that no test catches is listed as SURVIVED.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+
+FAULTS = (
+    # file, the line's part that is sound, the fault, the tests that look after it (below tests/PACKAGE)
+    ("slicemodel/kernel/closed_form.py", "c = (k_squared - gamma * gamma) * b", "c = (k_squared + gamma * gamma) * b",
+     "test_kernel.py"),
+    ("slicemodel/kernel/flock.py", "u_u = way.push * u + (", "u_u = way.push * u - (", "test_flock.py"),
+    ("slicemodel/kernel/flock.py", "margin >= 0.0 and 0.0 <= way.b <= (1.0 + way.a_minus_1) * flock.horizon",
+     "margin >= 0.0", "test_flock.py"),
+    ("slicemodel/observables.py", "middle = (times[0] + times[-1]) / 2", "middle = times[-1] / 2",
+     "test_observables.py"),
+    ("slicemodel/observables.py", "left > 2 * rest_speed", "left > rest_speed", "test_observables.py"),
+    ("slicemodel/landing.py", "base, cap = motion.base[:, 1] - rim", "base, cap = motion.base[:, 1] + rim",
+     "test_observables_landing.py"),
+    ("slicemodel/landing.py", "cosine + swing * sine", "cosine - swing * sine", "test_table.py"),
+    ("slicemodel/schemes/published.py", "MATLAB_GRAVITY = 9.8", "MATLAB_GRAVITY = 9.81", "test_vectors.py"),
+    ("slicemodel/step_advice.py", "worst * SAFETY <= tolerance", "worst <= tolerance", "test_step_advice.py"),
+    ("slicemodel/scenario.py", "drag=self.drag * self.n_slices / int(n_slices)", "drag=self.drag", "test_scenario.py"),
+    ("ode_reference/flow/search.py", "if max(abs(u), abs(far)) > clear:", "if abs(far) > clear:", "test_flow.py"),
+    ("ode_reference/flow/search.py", "bend += k * (k - 1) * abs(", "bend += k * abs(", "test_flow.py"),
+    ("ode_reference/flow/laws.py", "* speed * ratio / (1.0 + ratio)", "* speed * ratio", "test_flow.py"),
+    ("ode_reference/contact.py", "float(loose.sum()) / (1.0 + mass_ratio * len(loose))", "float(loose.sum())",
+     "test_ode_free_flight.py"),
+    ("ode_reference/contact.py", "at_cap = free & (v < 0)", "at_cap = free & (v > 0)", "test_ode_events.py"),
+    ("ode_reference/energy.py", "weights = _WEIGHTS * (end - begin) / 2", "weights = _WEIGHTS * (end - begin)",
+     "test_ode_energy.py"),
+    ("ode_reference/column.py", "return self.water * h / 6 - self.reduced", "return self.water * h / 3 - self.reduced",
+     "test_column.py"),
+    ("ode_reference/landing_core/impulses.py", "abs(along) <= friction * normal", "abs(along) <= normal",
+     "test_coulomb.py"),
+    ("ode_reference/landing_core/motion.py", "side, turn = -2 * m * mean * rate1", "side, turn = -m * mean * rate1",
+     "test_landing.py"),
+    ("ode_reference/landing_core/motion.py", "(1.0 + world.e_water) * w[i]", "world.e_water * w[i]", "test_landing.py"),
+    ("engine_check/mujoco_impacts.py", "2.0 * u < (1.0 - self.restitution)", "2.0 * u < (1.0 + self.restitution)",
+     "test_mujoco_flight.py"),
+    ("engine_check/mujoco_impacts.py", "self.side * self.world.a < 0.0", "self.side * self.world.a > 0.0",
+     "test_mujoco_flight.py"),
+    ("engine_check/watch.py", "- launch_y + scenario.gravity * state.gravity_time",
+     "- launch_y - scenario.gravity * state.gravity_time", "test_engine_watch.py"),
+    ("engine_check/pymunk_rods.py", "np.max(scenario.slice_height - apart", "np.max(apart - scenario.slice_height",
+     "test_pymunk_exclude.py"),
+    ("engine_check/restitution.py", "measured=leaving / arriving", "measured=arriving / leaving",
+     "test_certificate.py"),
+    ("engine_check/refinement.py", "beyond = ~(found < limit)", "beyond = found > limit", "test_certificate.py"),
+    ("engine_check/refinement.py", "horizon=min(verdict.horizon, before)", "horizon=verdict.horizon",
+     "test_certificate.py"),
+    ("reports/flipproof/landing/scatter.py", "z / (4 * throws * throws)", "z / (4 * throws)", "test_landing_study.py"),
+    ("reports/flipproof/landing/scatter.py", "math.hypot(self.value - low, other_high - other.value)",
+     "math.hypot(self.value - low, other.value - other_low)", "test_landing_study.py"),
+    ("reports/flipproof/chapters/agreement/study.py", "if len(alone) == 1 else None", "if alone else None",
+     "test_agreement.py"),
+    ("reports/flipproof/chapters/step_size/study.py", "y = 0.5 * np.log(", "y = np.log(", "test_studies.py"),
+    ("reports/flipproof/chapters/differences/study.py", 'parting, side="right"', 'parting, side="left"',
+     "test_studies.py"),
+    ("reports/flipproof/chapters/waterfall/study.py", "math.factorial(n - size - 1)", "math.factorial(n - size)",
+     "test_waterfall.py"),
+    ("reports/flipproof/chapters/alignment/tube.py", "(inside[:-1] ^ inside[1:]) / 2", "(inside[:-1] ^ inside[1:])",
+     "test_tube.py"),
+    ("reports/flipproof/chapters/model_form/richardson.py", "_order_of_three(h[:3], f[:3]), 1.25",
+     "_order_of_three(h[:3], f[:3]), 3.0", "test_model_form.py"),
+    ("reports/flipproof/chapters/stability/study.py", "if not error <= GOOD:", "if error > GOOD:", "test_stability.py"),
+    ("reports/flipproof/film/tracker/smoothing.py", "np.sqrt(1 - own[usable])", "(1 - own[usable])",
+     "tracker/test_tracker_kinematics.py"),
+    ("reports/flipproof/film/fit/uncertainty.py", "middle + np.sqrt(estimate.roughness)", "middle + estimate.roughness",
+     "test_fit.py"),
+    ("reports/flipproof/page/motion.py", "- 0.5 * scenario.gravity", "- scenario.gravity", "test_motion.py"),
+    ("reports/flipproof/sweep/run.py", "(points[:middle], points[middle:])", "(points[:middle], points[middle + 1 :])",
+     "test_sweep_run.py"),
+    ("reports/flipproof/check/diff.py", "return sum(abs(band) for band in known",
+     "return max(abs(band) for band in known", "test_diff.py"),
+    ("reports/flipproof/foreign/checks_order.py", "holds=abs(order - traits.order) <= WIDTH",
+     "holds=order - traits.order <= WIDTH", "foreign/test_certify.py"),
+    ("reports/flipproof/frame/keys.py", '"settings": dict(run.settings)}', '"settings": {}}', "test_run_store.py"),
+)  # fmt: skip
+
+
+def scratch(place: Path) -> Path:
+    """Copy what git knows of the checkout."""
+    names = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    for name in filter(None, names.split("\0")):
+        (place / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, place / name)
+    return place
+
+
+def first_failure(copy: Path, package: str, near: str) -> str:
+    """Return the name of the first test that fails, those of ``near`` before the others; "" if none does."""
+    path = os.pathsep.join([str(copy), str(copy / "reports")])
+    folder = f"tests/{package}"
+    for where in ([f"{folder}/{near}"], [folder, f"--ignore={folder}/{near}"]):
+        command = [sys.executable, "-m", "pytest", "-q", "-x", "-m", "not slow", "-p", "no:cacheprovider", *where]
+        done = subprocess.run(command, cwd=copy, env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True)
+        if done.returncode != 0:
+            named = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+            return named[0].partition(" - ")[0] if named else f"pytest ended with status {done.returncode}"
+    return ""
+
+
+def main(words: list[str]) -> int:
+    """Plant every fault, print a line for each; return how many survived."""
+    survived = 0
+    with tempfile.TemporaryDirectory(prefix="faults-") as place:
+        copy = scratch(Path(place))
+        for file, sound, fault, near in FAULTS:
+            if words and not any(word in f"{file} {fault}" for word in words):
+                continue
+            text = (copy / file).read_text(encoding="utf-8")
+            assert text.count(sound) == 1, f"{file}: {sound!r} stands there {text.count(sound)} times"
+            (copy / file).write_text(text.replace(sound, fault), encoding="utf-8")
+            caught = first_failure(copy, file.partition("/")[0], near)
+            (copy / file).write_text(text, encoding="utf-8")
+            survived += not caught
+            print(f"{caught or 'SURVIVED'} | {file}: {sound} -> {fault}", flush=True)
+    return survived
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,95 @@
+"""From a guest to free flight: the difference split over the assumptions that the guest's equation still makes.
+
+    plateau of free flight - plateau of the guest = sum of fair shares + rest
+
+A fair share is the mean over all orders of mending the assumptions (``foreign.explain``). The rest is the plateau of
+the guest's equation minus that of the guest: its own error, and what is no assumption of the ladder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields, replace
+from itertools import product
+from typing import Any
+
+from flipproof.chapters.waterfall.study import equation_run
+from flipproof.foreign.certify import Certificate
+from flipproof.foreign.contract import Traits
+from flipproof.foreign.explain import shares_of
+from flipproof.foreign.place import name_of, switches_of
+from flipproof.frame.chapter import Flights, Missing, Run
+from ode_reference.switches import Switches
+from slicemodel import Scenario, Trajectory
+from slicemodel.observables import plateau
+
+FREE = Switches(*[True] * len(fields(Switches)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Split:
+    """How a guest's plateau becomes that of free flight; ``bars`` maps a switch to its fair share."""
+
+    equation: str
+    start: float
+    end: float
+    bars: Mapping[str, float]
+
+    @property
+    def rest(self) -> float:
+        """What no assumption of the ladder explains."""
+        return self.end - self.start - sum(self.bars.values())
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the split as JSON-ready data."""
+        parts = {"bars": dict(self.bars), "rest": self.rest}
+        return {"equation": self.equation, "guest": self.start, "free-flight": self.end, **parts}
+
+
+def switches_made(traits: Traits | None, certificate: Certificate | None, nearest: str | None) -> Switches | None:
+    """Return the switches of the equation that a guest declares, else of its place, else of the ``nearest`` rung.
+
+    None if nothing is known of it, or if what it declares converges to no equation of the ladder.
+    """
+    if traits is not None and traits.equation is not None:
+        try:
+            return switches_of(traits.equation)
+        except ValueError:
+            return None
+    results = () if certificate is None else certificate.results
+    places = [r.found.facts["place"] for r in results if r.found is not None and "place" in r.found.facts]
+    if places:
+        return Switches.from_name(places[0]["switches"])
+    return None if nearest is None else switches_of(nearest)
+
+
+def sets_to_free(start: Switches) -> tuple[Switches, ...]:
+    """Return every set of assumptions on the way from ``start`` to free flight, in any order."""
+    off = [field.name for field in fields(Switches) if not getattr(start, field.name)]
+    return tuple(replace(start, **dict(zip(off, on, strict=True))) for on in product((False, True), repeat=len(off)))
+
+
+def plan_splits(starts: Iterable[Switches], throw: Scenario) -> list[Run]:
+    """Return the runs that the splits need; those of the waterfall of the same throw are among them."""
+    return list(dict.fromkeys(equation_run(throw, each) for start in starts for each in sets_to_free(start)))
+
+
+def split(run: Trajectory, start: Switches, flights: Flights) -> Split:
+    """Split the difference between a guest's run and free flight on the same throw.
+
+    Raises
+    ------
+    Missing
+        If a run is not whole.
+    """
+
+    def read(trajectory: Trajectory) -> float:
+        return plateau(trajectory.t, trajectory.omega, trajectory.scenario.omega0)
+
+    def value(switches: Switches) -> float:
+        return read(flights[equation_run(run.scenario, switches)].whole)
+
+    if len(run.t) < 2 or run.t[-1] < run.scenario.duration:
+        raise Missing("the guest's run does not reach the end of the flight")
+    bars = shares_of(start, FREE, value)
+    return Split(equation=name_of(start), start=read(run), end=value(FREE), bars=bars)

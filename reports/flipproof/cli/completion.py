@@ -1,0 +1,119 @@
+"""The command ``flipproof completion``: a script for bash or zsh that completes commands, options and solvers.
+
+The script is made from the parser, so that it knows what the parser knows; it starts no Python at a key stroke.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from collections.abc import Iterator
+from typing import Any, Final
+
+from flipproof.cli.arguments import add_command
+
+SHELLS: Final = ("bash", "zsh")
+
+SOLVERS: Final = frozenset({"solver", "solvers", "model", "guests", "spec", "first", "second"})
+"""Arguments that name solvers."""
+
+HEAD: Final = """\
+# Completion for flipproof. Now: eval "$(flipproof completion {shell})"; for good: put that line into {file}.
+{prefix}_flipproof() {{
+    local word=${{COMP_WORDS[COMP_CWORD]}} before=${{COMP_WORDS[COMP_CWORD-1]}} command=${{COMP_WORDS[1]}} words=""
+    COMPREPLY=()
+    if [ "$COMP_CWORD" -eq 1 ]; then
+        COMPREPLY=($(compgen -W {commands} -- "$word"))
+        return
+    fi
+    case "$command $before" in
+"""
+
+TAIL: Final = """\
+    esac
+    COMPREPLY=($(compgen -W "$words" -- "$word"))
+}
+complete -o default -F _flipproof flipproof
+"""
+
+ZSH: Final = """\
+whence compdef > /dev/null || { autoload -U +X compinit && compinit; }
+autoload -U +X bashcompinit && bashcompinit
+"""
+"""What zsh needs to take a script for bash."""
+
+FILES: Final = {"bash": "~/.bashrc", "zsh": "~/.zshrc"}
+
+
+def add_completion(commands: Any) -> None:
+    """Add the command."""
+    command = add_command(
+        commands, "completion", "Print a script that completes commands, options and solvers.", command_completion
+    )
+    command.add_argument("shell", choices=SHELLS, help='whose; then: eval "$(flipproof completion bash)"')
+
+
+def command_completion(options: argparse.Namespace) -> int:
+    """Print the script."""
+    from flipproof.cli.main import parser
+    from flipproof.frame.solvers import catalogue
+
+    print(script(options.shell, parser(), list(catalogue())), end="")
+    return 0
+
+
+def script(shell: str, top: argparse.ArgumentParser, solvers: list[str]) -> str:
+    """Return the script for a shell; a file's name is completed where there are no words."""
+    commands = _commands(top)
+    prefix = ZSH if shell == "zsh" else ""
+    head = HEAD.format(
+        shell=shell, file=FILES[shell], prefix=prefix, commands=shlex.quote(" ".join([*commands, *_options(top)]))
+    )
+    lines = [line for name, command in commands.items() for line in _values(name, command, solvers)]
+    lines += ["    esac", '    case "$command $word" in']
+    lines += [
+        f'        "{name} -"*) words={shlex.quote(" ".join(_options(each)))} ;;' for name, each in commands.items()
+    ]
+    for name, command in commands.items():
+        words = [word for action in _positionals(command) for word in _words(action, solvers)]
+        if words:
+            lines.append(f'        "{name} "*) words={shlex.quote(" ".join(dict.fromkeys(words)))} ;;')
+    return head + "\n".join(lines) + "\n" + TAIL
+
+
+def _commands(top: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    """Return the parser of every command by its name."""
+    (found,) = (action for action in top._actions if isinstance(action, argparse._SubParsersAction))
+    return dict(found.choices)
+
+
+def _options(parser: argparse.ArgumentParser) -> list[str]:
+    """Return the long options of a parser."""
+    return [word for action in parser._actions for word in action.option_strings if word.startswith("--")]
+
+
+def _positionals(parser: argparse.ArgumentParser) -> list[argparse.Action]:
+    return [action for action in parser._actions if not action.option_strings]
+
+
+def _values(name: str, command: argparse.ArgumentParser, solvers: list[str]) -> Iterator[str]:
+    """Yield a line for all options that take a file or a number, and one for every option that takes a word."""
+    free: list[str] = []
+    for action in command._actions:
+        if action.option_strings and action.nargs != 0:
+            cases = [f'"{name} {option}"' for option in action.option_strings]
+            words = _words(action, solvers)
+            if words:
+                quoted = shlex.quote(" ".join(words))
+                yield f'        {"|".join(cases)}) COMPREPLY=($(compgen -W {quoted} -- "$word")); return ;;'
+            else:
+                free += cases
+    if free:
+        yield f"        {'|'.join(free)}) return ;;"
+
+
+def _words(action: argparse.Action, solvers: list[str]) -> list[str]:
+    """Return what may stand for an argument, as far as that is a word."""
+    if action.choices is not None:
+        return [str(choice) for choice in action.choices]
+    return solvers if action.dest in SOLVERS else []

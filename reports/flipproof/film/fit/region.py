@@ -1,0 +1,161 @@
+"""What the data leave possible: the region of parameters whose chi^2 exceeds the lowest by little, evenly filled.
+
+Kinks and jumps of chi^2 make its curvature at the minimum a poor guide to how far the data allow a parameter to go, and
+side minima too narrow for a grid lie within that reach. So a box along the principal axes of the best points is filled
+evenly (Halton's sequence) and drawn anew around what is low enough, until it holds all of that and little more. Points
+of the last box stand for the same volume each: weighed by exp(-chi^2 / 2T) they are the posterior under a flat prior,
+and the farthest of them below a bound of chi^2 are the ends of a profile likelihood.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipproof.film.fit.landscape import Landscape, loss
+from slicemodel.trajectory import FloatArray
+
+BOXES: Final = 40
+"""Boxes at the most."""
+
+FEWEST: Final = 12
+"""Points for each parameter that a box is drawn around at the least."""
+
+MARGIN: Final = 0.15
+"""By what share of its extent a box reaches beyond the points that it is drawn around, on either side."""
+
+Draws = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Points:
+    """Points of the landscape that were flown.
+
+    Parameters
+    ----------
+    x : (S, K) - coordinates
+    rows : (S, P) - residuals at each
+    chi2 : (S,) - Huber's loss of each
+    """
+
+    x: FloatArray
+    rows: FloatArray
+    chi2: FloatArray
+
+    @classmethod
+    def flown(cls, land: Landscape, x: FloatArray) -> Points:
+        """Fly at the coordinates ``x``."""
+        rows = land.residuals(x)
+        return cls(x=x, rows=rows, chi2=loss(rows))
+
+    def with_more(self, other: Points) -> Points:
+        """Return these points and those of ``other``."""
+        names = ("x", "rows", "chi2")
+        return Points(**{name: np.concatenate((getattr(self, name), getattr(other, name))) for name in names})
+
+    def below(self, level: float, fewest: int, first: int = 0) -> Points:
+        """Return the points from ``first`` on of chi^2 up to ``level``, and at least the ``fewest`` lowest of them."""
+        x, rows, chi2 = self.x[first:], self.rows[first:], self.chi2[first:]
+        low = chi2 <= max(level, np.sort(chi2)[min(fewest, len(chi2)) - 1])
+        return Points(x=x[low], rows=rows[low], chi2=chi2[low])
+
+    def drawn(self, temperature: float, count: int) -> Draws:
+        """Return indices of ``count`` points, each as often as exp(-chi^2 / 2T) says (systematic resampling)."""
+        weights = np.exp(-0.5 * (self.chi2 - self.chi2.min()) / temperature)
+        ladder = (np.arange(count) + 0.5) / count
+        return np.minimum(np.searchsorted(np.cumsum(weights) / weights.sum(), ladder), len(weights) - 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A box along the principal axes of some points: ``centre + axes @ u`` with u from ``low`` to ``high``."""
+
+    centre: FloatArray
+    axes: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+    @classmethod
+    def around(cls, x: FloatArray, least: FloatArray) -> Box:
+        """Return the box around points (S, K), whose standard deviations count as ``least`` (K,) or more."""
+        centre = np.asarray(x.mean(axis=0), dtype=np.float64)
+        axes = np.asarray(np.linalg.cholesky(np.cov(x.T) + np.diag(least**2)), dtype=np.float64)
+        low, high = _extent(centre, axes, x)
+        reach = MARGIN * (high - low)
+        return cls(centre, axes, low - reach, high + reach)
+
+    def at(self, shares: FloatArray) -> FloatArray:
+        """Return coordinates at shares (S, K) of the box, from 0 to 1."""
+        return np.asarray(self.centre + (self.low + (self.high - self.low) * shares) @ self.axes.T)
+
+    def fits(self, x: FloatArray) -> bool:
+        """Return whether points (S, K) lie inside and reach over half of every edge."""
+        low, high = _extent(self.centre, self.axes, x)
+        edge = self.high - self.low
+        inside = (low >= self.low + 0.02 * edge) & (high <= self.high - 0.02 * edge)
+        return bool((inside & (high - low >= 0.5 * edge)).all())
+
+
+def _extent(centre: FloatArray, axes: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    u = np.linalg.solve(axes, (x - centre).T)
+    return np.asarray(u.min(axis=1)), np.asarray(u.max(axis=1))
+
+
+def explored(land: Landscape, seeds: Points, within: float, count: int) -> Points:
+    """Return points spread evenly over where chi^2 exceeds its lowest value by at most ``within``.
+
+    Parameters
+    ----------
+    seeds : Points - to begin with
+    count : int - points at the least
+    """
+    from scipy.stats.qmc import Halton
+
+    dimensions = len(land.low)
+    sequence, least = Halton(dimensions, scramble=False), 1e-12 * (land.high - land.low)
+    fewest = FEWEST * dimensions
+    pool, box, first = seeds, None, 0
+    for _ in range(BOXES):
+        level = float(pool.chi2.min()) + within
+        near = pool.below(level, fewest).x
+        if box is None or not box.fits(near):
+            box, first = Box.around(near, least), len(pool.x)
+        elif (pool.chi2[first:] <= level).sum() >= count:
+            break
+        x = box.at(sequence.random(count))
+        pool = pool.with_more(Points.flown(land, x[((x >= land.low) & (x <= land.high)).all(axis=1)]))
+    return pool.below(float(pool.chi2.min()) + within, fewest, first)
+
+
+def roughness(region: Points, variance: float, seed: int, draws: int = 400) -> float:
+    """Return by what factor a fit on this landscape lowers chi^2 more than one on a smooth one, at least 1.
+
+    A fit of K parameters on a smooth landscape lowers the chi^2 of the truth by K on average; one that may choose among
+    facets lowers it by more, and the likelihood ratio that bounds an interval has to grow alike (Bartlett's
+    correction). Found by simulation: points of the region in turn are the truth, noise is drawn anew, and the lowest
+    chi^2 among all flown points is looked up, once with what was flown there and once with the plane through it; no
+    flight is made.
+
+    Parameters
+    ----------
+    variance : float - of the noise in units of the residuals'
+    draws : int - simulated measurements
+    """
+    rng = np.random.default_rng(seed)
+    plane = np.column_stack((np.ones(len(region.x)), region.x - region.x.mean(axis=0)))
+    smooth = plane @ np.linalg.lstsq(plane, region.rows, rcond=None)[0]
+    truths = region.drawn(variance, draws)
+    noise = np.sqrt(variance) * rng.normal(size=(draws, region.rows.shape[1]))
+    rough, even = (_fall(rows, truths, noise) for rows in (region.rows, smooth))
+    return max(1.0, rough / even) if even > 0 else 1.0
+
+
+def _fall(rows: FloatArray, truths: Draws, noise: FloatArray) -> float:
+    """Return by how much the lowest of all ``rows`` is below the truth's on average when noise is added to a truth."""
+    true = rows[truths]
+    apart = (true**2).sum(axis=1)[:, None] - 2.0 * true @ rows.T + (rows**2).sum(axis=1)
+    along = noise @ rows.T - (noise * true).sum(axis=1)[:, None]
+    return float(-np.min(apart + 2.0 * along, axis=1).mean())

@@ -1,0 +1,70 @@
+"""Mathematics of the page: plain text with its signs, and equations of motion as MathML."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Final
+
+from markupsafe import Markup, escape
+
+SYMBOLS: Final = {
+    "omega_0": "ω₀", "omega0": "ω₀", "omega": "ω", "theta": "θ", "gamma": "γ", "alpha": "α", "epsilon": "ε",
+    "dt -> 0": "Δt → 0", "sum_free ": "Σ_free ", "beta = -": "β = −", "sqrt(": "√(", "^2": "²", " +- ": " ± ",
+    "<<": "≪", " - ": " − ", "-gamma": "−γ",
+}  # fmt: skip
+
+
+def typeset(text: str) -> str:
+    """Return plain-text mathematics with Greek letters and signs; the command line prints it as it is."""
+    pattern = "|".join(re.escape(word) for word in sorted(SYMBOLS, key=len, reverse=True))
+    return re.sub(pattern, lambda match: SYMBOLS[match.group()], text)
+
+
+FORMULA: Final = re.compile(r"^[a-z]\w*'* = [^:,]*")
+"""What begins like v' = or r_i'' =, up to a colon or comma; words follow."""
+
+TOKEN: Final = re.compile(
+    r"\((?P<above>\w+)/(?P<below>\w+)\)|(?P<base>[A-Za-z]+)(?P<first>'*)(?:_(?P<sub>[A-Za-z]+))?(?P<last>'*)"
+    r"(?:\^(?P<power>\d))?|(?P<number>\d+)|(?P<sign>[-+=/()])"
+)
+GREEK: Final = {"omega": "ω", "gamma": "γ", "alpha": "α", "theta": "θ", "sum": "\N{N-ARY SUMMATION}"}
+DOTS: Final = {"'": "˙", "''": "¨"}
+"""Primes are derivatives with respect to time."""
+
+
+def equation(text: str) -> Markup:
+    """Return an equation of motion with its formula as MathML; words stay words."""
+    found = FORMULA.match(text)
+    if found is None:
+        return Markup("{}").format(typeset(text))
+    formula = Markup("").join(_row(found.group()))
+    return Markup("<math>{}</math>{}").format(formula, typeset(text[found.end() :]))
+
+
+def _row(formula: str) -> Iterator[Markup]:
+    for token in TOKEN.finditer(formula):
+        if token["above"]:
+            yield Markup("<mfrac>{}{}</mfrac>").format(_name(token["above"]), _name(token["below"]))
+        elif token["number"]:
+            yield Markup("<mn>{}</mn>").format(token["number"])
+        elif token["sign"]:
+            yield Markup('<mo stretchy="false">{}</mo>').format(token["sign"].replace("-", "−"))
+        else:
+            yield _symbol(token["base"], token["sub"], (token["first"] or "") + (token["last"] or ""), token["power"])
+
+
+def _name(word: str) -> Markup:
+    base, _, sub = word.partition("_")
+    return _symbol(base, sub or None, "", None)
+
+
+def _symbol(base: str, sub: str | None, primes: str, power: str | None) -> Markup:
+    tag = "mo" if base == "sum" else "mi"
+    made = Markup("<{0}>{1}</{0}>").format(tag, GREEK.get(base, base))
+    if primes:
+        made = Markup("<mover>{}<mo>{}</mo></mover>").format(made, DOTS[primes])
+    if sub:
+        kind = "mi" if len(sub) == 1 else "mtext"
+        made = Markup("<msub>{0}<{1}>{2}</{1}></msub>").format(made, kind, escape(sub))
+    return made if power is None else Markup("<msup>{}<mn>{}</mn></msup>").format(made, power)

@@ -1,0 +1,188 @@
+"""What section 5 says of drag (Fig. 6)."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from itertools import pairwise
+from typing import Final
+
+from flipproof.paper.claim import FLAT_WHY, SUPERIMPOSED_WHY, states
+from flipproof.paper.claims_slices import AT_LEAST_FLAT, flat_plateau
+from flipproof.paper.observe import (
+    SUPERIMPOSED,
+    Flights,
+    climb,
+    distance,
+    drop_time,
+    largest_share_near_cap,
+    late_rise,
+    normalised,
+)
+from flipproof.paper.parameters import numbers
+from flipproof.paper.statements import OMEGA, Reading
+
+SUDDEN: Final = 0.25
+"""Share of the flight within which a sudden drop is half done."""
+
+STRONG_DRAG: Final = 0.0125
+GOOD_DRAG: Final = 0.01
+NEXT_DRAGS: Final = (0.0075, 0.0125)
+"""The values that the paper names on either side of the one it settles on [kg/s]."""
+
+HALF: Final = 0.5
+HALF_DRAG: Final = "half full, β = −0.5, α as named (Fig. 6)"
+
+
+def strong_drags() -> list[float]:
+    """Return the drags of Fig. 6 that count as strong [kg/s]."""
+    return [drag for drag in numbers("figure-6-drag") if drag >= STRONG_DRAG]
+
+
+@states(
+    "alpha-sensitive",
+    place="section 5, Fig. 6",
+    says="The outcome is highly sensitive to α.",
+    means="The curves for α = 0.0075 and for 0.0125, a quarter less and more than the settled 0.01, are both "
+    "farther than 0.05 ω₀ (root mean square) from it.",
+    throw=HALF_DRAG,
+    why=SUPERIMPOSED_WHY,
+)
+def _sensitive_to_drag(flights: Flights) -> tuple[Reading, ...]:
+    settled = flights.at("drag", GOOD_DRAG)
+    off = {drag: distance(flights.at("drag", drag), settled) for drag in NEXT_DRAGS}
+    least = min(off, key=lambda drag: off[drag])
+    return (
+        Reading(
+            name="distance of the curves for α = 0.0075 and 0.0125 from that for 0.01, the smaller",
+            value=off[least],
+            unit=OMEGA,
+            admissible=(SUPERIMPOSED, math.inf),
+            note=", ".join(f"{value:.3f} for {drag:g}" for drag, value in off.items()),
+        ),
+    )
+
+
+@states(
+    "strong-drag-impedes",
+    place="section 5, Fig. 6a",
+    says="For α ≥ 0.0125 drag keeps water from spreading over the whole bottle.",
+    means="At most half as much water as for α = 0 is ever in the cap's half of the bottle at once.",
+    throw=HALF_DRAG,
+    why="Half is a choice of ours for “impeded”.",
+)
+def _strong_drag_impedes(flights: Flights) -> tuple[Reading, ...]:
+    free = largest_share_near_cap(flights.at("drag", 0.0))
+    return tuple(
+        Reading(
+            name=f"most water in the cap's half at once for α = {drag:g}, by that for α = 0",
+            value=largest_share_near_cap(flights.at("drag", drag)) / free,
+            unit="",
+            admissible=(-math.inf, HALF),
+            note=f"{100 * free:.0f} % of the water for α = 0",
+        )
+        for drag in strong_drags()
+    )
+
+
+def _angle_grows_again_with_drag(flights: Flights) -> tuple[Reading, ...]:
+    turned = {case.value: math.degrees(float(run.theta[-1])) for case, run in flights.members("drag")}
+    rising = [turned[b] - turned[a] for a, b in pairwise(sorted(turned)) if b >= STRONG_DRAG]
+    note = ", ".join(f"{angle:.0f}° for {drag:g}" for drag, angle in turned.items())
+    return (
+        Reading(name="θ(T) for α = 0 minus that for 0.01", value=turned[0.0] - turned[GOOD_DRAG], unit="°",
+                admissible=(0.0, math.inf), note=note),
+        Reading(name="growth of θ(T) from one α to the next from 0.0125 on, the least", value=min(rising), unit="°",
+                admissible=(0.0, math.inf)),
+    )  # fmt: skip
+
+
+def _strong_drag_turns_back(flights: Flights) -> tuple[Reading, ...]:
+    lowest = {drag: float(normalised(flights.at("drag", drag)).min()) for drag in strong_drags()}
+    drag = min(lowest, key=lambda each: lowest[each])
+    return (
+        Reading(
+            name="lowest ω",
+            value=lowest[drag],
+            unit=OMEGA,
+            admissible=(-math.inf, 0.0),
+            note=f"for α = {drag:g}; Eq. 12 keeps the sign of ω, so that θ can never turn back",
+        ),
+    )
+
+
+def _strong_drag_oscillates(flights: Flights) -> tuple[Reading, ...]:
+    return tuple(
+        Reading(
+            name=f"largest climb over the lowest ω until then, α = {drag:g}",
+            value=climb(flights.at("drag", drag)),
+            unit=OMEGA,
+            admissible=AT_LEAST_FLAT,
+        )
+        for drag in strong_drags()
+    )
+
+
+_oscillates: Final = states(
+    "strong-drag-oscillates",
+    place="section 5, Fig. 6c",
+    says="For α ≥ 0.0125 ω oscillates.",
+    means="ω climbs by 0.1 ω₀ or more over its lowest value until then.",
+    throw=HALF_DRAG,
+    why=FLAT_WHY,
+)(_strong_drag_oscillates)
+
+_turns_back: Final = states(
+    "strong-drag-turns-back",
+    place="section 5, Fig. 6b",
+    says="For α ≥ 0.0125 θ varies non-monotonically.",
+    means="The slope of θ(t), which is ω, falls and rises again by 0.1 ω₀ or more. θ itself cannot turn back: by "
+    "Eq. 12 ω keeps its sign. This sense rests on the number of the next statement.",
+    throw=HALF_DRAG,
+    why=FLAT_WHY,
+    otherwise={
+        "as θ(T) over α, which falls up to 0.01 and grows from 0.0125 on": _angle_grows_again_with_drag,
+        "by the letter, as θ(t) turning back": _strong_drag_turns_back,
+    },
+)(_strong_drag_oscillates)
+
+
+@states(
+    "no-drag-rises",
+    place="section 5, Fig. 6",
+    says="For α = 0 ω increases late.",
+    means="ω over the last tenth of the flight lies at least 0.1 ω₀ over the plateau.",
+    throw=HALF_DRAG,
+    why=FLAT_WHY,
+)
+def _no_drag_rises_late(flights: Flights) -> tuple[Reading, ...]:
+    rise = late_rise(flights.at("drag", 0.0))
+    return (Reading(name="late rise over the plateau for α = 0", value=rise, unit=OMEGA, admissible=AT_LEAST_FLAT),)
+
+
+def _moderate_drag_is_flat(flights: Flights, drag: float) -> tuple[Reading, ...]:
+    run = flights.at("drag", drag)
+    return (
+        *flat_plateau(run),
+        Reading(name="time to half the drop", value=drop_time(run), unit="of T", admissible=(-math.inf, SUDDEN)),
+    )
+
+
+MODERATE: Final = tuple(
+    states(
+        f"moderate-drag-flat-{drag:g}",
+        place="section 5, Fig. 6c",
+        says=f"For α from 0.0075 to 0.01 ω drops suddenly to a flat plateau: at α = {drag:g}.",
+        means="Half the drop is done by T/4, the last tenth of the flight lies at most 0.1 ω₀ over the plateau, "
+        "and ω never climbs by more than 0.1 ω₀ over its lowest value until then.",
+        throw=HALF_DRAG,
+        why=f"A quarter of the flight is a choice of ours for “sudden”. {FLAT_WHY}",
+    )(partial(_moderate_drag_is_flat, drag=drag))
+    for drag in (0.0075, 0.01)
+)
+
+
+OF_DRAG: Final = (
+    _sensitive_to_drag, _strong_drag_impedes, _turns_back, _oscillates, _no_drag_rises_late, *MODERATE,
+)  # fmt: skip
+"""Statements on Fig. 6, in the order of the paper."""

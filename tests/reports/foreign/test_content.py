@@ -1,0 +1,179 @@
+"""The content of a foreign solver: rows of a sweep by its old files are never mixed with rows by its new ones."""
+
+import sqlite3
+import sys
+from contextlib import closing
+
+import pytest
+
+from flipproof.foreign.content import content_of
+from flipproof.frame.solvers import solve
+from flipproof.sweep.command import sweep
+from flipproof.sweep.design import read_design
+from flipproof.sweep.errors import SweepError
+from flipproof.sweep.store import Store
+from flipproof.sweep.work import code_identity, make_batch
+from slicemodel import Scenario
+
+SPIN = """
+import numpy as np
+import spins
+
+def solve(ask):
+    omega = np.full(len(ask.times), spins.SPIN)
+    return {"t": ask.times, "theta": omega * ask.times, "omega": omega}
+"""
+SWEEP = """
+[scenario]
+duration = 0.02
+n_slices = 3
+[sweep]
+design = "grid"
+[sweep.fields]
+omega0 = [18.0, 19.0, 20.0]
+[[solvers]]
+name = "eq8"
+[[solvers]]
+name = "{spec}"
+"""
+
+
+@pytest.fixture
+def mine(tmp_path):
+    (tmp_path / "spins.py").write_text("SPIN = 7.0\n")
+    (tmp_path / "mine.py").write_text(SPIN)
+    (tmp_path / "sweep.toml").write_text(SWEEP.format(spec=f"{tmp_path / 'mine.py'}:solve"))
+    return tmp_path
+
+
+def swept(folder):
+    return sweep(folder / "sweep.toml", folder / "out", lambda *_: lambda *_: None, jobs=1)
+
+
+def rows(folder):
+    with closing(sqlite3.connect(folder / "out" / "sweep.sqlite")) as connection:
+        return connection.execute("SELECT number, omega_end, status FROM points ORDER BY number").fetchall()
+
+
+def drop(folder, number):
+    with closing(sqlite3.connect(folder / "out" / "sweep.sqlite")) as connection:
+        connection.execute("DELETE FROM points WHERE number = ?", (number,))
+        connection.commit()
+
+
+def test_a_sweep_goes_on_with_the_files_it_was_begun_with_and_no_others(mine):
+    assert "6 ok" in swept(mine)
+    before = rows(mine)
+    assert [omega for _, omega, _ in before][3:] == [7.0] * 3
+    drop(mine, 5)
+    for file, other in (("mine.py", SPIN + "\n# faster\n"), ("spins.py", "SPIN = 8.0\n")):
+        old = (mine / file).read_text()
+        (mine / file).write_text(other)
+        with pytest.raises(SweepError, match=r"was begun with other code of .*mine\.py:solve; go on with") as caught:
+            swept(mine)
+        assert "\n" not in str(caught.value)
+        assert rows(mine) == before[:5]
+        (mine / file).write_text(old)
+    assert "5 were there" in swept(mine)
+    assert rows(mine) == before
+
+
+def test_no_row_of_the_old_files_is_saved_for_the_new_ones(mine):
+    swept(mine)
+    (mine / "spins.py").write_text("SPIN = 8.0\n")
+    out = mine / "other"
+    words = sweep(mine / "sweep.toml", out, lambda *_: lambda *_: None, damaged=mine / "out")
+    assert words.startswith("3 of 6 points")  # those of eq8
+    with Store(out, read_design(mine / "sweep.toml"), code_identity()) as store:
+        assert list(store.done()) == [1, 1, 1, 0, 0, 0]
+
+
+def test_a_worker_whose_file_is_another_makes_nothing(mine):
+    design = read_design(mine / "sweep.toml")
+    points = [design.point(number) for number in (3, 4)]
+    batch = make_batch(code_identity(), points, False)
+    assert [one.omega_end for one in batch.outcomes] == [7.0, 7.0]
+    (mine / "spins.py").write_text("SPIN = 8.0\n")
+    batch = make_batch(code_identity(), points, False)
+    assert not batch.outcomes
+    assert batch.changed.endswith("mine.py:solve")
+    (mine / "mine.py").unlink()
+    assert make_batch(code_identity(), points, False).changed == batch.changed
+
+
+def test_a_file_that_changes_during_a_sweep_ends_it_in_one_line(mine):
+    # The solver changes its own file at the second point.
+    text = SPIN.replace("def solve(ask):\n", "def solve(ask):\n    change(ask)\n") + (
+        "\nfrom pathlib import Path\n"
+        "def change(ask):\n"
+        "    if ask.scenario.omega0 == 19.0:\n"
+        "        Path(__file__).with_name('spins.py').write_text('SPIN = 8.0\\n')\n"
+    )
+    (mine / "mine.py").write_text(text)
+    with pytest.raises(SweepError, match="are not those that the sweep was begun with"):
+        swept(mine)
+    assert {omega for number, omega, _ in rows(mine) if number >= 3} <= {7.0}
+    assert 4 not in [number for number, *_ in rows(mine)]
+
+
+def test_a_changed_file_is_loaded_again_in_a_program_that_goes_on(mine):
+    throw, spec = Scenario(n_slices=3, duration=0.02), f"{mine / 'mine.py'}:solve"
+    assert solve(spec, throw).omega[-1] == 7.0
+    (mine / "spins.py").write_text("SPIN = 8.5\n")
+    assert solve(spec, throw).omega[-1] == 8.5
+
+
+def test_what_counts_as_the_content_of_each_kind_of_spec(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folder = tmp_path / "packed"
+    folder.mkdir()
+    files = {
+        "mine.py": "import near\nfrom packed import inner\n",
+        "near.py": "import far\n",
+        "far.py": "import near\n",
+        "packed/__init__.py": "",
+        "packed/inner.py": "raise SystemExit('imported')\n",
+        "program.py": "",
+        "table.csv": "t,theta,omega\n",
+        "alone.py": "",
+        "other.py": "",
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    program = f"cmd:{sys.executable} --with=table.csv program.py {{out}}"
+    seen = {
+        "mine.py:solve": {"mine.py", "near.py", "far.py", "packed/__init__.py", "packed/inner.py"},
+        "mine:solve": {"mine.py", "near.py", "far.py", "packed/__init__.py", "packed/inner.py"},
+        "packed.inner:solve": {"packed/__init__.py", "packed/inner.py"},
+        "alone.py:solve": {"alone.py"},
+        "csv:table.csv": {"table.csv"},
+        program: {"table.csv", "program.py"},
+    }
+    whole = {spec: content_of(spec) for spec in seen}
+    assert len(set(whole.values())) == len(whole) - 1  # the file and the module are the same
+    for name, text in files.items():
+        (tmp_path / name).write_text(text + "# more\n")
+        changed = {spec for spec in seen if content_of(spec) != whole[spec]}
+        assert changed == {spec for spec, names in seen.items() if name in names}, name
+        (tmp_path / name).write_text(text)
+    assert {spec: content_of(spec) for spec in seen} == whole
+    assert "packed" not in sys.modules
+    assert content_of("eq8") == content_of("switches:110000") == ""
+    assert content_of("nowhere.at.all:solve") == content_of("nowhere.near:solve")
+
+
+def test_a_file_that_is_no_python_has_a_content(tmp_path):
+    file = tmp_path / "broken.py"
+    file.write_bytes(b"def (\0")
+    assert content_of(f"{file}:solve")
+
+
+def test_what_cannot_be_read_is_said_in_one_line(tmp_path):
+    for spec, words in (
+        (f"csv:{tmp_path / 'nowhere.csv'}", "nowhere.csv cannot be read"),
+        ("cmd:'open", "No closing quotation"),
+        (f"{tmp_path / 'nowhere.py'}:solve", "there is no file"),
+    ):
+        with pytest.raises(ValueError, match=words) as caught:
+            solve(spec, Scenario(n_slices=3, duration=0.02))
+        assert "\n" not in str(caught.value)

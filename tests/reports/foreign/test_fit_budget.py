@@ -1,0 +1,110 @@
+"""A fit with somebody else's solver: what it will take is said first, and what cannot be done in time is refused."""
+
+import numpy as np
+import pytest
+
+from flipproof.cli import fit as command
+from flipproof.cli import main as cli
+from flipproof.film.fit import budget
+from flipproof.film.fit.budget import COARSE, FLIGHTS, affordable, chosen
+from flipproof.film.fit.estimate import USUAL, estimate
+from flipproof.film.fit.problem import Measurement, pose
+from flipproof.frame.solvers import solve
+from slicemodel import Scenario
+
+THROW = Scenario(n_slices=3, duration=0.2, drag=0.4, restitution=0.4)
+MINE = """
+import time
+import slicemodel
+
+def solve(ask):
+    time.sleep(SLEEP)
+    found = slicemodel.solve(ask.scenario, scheme="midpoint", steps=4001)
+    stride = 4000 // (len(ask.times) - 1)
+    return {name: getattr(found, name)[::stride] for name in ("t", "theta", "omega")}
+"""
+
+
+@pytest.fixture
+def mine(tmp_path):
+    def written(sleep=0.0):
+        (tmp_path / "mine.py").write_text(f"SLEEP = {sleep}\n{MINE}")
+        return f"{tmp_path / 'mine.py'}:solve"
+
+    return written
+
+
+@pytest.fixture(scope="module")
+def measured():
+    times = np.linspace(0.0, THROW.duration, 41)
+    run = solve("eq8", THROW, times=times)
+    noise = np.random.default_rng(1).normal(size=41) * 0.005
+    return Measurement(label="made up", t=times, values=run.theta + noise, noise=0.005)
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory, measured):
+    folder = tmp_path_factory.mktemp("fit")
+    np.savetxt(folder / "flight.csv", np.column_stack([measured.t, measured.values]), delimiter=",", header="t,theta",
+               comments="")  # fmt: skip
+    (folder / "throw.toml").write_text(THROW.to_toml())
+    return folder
+
+
+@pytest.mark.parametrize("also", [(), ("omega0",), ("omega0", "theta0")])
+@pytest.mark.parametrize(("name", "effort"), [("usual", USUAL), ("coarse", COARSE)])
+def test_a_search_makes_at_most_about_the_flights_that_are_said(measured, also, name, effort):
+    problem = pose(measured, THROW, "midpoint", also=also)
+    once, each = FLIGHTS[effort]
+    made = estimate(problem, effort).flights
+    assert made <= 1.25 * (once + each * len(problem.free)), name
+    assert made >= 0.2 * (once + each * len(problem.free)), name
+
+
+def test_the_coarse_search_finds_what_the_usual_one_does(measured):
+    problem = pose(measured, THROW, "midpoint")
+    usual, coarse = estimate(problem, USUAL), estimate(problem, COARSE)
+    assert coarse.flights < 0.3 * usual.flights
+    assert coarse.chi2 <= usual.chi2 + 0.1
+    widths = np.diff(usual.reach, axis=0)[0]
+    assert np.all(np.abs(coarse.x - usual.x) < 0.1 * widths)
+    assert np.all(np.abs(coarse.reach - usual.reach) < 0.4 * widths)
+
+
+def test_what_time_allows_is_chosen_and_less_is_refused_with_the_number(measured, mine):
+    problem = pose(measured, THROW, mine())
+    assert chosen(problem, 1e-3, 1.0).effort == USUAL
+    assert chosen(problem, 0.1, 1.0).effort == COARSE
+    assert "coarse search" in chosen(problem, 0.1, 1.0).words
+    with pytest.raises(ValueError, match=r"takes 1 s a flight; even a coarse fit makes about 400 of them, 7 min") as no:
+        chosen(problem, 1.0, 1.0)
+    assert "\n" not in str(no.value)
+    assert "--slices" in str(no.value)
+
+
+def test_a_solver_that_does_not_answer_is_said_before_the_search(measured, tmp_path):
+    (tmp_path / "bad.py").write_text("def solve(ask):\n    raise RuntimeError('no licence')\n")
+    with pytest.raises(ValueError, match="no licence"):
+        affordable(pose(measured, THROW, f"{tmp_path / 'bad.py'}:solve"))
+
+
+def test_the_command_says_what_it_will_take_and_ends_with_the_fit(table, mine, capsys, monkeypatch):
+    monkeypatch.setattr(command, "LINE", 0.0)
+    given = ["fit", str(table / "flight.csv"), "--scenario", str(table / "throw.toml"), "--model", mine(0.2)]
+    assert cli.main([*given, "--minutes", "1"]) == 2
+    said = capsys.readouterr().err
+    assert "s a flight; even a coarse fit makes about 400 of them" in said
+    given[-1] = mine()
+    monkeypatch.setattr(budget, "FLIGHTS", {COARSE: FLIGHTS[COARSE]})
+    assert cli.main([*given, "--minutes", "600"]) == 0
+    out, err = capsys.readouterr()
+    assert "s a flight, at most about" in err
+    assert "flights in" in err
+    assert "restitution  0." in out
+
+
+def test_flipproofs_own_equations_are_not_timed(table, monkeypatch, capsys):
+    monkeypatch.setattr("flipproof.film.fit.budget.affordable", None)
+    given = ["fit", str(table / "flight.csv"), "--scenario", str(table / "throw.toml"), "--model", "midpoint"]
+    assert cli.main([*given]) == 0
+    assert "a flight" not in capsys.readouterr().err
