@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import slicemodel
-from flipproof.chapters.waterfall.study import NAMES, STEP, plan_waterfall, program_run, study_waterfall
+from flipproof.chapters.waterfall.study import NAMES, STEP, column_run, plan_waterfall, program_run, study_waterfall
 from flipproof.frame.solvers import make
 from flipproof.frame.twins import twins
 from ode_reference import combinations, contact, motion, witness
@@ -137,6 +137,8 @@ def bars():
         assert trajectory is not None, planned.label
         # Twins say how wide a bar's band is, which is not asked here.
         runs |= dict.fromkeys([planned] if planned is program else [planned, *twins(planned)], trajectory)
+    column = column_run(THROW)
+    runs[column] = make(column).trajectory
     plateau = study_waterfall(program_run(THROW, STEPS), runs)[0]
     assert plateau.observable.name == "plateau"
     return {bar.name: bar.forward for bar in plateau.bars}

@@ -198,7 +198,7 @@ def test_all_three_packages_in_one_sweep_with_their_flights(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["{design}", "--out", "{design}"], "is a file; --out names a folder"),
+        (["{design}", "--out", "{design}"], "is a file that this command reads; name another"),
         (["{design}", "--out", "{out}", "--export", "rows.xls"], "the ending '.xls' is neither .csv nor .parquet"),
         (["nowhere.toml", "--out", "{out}"], "nowhere.toml: cannot be read"),
         (["{other}", "--out", "{out}"], "holds another design (samples is 80 there and 79 here)"),

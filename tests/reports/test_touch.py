@@ -37,7 +37,7 @@ def test_a_logarithmic_axis_shows_sizes_and_chosen_curves():
     data = touch_data(Touch(label="|d| [1]", curves=curves, limits=(1e-6, 2.0), shown=("first",)))
     times, found = read(data, "first")
     assert 10.0**found == pytest.approx(1e-3 * np.exp(-times), rel=1e-3, abs=0.0)
-    assert 10.0 ** read(data, "second")[1] == pytest.approx(1e-7)
+    assert 10.0 ** read(data, "second")[1] == pytest.approx(1e-7, rel=1e-6, abs=0.0)
     assert [line["off"] for line in data["lines"]] == [False, True]
     assert (data["y"]["low"], data["y"]["high"]) == (1e-6, 2.0)
 

@@ -15,10 +15,12 @@ import argparse
 import os
 import shlex
 import signal
+import threading
 import time
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
+from types import FrameType
 from typing import Any, Final, NoReturn
 
 from flipproof.cli.animate import add_animate
@@ -140,17 +142,36 @@ def entry() -> NoReturn:
     sys.exit(status)
 
 
-def _interrupt(*_: object) -> NoReturn:
+def _interrupt(signalled: int, frame: FrameType | None) -> None:
+    if _importing(frame):
+        # Compiled modules print a traceback of their own when an import of theirs is broken off: let it end first.
+        _interrupt_again(signalled)
+        return
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)  # a second one must not break the cleaning up
     raise KeyboardInterrupt
+
+
+def _interrupt_again(signalled: int) -> None:
+    later = threading.Timer(0.02, _thread.interrupt_main, (signalled,))
+    later.daemon = True
+    later.start()
+
+
+def _importing(frame: FrameType | None) -> bool:
+    """Return whether a module is being imported."""
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _unraisable(what: sys.UnraisableHookArgs) -> None:
     """Interrupt again if the interrupt came where Python drops exceptions, such as a finalizer."""
     if isinstance(what.exc_value, KeyboardInterrupt):
         signal.signal(signal.SIGINT, _interrupt)
-        _thread.interrupt_main()
+        _interrupt_again(signal.SIGINT)
     else:
         sys.__unraisablehook__(what)
 
