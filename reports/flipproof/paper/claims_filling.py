@@ -162,7 +162,8 @@ def _change_at_low_filling(flights: Flights) -> tuple[Reading, ...]:
             value=filling_of_slow_down(flights),
             unit="",
             admissible=(LITTLE, TENTH),
-            note="interpolated between the fillings flown: 0.05, 0.09, 0.095, 0.1, 0.13, 0.135, 0.14, 0.15, 0.2",
+            note="interpolated between the fillings flown: 0.05, 0.09, 0.095, 0.1, 0.13, 0.135, 0.14, 0.15, 0.2; that "
+            "adds an error of up to 0.002",
         ),
     )
 
