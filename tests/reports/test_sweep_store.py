@@ -174,7 +174,7 @@ def test_an_engine_counts_no_impacts_and_a_failing_solver_is_a_row():
     assert "pymunk counts no impacts" in outcome.reason
     refused = make_point(design(TEXT.replace("max_step = 0.01", "times = [3.0]")).point(0))
     assert refused.status == "failed"
-    assert refused.reason == "ValueError: times = np.float64(3.0) s is outside [0, 0.02] s (the duration)"
+    assert refused.reason == "ValueError: times = 3.0 s is outside [0, 0.02] s (the duration)"
 
 
 def test_a_mistake_in_a_solver_is_a_row(monkeypatch):
