@@ -272,7 +272,7 @@ class _Flight:
         return struck
 
     def _first_missed(self, t: FloatArray, path: Callable[[Any], FloatArray]) -> tuple[float, Found] | None:
-        """Return the first time before the end of the leg of a passage or a release that no event reported, and which.
+        """Return time and name of the first passage or release in this leg that no event reported, or None.
 
         ``solve_ivp`` looks at events where its steps end. A slice that passes an end and is back inside by then, or
         behind which another passes, shows between: it is beyond the end where one part of a step ends, or it turns
@@ -308,7 +308,7 @@ class _Flight:
         push = self._push(side, int(members[0]))
         values = np.array([push(t, y) for t, y in zip(times, states.T, strict=True)])
         before, after = values[np.r_[0, : len(values) - 1]], values[np.r_[1 : len(values), -1]]
-        # A dip to zero between three values stands below the middle one by no more than that does below the others.
+        # Looked into is what is lower than both neighbours and at most half as high as the higher of them.
         lowest = (values <= before) & (values <= after) & (values <= np.maximum(before, after) - values)
         for k in np.flatnonzero(lowest).tolist():
             begin, stop = max(k - 1, 0), min(k + 1, len(times) - 1)

@@ -385,8 +385,8 @@ def test_the_chapter_makes_the_same_and_finds_it_in_the_store(found, tmp_path):
 def test_calls_hold_every_case_once_and_are_worth_keeping():
     wave, unaimed = aiming(THROW, SMALL)
     assert unaimed == {}
-    many = chunks([case.repeated(throws=120) for case in wave.cases])
-    assert [case for some in many for case in some] == [case.repeated(throws=120) for case in wave.cases]
+    many = chunks([replace(case, throws=120) for case in wave.cases])
+    assert [case for some in many for case in some] == [replace(case, throws=120) for case in wave.cases]
     assert [sum(case.throws for case in some) for some in many] == [360, 360, 240]
     assert chunks([]) == []
 

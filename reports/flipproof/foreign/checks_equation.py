@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from flipproof.chapters.solvers import LIMITS
 from flipproof.chapters.vectors.published import Vector, load_all
 from flipproof.foreign.answers import Answer
 from flipproof.foreign.checking import Found, Making, NotApplicableError
 from flipproof.foreign.contract import Ask, Traits
-from flipproof.foreign.place import LIMITS, THROWS, name_of, placing, switches_of
+from flipproof.foreign.place import THROWS, name_of, placing, switches_of
 
 VECTOR = 1e-8
 """Largest relative difference to a published number; flipproof's own schemes keep to 1e-10."""

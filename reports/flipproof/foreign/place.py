@@ -12,11 +12,11 @@ from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from itertools import pairwise
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
+from flipproof.chapters.solvers import LIMITS
 from flipproof.chapters.waterfall.study import canonical
 from flipproof.foreign.answers import Answer
 from flipproof.foreign.checking import ask_of, drive, times_of
@@ -47,17 +47,6 @@ SURE: Final = 4.0
 
 FLOOR: Final = 2e-4
 """Distance that is no other equation, fraction of omega_0: what a rest speed of 1e-3 m/s instead of 1e-5 m/s may do."""
-
-LIMITS: Final = MappingProxyType(
-    {
-        "published-python": "published-limit",
-        "signs-corrected": "signs-limit",
-        "roots-corrected": "eq8-wall",
-        "exact-step": "eq8",
-        "midpoint": "eq8",
-    }
-)
-"""Scheme of the slice model -> the equation that it converges to; the other two converge to none of the ladder."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

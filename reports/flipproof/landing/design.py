@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import accumulate
 from typing import Any, Final
@@ -63,10 +63,6 @@ class Case:
             "law": self.law,
             "program": self.program,
         }
-
-    def repeated(self, **changes: Any) -> Case:
-        """Return the same with some parts replaced."""
-        return replace(self, **changes)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -26,7 +26,6 @@ from flipproof.chapters.maps.study import (
     EXTRA,
     LADDER,
     RUNGS,
-    SCHEMES,
     Axis,
     Reading,
     ValidityMap,
@@ -35,6 +34,7 @@ from flipproof.chapters.maps.study import (
     study_readings,
     word,
 )
+from flipproof.chapters.solvers import SCHEMES
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import Run
 from flipproof.sweep.axes import DAMPING, FILL, Value

@@ -19,11 +19,12 @@ from flipproof.foreign.contract import Traits
 from flipproof.foreign.explain import shares_of
 from flipproof.foreign.place import name_of, switches_of
 from flipproof.frame.chapter import Flights, Missing, Run
+from ode_reference.models import MODELS
 from ode_reference.switches import Switches
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import plateau
 
-FREE = Switches(*[True] * len(fields(Switches)))
+FREE = MODELS["free-flight"].switches
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,7 +16,8 @@ from matplotlib.patches import Patch, PathPatch, Rectangle
 from matplotlib.path import Path
 from numpy.typing import NDArray
 
-from flipproof.chapters.maps.study import LABELS, RUNGS, SCHEMES, Measure, ValidityMap
+from flipproof.chapters.maps.study import LABELS, RUNGS, Measure, ValidityMap
+from flipproof.chapters.solvers import SCHEMES
 from flipproof.figures.style import new_figure, styled
 from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray

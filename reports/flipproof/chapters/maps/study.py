@@ -17,6 +17,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from flipproof.chapters.solvers import SCHEMES
 from flipproof.chapters.waterfall.study import NAMES, canonical, fair_share
 from flipproof.frame.solvers import Made, Run, make
 from flipproof.frame.twins import band, twins
@@ -59,8 +60,6 @@ COLUMN: Final = "column"
 
 EXTRA: Final = ("exact-step", COLUMN)
 """Beside the ladder: a scheme held against its own equation, and the column against free flight."""
-
-SCHEMES: Final = ("published-python", "exact-step")
 
 SOLVERS: Final = tuple(dict.fromkeys((*LADDER, *EXTRA, *SETS.values())))
 """What flies every cell: two schemes, 40 models and the column."""
