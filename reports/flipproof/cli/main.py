@@ -94,6 +94,15 @@ exit status:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status (0, 1, 2, 3 or 130)."""
+    try:
+        return _status(arguments)
+    except KeyboardInterrupt:
+        print(INTERRUPTED_WORDS, file=sys.stderr)
+        return INTERRUPTED
+
+
+def _status(arguments: Sequence[str] | None) -> int:
+    """Run the command line; return its exit status unless it is interrupted."""
     speak_plainly()
     for number in SIGNALS:
         signal.signal(number, _interrupt)
@@ -107,9 +116,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # The reader of our output went away (a closed pager): not an error of ours.
         sys.stderr.close()
         return 0
-    except KeyboardInterrupt:
-        print(INTERRUPTED_WORDS, file=sys.stderr)
-        return INTERRUPTED
     except OSError as error:
         return _complain(_words_of(error), BAD_INPUT)
     except (ValueError, MemoryError) as error:
@@ -130,15 +136,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def entry() -> NoReturn:
     """Run the command line as a program."""
     sys.unraisablehook = _unraisable
-    status = main()
+    try:
+        status = _status(None)
+    except KeyboardInterrupt:
+        # Nothing is left to clean up. An orderly exit would wait for threads, and Python kills itself where it lets go
+        # of what was loaded by half: the exception that holds it is never given up.
+        sys.stdout.flush()
+        os.write(2, f"{INTERRUPTED_WORDS}\n".encode())
+        os._exit(INTERRUPTED)
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)  # the command is done, whatever comes while Python ends
-    if status == INTERRUPTED:
-        # An orderly exit would wait for threads, and Python kills itself where an import was interrupted in the middle
-        # of an ``exec``. Nothing is left to clean up.
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(status)
     sys.exit(status)
 
 
