@@ -7,7 +7,7 @@ what no switch explains is the rest: the solvers' own errors, and what is no cho
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import combinations
 
@@ -98,6 +98,23 @@ def shares_of(start: Switches, end: Switches, of: Callable[[Switches], float]) -
     ----------
     of : callable (switches) -> float - the number by the equation of a set of switches; asked for once each
     """
+    return {name: mean(changes) for name, changes in changes_of(start, end, of).items()}
+
+
+def mean(changes: Sequence[tuple[float, float]]) -> float:
+    """Return the mean of changes, each with its weight."""
+    return math.fsum(weight * change for weight, change in changes)
+
+
+def changes_of(
+    start: Switches, end: Switches, of: Callable[[Switches], float]
+) -> dict[str, list[tuple[float, float]]]:
+    """Return for every differing switch the changes of a number in single orders, each with its share of all orders.
+
+    Parameters
+    ----------
+    of : callable (switches) -> float - the number by the equation of a set of switches; asked for once each
+    """
     differing = [f.name for f in fields(Switches) if getattr(start, f.name) != getattr(end, f.name)]
     known: dict[Switches, float] = {}
 
@@ -108,13 +125,14 @@ def shares_of(start: Switches, end: Switches, of: Callable[[Switches], float]) -
         return known[switches]
 
     n = len(differing)
-    bars = {}
-    for name in differing:
-        others = [other for other in differing if other != name]
-        bars[name] = math.fsum(
-            math.factorial(size) * math.factorial(n - size - 1) / math.factorial(n)
-            * (value((*chosen, name)) - value(chosen))
+    return {
+        name: [
+            (
+                math.factorial(size) * math.factorial(n - size - 1) / math.factorial(n),
+                value((*chosen, name)) - value(chosen),
+            )
             for size in range(n)
-            for chosen in combinations(others, size)
-        )  # fmt: skip
-    return bars
+            for chosen in combinations([other for other in differing if other != name], size)
+        ]
+        for name in differing
+    }
