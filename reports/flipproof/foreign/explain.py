@@ -106,9 +106,7 @@ def mean(changes: Sequence[tuple[float, float]]) -> float:
     return math.fsum(weight * change for weight, change in changes)
 
 
-def changes_of(
-    start: Switches, end: Switches, of: Callable[[Switches], float]
-) -> dict[str, list[tuple[float, float]]]:
+def changes_of(start: Switches, end: Switches, of: Callable[[Switches], float]) -> dict[str, list[tuple[float, float]]]:
     """Return for every differing switch the changes of a number in single orders, each with its share of all orders.
 
     Parameters
