@@ -12,7 +12,7 @@ SOLVERS = ["eq8", "free-flight", "exact-step"]
 
 
 def offered(shell, folder, *words):
-    """Return what a shell in ``folder`` offers after ``flipproof`` and these words, the last of which is being typed."""
+    """Return what a shell in ``folder`` offers after ``flipproof`` and words, the last of which is being typed."""
     if shell == "fish":
         text = script(shell, parser(), SOLVERS) + f"complete -C 'flipproof {' '.join(words)}'\n"
         made = run(["fish", "--no-config"], text, folder)
