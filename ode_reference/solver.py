@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ode_reference.arguments import known_name, number_within
+from ode_reference.arguments import known_name, number_within, true_or_false
 from ode_reference.combinations import model_of
 from ode_reference.impacts import LAWS
 from ode_reference.models import MODELS
 from ode_reference.motion import Model
 from ode_reference.switches import PREFIX, Switches
 from slicemodel.scenario import Scenario, not_whole
-from slicemodel.trajectory import Trajectory, output_times
+from slicemodel.trajectory import Trajectory, output_times, times_given
 
 if TYPE_CHECKING:
     from ode_reference.flow.api import Batch
@@ -123,6 +123,7 @@ def solve(
     """
     if not isinstance(scenario, Scenario):
         raise ValueError(f"scenario = {scenario!r} is not a slicemodel.Scenario")
+    energy = true_or_false("energy", energy)
     if model == COLUMN:
         from ode_reference import column
 
@@ -193,7 +194,8 @@ def solve_batch(
             raise ValueError(f"throws[{k}] = {throw!r} is not a slicemodel.Scenario")
     chosen = _model(model)
     known_name("impact_law", impact_law, LAWS)
-    given = None if times is None else np.asarray(times, dtype=np.float64)
+    energy, states = true_or_false("energy", energy), true_or_false("states", states)
+    given = None if times is None else times_given(times)
     if given is not None and given.ndim == 2 and len(given) != len(throws):
         raise ValueError(f"times has shape {given.shape}; {len(throws)} throws need ({len(throws)}, P) or (P,)")
     rows = []
