@@ -35,7 +35,7 @@ def draw_waterfalls(guests: Sequence[Guest]) -> Exhibit:
                          f"the rest {guest.split.rest:+.2g}".replace(" by ,", ","))  # fmt: skip
     return Exhibit(
         name="guests-waterfall",
-        title="From each guest to free flight",
+        title="Waterfall of each guest",
         caption="Left: from the guest's mean of ω/ω₀ over the second half to that of free flight. The hatched bar is "
         "the rest, which leads to the equation that the guest solves and which no assumption explains; its error bar "
         "is the guest's own band. Every other bar is the fair share of an assumption of that equation, the mean over "
@@ -83,10 +83,10 @@ def figure_waterfalls(guests: Sequence[Guest]) -> Figure:
 def _panels(ladder: Axes, orders: Axes, split: Split, band: float | None) -> None:
     names = ["the guest", f"the rest, to {split.equation}", *(NAMES[name] for name in split.bars), "free flight"]
     places = list(range(len(names), 0, -1))
-    for place, value in ((places[0], split.start), (places[-1], split.end)):
+    for place, value, away in ((places[0], split.start, 8), (places[-1], split.end, -16)):
         ladder.plot(value, place, "D", color=WHOLE, markersize=8)
         ladder.annotate(
-            f"{value:.4f}", (value, place), xytext=(0, 8), textcoords="offset points", ha="center", fontsize=9
+            f"{value:.4f}", (value, place), xytext=(0, away), textcoords="offset points", ha="center", fontsize=9
         )
     level = split.start
     ladder.plot([level, level], [places[1] + 0.3, places[0]], color="#888888", linewidth=0.8)
@@ -104,7 +104,7 @@ def _panels(ladder: Axes, orders: Axes, split: Split, band: float | None) -> Non
         said = f"{share:+.2g}".replace("-", "\N{MINUS SIGN}")
         orders.annotate(said, (share, place), xytext=(0, 6), textcoords="offset points", ha="center", fontsize=9)
     ladder.set_yticks(places, names)
-    ladder.set_ylim(0.4, places[0] + 0.9)
+    ladder.set_ylim(0.1, places[0] + 0.9)
     orders.axvline(0.0, color="#444444", linewidth=0.8)
     for axes in (ladder, orders):
         axes.use_sticky_edges = False
