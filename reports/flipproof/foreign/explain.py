@@ -71,7 +71,7 @@ def explain(one: Runner, other: Runner, throw: Scenario) -> Explanation:
     asks = [ask_of(runner.traits, throw, LEVEL, POINTS) for runner in (one, other)]
     answers = [runner(ask) for runner, ask in zip((one, other), asks, strict=True)]
     values = tuple(plateau(answer.t, answer.omega, throw.omega0) for answer in answers)
-    bars = shares(places[0].switches, places[1].switches, throw)
+    bars = shares(*_without_idle(*places), throw)
     return Explanation(
         first=places[0],
         second=places[1],
@@ -79,6 +79,12 @@ def explain(one: Runner, other: Runner, throw: Scenario) -> Explanation:
         bars=bars,
         rest=values[1] - values[0] - sum(bars.values()),
     )
+
+
+def _without_idle(one: Place, other: Place) -> tuple[Switches, Switches]:
+    """Return the switches of both, those without effect in the equation of one as they stand in that of the other."""
+    start = replace(one.switches, **{name: getattr(other.switches, name) for name in one.inert})
+    return start, replace(other.switches, **{name: getattr(start, name) for name in other.inert})
 
 
 def shares(start: Switches, end: Switches, throw: Scenario) -> dict[str, float]:
