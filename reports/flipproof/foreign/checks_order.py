@@ -79,13 +79,13 @@ def check_order_across(traits: Traits) -> Making:
         raise NotApplicableError("no order is declared" if traits.order is None else "rtol has no order")
     # Several throws and steps a level: where rebounds wait for the grid, a single one carries the luck of its phase.
     throws = [THROW.with_slices(THROW.n_slices + more) for more in (0, 1, 2)]
-    squares = np.zeros(len(LEVELS))
-    for throw in throws:
-        asks = [ask_of(traits, throw, level - 4 + part, 11) for level in LEVELS for part in (0.0, 0.19)]
-        *answers, reference = yield [*asks, ask_of(traits, throw, 2, 11)]
-        off = np.array([shift(answer, reference, throw.omega0) for answer in answers])
-        squares += (off.reshape(len(LEVELS), -1) ** 2).mean(axis=1) / len(throws)
-    errors = np.sqrt(squares)
+    levels = [level - 4 + part for level in LEVELS for part in (0.0, 0.19)]
+    answers = yield [ask_of(traits, throw, level, 11) for throw in throws for level in (*levels, 2)]
+    squares = []
+    for k in range(0, len(answers), len(levels) + 1):
+        *coarser, reference = answers[k : k + len(levels) + 1]
+        squares.append([shift(answer, reference, THROW.omega0) ** 2 for answer in coarser])
+    errors = np.sqrt(np.mean(squares, axis=0).reshape(len(LEVELS), -1).mean(axis=1))
     if errors[-1] < ROUNDOFF:
         raise NotApplicableError(f"changes under refinement are round-off, {errors[0]:.2g} of omega_0")
     order = -float(np.polyfit(LEVELS, np.log2(np.maximum(errors, 1e-300)), 1)[0])
@@ -114,24 +114,25 @@ def check_floor(traits: Traits) -> Making:
     _refinable(traits)
     stride = 1 if traits.refined_by == "rtol" else 2
     deepest = DEEPEST[str(traits.refined_by)]
-    changes: list[float] = []
-    noise = None
-    (coarse,) = yield [ask_of(traits, SMOOTH, 0)]
-    for level in range(stride, deepest + 1, stride):
-        (fine,) = yield [ask_of(traits, SMOOTH, level)]
-        changes.append(shift(coarse, fine, SMOOTH.omega0))
-        coarse = fine
-        stopped = changes[-1] <= 16 * traits.epsilon or (len(changes) > 1 and changes[-1] > STILL * changes[-2])
-        # With another tolerance a solver takes other steps altogether: there, a change next to none says nothing.
-        if not stopped and len(changes) > 1 and level < deepest and traits.refined_by != "rtol":
-            (beside,) = yield [ask_of(traits, SMOOTH, level + SIXTEENTH)]
-            noise = shift(fine, beside, SMOOTH.omega0)
-            stopped = noise > NOISE * changes[-1]
+    coarse, fine = yield [ask_of(traits, SMOOTH, level) for level in (0, stride)]
+    changes = [shift(coarse, fine, SMOOTH.omega0)]
+    noises: list[float] = []
+    stopped = changes[0] <= 16 * traits.epsilon
+    for level in range(2 * stride, deepest + 1, stride):
         if stopped:
             break
+        # With another tolerance a solver takes other steps altogether: there, a change next to none says nothing.
+        near = [level + SIXTEENTH] if level < deepest and traits.refined_by != "rtol" else []
+        coarse = fine
+        fine, *beside = yield [ask_of(traits, SMOOTH, each) for each in (level, *near)]
+        changes.append(shift(coarse, fine, SMOOTH.omega0))
+        here = [shift(fine, each, SMOOTH.omega0) for each in beside]
+        noises += here
+        noisy = any(noise > NOISE * changes[-1] for noise in here)
+        stopped = changes[-1] <= 16 * traits.epsilon or changes[-1] > STILL * changes[-2] or noisy
     floor = min(changes)
     limited = stopped and floor > ADMISSIBLE["float64"]
-    singles = _singles(coarse) if limited else []
+    singles = _singles(fine) if limited else []
     if singles:
         said = f": the numbers of {', '.join(singles)} are those of float32"
     else:
@@ -153,7 +154,7 @@ def check_floor(traits: Traits) -> Making:
             "floor_reached": stopped,
             "arithmetic": "float32" if singles else None,
             "changes": changes,
-            "noise": noise,
+            "noises": noises,
         },
     )
 
