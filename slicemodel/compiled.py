@@ -39,7 +39,8 @@ def merged(function: Callable[..., Any]) -> Any:
 
     It counts no references to the arrays that it is given, which would take almost half of the time of a landing.
     """
-    return numba.njit(function, forceinline=True, _nrt=False, **OPTIONS)
+    uncounted: dict[str, Any] = {"_nrt": False}  # missing from numba's types, too
+    return numba.njit(function, forceinline=True, **OPTIONS, **uncounted)
 
 
 def kept_on_disk(*elsewhere: Path) -> Callable[[Callable[..., Any]], Any]:
