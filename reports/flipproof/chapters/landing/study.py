@@ -344,7 +344,7 @@ def read(throw: Scenario, size: Size, wave: Wave, rows: Rows, unaimed: Mapping[t
             found.outcome[at] = some[0].outcome or some[0].status
             found.theta[at] = np.nan if some[0].touch_theta is None else some[0].touch_theta
             continue
-        cells[key] = _cell(case.aim, some)
+        cells[key] = cell_of(case.aim, some)
         if key.axis == "filling":
             count = static.setdefault((key.family, key.kind), dict.fromkeys(BOTH_WAYS, 0))
             decided = [row for row in some if row.outcome not in (None, "undecided")]
@@ -370,7 +370,9 @@ def read(throw: Scenario, size: Size, wave: Wave, rows: Rows, unaimed: Mapping[t
     )
 
 
-def _cell(aim: Aim, rows: Sequence[Landed]) -> Cell:
+def cell_of(aim: Aim, rows: Sequence[Landed]) -> Cell:
+    """Return share, means and the interval of the mean bounces of the throws of one case."""
+
     def known(name: str) -> list[float]:
         return [abs(value) for row in rows if (value := getattr(row, name)) is not None]
 
@@ -386,7 +388,7 @@ def _cell(aim: Aim, rows: Sequence[Landed]) -> Cell:
         speed=mean("touch_speed"),
         energy=mean("touch_energy"),
         bounces=mean("bounces"),
-        bounces_band=Z * float(np.std(bounces, ddof=1)) / math.sqrt(len(bounces)) if len(bounces) > 1 else math.nan,
+        bounces_band=float(np.std(bounces, ddof=1)) / math.sqrt(len(bounces)) if len(bounces) > 1 else math.nan,
     )
 
 
