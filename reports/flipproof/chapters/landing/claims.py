@@ -189,8 +189,6 @@ def _witnesses(stored: Mapping[str, Any]) -> Iterator[Finding]:
             if "compliant" in one + other or case["slices"] == "staggered":
                 continue
             kind = "ice" if case["law"] is None else f"water-{case['law']}"
-            # A step longer than the engines' own lets hits of one cascade coincide (docs/landing.md, section 3).
-            grid = "" if case["dt"] is None else f"; with steps of {case['dt']:g} s, longer than the engine's own"
             most = ALIKE_OF_IMPULSES if "mujoco" in (one, other) else ALIKE
             both = matrix["decided by both"]
             share = matrix["differ"] / both if both else math.nan
@@ -199,11 +197,11 @@ def _witnesses(stored: Mapping[str, Any]) -> Iterator[Finding]:
                 title=f"Outcomes in which {one} and {other} differ from one touch: {kind.replace('-', ', ')}",
                 value=share if both else None,
                 unit="",
-                kind="regression" if case["dt"] is None else "observation",
+                kind="regression",
                 admissible=(0.0, most),
                 note=(
                     f"{matrix['differ']} of {both} decided by both; at most {most:.0%} is asked for: "
-                    f"{'reached' if share <= most else 'missed'}{grid}; stored, made by: {stored['command']}"
+                    f"{'reached' if share <= most else 'missed'}; stored, made by: {stored['command']}"
                 ),
             )
 

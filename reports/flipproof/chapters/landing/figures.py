@@ -103,7 +103,7 @@ def figures(found: Found) -> list[Exhibit]:
                 f"Two programs land the same {stored['touches']} touches, {stored['n_slices']} slices at filling "
                 f"{stored['cases'][0]['filling']:g}. Each matrix counts the touches by their outcome in the program "
                 "that stands beside it (rows) and in the one below it (columns); in red the two differ. "
-                f"{_steps(stored)}The counts are stored with this program; this command made them: {stored['command']}"
+                f"The counts are stored with this program; this command made them: {stored['command']}"
             ),
             alt=_witness_words(stored),
             maker=drawings.figure_witnesses,
@@ -141,12 +141,6 @@ def _energy_words(found: Found) -> str:
             stand = sum(run.outcome == "upright" for run in runs)
             words.append(f"{kind}: {len(runs)} landings, {stand} upright, {start:.1f} E_s after the first impact")
     return "; ".join(words)
-
-
-def _steps(stored: Mapping[str, Any]) -> str:
-    """Return which cases had another step than the engines' own, as sentences."""
-    others = [f"{case['law']} with steps of {case['dt']:g} s" for case in stored["cases"] if case["dt"] is not None]
-    return f"Engines landed {', '.join(others)}, else with their own. " if others else ""
 
 
 def _witness_words(stored: Mapping[str, Any]) -> str:

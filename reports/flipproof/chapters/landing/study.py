@@ -388,7 +388,7 @@ def cell_of(aim: Aim, rows: Sequence[Landed]) -> Cell:
         speed=mean("touch_speed"),
         energy=mean("touch_energy"),
         bounces=mean("bounces"),
-        bounces_band=float(np.std(bounces, ddof=1)) / math.sqrt(len(bounces)) if len(bounces) > 1 else math.nan,
+        bounces_band=Z * float(np.std(bounces, ddof=1)) / math.sqrt(len(bounces)) if len(bounces) > 1 else math.nan,
     )
 
 
