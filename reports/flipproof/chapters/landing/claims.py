@@ -155,8 +155,8 @@ def _model_uncertainty(found: Found) -> Finding:
         name,
         title,
         widest,
-        f"{where}; 95 % interval {low:+.3f} to {high:+.3f}; the laws are models of one impact and are not averaged; "
-        f"{found.assumed}",
+        f"{where}; 95 % interval of this pair alone {low:+.3f} to {high:+.3f}; the laws are models of one impact and "
+        f"are not averaged; {found.assumed}",
         (high - low) / 2,
     )
 
