@@ -397,7 +397,7 @@ def test_a_study_is_salvaged_without_its_aims(tmp_path):
 
 def test_workers_of_a_scheduler_make_the_same(found, tmp_path):
     with LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, silence_logs=50
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0", silence_logs=50
     ) as cluster:
         make_upright(THROW, SMALL, tmp_path / "study", quiet, lambda _: None, dask=cluster.scheduler_address)
     assert (tmp_path / "study" / "upright.csv").read_text(encoding="utf-8") == shares_csv(found)
