@@ -13,10 +13,11 @@ from markupsafe import Markup
 from flipproof.chapters.differences.study import Difference, moved, percent
 from flipproof.frame.gather import Gathered, Told
 from flipproof.frame.solvers import find
+from flipproof.frame.spoken import spoken
 from flipproof.output.summary import summarise
 from flipproof.page.captions import shared
-from flipproof.page.equations import equation, typeset
-from flipproof.page.glossary import EQUATIONS, TERMS, anchor
+from flipproof.page.equations import equation, mathematics, numbers, typeset
+from flipproof.page.glossary import EQUATIONS, TERMS, anchor, symbols
 from flipproof.page.headlines import headlines
 from flipproof.page.inline import data_uri, shape
 from flipproof.page.lead import answer, answers, lead_words
@@ -124,6 +125,8 @@ def page_environment() -> Environment:
         "typeset": typeset, "unbroken": unbroken, "amount": amount, "percent": percent, "data_uri": data_uri,
         "shape": shape, "touch_data": touch_data, "short": short,
         "restitution_error": restitution_error, "term_anchor": anchor, "equation": equation, "shared": shared,
+        "symbols": symbols,
+        "spoken": spoken, "mathematics": mathematics, "numbers": numbers,
     }  # fmt: skip
     templates.globals["assets"] = read_assets()
     return templates

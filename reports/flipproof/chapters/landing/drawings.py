@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from flipproof.chapters.landing.study import Cell, Energy, Found, Kind
-from flipproof.chapters.landing.tables import NAMES
+from flipproof.chapters.landing.tables import FAMILIES, NAMES
 from flipproof.figures.style import new_figure, shared_legend, styled
 
 LOOKS: Final[Mapping[Kind, dict[str, Any]]] = {
@@ -43,7 +43,7 @@ def figure_shares(found: Found) -> Figure:
             _curve(axes, kind, found.curve(family, kind))
         axes.axvspan(0.2, 0.5, color="#0072B2", alpha=0.06, linewidth=0)
         axes.set_xlabel("fill fraction M_w / M_max [1]")
-        axes.set_title({"A": "A: ω₀ as thrown", "B": "B: time of flight as thrown"}[family], fontsize=10, loc="left")
+        axes.set_title(FAMILIES[family], fontsize=10, loc="left")
         axes.set_ylim(0.0, 1.0)
     panels[0, 0].set_ylabel("P(upright) [1]")
     shared_legend(figure, panels[0, -1], columns=5)

@@ -42,8 +42,13 @@ def figures(found: Found) -> list[Exhibit]:
             caption=(
                 f"Share of throws that end upright, {size.throws} throws a point{soft}, with Wilson's 95 % interval. "
                 "The laws of the impact are models of one landing and are not averaged. The shaded fillings "
-                "are those that the paper calls optimal. In family A ice that does not reach the table from above "
-                f"counts as not upright. {found.assumed.capitalize()}."
+                "are those that the paper calls optimal. "
+                + (
+                    "In family A ice that does not reach the table from above counts as not upright. "
+                    if "A" in size.families
+                    else ""
+                )
+                + f"{found.assumed.capitalize()}."
             ),
             alt=shares,
             maker=drawings.figure_shares,
@@ -108,8 +113,8 @@ def figures(found: Found) -> list[Exhibit]:
             caption=(
                 f"Two programs land the same {stored['touches']} touches, {stored['n_slices']} slices at filling "
                 f"{stored['cases'][0]['filling']:g}. Each matrix counts the touches by their outcome in the program "
-                "that stands beside it (rows) and in the one below it (columns); in red the two differ, and '?' is "
-                f"undecided. {_steps(stored)}The counts are stored with this program; this command made them: "
+                "that stands beside it (rows) and in the one below it (columns); in red the two differ. "
+                f"{_steps(stored)}The counts are stored with this program; this command made them: "
                 f"{stored['command']}"
             ),
             alt=_witness_words(stored),

@@ -9,7 +9,7 @@
   const find = (name) => root.querySelector(`[data-testid="live-${name}"]`);
   const inputs = [...root.querySelectorAll("input")];
   const names = { "published-python": "program", eq8: "Eq. 8", "free-flight": "free flight" };
-  let thrown = { ...start }, drawn = {}, waiting = false;
+  let thrown = { ...start }, drawn = {}, waiting = false, touched = null;
 
   const flown = (set) => ({ "published-python": program({ ...fixed, ...set }), eq8: eq8({ ...fixed, ...set }), "free-flight": free({ ...fixed, ...set }) });
   // The throw with the gravity of the report is solved anew when something else than gravity is changed.
@@ -29,10 +29,11 @@
     // Free flight is solved again too: that it does not change is what is to be seen.
     const now = changed ? flown(thrown) : before, x = Array.from(now.eq8, (_, k) => (k * fixed.duration) / (now.eq8.length - 1));
     const lines = (curves, look) => Object.keys(names).map((name) => ({ name, x, y: Array.from(curves[name], (value) => value / thrown.omega0), ...look(name) }));
-    const all = [...(changed ? lines(before, () => ({ faint: true })) : []), ...lines(now, (name) => ({ label: names[name] }))];
-    const high = all.reduce((most, { y }) => Math.max(most, ...y.filter(Number.isFinite)), 1);
+    const plot = { behind: changed ? lines(before, () => ({ faint: true })) : [], lines: lines(now, (name) => ({ label: names[name] })) };
+    const high = [...plot.behind, ...plot.lines].reduce((most, { y }) => Math.max(most, ...y.filter(Number.isFinite)), 1);
     const y = { low: 0, high: Math.min(3, high), label: "angular velocity ω / ω₀ [1]" };
-    chart.draw(find("omega"), 340, { x: { low: 0, high: fixed.duration, label: "time t [s]" }, y, right: 84, lines: all });
+    if (touched) touched.change({ ...plot, y });
+    else touched = window.flipproofTouch.touch(find("omega"), 340, { x: { low: 0, high: fixed.duration, label: "time t [s]" }, y, right: 84, ...plot });
     for (const input of inputs) {
       input.value = thrown[input.name] / (scale[input.name] ?? 1);
       const text = `${chart.shown(Number(input.value), Number(input.dataset.digits))} ${input.dataset.unit}`.trim();
@@ -59,7 +60,7 @@
     set({ ...start, ...Object.fromEntries(asked.filter(([name, value]) => name in start && Number.isFinite(value))) }, false);
   }
   window.addEventListener("hashchange", () => { if (location.hash.startsWith("#live?")) recall(); });
-  window.addEventListener("load", () => setTimeout(() => { recall(); chart.onWidth(find("omega"), draw); }, 0));
+  window.addEventListener("load", () => setTimeout(recall, 0));
 
   // What a test, or a curious reader at the console, may ask.
   window.flipproofSliders = { drawn: () => drawn, set: (change) => { thrown = { ...thrown, ...change }; draw(); return drawn; } };
