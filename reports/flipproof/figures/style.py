@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from matplotlib.ticker import FixedFormatter, LogFormatterMathtext
+from matplotlib.ticker import FuncFormatter, LogFormatterMathtext
 
 from flipproof.frame.spoken import spoken
 from slicemodel import Trajectory
@@ -106,8 +106,8 @@ def draw(figure: Figure, png: bool = True) -> Drawing:
             form = axis.get_major_formatter()
             if isinstance(form, LogFormatterMathtext):
                 axis.set_major_formatter(PlainPowers())
-            elif isinstance(form, FixedFormatter):
-                axis.set_major_formatter(FixedFormatter([_written(label) for label in form.seq]))
+            elif isinstance(form, FuncFormatter):  # labels that were given, not computed
+                axis.set_major_formatter(FuncFormatter(lambda x, place, form=form: _written(form(x, place))))
     for text in figure.findobj(Text):
         text.set_text(_written(text.get_text()))
     lines, points = BytesIO(), BytesIO()

@@ -27,7 +27,7 @@ SPOKEN: Final[Mapping[str, str]] = {
 """Name in commands, files and tables -> name in charts, headings and sentences."""
 
 _NAME: Final = re.compile(
-    r"(?<![\w/.:=-])(?:" + "|".join(sorted(map(re.escape, SPOKEN), key=len, reverse=True)) + r")(?![\w/:=-])(?! step)"
+    r"(?<![\w/.:=-])(?:" + "|".join(sorted(map(re.escape, SPOKEN), key=len, reverse=True)) + r")(?![\w/=-]|:\w| step)"
 )
 
 

@@ -36,7 +36,7 @@
     else touched = window.flipproofTouch.touch(find("omega"), 340, { x: { low: 0, high: fixed.duration, label: "time t [s]" }, y, right: 84, ...plot });
     for (const input of inputs) {
       input.value = thrown[input.name] / (scale[input.name] ?? 1);
-      const text = `${chart.shown(Number(input.value), Number(input.dataset.digits))} ${input.dataset.unit}`.trim();
+      const text = `${chart.shown(Number(input.value), Number(input.dataset.digits))}${input.dataset.unit === "°" ? "" : " "}${input.dataset.unit}`.trim();
       input.previousElementSibling.querySelector("output").textContent = text;
       input.setAttribute("aria-valuetext", text);
     }

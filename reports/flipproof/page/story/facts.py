@@ -173,12 +173,12 @@ def _layers(summary: Summary, n: Mapping[str, Number | None]) -> list[Layer]:
     steps = summary.at("headlines/step/note") or "the steps"
     asked = (
         ("step", "The time step", f"Does it matter that the program makes {steps} and holds ω constant over each?",
-         "largest difference in ω between the program and what Eq. 9 becomes as the step goes to zero", "steps",
+         "Largest difference in ω between the program and what Eq. 9 becomes as the step goes to zero", "steps",
          "step", "time step"),
         ("program_eq8", "The algebra of Eq. 9", "Do the formulas of the program, Eq. 9, solve Eq. 8?",
-         "largest difference in ω between the program and Eq. 8", "errata", "program-eq8", "algebra"),
+         "Largest difference in ω between the program and Eq. 8", "errata", "program-eq8", "algebra"),
         ("eq8_free", "The physics of Eq. 8", "Does Eq. 8 describe slices in a bottle that flies freely?",
-         "largest difference in ω between Eq. 8 and free flight", "assumptions", "eq8-free", "physics"),
+         "Largest difference in ω between Eq. 8 and free flight", "assumptions", "eq8-free", "physics"),
     )  # fmt: skip
     return [
         Layer(
