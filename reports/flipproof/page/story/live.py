@@ -28,7 +28,7 @@ class Slider:
     @property
     def shown(self) -> str:
         """The value with its unit."""
-                space = "" if self.unit == "°" else " "
+        space = "" if self.unit == "°" else " "
         return f"{self.value:.{self.digits}f}{space}{self.unit}".strip().replace("-", "−")
 
 
