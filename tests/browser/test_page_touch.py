@@ -91,7 +91,7 @@ def test_the_chart_of_the_sliders_tells_its_values_at_a_cursor(visit, g):
         assert page.locator("#sliders [data-line=eq8]").count() == (1 if g else 2)
         box = svg.bounding_box()
         page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 100)
-        time = float(page.locator("#sliders .chart-tools > .soft").text_content().split()[3])
+        time = float(page.locator("#sliders .chart-tools > .soft").text_content().split()[4])
         assert 0.1 < time < 0.4
         curves = page.evaluate("flipproofSliders.drawn().curves.eq8.length") - 1
         for name in ("published-python", "eq8", "free-flight"):

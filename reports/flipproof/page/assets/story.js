@@ -180,7 +180,8 @@
       event.preventDefault();
       tell(...here.map((place, axis) => Math.max(0, Math.min([data.fills, data.dampings][axis].length - 1, place + move[axis]))));
     });
-    choice.addEventListener("change", () => { draw(); tell(...here); });
+    choice.addEventListener("change", () => { window.flipproofState.keep("map", choice.value); draw(); tell(...here); });
+    if ([...choice.options].some(({ value }) => value === window.flipproofState.kept("map"))) choice.value = window.flipproofState.kept("map");
     chart.onWidth(svg, draw);
     draw();
   }
