@@ -33,9 +33,9 @@ def test_symbols_get_their_indices_where_text_is_typeset(text, html):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("published-python → published-limit", "published program → published program, Δt → 0"),
+        ("published-python → published-limit", "published program → published program (Δt → 0)"),
         ("eq8-weightless, eq8: largest", "Eq. 8 without weight, Eq. 8: largest"),
-        ("pymunk rotating and pymunk", "pymunk, forces of Eq. 8 and pymunk"),
+        ("pymunk rotating and pymunk", "pymunk by Eq. 8 and pymunk"),
         ("trajectories/eq8/data.csv mujoco-compliant", "trajectories/eq8/data.csv mujoco-compliant"),
         ("switches:eq8 and mine.py:eq8", "switches:eq8 and mine.py:eq8"),
     ],
@@ -54,7 +54,7 @@ def test_a_figure_has_spoken_names_and_indices_everywhere():
     axes.set_yticks([0, 1], ["drag against C_M", "free-flight"])
     axes.legend()
     draw(figure, png=False)
-    assert axes.get_legend().get_texts()[0].get_text() == "Eq. 8, drag on the wall"
+    assert axes.get_legend().get_texts()[0].get_text() == "Eq. 8 (drag on the wall)"
     assert axes.get_xlabel() == r"fill fraction $M_{\mathrm{w}}$ / $M_{\mathrm{max}}$ [1]"
     assert [label.get_text() for label in axes.get_yticklabels()] == [r"drag against $C_{\mathrm{M}}$", "free flight"]
 

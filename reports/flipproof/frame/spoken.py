@@ -8,21 +8,21 @@ from typing import Final
 
 SPOKEN: Final[Mapping[str, str]] = {
     "published-python": "published program",
-    "published-limit": "published program, Δt → 0",
+    "published-limit": "published program (Δt → 0)",
     "published-matlab": "MATLAB program",
     "paper-typeset": "Eq. 9 as typeset",
     "signs-corrected": "signs corrected",
     "roots-corrected": "roots corrected",
-    "signs-limit": "signs corrected, Δt → 0",
+    "signs-limit": "signs corrected (Δt → 0)",
     "exact-step": "exact step",
     "midpoint": "midpoint step",
     "eq8": "Eq. 8",
-    "eq8-wall": "Eq. 8, drag on the wall",
+    "eq8-wall": "Eq. 8 (drag on the wall)",
     "eq8-weightless": "Eq. 8 without weight",
     "accelerating-origin": "moving origin",
     "free-flight": "free flight",
     "mujoco": "MuJoCo",
-    "pymunk rotating": "pymunk, forces of Eq. 8",
+    "pymunk rotating": "pymunk by Eq. 8",
 }
 """Name in commands, files and tables -> name in charts, headings and sentences."""
 
