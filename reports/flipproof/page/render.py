@@ -31,7 +31,8 @@ from flipproof.page.touch import touch_data
 
 def unbroken(text: str) -> str:
     """Return text in which no line ends between a sign of equality or a number and what belongs to it."""
-    return re.sub(r"(?<==) (?=[\d−])|(?<=\bEq\.) (?=\d)|(?<=\d) (?=(?:%|ms|s|rad)\b|%)| (?== )", "\N{NO-BREAK SPACE}", text)
+    between = r"(?<==) (?=[\d−])|(?<=\bEq\.) (?=\d)|(?<=\d) (?=(?:%|ms|s|rad)\b|%)| (?== )"
+    return re.sub(between, "\N{NO-BREAK SPACE}", text)
 
 
 def amount(difference: Difference) -> str:
