@@ -281,7 +281,10 @@ def test_every_finding_and_figure_says_what_is_assumed(found):
         if exhibit.name != "landing-witnesses":
             assert "ssumed: e_table = 0.3" in exhibit.caption
     assert shares_csv(found).count("\n") == len(found.cells) + 1
-    assert page(found)["assumed"] == found.assumed
+    ((family, fills, rows),) = page(found)["shares"]
+    assert family == "family B: time of flight as thrown"
+    assert [name for name, _ in rows] == ["water, together", "water, in turn", "ice"][: len(rows)]
+    assert all(len(cells) == len(fills) for _, cells in rows)
 
 
 def test_the_stored_witnesses_are_enough_and_agree(found):

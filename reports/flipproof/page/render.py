@@ -13,7 +13,6 @@ from markupsafe import Markup
 from flipproof.chapters.differences.study import Difference, moved, percent
 from flipproof.frame.gather import Gathered, Told
 from flipproof.frame.solvers import find
-from flipproof.frame.spoken import spoken
 from flipproof.output.summary import summarise
 from flipproof.page.captions import shared
 from flipproof.page.equations import equation, mathematics, numbers, typeset
@@ -127,7 +126,7 @@ def page_environment() -> Environment:
         "shape": shape, "touch_data": touch_data, "short": short,
         "restitution_error": restitution_error, "term_anchor": anchor, "equation": equation, "shared": shared,
         "symbols": symbols,
-        "spoken": spoken, "mathematics": mathematics, "numbers": numbers,
+        "mathematics": mathematics, "numbers": numbers,
     }  # fmt: skip
     templates.globals["assets"] = read_assets()
     return templates
