@@ -83,7 +83,7 @@ def erratum_matlab_comment(line: str = MATLAB_LINE) -> Erratum:
         prints=line,
         follows="a comment starts with %, as on the lines around it",
         value=float(len(stray)),
-        unit=f"statement{'s' * (len(stray) != 1)} that nothing defines",
+        unit="statements that nothing defines",
         admissible=(0.0, 0.0),
         note=f"MATLAB takes “{stray[0]}” for a call and stops: the program as printed cannot run" if stray else "",
     )
