@@ -113,8 +113,8 @@ def solve(
     the band is 3e-3 omega_0 on the paper's throw, and 4e-3 has been seen on another bottle with 50 slices: which slice
     rests when decides the order of all later impacts. Status "ok" says nothing of that band. With recoil,
     drag and e above 0.9 slices hop on an end and hardly ever rest: there a change of omega0 by 3e-11 of itself moved
-    omega by more than 1e-4 omega_0 in 56 of 117 flights, by 5e-2 at the most, and a tenth of the rest speed showed it in
-    11 of them. Ask for the band of a flight by a twin, ``solve_batch([throw, twin], model)`` with that change
+    omega by more than 1e-4 omega_0 in 56 of 117 flights, by 5e-2 at the most; a tenth of the rest speed showed it in 11
+    of these. Ask for the band of a flight by a twin, ``solve_batch([throw, twin], model)`` with that change
     (docs/theory.md, "Rests, and the band they cost"). Where gamma = |omega0| exactly and ``roots`` are off, nothing
     pushes the water and it stays where it is. A full bottle that no weight pulls along its axis is its own mirror image
     for ever, by the simultaneous law: all methods hold it to that, since rounding would part the two halves as
