@@ -26,7 +26,7 @@ def opened(request, visit):
     size, scheme = request.param
     with visit(size, scheme) as visited:
         visited.page.evaluate("document.querySelectorAll('details').forEach(details => { details.open = true; })")
-        visited.page.wait_for_timeout(100)
+        visited.settle()
         yield visited
 
 

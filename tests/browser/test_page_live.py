@@ -116,6 +116,7 @@ def test_a_wrong_sign_in_the_script_is_seen(browser):
 
 def line(visited, name):
     """Return the heights of a curve as it stands in the drawing."""
+    visited.page.wait_for_function("() => window.flipproofSliders.drawn().thrown")
     path = visited.page.evaluate(
         f"[...document.querySelectorAll('[data-testid=live-omega] [data-line=\"{name}\"]:not(.chart-faint)')].map("
         "path => path.getAttribute('d'))"
@@ -147,7 +148,7 @@ def test_sliders_work_from_the_keyboard_and_survive_a_reload(visit):
         was = line(visited, "eq8")
         for _ in range(5):
             visited.page.keyboard.press("ArrowRight")
-        visited.page.wait_for_timeout(200)
+        visited.page.wait_for_function("() => window.flipproofSliders.drawn().thrown.fill > 0.54")
         now = line(visited, "eq8")
         assert now != was
         assert "fill=" in visited.page.url
@@ -155,6 +156,6 @@ def test_sliders_work_from_the_keyboard_and_survive_a_reload(visit):
         visited.page.wait_for_function("() => window.flipproofSliders.drawn().thrown?.fill > 0.54")
         assert line(visited, "eq8") == now
         visited.page.get_by_test_id("live-reset").click()
-        visited.page.wait_for_timeout(200)
+        visited.page.wait_for_function("() => window.flipproofSliders.drawn().thrown.fill < 0.54")
         assert line(visited, "eq8") == was
         assert json.loads(visited.page.evaluate("JSON.stringify(flipproofSliders.drawn().thrown.slices)")) <= 50

@@ -14,7 +14,6 @@ LARGEST = 5e6
 @pytest.fixture(scope="module")
 def opened(visit):
     with visit() as visited:
-        visited.page.wait_for_timeout(200)
         yield visited
 
 
@@ -143,7 +142,7 @@ def test_a_section_opens_by_link_key_and_button_and_stays_open_on_reload(visit, 
         visited.page.locator("#ice summary").focus()
         visited.page.keyboard.press("Enter")
         visited.page.wait_for_function("() => document.querySelector('#ice > details').open")
-        visited.page.wait_for_timeout(50)
+        visited.page.wait_for_function("() => history.state?.open?.length === 2")
         visited.page.reload(wait_until="load")
         assert visited.page.evaluate(opened) == ["ice", "findings"]
         visited.page.locator(".unfold").click()
