@@ -142,7 +142,7 @@ def test_an_interrupt_while_the_program_loads_is_one_line(tmp_path, module):
                 assert process.poll() is None
         time.sleep(wait)
         process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=300)
         said = [line for line in err.splitlines() if not line.startswith("import time:")]
         assert (process.returncode, said) in (
             (130, ["flipproof: interrupted; nothing was overwritten"]),
