@@ -192,10 +192,3 @@ class Motion:
         n = self.n
         omega, acceleration = self.acceleration(y, self.free)
         return Instant(t, y, y[1 : n + 1], y[n + 1 :], acceleration, omega)
-
-    def derivative_of(self, now: Instant) -> FloatArray:
-        """Return dy/dt at ``now``, shape (2N + 1,), from the acceleration it carries."""
-        derivative = np.concatenate(((now.omega,), now.v, now.a))
-        if self.any_held:
-            derivative[self.held_speeds] = 0.0
-        return derivative
