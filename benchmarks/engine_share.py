@@ -127,7 +127,7 @@ def loop_seconds(engine: str, throw: Scenario, settings: dict[str, Any]) -> tupl
 
 def bare_seconds(throw: Scenario, steps: int, *, compiled: bool) -> float:
     """Return the seconds of as many steps of pymunk over the same world, ``compiled`` alone or in its Python method."""
-    from pymunk.space import lib
+    from pymunk._chipmunk_cffi import lib
 
     from engine_check.pymunk_settings import PymunkKnobs, enough_iterations
     from engine_check.pymunk_world import build, start_staggered

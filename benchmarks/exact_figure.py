@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -63,16 +64,14 @@ def measure() -> dict[str, list[tuple[float, float]]]:
     exact = {name: ode_reference.solve(THROW, name, times).omega for name in ("published-limit", "eq8")}
     found: dict[str, list[tuple[float, float]]] = {"published program": [], "exact-step": [], "DOP853": []}
     for steps in (*STEPS, USUAL):
-        run, spent = timed(lambda points=steps: published(THROW, points))
+        run, spent = timed(partial(published, THROW, steps))
         found["published program"].append((spent, error(run["omega"], exact["published-limit"])))
     for steps in STEPS:
-        run, spent = timed(
-            lambda points=steps: slicemodel.solve(THROW, scheme="exact-step", steps=points, store="summary")
-        )
+        run, spent = timed(partial(slicemodel.solve, THROW, "exact-step", steps, store="summary"))
         found["exact-step"].append((spent, error(run.omega, exact["eq8"])))
     for rtol in RTOL:
         settings: dict[str, Any] = {"method": "DOP853", "rtol": rtol, "atol": 1e-3 * rtol}
-        run, spent = timed(lambda given=settings: ode_reference.solve(THROW, "eq8", times, **given))
+        run, spent = timed(partial(ode_reference.solve, THROW, "eq8", times, **settings))
         found["DOP853"].append((spent, error(run.omega, exact["eq8"])))
     fine = ode_reference.solve(THROW, "eq8", times, method="DOP853", rtol=1e-13, atol=1e-15, max_step=2.5e-4)
     _, spent = timed(lambda: ode_reference.solve(THROW, "eq8", times))

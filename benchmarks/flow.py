@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from flow_agreement import impacts_of
 
 import ode_reference
 from slicemodel.scenario import Scenario
@@ -45,7 +46,7 @@ def row(n: int, model: str, scenario: Scenario, *, against: bool) -> dict[str, A
         ours.append(seconds(lambda: ode_reference.solve(scenario, model, times)))
         if against and k < 2:
             theirs.append(seconds(lambda: ode_reference.solve(scenario, model, times, method="DOP853")))
-    impacts, cost = len(run.impacts), float(np.median(ours))
+    impacts, cost = len(impacts_of(run)), float(np.median(ours))
     return {
         "slices": n,
         "model": model,
@@ -80,11 +81,12 @@ def growth() -> dict[str, Any]:
         run = ode_reference.solve(longer, "free-flight", [duration], rest_speed=1e-8, energy=True)
         spent = time.process_time() - began
         ledger = run.diagnostics["energy"]
-        points.append((len(run.impacts), spent, ledger["final"] / ledger["initial"] - 1, run.status))
-        if len(run.impacts) > 1e6:
+        impacts = len(impacts_of(run))
+        points.append((impacts, spent, ledger["final"] / ledger["initial"] - 1, run.status))
+        if impacts > 1e6:
             break
-    impacts, spent = (np.array([point[k] for point in points], dtype=float) for k in (0, 1))
-    return {"points": points, "exponent": float(np.polyfit(np.log(impacts), np.log(spent), 1)[0])}
+    counts, costs = (np.log([point[k] for point in points]) for k in (0, 1))
+    return {"points": points, "exponent": float(np.polyfit(counts, costs, 1)[0])}
 
 
 def batch(count: int) -> dict[str, Any]:
@@ -102,7 +104,7 @@ def batch(count: int) -> dict[str, Any]:
         "processor_seconds": round(time.process_time() - began, 2),
         "cores": len(os.sched_getaffinity(0)),
         "ok": found.status.count("ok"),
-        "impacts": sum(len(flown.impacts) for flown in found.flights),
+        "impacts": sum(len(impacts_of(flown)) for flown in found.flights),
     }
 
 

@@ -18,12 +18,13 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
 import ode_reference
 from slicemodel.scenario import Bottle, Scenario
-from slicemodel.trajectory import Trajectory
+from slicemodel.trajectory import Impacts, Trajectory
 
 TIME = 1e-8
 """Difference of the times of one impact [s]."""
@@ -35,6 +36,14 @@ TWIN, CHAOTIC = 1e-11, 1e-8
 """Relative change of omega_0, and what it may move omega by, as a fraction of omega_0."""
 
 RESTITUTIONS = (0.0, 0.2, 0.35, 0.5, 0.8, 0.95, 1.0)
+
+
+class Flown(Protocol):
+    """What has impacts."""
+
+    @property
+    def impacts(self) -> Impacts | None:
+        """The impacts, in the order of time."""
 
 
 @dataclass(frozen=True)
@@ -88,10 +97,16 @@ def integrated(case: Case) -> Trajectory:
     )
 
 
-def first_parting(one: Trajectory, other: Trajectory, within: float = TIME) -> str:
+def impacts_of(run: Flown) -> Impacts:
+    """Return the impacts of a run, which every solver of these equations knows."""
+    assert run.impacts is not None
+    return run.impacts
+
+
+def first_parting(one: Flown, other: Flown, within: float = TIME) -> str:
     """Return in words the first impact that the two lists do not share, slice by slice; nothing if there is none."""
     found = []
-    a, b = one.impacts, other.impacts
+    a, b = impacts_of(one), impacts_of(other)
     for i in np.union1d(a.slice, b.slice):
         mine, theirs = np.flatnonzero(a.slice == i), np.flatnonzero(b.slice == i)
         shared = min(len(mine), len(theirs))
@@ -114,7 +129,7 @@ def omega_apart(one: Trajectory, other: Trajectory) -> float:
 
 def is_exchange(one: Trajectory, other: Trajectory) -> bool:
     """Return whether the lists agree in times and ends, whichever slice it is."""
-    a, b = one.impacts, other.impacts
+    a, b = impacts_of(one), impacts_of(other)
     if len(a) != len(b):
         return False
     return bool(np.all(np.abs(a.time - b.time) <= TIME)) and np.array_equal(a.end, b.end)
@@ -146,7 +161,7 @@ def main() -> None:
         calm += 1
         theirs = integrated(case)
         apart, parting = omega_apart(mine, theirs), first_parting(mine, theirs)
-        impacts += len(mine.impacts)
+        impacts += len(impacts_of(mine))
         differences.append(apart)
         if parting and is_exchange(mine, theirs):
             exchanged += 1

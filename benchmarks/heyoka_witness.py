@@ -20,7 +20,7 @@ from typing import Any
 
 import heyoka as hy
 import numpy as np
-from flow_agreement import Case, first_parting, flow
+from flow_agreement import Case, first_parting, flow, impacts_of
 
 import ode_reference
 from ode_reference.contact import Ends, resolve
@@ -144,13 +144,13 @@ def main() -> None:
         second = ode_reference.solve(case.scenario, name, method="DOP853", rtol=1e-13, atol=1e-15)
         apart = abs(third.omega - first.omega[-1]) / abs(case.scenario.omega0)
         print(
-            f"{name:20} impacts {len(third.impacts)} heyoka, {len(first.impacts)} reduced flow, {len(second.impacts)} "
-            f"solve_ivp; omega(T) heyoka to reduced flow {apart:.1e} omega_0, solve_ivp to reduced flow "
-            f"{abs(second.omega[-1] - first.omega[-1]) / abs(case.scenario.omega0):.1e}; {third.steps} steps, "
-            f"{spent:.1f} s with compiling"
+            f"{name:20} impacts {len(third.impacts)} heyoka, {len(impacts_of(first))} reduced flow, "
+            f"{len(impacts_of(second))} solve_ivp; omega(T) heyoka to reduced flow {apart:.1e} omega_0, "
+            f"solve_ivp to reduced flow {abs(second.omega[-1] - first.omega[-1]) / abs(case.scenario.omega0):.1e}; "
+            f"{third.steps} steps, {spent:.1f} s with compiling"
         )
         for label, other in (("reduced flow", first), ("solve_ivp", second)):
-            parting = first_parting(third, other)  # type: ignore[arg-type]
+            parting = first_parting(third, other)
             print(f"    heyoka and {label}: {parting or 'the same impacts'}")
 
 

@@ -20,6 +20,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -160,10 +161,9 @@ def speed_up() -> dict[str, Any]:
     """Return seconds of the published program and of the public call, by number of slices."""
     found: dict[str, Any] = {}
     for n in (100, 500, 1000):
-        scenario = Scenario().with_slices(n)
         found[str(n)] = in_turns(
             {
-                "published program": lambda s=scenario: published(s, 1000),
+                "published program": partial(published, Scenario().with_slices(n), 1000),
                 "published-python": solving(n, 1000),
                 "exact-step": solving(n, 1000, "exact-step"),
             }
@@ -175,7 +175,7 @@ def scaling() -> dict[str, dict[str, dict[str, float]]]:
     """Return ns per slice-step of the public call, over slices and over points."""
     counts = (100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000)
     over_slices: dict[str, Callable[[], Any]] = {}
-    work = {}
+    work: dict[str, int] = {}
     for n in counts:
         # The shares of the flight that a run covers are equal, so that as many slices rebound per step.
         steps = 1000 if n <= 10_000 else 200

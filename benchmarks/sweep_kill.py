@@ -16,7 +16,6 @@ import json
 import os
 import random
 import signal
-import socket
 import sqlite3
 import subprocess
 import sys
@@ -151,21 +150,26 @@ def killed(design: Path, out: Path, kills: str, work: float, chance: random.Rand
 @contextmanager
 def cluster() -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
     """Give a real scheduler's address and its two workers, each a process with one thread and no nurse."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
     quiet: dict[str, Any] = {"cwd": ROOT, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     dask = [sys.executable, "-m", "distributed.cli.dask_"]
-    scheduler = [*dask[:-1], f"{dask[-1]}scheduler", "--host", address, "--no-dashboard"]
-    worker = [*dask[:-1], f"{dask[-1]}worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
-    processes = [subprocess.Popen(scheduler, **quiet)]
-    try:
-        processes += [subprocess.Popen(worker, **quiet) for _ in range(2)]
-        yield address, processes[1:]
-    finally:
-        for process in processes:
-            process.kill()
-            process.wait()
+    processes: list[subprocess.Popen[bytes]] = []
+    with tempfile.TemporaryDirectory() as place:
+        file = Path(place, "scheduler.json")
+        scheduler = [*dask[:-1], f"{dask[-1]}scheduler", "--host", "tcp://127.0.0.1:0", "--scheduler-file", str(file)]
+        try:
+            processes.append(subprocess.Popen([*scheduler, "--no-dashboard"], **quiet))
+            while not file.exists() or not file.stat().st_size:  # written when it listens, on a port that was free
+                if processes[0].poll() is not None:
+                    sys.exit(f"the scheduler ended with status {processes[0].returncode}")
+                time.sleep(0.05)
+            address = json.loads(file.read_text())["address"]
+            worker = [*dask[:-1], f"{dask[-1]}worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+            processes += [subprocess.Popen(worker, **quiet) for _ in range(2)]
+            yield address, processes[1:]
+        finally:
+            for process in processes:
+                process.kill()
+                process.wait()
 
 
 def through_dask(design: Path, out: Path, points: int, wanted: int) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
@@ -52,7 +53,7 @@ def main() -> int:
     began = time.perf_counter()
     with ProcessPoolExecutor(options.jobs) as pool:
         twins = list(tqdm(pool.map(one, tasks), total=len(tasks), disable=None))
-    seconds = time.perf_counter() - began
+    seconds, processor = time.perf_counter() - began, sum(os.times()[:4])
 
     print(f"{len(twins)} twins by {options.model}, {options.slices} slices, fitted to {options.measured}; truths from")
     for name, (low, high) in RANGES.items():
@@ -68,7 +69,8 @@ def main() -> int:
     print(f"    drag and restitution together held in {both} of {len(twins)}")
     missed = [twin.seed for twin in twins if twin.estimate.chi2 > twin.chi2_of_truth + 0.5]
     print(f"    lowest chi^2 not found (above that of the truth): {len(missed)} {missed or ''}")
-    print(f"    flights per fit: {median(twin.estimate.flights for twin in twins):.0f}; {seconds:.0f} s")
+    flights = median(twin.estimate.flights for twin in twins)
+    print(f"    flights per fit: {flights:.0f}; {seconds:.0f} s, {processor:.0f} s of processor time")
     if options.out:
         rows = [
             {"seed": twin.seed, "chi2": twin.estimate.chi2, "chi2_of_truth": twin.chi2_of_truth,

@@ -11,8 +11,9 @@ import argparse
 import html
 import re
 import shutil
-import sys
 from pathlib import Path
+
+import reference
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
@@ -113,9 +114,6 @@ def bring(source: Path, target: Path) -> None:
 
 def build(out: Path, report: Path | None = None) -> None:
     """Write the site into a folder."""
-    sys.path.insert(0, str(HERE))
-    import reference
-
     out.mkdir(parents=True, exist_ok=True)
     reference.build(out / "reference")
     for file in PAGES:

@@ -66,6 +66,11 @@ def run(scenario: Scenario, order: Order) -> Trajectory:
     if order.frame == "rotating":
         return run_rotating(scenario, order)
     settings = PymunkKnobs.from_overrides(order.knobs)
+    if settings.grid_offset:
+        raise ValueError(
+            f"grid_offset = {settings.grid_offset!r} has no effect in frame = 'free'; leave it out, or take frame = "
+            "'rotating'"
+        )
     iterations = enough_iterations(scenario) if order.iterations is None else order.iterations
     ice, dt, times = order.ice, order.dt, order.times
     hits = impacts.hits_of(scenario, order)

@@ -6,6 +6,8 @@ import math
 import numbers
 from collections.abc import Collection
 
+import numpy as np
+
 from slicemodel.scenario import unknown_name
 
 
@@ -14,6 +16,13 @@ def known_name(what: str, name: object, known: Collection[str]) -> str:
     if isinstance(name, str) and name in known:
         return name
     raise ValueError(unknown_name(f"{what} =", name, known))
+
+
+def true_or_false(name: str, value: object) -> bool:
+    """Return ``value`` as bool if it is one, else raise ValueError."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise ValueError(f"{name} = {value!r} is not True or False")
+    return bool(value)
 
 
 def number_above(name: str, value: object, above: float, most: float, unit: str = "") -> float:

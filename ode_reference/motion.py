@@ -121,34 +121,18 @@ class Model:
     switches: Switches = PUBLISHED
 
 
-@dataclass(frozen=True, slots=True)
-class Instant:
-    """A state, what it means and what it feels: ``y`` = [theta, r_0..r_N-1, v_0..v_N-1]; ``r``, ``v`` are views of it.
-
-    ``a`` is the model's acceleration of every slice, shape (N,) [m/s^2], held ones included (see ``Model``);
-    ``omega`` is in [rad/s].
-    """
-
-    t: float
-    y: FloatArray
-    r: FloatArray
-    v: FloatArray
-    a: FloatArray
-    omega: float
-
-
 class Motion:
-    """The right-hand side that a stepper integrates: one model, one throw, and the slices that are held at present.
+    """The right-hand side of a leg: one model, one throw, and the slices that are held at present.
 
     Parameters
     ----------
     throw : Throw
     model : Model
-    held : array, shape (N,) of bool - slices that do not move. Changed by ``hold``, and only between two steppers:
-        a stepper assumes that its right-hand side is smooth.
+    held : array, shape (N,) of bool - slices that do not move. Changed by ``hold``, and only between two legs:
+        within one the right-hand side must be smooth.
     """
 
-    __slots__ = ("any_held", "evaluations", "free", "held", "held_speeds", "model", "n", "throw")
+    __slots__ = ("evaluations", "free", "held", "model", "n", "throw")
 
     def __init__(self, throw: Throw, model: Model, held: BoolArray) -> None:
         self.throw = throw
@@ -160,8 +144,6 @@ class Motion:
     def hold(self, held: BoolArray) -> None:
         """Let these slices be held from now on, and no others."""
         self.held = held
-        self.held_speeds = held.nonzero()[0] + self.n + 1
-        self.any_held = self.held_speeds.size > 0
         self.free = np.where(held, 0.0, 1.0)
 
     def acceleration(self, y: FloatArray, free: FloatArray) -> tuple[float, FloatArray]:
@@ -175,27 +157,5 @@ class Motion:
     def __call__(self, t: float, y: FloatArray) -> FloatArray:
         """Return dy/dt, shape (2N + 1,); the equations do not depend on ``t`` itself."""
         del t
-        derivative = np.empty(2 * self.n + 1)
-        self.derive(y, derivative)
-        return derivative
-
-    def derive(self, y: FloatArray, derivative: FloatArray) -> None:
-        """Write dy/dt at ``y`` into ``derivative``, both of shape (2N + 1,)."""
-        n = self.n
-        derivative[0], derivative[n + 1 :] = self.acceleration(y, self.free)
-        derivative[1 : n + 1] = y[n + 1 :]
-        if self.any_held:
-            derivative[self.held_speeds] = 0.0
-
-    def at(self, t: float, y: FloatArray) -> Instant:
-        """Return the state ``y`` at time ``t`` with the acceleration the model gives it."""
-        n = self.n
-        omega, acceleration = self.acceleration(y, self.free)
-        return Instant(t, y, y[1 : n + 1], y[n + 1 :], acceleration, omega)
-
-    def derivative_of(self, now: Instant) -> FloatArray:
-        """Return dy/dt at ``now``, shape (2N + 1,), from the acceleration it carries."""
-        derivative = np.concatenate(((now.omega,), now.v, now.a))
-        if self.any_held:
-            derivative[self.held_speeds] = 0.0
-        return derivative
+        omega, a = self.acceleration(y, self.free)
+        return np.concatenate(((omega,), y[self.n + 1 :], np.where(self.held, 0.0, a)))

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ode_reference.arguments import known_name, number_within
+from ode_reference.arguments import known_name, number_within, true_or_false
 from ode_reference.combinations import model_of
 from ode_reference.impacts import LAWS
 from ode_reference.models import MODELS
 from ode_reference.motion import Model
 from ode_reference.switches import PREFIX, Switches
 from slicemodel.scenario import Scenario, not_whole
-from slicemodel.trajectory import Trajectory, output_times
+from slicemodel.trajectory import Trajectory, output_times, times_given
 
 if TYPE_CHECKING:
     from ode_reference.flow.api import Batch
@@ -111,7 +111,11 @@ def solve(
     changes by less than 1e-7 omega_0 when the rest speed is cut tenfold, unless a slice grazes an end (``grazes``). The
     exception is "accelerating-origin" with 1e-4 omega_0, since there only a slice at rest pushes the tube. With recoil
     the band is 3e-3 omega_0 on the paper's throw, and 4e-3 has been seen on another bottle with 50 slices: which slice
-    rests when decides the order of all later impacts. Where gamma = |omega0| exactly and ``roots`` are off, nothing
+    rests when decides the order of all later impacts. Status "ok" says nothing of that band. With recoil,
+    drag and e above 0.9 slices hop on an end and hardly ever rest: there a change of omega0 by 3e-11 of itself moved
+    omega by more than 1e-4 omega_0 in 56 of 117 flights, by 5e-2 at the most; a tenth of the rest speed showed it in 11
+    of these. Ask for the band of a flight by a twin, ``solve_batch([throw, twin], model)`` with that change
+    (docs/theory.md, "Rests, and the band they cost"). Where gamma = |omega0| exactly and ``roots`` are off, nothing
     pushes the water and it stays where it is. A full bottle that no weight pulls along its axis is its own mirror image
     for ever, by the simultaneous law: all methods hold it to that, since rounding would part the two halves as
     exp(theta) grows, and the hits of a pair with them. Water a hair short of full does part, after some turns.
@@ -123,6 +127,7 @@ def solve(
     """
     if not isinstance(scenario, Scenario):
         raise ValueError(f"scenario = {scenario!r} is not a slicemodel.Scenario")
+    energy = true_or_false("energy", energy)
     if model == COLUMN:
         from ode_reference import column
 
@@ -193,7 +198,8 @@ def solve_batch(
             raise ValueError(f"throws[{k}] = {throw!r} is not a slicemodel.Scenario")
     chosen = _model(model)
     known_name("impact_law", impact_law, LAWS)
-    given = None if times is None else np.asarray(times, dtype=np.float64)
+    energy, states = true_or_false("energy", energy), true_or_false("states", states)
+    given = None if times is None else times_given(times)
     if given is not None and given.ndim == 2 and len(given) != len(throws):
         raise ValueError(f"times has shape {given.shape}; {len(throws)} throws need ({len(throws)}, P) or (P,)")
     rows = []

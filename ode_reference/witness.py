@@ -133,7 +133,6 @@ class _Flight:
         self.t = 0.0
         self.y = np.concatenate([[scenario.theta0], scenario.initial_positions(), np.zeros(n)])
         self.resting: SideArray = np.zeros(n, dtype=np.int64)
-        self.length: float | None = None
         self.states: list[FloatArray] = []
         self.impacts: list[tuple[NDArray[Any], ...]] = []
         self.counts = {"steps": 0, "impacts": 0, "rests": 0, "releases": 0}
@@ -167,10 +166,6 @@ class _Flight:
             return
         path = leg.sol
         self.counts["steps"] += len(leg.t) - 1
-        if path.interpolants:
-            # What the last step would have been without the event; one step a leg says nothing of how long it may be.
-            last = path.interpolants[-1]
-            self.length = float(last.t - last.t_old) * (1.5 if len(leg.t) == 2 else 1.0)
         found = [name for (name, _), times in zip(watch, leg.t_events, strict=True) if len(times)]
         end, y = float(leg.t[-1]), leg.y[:, -1].copy()
         missed = self._first_missed(leg.t, path)
@@ -191,8 +186,6 @@ class _Flight:
     def _solved(self, events: list[Event]) -> Any:
         """Return what ``solve_ivp`` makes of a leg that starts now, or None if it cannot go on."""
         options = {name: self.settings[name] for name in ("method", "rtol", "atol", "max_step")}
-        if self.length is not None and self.settings["method"] != "LSODA":  # which starts at order 1, by short steps
-            options["first_step"] = min(self.length, options["max_step"], self.scenario.duration - self.t)
         span = self.t, self.scenario.duration
         try:
             return solve_ivp(self._slope, span, self.y, events=events, dense_output=True, **options)

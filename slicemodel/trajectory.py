@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from slicemodel.scenario import Scenario
+from slicemodel.scenario import Scenario, shown
 
 FloatArray = NDArray[np.float64]
 
@@ -260,17 +260,31 @@ def _read_only(values: ArrayLike) -> FloatArray:
     return array
 
 
+def times_given(times: ArrayLike) -> FloatArray:
+    """Return times as an array of numbers [s], of any shape.
+
+    Raises
+    ------
+    ValueError
+        If they are none.
+    """
+    try:
+        return np.array(times, dtype=np.float64)
+    except (ValueError, TypeError):
+        raise ValueError(f"times = {shown(times)} is no array of seconds") from None
+
+
 def output_times(scenario: Scenario, times: ArrayLike | None, default_points: int = 1000) -> FloatArray:
     """Return the output times of a run [s]: ``times`` if given, else uniform points with both ends.
 
     Raises
     ------
     ValueError
-        If a time is not finite, outside [0, duration], or not larger than the one before.
+        If they are no numbers, or one is not finite, outside [0, duration], or not larger than the one before.
     """
     if times is None:
         return np.linspace(0.0, scenario.duration, default_points)
-    values = np.array(times, dtype=np.float64)
+    values = times_given(times)
     if values.ndim != 1 or len(values) == 0:
         raise ValueError(f"times has shape {values.shape}; a non-empty one-dimensional list of seconds is needed")
     outside = ~((values >= 0.0) & (values <= scenario.duration))

@@ -41,6 +41,7 @@ def cache_of_these_tests(tmp_path_factory):
         yield
 
 
+@pytest.hookimpl(tryfirst=True)  # before xdist reads the marks
 def pytest_collection_modifyitems(items):
     """Keep in one process, with ``--dist loadgroup``, the tests of the one report, and those that share runs."""
     for item in items:

@@ -9,10 +9,13 @@ import numpy as np
 from flipproof.chapters import chapters_named
 from flipproof.chapters.maps.study import read_flight, study_readings
 from flipproof.cli import main as cli
+from flipproof.figures.style import Drawing
 from flipproof.frame.flights import Flights
-from flipproof.frame.gather import Gathered, gather
+from flipproof.frame.gather import Gathered, gather, tell
 from flipproof.frame.pool import Here, make_each
 from flipproof.frame.solvers import Made, Run
+from flipproof.output.provenance import provenance
+from flipproof.page.render import render
 from slicemodel import Scenario, Trajectory
 
 
@@ -61,6 +64,15 @@ def spoiled(gathered: Gathered, broken: Iterable[Run], reason: str, chapters: It
     made = {run: Made(run, None, 0.1, reason) if run in lost else each for run, each in gathered.flights.items()}
     again = gather(chapters_named(*chapters), gathered.ask, Answers(made.__getitem__))
     return replace(gathered, flights=Flights(made), outcomes={**gathered.outcomes, **again.outcomes})
+
+
+def page_of(gathered: Gathered, picture: Drawing) -> str:
+    """Return the page of a report with one picture in the place of every figure: to draw them takes longer."""
+    told = {
+        name: replace(each, figures=tuple(replace(figure, drawn=picture) for figure in each.figures))
+        for name, each in tell(gathered).items()
+    }
+    return render(gathered, told, provenance("flipproof report"))
 
 
 def study_map(throw, axis, fills, values, made, **how):

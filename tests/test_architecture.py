@@ -126,11 +126,24 @@ def test_helpers_know_nothing_of_the_model():
             assert not module.startswith(ROOMS), f"{helper} imports {module}"
 
 
-@pytest.mark.parametrize("heavy", ["numba", "scipy", "matplotlib", "pymunk", "mujoco", "jinja2", "numpy"])
-@pytest.mark.parametrize("statement", ["import slicemodel, ode_reference, engine_check, flipproof.cli.main"])
-def test_start_up_is_light(statement, heavy):
-    code = f"import sys; {statement}; sys.exit({heavy!r} in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0, f"{heavy} is loaded"
+def test_start_up_is_light():
+    heavy = {"numba", "scipy", "matplotlib", "pymunk", "mujoco", "jinja2", "numpy"}
+    code = "import sys, slicemodel, ode_reference, engine_check, flipproof.cli.main; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    assert "flipproof.cli.main" in loaded.split()
+    assert heavy.isdisjoint(loaded.split()), heavy.intersection(loaded.split())
+
+
+@pytest.fixture(scope="module")
+def shared():
+    return "costly to make"
+
+
+@pytest.mark.usefixtures("shared")
+def test_tests_that_share_a_fixture_are_kept_in_one_process(request):
+    """As the README's command runs them: xdist tells its scheduler the group at the end of a test's name."""
+    grouped = getattr(request.config.option, "loadgroup", False)
+    assert request.node.nodeid.endswith("@test_architecture") == grouped
 
 
 def test_a_relative_tolerance_says_what_holds_near_zero():

@@ -3,11 +3,16 @@
 import json
 import re
 import shlex
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from flipproof.cli.main import main
+from flipproof.film.fit.problem import predict
+from flipproof.film.measured import HELD, hold, read_measured
+from slicemodel import Scenario
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "tutorial.md"
 
@@ -58,10 +63,15 @@ def test_the_fit_finds_the_throw_and_the_equation(lesson):
     assert found["omega0"]["value"] == pytest.approx(20.0, rel=0.05, abs=0.0)
 
 
+def test_the_track_of_the_lesson_is_nearest_to_free_flight_with_nothing_fitted(lesson):
+    track = read_measured(lesson / "my-track" / "track.csv")
+    throw = replace(Scenario.from_toml(lesson / "throw.toml"), duration=float(track.t[-1]))
+    misfits = {name: np.linalg.norm(track.values - predict([throw], name, track)[0]) for name in HELD}
+    assert min(misfits, key=misfits.get) == "free-flight"
+
+
+@pytest.mark.slow
 def test_the_track_of_the_lesson_names_free_flight_beside_a_report(lesson):
     """What ``report --measured my-track/track.csv`` shows."""
-    from flipproof.film.measured import hold, read_measured
-    from slicemodel import Scenario
-
     measured = hold(read_measured(lesson / "my-track" / "track.csv"), Scenario.from_toml(lesson / "throw.toml"))
     assert next(iter(measured.misfits)) == measured.fits[0].solver == "free-flight"

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from slicemodel.compiled import inner
+from slicemodel.compiled import merged
 
 
-@inner
+@merged
 def gaps(s, q, world, out):
     """Write all gaps: four corners over the table, then the slices' [m]."""
     sine, cosine = math.sin(q[2]), math.cos(q[2])
@@ -29,7 +29,7 @@ def gaps(s, q, world, out):
             out[4 + n + i] = s[i] - world.low[i]
 
 
-@inner
+@merged
 def rates(w, q, world, out):
     """Write the rates of all gaps [m/s]."""
     sine, cosine = math.sin(q[2]), math.cos(q[2])
@@ -51,7 +51,7 @@ def rates(w, q, world, out):
             out[4 + n + i] = w[i]
 
 
-@inner
+@merged
 def seat(s, closed, world):
     """Put resting slices exactly on what they rest on: a rebound cut short has left them up to a micrometre off.
 
@@ -80,7 +80,7 @@ def seat(s, closed, world):
             j -= 1
 
 
-@inner
+@merged
 def first_zero(begin, rate, end, h):
     """Return the first zero in (0, h] of the parabola that starts at ``begin`` > 0 with ``rate`` and ends below 0."""
     bend = (end - begin - rate * h) / (h * h)

@@ -7,10 +7,10 @@ import math
 from ode_reference.landing_core.contacts import rates
 from ode_reference.landing_core.impulses import respond
 from ode_reference.landing_core.layout import MOST_ROUNDS, STILL
-from slicemodel.compiled import compiled, inner
+from slicemodel.compiled import merged
 
 
-@inner
+@merged
 def step(q, s, w, h, closed, world, free, target, work, x, y, pn, pt, q1, s1, w1):
     """Write the state a time ``h`` later with the closed contacts as they are; return whether impulses were found."""
     n, m = world.n, world.m
@@ -78,7 +78,7 @@ def step(q, s, w, h, closed, world, free, target, work, x, y, pn, pt, q1, s1, w1
     return solved
 
 
-@compiled
+@merged
 def energy(q, s, w, world):
     """Return the energy over the table [J]."""
     sine, cosine = math.sin(q[2]), math.cos(q[2])
@@ -90,7 +90,7 @@ def energy(q, s, w, world):
     return total
 
 
-@inner
+@merged
 def strike(q, s, w, taking, closed, world, free, target, work, x, y, pn, pt, rate):
     """Change the velocities by one impact of the contacts ``taking`` part; return whether impulses were found."""
     sine, cosine = math.sin(q[2]), math.cos(q[2])
@@ -115,7 +115,7 @@ def strike(q, s, w, taking, closed, world, free, target, work, x, y, pn, pt, rat
     return solved
 
 
-@inner
+@merged
 def impact(q, s, w, touching, taking, closed, world, free, target, work, x, y, pn, pt, rate):
     """Resolve one instant by the law of the world; return whether it could be."""
     count = len(touching)

@@ -50,8 +50,6 @@ class Flock(NamedTuple):
     horizon: float
 
 
-EMPTY = Flock(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
 NOTHING = math.inf
 """Between this and its negative lies no slice: so a flock is dissolved."""
 

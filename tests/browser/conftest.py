@@ -77,6 +77,11 @@ class Visit:
     def probe(self, call: str):
         return self.page.evaluate(f"probes.{call}()")
 
+    def settle(self):
+        """Wait until the page has drawn what was asked of it: for two frames, and for what they put off."""
+        frame = "new Promise(done => requestAnimationFrame(() => setTimeout(done)))"
+        self.page.evaluate(f"{frame}.then(() => {frame})")
+
 
 @pytest.fixture(scope="package")
 def visit(browser, folder) -> Callable[..., Iterator[Visit]]:
@@ -87,6 +92,7 @@ def visit(browser, folder) -> Callable[..., Iterator[Visit]]:
         context = browser.new_context(
             viewport={"width": size[0], "height": size[1]}, color_scheme=scheme, reduced_motion="reduce", **options
         )
+        context.set_default_timeout(120_000)  # of a machine with much else to do
         page = context.new_page()
         visited = Visit(page)
         page.on("console", lambda message: visited.console.append(f"{message.type}: {message.text}"))
@@ -95,6 +101,7 @@ def visit(browser, folder) -> Callable[..., Iterator[Visit]]:
         page.goto((folder / "index.html").as_uri() + fragment, wait_until="load")
         page.wait_for_function("() => [...document.images].every(image => image.src && image.complete)")
         page.evaluate((HERE / "probes.js").read_text(encoding="utf-8"))
+        visited.settle()
         yield visited
         context.close()
 

@@ -58,7 +58,6 @@ def test_findings_are_filtered_by_what_is_typed(visit, report):
 
 def test_only_boxes_that_scroll_are_stops(visit):
     with visit((390, 844)) as visited:
-        visited.page.wait_for_timeout(100)
         wrong = visited.page.evaluate(
             "[...document.querySelectorAll('main .scroll')].filter(box => box.checkVisibility() && "
             "(box.scrollWidth > box.clientWidth + 1) !== (box.tabIndex === 0)).map(box => box.ariaLabel)"

@@ -26,7 +26,7 @@ def opened(request, visit):
     size, scheme = request.param
     with visit(size, scheme) as visited:
         visited.page.evaluate("document.querySelectorAll('details').forEach(details => { details.open = true; })")
-        visited.page.wait_for_timeout(100)
+        visited.settle()
         yield visited
 
 
@@ -95,7 +95,7 @@ def test_on_a_phone_the_contents_fold_into_a_bar_that_stays(visit):
         bar = button.bounding_box()
         assert bar["y"] == pytest.approx(0.0, abs=1.0)
         assert heading["y"] >= bar["y"] + bar["height"]
-        assert visited.page.locator(".here").inner_text() == "Errata"
+        assert visited.page.locator(".here").inner_text() == "Errata of the paper"
 
 
 def test_a4_pages_cut_nothing_off(visit):

@@ -14,7 +14,6 @@ LARGEST = 5e6
 @pytest.fixture(scope="module")
 def opened(visit):
     with visit() as visited:
-        visited.page.wait_for_timeout(200)
         yield visited
 
 
@@ -143,9 +142,15 @@ def test_a_section_opens_by_link_key_and_button_and_stays_open_on_reload(visit, 
         visited.page.locator("#ice summary").focus()
         visited.page.keyboard.press("Enter")
         visited.page.wait_for_function("() => document.querySelector('#ice > details').open")
-        visited.page.wait_for_timeout(50)
+        visited.page.wait_for_function("() => history.state?.open?.length === 2")
         visited.page.reload(wait_until="load")
         assert visited.page.evaluate(opened) == ["ice", "findings"]
+        inner = visited.page.locator(".sentences")
+        assert inner.get_attribute("open") is None
+        inner.locator("summary").click()
+        visited.page.wait_for_timeout(50)
+        visited.page.reload(wait_until="load")
+        assert inner.get_attribute("open") is not None
         visited.page.locator(".unfold").click()
         assert len(visited.page.evaluate(opened)) == visited.page.locator(".fold").count()
 
@@ -177,4 +182,5 @@ def test_the_page_is_whole_without_scripts(browser, folder):
     assert page.locator("#verdict .answer").is_visible()
     assert page.locator("figure img").first.bounding_box()["height"] > 100
     assert page.locator(".fold-body").count() == page.locator(".fold-body:visible").count() > 10
+    assert page.locator("details").count() == page.locator("details[open]").count()
     context.close()

@@ -44,7 +44,7 @@ def test_the_cursor_tells_what_the_summary_has(chart, report):
     rows = {row["name"]: row for row in report.summary["solvers"]}
     for name in ("eq8", "free-flight", "published-python"):
         assert float(told(chart, name)) == pytest.approx(rows[name]["final"], abs=6e-4)
-    assert "eq8" in chart.page.locator("#figure-omega [role=status]").text_content()
+    assert "Eq. 8" in chart.page.locator("#figure-omega [role=status]").text_content()
     chart.page.keyboard.press("Home")
     assert float(told(chart, "eq8")) == pytest.approx(1.0, abs=1e-3)
 
@@ -69,6 +69,43 @@ def test_a_part_of_the_time_is_enlarged_by_keys_buttons_and_mouse(chart):
     chart.page.mouse.up()
     assert min(ticks(chart)) > 0.2
     assert max(ticks(chart)) < 0.45
+
+
+def test_buttons_say_the_spoken_names(chart):
+    words = chart.page.locator("#figure-omega .chart-tools button").all_text_contents()
+    assert any("Eq. 8" in each for each in words)
+    assert any("published program" in each for each in words)
+    assert not any("eq8" in each or "published-python" in each for each in words)
+
+
+@pytest.mark.parametrize("g", [9.81, 0.0])
+def test_the_chart_of_the_sliders_tells_its_values_at_a_cursor(visit, g):
+    """By mouse and by keys, also of the curves that a slider has just moved; faint curves tell none."""
+    with visit((1280, 900), fragment="#live") as visited:
+        page = visited.page
+        page.wait_for_function("() => flipproofSliders.drawn().thrown")
+        page.evaluate("g => { flipproofSliders.set({ g }); }", g)
+        svg = page.get_by_test_id("live-omega")
+        svg.scroll_into_view_if_needed()
+        assert page.locator("#sliders [data-toggle]").count() == 3
+        assert page.locator("#sliders [data-line=eq8]").count() == (1 if g else 2)
+        box = svg.bounding_box()
+        page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 100)
+        time = float(page.locator("#sliders .chart-tools > .soft").text_content().split()[4])
+        assert 0.1 < time < 0.4
+        curves = page.evaluate("flipproofSliders.drawn().curves.eq8.length") - 1
+        for name in ("published-python", "eq8", "free-flight"):
+            at = page.evaluate(
+                "([name, k]) => flipproofSliders.drawn().curves[name][k] / flipproofSliders.drawn().thrown.omega0",
+                [name, round(time / 0.5 * curves)],
+            )
+            assert float(page.locator(f"#sliders [data-toggle='{name}'] output").inner_text()) == pytest.approx(
+                at, abs=5e-3
+            )
+        svg.focus()
+        page.keyboard.press("Home")
+        assert page.locator("#sliders [data-toggle=eq8] output").inner_text() == "1.000"
+        assert visited.console == []
 
 
 def test_the_story_has_one_cursor_for_curves_and_water(visit):

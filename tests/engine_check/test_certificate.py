@@ -11,7 +11,7 @@ import pytest
 import engine_check
 import ode_reference
 from engine_check import DEFAULT_DT, ENGINES, certificate, certify, engine_pymunk, measure_restitution
-from engine_check.refinement import BENT, COARSEST, DOUBLE, EARLIER, ITERATED, Runs, coarsest_step
+from engine_check.refinement import BENT, COARSEST, DOUBLE, EARLIER, ITERATED, MOVED, Runs, coarsest_step
 from engine_check.witness import WITNESSES, witness_of
 from slicemodel.scenario import Bottle, Scenario
 from slicemodel.trajectory import output_times
@@ -175,6 +175,70 @@ def test_an_exchange_of_impacts_that_half_the_step_does_not_show_is_seen_by_anot
     assert half < 0.6 * np.max(error)
     assert np.max(error) <= 3e-3
     assert np.mean(error <= found.band + band) >= 0.95
+
+
+# ---------------------------------------------------------------- hits that are answered late
+
+
+def off_eq8(run):
+    exact = ode_reference.solve(run.scenario, "eq8", run.t).omega
+    return np.abs(run.omega - exact) / abs(run.scenario.omega0)
+
+
+def test_a_hit_in_the_last_step_before_an_output_time_is_told_by_no_halving_but_by_another_grid():
+    """Default throw, N = 50: the first hit, at 0.0148988 s, lies 0.93 h before the point that 4h, 2h and h share."""
+    fifty = Scenario().with_slices(50)
+    times = np.linspace(0.0, 0.5, 1000)[:41]
+    h = times[1] / 4
+    short = replace(fifty, duration=float(times[-1]))
+    runs = Runs(short, "pymunk", {"times": times, "frame": "rotating"})
+    of_4h, of_2h, of_h = (runs.make("", factor * h, 2) for factor in (4, 2, 1))
+    hit = ode_reference.solve(short, "eq8", times).impacts.time
+    assert len(hit) == 1
+    late = times[np.searchsorted(times, hit[0])] - hit[0]
+    assert 0.0 < late < h
+    after = times > hit[0]
+    error = off_eq8(of_h)[after]
+    for change in (runs.apart(of_4h, of_2h)[after] / 2, runs.apart(of_2h, of_h)[after]):
+        assert np.all(1.25 * change < error)
+    found = certify(short, times=times, frame="rotating")
+    assert found.ok, found.reason
+    assert found.settings["dt"] == pytest.approx(h, rel=1e-12, abs=0.0)
+    answered = (times < hit[0]) | (times > hit[0] + 2 * h)
+    assert np.all((off_eq8(found.trajectory) <= found.band)[answered])
+    assert roles(found).count(MOVED) == 3
+    # One hit: the error is a u, and the two grids are a h / 2 apart.
+    moved = engine_check.solve(short, dt=h, times=times, frame="rotating", grid_offset=0.5)
+    apart = np.abs(moved.omega - of_h.omega)[after] / short.omega0
+    assert apart[0] / (error[0] - off_eq8(of_h)[~after][-1]) == pytest.approx(h / 2 / late, rel=0.05, abs=0.0)
+
+
+@pytest.mark.parametrize(
+    "scenario",
+    [
+        Scenario().with_slices(50),
+        replace(Scenario(restitution=0.2).with_slices(50), drag=0.0),
+        replace(PAIR, restitution=0.8),
+        replace(TEN, restitution=0.0, omega0=-15.0),
+    ],
+    ids=["fifty", "fifty, dry", "pair", "ten, sticking"],
+)
+def test_certified_runs_in_eq8s_frame_are_eq8_within_their_bands(scenario):
+    found = certify(scenario, frame="rotating")
+    assert found.ok, found.reason
+    assert np.mean(off_eq8(found.trajectory) <= found.band) >= 0.99
+
+
+def test_where_late_hits_move_omega_beyond_the_tolerance_the_run_is_not_certified(monkeypatch):
+    monkeypatch.setattr(Runs, "delay", lambda *_: np.array([0.0, 1.1e-3]))
+    found = certify(SHORT, times=[0.0, 0.02], frame="rotating", tolerance=1e-3, levels=1)
+    assert found.status == "not-converged"
+    assert found.reason.startswith(MOVED)
+
+
+def test_a_certificate_chooses_its_grids_itself():
+    with pytest.raises(ValueError, match=r"grid_offset = 0\.5 is not offered to a certificate.*give dt"):
+        certify(SHORT, frame="rotating", grid_offset=0.5)
 
 
 def test_a_change_that_is_not_a_number_is_not_below_the_tolerance(monkeypatch):

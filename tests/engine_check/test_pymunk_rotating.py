@@ -256,6 +256,34 @@ def test_it_is_reproducible_and_the_mirror_throw_is_the_mirror_image():
     np.testing.assert_allclose(mirror.r, first.r, rtol=1e-12)
 
 
+@pytest.mark.parametrize(("drag", "least", "most"), [(0.0, 1.9, 2.1), (1.0, 0.9, 1.1)], ids=["dry", "drag"])
+@pytest.mark.parametrize("offset", [0.25, 0.5])
+def test_on_a_grid_beside_the_release_the_order_is_the_same(offset, drag, least, most):
+    smooth = replace(TEN, drag=drag, duration=0.012)
+    exact = ode_reference.solve(smooth, "eq8", [0.006, 0.012])
+    assert len(exact.impacts) == 0
+    gaps = []
+    for dt in (1e-4, 5e-5, 2.5e-5):
+        run = thrown(smooth, dt=dt, times=[0.006, 0.012], grid_offset=offset)
+        gaps.append(np.abs(run.omega - exact.omega))
+    orders = np.log2(np.divide(gaps[:-1], gaps[1:]))
+    assert np.all((least < orders) & (orders < most)), orders
+
+
+def test_on_a_grid_beside_the_release_the_run_starts_at_release():
+    run = thrown(FIFTY, times=[0.0, 0.01], grid_offset=0.5)
+    assert run.omega[0] == pytest.approx(FIFTY.omega0, rel=1e-13, abs=0.0)
+    assert run.theta[0] == FIFTY.theta0
+    np.testing.assert_allclose(run.r[0], FIFTY.initial_positions(), atol=1e-15)
+    assert np.all(run.v[0] == 0.0)
+    assert run.settings["grid_offset"] == 0.5
+
+
+def test_the_free_frame_has_no_grid_beside_the_release():
+    with pytest.raises(ValueError, match=r"grid_offset = 0\.5 has no effect in frame = 'free'"):
+        solve(THROW, dt=1e-4, grid_offset=0.5)
+
+
 def test_more_iterations_change_nothing():
     few, many = (thrown(FIFTY, times=[0.5], iterations=iterations).omega[0] for iterations in (None, 50))
     assert few == pytest.approx(many, rel=1e-12, abs=0.0)

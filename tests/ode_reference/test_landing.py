@@ -258,7 +258,7 @@ def flown(seed, **changes):
 
 @pytest.mark.parametrize("slices", ["exclude", "staggered"])
 def test_a_full_bottle_lands_like_ice(slices):
-    for seed in range(15):
+    for seed in range(50):
         full, table = flown(seed, water_mass=1.0)
         ice = replace(full, scenario=replace(full.scenario, frozen=True), v=np.zeros(10))
         one, other = ode_reference.land(full, table, slices=slices), ode_reference.land(ice, table)

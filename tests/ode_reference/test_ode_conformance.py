@@ -155,6 +155,12 @@ def test_a_run_in_which_time_stops_passing_is_stalled(monkeypatch):
         ({"times": [0.1, 0.4]}, ["outside [0, 0.3]"]),
         ({"times": [math.nan]}, ["times = "]),
         ({"times": []}, ["times has shape"]),
+        ({"times": "abc"}, ["times = 'abc' is no array of seconds"]),
+        ({"times": [[0.0, 0.1], [0.2]]}, ["times = [[0.0, 0.1], [0.2]] is no array of seconds"]),
+        ({"times": [1j]}, ["times = [1j] is no array of seconds"]),
+        ({"energy": "no"}, ["energy = 'no' is not True or False"]),
+        ({"energy": "no", "model": "column"}, ["energy = 'no' is not True or False"]),
+        ({"energy": "no", "method": "DOP853"}, ["energy = 'no' is not True or False"]),
     ],
 )
 def test_bad_arguments_are_refused_by_name_value_and_range(arguments, words):

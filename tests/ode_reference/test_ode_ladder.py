@@ -109,9 +109,10 @@ def test_free_flight_of_the_papers_throw_ends_where_the_engines_end(law):
     twins = [replace(Scenario(), omega0=20 * (1 + k * 1e-11)).with_slices(50) for k in range(-20, 21)]
     last = solve_batch(twins, "free-flight", [0.5], impact_law=law, rest_speed=1e-4).omega
     assert last.mean() == pytest.approx(3.3005, abs=1e-3)
-    # After half of the impacts the flights are still the same, and so are the two methods.
-    for method in ("taylor", "DOP853"):
-        found = solve(Scenario().with_slices(50), "free-flight", [0.15], method=method, impact_law=law)
+    # After half of the impacts the flights are still the same, and so are the two methods: by then a change of omega_0
+    # has grown four-hundredfold, and so has the error of a step.
+    for method in ({}, {"method": "DOP853", "rtol": 1e-12}):
+        found = solve(Scenario().with_slices(50), "free-flight", [0.15], **method, impact_law=law)
         assert found.omega[0] == pytest.approx(5.382677, abs=1e-6)
 
 

@@ -317,6 +317,36 @@ def test_a_table_that_cannot_be_fitted_is_refused_in_one_line(tmp_path, text, as
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("quantity", "value", "noise", "words"),
+    [
+        (
+            "theta",
+            1.5,
+            0.0,
+            r"nothing turns: theta changes by 0 rad in 60 frames; more than 8 times its noise of 0 rad",
+        ),
+        (
+            "theta",
+            1.5,
+            1e-3,
+            r"nothing turns: theta changes by 0.00\d+ rad in 60 frames; more than 8 times its noise of 0.0",
+        ),
+        ("omega", 0.0, 0.0, r"nothing turns: omega is at most 0 rad/s in 60 frames"),
+        ("omega", 0.0, 0.1, r"nothing turns: omega is at most 0.\d+ rad/s in 60 frames"),
+        ("omega", -7.0, 0.0, r"omega = -7 rad/s in all 60 frames: it turns like ice"),
+    ],
+)
+def test_a_flight_in_which_nothing_turns_or_all_turns_like_ice_is_refused(quantity, value, noise, words):
+    values = value + noise * np.random.default_rng(1).normal(size=60)
+    still = Measurement(label="film", t=np.arange(60) / 120, values=values, quantity=quantity)
+    with pytest.raises(ValueError, match=f"^film: {words}") as error:
+        pose(still, CUT, "midpoint")
+    assert "\n" not in str(error.value)
+    turning = replace(still, values=values + np.arange(60) * (0.5 if quantity == "theta" else 0.3))
+    assert pose(turning, CUT, "midpoint").noise > 0.0
+
+
 def test_a_table_is_cut_from_release_to_landing_and_empty_cells_are_left_out(tmp_path):
     path = tmp_path / "flight.csv"
     lines = spin(start=1.0)

@@ -6,7 +6,8 @@ from statistics import median
 import numpy as np
 import pytest
 
-from flipproof.film.fit.twins import CAMERA_NOISE, RANGES, draw_truth, film, film_table, fit_twin
+from flipproof.film.fit.reading import Averaged
+from flipproof.film.fit.twins import AVERAGED, CAMERA_NOISE, RANGES, RATE, draw_truth, film, fit_twin
 from flipproof.film.tracker.kinematics import angle
 from slicemodel import Scenario
 
@@ -72,6 +73,20 @@ def test_intervals_of_an_equation_with_exact_events_hold_the_truth(model, count)
     held = sum(twin.covers("drag") and twin.covers("restitution") for twin in twins)
     assert held >= 0.75 * count, [(twin.seed, twin.intervals) for twin in twins]
     assert median(twin.width("drag") for twin in twins) < 0.15
+
+
+def film_table(throw, solver, seed, quantity):
+    """Return a film of a simulated throw as a CSV table of t and theta or omega, labelled synthetic."""
+    t, cap, base = film(throw, solver, seed)
+    theta = np.unwrap(angle(cap, base))
+    values = theta if quantity == "theta" else Averaged(points=AVERAGED)(t, theta)
+    made = "theta by Eq. 1" if quantity == "theta" else f"omega by differences of theta, mean over {AVERAGED} points"
+    label = (
+        f"# synthetic: {solver}, {throw.n_slices} slices, drag {throw.drag:g} kg/s, restitution {throw.restitution:g}, "
+        f"filmed at {RATE:g} frames/s with {1e3 * CAMERA_NOISE:g} mm of noise, seed {seed}; {made}"
+    )
+    rows = [f"{time:.6f},{value:.5f}" for time, value in zip(t, values, strict=True)]
+    return "\n".join([label, f"t,{quantity}", *rows]) + "\n"
 
 
 @pytest.mark.parametrize(

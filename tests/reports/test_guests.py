@@ -15,7 +15,7 @@ from flipproof.chapters import chapters_named
 from flipproof.chapters.guests.claims import claim_guests
 from flipproof.chapters.guests.figures import draw_guests
 from flipproof.chapters.guests.split import FREE, split, switches_made
-from flipproof.chapters.guests.study import SPARSE, Guests, energy_of, received, study_guests, visit
+from flipproof.chapters.guests.study import SPARSE, Guests, energy_of, received, study_guests, visit, with_split
 from flipproof.chapters.waterfall.study import equation_run
 from flipproof.cli import main as cli
 from flipproof.foreign import certify as suite
@@ -242,6 +242,11 @@ def test_a_report_splits_what_leads_from_a_guest_to_free_flight():
         assert one.end == pytest.approx(free, abs=1e-12)
         assert one.start + sum(one.bars.values()) + one.rest == pytest.approx(one.end, abs=1e-15)
         assert abs(one.rest) < 1e-3 < abs(one.end - one.start)
+        assert set(one.ranges) == set(one.bars)
+        assert all(low <= one.bars[name] <= high for name, (low, high) in one.ranges.items())
+    # Each order of mending two assumptions is one of two: the mean is the middle of the range.
+    assert all(share == pytest.approx(sum(weightless.ranges[name]) / 2) for name, share in weightless.bars.items())
+    check_waterfalls(found)
     ids = {finding.id: finding for finding in claim_guests(found)}
     assert ids["guest-naive-rk4-waterfall"].value == eq8.end - eq8.start
     assert f"{eq8.bars['weightless']:+.3g}" in ids["guest-naive-rk4-waterfall"].note
@@ -251,6 +256,25 @@ def test_a_report_splits_what_leads_from_a_guest_to_free_flight():
     assert found.facts["naive RK4"] == f"{RK4}, files {content_of(RK4):.12}"
     page = chapters_named("guests")[0].chapters[0].page(found)
     assert [guest.label for guest in page["compared"]] == [guest.label for guest in page["splits"]]
+
+
+def check_waterfalls(found):
+    """In the figure every bar begins where the one before ends, from the guest to free flight."""
+    (exhibit,) = [one for one in draw_guests(found) if one.name == "guests-waterfall"]
+    figure = exhibit.maker(*exhibit.data)
+    assert len(figure.axes) == 2 * len(found.guests)
+    for axes, guest in zip(figure.axes[::2], found.guests, strict=True):
+        level = guest.split.start
+        assert len(axes.patches) == len(guest.split.bars) + 1
+        for bar, share in zip(axes.patches, [guest.split.rest, *guest.split.bars.values()], strict=True):
+            assert bar.get_x() == pytest.approx(level, abs=1e-12)
+            assert bar.get_width() == pytest.approx(share, abs=1e-12)
+            level += share
+        assert level == pytest.approx(guest.split.end, abs=1e-12)
+        assert guest.label in exhibit.alt
+        assert f"the rest {guest.split.rest:+.2g}" in exhibit.alt
+    rows = [row.split(",") for row in exhibit.table.splitlines()]
+    assert sum(row[2] == "the rest" for row in rows) == len(found.guests)
 
 
 def test_a_guest_without_an_equation_or_with_the_wrong_one_has_its_rest(ladder):
@@ -267,3 +291,18 @@ def test_a_guest_without_an_equation_or_with_the_wrong_one_has_its_rest(ladder):
     assert found.rest == found.end - found.start
     with pytest.raises(Missing):
         split(run, MODELS["eq8"].switches, Flights({made.run: made}))
+
+
+def test_bars_that_miss_the_whole_are_no_waterfall_and_the_guest_says_why(ladder, monkeypatch):
+    start = replace(FREE, recoil=False)
+    flown = {equation_run(THROW, start): ladder["eq8"], equation_run(THROW, FREE): ladder["free-flight"]}
+    flights = Flights({run: Made(run, flight, 0.0) for run, flight in flown.items()})
+    found = split(ladder["eq8-weightless"], start, flights)
+    assert found.placed + found.bars["recoil"] == pytest.approx(found.end, abs=1e-15)
+    monkeypatch.setattr("flipproof.chapters.guests.split.mean", lambda changes: 0.9 * changes[0][1])
+    with pytest.raises(ArithmeticError, match="rest and bars miss"):
+        split(ladder["eq8-weightless"], start, flights)
+    (guest,) = study_guests([visit(RK4, THROW, TIMES)], ladder, {}).guests
+    told = with_split(guest, start, flights)
+    assert told.split is None
+    assert "rest and bars miss" in told.visit.problems["waterfall"]

@@ -2,15 +2,13 @@
 
 import dataclasses
 
-from made_up import spoiled
+from made_up import page_of, spoiled
 
 from engine_check.solver import DEFAULT_TOLERANCE
-from flipproof.build import build
 from flipproof.chapters.solvers import CERTIFIED, TOLERANCE, UNCERTIFIED_DT, WITNESSES, solver_runs, witnesses
 from flipproof.frame.gather import tell
 from flipproof.frame.solvers import make
 from flipproof.frame.throws import REFERENCE
-from flipproof.output.provenance import provenance
 
 ENGINES = ("flights", "differences", "certificates", "agreement")
 
@@ -42,13 +40,13 @@ def test_the_hybrid_stands_beside_the_grid_where_there_is_no_drag_and_nowhere_el
     }  # fmt: skip
 
 
-def test_a_quick_report_says_what_it_does_not_certify(gathered):
+def test_a_quick_report_says_what_it_does_not_certify(gathered, report):
     runs = engine_runs(REFERENCE, "quick")
     assert runs["pymunk"].settings == {"dt": UNCERTIFIED_DT}
     found = dataclasses.replace(gathered.found("certificates"), uncertified=("pymunk", "mujoco"))
     outcome = dataclasses.replace(gathered.outcomes["certificates"], found=found)
     quick = dataclasses.replace(gathered, outcomes={**gathered.outcomes, "certificates": outcome})
-    html = build(quick, provenance("flipproof report"), jobs=1).html
+    html = page_of(quick, report.exhibits[0].drawn)
     assert "pymunk and mujoco: not certified in a quick report" in html
 
 

@@ -14,7 +14,7 @@ from flipproof.chapters import chapters_named
 from flipproof.chapters.landing.chapter import chunks
 from flipproof.chapters.landing.claims import claims
 from flipproof.chapters.landing.figures import figures, witnesses
-from flipproof.chapters.landing.study import AIMING, Key, Size, aiming, filled, share_of, standing
+from flipproof.chapters.landing.study import AIMING, Key, Size, aiming, cell_of, filled, share_of, standing
 from flipproof.chapters.landing.tables import page, shares_csv
 from flipproof.cli.main import main
 from flipproof.frame.gather import tell
@@ -25,7 +25,7 @@ from flipproof.landing.design import Case, Throws
 from flipproof.landing.scatter import Scatter, Share, scattered, wilson
 from flipproof.landing.throw import land_throw, told
 from flipproof.landing.upright import drive, make_case, make_upright
-from flipproof.landing.work import LANDING, flown, make_landing, saddle, touch_readings
+from flipproof.landing.work import LANDING, Landed, flown, make_landing, saddle, touch_readings
 from flipproof.sweep.errors import SweepError
 from ode_reference import fly, land
 from ode_reference.landing_forms import Block
@@ -281,16 +281,55 @@ def test_every_finding_and_figure_says_what_is_assumed(found):
         if exhibit.name != "landing-witnesses":
             assert "ssumed: e_table = 0.3" in exhibit.caption
     assert shares_csv(found).count("\n") == len(found.cells) + 1
-    assert page(found)["assumed"] == found.assumed
+    ((family, fills, rows),) = page(found)["shares"]
+    assert family == "family B: time of flight as thrown"
+    assert [name for name, _ in rows] == ["water, together", "water, in turn", "ice"][: len(rows)]
+    assert all(len(cells) == len(fills) for _, cells in rows)
+
+
+@pytest.mark.parametrize(("of_ice", "verdict"), [(2.0, "holds"), (1.4, "cannot be decided"), (0.0, "fails")])
+def test_the_claim_of_the_bounces_is_judged_by_its_interval(found, of_ice, verdict):
+    changed = dict(found.cells)
+    for kind, mean, band in (("together", 1.0, 0.3), ("ice", of_ice, 0.4)):
+        key = Key("filling", 0.4, "B", 0.4, kind)
+        changed[key] = replace(changed[key], bounces=mean, bounces_band=band)
+    (finding,) = (each for each in claims(replace(found, cells=changed)) if each.id == "landing-bounces")
+    assert finding.value == pytest.approx(of_ice - 1.0)
+    assert finding.band == pytest.approx(0.5)
+    assert f": {verdict}; assumed" in finding.note
+
+
+def test_the_interval_of_the_mean_bounces_is_that_of_a_mean():
+    aim = standing(THROW)
+    rows = [Landed(number=k, status="ok", outcome="lying", bounces=k) for k in (1, 2, 3)]
+    missed = Landed(number=4, status="missed")
+    cell = cell_of(aim, [*rows, missed])
+    assert (cell.bounces, cell.missed) == (2.0, 1)
+    assert cell.bounces_band == pytest.approx(1.96 / math.sqrt(3), rel=1e-4, abs=0)
+    assert math.isnan(cell_of(aim, rows[:1]).bounces_band)
+
+
+def test_the_distance_between_the_laws_has_an_interval_and_says_which(found):
+    changed = dict(found.cells)
+    for kind, upright in (("together", 10), ("in-turn", 30)):
+        key = Key("filling", 0.4, "B", 0.4, kind)
+        changed[key] = replace(changed[key], share=Share(upright=upright, undecided=0, throws=40))
+    (finding,) = (each for each in claims(replace(found, cells=changed)) if each.id == "landing-laws")
+    difference, low, high = Share(upright=30, undecided=0, throws=40).minus(Share(upright=10, undecided=0, throws=40))
+    assert (finding.value, finding.band) == (difference, (high - low) / 2)
+    assert "at filling 0.4, water, in turn minus water, together" in finding.note
 
 
 def test_the_stored_witnesses_are_enough_and_agree(found):
     stored = witnesses()
     assert stored["touches"] >= 200
-    for finding in claims(found):
-        if finding.id.startswith("landing-witnesses"):
-            assert finding.verdict in ("pass", "observed")
-            assert ("reached" in finding.note) != ("missed" in finding.note)
+    assert [case["law"] for case in stored["cases"]] == [None, "together", "in-turn"]
+    assert {case["dt"] for case in stored["cases"]} == {None}  # the engines' own steps
+    of_witnesses = [finding for finding in claims(found) if finding.id.startswith("landing-witnesses")]
+    assert len(of_witnesses) == 7
+    for finding in of_witnesses:
+        assert finding.verdict == "pass"
+        assert "reached" in finding.note
 
 
 def test_the_sweep_makes_the_same_and_goes_on(found, tmp_path):
@@ -361,7 +400,7 @@ def test_a_study_is_salvaged_without_its_aims(tmp_path):
 
 def test_workers_of_a_scheduler_make_the_same(found, tmp_path):
     with LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, silence_logs=50
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0", silence_logs=50
     ) as cluster:
         make_upright(THROW, SMALL, tmp_path / "study", quiet, lambda _: None, dask=cluster.scheduler_address)
     assert (tmp_path / "study" / "upright.csv").read_text(encoding="utf-8") == shares_csv(found)

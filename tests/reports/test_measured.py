@@ -7,6 +7,7 @@ import ode_reference
 from flipproof.build import ask_of, build, gather_report
 from flipproof.cli.main import main
 from flipproof.film.measured import HELD, figure_measured, hold, part_measured, read_measured
+from flipproof.frame.pool import Here
 from flipproof.output.provenance import provenance
 from flipproof.output.tables import trajectory_csv
 from slicemodel import Scenario
@@ -23,9 +24,16 @@ def filmed(path, model, quantity="theta", noise=6e-3):
     return path
 
 
+@pytest.fixture(scope="module")
+def held(tmp_path_factory):
+    """Films of two equations beside the solvers, by equation."""
+    folder = tmp_path_factory.mktemp("films")
+    return {m: hold(read_measured(filmed(folder / f"{m}.csv", m)), THROW) for m in ("free-flight", "eq8")}
+
+
 @pytest.mark.parametrize(("model", "named"), [("free-flight", "free-flight"), ("eq8", "midpoint")])
-def test_the_equation_that_made_a_film_is_named(tmp_path, model, named):
-    measured = hold(read_measured(filmed(tmp_path / "flight.csv", model)), THROW)
+def test_the_equation_that_made_a_film_is_named(held, model, named):
+    measured = held[model]
     assert measured.fits[0].solver == named
     assert next(iter(measured.misfits)) == named
     assert measured.fits[0].fits
@@ -41,11 +49,17 @@ def test_the_equation_that_made_a_film_is_named(tmp_path, model, named):
     assert len(figure_measured(*exhibit.data).axes) == 4
 
 
-def test_a_report_that_is_given_a_measurement_has_a_section_of_it(tmp_path):
-    part = part_measured(read_measured(filmed(tmp_path / "flight.csv", "free-flight")))
-    report = build(
-        gather_report(ask_of(THROW, "quick"), jobs=1, contents=(part,)), provenance("flipproof report"), jobs=1
-    )
+def test_a_report_that_is_given_a_measurement_has_a_section_of_it(held, monkeypatch):
+    measurement = held["free-flight"].measurement
+
+    def known(asked, throw):
+        assert asked is measurement
+        assert throw == THROW
+        return held["free-flight"]
+
+    monkeypatch.setattr("flipproof.film.measured.hold", known)
+    ask, contents = ask_of(THROW, "quick"), (part_measured(measurement),)
+    report = build(gather_report(ask, pool=Here(), contents=contents), provenance("flipproof report"), jobs=1)
     assert '<section id="measured" class="fold">' in report.html
     assert '<figure id="figure-measured">' in report.html
     assert "Your measurement is nearest to free flight" in report.html

@@ -179,6 +179,7 @@ def test_nothing_in_the_assets_asks_the_network():
         "chart.js",
         "motion.js",
         "live.js",
+        "column.js",
         "sliders.js",
         "touch.js",
         "story.js",

@@ -3,14 +3,12 @@
 import re
 
 import pytest
-from made_up import spoiled
+from made_up import page_of, spoiled
 
 from flipproof.chapters.solvers import FLIGHTS
 from flipproof.chapters.waterfall.study import program_run
-from flipproof.frame.gather import tell
-from flipproof.output.provenance import provenance
 from flipproof.page.pdf import VARIABLE, PrintError, find_browser, print_page, require_browser
-from flipproof.page.render import read_assets, render, unbroken
+from flipproof.page.render import read_assets, unbroken
 
 
 def section_of(page, name):
@@ -19,10 +17,10 @@ def section_of(page, name):
     return re.sub(r'<a class="term"[^>]*>(.*?)</a>', r"\1", section)
 
 
-def test_a_failed_solver_and_a_failed_study_stand_where_their_results_would(gathered):
+def test_a_failed_solver_and_a_failed_study_stand_where_their_results_would(gathered, report):
     lost = (gathered.ask.solvers["pymunk"], program_run(gathered.ask.throw, gathered.ask.steps))
     broken = spoiled(gathered, lost, "SetupError: the world is <not> the one that was meant", ("flights", "waterfall"))
-    page = render(broken, tell(broken), provenance("flipproof report"))
+    page = page_of(broken, report.exhibits[0].drawn)
     flights = section_of(page, "flights")
     row = re.search(r"<tr><th[^>]*>pymunk</th>.*?</tr>", flights, re.S).group()
     assert "✗ failed" in row

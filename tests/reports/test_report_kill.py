@@ -75,8 +75,10 @@ def test_a_small_report_killed_three_times(tmp_path):
     command = [sys.executable, str(tmp_path / "small.py"), str(tmp_path / "place" / "latest")]
     subprocess.run(command, cwd=ROOT, check=True)
     whole = time.monotonic() - began
+    # No program is done in 0.2 s; a later moment may find it done, when the machine had more to do while it was timed.
     chance = random.Random(3)
-    assert kill_and_finish(command, tmp_path / "place" / "latest", [chance.uniform(0.2, whole) for _ in range(3)])
+    moments = [0.2, *(chance.uniform(0.2, whole) for _ in range(2))]
+    assert kill_and_finish(command, tmp_path / "place" / "latest", moments)
 
 
 @pytest.mark.slow

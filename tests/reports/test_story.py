@@ -20,8 +20,8 @@ from slicemodel import Scenario
 SOLVERS = ("published-python", "eq8", "free-flight")
 KEPT = Path(__file__).parents[2] / "reports" / "snapshot" / "summary.json"
 NAMED = re.compile(
-    r"Eqs?\. \d+[a-z]?|Fig\. \d\w*|1000 (?:<em>)?time steps|r_CM|M_w|≤ 1e-7 %|up to 1 % we call small|1000 steps"
-    r"|arXiv:2407\.20627"
+    r"Eqs?\. \d+[a-z]?|\(9[ad]\)|Fig\. \d\w*|1000 (?:<em>)?time steps|r_CM|M_w|≤ 10⁻⁷ %|Up to 1 % we call small"
+    r"|1000 steps|numerical error below 0\.001 %|arXiv:2407\.20627"
 )
 """Digits that are names: of equations and figures, of the published program's steps, and limits that we set."""
 
@@ -71,6 +71,7 @@ def as_printed(text):
     clean = text.replace("−", "-").replace("+", "").replace("°", "").strip()
     share = clean.endswith("%")
     clean = clean.removesuffix("%").strip()
+    clean = clean.replace(" × 10", "e").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789"))
     value = float(clean)
     mantissa, _, exponent = clean.partition("e")
     digits = len(mantissa.partition(".")[2])

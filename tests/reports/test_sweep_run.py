@@ -5,6 +5,7 @@ import signal
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from multiprocessing.connection import Connection
 
 import pytest
 
@@ -213,15 +214,24 @@ def test_a_dead_process_breaks_its_own_call_only_and_is_replaced():
         executor.kill()
 
 
+def die_while_sending():
+    """End this process when it has sent the first kilobyte of its answer."""
+
+    def write(pipe, message):
+        sent = os.write(pipe, message[:1000])
+        if len(message) > 1000:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return sent
+
+    Connection._send.__defaults__ = (write,)
+    return bytes(100_000)
+
+
 def test_a_process_killed_while_it_sends_is_noticed():
     executor = Processes(1)
     try:
-        process = executor.submit(os.getpid).result(timeout=60)
-        large = executor.submit(bytes, 2_000_000_000)
-        time.sleep(0.4)
-        os.kill(process, signal.SIGKILL)
         with pytest.raises(WorkerDiedError, match="exit code -9"):
-            large.result(timeout=60)
+            executor.submit(die_while_sending).result(timeout=60)
         assert executor.submit(max, 1, 2).result(timeout=60) == 2
     finally:
         executor.kill()
@@ -241,15 +251,21 @@ def test_an_error_in_a_call_is_the_futures_and_not_the_workers():
         executor.submit(os.getpid)
 
 
-def test_leaving_ends_processes_in_the_middle_of_their_calls():
+def begin_and_sleep(mark):
+    mark.touch()
+    time.sleep(1000)
+
+
+def test_leaving_ends_processes_in_the_middle_of_their_calls(tmp_path):
     with local_workers(1) as workers:
         process = workers.executor.submit(os.getpid).result(timeout=60)
-        endless = workers.executor.submit(time.sleep, 1000)
+        endless = workers.executor.submit(begin_and_sleep, tmp_path / "begun")
         waiting = workers.executor.submit(time.sleep, 1000)
-        time.sleep(0.1)
+        while not (tmp_path / "begun").exists():
+            time.sleep(0.01)
         assert workers.capacity() == 1
     with pytest.raises(WorkerDiedError):
-        endless.result(timeout=10)
+        endless.result(timeout=60)
     assert waiting.cancelled()
     with pytest.raises(ProcessLookupError):
         os.kill(process, 0)

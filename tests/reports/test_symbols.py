@@ -6,8 +6,11 @@ from xml.etree import ElementTree
 
 import pytest
 
+from flipproof.figures.style import draw, new_figure
+from flipproof.frame.solvers import catalogue
+from flipproof.frame.spoken import SPOKEN, spoken
 from flipproof.page.captions import shared
-from flipproof.page.equations import equation
+from flipproof.page.equations import equation, mathematics, numbers
 from flipproof.page.glossary import linked
 from ode_reference.models import MODELS
 
@@ -18,12 +21,47 @@ from ode_reference.models import MODELS
         ("dr_CM/dt at M_w", "d<i>r</i><sub>CM</sub>/dt at <i>M</i><sub>w</sub>"),
         ("v e^(−γΔt) cosh", "v <i>e</i><sup>−γΔt</sup> cosh"),
         ("r''_CM, 5 % in omega_0", "<i>r</i>''<sub>CM</sub>, 5 % in ω₀"),
+        ("r&#39;_CM and 2M_w, ω_f", "<i>r</i>&#39;<sub>CM</sub> and 2<i>M</i><sub>w</sub>, <i>ω</i><sub>f</sub>"),
         ("<code>r_CM</code> <pre>M_w</pre>", "<code>r_CM</code> <pre>M_w</pre>"),
         ('<img alt="r_CM"> published_python', '<img alt="r_CM"> published_python'),
     ],
 )
 def test_symbols_get_their_indices_where_text_is_typeset(text, html):
     assert re.sub(r"</?a\b[^>]*>", "", linked(text)) == html
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("published-python → published-limit", "published program → published program (Δt → 0)"),
+        ("eq8-weightless, eq8: largest", "Eq. 8 without weight, Eq. 8: largest"),
+        ("pymunk rotating and pymunk", "pymunk by Eq. 8 and pymunk"),
+        ("trajectories/eq8/data.csv mujoco-compliant", "trajectories/eq8/data.csv mujoco-compliant"),
+        ("switches:eq8 and mine.py:eq8", "switches:eq8 and mine.py:eq8"),
+    ],
+)  # fmt: skip
+def test_charts_and_sentences_have_the_spoken_names_of_solvers(text, said):
+    assert spoken(text) == said
+    assert "eq8" not in re.sub(r"<[^>]*>", "", linked("<h3>eq8</h3><p>of eq8</p>"))
+    assert ">eq8</a>" in linked("<table><tr><td>eq8</td></tr></table>")
+    assert set(SPOKEN) - set(catalogue()) == {"pymunk rotating"}
+
+
+def test_a_figure_has_spoken_names_and_indices_everywhere():
+    figure, axes = new_figure()
+    axes.plot([0, 1], [0, 1], label="eq8-wall")
+    axes.set_xlabel("fill fraction M_w / M_max [1]")
+    axes.set_yticks([0, 1], ["drag against C_M", "free-flight"])
+    axes.legend()
+    draw(figure, png=False)
+    assert axes.get_legend().get_texts()[0].get_text() == "Eq. 8 (drag on the wall)"
+    assert axes.get_xlabel() == r"fill fraction $M_{\mathrm{w}}$ / $M_{\mathrm{max}}$ [1]"
+    assert [label.get_text() for label in axes.get_yticklabels()] == [r"drag against $C_{\mathrm{M}}$", "free flight"]
+
+
+def test_primes_minus_signs_and_numbers_are_set_as_they_are_printed():
+    assert mathematics("r'' − r''_CM, r', β = -0.5, 1e-06, (1, -1)") == "r″ − r″_CM, r′, β = −0.5, 1e-06, (1, −1)"
+    assert numbers("a < ≤ 1.4e-03 to 2") == 'a &lt; <span class="name">≤ 1.4e-03</span> to 2'
 
 
 def test_a_term_with_an_index_is_one_link():

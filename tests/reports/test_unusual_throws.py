@@ -18,7 +18,7 @@ SMALL = {
 }
 """What does not depend on the throw is tried elsewhere; here it is only as large as its claims need."""
 
-WITHOUT = ("engine-facts", "exact-cases", "horizon", "stability", "vectors")
+WITHOUT = ("engine-facts", "exact-cases", "horizon", "reference", "stability", "vectors")
 """What does not depend on the throw at all."""
 
 UNUSUAL = {

@@ -73,16 +73,14 @@ def test_independent_assumptions_split_alike_in_every_order():
         expected = worth.get(name, 0.0)
         bar = bars[words]
         assert (bar.forward, bar.backward, bar.average) == pytest.approx((expected,) * 3, abs=1e-14)
-        assert bar.interaction == pytest.approx(0.0, abs=1e-14)
     assert bars[waterfall.STEP].forward == pytest.approx(0.3)
 
 
-def test_an_interaction_is_shared_evenly_by_the_average_and_shows():
+def test_an_interaction_is_shared_evenly_by_the_average():
     bars = plateau_bars(split(lambda s: 1.0 if s.signs and s.recoil else 0.0))
     signs, recoil = bars[NAME_OF["signs"]], bars[NAME_OF["recoil"]]
     assert (signs.forward, signs.backward, signs.average) == pytest.approx((0.0, 1.0, 0.5))
     assert (recoil.forward, recoil.backward, recoil.average) == pytest.approx((1.0, 0.0, 0.5))
-    assert signs.interaction == pytest.approx(1.0)
 
 
 def test_every_split_of_every_observable_sums_to_the_whole():

@@ -184,7 +184,7 @@ def test_in_step_a_flock_needs_room_to_turn_where_it_was_before_the_step():
 
 
 def test_an_empty_flock_weighs_nothing_whatever_its_map():
-    assert sums_of(flock.EMPTY, Map(np.inf, np.nan, 1.0, 1.0, np.inf, 0.0)) == (0.0, 0.0, 0.0)
+    assert sums_of(Flock(*[0.0] * 9), Map(np.inf, np.nan, 1.0, 1.0, np.inf, 0.0)) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("gamma", [0.0, 5.0, 200.0])

@@ -1,4 +1,4 @@
-"""The command ``flipproof completion``: a script for bash or zsh that completes commands, options and solvers.
+"""The command ``flipproof completion``: a script for bash, zsh or fish that completes commands, options and solvers.
 
 The script is made from the parser, so that it knows what the parser knows; it starts no Python at a key stroke.
 """
@@ -11,8 +11,9 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from flipproof.cli.arguments import add_command
+from slicemodel.scenario import shortened
 
-SHELLS: Final = ("bash", "zsh")
+SHELLS: Final = ("bash", "zsh", "fish")
 
 SOLVERS: Final = frozenset({"solver", "solvers", "model", "guests", "spec", "first", "second"})
 """Arguments that name solvers."""
@@ -44,13 +45,35 @@ autoload -U +X bashcompinit && bashcompinit
 
 FILES: Final = {"bash": "~/.bashrc", "zsh": "~/.zshrc"}
 
+FISH: Final = """\
+# Completion for flipproof. Now: flipproof completion fish | source; for good: put that line into
+# ~/.config/fish/config.fish.
+function __flipproof_first
+    test (count (commandline -opc)) -eq 1
+end
+function __flipproof_is
+    set -l words (commandline -opc)
+    test (count $words) -gt 1; and test "$words[2]" = "$argv[1]"
+end
+complete -c flipproof -e
+complete -c flipproof -n __flipproof_first -f
+"""
+"""Which word is typed, asked by every line for fish; what was defined before is taken back."""
+
+SAID: Final = 70
+"""Letters of a description that fish shows beside a word."""
+
 
 def add_completion(commands: Any) -> None:
     """Add the command."""
     command = add_command(
         commands, "completion", "Print a script that completes commands, options and solvers.", command_completion
     )
-    command.add_argument("shell", choices=SHELLS, help='whose; then: eval "$(flipproof completion bash)"')
+    command.add_argument(
+        "shell",
+        choices=SHELLS,
+        help='whose; then: eval "$(flipproof completion bash)", or in fish: flipproof completion fish | source',
+    )
 
 
 def command_completion(options: argparse.Namespace) -> int:
@@ -65,6 +88,8 @@ def command_completion(options: argparse.Namespace) -> int:
 def script(shell: str, top: argparse.ArgumentParser, solvers: list[str]) -> str:
     """Return the script for a shell; a file's name is completed where there are no words."""
     commands = _commands(top)
+    if shell == "fish":
+        return FISH + "".join(f"complete -c flipproof {line}\n" for line in _fish(top, solvers))
     prefix = ZSH if shell == "zsh" else ""
     head = HEAD.format(
         shell=shell, file=FILES[shell], prefix=prefix, commands=shlex.quote(" ".join([*commands, *_options(top)]))
@@ -79,6 +104,36 @@ def script(shell: str, top: argparse.ArgumentParser, solvers: list[str]) -> str:
         if words:
             lines.append(f'        "{name} "*) words={shlex.quote(" ".join(dict.fromkeys(words)))} ;;')
     return head + "\n".join(lines) + "\n" + TAIL
+
+
+def _fish(top: argparse.ArgumentParser, solvers: list[str]) -> Iterator[str]:
+    """Yield a line for every command and option, with what fish says beside it, and for every word."""
+    first = "-n __flipproof_first"
+    yield from (f"{first} -l {action.option_strings[-1][2:]}" for action in top._actions if action.option_strings)
+    for name, command in _commands(top).items():
+        yield f"{first} -a {name} -d {_for_fish(command.description or '')}"
+        here = f"-n '__flipproof_is {name}'"
+        positionals = _positionals(command)
+        if not positionals or any(action.choices is not None for action in positionals):
+            yield f"{here} -f"  # no file's name stands there
+        words = [word for action in positionals for word in _words(action, solvers)]
+        if words:
+            yield f"{here} -a {_for_fish(' '.join(dict.fromkeys(words)))}"
+        for action in command._actions:
+            words = _words(action, solvers)
+            # After -r fish offers files, too, after -x words only.
+            takes = "" if action.nargs == 0 else " -r" if action.choices is None else " -x"
+            takes += f" -a {_for_fish(' '.join(words))}" if words else ""
+            said = command._get_formatter()._expand_help(action) if action.help else ""
+            for option in action.option_strings:
+                kind = "-l" if option.startswith("--") else "-s"
+                yield f"{here} {kind} {option.lstrip('-')}{takes} -d {_for_fish(shortened(said, SAID))}"
+
+
+def _for_fish(text: str) -> str:
+    """Return a text between quotes as fish reads it."""
+    escaped = text.replace("\\", "\\\\").replace("'", "\\'")
+    return f"'{escaped}'"
 
 
 def _commands(top: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:

@@ -5,6 +5,7 @@ Never pyplot, nothing global, nothing saved here.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import wraps
@@ -15,8 +16,10 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogFormatterMathtext
+from matplotlib.text import Text
+from matplotlib.ticker import FuncFormatter, LogFormatterMathtext
 
+from flipproof.frame.spoken import spoken
 from slicemodel import Trajectory
 
 WIDE = (8.0, 3.9)
@@ -54,6 +57,9 @@ STYLE: dict[Any, Any] = {
     "svg.hashsalt": "flipproof",
 }
 
+
+INDEXED = re.compile(r"(?<![A-Za-z_$])([A-Zrvetθω])_(CM|[Mwbcfs]|max|table)(?![\w$])")
+"""A symbol with its index in plain text."""
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -97,14 +103,24 @@ def draw(figure: Figure, png: bool = True) -> Drawing:
     """Render a figure; the same data give the same bytes (fixed ids, no date). Without ``png`` it has none."""
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
-            if isinstance(axis.get_major_formatter(), LogFormatterMathtext):
+            form = axis.get_major_formatter()
+            if isinstance(form, LogFormatterMathtext):
                 axis.set_major_formatter(PlainPowers())
+            elif isinstance(form, FuncFormatter):  # labels that were given, not computed
+                axis.set_major_formatter(FuncFormatter(lambda x, place, form=form: _written(form(x, place))))
+    for text in figure.findobj(Text):
+        text.set_text(_written(text.get_text()))
     lines, points = BytesIO(), BytesIO()
     figure.savefig(lines, format="svg", metadata={"Date": None})
     figure.set_layout_engine("none")  # laid out by now; to do it again for the second format costs as much as drawing
     if png:
         figure.savefig(points, format="png", dpi=100)
     return Drawing(lines.getvalue().decode("utf-8"), points.getvalue())
+
+
+def _written(text: str) -> str:
+    """Return a text of a figure with solvers under their spoken names and indices set lower."""
+    return INDEXED.sub(r"$\1_{\\mathrm{\2}}$", spoken(text))
 
 
 def solver_style(label: str, k: int = 0) -> dict[str, Any]:

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 
 from flipproof.foreign.contract import Ask, Traits
 from slicemodel.observables import centre_of_mass, moment_of_inertia
+from slicemodel.scenario import shown
 from slicemodel.trajectory import IMPACT_FIELDS, FloatArray, Impacts, Trajectory
 
 REQUIRED: Final = ("t", "theta", "omega")
 PER_TIME: Final = ("r_cm", "inertia")
 PER_SLICE: Final = ("r", "v")
+
+KINDS: Final = MappingProxyType({"c": "complex numbers", "U": "text", "S": "text", "O": "objects", "b": "truth values"})
+"""What an array holds that is no real number, by numpy's letter of its kind."""
 
 
 class AnswerError(ValueError):
@@ -105,7 +110,8 @@ def numbers_of(name: str, value: object, shape: tuple[int, ...]) -> FloatArray:
     if array.shape != shape:
         raise AnswerError(f"{name} has shape {array.shape}, not {shape}")
     if array.dtype.kind not in "fiu":
-        raise AnswerError(f"{name} holds {array.dtype} numbers; real numbers are needed")
+        kind = KINDS.get(array.dtype.kind, str(array.dtype))
+        raise AnswerError(f"{name} holds {kind}; real numbers are needed")
     array = np.ascontiguousarray(array, dtype=np.float64)
     if not np.isfinite(array).all():
         where = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
@@ -115,6 +121,8 @@ def numbers_of(name: str, value: object, shape: tuple[int, ...]) -> FloatArray:
 
 def _length(name: str, value: object, needed: int | None = None) -> int:
     """Return the length of a one-dimensional field, before anything of its size is copied."""
+    if isinstance(value, (str, bytes)):
+        raise AnswerError(f"{name} = {shown(value)} is not an array of numbers")
     shape = getattr(value, "shape", None)
     if shape is None:
         try:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
+from flipproof.foreign.answers import Answer
 from flipproof.foreign.checking import SMOOTH, THROW, Found, Making, NotApplicableError, ask_of, shift
 from flipproof.foreign.contract import Traits
 
@@ -21,8 +23,23 @@ ACROSS: Final = (0.5, 0.5)
 DEEPEST: Final = {"dt": 8, "steps": 8, "rtol": 6}
 """Level of refinement at which the search for a floor ends; level 8 is 250 000 steps."""
 
-SINGLE: Final = 2e-8
-"""Floor from which on the arithmetic is that of float32, fraction of omega_0."""
+SIXTEENTH: Final = math.log2(17 / 16)
+"""Level by which a step is shorter by a sixteenth: a change as large as by steps a quarter as long is noise."""
+
+STILL: Final = 0.7
+"""Share of the change before from which on a change counts as no smaller."""
+
+NOISE: Final = 0.5
+"""Share of a change that steps shorter by another sixteenth make where noise limits; with an error of order 1, 0.02."""
+
+ADMISSIBLE: Final = MappingProxyType({"float64": 2e-8, "float32": 1e-4})
+"""Floor above which something limits a solver that its declared arithmetic does not explain, fraction of omega_0."""
+
+PRINTED: Final = 0.1
+"""Distance to the next float32 up to which a number is one, printed with nine digits or more [spacing of float32]."""
+
+DISTINCT: Final = 20
+"""Different numbers that a field has at the least where they tell its arithmetic."""
 
 ROUNDOFF: Final = 1e-11
 """Changes below which orders drown in round-off, fraction of omega_0."""
@@ -60,12 +77,15 @@ def check_order_across(traits: Traits) -> Making:
     _refinable(traits)
     if traits.order is None or traits.refined_by == "rtol":
         raise NotApplicableError("no order is declared" if traits.order is None else "rtol has no order")
-    # Several steps near each level: where rebounds wait for the grid, a single one carries the luck of its phase.
-    near = (0.0, 0.19, 0.37, 0.55)
-    asks = [ask_of(traits, THROW, level - 4 + part, 11) for level in LEVELS for part in near]
-    *answers, reference = yield [*asks, ask_of(traits, THROW, max(LEVELS), 11)]
-    groups = [answers[k : k + len(near)] for k in range(0, len(answers), len(near))]
-    errors = [float(np.sqrt(np.mean([shift(a, reference, THROW.omega0) ** 2 for a in group]))) for group in groups]
+    # Several throws and steps a level: where rebounds wait for the grid, a single one carries the luck of its phase.
+    throws = [THROW.with_slices(THROW.n_slices + more) for more in (0, 1, 2)]
+    levels = [level - 4 + part for level in LEVELS for part in (0.0, 0.19)]
+    answers = yield [ask_of(traits, throw, level, 11) for throw in throws for level in (*levels, 2)]
+    squares = []
+    for k in range(0, len(answers), len(levels) + 1):
+        *coarser, reference = answers[k : k + len(levels) + 1]
+        squares.append([shift(answer, reference, THROW.omega0) ** 2 for answer in coarser])
+    errors = np.sqrt(np.mean(squares, axis=0).reshape(len(LEVELS), -1).mean(axis=1))
     if errors[-1] < ROUNDOFF:
         raise NotApplicableError(f"changes under refinement are round-off, {errors[0]:.2g} of omega_0")
     order = -float(np.polyfit(LEVELS, np.log2(np.maximum(errors, 1e-300)), 1)[0])
@@ -74,7 +94,8 @@ def check_order_across(traits: Traits) -> Making:
         holds=low <= order <= high,
         expected=f"order {low:g} to {high:g}",
         came=f"{order:.2f}, {errors[-1]:.2g} of omega_0 at the finest",
-        where="0.3 s with impacts on both ends, steps of 5 ms and its halves",
+        where=f"{throws[0].n_slices} to {throws[-1].n_slices} slices, 0.3 s with impacts on both ends, steps of 5 ms "
+        "and its halves",
         advice="rebounds answered at the next step give order 1; an order near 0 means that refinement does not help",
         facts={"order_across_impacts": order},
     )
@@ -89,27 +110,64 @@ def _order(changes: list[float]) -> float:
 
 
 def check_floor(traits: Traits) -> Making:
-    """Refined until changes stop shrinking, a solver in float64 goes below 1e-8 of omega_0 or is still shrinking."""
+    """Refined until changes stop shrinking, a solver in float64 goes below 2e-8 of omega_0 or is still shrinking."""
     _refinable(traits)
-    (coarse,) = yield [ask_of(traits, SMOOTH, 0)]
-    changes: list[float] = []
     stride = 1 if traits.refined_by == "rtol" else 2
-    for level in range(stride, DEEPEST[str(traits.refined_by)] + 1, stride):
-        (fine,) = yield [ask_of(traits, SMOOTH, level)]
-        changes.append(shift(coarse, fine, SMOOTH.omega0))
-        coarse = fine
-        if changes[-1] <= 16 * traits.epsilon or (len(changes) > 1 and changes[-1] > 0.7 * changes[-2]):
+    deepest = DEEPEST[str(traits.refined_by)]
+    coarse, fine = yield [ask_of(traits, SMOOTH, level) for level in (0, stride)]
+    changes = [shift(coarse, fine, SMOOTH.omega0)]
+    noises: list[float] = []
+    stopped = changes[0] <= 16 * traits.epsilon
+    for level in range(2 * stride, deepest + 1, stride):
+        if stopped:
             break
+        # With another tolerance a solver takes other steps altogether: there, a change next to none says nothing.
+        near = [level + SIXTEENTH] if level < deepest and traits.refined_by != "rtol" else []
+        coarse = fine
+        fine, *beside = yield [ask_of(traits, SMOOTH, each) for each in (level, *near)]
+        changes.append(shift(coarse, fine, SMOOTH.omega0))
+        here = [shift(fine, each, SMOOTH.omega0) for each in beside]
+        noises += here
+        noisy = any(noise > NOISE * changes[-1] for noise in here)
+        stopped = changes[-1] <= 16 * traits.epsilon or changes[-1] > STILL * changes[-2] or noisy
     floor = min(changes)
-    stopped = len(changes) > 1 and (changes[-1] > 0.7 * changes[-2] or changes[-1] <= 16 * traits.epsilon)
-    said = "float32 arithmetic" if stopped and floor > SINGLE else ""
-    meant = SINGLE if traits.precision == "float64" else 1e-4
+    limited = stopped and floor > ADMISSIBLE["float64"]
+    singles = _singles(fine) if limited else []
+    if singles:
+        said = f": the numbers of {', '.join(singles)} are those of float32"
+    else:
+        said = ": something else than refinement limits it" if limited and traits.precision == "float64" else ""
+    count = len(changes)
+    meant = ADMISSIBLE[traits.precision]
     return Found(
         holds=floor <= meant or not stopped,
         expected=f"changes fall below {meant:.0e} of omega_0, or still fall",
-        came=f"{floor:.2g} after {len(changes)} refinements, {'no longer' if stopped else 'still'} falling"
-        + (f", as in {said}" if said else ""),
+        came=f"{floor:.2g} of omega_0 after {count} refinement{'s' if count > 1 else ''}, "
+        f"{'no longer' if stopped else 'still'} falling{said}",
         where="0.05 s before any impact",
-        advice='declare precision = "float32", or look for a tolerance or a constant that does not refine',
-        facts={"floor": floor, "floor_reached": stopped, "arithmetic": said or None, "changes": changes},
+        advice='declare precision = "float32"'
+        if singles
+        else "look for a tolerance, a cut-off or rounded numbers that do not refine; if it computes in float32, "
+        'declare precision = "float32"',
+        facts={
+            "floor": floor,
+            "floor_reached": stopped,
+            "arithmetic": "float32" if singles else None,
+            "changes": changes,
+            "noises": noises,
+        },
     )
+
+
+def _singles(answer: Answer) -> list[str]:
+    """Return the names of the fields whose numbers are those of float32."""
+    found = []
+    for name in ("theta", "omega", "r", "v"):
+        values = getattr(answer, name)
+        if values is None or len(np.unique(values)) < DISTINCT:
+            continue
+        with np.errstate(over="ignore", invalid="ignore"):
+            nearest = values.astype(np.float32)
+            if np.all(np.abs(values - nearest) <= PRINTED * np.spacing(np.abs(nearest))):
+                found.append(name)
+    return found

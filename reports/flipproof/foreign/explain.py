@@ -7,7 +7,7 @@ what no switch explains is the rest: the solvers' own errors, and what is no cho
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import combinations
 
@@ -71,7 +71,7 @@ def explain(one: Runner, other: Runner, throw: Scenario) -> Explanation:
     asks = [ask_of(runner.traits, throw, LEVEL, POINTS) for runner in (one, other)]
     answers = [runner(ask) for runner, ask in zip((one, other), asks, strict=True)]
     values = tuple(plateau(answer.t, answer.omega, throw.omega0) for answer in answers)
-    bars = shares(places[0].switches, places[1].switches, throw)
+    bars = shares(*_without_idle(*places), throw)
     return Explanation(
         first=places[0],
         second=places[1],
@@ -79,6 +79,12 @@ def explain(one: Runner, other: Runner, throw: Scenario) -> Explanation:
         bars=bars,
         rest=values[1] - values[0] - sum(bars.values()),
     )
+
+
+def _without_idle(one: Place, other: Place) -> tuple[Switches, Switches]:
+    """Return the switches of both, those without effect in the equation of one as they stand in that of the other."""
+    start = replace(one.switches, **{name: getattr(other.switches, name) for name in one.inert})
+    return start, replace(other.switches, **{name: getattr(start, name) for name in other.inert})
 
 
 def shares(start: Switches, end: Switches, throw: Scenario) -> dict[str, float]:
@@ -98,6 +104,21 @@ def shares_of(start: Switches, end: Switches, of: Callable[[Switches], float]) -
     ----------
     of : callable (switches) -> float - the number by the equation of a set of switches; asked for once each
     """
+    return {name: mean(changes) for name, changes in changes_of(start, end, of).items()}
+
+
+def mean(changes: Sequence[tuple[float, float]]) -> float:
+    """Return the mean of changes, each with its weight."""
+    return math.fsum(weight * change for weight, change in changes)
+
+
+def changes_of(start: Switches, end: Switches, of: Callable[[Switches], float]) -> dict[str, list[tuple[float, float]]]:
+    """Return for every differing switch the changes of a number in single orders, each with its share of all orders.
+
+    Parameters
+    ----------
+    of : callable (switches) -> float - the number by the equation of a set of switches; asked for once each
+    """
     differing = [f.name for f in fields(Switches) if getattr(start, f.name) != getattr(end, f.name)]
     known: dict[Switches, float] = {}
 
@@ -108,13 +129,14 @@ def shares_of(start: Switches, end: Switches, of: Callable[[Switches], float]) -
         return known[switches]
 
     n = len(differing)
-    bars = {}
-    for name in differing:
-        others = [other for other in differing if other != name]
-        bars[name] = math.fsum(
-            math.factorial(size) * math.factorial(n - size - 1) / math.factorial(n)
-            * (value((*chosen, name)) - value(chosen))
+    return {
+        name: [
+            (
+                math.factorial(size) * math.factorial(n - size - 1) / math.factorial(n),
+                value((*chosen, name)) - value(chosen),
+            )
             for size in range(n)
-            for chosen in combinations(others, size)
-        )  # fmt: skip
-    return bars
+            for chosen in combinations([other for other in differing if other != name], size)
+        ]
+        for name in differing
+    }

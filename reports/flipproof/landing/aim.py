@@ -1,7 +1,7 @@
 """The throw that a bottle lands from upright: what is not given is solved for.
 
-Family "height" throws at the omega_0 given and solves for the height of the table; family "spin" keeps the time of
-flight and solves for omega_0. Between release and touch nothing but its water decides how far a bottle turns: its
+Family A throws at the omega_0 given and solves for the height of the table; family B keeps the time of flight and
+solves for omega_0. Between release and touch nothing but its water decides how far a bottle turns: its
 flight has no table and no scatter.
 """
 

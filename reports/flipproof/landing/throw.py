@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
 
 import ode_reference
 from flipproof.landing.aim import SPARE
@@ -13,8 +12,6 @@ from flipproof.landing.work import REFERENCE, landed, saddle, touch_readings
 from slicemodel import Outcome, Scenario, Table, Touch
 from slicemodel.scenario import unknown_name
 from slicemodel.table import LAWS
-
-SLICES: Final = 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -96,6 +96,6 @@ def _figure_mapping(exhibit: Exhibit, section: str) -> dict[str, Any]:
         "caption": exhibit.caption,
         "alt": exhibit.alt,
         "svg": f"{place}.svg",
-        "png": f"{place}.png" if exhibit.drawing.png else None,
+        "png": f"{place}.png" if exhibit.drawn and exhibit.drawn.png else None,
         "table": None if exhibit.table is None else f"{place}.csv",
     }

@@ -21,6 +21,17 @@ def typeset(text: str) -> str:
     return re.sub(pattern, lambda match: SYMBOLS[match.group()], text)
 
 
+def mathematics(text: str) -> str:
+    """Return plain-text mathematics with primes, minus signs and tau as they are printed."""
+    text = re.sub(r"(?<=\b[rv])'{1,2}", lambda found: "″" if len(found.group()) == 2 else "′", text)
+    return re.sub(r"(?<![\w)])-(?=\d)", "−", text).replace("(tau ", "(τ ")
+
+
+def numbers(text: str) -> Markup:
+    """Return text in which no line ends inside a number such as 1e-05, or between it and the sign of its bound."""
+    return Markup(re.sub(r"(?:≤ )?\d[\d.]*e[-+]\d+", r'<span class="name">\g<0></span>', str(escape(text))))
+
+
 FORMULA: Final = re.compile(r"^[a-z]\w*'* = [^:,]*")
 """What begins like v' = or r_i'' =, up to a colon or comma; words follow."""
 

@@ -8,6 +8,8 @@ from typing import Final
 
 from markupsafe import Markup, escape
 
+from flipproof.frame.spoken import spoken
+
 TERMS: Final[Mapping[str, str]] = {
     "ω": "Angular velocity of the bottle: by how many radians it turns in a second.",
     "ω₀": "Angular velocity at release. The page gives differences in ω as a share of ω₀.",
@@ -85,8 +87,9 @@ _WORD: Final = re.compile(
 _TAG: Final = re.compile(r"(<script.*?</script>|<style.*?</style>|<[^>]*>)", re.DOTALL)
 _PLAIN: Final = {"omega_0": "ω₀", "theta_0": "θ₀"}
 _SYMBOL: Final = re.compile(
-    r"(?<![\w/.])(?:(?P<plain>omega_0|theta_0)|e\^\((?P<power>[^()]*)\)"
-    r"|(?P<d>d?)(?P<letter>[rvCMeJHNθt])(?P<primes>'{0,2})_(?P<index>CM|M|w|W|max|b|table|c|i|j|t))(?![\w'])"
+    r"(?<![A-Za-z_/.])(?:(?P<plain>omega_0|theta_0)|e\^\((?P<power>[^()]*)\)"
+    r"|(?P<d>d?)(?P<letter>[rvCMeEJHNθωt])(?P<primes>(?:'|&#39;|′|″){0,2})"
+    r"_(?P<index>CM|M|w|W|max|b|table|c|f|i|j|n−1|new|n|s|t))(?![\w'&])"
 )
 """A symbol with its index, or a power of e, in plain text."""
 
@@ -106,12 +109,15 @@ def anchor(term: str) -> str:
 
 
 def linked(html: str) -> Markup:
-    """Return a section with its symbols typeset and a link to the glossary where a term appears first."""
+    """Return a section with its symbols typeset and a link to the glossary where a term appears first.
+
+    Outside of tables solvers have their spoken names.
+    """
     return Markup("".join(_linked(html, set())))
 
 
 def _linked(html: str, seen: set[str]) -> Iterator[str]:
-    depth = kept = 0
+    depth = kept = tables = 0
     for piece in _TAG.split(html):
         if piece.startswith("<"):
             name = piece.strip("</> ").split(" ", 1)[0].split("\n", 1)[0].lower()
@@ -119,10 +125,12 @@ def _linked(html: str, seen: set[str]) -> Iterator[str]:
                 step = -1 if piece.startswith("</") else 1
                 depth += step * (name in _CLOSED)
                 kept += step * (name in _AS_IT_IS)
+                tables += step * (name == "table")
             yield piece
         elif kept:
             yield piece
         else:
+            piece = piece if tables else spoken(piece)
             yield from _typeset(piece if depth else _WORD.sub(lambda found: _link(found.group(), seen), piece))
 
 
@@ -143,6 +151,11 @@ def _indexed(found: re.Match[str]) -> str:
 def indexed(html: str) -> Markup:
     """Return a section with its symbols typeset, without links: the glossary itself."""
     return Markup("".join(_typeset(html)))
+
+
+def symbols(text: str) -> Markup:
+    """Return plain text as HTML with its symbols typeset."""
+    return indexed(escape(text))
 
 
 def _link(term: str, seen: set[str]) -> str:

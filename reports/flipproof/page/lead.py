@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from flipproof.chapters.differences.study import PARTING_BAND, moved, percent
+from flipproof.chapters.waterfall.study import NAMES
 from flipproof.page.headlines import Headline
 
 NOTHING = 1e-6
@@ -13,16 +14,21 @@ NOTHING = 1e-6
 
 
 def answer(headlines: Sequence[Headline]) -> str:
-    """Return the verdict in one sentence: whether the step is short enough, and whether Eq. 8 is free flight.
+    """Return the verdict in one sentence: the step, whether the program solves Eq. 8, and whether Eq. 8 is free flight.
 
-    Either holds if no curve of omega moves by more than PARTING_BAND of omega_0.
+    Each holds if no curve of omega moves by more than PARTING_BAND of omega_0; weight is named if no other rung of the
+    ladder moves it further.
     """
     found = {headline.id: headline for headline in headlines}
     if not {"step", "eq8-free"} <= set(found):
         return "No verdict: what it needs could not be computed; the reasons stand below."
     within = percent(PARTING_BAND)
+    weight = "pair" in found and found["pair"].what == NAMES["weightless"]
+    solved = "program-eq8" not in found or found["program-eq8"].value <= PARTING_BAND
+    physics = "Eq. 8 lets weight push the water" if weight else "Eq. 8 is not free flight"
     return {
-        (True, False): "Not as it stands: its time step is short enough, but its Eq. 8 is not free flight.",
+        (True, False): "Not as it stands: its steps are short enough, but "
+        f"{'' if solved else 'it does not solve Eq. 8, and '}{physics}.",
         (True, True): f"On this throw the step is short enough, and Eq. 8 is free flight within {within} of ω₀.",
         (False, True): f"On this throw Eq. 8 is free flight within {within} of ω₀. The step is too long.",
         (False, False): "On this throw the step is too long, and Eq. 8 is not free flight.",

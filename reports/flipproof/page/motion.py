@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipproof.frame.solvers import Made
+from flipproof.frame.spoken import spoken
 from slicemodel import Scenario, Trajectory
 from slicemodel.trajectory import FloatArray, Impacts
 
@@ -179,6 +180,7 @@ def _packed(name: str, flight: Flight, length: float) -> dict[str, Any]:
     impacts = flight.impacts
     return {
         "name": name,
+        "words": spoken(name),
         "status": flight.status,
         "message": flight.message,
         "reached": len(flight.t),

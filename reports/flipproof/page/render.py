@@ -15,8 +15,8 @@ from flipproof.frame.gather import Gathered, Told
 from flipproof.frame.solvers import find
 from flipproof.output.summary import summarise
 from flipproof.page.captions import shared
-from flipproof.page.equations import equation, typeset
-from flipproof.page.glossary import EQUATIONS, TERMS, anchor
+from flipproof.page.equations import equation, mathematics, numbers, typeset
+from flipproof.page.glossary import EQUATIONS, TERMS, anchor, symbols
 from flipproof.page.headlines import headlines
 from flipproof.page.inline import data_uri, shape
 from flipproof.page.lead import answer, answers, lead_words
@@ -30,7 +30,8 @@ from flipproof.page.touch import touch_data
 
 def unbroken(text: str) -> str:
     """Return text in which no line ends between a sign of equality or a number and what belongs to it."""
-    return re.sub(r"(?<==) (?=[\d−])|(?<=\d) (?=(?:%|ms|s|rad)\b|%)| (?== )", "\N{NO-BREAK SPACE}", text)
+    between = r"(?<==) (?=[\d−])|(?<=\bEq\.) (?=\d)|(?<=\d) (?=(?:%|ms|s|rad)\b|%)| (?== )"
+    return re.sub(between, "\N{NO-BREAK SPACE}", text)
 
 
 def amount(difference: Difference) -> str:
@@ -124,6 +125,8 @@ def page_environment() -> Environment:
         "typeset": typeset, "unbroken": unbroken, "amount": amount, "percent": percent, "data_uri": data_uri,
         "shape": shape, "touch_data": touch_data, "short": short,
         "restitution_error": restitution_error, "term_anchor": anchor, "equation": equation, "shared": shared,
+        "symbols": symbols,
+        "mathematics": mathematics, "numbers": numbers,
     }  # fmt: skip
     templates.globals["assets"] = read_assets()
     return templates

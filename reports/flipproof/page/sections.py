@@ -15,7 +15,7 @@ STORY: Final[Mapping[str, str]] = {
     "answer": "The answer",
     "motion-story": "One flight, four ways",
     "live": "Switch gravity off",
-    "shares": "Which mistake costs what",
+    "shares": "Which assumption costs what",
     "survives": "What survives",
     "bottles": "For which bottles",
     "sure": "How sure we are",

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from flipproof.frame.spoken import spoken
+
 
 def environment() -> Environment:
     """Return a fresh environment over the package's templates."""
-    return Environment(
+    templates = Environment(
         loader=PackageLoader("flipproof.page"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    templates.filters["spoken"] = spoken
+    return templates

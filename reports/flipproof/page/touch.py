@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.frame.exhibit import Touch
+from flipproof.frame.spoken import spoken
 from slicemodel.trajectory import FloatArray
 
 POINTS: Final = 500
@@ -38,7 +39,12 @@ def touch_data(touch: Touch) -> dict[str, Any]:
         "low": low,
         "high": high,
         "lines": [
-            {"name": name, "off": bool(touch.shown) and name not in touch.shown, "values": _text(each, low, high)}
+            {
+                "name": name,
+                "words": spoken(name),
+                "off": bool(touch.shown) and name not in touch.shown,
+                "values": _text(each, low, high),
+            }
             for name, each in values.items()
         ],
     }

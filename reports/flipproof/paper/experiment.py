@@ -37,6 +37,10 @@ VIDEOS: Final = (0.1, 0.25, 0.33, 0.5, 0.75)
 Value = Callable[[Flights], float]
 
 
+ROUND_OFF: Final = 1e-12
+"""Misses that differ by less are one: arithmetic alone explains the rest."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Observation:
     """One statement of the text about the experiment.
@@ -100,7 +104,7 @@ class Comparison:
         if not misses or not self.observation.ranked:
             return ()
         least, band = min(misses.values())
-        return tuple(solver for solver, (miss, own) in misses.items() if miss <= least + band + own)
+        return tuple(solver for solver, (miss, own) in misses.items() if miss <= least + band + own + ROUND_OFF)
 
     def verdict(self, solver: str) -> Verdict:
         """Return whether an equation agrees with the text."""

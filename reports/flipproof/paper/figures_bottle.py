@@ -19,7 +19,7 @@ from flipproof.figures.style import new_figure, styled
 from flipproof.frame.exhibit import Exhibit
 from flipproof.output.columns import rows_csv
 from flipproof.paper.cases import HALF_FULL, family
-from flipproof.paper.figures_panels import COLUMN, NAMES, exhibit, head, legend_below, listed, settings_words
+from flipproof.paper.figures_panels import COLUMN, NAMES, RAMP, exhibit, head, legend_below, listed, settings_words
 from flipproof.paper.runs import SOLVERS, PaperRuns
 from slicemodel import Scenario, Trajectory
 from slicemodel.landing import lab_motion, moment_at
@@ -199,7 +199,7 @@ def figure_vectors(rows: tuple[tuple[Flight, ...], ...]) -> Figure:
             axes = grid[k][SOLVERS.index(flight.solver)]
             along = flight.base - flight.cap
             arrows = axes.quiver(
-                *flight.cap.T, *along.T, flight.t, angles="xy", scale_units="xy", scale=1.0, cmap="viridis",
+                *flight.cap.T, *along.T, flight.t, angles="xy", scale_units="xy", scale=1.0, cmap=RAMP,
                 width=0.006, headwidth=4.0,
             )  # fmt: skip
             axes.plot(*flight.centre.T, color="#CC0000", linewidth=1.2, label="centre of mass")

@@ -9,6 +9,7 @@ from typing import Any, Final
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from flipproof.figures.style import new_figure, solver_style, styled
@@ -25,8 +26,11 @@ NAMES: Final = {"published-python": "published program", "eq8": "Eq. 8", "free-f
 
 DASHES: Final = ("-", (0, (5, 1.5)), (0, (2, 1)), (0, (6, 1.5, 1.5, 1.5)))
 
-LIGHTEST: Final = 0.88
-"""Part of the colour map that is used: beyond it lines are too pale on white."""
+LIGHTEST: Final = 0.75
+"""Part of the colour map that is used: beyond it lines are too pale on white, and too dark on black."""
+
+RAMP: Final = ListedColormap(mpl.colormaps["viridis"](np.linspace(0.0, LIGHTEST, 256)))
+"""Colours of ordered values, dark to light."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +72,7 @@ def dots(colour: Any, *, filled: bool = True, joined: bool = False, size: float 
 
 def ramp(place: int, of: int) -> tuple[float, float, float, float]:
     """Return the colour of the ``place``-th of ``of`` ordered values, dark to light."""
-    red, green, blue, alpha = mpl.colormaps["viridis"](LIGHTEST * place / max(of - 1, 1))
+    red, green, blue, alpha = RAMP(place / max(of - 1, 1))
     return red, green, blue, alpha
 
 

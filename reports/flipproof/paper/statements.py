@@ -38,6 +38,11 @@ DIGITS: Final = 3
 """Digits of a number from which on its band is not worth a word."""
 
 
+def _with_unit(number: str, unit: str) -> str:
+    """Return a number with its unit; the sign of degrees stands without a space."""
+    return f"{number}{'' if unit == '°' else ' '}{unit}".rstrip()
+
+
 def _signed(digits: str) -> str:
     """Return digits with a true minus sign, and none before a zero."""
     return digits.replace("-", "\N{MINUS SIGN}") if float(digits) else digits.lstrip("-")
@@ -116,7 +121,7 @@ class Reading:
         """The margin with its sign and unit, and whether it is marginal."""
         if not math.isfinite(self.margin):
             return "no margin"
-        return f"margin {self.margin_number} {self.unit}".rstrip() + (", marginal" if self.marginal else "")
+        return f"margin {_with_unit(self.margin_number, self.unit)}" + (", marginal" if self.marginal else "")
 
     @property
     def threshold_text(self) -> str:
@@ -142,7 +147,7 @@ class Reading:
             if size + shown < DIGITS:
                 places = max(0, shown)
                 number, band = f"{self.value:.{places}f}", f" ± {self.band:.{places}f}"
-        return f"{_signed(number)}{band} {self.unit}".rstrip()
+        return _with_unit(f"{_signed(number)}{band}", self.unit)
 
     @property
     def words(self) -> str:

@@ -207,22 +207,27 @@ def infinite(ask):
     return found
 
 
-@wrong("omega holds complex128 numbers; real numbers are needed")
+@wrong("omega holds complex numbers; real numbers are needed")
 def complex_numbers(ask):
     return with_omega(ask, good(ask)["omega"] + 0j)
 
 
-@wrong("omega holds <U4 numbers; real numbers are needed")
+@wrong("theta = 'abc' is not an array of numbers")
+def one_word(ask):
+    return good(ask) | {"theta": "abc"}
+
+
+@wrong("omega holds text; real numbers are needed")
 def words(ask):
     return with_omega(ask, ["20.0"] * len(ask.times))
 
 
-@wrong("omega holds object numbers; real numbers are needed")
+@wrong("omega holds objects; real numbers are needed")
 def fractions(ask):
     return with_omega(ask, [Fraction(20)] * len(ask.times))
 
 
-@wrong("omega holds bool numbers; real numbers are needed")
+@wrong("omega holds truth values; real numbers are needed")
 def truths(ask):
     return with_omega(ask, np.ones(len(ask.times), dtype=bool))
 

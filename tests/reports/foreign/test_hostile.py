@@ -27,7 +27,7 @@ def runner(tmp_path):
     shutil.copy(HERE / "hostile.py", tmp_path)
     opened = []
 
-    def of(name, timeout=2.0):
+    def of(name, timeout=300.0):  # what is no hang may take its time on a busy machine
         opened.append(Isolated(f"{tmp_path / 'hostile.py'}:{name}", timeout))
         return opened[-1]
 
@@ -42,7 +42,7 @@ def test_there_are_at_least_thirty():
 
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_answer_is_a_reason_in_one_line(runner, name):
-    solver = runner(name)
+    solver = runner(name, 2.0) if "no answer within 2 s" in WRONG[name] else runner(name)
     with pytest.raises(ForeignError) as caught:
         solver(ASK)
     said = str(caught.value)
@@ -53,7 +53,7 @@ def test_a_wrong_answer_is_a_reason_in_one_line(runner, name):
 
 @pytest.mark.parametrize("name", HARMLESS)
 def test_an_odd_solver_that_answers_is_answered(runner, name):
-    answer = runner(name, 300.0)(ASK)  # a gigabyte of text takes its time on a busy machine
+    answer = runner(name)(ASK)
     np.testing.assert_array_equal(answer.omega, np.full(len(ASK.times), THROW.omega0))
     assert answer.t.dtype == np.float64
 

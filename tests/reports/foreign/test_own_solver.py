@@ -132,24 +132,30 @@ def test_a_plugin_that_is_not_used_costs_nothing():
 
 
 def test_the_passports_of_box2d_say_what_was_found():
-    """No rebound below 1 m/s at 1 unit a metre, the restitution asked for at 100, and float32 in both."""
+    """No rebound below 1 m/s at 1 unit a metre, the restitution asked for at 100, and a float32 floor in both."""
     facts = {name: json.loads((BOX2D / f"passport-{name}.json").read_text()) for name in ("box2d", "box2d-si")}
     low, high = facts["box2d-si"]["facts"]["threshold"]
     assert 0.95 <= low <= high <= 1.05
     assert all(abs(e - 0.5) <= 5e-3 for _, _, e in facts["box2d"]["facts"]["restitution"])
     for passport in facts.values():
-        assert passport["facts"]["arithmetic"] == "float32 arithmetic"
+        assert passport["facts"]["arithmetic"] == "float32"
+        assert passport["facts"]["floor_reached"]
+        assert len(passport["facts"]["changes"]) <= 2
         assert passport["facts"]["place"]["equation"] == "free-flight"
 
 
-def test_box2d_has_the_threshold_its_passport_names():
+def test_box2d_has_the_threshold_and_the_floor_its_passport_names():
     pytest.importorskip("Box2D")
     from flipproof.foreign.certify import certify
     from flipproof.foreign.power import InProcess
     from flipproof.foreign.specs import load
 
-    found = {name: certify(InProcess(load(f"{BOX2D / 'flipproof_box2d.py'}:{name}"), name), ["restitution"]).results[0]
+    names = ["restitution", "precision-floor"]
+    found = {name: certify(InProcess(load(f"{BOX2D / 'flipproof_box2d.py'}:{name}"), name), names).results
              for name in ("Box2D", "Box2DSI")}  # fmt: skip
-    low, high = found["Box2DSI"].found.facts["threshold"]
+    low, high = found["Box2DSI"][0].found.facts["threshold"]
     assert 0.95 <= low <= high <= 1.05
-    assert all(abs(e - 0.5) <= 5e-3 for _, _, e in found["Box2D"].found.facts["restitution"])
+    assert all(abs(e - 0.5) <= 5e-3 for _, _, e in found["Box2D"][0].found.facts["restitution"])
+    for _, floor in found.values():
+        assert floor.found.facts["arithmetic"] == "float32"
+        assert len(floor.found.facts["changes"]) <= 2

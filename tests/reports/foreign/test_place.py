@@ -88,6 +88,16 @@ def test_mistakes_in_impacts_and_rest_are_off_the_lattice(name):
     assert found.distance > 5 * found.room
 
 
+def test_a_switch_without_effect_in_one_equation_explains_nothing():
+    """In free flight drag is that of slices on the tube, whatever Eq. 8 takes it against: a report says so, too."""
+    found = explain(opened("eq8"), opened("free-flight"), Scenario(n_slices=4, duration=0.3))
+    assert found.second.inert == ("drag_on_centre",)
+    assert list(found.bars) == ["weightless", "origin", "recoil"]
+    assert found.difference == pytest.approx(sum(found.bars.values()) + found.rest, abs=1e-12)
+    back = explain(opened("free-flight"), opened("eq8"), Scenario(n_slices=4, duration=0.3)).bars
+    assert back == pytest.approx({name: -share for name, share in found.bars.items()}, abs=1e-12)
+
+
 def test_gravity_explains_what_gravity_does():
     with_it, without = (opened(f"{EXAMPLES / 'rk4.py'}:{name}") for name in ("Eq8", "Weightless"))
     try:

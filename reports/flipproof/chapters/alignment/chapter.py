@@ -81,7 +81,7 @@ def figures(found: Events) -> Iterator[Exhibit]:
             name=f"gantt-{first}-{second}",
             title=f"Contacts and impacts: {first} and {second}",
             caption=(
-                "One row per slice. Bars are contacts, ticks are impacts; the upper lane of a row is the first "
+                "One row per slice. Bars are contacts, triangles are impacts; the upper lane of a row is the first "
                 "solver, the lower the second. Where the two lanes of a row look alike, both solvers have the same "
                 "contacts and impacts of that slice. At a fork the slice strikes one end in the first flight and the "
                 "other end in the second."

@@ -52,9 +52,8 @@ def figure_gantt(alignment: Alignment) -> Figure:
     axes.set_xlim(-0.01 * alignment.until, 1.01 * alignment.until)
     axes.set_xlabel("time t [s]")
     axes.set_ylabel("slice number [1], 0 starts on the base")
-    title = (
-        f"in each row: {alignment.first} above, {alignment.second} below; {len(alignment.swapped)} neighbours swapped"
-    )
+    title = f"in each row: {alignment.first} above, {alignment.second} below; "
+    title += f"{len(alignment.swapped)} impacts in another order"
     axes.set_title(title, fontsize=10, loc="left")
     figure.legend(handles=_gantt_handles(alignment), loc="outside lower center", ncols=4)
     return figure

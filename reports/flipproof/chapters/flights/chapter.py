@@ -93,9 +93,10 @@ def figures(found: Flown) -> Iterator[Exhibit]:
     over_time = partial(_over_time, flights)
     yield over_time(
         "omega", "Angular velocity", pictures.figure_omega, "omega/omega_0", "[1]",
-        caption="published-python and published-limit, and exact-step and eq8, are each a scheme and the equation that "
-        "it solves: they differ by what a finite time step does. free-flight and pymunk both solve free flight. Any "
-        f"other two curves solve different equations. All have N = {flights[0].scenario.n_slices} slices.",
+        caption="The published program and its limit Δt → 0, and the exact step and Eq. 8, are each a scheme and the "
+        "equation that it solves: they differ by what a finite time step does. pymunk throws the bottle of free flight "
+        "by its own mechanics. Any other two curves solve different equations. All have "
+        f"N = {flights[0].scenario.n_slices} slices.",
         values={run.label: run.omega / run.scenario.omega0 for run in flights},
         alt="Line plot of omega over omega_0 against time, 1 at release. Values at the end: {ends}. {apart}",
         digits=".3f", apart=".2g", unit=" of omega_0", label="angular velocity ω / ω₀ [1]",

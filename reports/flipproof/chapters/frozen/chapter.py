@@ -38,6 +38,12 @@ def figures(found: Frozen) -> Iterator[Exhibit]:
             "holding it constant misses in that step, with a marker at the largest value of each; v_CM jumps at every "
             "impact, so that a band shows the range of what holding it misses. Bottom: the missed velocities added up, "
             "beside the error of the velocity and of ω that they lead to."
+            + (
+                ""
+                if found.explained is None
+                else " Before the first impact the error of the velocity is "
+                f"{found.explained:.2f} of what they add up to."
+            )
         ),
         alt=f"Curves over time for {found.scheme} at a step of {found.dt * 1e3:.2g} ms. Share of the steps in which "
         f"freezing costs most: {shares}. Largest velocity missed in one step: {peaks or 'none'}. Largest error of "

@@ -40,7 +40,7 @@ def figure_frozen(study: Frozen) -> Figure:
         if not values.any():
             continue
         time, peak = study.peak[quantity]
-        label = f"{WORDS[quantity]}: largest in {study.share[quantity]:.0%} of the steps"
+        label = f"{WORDS[quantity]}: largest in {100 * study.share[quantity]:.0f} % of the steps"
         colour = COLOURS[quantity]
         if quantity == JUMPS:
             t, least, most = envelope(study.t, values)
@@ -56,13 +56,14 @@ def figure_frozen(study: Frozen) -> Figure:
     errors.semilogy(
         end, _shown(study.velocity_error), color="#56B4E9", label=f"error of r' against {study.model} [m/s]"
     )
-    errors.semilogy(end, _shown(study.cumulative), color="#444444", label="defects added up [m/s]", linewidth=1.0)
+    errors.semilogy(
+        end, _shown(study.cumulative), color="#444444", label="missed velocities added up [m/s]", linewidth=1.0
+    )
     errors.semilogy(end, _shown(study.omega_error), color="#D55E00", linestyle="--", label="error of ω / ω₀ [1]")
     if study.first_impact is not None:
         errors.axvline(study.first_impact, color=ASSUMPTIONS[4], linewidth=1.0, linestyle=":", label="first impact")
-    words = "" if study.explained is None else f"; before the first impact error / defects = {study.explained:.2f}"
-    errors.set_title(f"what becomes of them, slices that have not hit an end{words}", fontsize=10, loc="left")
-    errors.set_ylabel("added up [m/s], [1]")
+    errors.set_title("missed velocities added up, over slices that have not hit an end yet", fontsize=10, loc="left")
+    errors.set_ylabel("error [m/s], [1]")
     errors.set_xlabel("time t [s]")
     for axes in panels:
         axes.margins(x=0.01)

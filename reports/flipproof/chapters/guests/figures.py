@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from flipproof.chapters.guests.study import Guest, Guests
+from flipproof.chapters.guests.waterfall import draw_waterfalls
 from flipproof.figures.style import ASSUMPTIONS, MARKERS, new_figure, shared_legend, solver_style, styled
 from flipproof.frame.exhibit import Exhibit
 from flipproof.output.columns import curves_csv
@@ -31,6 +32,9 @@ def draw_guests(found: Guests) -> Iterator[Exhibit]:
     apart = [guest for guest in flown if guest.differences]
     if apart:
         yield _draw_differences(apart)
+    placed = [guest for guest in flown if guest.split is not None]
+    if placed:
+        yield draw_waterfalls(placed)
     refined = [guest for guest in flown if len(guest.errors) > 1]
     if refined:
         yield _draw_convergence(refined)

@@ -1,9 +1,9 @@
 """From a guest to free flight: the difference split over the assumptions that the guest's equation still makes.
 
-    plateau of free flight - plateau of the guest = sum of fair shares + rest
+    plateau of free flight - plateau of the guest = rest + sum of fair shares
 
-A fair share is the mean over all orders of mending the assumptions (``foreign.explain``). The rest is the plateau of
-the guest's equation minus that of the guest: its own error, and what is no assumption of the ladder.
+The rest is the plateau of the guest's equation minus that of the guest: its own error, and what is no assumption of the
+ladder. A fair share is the mean over all orders of mending the assumptions (``foreign.explain``).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 from flipproof.chapters.waterfall.study import equation_run
 from flipproof.foreign.certify import Certificate
 from flipproof.foreign.contract import Traits
-from flipproof.foreign.explain import shares_of
+from flipproof.foreign.explain import changes_of, mean
 from flipproof.foreign.place import name_of, switches_of
 from flipproof.frame.chapter import Flights, Missing, Run
 from ode_reference.models import MODELS
@@ -29,21 +29,32 @@ FREE = MODELS["free-flight"].switches
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Split:
-    """How a guest's plateau becomes that of free flight; ``bars`` maps a switch to its fair share."""
+    """How a guest's plateau becomes that of free flight.
+
+    Parameters
+    ----------
+    equation : str - that the guest solves
+    start, placed, end : float - plateau of the guest, of its equation, of free flight
+    bars : mapping switch -> float - its fair share
+    ranges : mapping switch -> (float, float) - least and largest change by it in a single order
+    """
 
     equation: str
     start: float
+    placed: float
     end: float
     bars: Mapping[str, float]
+    ranges: Mapping[str, tuple[float, float]]
 
     @property
     def rest(self) -> float:
         """What no assumption of the ladder explains."""
-        return self.end - self.start - sum(self.bars.values())
+        return self.placed - self.start
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the split as JSON-ready data."""
-        parts = {"bars": dict(self.bars), "rest": self.rest}
+        ranges = {name: list(each) for name, each in self.ranges.items()}
+        parts = {"rest": self.rest, "bars": dict(self.bars), "ranges": ranges}
         return {"equation": self.equation, "guest": self.start, "free-flight": self.end, **parts}
 
 
@@ -82,6 +93,8 @@ def split(run: Trajectory, start: Switches, flights: Flights) -> Split:
     ------
     Missing
         If a run is not whole.
+    ArithmeticError
+        If rest and bars miss the whole difference by more than round-off.
     """
 
     def read(trajectory: Trajectory) -> float:
@@ -92,5 +105,16 @@ def split(run: Trajectory, start: Switches, flights: Flights) -> Split:
 
     if len(run.t) < 2 or run.t[-1] < run.scenario.duration:
         raise Missing("the guest's run does not reach the end of the flight")
-    bars = shares_of(start, FREE, value)
-    return Split(equation=name_of(start), start=read(run), end=value(FREE), bars=bars)
+    changes = changes_of(start, FREE, value)
+    found = Split(
+        equation=name_of(start),
+        start=read(run),
+        placed=value(start),
+        end=value(FREE),
+        bars={name: mean(each) for name, each in changes.items()},
+        ranges={name: (min(c for _, c in each), max(c for _, c in each)) for name, each in changes.items()},
+    )
+    missed = found.end - found.start - found.rest - sum(found.bars.values())
+    if not abs(missed) <= 1e-12 * (1.0 + abs(found.start) + sum(map(abs, found.bars.values()))):
+        raise ArithmeticError(f"rest and bars miss the difference to free flight by {missed:.3g}")
+    return found

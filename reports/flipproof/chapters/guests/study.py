@@ -188,14 +188,19 @@ def study(ask: Ask) -> Study[Guests]:
     found = study_guests(received(calls, flights), rungs, run_bands(ask.solvers, flights), others)
     starts = {g.label: switches_made(g.visit.traits, g.visit.certificate, g.equation) for g in found.guests}
     flights = yield plan_splits([start for start in starts.values() if start is not None], ask.throw)
-    guests = tuple(_with_split(guest, starts[guest.label], flights) for guest in found.guests)
+    guests = tuple(with_split(guest, starts[guest.label], flights) for guest in found.guests)
     return replace(found, guests=guests)
 
 
-def _with_split(guest: Guest, start: Switches | None, flights: Flights) -> Guest:
+def with_split(guest: Guest, start: Switches | None, flights: Flights) -> Guest:
+    """Return a guest with its split from ``start`` to free flight, or with the reason why it has none."""
     if guest.run is None or start is None:
         return guest
-    return replace(guest, split=attempt(split, guest.run, start, flights).found)
+    found = attempt(split, guest.run, start, flights)
+    if found.found is None:
+        problems = {**guest.visit.problems, "waterfall": found.reason}
+        return replace(guest, visit=replace(guest.visit, problems=problems))
+    return replace(guest, split=found.found)
 
 
 def received(calls: Mapping[str, Call], flights: Flights) -> tuple[Visit, ...]:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from flipproof.chapters.landing.figures import witnesses
-from flipproof.chapters.landing.study import Cell, Found, Kind
+from flipproof.chapters.landing.study import OPTIMAL, Cell, Found, Kind
 from flipproof.chapters.landing.tables import NAMES
 from flipproof.frame.findings import Finding
 from flipproof.frame.throws import REFERENCE
-
-OPTIMAL: Final = (0.2, 0.5)
-"""Fillings that the paper calls optimal (section 5)."""
 
 ALIKE: Final = 0.02
 ALIKE_OF_IMPULSES: Final = 0.03
@@ -50,14 +48,12 @@ def _water_and_ice(found: Found) -> Iterator[Finding]:
             if (cell := found.cell(family, kind, filling)) is not None
         )
         verdict = "water stands more often" if low > 0 else "ice stands more often" if high < 0 else "undistinguished"
-        yield Finding(
-            id=f"landing-water-minus-ice-{filling:g}",
-            title=f"P(upright) of water minus ice at filling {filling:g} (abstract, section 3: redistribution helps)",
-            value=difference,
-            unit="",
-            kind="observation",
-            band=(high - low) / 2,
-            note=f"95 % interval {low:+.3f} to {high:+.3f}: {verdict}; law together; {laws}; {found.assumed}",
+        yield _observed(
+            f"landing-water-minus-ice-{filling:g}",
+            f"P(upright) of water minus ice at filling {filling:g} (abstract, section 3: redistribution helps)",
+            difference,
+            f"95 % interval {low:+.3f} to {high:+.3f}: {verdict}; law together; {laws}; {found.assumed}",
+            (high - low) / 2,
         )
 
 
@@ -66,25 +62,22 @@ def _best_filling(found: Found) -> Finding:
     curve = found.curve(_family(found), "together")
     inside = [pair for pair in curve if OPTIMAL[0] <= pair[0] <= OPTIMAL[1]]
     outside = [pair for pair in curve if pair not in inside]
+    name, title = "landing-best-filling", "Filling at which water stands most often (section 5: 0.2 to 0.5)"
     if not inside or not outside:
-        return _absent("landing-best-filling", "Filling at which water stands most often", "no filling on one side")
+        return _observed(name, title, None, "no filling on one side")
 
     def share(pair: tuple[float, Cell]) -> float:
         return pair[1].share.value
 
     best, other = max(inside, key=share), max(outside, key=share)
     difference, low, high = best[1].share.minus(other[1].share)
-    return Finding(
-        id="landing-best-filling",
-        title="Filling at which water stands most often (section 5: 0.2 to 0.5)",
-        value=max(curve, key=share)[0],
-        unit="",
-        kind="observation",
-        note=(
-            f"best inside: {best[0]:g} with {share(best):.3f}, outside: {other[0]:g} with {share(other):.3f}; "
-            f"difference {difference:+.3f}, 95 % interval {low:+.3f} to {high:+.3f}: "
-            f"{'decided' if low > 0 or high < 0 else 'not decided'}; {found.assumed}"
-        ),
+    return _observed(
+        name,
+        title,
+        max(curve, key=share)[0],
+        f"best inside: {best[0]:g} with {share(best):.3f}, outside: {other[0]:g} with {share(other):.3f}; "
+        f"difference {difference:+.3f}, 95 % interval {low:+.3f} to {high:+.3f}: "
+        f"{'decided' if low > 0 or high < 0 else 'not decided'}; {found.assumed}",
     )
 
 
@@ -95,83 +88,76 @@ def _static(found: Found) -> Iterator[Finding]:
         others = counts[False, True] + counts[False, False]
         if not said + others:
             continue
-        yield Finding(
-            id=f"landing-static-{family}-{kind.replace(', ', '-')}",
-            title=(
-                "Throws of which the toppling angle at the touch says rightly whether they stand: "
-                f"{NAMES[kind]}, family {family}"
-            ),
-            value=(counts[True, True] + counts[False, False]) / (said + others),
-            unit="",
-            kind="observation",
-            note=(
-                f"of those with a tilt below it {counts[True, True]} of {said} stand, of those above it "
-                f"{counts[False, True]} of {others}; {found.assumed}"
-            ),
+        yield _observed(
+            f"landing-static-{family}-{kind.replace(', ', '-')}",
+            "Throws of which the toppling angle at the touch says rightly whether they stand: "
+            f"{NAMES[kind]}, family {family}",
+            (counts[True, True] + counts[False, False]) / (said + others),
+            f"of those with a tilt below it {counts[True, True]} of {said} stand, of those above it "
+            f"{counts[False, True]} of {others}; {found.assumed}",
         )
 
 
 def _slow_rotation(found: Found) -> Finding:
     """Return whether bottles that turn more slowly at the touch stand more often (section 6)."""
     family = _family(found)
+    name = "landing-slow-rotation"
     title = "P(upright) of the slower minus the faster half of the touches, water (section 6: slow rotation helps)"
     if (family, "together") not in found.slow:
-        return _absent("landing-slow-rotation", title, "water was not thrown")
+        return _observed(name, title, None, "water was not thrown")
     slow, fast = found.slow[family, "together"]
     difference, low, high = slow.minus(fast)
-    return Finding(
-        id="landing-slow-rotation",
-        title=title,
-        value=difference,
-        unit="",
-        kind="observation",
-        band=(high - low) / 2,
-        note=(
-            f"halves of |omega| at the touch within each filling; 95 % interval {low:+.3f} to {high:+.3f}: "
-            f"{'holds' if low > 0 else 'fails' if high < 0 else 'cannot be decided'}; {found.assumed}"
-        ),
+    return _observed(
+        name,
+        title,
+        difference,
+        f"halves of |omega| at the touch within each filling; 95 % interval {low:+.3f} to {high:+.3f}: "
+        f"{_judged(low, high)}; {found.assumed}",
+        (high - low) / 2,
     )
 
 
 def _bounces(found: Found) -> Finding:
     """Return whether falling water dampens the bounce (section 6)."""
-    family, filling = _family(found), found.size.axis_filling
+    name, family, filling = "landing-bounces", _family(found), found.size.axis_filling
     title = f"Bounces of ice minus bounces of water at filling {filling:g} (section 6: falling water dampens them)"
     water, ice = (found.cell(family, kind, filling) for kind in ("together", "ice"))
     if water is None or ice is None:
-        return _absent("landing-bounces", title, "water or ice was not thrown at this filling")
-    return Finding(
-        id="landing-bounces",
-        title=title,
-        value=ice.bounces - water.bounces,
-        unit="bounces",
-        kind="observation",
-        note=(
-            f"until the outcome is certain; ice {ice.bounces:.2f}, water {water.bounces:.2f}: "
-            f"{'holds' if water.bounces < ice.bounces else 'fails'}; {found.assumed}"
-        ),
+        return _observed(name, title, None, "water or ice was not thrown at this filling")
+    difference, band = ice.bounces - water.bounces, math.hypot(ice.bounces_band, water.bounces_band)
+    return _observed(
+        name,
+        title,
+        difference,
+        f"until the outcome is certain; ice {ice.bounces:.2f}, water {water.bounces:.2f}; 95 % interval "
+        f"{difference - band:+.2f} to {difference + band:+.2f}: {_judged(difference - band, difference + band)}; "
+        f"{found.assumed}",
+        band,
+        "bounces",
     )
 
 
 def _model_uncertainty(found: Found) -> Finding:
     """Return how far the laws of the impact are apart: a band of the model, not of the sample."""
     family = _family(found)
-    title = "Largest distance in P(upright) between two laws of the impact, water"
-    widest, where = -math.inf, ""
-    for filling, cell in found.curve(family, "together"):
-        kinds: tuple[Kind, ...] = ("in-turn", "compliant")
-        shares = [cell.share.value] + [c.share.value for kind in kinds if (c := found.cell(family, kind, filling))]
-        if len(shares) > 1 and max(shares) - min(shares) > widest:
-            widest, where = max(shares) - min(shares), f"at filling {filling:g}"
-    if not where:
-        return _absent("landing-laws", title, "one law only")
-    return Finding(
-        id="landing-laws",
-        title=title,
-        value=widest,
-        unit="",
-        kind="observation",
-        note=f"{where}; the laws are models of one impact and are not averaged; {found.assumed}",
+    name, title = "landing-laws", "Largest distance in P(upright) between two laws of the impact, water"
+    kinds: tuple[Kind, ...] = ("together", "in-turn", "compliant")
+    pairs = [
+        (one.share.minus(other.share), f"at filling {filling:g}, {NAMES[first]} minus {NAMES[second]}")
+        for filling in found.size.fillings
+        for first, second in itertools.permutations(kinds, 2)
+        if (one := found.cell(family, first, filling)) and (other := found.cell(family, second, filling))
+    ]
+    if not pairs:
+        return _observed(name, title, None, "one law only")
+    (widest, low, high), where = max(pairs)
+    return _observed(
+        name,
+        title,
+        widest,
+        f"{where}; 95 % interval of this pair alone {low:+.3f} to {high:+.3f}; the laws are models of one impact and "
+        f"are not averaged; {found.assumed}",
+        (high - low) / 2,
     )
 
 
@@ -182,7 +168,7 @@ def _undecided(found: Found) -> Finding:
     throws = sum(cell.share.throws for cell in cells)
     unknown = sum(cell.share.undecided for cell in cells)
     if not throws:
-        return _absent("landing-undecided", title, "nothing was thrown")
+        return _observed("landing-undecided", title, None, "nothing was thrown")
     paper = found.throw.with_slices(REFERENCE.n_slices) == REFERENCE
     return Finding(
         id="landing-undecided",
@@ -203,8 +189,6 @@ def _witnesses(stored: Mapping[str, Any]) -> Iterator[Finding]:
             if "compliant" in one + other or case["slices"] == "staggered":
                 continue
             kind = "ice" if case["law"] is None else f"water-{case['law']}"
-            # A step longer than the engines' own lets hits of one cascade coincide (docs/landing.md, section 3).
-            grid = "" if case["dt"] is None else f"; with steps of {case['dt']:g} s, longer than the engine's own"
             most = ALIKE_OF_IMPULSES if "mujoco" in (one, other) else ALIKE
             both = matrix["decided by both"]
             share = matrix["differ"] / both if both else math.nan
@@ -213,14 +197,22 @@ def _witnesses(stored: Mapping[str, Any]) -> Iterator[Finding]:
                 title=f"Outcomes in which {one} and {other} differ from one touch: {kind.replace('-', ', ')}",
                 value=share if both else None,
                 unit="",
-                kind="regression" if case["dt"] is None else "observation",
+                kind="regression",
                 admissible=(0.0, most),
                 note=(
                     f"{matrix['differ']} of {both} decided by both; at most {most:.0%} is asked for: "
-                    f"{'reached' if share <= most else 'missed'}{grid}; stored, made by: {stored['command']}"
+                    f"{'reached' if share <= most else 'missed'}; stored, made by: {stored['command']}"
                 ),
             )
 
 
-def _absent(name: str, title: str, reason: str) -> Finding:
-    return Finding(id=name, title=title, value=None, unit="", kind="observation", note=reason)
+def _observed(
+    name: str, title: str, value: float | None, note: str, band: float | None = None, unit: str = ""
+) -> Finding:
+    """Return an observation; its value is None if it could not be made, and ``note`` says why."""
+    return Finding(id=name, title=title, value=value, unit=unit, kind="observation", band=band, note=note)
+
+
+def _judged(low: float, high: float) -> str:
+    """Return what an interval says of a claim that is true above 0."""
+    return "holds" if low > 0 else "fails" if high < 0 else "cannot be decided"

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from flipproof.chapters.landing.study import Cell, Energy, Found, Kind
-from flipproof.chapters.landing.tables import NAMES
+from flipproof.chapters.landing.study import OPTIMAL, Cell, Found, Kind
+from flipproof.chapters.landing.tables import FAMILIES, NAMES
 from flipproof.figures.style import new_figure, shared_legend, styled
 
 LOOKS: Final[Mapping[Kind, dict[str, Any]]] = {
@@ -30,6 +30,9 @@ SHADES: Final = {
 }  # fmt: skip
 """Colour of every outcome on the map; water and ice alike."""
 
+FALLEN: Final = "#B08D57"
+"""Colour of the energy of a landing that does not end upright."""
+
 TOP: Final = 4.0
 """Largest energy that is drawn [E_s]."""
 
@@ -41,9 +44,9 @@ def figure_shares(found: Found) -> Figure:
     for axes, family in zip(panels[0], found.size.families, strict=True):
         for kind in LOOKS:
             _curve(axes, kind, found.curve(family, kind))
-        axes.axvspan(0.2, 0.5, color="#0072B2", alpha=0.06, linewidth=0)
+        axes.axvspan(*OPTIMAL, color="#0072B2", alpha=0.06, linewidth=0)
         axes.set_xlabel("fill fraction M_w / M_max [1]")
-        axes.set_title({"A": "A: ω₀ as thrown", "B": "B: time of flight as thrown"}[family], fontsize=10, loc="left")
+        axes.set_title(FAMILIES[family], fontsize=10, loc="left")
         axes.set_ylim(0.0, 1.0)
     panels[0, 0].set_ylabel("P(upright) [1]")
     shared_legend(figure, panels[0, -1], columns=5)
@@ -141,7 +144,8 @@ def figure_energy(found: Found) -> Figure:
     for axes, kind in zip(panels, kinds, strict=True):
         for run in found.energies:
             if run.kind == kind:
-                _energy(axes, run)
+                colour = SHADES["upright"] if run.outcome == "upright" else FALLEN
+                axes.plot(run.t, np.minimum(run.energy, 2 * TOP), color=colour, linewidth=1.1, alpha=0.85)
         axes.axhline(1.0, color="black", linewidth=1.2)
         axes.set_title(NAMES[kind], fontsize=10, loc="left")
         axes.set_xlabel("time from the touch [s]")
@@ -149,15 +153,10 @@ def figure_energy(found: Found) -> Figure:
         axes.margins(x=0.0)
     panels[0].set_ylabel("energy over the table / saddle E_s [1]")
     handles = [Line2D([], [], color=SHADES["upright"], label="ends upright")]
-    handles += [Line2D([], [], color="#B08D57", label="ends lying or on the cap")]
+    handles += [Line2D([], [], color=FALLEN, label="ends lying or on the cap")]
     handles += [Line2D([], [], color="black", label="saddle: below it the outcome is final")]
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
-
-
-def _energy(axes: Axes, run: Energy) -> None:
-    colour = SHADES["upright"] if run.outcome == "upright" else "#B08D57"
-    axes.plot(run.t, np.minimum(run.energy, 2 * TOP), color=colour, linewidth=1.1, alpha=0.85)
 
 
 @styled

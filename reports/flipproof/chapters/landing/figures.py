@@ -11,13 +11,7 @@ from typing import Any
 
 from flipproof.chapters.landing import drawings
 from flipproof.chapters.landing.study import Found
-from flipproof.chapters.landing.tables import (
-    energies_csv,
-    map_csv,
-    share_line,
-    shares_csv,
-    static_csv,
-)
+from flipproof.chapters.landing.tables import energies_csv, map_csv, share_line, shares_csv, static_csv
 from flipproof.frame.exhibit import Exhibit
 
 
@@ -35,15 +29,16 @@ def figures(found: Found) -> list[Exhibit]:
     cells = len(found.fillings) * len(found.omegas)
     stored = witnesses()
     soft = f" (soft contacts {size.engine_throws})" if size.engine_throws else ""
+    missed = "In family A ice that does not reach the table from above counts as not upright. "
+    assumed = found.assumed.capitalize() + "."
     return [
         Exhibit(
             name="landing-shares",
             title="Does it stand? Water and ice over the filling",
             caption=(
                 f"Share of throws that end upright, {size.throws} throws a point{soft}, with Wilson's 95 % interval. "
-                "The laws of the impact are models of one landing and are not averaged. The shaded fillings "
-                "are those that the paper calls optimal. In family A ice that does not reach the table from above "
-                f"counts as not upright. {found.assumed.capitalize()}."
+                "The laws of the impact are models of one landing and are not averaged. The shaded fillings are those "
+                f"that the paper calls optimal. {missed if 'A' in size.families else ''}{assumed}"
             ),
             alt=shares,
             maker=drawings.figure_shares,
@@ -56,8 +51,7 @@ def figures(found: Found) -> list[Exhibit]:
             caption=(
                 "One throw a cell, without scatter, onto a table where the bottle would touch standing after the "
                 "flight's duration. On the lines the bottle touches at 360 and at 720 degrees. Bottle and water strike "
-                "the table together. "
-                f"{found.assumed.capitalize()}."
+                f"the table together. {assumed}"
             ),
             alt=", ".join(f"{kind}: {count} of {cells} cells upright" for kind, count in upright.items()),
             maker=drawings.figure_map,
@@ -70,7 +64,7 @@ def figures(found: Found) -> list[Exhibit]:
             caption=(
                 f"Share of throws that end upright at filling {size.axis_filling:g}, along each assumption, with the "
                 f"others as they are; {size.axis_throws} throws a point, the same for all points. "
-                f"{found.assumed.capitalize()}."
+                f"{assumed}"
             ),
             alt=_axes_words(found),
             maker=drawings.figure_axes,
@@ -83,7 +77,7 @@ def figures(found: Found) -> list[Exhibit]:
             caption=(
                 "The toppling angle of Eq. 13a, with the water where it is at the touch, says whether a bottle put "
                 "down at rest would come upright. Each bar is the share that does end upright, of all throws that the "
-                f"angle calls upright and of all others, at all fillings. {found.assumed.capitalize()}."
+                f"angle calls upright and of all others, at all fillings. {assumed}"
             ),
             alt=_static_words(found),
             maker=drawings.figure_static,
@@ -95,7 +89,7 @@ def figures(found: Found) -> list[Exhibit]:
             title="Energy against the saddle",
             caption=(
                 f"The same throwers with water and with ice, filling {size.axis_filling:g}. Below 1 the energy does "
-                f"not suffice to get from the base over a rim, and the outcome is final. {found.assumed.capitalize()}."
+                f"not suffice to get from the base over a rim, and the outcome is final. {assumed}"
             ),
             alt=_energy_words(found),
             maker=drawings.figure_energy,
@@ -108,9 +102,8 @@ def figures(found: Found) -> list[Exhibit]:
             caption=(
                 f"Two programs land the same {stored['touches']} touches, {stored['n_slices']} slices at filling "
                 f"{stored['cases'][0]['filling']:g}. Each matrix counts the touches by their outcome in the program "
-                "that stands beside it (rows) and in the one below it (columns); in red the two differ, and '?' is "
-                f"undecided. {_steps(stored)}The counts are stored with this program; this command made them: "
-                f"{stored['command']}"
+                "that stands beside it (rows) and in the one below it (columns); in red the two differ. "
+                f"The counts are stored with this program; this command made them: {stored['command']}"
             ),
             alt=_witness_words(stored),
             maker=drawings.figure_witnesses,
@@ -148,12 +141,6 @@ def _energy_words(found: Found) -> str:
             stand = sum(run.outcome == "upright" for run in runs)
             words.append(f"{kind}: {len(runs)} landings, {stand} upright, {start:.1f} E_s after the first impact")
     return "; ".join(words)
-
-
-def _steps(stored: Mapping[str, Any]) -> str:
-    """Return which cases had another step than the engines' own, as sentences."""
-    others = [f"{case['law']} with steps of {case['dt']:g} s" for case in stored["cases"] if case["dt"] is not None]
-    return f"Engines landed {', '.join(others)}, else with their own. " if others else ""
 
 
 def _witness_words(stored: Mapping[str, Any]) -> str:

@@ -16,32 +16,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipproof.landing.aim import SPARE, Aim, aimed
-from flipproof.landing.design import Case
-from flipproof.landing.scatter import Scatter, Share
+from flipproof.landing.design import Case, Throws
+from flipproof.landing.scatter import Scatter, Share, Z
 from flipproof.landing.work import Landed
+from ode_reference import fly
 from ode_reference.landing import path
 from slicemodel import Scenario, Table
+from slicemodel.observables import centre_of_mass_at_rest
 from slicemodel.trajectory import FloatArray
 
 Kind = Literal["together", "in-turn", "compliant", "ice", "ice, compliant"]
+
+COMPLIANT: Final = "mujoco-compliant"
 
 KINDS: Final[Mapping[Kind, tuple[bool, str | None, str]]] = {
     "together": (False, "together", "ode_reference"),
     "in-turn": (False, "in-turn", "ode_reference"),
     "ice": (True, None, "ode_reference"),
-    "compliant": (False, None, "mujoco-compliant"),
-    "ice, compliant": (True, None, "mujoco-compliant"),
+    "compliant": (False, None, COMPLIANT),
+    "ice, compliant": (True, None, COMPLIANT),
 }
-"""What is landed -> frozen, law and program."""
+"""What is landed -> frozen, law and program. The laws of water are models of one impact and are never averaged."""
 
-WATER: Final = ("together", "in-turn", "compliant")
-"""The laws of water: three models of one impact, shown side by side and never averaged."""
+OPTIMAL: Final = (0.2, 0.5)
+"""Fillings that the paper calls optimal (section 5)."""
 
 AIMING, COUNTING, MAPPING = range(3)
 AXES: Final = {"restitution": 3, "friction": 4, "scatter": 5}
 """Streams of seeds: throws that choose an aim are never counted, and every axis has throws of its own."""
 
-COMPLIANT: Final = "mujoco-compliant"
+BOTH_WAYS: Final = ((True, True), (True, False), (False, True), (False, False))
+"""What the static criterion says, and what is so."""
+
 PATHS: Final = 10
 """Throws whose energy is drawn."""
 
@@ -119,6 +125,7 @@ class Cell:
     share : Share - of them upright
     missed : int - how many did not come down on the table; they count as not upright
     omega [rad/s], speed [m/s], energy [E_s], bounces : float - means at the touch, and of the landing
+    bounces_band : float - half width of the 95 % interval of that mean
     """
 
     aim: Aim
@@ -128,6 +135,7 @@ class Cell:
     speed: float
     energy: float
     bounces: float
+    bounces_band: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -208,11 +216,9 @@ def study(throw: Scenario, size: Size, planned: Planned | None = None) -> Genera
     """Ask for both waves and return what they say; ``planned`` is what ``aiming`` returned elsewhere."""
     wave, unaimed = planned or aiming(throw, size)
     rows = yield wave
-    aims = best_aims(wave, rows)
-    fillings, omegas = map_axes(size)
-    wave = counting(throw, size, aims)
+    wave = counting(throw, size, best_aims(wave, rows))
     rows = yield wave
-    return read(throw, size, wave, rows, fillings, omegas, unaimed)
+    return read(throw, size, wave, rows, unaimed)
 
 
 # ---------------------------------------------------------------------- what is asked for
@@ -293,8 +299,6 @@ def map_axes(size: Size) -> tuple[FloatArray, FloatArray]:
 def standing(throw: Scenario) -> Aim:
     """Return the throw onto a table where it would touch, standing, after the duration of the flight."""
     time, (_, v_y) = throw.duration, throw.launch_velocity
-    from slicemodel.observables import centre_of_mass_at_rest
-
     rest = centre_of_mass_at_rest(throw)
     release = -rest * math.cos(throw.theta0)
     height = release + v_y * time - throw.gravity * time**2 / 2 - (throw.bottle.length - rest)
@@ -325,16 +329,9 @@ def share_of(rows: Sequence[Landed]) -> Share:
     return Share(upright=sum(row.outcome == "upright" for row in rows), undecided=unknown, throws=len(rows))
 
 
-def read(
-    throw: Scenario,
-    size: Size,
-    wave: Wave,
-    rows: Rows,
-    fillings: FloatArray,
-    omegas: FloatArray,
-    unaimed: Mapping[tuple[str, float, bool], str],
-) -> Found:
+def read(throw: Scenario, size: Size, wave: Wave, rows: Rows, unaimed: Mapping[tuple[str, float, bool], str]) -> Found:
     """Return what the rows of the second wave say."""
+    fillings, omegas = map_axes(size)
     cells: dict[Key, Cell] = {}
     static: dict[tuple[str, Kind], dict[tuple[bool, bool], int]] = {}
     halves: dict[tuple[str, Kind], list[list[Landed]]] = {}
@@ -347,9 +344,9 @@ def read(
             found.outcome[at] = some[0].outcome or some[0].status
             found.theta[at] = np.nan if some[0].touch_theta is None else some[0].touch_theta
             continue
-        cells[key] = _cell(case.aim, some)
+        cells[key] = cell_of(case.aim, some)
         if key.axis == "filling":
-            count = static.setdefault((key.family, key.kind), dict.fromkeys(_pairs(), 0))
+            count = static.setdefault((key.family, key.kind), dict.fromkeys(BOTH_WAYS, 0))
             decided = [row for row in some if row.outcome not in (None, "undecided")]
             for row in decided:
                 assert row.static_margin is not None
@@ -373,15 +370,16 @@ def read(
     )
 
 
-def _pairs() -> list[tuple[bool, bool]]:
-    return [(said, true) for said in (True, False) for true in (True, False)]
+def cell_of(aim: Aim, rows: Sequence[Landed]) -> Cell:
+    """Return share, means and the interval of the mean bounces of the throws of one case."""
 
+    def known(name: str) -> list[float]:
+        return [abs(value) for row in rows if (value := getattr(row, name)) is not None]
 
-def _cell(aim: Aim, rows: Sequence[Landed]) -> Cell:
     def mean(name: str) -> float:
-        values = [getattr(row, name) for row in rows if getattr(row, name) is not None]
-        return float(np.mean(np.abs(values))) if values else math.nan
+        return float(np.mean(values)) if (values := known(name)) else math.nan
 
+    bounces = known("bounces")
     return Cell(
         aim=aim,
         share=share_of(rows),
@@ -390,14 +388,12 @@ def _cell(aim: Aim, rows: Sequence[Landed]) -> Cell:
         speed=mean("touch_speed"),
         energy=mean("touch_energy"),
         bounces=mean("bounces"),
+        bounces_band=Z * float(np.std(bounces, ddof=1)) / math.sqrt(len(bounces)) if len(bounces) > 1 else math.nan,
     )
 
 
 def _energies(wave: Wave, rows: Rows, size: Size) -> tuple[Energy, ...]:
     """Follow the energy of the first throws of water and of ice at the filling of the axes."""
-    import ode_reference
-    from flipproof.landing.design import Throws
-
     found = []
     for kind in ("together", "ice"):
         wanted = Key("restitution", size.restitution, size.families[-1], size.axis_filling, kind)
@@ -410,6 +406,6 @@ def _energies(wave: Wave, rows: Rows, size: Size) -> tuple[Energy, ...]:
         for place, row in enumerate(rows[k][:PATHS]):
             if row.outcome in (None, "undecided"):
                 continue
-            run = path(ode_reference.fly(design.point(place).scenario(), table), table, case.law, duration=PATH)
+            run = path(fly(design.point(place).scenario(), table), table, case.law, duration=PATH)
             found.append(Energy(kind=kind, t=run.t, energy=run.energy / run.saddle, outcome=str(row.outcome)))
     return tuple(found)

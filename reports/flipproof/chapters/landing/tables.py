@@ -18,6 +18,9 @@ NAMES: dict[Kind, str] = {
 }
 """What is landed, as figures and tables name it."""
 
+FAMILIES = {"A": "A: ω₀ as thrown", "B": "B: time of flight as thrown"}
+"""Family of throws -> what all its bottles share."""
+
 
 def shares_csv(found: Found) -> str:
     """Return one row for each share: what was thrown, the share with its 95 % interval, and means at the touch."""
@@ -86,6 +89,21 @@ def share_line(found: Found, family: str) -> str:
     return "\n".join(lines)
 
 
+def _shares_of(found: Found, family: str) -> tuple[str, list[float], list[tuple[str, list[dict[str, str]]]]]:
+    """Return a family in words, its fillings, and the shares of every law of the impact there with their intervals."""
+    curves = {NAMES[kind]: dict(found.curve(family, kind)) for kind in KINDS}
+    fills = sorted({fill for curve in curves.values() for fill in curve})
+    rows = [(name, [_cell_words(curve.get(fill)) for fill in fills]) for name, curve in curves.items() if curve]
+    return f"family {FAMILIES[family]}", fills, rows
+
+
+def _cell_words(cell: Cell | None) -> dict[str, str]:
+    if cell is None:
+        return {"value": "–", "interval": ""}
+    low, high = cell.share.interval
+    return {"value": f"{cell.share.value:.2f}", "interval": f"{low:.2f} to {high:.2f}"}
+
+
 def _csv(names: Iterable[str], rows: Iterable[Sequence[object]]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -98,7 +116,6 @@ def _csv(names: Iterable[str], rows: Iterable[Sequence[object]]) -> str:
 def page(found: Found) -> dict[str, object]:
     """Return what the chapter's template takes."""
     return {
-        "assumed": found.assumed,
-        "lines": [share_line(found, family) for family in found.size.families],
+        "shares": [_shares_of(found, family) for family in found.size.families],
         "unaimed": sorted(set(found.unaimed.values())),
     }

@@ -130,7 +130,7 @@ def draw_overlap(study: Overlap) -> Exhibit:
         caption="In the paper slices pass through each other, and a full bottle, which ought to behave like ice, slows "
         "down. In the same engine, slices that are rods and exclude each other keep the angular velocity of a full "
         "bottle. The two curves differ by what overlap does. Water as one stretching column cannot overlap either, and "
-        "has nothing to choose; free flight minus the column is what overlap changes between two exact equations. "
+        "has no parameter to choose; free flight minus the column is what overlap changes between two exact equations. "
         f"That is a difference of two models, free flight at N = {study.slices}, and no share{_costs(study)}. In the "
         "paper's experiment the fall is largest at fillings of 0.25 to 0.5, and a filling of 0.1 turns like ice. Bars: "
         "twice what halving the step changes.",
@@ -147,7 +147,7 @@ def _costs(study: Overlap) -> str:
     if not np.isfinite(cost).any():
         return ""
     k = int(np.nanargmax(cost))
-    return f"; at most {study.cost_to_column[k]:+.3f}, at filling {study.fills[k]:.0%}"
+    return f"; at most {study.cost_to_column[k]:+.3f}, at filling {100 * study.fills[k]:.0f} %".replace("-", "−")
 
 
 def table_overlap(study: Overlap) -> str:

@@ -122,8 +122,11 @@ class PartingGrowth:
     def words(self) -> str:
         """The parting in words."""
         if self.time is None:
-            return f"{self.first} and {self.second} never part by {percent(PARTING_BAND)} of ω₀"
-        words = f"{self.first} and {self.second} part at {self.time * 1e3:.1f} ms"
+            return f"{self.first} and {self.second} never differ by more than {percent(PARTING_BAND)} of ω₀"
+        words = (
+            f"{self.first} and {self.second} differ by more than {percent(PARTING_BAND)} of ω₀ from "
+            f"{self.time * 1e3:.1f} ms on"
+        )
         if self.impact is not None and self.k is not None:
             words += (
                 f", {(self.time - self.impact.time) * 1e3:.1f} ms after the {ordinal(self.k)} impact of slice "
@@ -220,13 +223,19 @@ class Predictability:
     def words(self) -> str:
         """Amplification of every size, horizon, growth and smoothness in words."""
         factors = zip(self.sizes, self.largest_amplification, strict=True)
-        each = " and ".join(f"a change of {size:.0e} by at most a factor of {factor:.3g}" for size, factor in factors)
+        each = " and ".join(
+            f"a change of the release by {size:.0e} at most {factor:.3g} times" for size, factor in factors
+        )
         words = f"{self.solver}: the flight amplifies {each}"
         if self.horizon is None:
             words += f"; none of these moves ω by {self.band:g} of ω₀, so that the flight is predictable to its end"
         for size, time in zip(self.sizes, self.horizons, strict=True):
-            words += "" if time is None else f"; {size:.0e} moves ω by {self.band:g} of ω₀ at {time * 1e3:.1f} ms"
-        words += f"; the effect of a change of {self.sizes[0]:.0e} {self.growths[0].words}"
+            words += (
+                ""
+                if time is None
+                else f"; a change by {size:.0e} moves ω by {self.band:g} of ω₀ at {time * 1e3:.1f} ms"
+            )
+        words += f"; the effect of a change by {self.sizes[0]:.0e} {self.growths[0].words}"
         if self.rough_from is not None:
             words += (
                 f" and reaches {self.spread[0].max():.1e} of ω₀; from {self.rough_from * 1e3:.1f} ms on the factor "

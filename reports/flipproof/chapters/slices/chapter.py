@@ -105,7 +105,7 @@ def draw(studies: Mapping[str, SliceCount]) -> Figure:
     figure, panels = new_figure(1, len(studies), size=(8.0, 4.0), sharey=True, squeeze=False)
     panels = panels[0]
     for axes, (scheme, study) in zip(panels, studies.items(), strict=True):
-        colours = mpl.colormaps["viridis"](np.linspace(0.9, 0.0, len(study.counts)))
+        colours = mpl.colormaps["viridis"](np.linspace(0.72, 0.0, len(study.counts)))
         for n, trajectory, colour in zip(study.counts, study.trajectories, colours, strict=True):
             omega = trajectory.omega / trajectory.scenario.omega0
             axes.plot(trajectory.t, omega, color=colour, linewidth=1.3, label=f"{n} slices")

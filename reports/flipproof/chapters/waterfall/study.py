@@ -106,11 +106,6 @@ class Bar:
     average_band: float
     finer: float | None = None
 
-    @property
-    def interaction(self) -> float:
-        """Largest difference between the three splits."""
-        return max(self.forward, self.backward, self.average) - min(self.forward, self.backward, self.average)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Waterfall:

@@ -354,7 +354,7 @@ def _curve(rival: Contender, points: tuple[Point, ...], held: Mapping[str, Any],
     ]
     reason = ""
     if len(used) < 3:
-        reason = f"{len(used)} levels between the floor and {SATURATED:g} omega_0; 3 are needed"
+        reason = f"{len(used)} level{'s' * (len(used) != 1)} between the floor and {SATURATED:g} omega_0; 3 are needed"
     elif max(point.work for point in used) < LEAST_SPAN * min(point.work for point in used):
         reason = "refinement hardly changes the cost: events set it"
     slope, slope_error = math.nan, math.nan

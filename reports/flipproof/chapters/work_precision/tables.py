@@ -65,7 +65,7 @@ def _results(study: WorkPrecision) -> Table:
         title=f"What an error costs: {study.case.title}",
         columns=(
             "contender", "equation", "error, first to last level", "of the plateau, last", "order in cost",
-            *(f"updates for {error:.0e}" for error in ERRORS), "s for 1e-03", "failed",
+            *(f"updates for {error:.0e}" for error in ERRORS), "seconds for 1e-03", "failed",
         ),
         rows=tuple(_result(study, curve) for curve in study.curves.values()),
         note="Errors in fractions of omega_0; floor: not told apart from the reference. ≤: the coarsest level that was "

@@ -41,6 +41,9 @@ SLICES: Final = 50
 FAR: Final = 1e6
 """Residual, in standard deviations, of a flight that the solver could not finish."""
 
+STILL: Final = 8.0
+"""Angle, or angular velocity, in standard deviations of its noise, up to which nothing is taken to turn."""
+
 STEP: Final = 5e-4
 """Longest step of a scheme [s]: the paper's own, 1000 of them in half a second."""
 
@@ -323,11 +326,12 @@ def pose(
             raise ValueError(unknown_name("also =", name, ALSO))
     package_of(solver)  # an engine is refused here
     known = replace(throw.with_slices(slices or min(throw.n_slices, SLICES)), duration=float(measured.t[-1]))
+    noise = measured.noise if measured.noise is not None else noise_of(measured.values)
+    _refuse_still(measured, noise)
     guess = first_frames(measured)
     first = {name: guess[name] for name in also if name in guess}
     if first.get("omega0") == 0.0:
         raise ValueError(f"{measured.label}: does not turn in its first frames")
-    noise = measured.noise if measured.noise is not None else noise_of(measured.values)
     if not noise > 0:
         # Values of a simulation, written with few digits, can have none.
         noise = 1e-6 * float(np.ptp(measured.values)) or 1e-9
@@ -335,6 +339,23 @@ def pose(
         first["theta0"] = known.theta0
     free = ALWAYS + tuple(name for name in ALSO if name in also)
     return Problem(measured=measured, throw=replace(known, **first), solver=solver, free=free, noise=noise)  # type: ignore[arg-type]
+
+
+def _refuse_still(measured: Measurement, noise: float) -> None:
+    """Refuse a flight that no drag and no restitution could change: one that does not turn, or turns like ice."""
+    name, unit, values = measured.quantity, measured.unit, measured.values
+    angle = name == "theta"
+    most = float(np.ptp(values) if angle else np.max(np.abs(values)))
+    if most <= STILL * noise:
+        raise ValueError(
+            f"{measured.label}: nothing turns: {name} {'changes by' if angle else 'is at most'} {most:.2g} {unit} in "
+            f"{len(values)} frames; more than {STILL:g} times its noise of {noise:.2g} {unit} is needed"
+        )
+    if not angle and float(np.ptp(values)) == 0.0:
+        raise ValueError(
+            f"{measured.label}: omega = {float(values[0]):.6g} rad/s in all {len(values)} frames: it turns like ice, "
+            "which tells nothing of drag and restitution; an omega that changes is needed"
+        )
 
 
 def first_frames(measured: Measurement) -> dict[str, float]:

@@ -74,20 +74,6 @@ def film(throw: Scenario, solver: str, seed: int) -> tuple[FloatArray, FloatArra
     return t, -half + grain[0], half + grain[1]
 
 
-def film_table(throw: Scenario, solver: str, seed: int, quantity: Quantity = "theta") -> str:
-    """Return a film of a simulated throw as a CSV table of t and theta or omega, labelled synthetic."""
-    t, cap, base = film(throw, solver, seed)
-    theta = np.unwrap(angle(cap, base))
-    values = theta if quantity == "theta" else Averaged(points=AVERAGED)(t, theta)
-    made = "theta by Eq. 1" if quantity == "theta" else f"omega by differences of theta, mean over {AVERAGED} points"
-    label = (
-        f"# synthetic: {solver}, {throw.n_slices} slices, drag {throw.drag:g} kg/s, restitution {throw.restitution:g}, "
-        f"filmed at {RATE:g} frames/s with {1e3 * CAMERA_NOISE:g} mm of noise, seed {seed}; {made}"
-    )
-    rows = [f"{time:.6f},{value:.5f}" for time, value in zip(t, values, strict=True)]
-    return "\n".join([label, f"t,{quantity}", *rows]) + "\n"
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Twin:
     """One twin experiment and what its fit said.

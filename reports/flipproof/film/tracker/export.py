@@ -13,9 +13,6 @@ from slicemodel import Scenario, Trajectory
 from slicemodel.landing import LabMotion, lab_motion, landing
 from slicemodel.trajectory import FloatArray
 
-FRAME_RATE: Final = 240.0
-"""Of the paper's camera [1/s]."""
-
 MOST_FRAMES: Final = 1_000_000
 """Of an exported table."""
 

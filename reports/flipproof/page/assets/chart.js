@@ -24,10 +24,26 @@ window.flipproofChart ??= (() => {
     return made;
   }
 
+  // Parts of a text, in turn as it is and an index of what stands before it, as CM in r_CM.
+  const parts = (text) => text.split(/(?<=[A-Za-zθω])_(CM|M|w|b|f|max)(?!\w)/);
+
   function words(text, attributes, parent) {
     const made = element("text", attributes, parent);
-    made.textContent = text;
+    parts(text).forEach((part, k, all) => {
+      if (all.length === 1) made.textContent = part;
+      else element("tspan", k % 2 ? { dy: 3, "font-size": "80%" } : { dy: k ? -3 : 0 }, made).textContent = part;
+    });
     return made;
+  }
+
+  // The same for a button or a paragraph.
+  function indexed(text) {
+    return parts(text).map((part, k) => {
+      if (k % 2 === 0) return part;
+      const made = document.createElement("sub");
+      made.textContent = part;
+      return made;
+    });
   }
 
   // Returns a step of 1, 2 or 5 times a power of ten that divides a range into about `count` parts.
@@ -153,5 +169,5 @@ window.flipproofChart ??= (() => {
     }).observe(node);
   }
 
-  return { numbers, bytes, element, words, draw, sample, shown, colour, onWidth };
+  return { numbers, bytes, element, words, indexed, draw, sample, shown, colour, onWidth };
 })();

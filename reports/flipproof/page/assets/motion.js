@@ -43,7 +43,7 @@
 
   function unpacked(packed) {
     const flight = {
-      name: packed.name, status: packed.status, reached: packed.reached, slices: packed.drawn.length, numbers: packed.drawn,
+      name: packed.name, words: packed.words, status: packed.status, reached: packed.reached, slices: packed.drawn.length, numbers: packed.drawn,
       theta: chart.numbers(packed.theta, Float32Array), omega: chart.numbers(packed.omega, Float32Array),
       centre: chart.numbers(packed.r_cm, Float32Array), r: chart.numbers(packed.r, Int16Array), moments: null,
     };
@@ -165,7 +165,7 @@
     pen.font = "600 13px system-ui, sans-serif";
     pen.textBaseline = "middle";
     pen.fillStyle = flight.colour;
-    pen.fillText(flight.name, corner.x + 8, corner.y + cell.label / 2 + 2, cell.width - 12);
+    pen.fillText(flight.words, corner.x + 8, corner.y + cell.label / 2 + 2, cell.width - 12);
     if (corner.x > 0) {
       pen.strokeStyle = colours.line;
       pen.lineWidth = 1;
@@ -343,7 +343,7 @@
         row.dataset.solver = flight.name;
         const name = row.insertCell();
         name.className = "name";
-        name.append(chart.sample(flight), ` ${flight.name}`);
+        name.append(chart.sample(flight), ` ${flight.words}`);
         for (let k = 0; k < 4; k++) row.insertCell().className = "number";
         return row;
       }));
@@ -362,7 +362,7 @@
     const shown = flights.filter((flight) => state.visible.has(flight.name));
     const each = shown.map((flight) => {
       const now = posture(flight, state.time);
-      return `${flight.name} θ ${chart.shown((now.theta * 180) / Math.PI, 0)}°, ω ${chart.shown(now.omega, 2)} rad/s`;
+      return `${flight.words} θ ${chart.shown((now.theta * 180) / Math.PI, 0)}°, ω ${chart.shown(now.omega, 2)} rad/s`;
     });
     return `t = ${state.time.toFixed(3)} s: ${each.join("; ") || "no bottle chosen"}.`;
   }
@@ -438,13 +438,13 @@
       ? moments.findIndex((moment) => moment.time > state.time + half)
       : moments.findLastIndex((moment) => moment.time < state.time - half);
     if (k < 0) {
-      find("note").textContent = flight?.moments ? `${flight.name}: no ${direction > 0 ? "later" : "earlier"} impact.` : "This solver knows contacts, not impacts.";
+      find("note").textContent = flight?.moments ? `${flight.words}: no ${direction > 0 ? "later" : "earlier"} impact.` : "This solver knows contacts, not impacts.";
       say(find("note").textContent);
       return;
     }
     const { time, hits } = moments[k];
     const others = hits.length > 1 ? ` and ${hits.length - 1} more at once` : "";
-    seek(time, `${flight.name}, moment ${k + 1} of ${moments.length} with impacts, t = ${time.toFixed(5)} s: ${flight.tell(hits[0])}${others}.`);
+    seek(time, `${flight.words}, moment ${k + 1} of ${moments.length} with impacts, t = ${time.toFixed(5)} s: ${flight.tell(hits[0])}${others}.`);
   }
 
   function pause() {

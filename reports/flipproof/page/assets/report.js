@@ -109,6 +109,15 @@ window.flipproofState = (() => {
       figure.append(small);
     }
   }
+  /* Folds within the story and within sections, closed ones but for paper and without this script; kept by number. */
+  const inner = [...document.querySelectorAll("details")].filter((fold) => !folds.includes(fold));
+  const usual = inner.map((fold) => !("closed" in fold.dataset)), asLeft = state.kept("inner") ?? {};
+  inner.forEach((fold, k) => {
+    fold.open = asLeft[k] ?? usual[k];
+    fold.addEventListener("toggle", () => {
+      state.keep("inner", Object.fromEntries(inner.map(({ open }, j) => [j, open]).filter(([j, open]) => open !== usual[j])));
+    });
+  });
   all.hidden = false;
   all.addEventListener("click", () => {
     const open = !folds.every((fold) => fold.open);

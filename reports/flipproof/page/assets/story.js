@@ -137,12 +137,12 @@
       chart.element("path", { class: "map-border-halo", d: borders }, svg);
       chart.element("path", { class: "map-border", d: borders }, svg);
       regions(x, y, w, h);
-      chart.words("drag γ/ω₀", { x: 2, y: 12 }, svg);
-      chart.words("filling M_w / M_max", { x: width - edge.right, y: edge.top + ny * h + 32, "text-anchor": "end" }, svg);
+      chart.words("drag γ/ω₀ [1], logarithmic", { x: 2, y: 12 }, svg);
+      chart.words("filling M_w / M_max [1]", { x: width - edge.right, y: edge.top + ny * h + 32, "text-anchor": "end" }, svg);
       data.fills.forEach((fill, i) => { if (Math.abs(fill * 10 - Math.round(fill * 10)) < 1e-9 && (w > 24 || Math.round(fill * 10) % 2 === 0)) chart.words(fill.toFixed(1), { x: x(i) + w / 2, y: edge.top + ny * h + 15, "text-anchor": "middle" }, svg); });
       data.dampings.forEach((value, j) => { if (j % 4 === 0 || j === ny - 1) chart.words(String(Number(value.toPrecision(2))), { x: edge.left - 6, y: y(j) + h / 2 + 4, "text-anchor": "end" }, svg); });
       const key = edge.top + ny * h + 40, part = (width - edge.left - edge.right) / 5;
-      ["≤ 1 %", "≤ 3 %", "≤ 10 %", "≤ 30 %", "more"].forEach((words, k) => {
+      ["≤ 1 % of ω₀", "≤ 3 %", "≤ 10 %", "≤ 30 %", "more"].forEach((words, k) => {
         chart.element("rect", { class: `map-cell shade-${k}`, x: edge.left + k * part, y: key, width: part, height: 8 }, svg);
         chart.words(words, { x: edge.left + (k + 0.5) * part, y: key + 21, "text-anchor": "middle" }, svg);
       });
@@ -180,7 +180,8 @@
       event.preventDefault();
       tell(...here.map((place, axis) => Math.max(0, Math.min([data.fills, data.dampings][axis].length - 1, place + move[axis]))));
     });
-    choice.addEventListener("change", () => { draw(); tell(...here); });
+    choice.addEventListener("change", () => { window.flipproofState.keep("map", choice.value); draw(); tell(...here); });
+    if ([...choice.options].some(({ value }) => value === window.flipproofState.kept("map"))) choice.value = window.flipproofState.kept("map");
     chart.onWidth(svg, draw);
     draw();
   }

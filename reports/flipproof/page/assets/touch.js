@@ -16,8 +16,9 @@ window.flipproofTouch = (() => {
     return y[low] + ((y[high] - y[low]) * (at - x[low])) / (x[high] - x[low]);
   }
 
-  // Lays a chart into `svg` and its buttons behind it. A plot is that of chart.draw, with {y: {percent}, start: cursor}
-  // and lines with {off: true} not shown at first; `moved` hears where the reader puts the cursor.
+  // Lays a chart into `svg` and its buttons behind it. A plot is that of chart.draw, with {y: {percent}, start: cursor},
+  // lines with {off: true} not shown at first, and lines `behind` that tell no values; `moved` hears where the reader
+  // puts the cursor; `change` takes other numbers for the same lines.
   function touch(svg, height, plot, moved = () => {}) {
     const whole = [plot.x.low, plot.x.high], hidden = new Set(plot.lines.filter((line) => line.off).map((line) => line.name));
     let [low, high] = whole, at = plot.start ?? (whole[0] + whole[1]) / 2, scales = null, dragged = null;
@@ -37,7 +38,7 @@ window.flipproofTouch = (() => {
       const value = document.createElement("output"), name = line.words ?? line.label ?? line.name;
       value.setAttribute("aria-live", "off");
       told.set(line.name, value);
-      const made = button([chart.sample(line), ` ${name} `, value], () => {
+      const made = button([chart.sample(line), " ", ...chart.indexed(name), " ", value], () => {
         if (!hidden.delete(line.name)) hidden.add(line.name);
         made.setAttribute("aria-pressed", String(!hidden.has(line.name)));
         draw();
@@ -70,7 +71,7 @@ window.flipproofTouch = (() => {
     }
 
     function draw() {
-      scales = chart.draw(svg, height, { ...plot, x: { ...plot.x, low, high }, y: vertical(), lines: seen() });
+      scales = chart.draw(svg, height, { ...plot, x: { ...plot.x, low, high }, y: vertical(), lines: [...(plot.behind ?? []), ...seen()] });
       scales.cursor = chart.element("g", {}, svg);
       chart.element("path", { class: "chart-cursor", d: `M0 ${scales.top}V${scales.bottom}` }, scales.cursor);
       for (const line of seen()) chart.element("circle", { class: "chart-dot", r: 4.5, style: `fill: ${chart.colour(line)}` }, scales.cursor);
@@ -144,7 +145,7 @@ window.flipproofTouch = (() => {
     svg.classList.add("chart-touched");
     chart.onWidth(svg, draw);
     draw();
-    return { put: (place) => put(place, false), draw };
+    return { put: (place) => put(place, false), change: (other) => { Object.assign(plot, other); draw(); } };
   }
 
   // Numbers of the page's figures: 16 bits between the least and the largest of a figure, the last of them for none.

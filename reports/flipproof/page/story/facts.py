@@ -11,6 +11,7 @@ from types import SimpleNamespace
 from typing import Any, Final
 
 from flipproof.chapters.differences.study import PARTING_BAND, percent
+from flipproof.figures.style import SUPERSCRIPTS
 from flipproof.page.story.numbers import Number, Summary
 
 NAMES: Final[Mapping[str, str]] = {
@@ -22,13 +23,14 @@ NAMES: Final[Mapping[str, str]] = {
 """Solver -> its name on the story's charts."""
 
 CHANGES: Final[Mapping[str, str]] = {
-    "signs of Eq. 9d: no damping": "Eq. 9d has the wrong sign in one term, and the program has it too: its drag "
-    "does not damp.",
-    "roots of Eq. 9a: γ ≪ ω": "Eq. 9a is solved as if drag were small; at the end of the flight it is not.",
+    "signs of Eq. 9d: no damping": "Eq. 9d has the wrong sign in two terms, and the program in one: its drag does "
+    "not damp.",
+    "roots of Eq. 9a: γ ≪ ω": "Eq. 9a holds for small drag (γ ≪ ω); at the end of the flight drag is not small.",
     "drag against C_M": "Eq. 8 measures drag against the centre of mass; water rubs on the wall of the bottle.",
     "gravity in Eq. 8": "Eq. 8 lets weight push water along the bottle; a falling bottle feels none.",
-    "origin at rest, drag on the tube": "Eq. 8 forgets that the centre of mass itself moves along the bottle.",
-    "no recoil in impacts": "Water that strikes an end kicks the bottle; Eq. 8 lets the bottle ignore it.",
+    "origin at rest, drag on the tube": "Eq. 8 leaves out that the centre of mass accelerates along the bottle, and "
+    "that drag pulls the bottle.",
+    "no recoil in impacts": "Water that strikes an end kicks the bottle; with Eq. 8 the bottle is not kicked.",
 }
 """Assumption that is changed -> what it means, in one sentence."""
 
@@ -55,6 +57,9 @@ SOURCES: Final[Mapping[str, str]] = {
     "exact": "findings/exact-cases-free-flight/value",
     "energy": "findings/energy-free-flight/value",
     "rotating": "findings/difference-eq8-pymunk-rotating/value",
+    "weight": "differences/gravity in Eq. 8/largest",
+    "origin": "differences/origin at rest, drag on the tube/largest",
+    "recoil": "differences/no recoil in impacts/largest",
 }
 """Name -> source of a number that is printed in percent of omega_0."""
 
@@ -88,6 +93,7 @@ class Layer:
     """One of the three layers of the answer: what was tested, its number, what kind of number, and the verdict."""
 
     name: str
+    short: str
     question: str
     number: Number
     kind: str
@@ -136,7 +142,10 @@ def degrees(value: float) -> str:
 
 def small(value: float) -> str:
     """Return a fraction in percent, a tiny one as a power of ten."""
-    return percent(value) if value >= 1e-5 or value == 0.0 else f"{100 * value:.0e} %"
+    if value >= 1e-5 or value == 0.0:
+        return percent(value)
+    digit, _, exponent = f"{100 * value:.0e}".partition("e")
+    return f"{digit} × 10{str(int(exponent)).translate(SUPERSCRIPTS)} %"
 
 
 def story(content: Mapping[str, Any], tables: Mapping[str, str | None]) -> SimpleNamespace:
@@ -164,15 +173,17 @@ def _layers(summary: Summary, n: Mapping[str, Number | None]) -> list[Layer]:
     steps = summary.at("headlines/step/note") or "the steps"
     asked = (
         ("step", "The time step", f"Does it matter that the program makes {steps} and holds ω constant over each?",
-         "largest difference in ω between the program and its own equation solved exactly", "steps", "step"),
-        ("program_eq8", "The algebra of Eq. 9", "Does the program solve the paper's own equation, Eq. 8?",
-         "largest difference in ω between the program and Eq. 8 solved exactly", "errata", "program-eq8"),
+         "Largest difference in ω between the program and what Eq. 9 becomes as the step goes to zero", "steps",
+         "step", "time step"),
+        ("program_eq8", "The algebra of Eq. 9", "Do the formulas of the program, Eq. 9, solve Eq. 8?",
+         "Largest difference in ω between the program and Eq. 8", "errata", "program-eq8", "algebra"),
         ("eq8_free", "The physics of Eq. 8", "Does Eq. 8 describe slices in a bottle that flies freely?",
-         "largest difference in ω between Eq. 8 and free flight, both solved exactly", "assumptions", "eq8-free"),
+         "Largest difference in ω between Eq. 8 and free flight", "assumptions", "eq8-free", "physics"),
     )  # fmt: skip
     return [
         Layer(
             name=name,
+            short=short,
             question=question,
             number=number,
             kind=kind,
@@ -181,7 +192,7 @@ def _layers(summary: Summary, n: Mapping[str, Number | None]) -> list[Layer]:
             finer_slices=summary.number(f"headlines/{id_}/finer_slices", plain),
             band=summary.number(f"headlines/{id_}/band", small),
         )
-        for key, name, question, kind, section, id_ in asked
+        for key, name, question, kind, section, id_, short in asked
         if (number := n[key]) is not None
     ]
 

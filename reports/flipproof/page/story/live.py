@@ -28,7 +28,8 @@ class Slider:
     @property
     def shown(self) -> str:
         """The value with its unit."""
-        return f"{self.value:.{self.digits}f} {self.unit}".strip().replace("-", "−")
+        space = "" if self.unit == "°" else " "
+        return f"{self.value:.{self.digits}f}{space}{self.unit}".strip().replace("-", "−")
 
 
 def sliders(throw: Scenario) -> list[Slider]:
