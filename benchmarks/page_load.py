@@ -125,10 +125,10 @@ def main() -> None:
                     f"longest frame {longest:.0f} ms (50 frames/s asked)"
                 )
         clock, processor = redraw_times(page)
-        for words, times in (("by the clock", clock), ("processor time", processor)):
+        for words, redraws in (("by the clock", clock), ("processor time", processor)):
             print(
-                f"sliders: 40 settings solved and drawn, {words}: {statistics.median(times):.0f} ms each (median), "
-                f"{times[-1]:.0f} ms at the most (50 ms asked)"
+                f"sliders: 40 settings solved and drawn, {words}: {statistics.median(redraws):.0f} ms each (median), "
+                f"{redraws[-1]:.0f} ms at the most (50 ms asked)"
             )
         browser.close()
 
