@@ -9,9 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from itertools import combinations
 
-from flipproof.chapters.waterfall.study import NAMES, canonical
+from flipproof.chapters.waterfall.study import NAMES, canonical, sets_before
 from flipproof.foreign.checking import ask_of, times_of
 from flipproof.foreign.place import Place, curve, place
 from flipproof.foreign.specs import Runner
@@ -94,16 +93,6 @@ def shares(start: Switches, end: Switches, throw: Scenario) -> dict[str, float]:
         found = curve(switches.name, throw, times_of(throw, POINTS))
         return plateau(found.t, found.omega, throw.omega0)
 
-    return shares_of(start, end, of)
-
-
-def shares_of(start: Switches, end: Switches, of: Callable[[Switches], float]) -> dict[str, float]:
-    """Return the mean change of a number over all orders of turning the switches from ``start`` to ``end``.
-
-    Parameters
-    ----------
-    of : callable (switches) -> float - the number by the equation of a set of switches; asked for once each
-    """
     return {name: mean(changes) for name, changes in changes_of(start, end, of).items()}
 
 
@@ -128,15 +117,7 @@ def changes_of(start: Switches, end: Switches, of: Callable[[Switches], float]) 
             known[switches] = of(switches)
         return known[switches]
 
-    n = len(differing)
     return {
-        name: [
-            (
-                math.factorial(size) * math.factorial(n - size - 1) / math.factorial(n),
-                value((*chosen, name)) - value(chosen),
-            )
-            for size in range(n)
-            for chosen in combinations([other for other in differing if other != name], size)
-        ]
+        name: [(weight, value((*chosen, name)) - value(chosen)) for chosen, weight in sets_before(name, differing)]
         for name in differing
     }

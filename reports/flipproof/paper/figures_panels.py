@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.frame.exhibit import Exhibit
+from flipproof.frame.spoken import SPOKEN
 from flipproof.output.columns import columns_csv
 from flipproof.paper.runs import BANDS
 from slicemodel.trajectory import FloatArray
@@ -21,7 +22,7 @@ from slicemodel.trajectory import FloatArray
 COLUMN: Final = 3.2
 """Width of a panel [inches]."""
 
-NAMES: Final = {"published-python": "published program", "eq8": "Eq. 8", "free-flight": "free flight"}
+NAMES: Final = {name: SPOKEN[name] for name in ("published-python", "eq8", "free-flight")}
 """Solver -> its name over a column."""
 
 DASHES: Final = ("-", (0, (5, 1.5)), (0, (2, 1)), (0, (6, 1.5, 1.5, 1.5)))

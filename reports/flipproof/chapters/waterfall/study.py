@@ -16,7 +16,7 @@ minus free flight is a difference of two models.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from itertools import combinations
 from types import MappingProxyType
@@ -252,7 +252,7 @@ def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) 
     for name in order:
         before = order[: order.index(name)]
         after = order[order.index(name) + 1 :]
-        changes = [_change(name, chosen, values) for chosen, _ in _others(name)]
+        changes = [_change(name, chosen, values) for chosen, _ in sets_before(name, NAMES)]
         bars.append(
             Bar(
                 name=NAMES[name],
@@ -263,7 +263,8 @@ def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) 
                 high=max(changes),
                 forward_band=bands[_with(before)] + bands[_with([*before, name])],
                 average_band=sum(
-                    weight * (bands[_with(chosen)] + bands[_with([*chosen, name])]) for chosen, weight in _others(name)
+                    weight * (bands[_with(chosen)] + bands[_with([*chosen, name])])
+                    for chosen, weight in sets_before(name, NAMES)
                 ),
                 finer=fair_share(name, more) if more else None,
             )
@@ -296,10 +297,10 @@ def _change(name: str, others: list[str] | tuple[str, ...], values: Mapping[Swit
     return values[_with([*others, name])] - values[_with(others)]
 
 
-def _others(name: str) -> Iterator[tuple[tuple[str, ...], float]]:
-    """Yield every set of other assumptions with the share of all orders in which just these come before ``name``."""
-    others = [other for other in NAMES if other != name]
-    n = len(NAMES)
+def sets_before(name: str, names: Collection[str]) -> Iterator[tuple[tuple[str, ...], float]]:
+    """Yield every set of other ``names`` with the share of all orders in which just these come before ``name``."""
+    others = [other for other in names if other != name]
+    n = len(names)
     for size in range(n):
         weight = math.factorial(size) * math.factorial(n - size - 1) / math.factorial(n)
         for chosen in combinations(others, size):
@@ -308,5 +309,5 @@ def _others(name: str) -> Iterator[tuple[tuple[str, ...], float]]:
 
 def fair_share(name: str, values: Mapping[Switches, Value]) -> Value:
     """Return what switching ``name`` on changes, as the mean over all orders (the Shapley value), of values by set."""
-    shares = [weight * _change(name, chosen, values) for chosen, weight in _others(name)]
+    shares = [weight * _change(name, chosen, values) for chosen, weight in sets_before(name, NAMES)]
     return sum(shares[1:], shares[0])

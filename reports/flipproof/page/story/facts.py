@@ -12,13 +12,11 @@ from typing import Any, Final
 
 from flipproof.chapters.differences.study import PARTING_BAND, percent
 from flipproof.figures.style import SUPERSCRIPTS
+from flipproof.frame.spoken import SPOKEN
 from flipproof.page.story.numbers import Number, Summary
 
-NAMES: Final[Mapping[str, str]] = {
-    "published-python": "published program",
-    "eq8": "Eq. 8",
-    "free-flight": "free flight",
-    "pymunk": "engine (pymunk)",
+NAMES: Final[Mapping[str, str]] = {name: SPOKEN[name] for name in ("published-python", "eq8", "free-flight")} | {
+    "pymunk": "engine (pymunk)"
 }
 """Solver -> its name on the story's charts."""
 
