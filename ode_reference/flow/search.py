@@ -62,7 +62,7 @@ def first_zero(now, table, order):
         else:
             return NONE
         x += further
-        if x > 1.0:
+        if x > 1.0 or x >= now.root:
             return NONE
         if further <= 2e-16 * x:
             return x
