@@ -46,9 +46,6 @@ NAME: Final = "column"
 RTOL: Final = 1e-12
 ATOL: Final = 1e-14
 
-LONGEST_TURN: Final = 0.02
-"""Longest step, as the angle by which the bottle turns in it at release [rad]: it keeps the dense output accurate."""
-
 
 class Column:
     """The constants of one throw as the equations above name them, and J and its derivative as functions of h."""
@@ -167,9 +164,8 @@ def _states(
 
         room.terminal = True  # type: ignore[attr-defined]
         run = solve_ivp(
-            column.slope, (0.0, scenario.duration), y, "DOP853", dense_output=True, events=room,
-            rtol=rtol, atol=atol, max_step=LONGEST_TURN / abs(scenario.omega0),
-        )  # fmt: skip
+            column.slope, (0.0, scenario.duration), y, "DOP853", dense_output=True, events=room, rtol=rtol, atol=atol
+        )
         if run.status < 0:
             raise ArithmeticError(f"column: {run.message} at t = {run.t[-1]:.9g} s")
         y, end = run.y[:, -1].copy(), float(run.t[-1])
