@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -48,3 +50,17 @@ def test_only_the_run_that_kills_its_worker_is_lost_and_the_order_stays(monkeypa
     assert list(made) == runs
     assert [result.trajectory is None for result in made.values()] == [False, True, False]
     assert made[runs[1]].reason == f"the worker process died {TRIES} times with this run (exit code -9)"
+
+
+def test_a_script_whose_workers_would_begin_it_anew_is_told_so(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from flipproof.frame.pool import make_all, workers\n"
+        "from flipproof.frame.solvers import Run\n"
+        "from slicemodel import Scenario\n"
+        "with workers(2) as pool:\n"
+        "    make_all(pool, [Run('eq8', Scenario(n_slices=n)) for n in range(1, 50)], lambda *_: None)\n"
+    )
+    ended = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=120, check=False)
+    assert ended.returncode == 1
+    assert 'begin its work below `if __name__ == "__main__":`' in ended.stderr.splitlines()[-1]

@@ -28,6 +28,10 @@ class WorkerDiedError(RuntimeError):
     """The process that made a call ended before it answered."""
 
 
+class NoWorkersError(RuntimeError):
+    """No worker can be started: the next one would fail like the last."""
+
+
 @contextmanager
 def processes(jobs: int | None, tries: int = 1) -> Iterator[Processes]:
     """Give ``jobs`` worker processes, or one per core; end them at once when the block is left, however it is left."""
@@ -105,10 +109,14 @@ class Processes(Executor):
                     worker = worker or self._start()
                     fine, answer = worker.ask(call)
                 except (EOFError, OSError) as error:
-                    code = worker.end() if worker else None
+                    code, ready = (worker.end(), worker.ready) if worker else (None, True)
                     self._forget(worker)
                     worker = None
                     words = f"exit code {code}" if code is not None else str(error)
+                    if not ready and code and code > 0:
+                        words += '; a script has to begin its work below `if __name__ == "__main__":`'
+                        future.set_exception(NoWorkersError(f"a worker process ended as it started ({words})"))
+                        break
                     if tried == self._tries or self._ended:
                         future.set_exception(WorkerDiedError(words))
                         break
@@ -144,6 +152,7 @@ class _Worker:
 
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")
+        self.ready = False
         self.pipe, far = context.Pipe()
         self.process = context.Process(target=_answer_calls, args=(far,), daemon=True)
         self.process.start()
@@ -151,6 +160,8 @@ class _Worker:
         far.close()
 
     def ask(self, call: Call) -> tuple[bool, Any]:
+        if not self.ready:
+            self.ready = self.pipe.recv()
         self.pipe.send(call)
         fine, answer = self.pipe.recv()
         return fine, answer
@@ -165,6 +176,7 @@ def _answer_calls(pipe: Connection) -> None:
     """Live as a worker: answer calls until the pipe or the parent ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    pipe.send(True)
     while True:
         try:
             call = pipe.recv()
