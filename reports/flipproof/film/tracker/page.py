@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from flipproof.film.tracker.bench import Measurement
-from flipproof.film.tracker.parabola import Parabola
+from flipproof.output.columns import columns_csv
 from flipproof.page.templating import environment
 
 COLUMNS = {
@@ -40,24 +40,15 @@ def csv_text(measured: Measurement) -> str:
         spin.t, spin.theta, spin.omega, spin.band, spin.omega_paper, spin.band_paper, measured.r_cm, spin.measured,
         spin.interpolated, measured.flight.inside, measured.reduced_time, spin.omega / measured.omega0, spin.lines,
     )  # fmt: skip
-    whole = {"measured", "interpolated", "in_flight", "line"}
-    rows = [",".join(COLUMNS)]
-    for row in zip(*columns, strict=True):
-        cells = (
-            str(int(value)) if name in whole else "" if math.isnan(value) else f"{value:.9g}"
-            for name, value in zip(COLUMNS, row, strict=True)
-        )
-        rows.append(",".join(cells))
-    return "\n".join(rows) + "\n"
+    shown = (column if column.dtype.kind == "f" else column.astype(int) for column in columns)
+    return columns_csv(dict(zip(COLUMNS, shown, strict=True)))
 
 
 def summary(measured: Measurement) -> dict[str, Any]:
     """Return every number of a measurement, ready for JSON."""
     spin, flight = measured.spin, measured.flight
-    request = asdict(measured.request)
-    request["files"] = [str(path) for path in measured.request.files]
     return {
-        "request": request,
+        "request": asdict(measured.request) | {"files": [str(path) for path in measured.request.files]},
         "files": [dialect.words for dialect in measured.table.dialects],
         "tracks": list(measured.table.tracks),
         "frames": {
@@ -75,18 +66,16 @@ def summary(measured: Measurement) -> dict[str, Any]:
         "theta0": float(spin.theta[flight.inside][~np.isnan(spin.theta[flight.inside])][0]),
         "omega0": {"value": measured.omega0, "deviation": measured.omega0_deviation},
         "late_omega_over_omega0": measured.mean,
-        "parabola_from_axis": _fit(measured.axis),
-        "parabola_from_track": None if measured.track is None else _fit(measured.track),
+        **{
+            f"parabola_from_{name}": fit and asdict(fit) | {"v0": math.hypot(fit.v0x, fit.v0y)}
+            for name, fit in (("axis", measured.axis), ("track", measured.track))
+        },
         "calibration": asdict(measured.calibration),
         "length_unit_in_metres": measured.metres,
         "warnings": list(measured.warnings),
         "notes": list(measured.notes),
         "columns": COLUMNS,
     }
-
-
-def _fit(fit: Parabola) -> dict[str, float]:
-    return asdict(fit) | {"v0": math.hypot(fit.v0x, fit.v0y)}
 
 
 def lines(measured: Measurement) -> list[str]:
@@ -122,12 +111,18 @@ def write(measured: Measurement, folder: Path, provenance: Mapping[str, str]) ->
         (folder / f"{name}.svg").write_text(drawing.svg, encoding="utf-8")
         (folder / f"{name}.png").write_bytes(drawing.png)
     numbers = summary(measured) | {"provenance": dict(provenance)}
-    (folder / "summary.json").write_text(
-        json.dumps(_finite(numbers), indent=2, ensure_ascii=False) + "\n", encoding="utf-8"
-    )
-    templates = environment()
-    page = templates.get_template("track.html.j2").render(
-        measured=measured, fit=measured.track or measured.axis, summary=numbers, figures=drawn, provenance=provenance
+    text = json.dumps(_finite(numbers), indent=2, ensure_ascii=False) + "\n"
+    (folder / "summary.json").write_text(text, encoding="utf-8")
+    page = (
+        environment()
+        .get_template("track.html.j2")
+        .render(
+            measured=measured,
+            fit=measured.track or measured.axis,
+            summary=numbers,
+            figures=drawn,
+            provenance=provenance,
+        )
     )
     (folder / "index.html").write_text(page, encoding="utf-8")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
@@ -15,13 +15,9 @@ from slicemodel.scenario import unknown_name
 from slicemodel.trajectory import FloatArray
 
 METRES: Final = MappingProxyType({"m": 1.0, "cm": 0.01, "mm": 0.001})
-"""Length units by name, in metres."""
-
 RADIANS: Final = MappingProxyType({"deg": np.pi / 180, "rad": 1.0})
-"""Angle units by name, in radians."""
-
-GREEK: Final = MappingProxyType({"θ": "theta", "ω": "omega", "α": "alpha", "φ": "phi"})
-WITH_UNIT: Final = re.compile(r"(?P<name>.*?)\s*(?:\((?P<round>[^()]*)\)|\[(?P<square>[^\[\]]*)\])\s*")
+SECONDS: Final = MappingProxyType({"s": 1.0, "ms": 1e-3})
+"""Units of lengths, angles and times by name, in SI."""
 
 
 class TrackFileError(ValueError):
@@ -39,9 +35,8 @@ class Dialect:
     @property
     def words(self) -> str:
         """Return the dialect in words."""
-        signs = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "space"}
-        decimal = {".": "decimal point", ",": "decimal comma"}
-        return f"{self.encoding}, {signs[self.delimiter]}-delimited, {decimal[self.decimal]}"
+        sign = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "space"}[self.delimiter]
+        return f"{self.encoding}, {sign}-delimited, decimal {'point' if self.decimal == '.' else 'comma'}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -52,8 +47,8 @@ class Track:
     """
 
     name: str
-    columns: Mapping[str, FloatArray]
-    units: Mapping[str, str]
+    columns: dict[str, FloatArray]
+    units: dict[str, str]
 
     def column(self, name: str) -> FloatArray:
         """Return a column, shape (P,).
@@ -116,6 +111,22 @@ class TrackTable:
             )
         raise TrackFileError(f"{self.source}: {unknown_name('track', name, self.tracks)}")
 
+    def length_unit(self, names: Sequence[str]) -> str:
+        """Return the unit that the headings of x and y of some tracks state, "" if none does.
+
+        Raises
+        ------
+        TrackFileError
+            If they state two, or one that is not in ``METRES``.
+        """
+        stated = {unit for name in names for column, unit in self.track(name).units.items() if column in ("x", "y")}
+        if len(stated) > 1 or not stated <= METRES.keys():
+            raise TrackFileError(
+                f"{self.source}: the columns x, y state the units {', '.join(sorted(stated))}; one of "
+                f"{', '.join(METRES)} for all is needed"
+            )
+        return next(iter(stated), "")
+
 
 def plain(name: str) -> str:
     """Return a track's name with underscores as spaces."""
@@ -124,11 +135,11 @@ def plain(name: str) -> str:
 
 def column_name(heading: str) -> tuple[str, str]:
     """Return the plain name and the unit ("" if none) of a heading: ``v_{x}`` is vx, ``x (cm)`` is x in cm."""
-    match = WITH_UNIT.fullmatch(heading)
+    match = re.fullmatch(r"(?P<name>.*?)\s*(?:\((?P<round>[^()]*)\)|\[(?P<square>[^\[\]]*)\])\s*", heading)
     unit = ""
     if match and match["name"]:
         heading, unit = match["name"], (match["round"] or match["square"] or "").strip()
     name = re.sub(r"[\\{}_\s]", "", heading)
-    for letter, word in GREEK.items():
+    for letter, word in {"θ": "theta", "ω": "omega", "α": "alpha", "φ": "phi"}.items():
         name = name.replace(letter, word)
     return name, unit
