@@ -17,7 +17,6 @@ from flipproof.film.fit.uncertainty import Interval, intervals
 INDISTINCT: Final = 4.0
 """Difference of AIC up to which two equations are said to do equally well."""
 
-
 COUNTED: Final = ("eq8", "free-flight")
 """Equations of the reference whose intervals held the truth in at least 90 of 100 twins (``benchmarks/twins.py``)."""
 
@@ -84,10 +83,8 @@ def compare(estimates: Sequence[Estimate]) -> tuple[Contender, ...]:
 def verdict(contenders: Sequence[Contender]) -> str:
     """Return what a comparison says, in plain words."""
     best, *others = contenders
-    if best.estimate.problem.measured.quantity == "omega":
-        noise = "the noise of its neighbours' differences"
-    else:
-        noise = "the camera's noise"
+    angle = best.estimate.problem.measured.quantity == "theta"
+    noise = "the camera's noise" if angle else "the noise of its neighbours' differences"
     words = [
         f"{best.solver} leaves {best.misfit:.3g} times {noise}"
         + (": it explains the flight." if best.fits else ", more than chance: it does not explain the flight.")
@@ -97,7 +94,8 @@ def verdict(contenders: Sequence[Contender]) -> str:
     equal = [one.solver for one in others if one.aic <= INDISTINCT]
     worse = [one for one in others if one.aic > INDISTINCT]
     if equal:
-        words.append(f"The data cannot tell it from {_listed(equal)}.")
+        *first, last = equal
+        words.append(f"The data cannot tell it from {', '.join(first)}{' and ' if first else ''}{last}.")
     words += [f"{one.solver} leaves {one.misfit:.3g} times the noise (AIC {one.aic:.0f} higher)." for one in worse]
     if worse:
         words.append(
@@ -105,10 +103,6 @@ def verdict(contenders: Sequence[Contender]) -> str:
             f"number. The least is best; up to {INDISTINCT:g} more is no difference."
         )
     return " ".join(words)
-
-
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def promise(solver: str, *, fits: bool) -> str:
@@ -131,9 +125,7 @@ def told(interval: Interval) -> str:
         return f"the data cannot tell it: the interval all but covers [{low:.3g}, {high:.3g}], all that was searched"
     if interval.verdict == "bounded below":
         return f"bounded from below only: the search ended at {high:.3g}"
-    if interval.verdict == "bounded above":
-        return f"bounded from above only: {low:.3g} is not excluded"
-    return ""
+    return f"bounded from above only: {low:.3g} is not excluded" if interval.verdict == "bounded above" else ""
 
 
 def digits(interval: Interval) -> int:

@@ -10,22 +10,13 @@ and the farthest of them below a bound of chi^2 are the ends of a profile likeli
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats.qmc import Halton
 
 from flipproof.film.fit.landscape import Landscape, loss
 from slicemodel.trajectory import FloatArray
-
-BOXES: Final = 40
-"""Boxes at the most."""
-
-FEWEST: Final = 12
-"""Points for each parameter that a box is drawn around at the least."""
-
-MARGIN: Final = 0.15
-"""By what share of its extent a box reaches beyond the points that it is drawn around, on either side."""
 
 Draws = NDArray[np.intp]
 
@@ -53,8 +44,9 @@ class Points:
 
     def with_more(self, other: Points) -> Points:
         """Return these points and those of ``other``."""
-        names = ("x", "rows", "chi2")
-        return Points(**{name: np.concatenate((getattr(self, name), getattr(other, name))) for name in names})
+        pairs = (self.x, other.x), (self.rows, other.rows), (self.chi2, other.chi2)
+        x, rows, chi2 = (np.concatenate(pair) for pair in pairs)
+        return Points(x=x, rows=rows, chi2=chi2)
 
     def below(self, level: float, fewest: int, first: int = 0) -> Points:
         """Return the points from ``first`` on of chi^2 up to ``level``, and at least the ``fewest`` lowest of them."""
@@ -80,11 +72,14 @@ class Box:
 
     @classmethod
     def around(cls, x: FloatArray, least: FloatArray) -> Box:
-        """Return the box around points (S, K), whose standard deviations count as ``least`` (K,) or more."""
+        """Return the box around points (S, K), whose standard deviations count as ``least`` (K,) or more.
+
+        On either side it reaches beyond them by 15 % of their extent.
+        """
         centre = np.asarray(x.mean(axis=0), dtype=np.float64)
         axes = np.asarray(np.linalg.cholesky(np.cov(x.T) + np.diag(least**2)), dtype=np.float64)
         low, high = _extent(centre, axes, x)
-        reach = MARGIN * (high - low)
+        reach = 0.15 * (high - low)
         return cls(centre, axes, low - reach, high + reach)
 
     def at(self, shares: FloatArray) -> FloatArray:
@@ -105,20 +100,15 @@ def _extent(centre: FloatArray, axes: FloatArray, x: FloatArray) -> tuple[FloatA
 
 
 def explored(land: Landscape, seeds: Points, within: float, count: int) -> Points:
-    """Return points spread evenly over where chi^2 exceeds its lowest value by at most ``within``.
+    """Return ``count`` points or more, spread evenly over where chi^2 exceeds its lowest value by at most ``within``.
 
-    Parameters
-    ----------
-    seeds : Points - to begin with
-    count : int - points at the least
+    ``seeds`` are the points to begin with; at least 12 for each parameter tell where a box lies.
     """
-    from scipy.stats.qmc import Halton
-
     dimensions = len(land.low)
     sequence, least = Halton(dimensions, scramble=False), 1e-12 * (land.high - land.low)
-    fewest = FEWEST * dimensions
+    fewest = 12 * dimensions
     pool, box, first = seeds, None, 0
-    for _ in range(BOXES):
+    for _ in range(40):
         level = float(pool.chi2.min()) + within
         near = pool.below(level, fewest).x
         if box is None or not box.fits(near):

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
+from scipy.stats import chi2 as distribution
 
 from flipproof.film.fit.landscape import HUBER, Landscape
 from slicemodel.trajectory import FloatArray
-
-UNLIKELY: Final = 0.001
-"""Probability of a chi^2 this large below which an equation is said not to fit."""
 
 
 def temperature(land: Landscape, x: FloatArray, steps: FloatArray) -> float:
@@ -36,10 +32,8 @@ def temperature(land: Landscape, x: FloatArray, steps: FloatArray) -> float:
 
 
 def fits(chi2: float, freedom: int) -> bool:
-    """Return whether noise alone makes a chi^2 this large more often than ``UNLIKELY``."""
-    from scipy.stats import chi2 as distribution
-
-    return bool(distribution.sf(chi2, freedom) > UNLIKELY)
+    """Return whether noise alone makes a chi^2 this large more often than in one of a thousand cases."""
+    return bool(distribution.sf(chi2, freedom) > 0.001)
 
 
 def autocovariance(residual: FloatArray) -> FloatArray:
