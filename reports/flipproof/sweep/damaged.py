@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.sweep.plan import Plan
+from flipproof.sweep.design import Plan
 from flipproof.sweep.schema import PAGE, as_stored, intact, kinds
 
 POINT: Final = re.compile(rb"[\x04-\x7f]\x00\x81\x0d")

@@ -33,27 +33,19 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 
 from flipproof.sweep.axes import DAMPING, FILL, Axis, Choices, Range, Value, read_axes
-from flipproof.sweep.entries import Entry, read_entries
+from flipproof.sweep.entries import Entry, as_json, read_entries
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.plan import FLIGHT
-from slicemodel.scenario import (
-    Bottle,
-    Scenario,
-    ScenarioError,
-    UnsuitableFileError,
-    not_whole,
-    read_text,
-    unknown_name,
-)
+from slicemodel.scenario import Bottle, Scenario, ScenarioError, UnsuitableFileError, not_whole, read_text, unknown_name
 from slicemodel.trajectory import FloatArray
 
-MOST_FILE: Final = 2**25
-"""Bytes of a design at the most: a million values with all their digits."""
+if TYPE_CHECKING:
+    from flipproof.landing.design import Throws
 
 MOST_POINTS: Final = 1_000_000
 """Points of a sweep at the most, all solvers together: a minute of bookkeeping, 100 MB of memory, 620 MB of rows."""
@@ -61,8 +53,10 @@ MOST_POINTS: Final = 1_000_000
 GRID: Final = "grid"
 LATIN: Final = "latin-hypercube"
 KEYS: Final = ("design", "samples", "seed", "trajectories", "curves", "fields")
-MOST_CURVE: Final = 10_000
-"""Points of a row's curves at the most."""
+FLIGHT: Final = MappingProxyType(
+    dict.fromkeys(("plateau", "omega_end", "theta_end", "r_cm_end", "t_end"), "REAL") | {"impacts": "INTEGER"}
+)
+"""What a row holds of a flight -> its SQLite type."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +100,7 @@ class Point:
 
     def text(self) -> str:
         """Return the parameters as JSON, keys in order; it reads back to the last bit."""
-        return _dumps(self.parameters())
+        return as_json(self.parameters())
 
     def key(self, code: str) -> str:
         """Return the key of this point as made by the code."""
@@ -123,9 +117,6 @@ def from_parameters(text: str) -> Point:
     stated = json.loads(text)
     throw = {"bottle": stated["bottle"], "scenario": stated["scenario"]}
     return Point(0, (), throw, stated["solver"], stated["settings"], stated.get("content", ""))
-
-
-_dumps = json.JSONEncoder(sort_keys=True).encode
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,6 +140,8 @@ class Design:
     trajectories: bool
     curves: int
 
+    readings = FLIGHT
+
     @property
     def throws(self) -> int:
         """Throws of every solver."""
@@ -165,11 +158,6 @@ class Design:
     def lines(self) -> tuple[range, ...]:
         """Numbers of the points of each solver: a worker that has compiled a solver gets more of it."""
         return tuple(range(k * self.throws, (k + 1) * self.throws) for k in range(len(self.entries)))
-
-    @property
-    def readings(self) -> Mapping[str, str]:
-        """What a row holds of a flight."""
-        return FLIGHT
 
     def point(self, number: int) -> Point:
         """Return the point of that number in [0, size)."""
@@ -224,6 +212,10 @@ class Design:
         }
 
 
+Plan: TypeAlias = "Design | Throws"
+"""What a store and the loop of a sweep work on: a design of flights, or one of landings."""
+
+
 def read_design(path: Path) -> Design:
     """Read a sweep's file.
 
@@ -233,7 +225,7 @@ def read_design(path: Path) -> Design:
         Naming file, table, key, value, and what is admissible or nearest.
     """
     try:
-        text = read_text(path, MOST_FILE)
+        text = read_text(path, 2**25)  # a million values with all their digits
         document = tomllib.loads(text)
     except UnsuitableFileError as error:
         raise SweepError(f"{path}: {error}") from None
@@ -265,7 +257,7 @@ def design_of(document: Mapping[str, Any], source: str, text: str = "") -> Desig
     if not isinstance(trajectories, bool):
         raise SweepError(f"{where} trajectories = {trajectories!r} is neither true nor false")
     curves = table.get("curves", 0)
-    problem = not_whole(f"{where} curves", curves, 2, MOST_CURVE) if curves != 0 or isinstance(curves, bool) else ""
+    problem = not_whole(f"{where} curves", curves, 2, 10_000) if curves != 0 or isinstance(curves, bool) else ""
     if problem:
         raise SweepError(f"{problem}, or 0 for none")
     fields = table.get("fields")

@@ -16,6 +16,9 @@ from flipproof.frame.solvers import Solver, find, solve
 from flipproof.sweep.errors import SweepError
 from slicemodel.scenario import Scenario, unknown_name
 
+as_json = json.JSONEncoder(sort_keys=True).encode
+"""Settings or parameters -> JSON, keys in order; it reads back to the last bit."""
+
 
 @dataclass(frozen=True, slots=True)
 class Entry:
@@ -104,8 +107,3 @@ def try_entries(entries: tuple[Entry, ...]) -> None:
         except Exception as error:
             kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
             raise SweepError(f"{entry.where}: {kind}{error}") from None
-
-
-def settings_text(settings: Mapping[str, Any]) -> str:
-    """Return settings as JSON, keys in order; it reads back to the last bit."""
-    return json.dumps(settings, sort_keys=True)

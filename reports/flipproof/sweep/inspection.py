@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from flipproof.sweep.damaged import count
+from flipproof.sweep.design import Plan
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.plan import Plan
 from flipproof.sweep.schema import APPLICATION, SCHEMA, columns, intact, kinds
 from slicemodel.scenario import shortened
 

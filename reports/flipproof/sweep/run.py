@@ -15,12 +15,11 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import Final
 
-from flipproof.sweep.design import Point
+from flipproof.sweep.design import Plan, Point
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.local import Workers
-from flipproof.sweep.plan import Plan
 from flipproof.sweep.store import Store
 from flipproof.sweep.work import Outcome, Returned, make_batch, versions
+from flipproof.sweep.workers import Workers
 
 TARGET: Final = 0.4
 """Seconds that a batch should take: sending one costs up to some milliseconds, and a kill loses it."""

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from flipproof.sweep.damaged import count, rows, versions
+from flipproof.sweep.design import Plan
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import whole_file
-from flipproof.sweep.plan import Plan
 from flipproof.sweep.schema import FILE, columns
 from flipproof.sweep.store import Store
 

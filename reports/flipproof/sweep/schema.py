@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from flipproof.sweep.axes import column
-from flipproof.sweep.plan import Plan
+from flipproof.sweep.design import Plan
 from flipproof.sweep.work import CURVES, OUTCOMES
 
 SCHEMA: Final = 2

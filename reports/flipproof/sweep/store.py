@@ -32,23 +32,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from flipproof.output.ownership import MARKER, OutputError, check_own, marker_text, sole_writer
-from flipproof.sweep.design import key_of
-from flipproof.sweep.entries import settings_text
+from flipproof.sweep.design import Plan, key_of
+from flipproof.sweep.entries import as_json
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import TEMPORARY, sweep_away_parts, whole_file, write_whole
 from flipproof.sweep.inspection import damage, inspect, is_damage, result_code
-from flipproof.sweep.plan import Plan
-from flipproof.sweep.schema import (
-    APPLICATION,
-    FILE,
-    PAGE,
-    SCHEMA,
-    SHARED,
-    checksum,
-    columns,
-    kinds,
-    points_table,
-)
+from flipproof.sweep.schema import APPLICATION, FILE, PAGE, SCHEMA, SHARED, checksum, columns, kinds, points_table
 from flipproof.sweep.work import CURVES, Outcome, Returned
 from slicemodel.trajectory import FloatArray
 
@@ -207,7 +196,7 @@ class Store:
             key_of(parameters, self.code),
             *point.values,
             point.solver,
-            settings_text(point.settings),
+            as_json(point.settings),
             *(getattr(outcome, name) for name in self.design.readings),
             outcome.status,
             outcome.message,
