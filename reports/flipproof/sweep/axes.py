@@ -21,9 +21,6 @@ Value = float | int | bool
 MOST_VALUES: Final = 1_000_000
 """Values of one axis at the most."""
 
-MOST_WHOLE: Final = 2**63
-"""A whole number must be smaller than this to have a place in the store."""
-
 FILL: Final = "fill_fraction"
 """M_w / M_max: sets ``water_mass``."""
 
@@ -36,17 +33,13 @@ INSTEAD: Final = MappingProxyType({FILL: "water_mass", DAMPING: "drag"})
 
 def _kinds() -> Mapping[str, Kind]:
     kinds: dict[str, Kind] = {f"bottle.{field.name}": "real" for field in fields(Bottle)}
-    default = Scenario()
+    of_type: dict[type, Kind] = {bool: "truth", int: "whole", float: "real"}
     for field in fields(Scenario):
-        value = getattr(default, field.name)
-        if isinstance(value, bool):
-            kinds[field.name] = "truth"
-        elif isinstance(value, int):
-            kinds[field.name] = "whole"
-        elif isinstance(value, float):
-            kinds[field.name] = "real"
-        elif isinstance(value, tuple):
+        value = getattr(Scenario(), field.name)
+        if isinstance(value, tuple):
             kinds |= {f"{field.name}.{axis}": "real" for axis in "xy"}
+        elif type(value) in of_type:
+            kinds[field.name] = of_type[type(value)]
     return MappingProxyType(kinds | dict.fromkeys(INSTEAD, "real"))
 
 
@@ -135,7 +128,7 @@ def _axis(name: str, given: object, where: str, grid: bool) -> Axis:
         return _distinct(Choices(name, kind, tuple(_value(value, kind, where) for value in given)), where)
     if not isinstance(given, Mapping) or kind == "truth":
         example = "[false, true]" if kind == "truth" else "[...] or {from = ..., to = ..., count = ...}"
-        raise SweepError(f"{where} = {_short(given)} is not a list of values; write {example}")
+        raise SweepError(f"{where} = {shortened(repr(given), 60)} is not a list of values; write {example}")
     known = ("from", "to", "count", "scale") if grid else ("from", "to", "scale")
     for key in given:
         if key == "count" and not grid:
@@ -166,7 +159,8 @@ def _axis(name: str, given: object, where: str, grid: bool) -> Axis:
 def _value(given: object, kind: Kind, where: str) -> Value:
     if kind == "truth" and isinstance(given, bool):
         return given
-    if kind == "whole" and isinstance(given, int) and not isinstance(given, bool) and abs(given) < MOST_WHOLE:
+    # A whole number must have a place in the store.
+    if kind == "whole" and isinstance(given, int) and not isinstance(given, bool) and abs(given) < 2**63:
         return given
     if kind == "real" and isinstance(given, int | float) and not isinstance(given, bool):
         try:
@@ -176,7 +170,7 @@ def _value(given: object, kind: Kind, where: str) -> Value:
         if math.isfinite(number):
             return number
     words = {"truth": "true or false", "whole": "a whole number", "real": "a finite number"}[kind]
-    raise SweepError(f"{where} = {_short(given)} is not {words}")
+    raise SweepError(f"{where} = {shortened(repr(given), 60)} is not {words}")
 
 
 def _distinct(axis: Choices, where: str) -> Choices:
@@ -190,7 +184,3 @@ def _distinct(axis: Choices, where: str) -> Choices:
             raise SweepError(f"{where} takes the value {value!r} twice")
         seen.add(value)
     return axis
-
-
-def _short(value: object) -> str:
-    return shortened(repr(value), 60)

@@ -37,9 +37,6 @@ MOST_LOCAL: Final = PAGE - 35
 LEAST_LOCAL: Final = (PAGE - 12) * 32 // 255 - 23
 """Bytes of a record that stay in its page if it has no overflow pages, and at the least if it has some."""
 
-MOST_ROW: Final = 16 * 2**20
-"""Bytes of a row at the most; a damaged record may claim any size, and its overflow pages may lead in a circle."""
-
 Bytes = bytes | mmap.mmap
 Row = tuple[Any, ...]
 PageOf = Callable[[int], bytes]
@@ -128,7 +125,7 @@ def _record(content: Bytes, start: int, page: int, width: int, page_of: tuple[Pa
     if at != content[start] or len(types) != width or {10, 11} & set(types):
         return
     size = at + sum(map(_size, types))
-    if size > MOST_ROW:
+    if size > 16 * 2**20:  # a damaged record may claim any size, and its overflow pages may lead in a circle
         return
     local = size
     if size > MOST_LOCAL:
@@ -144,7 +141,7 @@ def _record(content: Bytes, start: int, page: int, width: int, page_of: tuple[Pa
             link = overflow[:4]
             parts.append(overflow[4 : 4 + rest])
             rest -= len(parts[-1])
-            if len(parts[-1]) == 0:
+            if not parts[-1]:
                 break
         if rest == 0:
             yield number, *_cells(b"".join(parts), at, types)[1:]

@@ -240,9 +240,10 @@ def read_design(path: Path) -> Design:
 
 def design_of(document: Mapping[str, Any], source: str, text: str = "") -> Design:
     """Build a design from what its file holds; errors name ``source``."""
+    tables = ("scenario", "bottle", "sweep", "solvers")
     for name in document:
-        if name not in ("scenario", "bottle", "sweep", "solvers"):
-            raise SweepError(unknown_name(f"{source}: table", name, ("scenario", "bottle", "sweep", "solvers")))
+        if name not in tables:
+            raise SweepError(unknown_name(f"{source}: table", name, tables))
     table = document.get("sweep")
     if not isinstance(table, Mapping):
         raise SweepError(f'{source}: has no table [sweep]; write at least [sweep] design = "grid"')
@@ -266,13 +267,7 @@ def design_of(document: Mapping[str, Any], source: str, text: str = "") -> Desig
     axes = read_axes(fields, f"{source}: [sweep.fields]", grid=kind == GRID)
     entries = read_entries(document.get("solvers"), source)
     samples, seed = _samples(table, where, axes, grid=kind == GRID)
-    throws = samples if samples is not None else math.prod(len(a.values) for a in axes if isinstance(a, Choices))
-    if throws * len(entries) > MOST_POINTS:
-        raise SweepError(
-            f"{source}: {throws} throws by {len(entries)} solvers make {throws * len(entries)} points, more than "
-            f"{MOST_POINTS}; take fewer values, or a Latin hypercube"
-        )
-    return Design(
+    design = Design(
         text=text,
         base=_base(document, source, axes),
         axes=axes,
@@ -282,6 +277,12 @@ def design_of(document: Mapping[str, Any], source: str, text: str = "") -> Desig
         trajectories=trajectories,
         curves=int(curves),
     )
+    if design.size > MOST_POINTS:
+        raise SweepError(
+            f"{source}: {design.throws} throws by {len(entries)} solvers make {design.size} points, more than "
+            f"{MOST_POINTS}; take fewer values, or a Latin hypercube"
+        )
+    return design
 
 
 def _samples(
@@ -307,12 +308,12 @@ def _samples(
 
 def _base(document: Mapping[str, Any], source: str, axes: tuple[Axis, ...]) -> Mapping[str, Mapping[str, Any]]:
     tables = {name: document[name] for name in ("scenario", "bottle") if name in document}
-    names = {axis.name for axis in axes}
-    capacity = tables.get("bottle", {}).get("capacity", 1.0) if isinstance(tables.get("bottle", {}), Mapping) else 1.0
-    replaced = names & {FILL, "water_mass"} and isinstance(capacity, int | float)
-    if replaced and isinstance(tables.get("scenario", {}), Mapping):
+    scenario, bottle = tables.get("scenario", {}), tables.get("bottle", {})
+    capacity = bottle.get("capacity", 1.0) if isinstance(bottle, Mapping) else 1.0
+    swept = {axis.name for axis in axes} & {FILL, "water_mass"}
+    if swept and isinstance(capacity, int | float) and isinstance(scenario, Mapping):
         # The water is set by every point; the base's own must not be what is refused.
-        tables["scenario"] = {**tables.get("scenario", {}), "water_mass": capacity / 2}
+        tables["scenario"] = {**scenario, "water_mass": capacity / 2}
     try:
         return Scenario.from_mapping(tables, source=source).to_mapping()
     except ScenarioError as error:

@@ -7,7 +7,6 @@ that they read back to the last bit. The full parameters of a row and its curves
 from __future__ import annotations
 
 import csv
-import sqlite3
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
@@ -18,11 +17,7 @@ from flipproof.sweep.files import whole_file
 from flipproof.sweep.schema import columns
 from flipproof.sweep.store import Store
 
-FORMS: Final = (".csv", ".parquet")
 LEFT_OUT: Final = ("parameters", "versions", "curves", "checksum")
-CHUNK: Final = 10_000
-"""Rows in memory at a time."""
-
 Rows = list[tuple[Any, ...]]
 
 
@@ -34,7 +29,7 @@ def check_export(path: Path, out: Path) -> None:
     SweepError
         If the ending is unknown, the folder is missing, or pyarrow is.
     """
-    if path.suffix not in FORMS:
+    if path.suffix not in (".csv", ".parquet"):
         raise SweepError(f"--export {path}: the ending {path.suffix!r} is neither .csv nor .parquet")
     parent = path.resolve().parent
     if path.is_dir() or not (parent.is_dir() or parent == out.resolve()):
@@ -52,24 +47,18 @@ def export(store: Store, path: Path) -> None:
         If the file cannot be written.
     """
     names = [name for name in columns(store.design) if name not in LEFT_OUT]
-    quoted = ", ".join(names)
     try:
-        rows = store.connection.execute(f"SELECT {quoted} FROM points ORDER BY number")
+        rows = store.connection.execute(f"SELECT {', '.join(names)} FROM points ORDER BY number")
+        chunks: Iterator[Rows] = iter(lambda: rows.fetchmany(10_000), [])
         with whole_file(path.resolve()) as part:
             if path.suffix == ".csv":
-                _write_csv(part, names, _chunks(rows))
+                _write_csv(part, names, chunks)
             else:
                 types = {name: kind for _, name, kind, *_ in store.connection.execute("PRAGMA table_info(points)")}
-                _write_parquet(part, {name: types[name] for name in names}, _chunks(rows))
+                _write_parquet(part, {name: types[name] for name in names}, chunks)
     except OSError as error:
-        raise SweepError(
-            f"{path} cannot be written ({error.strerror or error}); the rows are in {store.file}"
-        ) from None
-
-
-def _chunks(rows: sqlite3.Cursor) -> Iterator[Rows]:
-    while chunk := rows.fetchmany(CHUNK):
-        yield chunk
+        words = f"{path} cannot be written ({error.strerror or error}); the rows are in {store.file}"
+        raise SweepError(words) from None
 
 
 def _write_csv(path: Path, names: list[str], chunks: Iterator[Rows]) -> None:

@@ -26,7 +26,6 @@ import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -46,12 +45,8 @@ if TYPE_CHECKING:
 
 LOCK: Final = "sweep.lock"
 KIND: Final = "sweep"
-FLIGHTS: Final = "trajectories"
 BUSY: Final = 10.0
 """Seconds to wait for somebody who holds the file."""
-
-SAFE: Final = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM)
-"""What SQLite refuses before it has changed anything."""
 
 
 class Store:
@@ -68,14 +63,14 @@ class Store:
         """
         self.folder, self.design, self.code = folder, design, code
         self._kinds = kinds(design)[:-1]
-        self._lock = ExitStack()
-        self._rows: sqlite3.Connection | None = None
+        self._marks = ", ".join("?" * len(columns(design)))
+        self._held = ExitStack()
         with self._plainly():
             _check_folder(folder)
             folder.mkdir(parents=True, exist_ok=True)
         try:
             with self._plainly():
-                self._lock.enter_context(sole_writer(folder / LOCK, folder))
+                self._held.enter_context(sole_writer(folder / LOCK, folder))
                 if not (folder / MARKER).exists():
                     write_whole(folder / MARKER, marker_text(KIND).encode())
                 self.fresh = not os.path.lexists(self.file)
@@ -83,9 +78,10 @@ class Store:
                     self._begin()
                 else:
                     inspect(self.file, design, code, BUSY)
-                self._rows = sqlite3.connect(self.file, timeout=BUSY, isolation_level=None)
-                self._rows.execute("PRAGMA journal_mode = WAL").fetchall()
-                self._rows.execute("PRAGMA synchronous = NORMAL")
+                connection = sqlite3.connect(self.file, timeout=BUSY, isolation_level=None)
+                self.connection = self._held.enter_context(closing(connection))
+                self.connection.execute("PRAGMA journal_mode = WAL").fetchall()
+                self.connection.execute("PRAGMA synchronous = NORMAL")
                 sweep_away_parts(folder)
         except BaseException:
             self.close()
@@ -96,26 +92,15 @@ class Store:
         """The SQLite file."""
         return self.folder / FILE
 
-    @property
-    def connection(self) -> sqlite3.Connection:
-        """The connection that writes."""
-        assert self._rows is not None
-        return self._rows
-
     def __enter__(self) -> Store:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
         """Close the file and let go of the folder."""
-        if self._rows is not None:
-            self._rows.close()
-        self._rows = None
-        self._lock.close()
+        self._held.close()
 
     def done(self) -> bytearray:
         """Return one byte for each point of the design: 1 if its row is there, and its flight if flights are kept."""
@@ -148,8 +133,7 @@ class Store:
                     # A row whose flight was deleted has been made again.
                     gone = ((outcome.number,) for outcome in batch.outcomes)
                     self.connection.executemany("DELETE FROM points WHERE number = ?", gone)
-                    marks = ", ".join("?" * len(columns(self.design)))
-                    self.connection.executemany(f"INSERT INTO points VALUES ({marks})", rows)
+                    self.connection.executemany(f"INSERT INTO points VALUES ({self._marks})", rows)
 
     def restore(self, rows: Sequence[tuple[Any, ...]], versions: Mapping[int, str]) -> None:
         """Write rows that were read from another file of this sweep; a point that has a row keeps it.
@@ -160,13 +144,12 @@ class Store:
         versions : mapping from the id that the rows refer to, to the versions there; one that is missing is lost
         """
         place = columns(self.design).index("versions")
-        marks = ", ".join("?" * len(columns(self.design)))
         with self._plainly(), _transaction(self.connection):
             ids = {row[place]: 0 for row in rows}
             for old in ids:
                 ids[old] = self._versions(versions.get(old, json.dumps({"lost": f"versions {old} of a damaged file"})))
             moved = (self._signed((*row[:place], ids[row[place]], *row[place + 1 : -1])) for row in rows)
-            self.connection.executemany(f"INSERT OR IGNORE INTO points VALUES ({marks})", moved)
+            self.connection.executemany(f"INSERT OR IGNORE INTO points VALUES ({self._marks})", moved)
 
     def _begin(self) -> None:
         """Make the file with its tables; it gets its name when it is whole, so that no kill leaves half of it."""
@@ -191,23 +174,12 @@ class Store:
     def _row(self, outcome: Outcome | Landed, flight: str | None, versions: int) -> tuple[Any, ...]:
         point = self.design.point(outcome.number)
         parameters = point.text()
-        cells = (
-            outcome.number,
-            key_of(parameters, self.code),
-            *point.values,
-            point.solver,
-            as_json(point.settings),
-            *(getattr(outcome, name) for name in self.design.readings),
-            outcome.status,
-            outcome.message,
-            outcome.reason,
-            outcome.seconds,
-            flight,
-            *([_bytes(outcome.curves)] if self.design.curves else []),
-            versions,
-            parameters,
-        )
-        return self._signed(cells)
+        curves = None if outcome.curves is None else outcome.curves.astype("<f8").tobytes()
+        return self._signed((
+            outcome.number, key_of(parameters, self.code), *point.values, point.solver, as_json(point.settings),
+            *(getattr(outcome, name) for name in self.design.readings), outcome.status, outcome.message, outcome.reason,
+            outcome.seconds, flight, *([curves] if self.design.curves else []), versions, parameters,
+        ))  # fmt: skip
 
     def _signed(self, cells: Sequence[Any]) -> tuple[Any, ...]:
         """Return cells with their checksum; cells that the tables refuse, and will say so, get none."""
@@ -230,18 +202,17 @@ class Store:
             if is_damage(error):
                 raise damage(self.file, self.design, self.code, str(error)) from None
             words = getattr(error, "strerror", None) or str(error)
-            safe = isinstance(error, OSError) or result_code(error) in SAFE
-            kept = (
-                "the points stored so far are safe, the same command goes on from there"
-                if safe
-                else "what was stored is read through when the same command goes on from there"
-            )
+            # What SQLite refuses before it has changed anything.
+            safe = sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM
+            kept = "what was stored is read through when the same command goes on from there"
+            if isinstance(error, OSError) or result_code(error) in safe:
+                kept = "the points stored so far are safe, the same command goes on from there"
             raise SweepError(f"{self.folder} cannot be written ({words}); {kept}") from None
 
     def _keep(self, outcome: Outcome) -> str:
         """Write the flight of a point and return its file's name from the folder."""
         key = self.design.point(outcome.number).key(self.code)
-        name = f"{FLIGHTS}/{key[:2]}/{key}.npz"
+        name = f"trajectories/{key[:2]}/{key}.npz"
         path = self.folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(path) as part, part.open("wb") as file:
@@ -253,10 +224,6 @@ class Store:
 def read_curves(blob: bytes) -> dict[str, FloatArray]:
     """Return the curves of a row by name, each of shape (P,)."""
     return dict(zip(CURVES, np.frombuffer(blob, dtype="<f8").reshape(len(CURVES), -1), strict=True))
-
-
-def _bytes(curves: FloatArray | None) -> bytes | None:
-    return None if curves is None else curves.astype("<f8").tobytes()
 
 
 def _check_folder(folder: Path) -> None:
