@@ -34,7 +34,6 @@ class Measured:
 
     Parameters
     ----------
-    measurement : Measurement
     noise : float - standard deviation of one value [rad or rad/s]
     throw : Scenario - the report's, over the time that was measured
     predicted : solver -> (P,) - without any fitting

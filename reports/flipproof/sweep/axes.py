@@ -99,13 +99,7 @@ def column(name: str) -> str:
 
 
 def read_axes(table: Mapping[str, Any], where: str, *, grid: bool) -> tuple[Axis, ...]:
-    """Read ``[sweep.fields]``; in a grid every axis becomes choices.
-
-    Raises
-    ------
-    SweepError
-        Naming ``where``, the field, its value and what is admissible.
-    """
+    """Read ``[sweep.fields]``, a mistake in which is named after ``where``; in a grid every axis becomes choices."""
     entries: dict[str, Any] = {}
     for name, given in table.items():
         # TOML reads bottle.length without quotes as a table in a table.

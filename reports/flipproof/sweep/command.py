@@ -43,8 +43,7 @@ def fill(
     ----------
     begin : callable (points there, points of the design) -> progress
     end : callable (complete store, line that tells what is there) -> lines to return
-    damaged : path or None
-        File of a damaged sweep of this design: ``out`` is begun with its whole rows, and no point is made.
+    damaged : path or None - a damaged sweep of this design: ``out`` is begun with its whole rows, no point is made
     how : ``jobs``, ``dask`` and ``export_to`` of ``completed``
 
     Raises

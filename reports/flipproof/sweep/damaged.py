@@ -43,13 +43,7 @@ PageOf = Callable[[int], bytes]
 
 
 def rows(file: Path, design: Plan, code: str) -> Iterator[Row]:
-    """Yield the rows of the design's points, made by ``code``, that are whole in a damaged file; some may come twice.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be read.
-    """
+    """Yield the rows of the design's points, made by ``code``, that are whole in a damaged file, some of them twice."""
     types = kinds(design)
     for row in _records(file, POINT, len(types)):
         number = row[0]
@@ -63,7 +57,7 @@ def versions(file: Path) -> dict[int, str]:
 
 
 def count(file: Path, design: Plan, code: str) -> int:
-    """Return how many points of the design have a row that is whole; raise as ``rows``."""
+    """Return how many points of the design have a row that is whole."""
     found = bytearray(design.size)
     for row in rows(file, design, code):
         found[row[0]] = 1
@@ -105,10 +99,7 @@ def _mapped(path: Path) -> Bytes:
 def _record(content: Bytes, start: int, page: int, width: int, page_of: tuple[PageOf, ...]) -> Iterator[Row]:
     """Yield the record whose header begins at ``start``, once for each of the ways to its overflow pages.
 
-    Parameters
-    ----------
-    page : int - where the page begins
-    page_of : callables (number of a page) -> its bytes, or fewer if it is not there
+    ``page`` is where its page begins; a way gives by its number the bytes of a page, or fewer if it is not there.
     """
     before = bytes(content[max(page, start - 9) : start])
     last = len(before) - 1

@@ -68,7 +68,6 @@ class Point:
     number : int - place in the design, from 0
     values : values of the swept fields, in the order of the axes
     throw : {"bottle": {...}, "scenario": {...}} - every field, possible or not
-    solver : str
     settings : mapping - what the solver is called with
     content : str - fingerprint of somebody else's solver; empty for flipproof's own
     """
@@ -81,13 +80,7 @@ class Point:
     content: str = ""
 
     def scenario(self) -> Scenario:
-        """Return the throw.
-
-        Raises
-        ------
-        ScenarioError
-            If no bottle can be thrown so.
-        """
+        """Return the throw; raise ScenarioError if no bottle can be thrown so."""
         fields = dict(self.throw["scenario"])
         return Scenario(
             bottle=Bottle(**self.throw["bottle"]), **fields | {"launch_velocity": tuple(fields["launch_velocity"])}

@@ -34,14 +34,9 @@ class Entry:
 
 
 def read_entries(tables: object, source: str) -> tuple[Entry, ...]:
-    """Read the list of ``[[solvers]]``.
+    """Read the list of ``[[solvers]]``; a mistake is named with the number of its table, the solver and the key.
 
     A scheme's ``store`` is "summary" unless the file says "full": no observable needs the slices.
-
-    Raises
-    ------
-    SweepError
-        Naming the table by its number and solver, the key, and the nearest known one.
     """
     if not isinstance(tables, list) or not tables or not all(isinstance(table, Mapping) for table in tables):
         raise SweepError(f'{source}: has no [[solvers]]; write one table for each, such as [[solvers]] name = "eq8"')

@@ -22,13 +22,7 @@ Rows = list[tuple[Any, ...]]
 
 
 def check_export(path: Path, out: Path) -> None:
-    """Refuse, before the sweep begins, a file that could not be written after it; the sweep's folder may hold it.
-
-    Raises
-    ------
-    SweepError
-        If the ending is unknown, the folder is missing, or pyarrow is.
-    """
+    """Refuse, before the sweep begins, a file that could not be written after it; the sweep's folder may hold it."""
     if path.suffix not in (".csv", ".parquet"):
         raise SweepError(f"--export {path}: the ending {path.suffix!r} is neither .csv nor .parquet")
     parent = path.resolve().parent
@@ -39,13 +33,7 @@ def check_export(path: Path, out: Path) -> None:
 
 
 def export(store: Store, path: Path) -> None:
-    """Write all rows of a store to ``path``; what was there stays until the new file is whole.
-
-    Raises
-    ------
-    SweepError
-        If the file cannot be written.
-    """
+    """Write all rows of a store to ``path``; what was there stays until the new file is whole."""
     names = [name for name in columns(store.design) if name not in LEFT_OUT]
     try:
         rows = store.connection.execute(f"SELECT {', '.join(names)} FROM points ORDER BY number")

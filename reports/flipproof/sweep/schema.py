@@ -100,10 +100,7 @@ AS_STORED: Final[Mapping[str, Callable[[Any], Any]]] = MappingProxyType(
 def as_stored(cells: Sequence[Any], types: Sequence[str]) -> tuple[Any, ...]:
     """Return cells as SQLite gives them back from columns of these types.
 
-    Raises
-    ------
-    ValueError, TypeError, OverflowError
-        If a cell is not of its type.
+    A cell that is not of its type raises ValueError, TypeError or OverflowError.
     """
     return tuple(None if cell is None else AS_STORED[kind](cell) for cell, kind in zip(cells, types, strict=True))
 

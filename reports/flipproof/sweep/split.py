@@ -47,10 +47,7 @@ def releases(runs: list[Run]) -> dict[str, list[Value]]:
 def make_split(throw: Scenario, out: Path, begin: Begin, **how: Any) -> str:
     """Make every run of the waterfall that has no row in ``out``, draw it; return its table and what is there.
 
-    Raises
-    ------
-    SweepError
-        If a run is not whole: a split needs all of them; else as for ``flipproof.sweep.command.fill``.
+    Parameters and errors as for ``flipproof.sweep.command.fill``; a run that is not whole is one: a split needs all.
     """
     runs = plan_split(throw)
 
@@ -67,13 +64,7 @@ def make_split(throw: Scenario, out: Path, begin: Begin, **how: Any) -> str:
 
 
 def split_rows(rows: Mapping[Run, Row]) -> tuple[Waterfall, ...]:
-    """Split every observable of the rows of ``plan_split``.
-
-    Raises
-    ------
-    SweepError
-        If a run is not whole.
-    """
+    """Split every observable of the rows of ``plan_split``; a run that is not whole is refused."""
     program = next(run for run in rows if run.solver == PROGRAM)
     return split_all(program, {run: _observed(run, row) for run, row in rows.items()})
 

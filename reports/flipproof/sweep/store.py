@@ -117,13 +117,7 @@ class Store:
             return dict(self.connection.execute(query).fetchall())
 
     def add(self, returned: Sequence[Returned]) -> None:
-        """Write the points of some batches in one transaction, their flights first.
-
-        Raises
-        ------
-        SweepError
-            If the disk is full or the file cannot be written; what was there before is there still.
-        """
+        """Write the points of some batches in one transaction, their flights first; what was there before stays."""
         with self._plainly():
             flights = {o.number: self._keep(o) for batch in returned for o in batch.outcomes if o.arrays is not None}
             with _transaction(self.connection):
@@ -138,10 +132,7 @@ class Store:
     def restore(self, rows: Sequence[tuple[Any, ...]], versions: Mapping[int, str]) -> None:
         """Write rows that were read from another file of this sweep; a point that has a row keeps it.
 
-        Parameters
-        ----------
-        rows : sequence of tuples - the cells of each, in the order of ``columns``
-        versions : mapping from the id that the rows refer to, to the versions there; one that is missing is lost
+        Their cells stand in the order of ``columns``; ``versions`` are those there by the id that rows refer to.
         """
         place = columns(self.design).index("versions")
         with self._plainly(), _transaction(self.connection):

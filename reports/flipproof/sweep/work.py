@@ -138,11 +138,7 @@ def versions() -> Mapping[str, str]:
 def make_batch(code: str, points: Sequence[Point], keep: bool, curves: int = 0) -> Returned:
     """Make points by one process; if the caller's ``code``, or that of the points' solver, is not that here, make none.
 
-    Parameters
-    ----------
-    code : str - ``code_identity()`` where the sweep is written
-    keep : bool - return the flights too
-    curves : int - points of the curves to return; 0: none
+    ``keep``: return the flights too; ``curves``: points of the curves to return, 0 for none.
     """
     began = time.perf_counter()
     here = code_identity()

@@ -27,7 +27,6 @@ class Workers:
 
     Parameters
     ----------
-    executor : Executor
     capacity : callable - how many batches to keep in flight now; 0: nobody is there at the moment
     died : exceptions of a future that mean that its worker died
     """

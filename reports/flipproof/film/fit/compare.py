@@ -27,8 +27,6 @@ class Contender:
 
     Parameters
     ----------
-    estimate : Estimate
-    intervals : tuple of Interval
     misfit : float - root mean square residual in units of the noise
     fits : whether noise alone makes residuals this large
     aic : float - Akaike's criterion less that of the best, chi^2 taken in units of what the best equation leaves if
@@ -53,13 +51,7 @@ class Contender:
 
 
 def compare(estimates: Sequence[Estimate]) -> tuple[Contender, ...]:
-    """Return the fits of one measurement by several equations, the best first.
-
-    Raises
-    ------
-    ValueError
-        If the measurements or the assumed noise are not the same.
-    """
+    """Return the fits by several equations, the best first; fits of different measurements or noise are refused."""
     first = estimates[0].problem
     for estimate in estimates[1:]:
         if estimate.problem.measured is not first.measured or estimate.problem.noise != first.noise:

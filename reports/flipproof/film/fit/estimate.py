@@ -59,7 +59,6 @@ class Estimate:
 
     Parameters
     ----------
-    problem : Problem
     x : (K,) - coordinates of the lowest chi^2
     chi2 : float - Huber's loss at ``x`` in units of the noise
     temperature : float - variance that the intervals rest on, in units of the noise's

@@ -24,7 +24,6 @@ class Landscape:
 
     Parameters
     ----------
-    problem : Problem
     scale : float - residuals are divided by ``problem.noise * scale`` before the loss
     tick : callable - called with the number of flights that were made
     """
@@ -61,10 +60,7 @@ class Landscape:
     def descend(self, x: FloatArray, steps: FloatArray, flights: int) -> tuple[FloatArray, float]:
         """Minimise chi^2 from ``x``; return where it ended, and chi^2 there.
 
-        Parameters
-        ----------
-        steps : (K,) - of the difference quotients
-        flights : int - trial points at the most
+        ``steps`` (K,) are those of the difference quotients, ``flights`` the trial points at the most.
         """
         # The solver wants its start strictly inside.
         margin = 1e-9 * (self.high - self.low)

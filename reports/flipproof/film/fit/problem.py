@@ -43,7 +43,6 @@ class Measurement:
 
     Parameters
     ----------
-    label : str
     t : (P,) - seconds from release, increasing, the first at least 0
     values : (P,) - theta [rad] or omega [rad/s]
     quantity : "theta" or "omega"
@@ -102,7 +101,6 @@ class Problem:
 
     Parameters
     ----------
-    measured : Measurement
     throw : Scenario - all that is not fitted, cut into the slices of the fit; its duration is that of the flight
     solver : str - a scheme of ``slicemodel``, a model of ``ode_reference`` or somebody else's
     free : tuple of str - names of the fitted parameters, from ``ALWAYS`` and ``ALSO``
@@ -200,12 +198,7 @@ def flights(throws: Sequence[Scenario], solver: str, times: FloatArray) -> tuple
     """Return theta and omega of throws of equal duration at ``times`` by the settings of a fit, each of shape (M, P).
 
     A scheme runs in steps of 0.5 ms and is interpolated; the reference and somebody else's solver are asked for the
-    times themselves. Where the latter gives no answer, theta and omega are NaN.
-
-    Raises
-    ------
-    ValueError
-        If the solver is an engine, or a curve in a file.
+    times themselves. Where the latter gives no answer, theta and omega are NaN. Refuses solvers as ``package_of``.
     """
     package = package_of(solver)
     if package == FOREIGN:
@@ -251,13 +244,7 @@ def sampled(grid: FloatArray, theta: FloatArray, omega: FloatArray, times: Float
 
 
 def package_of(solver: str) -> str:
-    """Return the package of a solver that can be fitted.
-
-    Raises
-    ------
-    ValueError
-        If there is no such solver, or it is an engine, or a curve in a file.
-    """
+    """Return the package of a solver that can be fitted; an engine, a curve in a file, an unknown name are refused."""
     from flipproof.foreign.specs import check_asked
     from flipproof.frame.solvers import catalogue, find
 
@@ -277,9 +264,7 @@ def pose(
 
     Parameters
     ----------
-    measured : Measurement
     throw : Scenario - what is known of the throw; its duration gives way to the measured one
-    solver : str
     also : names from ``ALSO`` - fitted too; they start from the measurement's first frames
     slices : int or None - None: ``SLICES``, or the throw's if fewer
 

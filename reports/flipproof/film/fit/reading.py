@@ -42,7 +42,6 @@ def read_flight(
 
     Parameters
     ----------
-    path : Path
     quantity : what to fit; None: theta if the table has it
     release, landing : [s] by the table's clock; None: its first and last row
     noise : standard deviation of one value, if known

@@ -22,7 +22,6 @@ class Interval:
 
     Parameters
     ----------
-    name : str
     value : float - estimate (lowest chi^2)
     low, high : float - ends of the interval
     deviation : float - standard deviation of what the data allow

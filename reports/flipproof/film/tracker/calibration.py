@@ -106,10 +106,7 @@ def check(spin: MeasuredSpin, flight: Flight, metres: float, length: float | Non
 def check_gravity(g: float, deviation: float) -> str:
     """Return a warning if the fitted g [m/s^2] is far from ``GRAVITY``, "" if it is not.
 
-    Raises
-    ------
-    ValueError
-        If the bottle falls upwards: then y points down, and theta and omega are those of the mirror image.
+    A bottle that falls upwards is refused: then y points down, and theta and omega are those of the mirror image.
     """
     if g < -max(5.0 * deviation, 1e-3):  # below 1e-3 m/s^2 nothing falls either way
         raise ValueError(
@@ -129,9 +126,7 @@ def check_gravity(g: float, deviation: float) -> str:
 def check_place(r_cm: FloatArray, length: float) -> list[str]:
     """Return warnings if the centre of mass starts nearer to the cap than to the base, or leaves the bottle.
 
-    Parameters
-    ----------
-    r_cm : (P,) - from the cap, NaN outside the flight; ``length`` of the bottle in the same unit
+    ``r_cm`` (P,) counts from the cap, NaN outside the flight, in the unit of the bottle's ``length``.
     """
     known = r_cm[~np.isnan(r_cm)]
     warnings = []

@@ -104,13 +104,7 @@ def tracker_text(t: FloatArray, tracks: Mapping[str, Mapping[str, FloatArray]], 
 
 
 def frame_times(scenario: Scenario, frame_rate: float) -> FloatArray:
-    """Return the times of a camera's frames from release to landing [s].
-
-    Raises
-    ------
-    ValueError
-        If the rate is not in [1, 1e5] per second, or if there are more frames than a table should have.
-    """
+    """Return the times of a camera's frames from release to landing [s], at a rate in [1, 1e5] per second."""
     if not 1 <= frame_rate <= 1e5:
         raise ValueError(f"frame_rate = {frame_rate!r} 1/s is outside [1, 100000]")
     most = 1_000_000
@@ -133,13 +127,7 @@ def at_times(run: Trajectory, times: FloatArray) -> Trajectory:
 
 
 def until_landing(run: Trajectory, frames: Trajectory, height: float) -> tuple[Trajectory, str]:
-    """Return the frames before the bottle comes down on a table, and how it does, in words.
-
-    Raises
-    ------
-    ValueError
-        If it does not come down during the run.
-    """
+    """Return the frames before the bottle comes down on a table, and how it does, in words; refuse if it does not."""
     found = landing(run, height)
     if found is None:
         raise ValueError(

@@ -173,12 +173,8 @@ def frame_grid(table: TrackTable) -> tuple[float, Numbers, str]:
     """Return the frame time, the frame number of every row, and how the times were read.
 
     Rows may be missing. The frame time is the slope of a straight line through the times over their frame numbers, so
-    that times printed with few digits do not spoil it.
-
-    Raises
-    ------
-    ValueError
-        If the steps between rows are no multiples of one frame time: a camera with variable frame rate.
+    that times printed with few digits do not spoil it. Steps that are no multiples of one frame time are refused: a
+    camera with variable frame rate.
     """
     t = table.t
     if len(t) < 2:
@@ -216,14 +212,8 @@ def frame_grid(table: TrackTable) -> tuple[float, Numbers, str]:
 def unwrapped(raw: FloatArray, t: FloatArray, frame_time: float, source: str) -> FloatArray:
     """Return an angle without jumps of 2 pi: every value takes the turn nearest to what the rate so far predicts.
 
-    Parameters
-    ----------
-    raw : shape (P,) - angles in any turn [rad]; NaN where missing
-
-    Raises
-    ------
-    ValueError
-        If a gap is so long at the known rate that the number of turns is a guess.
+    ``raw`` (P,) holds angles in any turn [rad], NaN where missing. A gap that is so long at the known rate that the
+    number of turns is a guess is refused.
     """
     theta = raw.copy()
     known = np.flatnonzero(~np.isnan(raw))

@@ -57,13 +57,8 @@ def fit_track(t: FloatArray, points: FloatArray, start: float) -> Parabola:
     Parameters
     ----------
     t : (P,) [s]
-    points : (P, 2) - NaN where missing
+    points : (P, 2) - NaN where missing; fewer than ``LEAST_POINTS`` others are refused
     start : time of the release [s]
-
-    Raises
-    ------
-    ValueError
-        If fewer than ``LEAST_POINTS`` points are there.
     """
     known = ~np.isnan(points).any(axis=1)
     if known.sum() < LEAST_POINTS:
@@ -94,10 +89,7 @@ def least_squares(matrix: FloatArray, values: FloatArray) -> tuple[FloatArray, F
 def axis_equations(t: FloatArray, cap: FloatArray, base: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return matrix (P, 5) and right-hand side (P,) of the axis condition for (x0, y0, v0x, v0y, g).
 
-    Parameters
-    ----------
-    t : (P,) - times since the release [s]
-    cap, base : (P, 2) - no value missing
+    ``t`` (P,) counts from the release [s]; no value of ``cap`` and ``base`` (P, 2) is missing.
     """
     axis = base - cap
     axis = axis / np.hypot(*axis.T)[:, None]
@@ -111,12 +103,7 @@ def fit_axis(
 ) -> Parabola:
     """Find the parabola of the centre of mass from cap and base alone, over the frames ``inside``.
 
-    With ``gravity`` given, g is not fitted.
-
-    Raises
-    ------
-    ValueError
-        If fewer than ``LEAST_POINTS`` frames are inside.
+    With ``gravity`` given, g is not fitted. Fewer than ``LEAST_POINTS`` frames are refused.
     """
     if inside.sum() < LEAST_POINTS:
         raise ValueError(f"the flight has {inside.sum()} tracked frames; {LEAST_POINTS} are needed")

@@ -51,13 +51,7 @@ class Track:
     units: dict[str, str]
 
     def column(self, name: str) -> FloatArray:
-        """Return a column, shape (P,).
-
-        Raises
-        ------
-        ValueError
-            If the track has none of that name.
-        """
+        """Return a column, shape (P,); a name that the track does not have is refused."""
         if name not in self.columns:
             raise ValueError(
                 f"track {self.name!r} has no column {name!r}, only {', '.join(self.columns)}; "
@@ -94,12 +88,9 @@ class TrackTable:
     lines: NDArray[np.int64]
 
     def track(self, name: str) -> Track:
-        """Return a track by name; spaces and underscores are the same, as Tracker's own copying makes them.
+        """Return a track by name, the nearest of which is named if there is none.
 
-        Raises
-        ------
-        TrackFileError
-            If there is none; the message names the nearest, or all.
+        Spaces and underscores are the same, as Tracker's own copying makes them.
         """
         found = [track for key, track in self.tracks.items() if plain(key) == plain(name)]
         if len(found) == 1:
@@ -112,13 +103,7 @@ class TrackTable:
         raise TrackFileError(f"{self.source}: {unknown_name('track', name, self.tracks)}")
 
     def length_unit(self, names: Sequence[str]) -> str:
-        """Return the unit that the headings of x and y of some tracks state, "" if none does.
-
-        Raises
-        ------
-        TrackFileError
-            If they state two, or one that is not in ``METRES``.
-        """
+        """Return the unit that the headings of x and y of some tracks state, "" if none does; two are refused."""
         stated = {unit for name in names for column, unit in self.track(name).units.items() if column in ("x", "y")}
         if len(stated) > 1 or not stated <= METRES.keys():
             raise TrackFileError(
