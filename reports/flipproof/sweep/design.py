@@ -40,8 +40,8 @@ import numpy as np
 
 from flipproof.sweep.axes import DAMPING, FILL, Axis, Choices, Range, Value, read_axes
 from flipproof.sweep.entries import Entry, as_json, read_entries
-from flipproof.sweep.errors import SweepError
-from slicemodel.scenario import Bottle, Scenario, ScenarioError, UnsuitableFileError, not_whole, read_text, unknown_name
+from flipproof.sweep.errors import SweepError, refuse, refuse_unknown
+from slicemodel.scenario import Bottle, Scenario, ScenarioError, UnsuitableFileError, not_whole, read_text
 from slicemodel.trajectory import FloatArray
 
 if TYPE_CHECKING:
@@ -52,7 +52,6 @@ MOST_POINTS: Final = 1_000_000
 
 GRID: Final = "grid"
 LATIN: Final = "latin-hypercube"
-KEYS: Final = ("design", "samples", "seed", "trajectories", "curves", "fields")
 FLIGHT: Final = MappingProxyType(
     dict.fromkeys(("plateau", "omega_end", "theta_end", "r_cm_end", "t_end"), "REAL") | {"impacts": "INTEGER"}
 )
@@ -233,27 +232,20 @@ def read_design(path: Path) -> Design:
 
 def design_of(document: Mapping[str, Any], source: str, text: str = "") -> Design:
     """Build a design from what its file holds; errors name ``source``."""
-    tables = ("scenario", "bottle", "sweep", "solvers")
-    for name in document:
-        if name not in tables:
-            raise SweepError(unknown_name(f"{source}: table", name, tables))
+    refuse_unknown(f"{source}: table", document, ("scenario", "bottle", "sweep", "solvers"))
     table = document.get("sweep")
     if not isinstance(table, Mapping):
         raise SweepError(f'{source}: has no table [sweep]; write at least [sweep] design = "grid"')
     where = f"{source}: [sweep]"
-    for key in table:
-        if key not in KEYS:
-            raise SweepError(unknown_name(f"{where} key", key, KEYS))
+    refuse_unknown(f"{where} key", table, ("design", "samples", "seed", "trajectories", "curves", "fields"))
     kind = table.get("design")
-    if kind not in (GRID, LATIN):
-        raise SweepError(unknown_name(f"{where} design =", kind, (GRID, LATIN)))
+    refuse_unknown(f"{where} design =", [kind], (GRID, LATIN))
     trajectories = table.get("trajectories", False)
     if not isinstance(trajectories, bool):
         raise SweepError(f"{where} trajectories = {trajectories!r} is neither true nor false")
     curves = table.get("curves", 0)
     problem = not_whole(f"{where} curves", curves, 2, 10_000) if curves != 0 or isinstance(curves, bool) else ""
-    if problem:
-        raise SweepError(f"{problem}, or 0 for none")
+    refuse(problem and f"{problem}, or 0 for none")
     fields = table.get("fields")
     if not isinstance(fields, Mapping):
         raise SweepError(f"{source}: has no table [sweep.fields]; it names the fields to vary")
@@ -288,9 +280,7 @@ def _samples(
                 raise SweepError(f'{where} {key} = {table[key]!r} belongs to design = "{LATIN}", not to a grid')
         return None, None
     samples, seed = table.get("samples"), table.get("seed", 0)
-    problem = not_whole(f"{where} samples", samples, 1, MOST_POINTS) or not_whole(f"{where} seed", seed, 0, 2**63 - 1)
-    if problem:
-        raise SweepError(problem)
+    refuse(not_whole(f"{where} samples", samples, 1, MOST_POINTS) or not_whole(f"{where} seed", seed, 0, 2**63 - 1))
     if not any(isinstance(axis, Range) and axis.kind == "real" for axis in axes):
         raise SweepError(
             f'{where} design = "{LATIN}" needs a field {{from = ..., to = ...}} of real numbers in [sweep.fields]; '

@@ -13,8 +13,8 @@ from typing import Any
 from flipproof.foreign.content import content_of
 from flipproof.foreign.specs import check_asked
 from flipproof.frame.solvers import Solver, find, solve
-from flipproof.sweep.errors import SweepError
-from slicemodel.scenario import Scenario, unknown_name
+from flipproof.sweep.errors import SweepError, refuse_unknown
+from slicemodel.scenario import Scenario
 
 as_json = json.JSONEncoder(sort_keys=True).encode
 """Settings or parameters -> JSON, keys in order; it reads back to the last bit."""
@@ -61,9 +61,9 @@ def _entry(table: dict[str, Any], where: str) -> Entry:
         raise SweepError(f"{where}: {error}") from None
     where = f"{where} ({name})"
     known, open_ended = _settings_of(solver)
+    if not open_ended:
+        refuse_unknown(f"{where} key", table, known)
     for key, value in table.items():
-        if key not in known and not open_ended:
-            raise SweepError(unknown_name(f"{where} key", key, known))
         if not _plain(value):
             raise SweepError(f"{where} {key} = {value!r} is not a finite number, a word, true, false or a list of them")
     if solver.package == "slicemodel":

@@ -218,7 +218,7 @@ def make_point(point: Point, keep: bool = False, curves: int = 0) -> Outcome:
     outcome = _read(point.number, flight, made.seconds)
     return replace(
         outcome,
-        arrays=_arrays(flight) if keep else None,
+        arrays=_arrays(flight) if keep and len(flight.t) else None,
         curves=curves_of(flight, curves) if curves and flight.status in WHOLE else None,
     )
 

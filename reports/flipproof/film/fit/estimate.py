@@ -81,12 +81,6 @@ class Estimate:
     flights: int
 
     @property
-    def values(self) -> dict[str, float]:
-        """Estimated parameters [SI] by name."""
-        pairs = zip(self.problem.free, self.x, strict=True)
-        return {name: self.problem.value(name, float(c)) for name, c in pairs}
-
-    @property
     def freedom(self) -> int:
         """Values less parameters."""
         return self.problem.points - len(self.x)
