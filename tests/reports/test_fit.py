@@ -17,8 +17,7 @@ from flipproof.film.fit.estimate import Effort, estimate, scan
 from flipproof.film.fit.landscape import HUBER, Landscape, loss
 from flipproof.film.fit.problem import ALWAYS, FAR, Measurement, Problem, first_frames, noise_of, pose, predict
 from flipproof.film.fit.reading import averaged_omega, read_flight
-from flipproof.film.fit.region import Points, explored, roughness
-from flipproof.film.fit.temperature import autocovariance, temperature
+from flipproof.film.fit.region import Points, autocovariance, explored, roughness, temperature
 from flipproof.film.fit.uncertainty import correlation, intervals
 from flipproof.film.tracker.kinematics import angle
 from slicemodel import Scenario

@@ -106,7 +106,7 @@ class Measured:
             alt=f"{m.label}: {len(m.t)} values of {m.quantity}; {HELD[nearest]} is nearest as thrown, "
             f"{HELD[self.fits[0].solver]} when fitted.",
             maker=figure_measured,
-            data=(m.t, m.values, m.quantity, self.noise, self.predicted, fitted),
+            data=(m, self.noise, self.predicted, fitted),
             table=columns_csv(columns),
         )
 
@@ -169,15 +169,10 @@ def part_measured(measurement: Measurement) -> Part:
 
 @styled
 def figure_measured(
-    t: FloatArray,
-    values: FloatArray,
-    quantity: str,
-    noise: float,
-    predicted: dict[str, FloatArray],
-    fitted: dict[str, FloatArray],
+    measured: Measurement, noise: float, predicted: dict[str, FloatArray], fitted: dict[str, FloatArray]
 ) -> Figure:
     """Measurement over the solvers above, residuals below: as thrown on the left, fitted on the right."""
-    unit = "rad" if quantity == "theta" else "rad/s"
+    t, values = measured.t, measured.values
     figure, axes = new_figure(2, 2, size=(9.0, 5.6), sharex=True, gridspec_kw={"height_ratios": [2.0, 1.0]})
     for column, (words, curves) in enumerate((("nothing fitted", predicted), ("fitted", fitted))):
         above, below = axes[0][column], axes[1][column]
@@ -190,7 +185,7 @@ def figure_measured(
             below.plot(t, values - curve, **look)
         above.set_title(words, fontsize=10, loc="left")
         below.set_xlabel("time from release [s]")
-    axes[0][0].set_ylabel(f"{'θ' if quantity == 'theta' else 'ω'} [{unit}]")
-    axes[1][0].set_ylabel(f"measured − computed [{unit}]")
+    axes[0][0].set_ylabel(f"{'θ' if measured.quantity == 'theta' else 'ω'} [{measured.unit}]")
+    axes[1][0].set_ylabel(f"measured − computed [{measured.unit}]")
     axes[0][0].legend()
     return figure

@@ -23,8 +23,9 @@ from flipproof.sweep.axes import Value
 from flipproof.sweep.command import Begin, fill
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import write_whole
-from flipproof.sweep.planned import Row, design_of_runs, read_runs
+from flipproof.sweep.planned import design_of_runs, read_runs
 from flipproof.sweep.store import Store
+from flipproof.sweep.work import CURVES, Outcome
 from slicemodel import Scenario
 from slicemodel.observables import toppling_angle
 
@@ -63,13 +64,13 @@ def make_split(throw: Scenario, out: Path, begin: Begin, **how: Any) -> str:
     return fill(design_of_runs(runs, releases(runs), ENDS, "flipproof waterfall"), out, begin, end, **how)
 
 
-def split_rows(rows: Mapping[Run, Row]) -> tuple[Waterfall, ...]:
+def split_rows(rows: Mapping[Run, Outcome]) -> tuple[Waterfall, ...]:
     """Split every observable of the rows of ``plan_split``; a run that is not whole is refused."""
     program = next(run for run in rows if run.solver == PROGRAM)
     return split_all(program, {run: _observed(run, row) for run, row in rows.items()})
 
 
-def _observed(run: Run, row: Row) -> dict[str, float]:
+def _observed(run: Run, row: Outcome) -> dict[str, float]:
     throw = run.scenario
     if row.status != "ok":
         raise SweepError(f"{run.name}: {row.status}: {row.message or row.reason}; a waterfall needs every run whole")
@@ -77,12 +78,13 @@ def _observed(run: Run, row: Row) -> dict[str, float]:
     assert row.omega_end is not None
     assert row.theta_end is not None
     assert row.r_cm_end is not None
+    assert row.curves is not None
     return {
         "plateau": row.plateau,
         "omega": row.omega_end / throw.omega0,
         "theta": row.theta_end,
         "toppling": float(toppling_angle(throw, row.r_cm_end)),
-        "v_cm": float(row.curves["v_cm"][-1]),
+        "v_cm": float(row.curves[CURVES.index("v_cm"), -1]),
     }
 
 

@@ -212,9 +212,9 @@ class Store:
         return name
 
 
-def read_curves(blob: bytes) -> dict[str, FloatArray]:
-    """Return the curves of a row by name, each of shape (P,)."""
-    return dict(zip(CURVES, np.frombuffer(blob, dtype="<f8").reshape(len(CURVES), -1), strict=True))
+def read_curves(blob: bytes) -> FloatArray:
+    """Return the curves of a row, shape (4, P), in the order of ``CURVES``."""
+    return np.frombuffer(blob, dtype="<f8").reshape(len(CURVES), -1)
 
 
 def _check_folder(folder: Path) -> None:

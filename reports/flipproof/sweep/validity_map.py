@@ -39,8 +39,9 @@ from flipproof.output.columns import rows_csv
 from flipproof.sweep.axes import DAMPING, FILL, Value
 from flipproof.sweep.command import Begin, fill
 from flipproof.sweep.files import write_whole
-from flipproof.sweep.planned import Row, design_of_runs, read_runs
+from flipproof.sweep.planned import design_of_runs, read_runs
 from flipproof.sweep.store import Store
+from flipproof.sweep.work import CURVES, Outcome
 from slicemodel import Scenario
 
 STEPS: Final = 1000
@@ -76,7 +77,7 @@ class Plan:
         restitution = {"restitution": self.values} if self.axis == "restitution" else {}
         return {**restitution, DAMPING: [self.throw.damping_rate], FILL: self.fills}
 
-    def study(self, rows: Mapping[Run, Row]) -> ValidityMap:
+    def study(self, rows: Mapping[Run, Outcome]) -> ValidityMap:
         """Return the map that the rows of its runs make."""
         readings = {run: _reading(row) for run, row in rows.items()}
         return study_readings(self.throw, self.axis, self.fills, self.values, readings, steps=STEPS, points=None)
@@ -153,8 +154,9 @@ def _dominating(study: ValidityMap) -> dict[str, int]:
     return {name: int((study.dominant == k).sum()) for k, name in enumerate(RUNGS)}
 
 
-def _reading(row: Row) -> Reading:
+def _reading(row: Outcome) -> Reading:
     if row.status != "ok":
         return Reading(problem=word(row.reason) if row.status == "failed" else row.status)
     assert row.plateau is not None
-    return Reading(level=row.plateau, omega=row.curves["omega"])
+    assert row.curves is not None
+    return Reading(level=row.plateau, omega=row.curves[CURVES.index("omega")])

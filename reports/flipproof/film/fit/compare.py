@@ -11,7 +11,7 @@ import numpy as np
 
 from flipproof.film.fit.estimate import Estimate
 from flipproof.film.fit.problem import package_of
-from flipproof.film.fit.temperature import fits
+from flipproof.film.fit.region import fits
 from flipproof.film.fit.uncertainty import Interval, intervals
 
 INDISTINCT: Final = 4.0

@@ -17,8 +17,7 @@ from scipy.ndimage import minimum_filter
 
 from flipproof.film.fit.landscape import Landscape, Tick, loss
 from flipproof.film.fit.problem import Problem
-from flipproof.film.fit.region import Points, explored, roughness
-from flipproof.film.fit.temperature import fits, temperature
+from flipproof.film.fit.region import Points, explored, fits, roughness, temperature
 from slicemodel.trajectory import FloatArray
 
 LIKELY: Final = 5.024
@@ -108,7 +107,7 @@ def estimate(problem: Problem, effort: Effort = USUAL, *, tick: Tick = lambda _:
     residuals = land.residuals(ends)
     steps = problem.coarse_steps()
     typical = float((1.4826 * np.median(np.abs(residuals), axis=1)).min())
-    land = land.rescaled(typical if typical > 2.0 else 1.0)
+    land.scale = typical if typical > 2.0 else 1.0
     levels = loss(residuals / land.scale)
     order = np.argsort(levels)
     around = _around(land, ends[levels <= levels.min() + 30.0])

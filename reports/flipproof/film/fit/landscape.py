@@ -20,24 +20,15 @@ Tick = Callable[[int], object]
 
 
 class Landscape:
-    """chi^2 of a problem, and how often it was asked for.
+    """chi^2 of a problem, and how often it was asked for; ``tick`` is called with the number of flights made.
 
-    Parameters
-    ----------
-    scale : float - residuals are divided by ``problem.noise * scale`` before the loss
-    tick : callable - called with the number of flights that were made
+    Residuals are divided by ``problem.noise * scale`` before the loss.
     """
 
-    def __init__(self, problem: Problem, *, scale: float = 1.0, tick: Tick = lambda _: None) -> None:
-        self.problem, self.scale, self.tick = problem, scale, tick
+    def __init__(self, problem: Problem, *, tick: Tick = lambda _: None) -> None:
+        self.problem, self.tick = problem, tick
         self.low, self.high = problem.bounds()
-        self.flights = 0
-
-    def rescaled(self, scale: float) -> Landscape:
-        """Return the same landscape in other units of residuals; flights are counted on."""
-        other = Landscape(self.problem, scale=scale, tick=self.tick)
-        other.flights = self.flights
-        return other
+        self.scale, self.flights = 1.0, 0
 
     def residuals(self, points: FloatArray) -> FloatArray:
         """Return the residuals at many points (M, K) in standard deviations, shape (M, P)."""

@@ -163,6 +163,7 @@ def measure(request: Request) -> Measurement:
     points = _centre(request, table, spin, metres)
     track = None if points is None else fit_track(spin.t[flight.inside], points[flight.inside], flight.release)
     omega0, deviation = _first_omega(spin, flight)
+    late = flight.inside & (spin.t >= (flight.release + flight.landing) / 2) & ~np.isnan(spin.omega)
     off = check_gravity(axis.g, axis.sd_g)
     # g is known better than a liquid bottle's video tells it, and r_CM hangs on it.
     steady = fit_axis(spin.t, cap, base, inside, flight.release, gravity=GRAVITY)
@@ -173,7 +174,8 @@ def measure(request: Request) -> Measurement:
     return Measurement(
         request=request, table=table, spin=spin, flight=flight, calibration=calibration, metres=metres, axis=axis,
         track=track, track_points=points, omega0=omega0, omega0_deviation=deviation,
-        mean=_late_mean(spin, flight, omega0), r_cm=r_cm, warnings=warnings, notes=tuple(notes),
+        mean=float(spin.omega[late].mean() / omega0) if late.any() else np.nan, r_cm=r_cm, warnings=warnings,
+        notes=tuple(notes),
     )  # fmt: skip
 
 
@@ -294,12 +296,6 @@ def _fitted_omega(spin: MeasuredSpin, flight: Flight, flight_time: float) -> tup
         raise ValueError("too few frames around the release were tracked to tell omega there; name another release")
     solution, _, _ = least_squares(matrix, spin.theta[near])
     return float(solution[1]), float(spin.theta_noise * np.sqrt(np.linalg.inv(matrix.T @ matrix)[1, 1]))
-
-
-def _late_mean(spin: MeasuredSpin, flight: Flight, omega0: float) -> float:
-    middle = (flight.release + flight.landing) / 2
-    late = flight.inside & (spin.t >= middle) & ~np.isnan(spin.omega)
-    return float(spin.omega[late].mean() / omega0) if late.any() else float("nan")
 
 
 def check_angles(table: TrackTable, spin: MeasuredSpin, track: str, unit: str) -> str:

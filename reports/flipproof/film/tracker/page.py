@@ -49,7 +49,7 @@ def summary(measured: Measurement) -> dict[str, Any]:
     spin, flight = measured.spin, measured.flight
     return {
         "request": asdict(measured.request) | {"files": [str(path) for path in measured.request.files]},
-        "files": [dialect.words for dialect in measured.table.dialects],
+        "files": list(measured.table.dialects),
         "tracks": list(measured.table.tracks),
         "frames": {
             "count": len(spin.t),
@@ -84,7 +84,7 @@ def lines(measured: Measurement) -> list[str]:
     how = "C_M as tracked" if measured.track else "found from the axis"
     found = [
         f"{measured.table.source}: {len(spin.t)} frames at {1 / spin.frame_time:.4g}/s, {spin.measured.sum()} with cap "
-        f"and base, {spin.interpolated.sum()} interpolated ({'; '.join(d.words for d in measured.table.dialects)})",
+        f"and base, {spin.interpolated.sum()} interpolated ({'; '.join(measured.table.dialects)})",
         f"release  t = {flight.release:.4f} s ({flight.release_how})",
         f"landing  t = {flight.landing:.4f} s ({flight.landing_how})",
         f"omega_0  {measured.omega0:.2f} +- {measured.omega0_deviation:.2g} rad/s; second half of the flight: "

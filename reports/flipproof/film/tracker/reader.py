@@ -37,7 +37,7 @@ from flipproof.film.tracker.dialect import (
     number,
     read_lines,
 )
-from flipproof.film.tracker.table import Dialect, Track, TrackFileError, TrackTable, column_name, plain
+from flipproof.film.tracker.table import Track, TrackFileError, TrackTable, column_name, plain
 from slicemodel.scenario import shortened
 
 LARGEST: Final = 1e9
@@ -86,7 +86,9 @@ def _read(path: Path) -> TrackTable:
     rows = _of_one_length(path, rows, len(titles), delimiter)
     decimal = decimal_of(rows)
     headings = _headings(header, titles, _track_names(above, delimiter, titles, pieces))
-    return _table(path, headings, rows, Dialect(encoding=encoding, delimiter=delimiter, decimal=decimal))
+    sign = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "space"}[delimiter]
+    dialect = f"{encoding}, {sign}-delimited, decimal {'point' if decimal == '.' else 'comma'}"
+    return _table(path, headings, rows, decimal, dialect)
 
 
 # ---------------------------------------------------------------------- the rows above the numbers
@@ -202,8 +204,8 @@ def _of_one_length(path: Path, rows: Rows, columns: int, delimiter: str) -> Rows
     )
 
 
-def _table(path: Path, headings: Sequence[Heading], rows: Rows, dialect: Dialect) -> TrackTable:
-    values = np.array([[_value(line, cell, dialect.decimal) for cell in cells] for line, cells in rows])
+def _table(path: Path, headings: Sequence[Heading], rows: Rows, decimal: str, dialect: str) -> TrackTable:
+    values = np.array([[_value(line, cell, decimal) for cell in cells] for line, cells in rows])
     t = values[:, 0]
     for k, (line, _) in enumerate(rows):
         if math.isnan(t[k]):
@@ -222,7 +224,7 @@ def _table(path: Path, headings: Sequence[Heading], rows: Rows, dialect: Dialect
         source=str(path),
         dialects=(dialect,),
         t=t,
-        resolution=np.array([last_digit(cells[0], dialect.decimal) for _, cells in rows]),
+        resolution=np.array([last_digit(cells[0], decimal) for _, cells in rows]),
         tracks=tracks,
         lines=np.array([line.number for line, _ in rows]),
     )

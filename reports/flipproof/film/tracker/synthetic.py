@@ -32,10 +32,8 @@ class SyntheticVideo:
     landing: float
 
 
-def synthetic_video(
-    run: Trajectory, *, frame_rate: float = 240.0, before: float = 0.1, after: float = 0.12, start: float = 0.0
-) -> SyntheticVideo:
-    """Return what a camera with no noise would see of a throw: ``before`` seconds of hand, the flight, the table.
+def synthetic_video(run: Trajectory) -> SyntheticVideo:
+    """Return what a camera of 240 frames/s without noise would see: 0.1 s of hand, the flight, 0.12 s of table.
 
     In the hand the centre of mass and the angle accelerate evenly, by (-6, 24) m/s^2, far from free fall, and
     90 rad/s^2, and meet the release in place and velocity. On the table the base stays where it is and the bottle rocks
@@ -45,7 +43,7 @@ def synthetic_video(
     length, gravity = scenario.bottle.length, scenario.gravity
     velocity = np.array(scenario.launch_velocity)
     flight = float(run.t[-1])
-    tau = np.arange(-np.floor(before * frame_rate), np.floor((flight + after) * frame_rate) + 1) / frame_rate
+    tau = np.arange(-24, np.floor((flight + 0.12) * 240.0) + 1) / 240.0
     inside = np.clip(tau, 0.0, flight)
     theta = np.interp(inside, run.t, run.theta)
     r_cm = np.interp(inside, run.t, run.r_cm)
@@ -71,14 +69,14 @@ def synthetic_video(
         cap[down] = base[down] - length * axis[down]
         centre[down] = cap[down] + r_cm[down, None] * axis[down]
     return SyntheticVideo(
-        t=tau - tau[0] + start,
+        t=tau - tau[0],
         theta=theta,
         omega=omega,
         cap=cap,
         base=base,
         centre=centre,
-        release=float(-tau[0] + start),
-        landing=float(flight - tau[0] + start),
+        release=float(-tau[0]),
+        landing=float(flight - tau[0]),
     )
 
 

@@ -24,21 +24,6 @@ class TrackFileError(ValueError):
     """A file that cannot be read as a table of tracks; the message names file, line and a way out."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Dialect:
-    """How a file is written: its encoding, what stands between cells, and its decimal sign."""
-
-    encoding: str
-    delimiter: str
-    decimal: str
-
-    @property
-    def words(self) -> str:
-        """Return the dialect in words."""
-        sign = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "space"}[self.delimiter]
-        return f"{self.encoding}, {sign}-delimited, decimal {'point' if self.decimal == '.' else 'comma'}"
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Track:
     """One tracked point: columns by name (``x``, ``y``, ``vx``, ``theta``), each of shape (P,); NaN where missing.
@@ -73,7 +58,7 @@ class TrackTable:
     Parameters
     ----------
     source : str - the files, as they are named in messages
-    dialects : how each file is written
+    dialects : how each file is written: its encoding, what stands between cells, and its decimal sign
     t : (P,) - times in the file's unit, increasing
     resolution : (P,) - half a unit of the last digit with which each time is printed
     tracks : by name
@@ -81,7 +66,7 @@ class TrackTable:
     """
 
     source: str
-    dialects: tuple[Dialect, ...]
+    dialects: tuple[str, ...]
     t: FloatArray
     resolution: FloatArray
     tracks: Mapping[str, Track]
