@@ -58,10 +58,7 @@ def versions(file: Path) -> dict[int, str]:
 
 def count(file: Path, design: Plan, code: str) -> int:
     """Return how many points of the design have a row that is whole."""
-    found = bytearray(design.size)
-    for row in rows(file, design, code):
-        found[row[0]] = 1
-    return sum(found)
+    return len({row[0] for row in rows(file, design, code)})
 
 
 # ---------------------------------------------------------------------- SQLite's format
