@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from flipproof.film.tracker.bench import Measurement
+from flipproof.film.tracker.parabola import Parabola
 from flipproof.output.columns import columns_csv
 from flipproof.page.templating import environment
 
@@ -66,16 +67,18 @@ def summary(measured: Measurement) -> dict[str, Any]:
         "theta0": float(spin.theta[flight.inside][~np.isnan(spin.theta[flight.inside])][0]),
         "omega0": {"value": measured.omega0, "deviation": measured.omega0_deviation},
         "late_omega_over_omega0": measured.mean,
-        **{
-            f"parabola_from_{name}": fit and asdict(fit) | {"v0": math.hypot(fit.v0x, fit.v0y)}
-            for name, fit in (("axis", measured.axis), ("track", measured.track))
-        },
+        "parabola_from_axis": _fit(measured.axis),
+        "parabola_from_track": None if measured.track is None else _fit(measured.track),
         "calibration": asdict(measured.calibration),
         "length_unit_in_metres": measured.metres,
         "warnings": list(measured.warnings),
         "notes": list(measured.notes),
         "columns": COLUMNS,
     }
+
+
+def _fit(fit: Parabola) -> dict[str, float]:
+    return asdict(fit) | {"v0": math.hypot(fit.v0x, fit.v0y)}
 
 
 def lines(measured: Measurement) -> list[str]:
@@ -113,18 +116,10 @@ def write(measured: Measurement, folder: Path, provenance: Mapping[str, str]) ->
     numbers = summary(measured) | {"provenance": dict(provenance)}
     text = json.dumps(_finite(numbers), indent=2, ensure_ascii=False) + "\n"
     (folder / "summary.json").write_text(text, encoding="utf-8")
-    page = (
-        environment()
-        .get_template("track.html.j2")
-        .render(
-            measured=measured,
-            fit=measured.track or measured.axis,
-            summary=numbers,
-            figures=drawn,
-            provenance=provenance,
-        )
-    )
-    (folder / "index.html").write_text(page, encoding="utf-8")
+    fit = measured.track or measured.axis
+    page = environment().get_template("track.html.j2")
+    html = page.render(measured=measured, fit=fit, summary=numbers, figures=drawn, provenance=provenance)
+    (folder / "index.html").write_text(html, encoding="utf-8")
 
 
 def _finite(value: Any) -> Any:
