@@ -35,14 +35,12 @@ class Measured:
     Parameters
     ----------
     noise : float - standard deviation of one value [rad or rad/s]
-    throw : Scenario - the report's, over the time that was measured
     predicted : solver -> (P,) - without any fitting
     fits : tuple of Contender - the best first; drag, restitution and release fitted
     """
 
     measurement: Measurement
     noise: float
-    throw: Scenario
     predicted: dict[str, FloatArray]
     fits: tuple[Contender, ...]
 
@@ -140,7 +138,6 @@ def hold(measurement: Measurement, scenario: Scenario, tick: Callable[[int], obj
     return Measured(
         measurement=measurement,
         noise=problems[0].noise,
-        throw=throw,
         predicted={name: predict([throw], name, measurement)[0] for name in HELD},
         fits=compare([estimate(problem, tick=tick) for problem in problems]),
     )
