@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Literal
 
 import numpy as np
 
 from flipproof.film.fit.estimate import Estimate
 from slicemodel.trajectory import FloatArray
-
-LEVEL: Final = 0.975
-"""Probability of one interval, so that those of drag and restitution hold together in 95 % (Bonferroni)."""
 
 Verdict = Literal["told", "bounded above", "bounded below", "not told"]
 
@@ -50,7 +47,8 @@ def intervals(estimate: Estimate) -> tuple[Interval, ...]:
     """
     problem = estimate.problem
     low, high = problem.bounds()
-    tails = (1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0
+    level = 0.975  # of one, so that those of drag and restitution hold together in 95 % (Bonferroni)
+    tails = (1.0 - level) / 2.0, (1.0 + level) / 2.0
     found = []
     for k, name in enumerate(problem.free):
         middle, *tail = np.quantile(estimate.cloud[:, k], (0.5, *tails))

@@ -80,9 +80,7 @@ def _read(path: Path) -> TrackTable:
         raise header.error(f"column {titles.index('') + 1} has no name; {EXPORT} again")
     for line, cells in rows:
         if column_name(cells[0])[0].lower() in TIMES:
-            raise line.error(
-                "a second row of column names; two exports were joined: put each into a file of its own"
-            )  # fmt: skip
+            raise line.error("a second row of column names; two exports were joined: put each into a file of its own")
     rows = _of_one_length(path, rows, len(titles), delimiter)
     decimal = decimal_of(rows)
     headings = _headings(header, titles, _track_names(above, delimiter, titles, pieces))
@@ -130,7 +128,7 @@ def _track_names(line: Line | None, delimiter: str, titles: Sequence[str], piece
     # The name of the only track may stand alone in its row.
     if delimiter == " " and not line.text.startswith(" "):
         return [line.text.strip(" ")] * (count - 1)
-    if cells[0] and not any(cells[1:]) and len(cells) in (1, count, count + 1) and not line.text.startswith(delimiter):
+    if cells[0] and not any(cells[1:]) and len(cells) in (1, count, count + 1):
         return [cells[0]] * (count - 1)
     if cells[0] or not any(cells[1:]):
         raise line.error(f"is neither track names nor column names; {EXPORT} again, or begin it with //")

@@ -23,8 +23,6 @@ class SyntheticVideo:
     """
 
     t: FloatArray
-    theta: FloatArray
-    omega: FloatArray
     cap: FloatArray
     base: FloatArray
     centre: FloatArray
@@ -47,16 +45,10 @@ def synthetic_video(run: Trajectory) -> SyntheticVideo:
     inside = np.clip(tau, 0.0, flight)
     theta = np.interp(inside, run.t, run.theta)
     r_cm = np.interp(inside, run.t, run.r_cm)
-    omega = np.interp(inside, run.t, run.omega)
     held, down = tau < 0, tau > flight
-    spin_up = np.sign(scenario.omega0) * 90.0
-    theta[held] += scenario.omega0 * tau[held] + 0.5 * spin_up * tau[held] ** 2
-    omega[held] += spin_up * tau[held]
-    upright = 2 * np.pi * np.rint(theta[down][:1] / (2 * np.pi)) if down.any() else np.zeros(1)
-    rocking = 0.03
-    fade = np.exp(-(tau[down] - flight) / rocking)
-    lean = theta[down] - upright
-    theta[down], omega[down] = upright + lean * fade, -lean * fade / rocking
+    theta[held] += scenario.omega0 * tau[held] + 0.5 * np.sign(scenario.omega0) * 90.0 * tau[held] ** 2
+    upright = 2 * np.pi * np.rint(theta[down][0] / (2 * np.pi))
+    theta[down] = upright + (theta[down] - upright) * np.exp(-(tau[down] - flight) / 0.03)
     origin = centre_of_mass_at_rest(scenario) * np.array([np.sin(scenario.theta0), -np.cos(scenario.theta0)])
     acceleration = np.where(held[:, None], (-6.0, 24.0), (0.0, -gravity))
     clock = np.where(held, tau, inside)[:, None]
@@ -64,14 +56,11 @@ def synthetic_video(run: Trajectory) -> SyntheticVideo:
     axis = direction(theta)
     cap = centre - r_cm[:, None] * axis
     base = cap + length * axis
-    if down.any():
-        base[down] = base[max(int(down.argmax()) - 1, 0)]
-        cap[down] = base[down] - length * axis[down]
-        centre[down] = cap[down] + r_cm[down, None] * axis[down]
+    base[down] = base[int(down.argmax()) - 1]
+    cap[down] = base[down] - length * axis[down]
+    centre[down] = cap[down] + r_cm[down, None] * axis[down]
     return SyntheticVideo(
         t=tau - tau[0],
-        theta=theta,
-        omega=omega,
         cap=cap,
         base=base,
         centre=centre,
