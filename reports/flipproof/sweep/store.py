@@ -24,7 +24,7 @@ import json
 import os
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -49,7 +49,7 @@ BUSY: Final = 10.0
 """Seconds to wait for somebody who holds the file."""
 
 
-class Store:
+class Store(AbstractContextManager["Store"]):
     """The rows of one design in a folder. Use as a context manager; the folder is locked until it ends."""
 
     def __init__(self, folder: Path, design: Plan, code: str) -> None:
@@ -91,9 +91,6 @@ class Store:
     def file(self) -> Path:
         """The SQLite file."""
         return self.folder / FILE
-
-    def __enter__(self) -> Store:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

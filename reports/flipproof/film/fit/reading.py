@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -93,35 +93,20 @@ def read_flight(
     )
 
 
-def read_tracker(
-    path: Path,
-    *,
-    cap: str,
-    base: str,
-    length_unit: str = "",
-    release: float | None = None,
-    landing: float | None = None,
-    noise: float | None = None,
-) -> tuple[Measurement, str]:
+def read_tracker(path: Path, *, noise: float | None = None, **asked: Any) -> tuple[Measurement, str]:
     """Return the flight in an export of Tracker, and how its ends were found; raise as ``tracker.bench.measure``.
 
     The angles are those of Eq. 1 in the frames in which cap and base were tracked; none is interpolated or smoothed.
+    ``asked`` are fields of ``tracker.bench.Request``: cap, base, length_unit, release, landing.
     """
     from flipproof.film.tracker.bench import Request, measure
 
-    found = measure(
-        Request(files=(path,), cap=cap, base=base, length_unit=length_unit, release=release, landing=landing)
-    )
+    found = measure(Request(files=(path,), **asked))
     spin, flight = found.spin, found.flight
     tracked = flight.inside & spin.measured
-    measured = Measurement(
-        label=path.name,
-        t=np.maximum(spin.t[tracked] - flight.release, 0.0),
-        values=spin.theta[tracked],
-        noise=noise,
-    )
+    t = np.maximum(spin.t[tracked] - flight.release, 0.0)
     words = (
         f"release at {flight.release:.4f} s ({flight.release_how}), landing at {flight.landing:.4f} s "
         f"({flight.landing_how})"
     )
-    return measured, words
+    return Measurement(label=path.name, t=t, values=spin.theta[tracked], noise=noise), words
