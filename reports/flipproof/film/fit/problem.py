@@ -16,6 +16,7 @@ import numpy as np
 
 from flipproof.frame.solvers import FOREIGN
 from slicemodel import Scenario
+from slicemodel.scenario import unknown_name
 from slicemodel.trajectory import FloatArray
 
 Quantity = Literal["theta", "omega"]
@@ -273,6 +274,9 @@ def pose(
     ValueError
         Naming what cannot be fitted and why.
     """
+    for name in also:
+        if name not in ALSO:
+            raise ValueError(unknown_name("also =", name, ALSO))
     package_of(solver)  # an engine is refused here
     known = replace(throw.with_slices(slices or min(throw.n_slices, SLICES)), duration=float(measured.t[-1]))
     noise = measured.noise if measured.noise is not None else noise_of(measured.values)
