@@ -19,21 +19,136 @@ import os
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from statistics import median
+from typing import Any, Final
 
+import numpy as np
 from tqdm import tqdm
 
-from flipproof.film.fit.problem import ALSO, SLICES
-from flipproof.film.fit.twins import CAMERA_NOISE, RANGES, RATE, Twin, fit_twin
+from flipproof.film.fit.estimate import Estimate, estimate
+from flipproof.film.fit.landscape import loss
+from flipproof.film.fit.problem import ALSO, SLICES, Measurement, Quantity, flights, pose
+from flipproof.film.fit.reading import averaged_omega
+from flipproof.film.fit.uncertainty import Interval, intervals
+from flipproof.film.tracker.kinematics import angle, direction
+from slicemodel import Scenario
+from slicemodel.trajectory import FloatArray
 
 NEEDED = 0.90
 
+RATE: Final = 240.0
+"""Frames per second of the paper's camera."""
 
-def one(task: tuple[int, str, int, tuple[str, ...], str]) -> Twin:
-    """Fit one twin."""
-    seed, solver, slices, also, quantity = task
-    return fit_twin(seed, solver, slices=slices, also=also, quantity=quantity)  # type: ignore[arg-type]
+CAMERA_NOISE: Final = 1e-3
+"""Standard deviation of one coordinate of one marker [m]."""
+
+AVERAGED: Final = 5
+"""Points that the paper's omega is averaged over."""
+
+RANGES: Final = {
+    "fill_fraction": (0.25, 0.75),
+    "damping_rate": (1.0, 10.0),
+    "restitution": (0.1, 0.9),
+    "omega0": (15.0, 25.0),
+    "theta0": (1.2, 1.9),
+    "duration": (0.4, 0.55),
+}
+"""Where truths are drawn from; the damping rate [1/s] evenly in its logarithm, everything else evenly."""
+
+
+def draw_truth(seed: int, slices: int) -> Scenario:
+    """Return a throw drawn at random from ``RANGES``."""
+    share = dict(zip(RANGES, np.random.default_rng([seed, 0]).uniform(size=len(RANGES)), strict=True))
+    drawn = {name: low + (high - low) * share[name] for name, (low, high) in RANGES.items()}
+    low, high = RANGES["damping_rate"]
+    gamma = low * (high / low) ** share["damping_rate"]
+    kept: dict[str, Any] = {name: drawn[name] for name in ("restitution", "omega0", "theta0", "duration")}
+    throw = replace(Scenario(), water_mass=drawn["fill_fraction"] * Scenario().bottle.capacity, n_slices=slices, **kept)
+    return replace(throw, drag=2.0 * throw.slice_mass * gamma)
+
+
+def film(throw: Scenario, solver: str, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return what a camera of ``RATE`` and ``CAMERA_NOISE`` sees of a simulated throw.
+
+    Returns
+    -------
+    t : (P,) - [s]
+    cap, base : (P, 2) - x and y of the markers [m], the centre of the bottle at rest (Eq. 1 takes differences only)
+    """
+    t = np.arange(int(np.floor(throw.duration * RATE)) + 1) / RATE
+    whole = replace(throw, duration=float(t[-1]))
+    theta = flights([whole], solver, t)[0][0]
+    half = 0.5 * throw.bottle.length * direction(theta)
+    grain = np.random.default_rng([seed, 1]).normal(0.0, CAMERA_NOISE, (2, len(t), 2))
+    return t, -half + grain[0], half + grain[1]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Twin:
+    """One twin experiment and what its fit said.
+
+    Parameters
+    ----------
+    seed : int
+    truth : Scenario
+    chi2_of_truth : float - in units of the noise, for comparison with ``estimate.chi2``
+    estimate : Estimate
+    intervals : tuple of Interval
+    """
+
+    seed: int
+    truth: Scenario
+    chi2_of_truth: float
+    estimate: Estimate
+    intervals: tuple[Interval, ...]
+
+    def covers(self, name: str) -> bool:
+        """Return whether the interval of a parameter holds the truth."""
+        return any(i.low <= getattr(self.truth, name) <= i.high for i in self.intervals if i.name == name)
+
+    def width(self, name: str) -> float:
+        """Return the interval's width in units of the true value (restitution: as it is)."""
+        (width,) = (interval.high - interval.low for interval in self.intervals if interval.name == name)
+        return width / self.truth.drag if name == "drag" else width
+
+
+def fit_twin(seed: int, solver: str, *, slices: int, also: tuple[str, ...] = (), quantity: Quantity = "theta") -> Twin:
+    """Draw a truth, film it, forget it, and fit the film with the equation that made it.
+
+    Parameters
+    ----------
+    seed : int - of truth and camera
+    solver : str
+    slices : int
+    also : names from ``ALSO`` that are fitted; others are known exactly
+    quantity : "theta" from Eq. 1, or "omega" as the paper makes it of theta
+    """
+    truth = draw_truth(seed, slices)
+    t, cap, base = film(truth, solver, seed)
+    theta = np.unwrap(angle(cap, base))
+    averaged = partial(averaged_omega, points=AVERAGED) if quantity == "omega" else None
+    measured = Measurement(
+        label=f"twin {seed}",
+        t=t,
+        values=theta if averaged is None else averaged(t, theta),
+        quantity=quantity,
+        operator=averaged,
+    )
+    # What is fitted must not be known: the fit starts from a throw that says nothing of it.
+    known = replace(truth, drag=0.0, restitution=0.5)
+    problem = pose(measured, known, solver, also=also, slices=slices)
+    found = estimate(problem, seed=seed)
+    here = np.array([problem.coordinate(name, getattr(truth, name)) for name in problem.free])
+    return Twin(
+        seed=seed,
+        truth=truth,
+        chi2_of_truth=float(loss(problem.residuals(here[np.newaxis])[0])),
+        estimate=found,
+        intervals=intervals(found),
+    )
 
 
 def main() -> int:
@@ -49,10 +164,12 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=None, help="JSON file for every twin")
     options = parser.parse_args()
     seeds = range(options.first, options.first + options.twins)
-    tasks = [(seed, options.model, options.slices, tuple(options.also), options.measured) for seed in seeds]
+    asked = {"slices": options.slices, "also": tuple(options.also), "quantity": options.measured}
     began = time.perf_counter()
     with ProcessPoolExecutor(options.jobs) as pool:
-        twins = list(tqdm(pool.map(one, tasks), total=len(tasks), disable=None))
+        twins = list(
+            tqdm(pool.map(partial(fit_twin, solver=options.model, **asked), seeds), total=len(seeds), disable=None)
+        )
     seconds, processor = time.perf_counter() - began, sum(os.times()[:4])
 
     print(f"{len(twins)} twins by {options.model}, {options.slices} slices, fitted to {options.measured}; truths from")

@@ -5,9 +5,9 @@ from statistics import median
 
 import numpy as np
 import pytest
+from twins import AVERAGED, CAMERA_NOISE, RANGES, RATE, draw_truth, film, fit_twin
 
-from flipproof.film.fit.reading import Averaged
-from flipproof.film.fit.twins import AVERAGED, CAMERA_NOISE, RANGES, RATE, draw_truth, film, fit_twin
+from flipproof.film.fit.reading import averaged_omega
 from flipproof.film.tracker.kinematics import angle
 from slicemodel import Scenario
 
@@ -79,7 +79,7 @@ def film_table(throw, solver, seed, quantity):
     """Return a film of a simulated throw as a CSV table of t and theta or omega, labelled synthetic."""
     t, cap, base = film(throw, solver, seed)
     theta = np.unwrap(angle(cap, base))
-    values = theta if quantity == "theta" else Averaged(points=AVERAGED)(t, theta)
+    values = theta if quantity == "theta" else averaged_omega(t, theta, AVERAGED)
     made = "theta by Eq. 1" if quantity == "theta" else f"omega by differences of theta, mean over {AVERAGED} points"
     label = (
         f"# synthetic: {solver}, {throw.n_slices} slices, drag {throw.drag:g} kg/s, restitution {throw.restitution:g}, "

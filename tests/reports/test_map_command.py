@@ -21,12 +21,12 @@ from flipproof.frame.pool import Here
 from flipproof.frame.solvers import make
 from flipproof.sweep.design import design_of
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.local import Workers
 from flipproof.sweep.planned import design_of_runs, read_runs
 from flipproof.sweep.split import ENDS, plan_split, releases, split_rows, waterfall_csv
 from flipproof.sweep.store import Store
 from flipproof.sweep.validity_map import Plan, map_csv, map_facts
 from flipproof.sweep.work import code_identity, make_batch
+from flipproof.sweep.workers import Workers
 from slicemodel import Scenario
 
 ROOT = Path(__file__).resolve().parents[2]

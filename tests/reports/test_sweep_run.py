@@ -14,10 +14,10 @@ from flipproof.frame.processes import Processes, WorkerDiedError
 from flipproof.sweep import run
 from flipproof.sweep.design import design_of
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.local import Workers, local_workers
-from flipproof.sweep.run import DEATHS_IN_A_ROW, GROWTH, LONE_DEATHS, MOST_BYTES, Pace, run_sweep
+from flipproof.sweep.run import DEATHS_IN_A_ROW, GROWTH, LONE_DEATHS, MOST_BYTES, Line, run_sweep
 from flipproof.sweep.store import Store
 from flipproof.sweep.work import Outcome, Returned
+from flipproof.sweep.workers import Workers, local_workers
 
 CODE = "0.1.0+test"
 
@@ -107,9 +107,9 @@ def test_a_batch_of_flights_is_bounded_in_bytes():
     class Big:
         nbytes = MOST_BYTES // 3
 
-    pace = Pace(size=10)
-    pace.learn(Returned(CODE, {}, [Outcome(number=k, status="ok", arrays={"r": Big()}) for k in range(10)], 1e-3))
-    assert pace.size == 3
+    line = Line(iter(()), 10, 10, size=10)
+    line.learn(Returned(CODE, {}, [Outcome(number=k, status="ok", arrays={"r": Big()}) for k in range(10)], 1e-3))
+    assert line.size == 3
 
 
 @pytest.mark.usefixtures("_quick")

@@ -8,12 +8,12 @@ import shlex
 import sys
 import time
 from collections.abc import Callable, Sequence
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, number, read_scenario
 
-MODELS = ("midpoint",)
 LINE = 15.0
 """Seconds between two lines of a log."""
 
@@ -27,7 +27,7 @@ def add_fit(commands: Any) -> None:
     )  # fmt: skip
     fit.add_argument("--scenario", metavar="THROW.toml", help=f"what is known: bottle, water, release; {SCENARIO_HELP}")
     fit.add_argument(
-        "--model", nargs="+", default=list(MODELS), metavar="NAME", help="equations to fit and compare, see 'flipproof "
+        "--model", nargs="+", default=["midpoint"], metavar="NAME", help="equations to fit and compare, see 'flipproof "
         "models'; midpoint solves eq8 in steps of 0.5 ms (default midpoint)",
     )  # fmt: skip
     fit.add_argument(
@@ -39,9 +39,7 @@ def add_fit(commands: Any) -> None:
         "--minutes", type=_positive, metavar="M", help="time that a fit with another solver, such as mine.py:solve, "
         "may take: it decides between the usual search, a coarse one and none (default 10)",
     )  # fmt: skip
-    fit.add_argument(
-        "--slices", type=count, metavar="N", help="slices of every throw, alpha/2m unchanged (50)",
-    )  # fmt: skip
+    fit.add_argument("--slices", type=count, metavar="N", help="slices of every throw, alpha/2m unchanged (50)")
     fit.add_argument("--quantity", choices=("theta", "omega"), help="column to fit (theta if there is one)")
     fit.add_argument(
         "--averaged", type=count, metavar="N", help="omega was made of theta by differences and a mean over N points"
@@ -97,20 +95,15 @@ def _read(options: argparse.Namespace) -> tuple[Any, list[str]]:
     """Return the measurement, and remarks on how it was read."""
     from flipproof.film.fit.reading import read_flight, read_tracker
 
+    known = {name: getattr(options, name) for name in ("release", "landing", "noise")}
     if options.cap is None:
-        measured = read_flight(
-            options.file, quantity=options.quantity, release=options.release, landing=options.landing,
-            noise=options.noise, averaged=options.averaged,
-        )  # fmt: skip
-        return measured, []
+        return read_flight(options.file, quantity=options.quantity, averaged=options.averaged, **known), []
     if options.quantity == "omega" or options.averaged is not None:
         raise ValueError(
             "a Tracker export is fitted by its theta (Eq. 1); --quantity omega and --averaged are for tables"
         )
-    measured, words = read_tracker(
-        options.file, cap=options.cap, base=options.base, length_unit=options.length_unit, release=options.release,
-        landing=options.landing, noise=options.noise,
-    )  # fmt: skip
+    tracks = {"cap": options.cap, "base": options.base, "length_unit": options.length_unit}
+    measured, words = read_tracker(options.file, **tracks, **known)
     return measured, [words]
 
 
@@ -118,13 +111,12 @@ def _disagreements(problem: Any, throw: Any, also: tuple[str, ...]) -> list[str]
     """Return what of the scenario the first frames contradict although it is not fitted."""
     from flipproof.film.fit.problem import first_frames
 
-    found = first_frames(problem.measured)
     near = {"omega0": 0.1 * abs(throw.omega0), "theta0": 0.05}
     return [
-        f"the first frames say {name} = {found[name]:.3g}, the scenario {getattr(throw, name):.3g}: correct it or add "
+        f"the first frames say {name} = {value:.3g}, the scenario {getattr(throw, name):.3g}: correct it or add "
         f"--also {name}"
-        for name in ("omega0", "theta0")
-        if name in found and name not in also and abs(found[name] - getattr(throw, name)) > near[name]
+        for name, value in sorted(first_frames(problem.measured).items())
+        if name not in also and abs(value - getattr(throw, name)) > near[name]
     ]
 
 
@@ -138,18 +130,18 @@ def _estimates(problems: Sequence[Any], starts: int | None, minutes: float | Non
     from flipproof.film.fit.estimate import USUAL, estimate
     from flipproof.foreign.specs import is_foreign
 
-    efforts, planned = [], []
+    searches = []
     for problem in problems:
-        budget = affordable(problem, minutes or MINUTES) if is_foreign(problem.solver) else None
-        if budget is not None:
+        effort, planned = USUAL, None
+        if is_foreign(problem.solver):
+            budget = affordable(problem, minutes or MINUTES)
             print(f"flipproof: {problem.solver}: {budget.words}", file=sys.stderr, flush=True)
-        effort = USUAL if budget is None else budget.effort
-        efforts.append(replace(effort, starts=starts) if starts else effort)
-        planned.append(None if budget is None else budget.flights)
+            effort, planned = budget.effort, budget.flights
+        searches.append((problem, replace(effort, starts=starts) if starts else effort, planned))
     estimates = []
-    for problem, effort, flights in zip(problems, efforts, planned, strict=True):
-        with tqdm(desc=problem.solver, total=flights, unit="flight", disable=None, leave=False) as bar:
-            estimates.append(estimate(problem, effort, tick=_ticker(bar, problem.solver, flights)))
+    for problem, effort, planned in searches:
+        with tqdm(desc=problem.solver, total=planned, unit="flight", disable=None, leave=False) as bar:
+            estimates.append(estimate(problem, effort, tick=_ticker(bar, problem.solver, planned)))
     return estimates
 
 
@@ -157,7 +149,8 @@ def _ticker(bar: Any, solver: str, planned: int | None) -> Callable[[int], objec
     """Return what counts flights: the bar of a terminal, or lines in a log of a search that was estimated."""
     if not bar.disable or planned is None:
         return lambda count: bar.update(count)
-    made, due, began = 0, time.perf_counter() + LINE, time.perf_counter()
+    began = time.perf_counter()
+    made, due = 0, began + LINE
 
     def tick(count: int) -> None:
         nonlocal made, due
@@ -177,8 +170,10 @@ def _report(contenders: Sequence[Any], remarks: Sequence[str]) -> str:
     problem = contenders[0].estimate.problem
     measured = problem.measured
     how = "given" if measured.noise is not None else "estimated from neighbouring values"
-    frames = f"{len(measured.t)} values of {measured.quantity} over {measured.t[-1]:.3f} s"
-    lines = [f"{measured.label}: {frames}; noise of one {problem.noise:.3g} {measured.unit} ({how})"]
+    lines = [
+        f"{measured.label}: {len(measured.t)} values of {measured.quantity} over {measured.t[-1]:.3f} s; noise of one "
+        f"{problem.noise:.3g} {measured.unit} ({how})"
+    ]
     if measured.quantity == "omega":
         lines.append("neighbouring values of omega share noise; intervals are widened by the residuals' autocovariance")
     lines += remarks
@@ -204,9 +199,8 @@ def _fit_lines(one: Any) -> list[str]:
         if found.name == "drag":
             gamma = [value / (2 * throw.slice_mass) for value in (found.value, found.low, found.high)]
             lines.append(f"  {'alpha/2m':12} {gamma[0]:.4g} [{gamma[1]:.4g}, {gamma[2]:.4g}] /s")
-    pairs = correlation(estimate)
-    names = estimate.problem.free
-    words = [f"{names[i]}-{names[j]} {pairs[i, j]:+.2f}" for i in range(len(names)) for j in range(i + 1, len(names))]
+    pairs, names = correlation(estimate), estimate.problem.free
+    words = [f"{names[i]}-{names[j]} {pairs[i, j]:+.2f}" for i, j in combinations(range(len(names)), 2)]
     lines.append(f"  correlation  {', '.join(words)}")
     lines.append(
         f"  chi^2        {estimate.chi2:.0f} for {estimate.freedom} degrees of freedom; residual "

@@ -13,8 +13,6 @@ from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, read_scen
 from flipproof.cli.start import INTERRUPTED
 
 SLICES: Final = 50
-SIDE: Final = (2, 1000)
-"""Cells along a side of a map."""
 
 
 def add_sweeps(commands: Any) -> None:
@@ -95,7 +93,7 @@ def _address(text: str) -> str:
 
 def _size(text: str) -> tuple[int, int]:
     columns, _, rows = text.partition("x")
-    least, most = SIDE
+    least, most = 2, 1000  # cells along a side of a map
     if not all(side.isdecimal() and least <= int(side) <= most for side in (columns, rows)):
         raise argparse.ArgumentTypeError(f"{text!r} is not COLUMNSxROWS, each in [{least}, {most}], such as 20x20")
     return int(columns), int(rows)
@@ -113,7 +111,7 @@ def fill(options: argparse.Namespace, make: Callable[[Any, dict[str, Any]], str]
         if 0 < there < size and not options.quiet:
             print(f"flipproof: {there} of {size} points are there; going on", file=sys.stderr)
         stored[:] = there, size
-        hide = True if options.quiet else None
+        hide = options.quiet or None
         bar = bars.enter_context(
             tqdm(total=size, initial=there, unit="point", disable=hide, leave=False, smoothing=0.05)
         )

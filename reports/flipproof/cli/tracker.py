@@ -6,11 +6,11 @@ import argparse
 import math
 import shlex
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, number, read_scenario
+from flipproof.cli.arguments import SCENARIO_HELP, add_command, check_writable, count, number, read_scenario
 
 DELIMITERS = {"tab": "\t", "comma": ",", "semicolon": ";", "space": " "}
 
@@ -43,8 +43,9 @@ def add_tracker(commands: Any) -> None:
         "--window", type=count, default=11, metavar="N", help="frames of the derivative, odd (%(default)s)"
     )
     track.add_argument(
-        "--max-gap", type=_frames, default=3, metavar="N", help="frames interpolated at most (%(default)s)"
-    )
+        "--max-gap", dest="most_gap", type=_frames, default=3, metavar="N", help="frames interpolated at most "
+        "(%(default)s)",
+    )  # fmt: skip
     track.add_argument("--angle-track", metavar="NAME", help="track whose own angle is compared with Eq. 1")
     track.add_argument("--out", type=Path, metavar="DIR", help="folder for track.csv, figures and page")
 
@@ -77,16 +78,8 @@ def command_track(options: argparse.Namespace) -> int:
         check_replaceable(options.out, "track")
     from flipproof.film.tracker.bench import Request, measure
 
-    measured = measure(
-        Request(
-            files=tuple(options.files), cap=options.cap, base=options.base, ice_top=options.ice_top,
-            centre=options.centre, r_cm=options.r_cm, length_unit=options.length_unit, angle_unit=options.angle_unit,
-            time_unit=options.time_unit, length=options.length, table_height=options.table_height,
-            release=options.release, landing=options.landing, frame_rate=options.frame_rate,
-            window=options.window, most_gap=options.max_gap,
-            angle_track=options.angle_track,
-        )
-    )  # fmt: skip
+    given = {field.name: getattr(options, field.name) for field in fields(Request)}
+    measured = measure(Request(**given | {"files": tuple(options.files)}))
     from flipproof.film.tracker.page import lines, write
 
     if options.out is not None:
@@ -109,10 +102,8 @@ def command_export(options: argparse.Namespace) -> int:
 
     if options.length_unit not in METRES:
         raise ValueError(f"length_unit = {options.length_unit!r} is unknown; known: {', '.join(METRES)}")
-    if options.out and not options.out.parent.is_dir():
-        raise ValueError(f"--out {options.out}: the folder {options.out.parent} does not exist")
-    if options.out and options.out.is_dir():
-        raise ValueError(f"--out {options.out} is a folder; name a file")
+    if options.out:
+        check_writable("--out", options.out)
     scenario = read_scenario(options.scenario, options.slices)
     scenario = replace(scenario, launch_velocity=_velocity(scenario.launch_velocity, options))
     times = frame_times(scenario, options.frame_rate)

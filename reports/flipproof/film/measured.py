@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -27,9 +27,6 @@ from slicemodel.trajectory import FloatArray
 HELD: Final = {"published-python": "published program", "midpoint": "Eq. 8", "free-flight": "free flight"}
 """Solver -> what it is called beside a measurement; ``midpoint`` is the fast way to solve Eq. 8."""
 
-SAME: Final = 1e-9
-"""Times of a table that differ by no more than this are one time [s]."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measured:
@@ -37,16 +34,13 @@ class Measured:
 
     Parameters
     ----------
-    measurement : Measurement
     noise : float - standard deviation of one value [rad or rad/s]
-    throw : Scenario - the report's, over the time that was measured
     predicted : solver -> (P,) - without any fitting
     fits : tuple of Contender - the best first; drag, restitution and release fitted
     """
 
     measurement: Measurement
     noise: float
-    throw: Scenario
     predicted: dict[str, FloatArray]
     fits: tuple[Contender, ...]
 
@@ -72,36 +66,34 @@ class Measured:
 
     def findings(self) -> tuple[Finding, ...]:
         """Return one observation for each solver, and one for each fit."""
-        unit = self.measurement.unit
-        return (
-            *(
-                Finding(
-                    id=f"measured-{name}", title=f"{HELD[name]} as thrown, held against {self.measurement.label}",
-                    value=misfit, unit=unit, kind="observation", band=self.noise,
-                    note="root mean square of measured minus computed, nothing fitted; the band is the noise of "
-                    "a value",
-                )
-                for name, misfit in self.misfits.items()
-            ),
-            *(
-                Finding(
-                    id=f"measured-fit-{one.solver}", title=f"{HELD[one.solver]} fitted to {self.measurement.label}",
-                    value=one.root_mean_square, unit=unit, kind="observation", band=self.noise,
-                    note=", ".join(
-                        f"{found.name} = {found.value:.4g} [{found.low:.4g}, {found.high:.4g}]"
-                        for found in one.intervals
-                    ),
-                )
-                for one in self.fits
-            ),
-        )  # fmt: skip
+        label = self.measurement.label
+        observed: dict[str, Any] = {"unit": self.measurement.unit, "kind": "observation", "band": self.noise}
+        thrown = [
+            Finding(
+                id=f"measured-{name}", title=f"{HELD[name]} as thrown, held against {label}", value=misfit,
+                note="root mean square of measured minus computed, nothing fitted; the band is the noise of a value",
+                **observed,
+            )
+            for name, misfit in self.misfits.items()
+        ]  # fmt: skip
+        fitted = [
+            Finding(
+                id=f"measured-fit-{one.solver}", title=f"{HELD[one.solver]} fitted to {label}",
+                value=one.root_mean_square,
+                note=", ".join(f"{i.name} = {i.value:.4g} [{i.low:.4g}, {i.high:.4g}]" for i in one.intervals),
+                **observed,
+            )
+            for one in self.fits
+        ]  # fmt: skip
+        return (*thrown, *fitted)
 
     def exhibit(self) -> Exhibit:
         """Return the figure: the measurement over the solvers, and what is left of it."""
         m = self.measurement
+        fitted = {one.solver: m.values - one.estimate.residual() for one in self.fits}
         columns = {"t [s]": m.t, f"measured {m.quantity} [{m.unit}]": m.values}
         columns |= {f"{HELD[name]} as thrown [{m.unit}]": values for name, values in self.predicted.items()}
-        columns |= {f"{HELD[one.solver]} fitted [{m.unit}]": m.values - one.estimate.residual() for one in self.fits}
+        columns |= {f"{HELD[name]} fitted [{m.unit}]": values for name, values in fitted.items()}
         nearest = next(iter(self.misfits))
         return Exhibit(
             name="measured",
@@ -112,12 +104,9 @@ class Measured:
             alt=f"{m.label}: {len(m.t)} values of {m.quantity}; {HELD[nearest]} is nearest as thrown, "
             f"{HELD[self.fits[0].solver]} when fitted.",
             maker=figure_measured,
-            data=(
-                m.t, m.values, m.quantity, self.noise, self.predicted,
-                {one.solver: m.values - one.estimate.residual() for one in self.fits},
-            ),
+            data=(m, self.noise, self.predicted, fitted),
             table=columns_csv(columns),
-        )  # fmt: skip
+        )
 
 
 def read_measured(path: Path) -> Measurement:
@@ -133,10 +122,11 @@ def read_measured(path: Path) -> Measurement:
     if quantity is None:
         raise ValueError(f"{path}: has neither theta nor omega")
     t, values = curve.series[quantity]
-    if (np.diff(t) <= SAME).any():
-        late = int(np.flatnonzero(np.diff(t) <= SAME)[0])
+    same = 1e-9  # times that differ by no more [s] are one time
+    if (np.diff(t) <= same).any():
+        late = int(np.flatnonzero(np.diff(t) <= same)[0])
         raise ValueError(f"{path}: t does not increase: {t[late + 1]:g} s follows {t[late]:g} s")
-    inside = t >= -SAME
+    inside = t >= -same
     return Measurement(label=path.name, t=np.maximum(t[inside], 0.0), values=values[inside], quantity=quantity)
 
 
@@ -148,7 +138,6 @@ def hold(measurement: Measurement, scenario: Scenario, tick: Callable[[int], obj
     return Measured(
         measurement=measurement,
         noise=problems[0].noise,
-        throw=throw,
         predicted={name: predict([throw], name, measurement)[0] for name in HELD},
         fits=compare([estimate(problem, tick=tick) for problem in problems]),
     )
@@ -177,15 +166,10 @@ def part_measured(measurement: Measurement) -> Part:
 
 @styled
 def figure_measured(
-    t: FloatArray,
-    values: FloatArray,
-    quantity: str,
-    noise: float,
-    predicted: dict[str, FloatArray],
-    fitted: dict[str, FloatArray],
+    measured: Measurement, noise: float, predicted: dict[str, FloatArray], fitted: dict[str, FloatArray]
 ) -> Figure:
     """Measurement over the solvers above, residuals below: as thrown on the left, fitted on the right."""
-    unit = "rad" if quantity == "theta" else "rad/s"
+    t, values = measured.t, measured.values
     figure, axes = new_figure(2, 2, size=(9.0, 5.6), sharex=True, gridspec_kw={"height_ratios": [2.0, 1.0]})
     for column, (words, curves) in enumerate((("nothing fitted", predicted), ("fitted", fitted))):
         above, below = axes[0][column], axes[1][column]
@@ -198,7 +182,7 @@ def figure_measured(
             below.plot(t, values - curve, **look)
         above.set_title(words, fontsize=10, loc="left")
         below.set_xlabel("time from release [s]")
-    axes[0][0].set_ylabel(f"{'θ' if quantity == 'theta' else 'ω'} [{unit}]")
-    axes[1][0].set_ylabel(f"measured − computed [{unit}]")
+    axes[0][0].set_ylabel(f"{'θ' if measured.quantity == 'theta' else 'ω'} [{measured.unit}]")
+    axes[1][0].set_ylabel(f"measured − computed [{measured.unit}]")
     axes[0][0].legend()
     return figure

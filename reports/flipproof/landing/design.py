@@ -67,7 +67,7 @@ class Case:
 
 @dataclass(frozen=True, kw_only=True)
 class Throws:
-    """Every throw of some cases; a ``flipproof.sweep.plan.Plan``.
+    """Every throw of some cases; a ``flipproof.sweep.design.Plan``.
 
     Throw k of any case of one stream is scattered by the seed (seed, stream, k): water and ice, fillings, laws and
     tables meet the same throwers.

@@ -55,7 +55,7 @@ def make_upright(
 
     Parameters
     ----------
-    jobs, dask, export_to : as for ``flipproof.sweep.command.sweep``
+    jobs, dask, export_to : as for ``flipproof.sweep.command.completed``
     damaged : path or None
         Folder of a damaged study, or a file of it: ``out`` is begun with its whole rows, and only throws that choose an
         aim are made, for without the aims it is not known which throws are counted.

@@ -7,22 +7,20 @@ cuts into equal shares.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import Any, Final, Literal
 
-from flipproof.sweep.errors import SweepError
-from slicemodel.scenario import Bottle, Scenario, not_whole, shortened, unknown_name
+from flipproof.sweep.errors import SweepError, refuse, refuse_unknown
+from slicemodel.scenario import Bottle, Scenario, not_whole, shortened
 
 Kind = Literal["real", "whole", "truth"]
 Value = float | int | bool
 
 MOST_VALUES: Final = 1_000_000
 """Values of one axis at the most."""
-
-MOST_WHOLE: Final = 2**63
-"""A whole number must be smaller than this to have a place in the store."""
 
 FILL: Final = "fill_fraction"
 """M_w / M_max: sets ``water_mass``."""
@@ -36,17 +34,13 @@ INSTEAD: Final = MappingProxyType({FILL: "water_mass", DAMPING: "drag"})
 
 def _kinds() -> Mapping[str, Kind]:
     kinds: dict[str, Kind] = {f"bottle.{field.name}": "real" for field in fields(Bottle)}
-    default = Scenario()
+    of_type: dict[type, Kind] = {bool: "truth", int: "whole", float: "real"}
     for field in fields(Scenario):
-        value = getattr(default, field.name)
-        if isinstance(value, bool):
-            kinds[field.name] = "truth"
-        elif isinstance(value, int):
-            kinds[field.name] = "whole"
-        elif isinstance(value, float):
-            kinds[field.name] = "real"
-        elif isinstance(value, tuple):
+        value = getattr(Scenario(), field.name)
+        if isinstance(value, tuple):
             kinds |= {f"{field.name}.{axis}": "real" for axis in "xy"}
+        elif type(value) in of_type:
+            kinds[field.name] = of_type[type(value)]
     return MappingProxyType(kinds | dict.fromkeys(INSTEAD, "real"))
 
 
@@ -106,13 +100,7 @@ def column(name: str) -> str:
 
 
 def read_axes(table: Mapping[str, Any], where: str, *, grid: bool) -> tuple[Axis, ...]:
-    """Read ``[sweep.fields]``; in a grid every axis becomes choices.
-
-    Raises
-    ------
-    SweepError
-        Naming ``where``, the field, its value and what is admissible.
-    """
+    """Read ``[sweep.fields]``, a mistake in which is named after ``where``; in a grid every axis becomes choices."""
     entries: dict[str, Any] = {}
     for name, given in table.items():
         # TOML reads bottle.length without quotes as a table in a table.
@@ -120,9 +108,7 @@ def read_axes(table: Mapping[str, Any], where: str, *, grid: bool) -> tuple[Axis
         entries |= {f"{name}.{key}": value for key, value in given.items()} if inner else {name: given}
     if not entries:
         raise SweepError(f"{where} is empty; name at least one field, such as fill_fraction = [0.25, 0.5]")
-    for name in entries:
-        if name not in KINDS:
-            raise SweepError(unknown_name(f"{where} key", name, KINDS))
+    refuse_unknown(f"{where} key", entries, KINDS)
     for quantity, name in INSTEAD.items():
         if quantity in entries and name in entries:
             raise SweepError(f"{where}: {quantity} and {name} set the same thing; remove one of them")
@@ -135,13 +121,11 @@ def _axis(name: str, given: object, where: str, grid: bool) -> Axis:
         return _distinct(Choices(name, kind, tuple(_value(value, kind, where) for value in given)), where)
     if not isinstance(given, Mapping) or kind == "truth":
         example = "[false, true]" if kind == "truth" else "[...] or {from = ..., to = ..., count = ...}"
-        raise SweepError(f"{where} = {_short(given)} is not a list of values; write {example}")
+        raise SweepError(f"{where} = {shortened(repr(given), 60)} is not a list of values; write {example}")
     known = ("from", "to", "count", "scale") if grid else ("from", "to", "scale")
-    for key in given:
-        if key == "count" and not grid:
-            raise SweepError(f"{where}: count belongs to a grid; in a Latin hypercube [sweep] samples counts them all")
-        if key not in known:
-            raise SweepError(unknown_name(f"{where} key", key, known))
+    if "count" in given and not grid:
+        raise SweepError(f"{where}: count belongs to a grid; in a Latin hypercube [sweep] samples counts them all")
+    refuse_unknown(f"{where} key", given, known)
     missing = [key for key in known[:-1] if key not in given]
     if missing:
         raise SweepError(f"{where} lacks {' and '.join(missing)}")
@@ -149,34 +133,27 @@ def _axis(name: str, given: object, where: str, grid: bool) -> Axis:
     if not low < high:
         raise SweepError(f"{where}: from = {low!r} is not below to = {high!r}")
     scale = given.get("scale", "linear")
-    if scale not in ("linear", "log"):
-        raise SweepError(unknown_name(f"{where} scale =", scale, ("linear", "log")))
+    refuse_unknown(f"{where} scale =", [scale], ("linear", "log"))
     if scale == "log" and not low > 0:
         raise SweepError(f"{where}: from = {low!r} is outside (0, inf), as scale = 'log' needs")
     axis = Range(name, kind, float(low), float(high), scale == "log")
     if not grid:
         return axis
-    problem = not_whole(f"{where} count", given["count"], 2, MOST_VALUES)
-    if problem:
-        raise SweepError(problem)
+    refuse(not_whole(f"{where} count", given["count"], 2, MOST_VALUES))
     last = given["count"] - 1
     return _distinct(Choices(name, kind, tuple(axis.at(k / last) for k in range(last + 1))), where)
 
 
 def _value(given: object, kind: Kind, where: str) -> Value:
-    if kind == "truth" and isinstance(given, bool):
+    if isinstance(given, bool):
+        if kind == "truth":
+            return given
+    elif kind == "whole" and isinstance(given, int) and abs(given) < 2**63:  # it must have a place in the store
         return given
-    if kind == "whole" and isinstance(given, int) and not isinstance(given, bool) and abs(given) < MOST_WHOLE:
-        return given
-    if kind == "real" and isinstance(given, int | float) and not isinstance(given, bool):
-        try:
-            number = float(given)
-        except OverflowError:
-            number = math.inf
-        if math.isfinite(number):
-            return number
+    elif kind == "real" and isinstance(given, int | float) and abs(given) <= sys.float_info.max:
+        return float(given)
     words = {"truth": "true or false", "whole": "a whole number", "real": "a finite number"}[kind]
-    raise SweepError(f"{where} = {_short(given)} is not {words}")
+    raise SweepError(f"{where} = {shortened(repr(given), 60)} is not {words}")
 
 
 def _distinct(axis: Choices, where: str) -> Choices:
@@ -190,7 +167,3 @@ def _distinct(axis: Choices, where: str) -> Choices:
             raise SweepError(f"{where} takes the value {value!r} twice")
         seen.add(value)
     return axis
-
-
-def _short(value: object) -> str:
-    return shortened(repr(value), 60)

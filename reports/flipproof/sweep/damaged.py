@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.sweep.plan import Plan
+from flipproof.sweep.design import Plan
 from flipproof.sweep.schema import PAGE, as_stored, intact, kinds
 
 POINT: Final = re.compile(rb"[\x04-\x7f]\x00\x81\x0d")
@@ -37,22 +37,13 @@ MOST_LOCAL: Final = PAGE - 35
 LEAST_LOCAL: Final = (PAGE - 12) * 32 // 255 - 23
 """Bytes of a record that stay in its page if it has no overflow pages, and at the least if it has some."""
 
-MOST_ROW: Final = 16 * 2**20
-"""Bytes of a row at the most; a damaged record may claim any size, and its overflow pages may lead in a circle."""
-
 Bytes = bytes | mmap.mmap
 Row = tuple[Any, ...]
 PageOf = Callable[[int], bytes]
 
 
 def rows(file: Path, design: Plan, code: str) -> Iterator[Row]:
-    """Yield the rows of the design's points, made by ``code``, that are whole in a damaged file; some may come twice.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be read.
-    """
+    """Yield the rows of the design's points, made by ``code``, that are whole in a damaged file, some of them twice."""
     types = kinds(design)
     for row in _records(file, POINT, len(types)):
         number = row[0]
@@ -66,11 +57,8 @@ def versions(file: Path) -> dict[int, str]:
 
 
 def count(file: Path, design: Plan, code: str) -> int:
-    """Return how many points of the design have a row that is whole; raise as ``rows``."""
-    found = bytearray(design.size)
-    for row in rows(file, design, code):
-        found[row[0]] = 1
-    return sum(found)
+    """Return how many points of the design have a row that is whole."""
+    return len({row[0] for row in rows(file, design, code)})
 
 
 # ---------------------------------------------------------------------- SQLite's format
@@ -108,10 +96,7 @@ def _mapped(path: Path) -> Bytes:
 def _record(content: Bytes, start: int, page: int, width: int, page_of: tuple[PageOf, ...]) -> Iterator[Row]:
     """Yield the record whose header begins at ``start``, once for each of the ways to its overflow pages.
 
-    Parameters
-    ----------
-    page : int - where the page begins
-    page_of : callables (number of a page) -> its bytes, or fewer if it is not there
+    ``page`` is where its page begins; a way gives by its number the bytes of a page, or fewer if it is not there.
     """
     before = bytes(content[max(page, start - 9) : start])
     last = len(before) - 1
@@ -128,7 +113,7 @@ def _record(content: Bytes, start: int, page: int, width: int, page_of: tuple[Pa
     if at != content[start] or len(types) != width or {10, 11} & set(types):
         return
     size = at + sum(map(_size, types))
-    if size > MOST_ROW:
+    if size > 16 * 2**20:  # a damaged record may claim any size, and its overflow pages may lead in a circle
         return
     local = size
     if size > MOST_LOCAL:
@@ -144,7 +129,7 @@ def _record(content: Bytes, start: int, page: int, width: int, page_of: tuple[Pa
             link = overflow[:4]
             parts.append(overflow[4 : 4 + rest])
             rest -= len(parts[-1])
-            if len(parts[-1]) == 0:
+            if not parts[-1]:
                 break
         if rest == 0:
             yield number, *_cells(b"".join(parts), at, types)[1:]

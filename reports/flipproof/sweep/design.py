@@ -33,36 +33,29 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 
 from flipproof.sweep.axes import DAMPING, FILL, Axis, Choices, Range, Value, read_axes
-from flipproof.sweep.entries import Entry, read_entries
-from flipproof.sweep.errors import SweepError
-from flipproof.sweep.plan import FLIGHT
-from slicemodel.scenario import (
-    Bottle,
-    Scenario,
-    ScenarioError,
-    UnsuitableFileError,
-    not_whole,
-    read_text,
-    unknown_name,
-)
+from flipproof.sweep.entries import Entry, as_json, read_entries
+from flipproof.sweep.errors import SweepError, refuse, refuse_unknown
+from slicemodel.scenario import Bottle, Scenario, ScenarioError, UnsuitableFileError, not_whole, read_text
 from slicemodel.trajectory import FloatArray
 
-MOST_FILE: Final = 2**25
-"""Bytes of a design at the most: a million values with all their digits."""
+if TYPE_CHECKING:
+    from flipproof.landing.design import Throws
 
 MOST_POINTS: Final = 1_000_000
 """Points of a sweep at the most, all solvers together: a minute of bookkeeping, 100 MB of memory, 620 MB of rows."""
 
 GRID: Final = "grid"
 LATIN: Final = "latin-hypercube"
-KEYS: Final = ("design", "samples", "seed", "trajectories", "curves", "fields")
-MOST_CURVE: Final = 10_000
-"""Points of a row's curves at the most."""
+FLIGHT: Final = MappingProxyType(
+    dict.fromkeys(("plateau", "omega_end", "theta_end", "r_cm_end", "t_end"), "REAL") | {"impacts": "INTEGER"}
+)
+"""What a row holds of a flight -> its SQLite type."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +67,6 @@ class Point:
     number : int - place in the design, from 0
     values : values of the swept fields, in the order of the axes
     throw : {"bottle": {...}, "scenario": {...}} - every field, possible or not
-    solver : str
     settings : mapping - what the solver is called with
     content : str - fingerprint of somebody else's solver; empty for flipproof's own
     """
@@ -87,13 +79,7 @@ class Point:
     content: str = ""
 
     def scenario(self) -> Scenario:
-        """Return the throw.
-
-        Raises
-        ------
-        ScenarioError
-            If no bottle can be thrown so.
-        """
+        """Return the throw; raise ScenarioError if no bottle can be thrown so."""
         fields = dict(self.throw["scenario"])
         return Scenario(
             bottle=Bottle(**self.throw["bottle"]), **fields | {"launch_velocity": tuple(fields["launch_velocity"])}
@@ -106,7 +92,7 @@ class Point:
 
     def text(self) -> str:
         """Return the parameters as JSON, keys in order; it reads back to the last bit."""
-        return _dumps(self.parameters())
+        return as_json(self.parameters())
 
     def key(self, code: str) -> str:
         """Return the key of this point as made by the code."""
@@ -123,9 +109,6 @@ def from_parameters(text: str) -> Point:
     stated = json.loads(text)
     throw = {"bottle": stated["bottle"], "scenario": stated["scenario"]}
     return Point(0, (), throw, stated["solver"], stated["settings"], stated.get("content", ""))
-
-
-_dumps = json.JSONEncoder(sort_keys=True).encode
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,6 +132,8 @@ class Design:
     trajectories: bool
     curves: int
 
+    readings = FLIGHT
+
     @property
     def throws(self) -> int:
         """Throws of every solver."""
@@ -165,11 +150,6 @@ class Design:
     def lines(self) -> tuple[range, ...]:
         """Numbers of the points of each solver: a worker that has compiled a solver gets more of it."""
         return tuple(range(k * self.throws, (k + 1) * self.throws) for k in range(len(self.entries)))
-
-    @property
-    def readings(self) -> Mapping[str, str]:
-        """What a row holds of a flight."""
-        return FLIGHT
 
     def point(self, number: int) -> Point:
         """Return the point of that number in [0, size)."""
@@ -224,6 +204,10 @@ class Design:
         }
 
 
+Plan: TypeAlias = "Design | Throws"
+"""What a store and the loop of a sweep work on: a design of flights, or one of landings."""
+
+
 def read_design(path: Path) -> Design:
     """Read a sweep's file.
 
@@ -233,7 +217,7 @@ def read_design(path: Path) -> Design:
         Naming file, table, key, value, and what is admissible or nearest.
     """
     try:
-        text = read_text(path, MOST_FILE)
+        text = read_text(path, 2**25)  # a million values with all their digits
         document = tomllib.loads(text)
     except UnsuitableFileError as error:
         raise SweepError(f"{path}: {error}") from None
@@ -248,39 +232,27 @@ def read_design(path: Path) -> Design:
 
 def design_of(document: Mapping[str, Any], source: str, text: str = "") -> Design:
     """Build a design from what its file holds; errors name ``source``."""
-    for name in document:
-        if name not in ("scenario", "bottle", "sweep", "solvers"):
-            raise SweepError(unknown_name(f"{source}: table", name, ("scenario", "bottle", "sweep", "solvers")))
+    refuse_unknown(f"{source}: table", document, ("scenario", "bottle", "sweep", "solvers"))
     table = document.get("sweep")
     if not isinstance(table, Mapping):
         raise SweepError(f'{source}: has no table [sweep]; write at least [sweep] design = "grid"')
     where = f"{source}: [sweep]"
-    for key in table:
-        if key not in KEYS:
-            raise SweepError(unknown_name(f"{where} key", key, KEYS))
+    refuse_unknown(f"{where} key", table, ("design", "samples", "seed", "trajectories", "curves", "fields"))
     kind = table.get("design")
-    if kind not in (GRID, LATIN):
-        raise SweepError(unknown_name(f"{where} design =", kind, (GRID, LATIN)))
+    refuse_unknown(f"{where} design =", [kind], (GRID, LATIN))
     trajectories = table.get("trajectories", False)
     if not isinstance(trajectories, bool):
         raise SweepError(f"{where} trajectories = {trajectories!r} is neither true nor false")
     curves = table.get("curves", 0)
-    problem = not_whole(f"{where} curves", curves, 2, MOST_CURVE) if curves != 0 or isinstance(curves, bool) else ""
-    if problem:
-        raise SweepError(f"{problem}, or 0 for none")
+    problem = not_whole(f"{where} curves", curves, 2, 10_000) if curves != 0 or isinstance(curves, bool) else ""
+    refuse(problem and f"{problem}, or 0 for none")
     fields = table.get("fields")
     if not isinstance(fields, Mapping):
         raise SweepError(f"{source}: has no table [sweep.fields]; it names the fields to vary")
     axes = read_axes(fields, f"{source}: [sweep.fields]", grid=kind == GRID)
     entries = read_entries(document.get("solvers"), source)
     samples, seed = _samples(table, where, axes, grid=kind == GRID)
-    throws = samples if samples is not None else math.prod(len(a.values) for a in axes if isinstance(a, Choices))
-    if throws * len(entries) > MOST_POINTS:
-        raise SweepError(
-            f"{source}: {throws} throws by {len(entries)} solvers make {throws * len(entries)} points, more than "
-            f"{MOST_POINTS}; take fewer values, or a Latin hypercube"
-        )
-    return Design(
+    design = Design(
         text=text,
         base=_base(document, source, axes),
         axes=axes,
@@ -290,6 +262,12 @@ def design_of(document: Mapping[str, Any], source: str, text: str = "") -> Desig
         trajectories=trajectories,
         curves=int(curves),
     )
+    if design.size > MOST_POINTS:
+        raise SweepError(
+            f"{source}: {design.throws} throws by {len(entries)} solvers make {design.size} points, more than "
+            f"{MOST_POINTS}; take fewer values, or a Latin hypercube"
+        )
+    return design
 
 
 def _samples(
@@ -302,9 +280,7 @@ def _samples(
                 raise SweepError(f'{where} {key} = {table[key]!r} belongs to design = "{LATIN}", not to a grid')
         return None, None
     samples, seed = table.get("samples"), table.get("seed", 0)
-    problem = not_whole(f"{where} samples", samples, 1, MOST_POINTS) or not_whole(f"{where} seed", seed, 0, 2**63 - 1)
-    if problem:
-        raise SweepError(problem)
+    refuse(not_whole(f"{where} samples", samples, 1, MOST_POINTS) or not_whole(f"{where} seed", seed, 0, 2**63 - 1))
     if not any(isinstance(axis, Range) and axis.kind == "real" for axis in axes):
         raise SweepError(
             f'{where} design = "{LATIN}" needs a field {{from = ..., to = ...}} of real numbers in [sweep.fields]; '
@@ -315,12 +291,12 @@ def _samples(
 
 def _base(document: Mapping[str, Any], source: str, axes: tuple[Axis, ...]) -> Mapping[str, Mapping[str, Any]]:
     tables = {name: document[name] for name in ("scenario", "bottle") if name in document}
-    names = {axis.name for axis in axes}
-    capacity = tables.get("bottle", {}).get("capacity", 1.0) if isinstance(tables.get("bottle", {}), Mapping) else 1.0
-    replaced = names & {FILL, "water_mass"} and isinstance(capacity, int | float)
-    if replaced and isinstance(tables.get("scenario", {}), Mapping):
+    scenario, bottle = tables.get("scenario", {}), tables.get("bottle", {})
+    capacity = bottle.get("capacity", 1.0) if isinstance(bottle, Mapping) else 1.0
+    swept = {axis.name for axis in axes} & {FILL, "water_mass"}
+    if swept and isinstance(capacity, int | float) and isinstance(scenario, Mapping):
         # The water is set by every point; the base's own must not be what is refused.
-        tables["scenario"] = {**tables.get("scenario", {}), "water_mass": capacity / 2}
+        tables["scenario"] = {**scenario, "water_mass": capacity / 2}
     try:
         return Scenario.from_mapping(tables, source=source).to_mapping()
     except ScenarioError as error:

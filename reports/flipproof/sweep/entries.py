@@ -13,8 +13,11 @@ from typing import Any
 from flipproof.foreign.content import content_of
 from flipproof.foreign.specs import check_asked
 from flipproof.frame.solvers import Solver, find, solve
-from flipproof.sweep.errors import SweepError
-from slicemodel.scenario import Scenario, unknown_name
+from flipproof.sweep.errors import SweepError, refuse_unknown
+from slicemodel.scenario import Scenario
+
+as_json = json.JSONEncoder(sort_keys=True).encode
+"""Settings or parameters -> JSON, keys in order; it reads back to the last bit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,14 +34,9 @@ class Entry:
 
 
 def read_entries(tables: object, source: str) -> tuple[Entry, ...]:
-    """Read the list of ``[[solvers]]``.
+    """Read the list of ``[[solvers]]``; a mistake is named with the number of its table, the solver and the key.
 
     A scheme's ``store`` is "summary" unless the file says "full": no observable needs the slices.
-
-    Raises
-    ------
-    SweepError
-        Naming the table by its number and solver, the key, and the nearest known one.
     """
     if not isinstance(tables, list) or not tables or not all(isinstance(table, Mapping) for table in tables):
         raise SweepError(f'{source}: has no [[solvers]]; write one table for each, such as [[solvers]] name = "eq8"')
@@ -63,9 +61,9 @@ def _entry(table: dict[str, Any], where: str) -> Entry:
         raise SweepError(f"{where}: {error}") from None
     where = f"{where} ({name})"
     known, open_ended = _settings_of(solver)
+    if not open_ended:
+        refuse_unknown(f"{where} key", table, known)
     for key, value in table.items():
-        if key not in known and not open_ended:
-            raise SweepError(unknown_name(f"{where} key", key, known))
         if not _plain(value):
             raise SweepError(f"{where} {key} = {value!r} is not a finite number, a word, true, false or a list of them")
     if solver.package == "slicemodel":
@@ -104,8 +102,3 @@ def try_entries(entries: tuple[Entry, ...]) -> None:
         except Exception as error:
             kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
             raise SweepError(f"{entry.where}: {kind}{error}") from None
-
-
-def settings_text(settings: Mapping[str, Any]) -> str:
-    """Return settings as JSON, keys in order; it reads back to the last bit."""
-    return json.dumps(settings, sort_keys=True)

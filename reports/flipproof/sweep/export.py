@@ -8,33 +8,22 @@ from __future__ import annotations
 
 import csv
 import sqlite3
-from collections.abc import Iterator
 from importlib import import_module
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import whole_file
-from flipproof.sweep.schema import columns
+from flipproof.sweep.schema import columns, kinds
 from flipproof.sweep.store import Store
 
-FORMS: Final = (".csv", ".parquet")
 LEFT_OUT: Final = ("parameters", "versions", "curves", "checksum")
-CHUNK: Final = 10_000
-"""Rows in memory at a time."""
-
-Rows = list[tuple[Any, ...]]
 
 
 def check_export(path: Path, out: Path) -> None:
-    """Refuse, before the sweep begins, a file that could not be written after it; the sweep's folder may hold it.
-
-    Raises
-    ------
-    SweepError
-        If the ending is unknown, the folder is missing, or pyarrow is.
-    """
-    if path.suffix not in FORMS:
+    """Refuse, before the sweep begins, a file that could not be written after it; the sweep's folder may hold it."""
+    if path.suffix not in (".csv", ".parquet"):
         raise SweepError(f"--export {path}: the ending {path.suffix!r} is neither .csv nor .parquet")
     parent = path.resolve().parent
     if path.is_dir() or not (parent.is_dir() or parent == out.resolve()):
@@ -44,49 +33,29 @@ def check_export(path: Path, out: Path) -> None:
 
 
 def export(store: Store, path: Path) -> None:
-    """Write all rows of a store to ``path``; what was there stays until the new file is whole.
-
-    Raises
-    ------
-    SweepError
-        If the file cannot be written.
-    """
-    names = [name for name in columns(store.design) if name not in LEFT_OUT]
-    quoted = ", ".join(names)
+    """Write all rows of a store to ``path``; what was there stays until the new file is whole."""
+    design = store.design
+    types = {n: kind for n, kind in zip(columns(design), kinds(design), strict=True) if n not in LEFT_OUT}
     try:
-        rows = store.connection.execute(f"SELECT {quoted} FROM points ORDER BY number")
+        rows = store.connection.execute(f"SELECT {', '.join(types)} FROM points ORDER BY number")
         with whole_file(path.resolve()) as part:
             if path.suffix == ".csv":
-                _write_csv(part, names, _chunks(rows))
+                with part.open("w", encoding="utf-8", newline="") as file:
+                    csv.writer(file, lineterminator="\n").writerows(chain([types], rows))
             else:
-                types = {name: kind for _, name, kind, *_ in store.connection.execute("PRAGMA table_info(points)")}
-                _write_parquet(part, {name: types[name] for name in names}, _chunks(rows))
+                _write_parquet(part, types, rows)
     except OSError as error:
-        raise SweepError(
-            f"{path} cannot be written ({error.strerror or error}); the rows are in {store.file}"
-        ) from None
+        words = f"{path} cannot be written ({error.strerror or error}); the rows are in {store.file}"
+        raise SweepError(words) from None
 
 
-def _chunks(rows: sqlite3.Cursor) -> Iterator[Rows]:
-    while chunk := rows.fetchmany(CHUNK):
-        yield chunk
-
-
-def _write_csv(path: Path, names: list[str], chunks: Iterator[Rows]) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(names)
-        for chunk in chunks:
-            writer.writerows(chunk)
-
-
-def _write_parquet(path: Path, types: dict[str, str], chunks: Iterator[Rows]) -> None:
+def _write_parquet(path: Path, types: dict[str, str], rows: sqlite3.Cursor) -> None:
     pyarrow = _pyarrow(path)
     parquet = import_module("pyarrow.parquet")
-    kinds = {"REAL": pyarrow.float64(), "INTEGER": pyarrow.int64(), "TEXT": pyarrow.string()}
-    schema = pyarrow.schema([(name, kinds[kind]) for name, kind in types.items()])
+    of_kind = {"REAL": pyarrow.float64(), "INTEGER": pyarrow.int64(), "TEXT": pyarrow.string()}
+    schema = pyarrow.schema([(name, of_kind[kind]) for name, kind in types.items()])
     with parquet.ParquetWriter(path, schema) as writer:
-        for chunk in chunks:
+        while chunk := rows.fetchmany(10_000):
             writer.write_table(pyarrow.table(list(map(list, zip(*chunk, strict=True))), schema=schema))
 
 

@@ -6,22 +6,13 @@ import json
 import sqlite3
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from flipproof.sweep.damaged import count
+from flipproof.sweep.design import Plan
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.plan import Plan
 from flipproof.sweep.schema import APPLICATION, SCHEMA, columns, intact, kinds
 from slicemodel.scenario import shortened
-
-BEGINNING: Final = b"SQLite format 3\0"
-TABLES: Final = frozenset({"schema_version", "design", "versions", "points"})
-FACTS: Final = ("TEXT", "INTEGER", "TEXT", "TEXT", "TEXT")
-"""Types of the columns of the design."""
-
-WAITED: Final = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
-LONGEST: Final = 120
-"""Characters of what SQLite says."""
 
 
 def inspect(file: Path, design: Plan, code: str, patience: float) -> None:
@@ -42,14 +33,14 @@ def inspect(file: Path, design: Plan, code: str, patience: float) -> None:
         if file.is_dir():
             raise SweepError(f"{file} is a folder, where a sweep keeps its rows in a file; name another --out")
         with file.open("rb") as opened:
-            beginning = opened.read(len(BEGINNING))
+            beginning = opened.read(16)
     except OSError as error:
         raise SweepError(
             f"{file} cannot be read ({error.strerror or error}), so that it is not known what it holds; it is as it was"
         ) from None
     if not beginning:
         wrong = "it is empty (0 bytes)"
-    elif beginning != BEGINNING:
+    elif beginning != b"SQLite format 3\0":
         wrong = "it does not begin as an SQLite file does"
     else:
         try:
@@ -57,7 +48,7 @@ def inspect(file: Path, design: Plan, code: str, patience: float) -> None:
             with closing(sqlite3.connect(f"{file.resolve().as_uri()}?mode=ro", uri=True, timeout=patience)) as rows:
                 wrong = _wrong(file, rows, design, code)
         except sqlite3.Error as error:
-            if result_code(error) in WAITED:
+            if result_code(error) in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
                 raise
             wrong = str(error)
     if wrong:
@@ -75,7 +66,7 @@ def damage(file: Path, design: Plan, code: str, wrong: str) -> SweepError:
         if whole
         else "no point of this design can be saved from it; name another --out"
     )
-    return SweepError(f"{file} is damaged ({shortened(wrong, LONGEST)}); {saved}")
+    return SweepError(f"{file} is damaged ({shortened(wrong, 120)}); {saved}")
 
 
 def is_damage(error: Exception) -> bool:
@@ -93,7 +84,7 @@ def _wrong(file: Path, connection: sqlite3.Connection, design: Plan, code: str) 
     connection.text_factory = lambda text: text.decode("utf-8", "surrogateescape")
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     there = {name for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
-    missing = sorted(TABLES - there)
+    missing = sorted({"schema_version", "design", "versions", "points"} - there)
     if missing and application != APPLICATION and there:
         raise SweepError(f"{file} is a database, but no sweep; name another --out")
     if missing:
@@ -119,7 +110,7 @@ def _wrong_design(file: Path, connection: sqlite3.Connection, design: Plan, code
     found = connection.execute("SELECT code, size, facts, source, checksum FROM design").fetchall()
     if len(found) != 1:
         return f"its table design has {len(found)} rows instead of 1"
-    if not intact(found[0], FACTS):
+    if not intact(found[0], ("TEXT", "INTEGER", "TEXT", "TEXT", "TEXT")):
         return "its design does not match its checksum"
     began, _, facts, *_ = found[0]
     there, here = json.loads(facts), json.loads(json.dumps(design.facts()))
@@ -169,8 +160,7 @@ def _difference(there: Any, here: Any, name: str = "") -> str:
             if found:
                 return found
         return ""
-    return "" if there == here else f"{name} is {_short(there)} there and {_short(here)} here"
-
-
-def _short(value: object) -> str:
-    return shortened(json.dumps(value), 40)
+    if there == here:
+        return ""
+    one, other = (shortened(json.dumps(value), 40) for value in (there, here))
+    return f"{name} is {one} there and {other} here"

@@ -11,21 +11,19 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import islice
 from typing import Final
 
 from flipproof.sweep.design import Point
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.local import Workers
-from flipproof.sweep.plan import Plan
 from flipproof.sweep.store import Store
 from flipproof.sweep.work import Outcome, Returned, make_batch, versions
+from flipproof.sweep.workers import Workers
 
 TARGET: Final = 0.4
 """Seconds that a batch should take: sending one costs up to some milliseconds, and a kill loses it."""
 
-MOST_IN_BATCH: Final = 5_000
 MOST_BYTES: Final = 32 * 2**20
 """Bytes of flights in one batch."""
 
@@ -49,36 +47,27 @@ Progress = Callable[[int, int], None]
 
 
 @dataclass(slots=True)
-class Pace:
-    """How many points of one solver a batch may hold, by what the last batch took."""
-
-    size: int = 1
-
-    def learn(self, returned: Returned) -> None:
-        """Set the size of the next batch."""
-        count = len(returned.outcomes)
-        if count == 0:
-            return
-        bytes_each = sum(a.nbytes for o in returned.outcomes for a in (o.arrays or {}).values()) / count
-        wanted = min(TARGET * count / max(returned.seconds, 1e-6), MOST_BYTES / max(bytes_each, 1.0), MOST_IN_BATCH)
-        self.size = max(1, min(int(wanted), GROWTH * count))
-
-
-@dataclass(slots=True)
 class Line:
-    """The points of one solver that wait for a worker."""
+    """The points of one solver that wait for a worker, and how many of them the next batch may hold."""
 
     points: Iterator[Point]
     total: int
     left: int
-    pace: Pace = field(default_factory=Pace)
+    size: int = 1
 
     def take(self, shares: int) -> Batch:
         """Return the next batch; towards the end of the line smaller ones, so that no worker is left waiting."""
-        size = max(1, min(self.pace.size, -(-self.left // shares)))
-        points = tuple(islice(self.points, size))
+        points = tuple(islice(self.points, max(1, min(self.size, -(-self.left // shares)))))
         self.left -= len(points)
-        return Batch(points, self.pace)
+        return Batch(points, self)
+
+    def learn(self, returned: Returned) -> None:
+        """Set the size of the next batch by what the last one took."""
+        count = len(returned.outcomes)
+        if count:
+            bytes_each = sum(a.nbytes for o in returned.outcomes for a in (o.arrays or {}).values()) / count
+            wanted = min(TARGET * count / max(returned.seconds, 1e-6), MOST_BYTES / max(bytes_each, 1.0), 5_000)
+            self.size = max(1, min(int(wanted), GROWTH * count))
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +75,7 @@ class Batch:
     """Points on their way through one worker, and how often its worker died with one point in it."""
 
     points: tuple[Point, ...]
-    pace: Pace
+    line: Line
     deaths: int = 0
 
 
@@ -98,14 +87,27 @@ def run_sweep(store: Store, workers: Workers, progress: Progress) -> None:
     SweepError
         If rows cannot be written, workers run other code, die whatever they are given, or are gone.
     """
-    lines = _lines(store.design, store.done())
+    design, done = store.design, store.done()
+    lines = [
+        Line(
+            points=(design.point(number) for number in numbers if not done[number]), total=len(numbers),
+            left=len(numbers) - done.count(1, numbers.start, numbers.stop),
+        )
+        for numbers in design.lines
+    ]  # fmt: skip
     again: deque[Batch] = deque()
     flying: dict[Future[Returned], Batch] = {}
     deaths, heard = 0, time.monotonic()
     while True:
         capacity = workers.capacity()
         while len(flying) < capacity and (batch := _next(lines, again, capacity)) is not None:
-            flying[_submit(workers, store, batch)] = batch
+            try:
+                future = workers.executor.submit(
+                    make_batch, store.code, batch.points, design.trajectories, design.curves
+                )
+            except Exception as error:
+                raise _no_workers(store.code, error) from None
+            flying[future] = batch
         if not flying and not again and not any(line.left for line in lines):
             return
         if capacity > 0:
@@ -133,7 +135,7 @@ def run_sweep(store: Store, workers: Workers, progress: Progress) -> None:
             else:
                 deaths = 0
                 problem = problem or _other_code(store.code, returned)
-                batch.pace.learn(returned)
+                batch.line.learn(returned)
                 came.append(returned)
         # What came back is stored before anything is said of what did not.
         if came:
@@ -142,16 +144,6 @@ def run_sweep(store: Store, workers: Workers, progress: Progress) -> None:
             progress(len(outcomes), sum(not outcome.whole for outcome in outcomes))
         if problem:
             raise problem
-
-
-def _lines(design: Plan, done: bytearray) -> list[Line]:
-    """Return the waiting points of every line of the design."""
-    lines = []
-    for numbers in design.lines:
-        left = len(numbers) - done.count(1, numbers.start, numbers.stop)
-        points = (design.point(number) for number in numbers if not done[number])
-        lines.append(Line(points, len(numbers), left))
-    return lines
 
 
 def _next(lines: list[Line], again: deque[Batch], capacity: int) -> Batch | None:
@@ -163,14 +155,6 @@ def _next(lines: list[Line], again: deque[Batch], capacity: int) -> Batch | None
         return again.popleft()
     line = max(lines, key=lambda line: line.left / line.total)
     return line.take(capacity) if line.left else None
-
-
-def _submit(workers: Workers, store: Store, batch: Batch) -> Future[Returned]:
-    design = store.design
-    try:
-        return workers.executor.submit(make_batch, store.code, batch.points, design.trajectories, design.curves)
-    except Exception as error:
-        raise _no_workers(store.code, error) from None
 
 
 def _no_workers(code: str, error: Exception) -> SweepError:
@@ -185,10 +169,10 @@ def _after_death(batch: Batch, error: BaseException) -> tuple[list[Batch], list[
     points = batch.points
     if len(points) > 1:
         middle = len(points) // 2
-        return [Batch(half, batch.pace) for half in (points[:middle], points[middle:])], []
+        return [Batch(half, batch.line) for half in (points[:middle], points[middle:])], []
     deaths = batch.deaths + 1
     if deaths < LONE_DEATHS:
-        return [Batch(points, batch.pace, deaths)], []
+        return [Batch(points, batch.line, deaths)], []
     reason = f"the worker died {deaths} times with this point alone in it ({error})"
     lost = Outcome(number=points[0].number, status="worker-died", reason=reason)
     return [], [Returned("", versions(), [lost], 0.0)]

@@ -4,21 +4,15 @@ from __future__ import annotations
 
 import shutil
 import zipfile
-from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
-from typing import Any, Final
 
 from flipproof.sweep.damaged import count, rows, versions
+from flipproof.sweep.design import Plan
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import whole_file
-from flipproof.sweep.plan import Plan
 from flipproof.sweep.schema import FILE, columns
 from flipproof.sweep.store import Store
-
-CHUNK: Final = 1000
-"""Rows written in one transaction."""
-
-Row = tuple[Any, ...]
 
 
 def salvage(damaged: Path, out: Path, design: Plan, code: str) -> str:
@@ -39,9 +33,10 @@ def salvage(damaged: Path, out: Path, design: Plan, code: str) -> str:
             raise SweepError(f"{file} holds no whole row of this design made by flipproof {code}")
         with Store(out, design, code) as store:
             known = versions(file)
-            for chunk in _chunks(rows(file, design, code)):
+            found, place = rows(file, design, code), columns(design).index("trajectory")
+            while chunk := list(islice(found, 1000)):  # rows in one transaction
                 for row in chunk:
-                    _copy_flight(file.parent, out, row[columns(design).index("trajectory")])
+                    _copy_flight(file.parent, out, row[place])
                 store.restore(chunk, known)
             saved = sum(store.done())
     except OSError as error:
@@ -50,16 +45,6 @@ def salvage(damaged: Path, out: Path, design: Plan, code: str) -> str:
     return f"{saved} of {design.size} points of {file} are saved in {store.file}; " + (
         rest if saved < design.size else "none is missing"
     )
-
-
-def _chunks(found: Iterator[Row]) -> Iterator[list[Row]]:
-    chunk: list[Row] = []
-    for row in found:
-        chunk.append(row)
-        if len(chunk) == CHUNK:
-            yield chunk
-            chunk = []
-    yield chunk
 
 
 def _copy_flight(source: Path, out: Path, name: str | None) -> None:

@@ -7,12 +7,12 @@ seen, and so that a row can be trusted wherever in a damaged file it is found.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Final
 
 from flipproof.sweep.axes import column
-from flipproof.sweep.plan import Plan
+from flipproof.sweep.design import Plan
 from flipproof.sweep.work import CURVES, OUTCOMES
 
 SCHEMA: Final = 2
@@ -45,31 +45,35 @@ CREATE TABLE versions (
 """
 
 
-def points_table(design: Plan) -> str:
-    """Return the statements that make the table of points, with a column for every swept field."""
-    swept = "".join(f"    {column(axis.name)} {TYPES[axis.kind]} NOT NULL,\n" for axis in design.axes)
-    readings = "".join(
-        f"    {name} {kind} CHECK (typeof({name}) IN ('{kind.lower()}', 'null')),\n"
-        for name, kind in design.readings.items()
-    )
-    known = " AND ".join(f"{name} IS NOT NULL" for name in design.readings)
+def _points(design: Plan) -> Iterator[tuple[str, str, str, str]]:
+    """Yield name, SQLite type, rules and meaning of every column of the table of points, one for each swept field."""
+    yield "number", "INTEGER", " PRIMARY KEY", "place in the design, from 0"
+    yield "key", "TEXT", " NOT NULL UNIQUE", "SHA-256 of parameters and code"
+    yield from ((column(axis.name), TYPES[axis.kind], " NOT NULL", "value of a swept field") for axis in design.axes)
+    yield "solver", "TEXT", " NOT NULL", "its name, or land"
+    yield "settings", "TEXT", " NOT NULL", "JSON"
+    for name, kind in design.readings.items():
+        yield name, kind, f" CHECK (typeof({name}) IN ('{kind.lower()}', 'null'))", "what the point gave, in SI"
     statuses = ", ".join(f"'{status}'" for status in OUTCOMES)
-    curves = f"    curves BLOB,  -- float64, little-endian: {', '.join(CURVES)}\n" if design.curves else ""
+    yield "status", "TEXT", f" NOT NULL CHECK (status IN ({statuses}))", "what became of the point"
+    yield "message", "TEXT", " NOT NULL", "the solver's own"
+    yield "reason", "TEXT", " NOT NULL", "why a number is NULL"
+    yield "seconds", "REAL", " NOT NULL", "what the point took [s]"
+    yield "trajectory", "TEXT", "", "file of the flight, if it was kept"
+    if design.curves:
+        yield "curves", "BLOB", "", f"float64, little-endian: {', '.join(CURVES)}"
+    yield "versions", "INTEGER", " NOT NULL REFERENCES versions (id)", "what made the row"
+    yield "parameters", "TEXT", " NOT NULL", "JSON: enough to make this row again alone"
+    yield "checksum", "TEXT", " NOT NULL", "CRC-32 of the other cells"
+
+
+def points_table(design: Plan) -> str:
+    """Return the statements that make the table of points."""
+    lines = "".join(f"    {name} {kind}{rules},  -- {meaning}\n" for name, kind, rules, meaning in _points(design))
+    known = " AND ".join(f"{name} IS NOT NULL" for name in design.readings)
     return f"""
 CREATE TABLE points (
-    number INTEGER PRIMARY KEY,  -- place in the design, from 0
-    key TEXT NOT NULL UNIQUE,    -- SHA-256 of parameters and code
-{swept}    solver TEXT NOT NULL,
-    settings TEXT NOT NULL,      -- JSON
-{readings}    status TEXT NOT NULL CHECK (status IN ({statuses})),
-    message TEXT NOT NULL,
-    reason TEXT NOT NULL,        -- why a number is NULL
-    seconds REAL NOT NULL,
-    trajectory TEXT,             -- file of the flight, if it was kept
-{curves}    versions INTEGER NOT NULL REFERENCES versions (id),
-    parameters TEXT NOT NULL,    -- JSON: enough to make this row again alone
-    checksum TEXT NOT NULL,      -- CRC-32 of the other cells
-    CHECK (reason <> '' OR ({known}))
+{lines}    CHECK (reason <> '' OR ({known}))
 );
 CREATE INDEX points_by_solver ON points (solver, status);
 """
@@ -77,18 +81,12 @@ CREATE INDEX points_by_solver ON points (solver, status);
 
 def columns(design: Plan) -> tuple[str, ...]:
     """Return the columns of the table of points, in order."""
-    swept = (column(axis.name) for axis in design.axes)
-    kept = ("trajectory", "curves") if design.curves else ("trajectory",)
-    told = ("status", "message", "reason", "seconds", *kept, "versions", "parameters", "checksum")
-    return ("number", "key", *swept, "solver", "settings", *design.readings, *told)
+    return tuple(name for name, *_ in _points(design))
 
 
 def kinds(design: Plan) -> tuple[str, ...]:
     """Return the SQLite type of every column of the table of points."""
-    types = {column(axis.name): TYPES[axis.kind] for axis in design.axes}
-    types |= {**design.readings, "seconds": "REAL", "curves": "BLOB"}
-    types |= dict.fromkeys(("number", "versions"), "INTEGER")
-    return tuple(types.get(name, "TEXT") for name in columns(design))
+    return tuple(kind for _, kind, *_ in _points(design))
 
 
 # SQLite keeps a negative zero as zero, and a real number without a fraction as an integer.
@@ -100,10 +98,7 @@ AS_STORED: Final[Mapping[str, Callable[[Any], Any]]] = MappingProxyType(
 def as_stored(cells: Sequence[Any], types: Sequence[str]) -> tuple[Any, ...]:
     """Return cells as SQLite gives them back from columns of these types.
 
-    Raises
-    ------
-    ValueError, TypeError, OverflowError
-        If a cell is not of its type.
+    A cell that is not of its type raises ValueError, TypeError or OverflowError.
     """
     return tuple(None if cell is None else AS_STORED[kind](cell) for cell, kind in zip(cells, types, strict=True))
 

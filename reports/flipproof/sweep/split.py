@@ -9,24 +9,23 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from flipproof.chapters.waterfall.figure import figure_waterfall
 from flipproof.chapters.waterfall.study import PROGRAM, Waterfall, plan_waterfall, split_all
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import Run
+from flipproof.output.columns import rows_csv
 from flipproof.sweep.axes import Value
-from flipproof.sweep.command import Begin, completed
+from flipproof.sweep.command import Begin, fill
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import write_whole
-from flipproof.sweep.planned import Row, design_of_runs, read_runs
-from flipproof.sweep.salvage import salvage
-from flipproof.sweep.work import code_identity
+from flipproof.sweep.planned import design_of_runs, read_runs
+from flipproof.sweep.store import Store
+from flipproof.sweep.work import CURVES, Outcome
 from slicemodel import Scenario
 from slicemodel.observables import toppling_angle
 
@@ -46,50 +45,32 @@ def releases(runs: list[Run]) -> dict[str, list[Value]]:
     return {"omega0": list(dict.fromkeys(run.scenario.omega0 for run in runs))}
 
 
-def make_split(
-    throw: Scenario,
-    out: Path,
-    begin: Begin,
-    *,
-    jobs: int | None = None,
-    dask: str | None = None,
-    export_to: Path | None = None,
-    damaged: Path | None = None,
-) -> str:
+def make_split(throw: Scenario, out: Path, begin: Begin, **how: Any) -> str:
     """Make every run of the waterfall that has no row in ``out``, draw it; return its table and what is there.
 
-    Raises
-    ------
-    SweepError
-        If a run is not whole: a split needs all of them; else as for ``flipproof.sweep.command.sweep``.
+    Parameters and errors as for ``flipproof.sweep.command.fill``; a run that is not whole is one: a split needs all.
     """
     runs = plan_split(throw)
-    design = design_of_runs(runs, releases(runs), ENDS, "flipproof waterfall")
-    if damaged:
-        return salvage(damaged, out, design, code_identity())
-    with completed(design, out, begin, jobs=jobs, dask=dask, export_to=export_to) as (store, summary):
+
+    def end(store: Store, summary: str) -> str:
         waterfalls = split_rows(read_runs(store, runs))
         for waterfall in waterfalls:
             drawing = draw(figure_waterfall(waterfall))
             write_whole(out / f"waterfall-{waterfall.observable.name}.svg", drawing.svg.encode())
             write_whole(out / f"waterfall-{waterfall.observable.name}.png", drawing.png)
         write_whole(out / "waterfall.csv", waterfall_csv(waterfalls).encode())
-    return f"{_table(waterfalls[0])}\n{summary}"
+        return f"{_table(waterfalls[0])}\n{summary}"
+
+    return fill(design_of_runs(runs, releases(runs), ENDS, "flipproof waterfall"), out, begin, end, **how)
 
 
-def split_rows(rows: Mapping[Run, Row]) -> tuple[Waterfall, ...]:
-    """Split every observable of the rows of ``plan_split``.
-
-    Raises
-    ------
-    SweepError
-        If a run is not whole.
-    """
+def split_rows(rows: Mapping[Run, Outcome]) -> tuple[Waterfall, ...]:
+    """Split every observable of the rows of ``plan_split``; a run that is not whole is refused."""
     program = next(run for run in rows if run.solver == PROGRAM)
     return split_all(program, {run: _observed(run, row) for run, row in rows.items()})
 
 
-def _observed(run: Run, row: Row) -> dict[str, float]:
+def _observed(run: Run, row: Outcome) -> dict[str, float]:
     throw = run.scenario
     if row.status != "ok":
         raise SweepError(f"{run.name}: {row.status}: {row.message or row.reason}; a waterfall needs every run whole")
@@ -97,44 +78,40 @@ def _observed(run: Run, row: Row) -> dict[str, float]:
     assert row.omega_end is not None
     assert row.theta_end is not None
     assert row.r_cm_end is not None
+    assert row.curves is not None
     return {
         "plateau": row.plateau,
         "omega": row.omega_end / throw.omega0,
         "theta": row.theta_end,
         "toppling": float(toppling_angle(throw, row.r_cm_end)),
-        "v_cm": float(row.curves["v_cm"][-1]),
+        "v_cm": float(row.curves[CURVES.index("v_cm"), -1]),
     }
 
 
 def waterfall_csv(waterfalls: tuple[Waterfall, ...]) -> str:
     """Return one row per observable and bar as CSV; numbers read back to the last bit."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(
-        ["observable", "unit", "bar", "forward", "backward", "mean of all orders", "forward band", "mean band"]
-    )
+    header = ["observable", "unit", "bar", "forward", "backward", "mean of all orders", "forward band", "mean band"]
+    rows: list[list[str]] = []
     for waterfall in waterfalls:
         what = (waterfall.observable.name, waterfall.observable.unit)
-        writer.writerow([*what, "published program", repr(waterfall.start), "", "", "", ""])
+        rows.append([*what, "published program", repr(waterfall.start), "", "", "", ""])
         for bar in waterfall.bars:
             numbers = (bar.forward, bar.backward, bar.average, bar.forward_band, bar.average_band)
-            writer.writerow([*what, bar.name, *map(repr, numbers)])
-        writer.writerow([*what, "free flight", repr(waterfall.end), "", "", repr(waterfall.end_band), ""])
-        writer.writerow([*what, "column", repr(waterfall.column), "", "", "", ""])
-    return text.getvalue()
+            rows.append([*what, bar.name, *map(repr, numbers)])
+        rows.append([*what, "free flight", repr(waterfall.end), "", "", repr(waterfall.end_band), ""])
+        rows.append([*what, "column", repr(waterfall.column), "", "", "", ""])
+    return rows_csv(header, rows)
 
 
 def _table(waterfall: Waterfall) -> str:
-    observable = waterfall.observable
-    return "\n".join(
-        [
-            f"{observable.words} [{observable.unit}]: in the order shown, in reverse, mean of all orders",
-            f"  {waterfall.start:+8.4f}                      published program",
-            *(
-                f"  {bar.forward:+8.4f}  {bar.backward:+8.4f}  {bar.average:+8.4f}  {bar.name}"
-                for bar in waterfall.bars
-            ),
-            f"  {waterfall.end:+8.4f}                      free flight (+- {waterfall.end_band:.1g})",
-            f"  {waterfall.overlap:+8.4f}                      column minus free flight: no overlap, no share",
-        ]
-    )
+    observable, space = waterfall.observable, 20 * " "
+    lines = [
+        f"{observable.words} [{observable.unit}]: in the order shown, in reverse, mean of all orders",
+        f"  {waterfall.start:+8.4f}  {space}published program",
+    ]
+    lines += [f"  {bar.forward:+8.4f}  {bar.backward:+8.4f}  {bar.average:+8.4f}  {bar.name}" for bar in waterfall.bars]
+    lines += [
+        f"  {waterfall.end:+8.4f}  {space}free flight (+- {waterfall.end_band:.1g})",
+        f"  {waterfall.overlap:+8.4f}  {space}column minus free flight: no overlap, no share",
+    ]
+    return "\n".join(lines)

@@ -24,31 +24,19 @@ import json
 import os
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from flipproof.output.ownership import MARKER, OutputError, check_own, marker_text, sole_writer
-from flipproof.sweep.design import key_of
-from flipproof.sweep.entries import settings_text
+from flipproof.sweep.design import Plan, key_of
+from flipproof.sweep.entries import as_json
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import TEMPORARY, sweep_away_parts, whole_file, write_whole
 from flipproof.sweep.inspection import damage, inspect, is_damage, result_code
-from flipproof.sweep.plan import Plan
-from flipproof.sweep.schema import (
-    APPLICATION,
-    FILE,
-    PAGE,
-    SCHEMA,
-    SHARED,
-    checksum,
-    columns,
-    kinds,
-    points_table,
-)
+from flipproof.sweep.schema import APPLICATION, FILE, PAGE, SCHEMA, SHARED, checksum, columns, kinds, points_table
 from flipproof.sweep.work import CURVES, Outcome, Returned
 from slicemodel.trajectory import FloatArray
 
@@ -57,15 +45,11 @@ if TYPE_CHECKING:
 
 LOCK: Final = "sweep.lock"
 KIND: Final = "sweep"
-FLIGHTS: Final = "trajectories"
 BUSY: Final = 10.0
 """Seconds to wait for somebody who holds the file."""
 
-SAFE: Final = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM)
-"""What SQLite refuses before it has changed anything."""
 
-
-class Store:
+class Store(AbstractContextManager["Store"]):
     """The rows of one design in a folder. Use as a context manager; the folder is locked until it ends."""
 
     def __init__(self, folder: Path, design: Plan, code: str) -> None:
@@ -79,14 +63,14 @@ class Store:
         """
         self.folder, self.design, self.code = folder, design, code
         self._kinds = kinds(design)[:-1]
-        self._lock = ExitStack()
-        self._rows: sqlite3.Connection | None = None
+        self._marks = ", ".join("?" * len(columns(design)))
+        self._held = ExitStack()
         with self._plainly():
             _check_folder(folder)
             folder.mkdir(parents=True, exist_ok=True)
         try:
             with self._plainly():
-                self._lock.enter_context(sole_writer(folder / LOCK, folder))
+                self._held.enter_context(sole_writer(folder / LOCK, folder))
                 if not (folder / MARKER).exists():
                     write_whole(folder / MARKER, marker_text(KIND).encode())
                 self.fresh = not os.path.lexists(self.file)
@@ -94,9 +78,10 @@ class Store:
                     self._begin()
                 else:
                     inspect(self.file, design, code, BUSY)
-                self._rows = sqlite3.connect(self.file, timeout=BUSY, isolation_level=None)
-                self._rows.execute("PRAGMA journal_mode = WAL").fetchall()
-                self._rows.execute("PRAGMA synchronous = NORMAL")
+                connection = sqlite3.connect(self.file, timeout=BUSY, isolation_level=None)
+                self.connection = self._held.enter_context(closing(connection))
+                self.connection.execute("PRAGMA journal_mode = WAL").fetchall()
+                self.connection.execute("PRAGMA synchronous = NORMAL")
                 sweep_away_parts(folder)
         except BaseException:
             self.close()
@@ -107,26 +92,12 @@ class Store:
         """The SQLite file."""
         return self.folder / FILE
 
-    @property
-    def connection(self) -> sqlite3.Connection:
-        """The connection that writes."""
-        assert self._rows is not None
-        return self._rows
-
-    def __enter__(self) -> Store:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
         """Close the file and let go of the folder."""
-        if self._rows is not None:
-            self._rows.close()
-        self._rows = None
-        self._lock.close()
+        self._held.close()
 
     def done(self) -> bytearray:
         """Return one byte for each point of the design: 1 if its row is there, and its flight if flights are kept."""
@@ -143,13 +114,7 @@ class Store:
             return dict(self.connection.execute(query).fetchall())
 
     def add(self, returned: Sequence[Returned]) -> None:
-        """Write the points of some batches in one transaction, their flights first.
-
-        Raises
-        ------
-        SweepError
-            If the disk is full or the file cannot be written; what was there before is there still.
-        """
+        """Write the points of some batches in one transaction, their flights first; what was there before stays."""
         with self._plainly():
             flights = {o.number: self._keep(o) for batch in returned for o in batch.outcomes if o.arrays is not None}
             with _transaction(self.connection):
@@ -159,25 +124,20 @@ class Store:
                     # A row whose flight was deleted has been made again.
                     gone = ((outcome.number,) for outcome in batch.outcomes)
                     self.connection.executemany("DELETE FROM points WHERE number = ?", gone)
-                    marks = ", ".join("?" * len(columns(self.design)))
-                    self.connection.executemany(f"INSERT INTO points VALUES ({marks})", rows)
+                    self.connection.executemany(f"INSERT INTO points VALUES ({self._marks})", rows)
 
     def restore(self, rows: Sequence[tuple[Any, ...]], versions: Mapping[int, str]) -> None:
         """Write rows that were read from another file of this sweep; a point that has a row keeps it.
 
-        Parameters
-        ----------
-        rows : sequence of tuples - the cells of each, in the order of ``columns``
-        versions : mapping from the id that the rows refer to, to the versions there; one that is missing is lost
+        Their cells stand in the order of ``columns``; ``versions`` are those there by the id that rows refer to.
         """
         place = columns(self.design).index("versions")
-        marks = ", ".join("?" * len(columns(self.design)))
         with self._plainly(), _transaction(self.connection):
             ids = {row[place]: 0 for row in rows}
             for old in ids:
                 ids[old] = self._versions(versions.get(old, json.dumps({"lost": f"versions {old} of a damaged file"})))
             moved = (self._signed((*row[:place], ids[row[place]], *row[place + 1 : -1])) for row in rows)
-            self.connection.executemany(f"INSERT OR IGNORE INTO points VALUES ({marks})", moved)
+            self.connection.executemany(f"INSERT OR IGNORE INTO points VALUES ({self._marks})", moved)
 
     def _begin(self) -> None:
         """Make the file with its tables; it gets its name when it is whole, so that no kill leaves half of it."""
@@ -202,23 +162,12 @@ class Store:
     def _row(self, outcome: Outcome | Landed, flight: str | None, versions: int) -> tuple[Any, ...]:
         point = self.design.point(outcome.number)
         parameters = point.text()
-        cells = (
-            outcome.number,
-            key_of(parameters, self.code),
-            *point.values,
-            point.solver,
-            settings_text(point.settings),
-            *(getattr(outcome, name) for name in self.design.readings),
-            outcome.status,
-            outcome.message,
-            outcome.reason,
-            outcome.seconds,
-            flight,
-            *([_bytes(outcome.curves)] if self.design.curves else []),
-            versions,
-            parameters,
-        )
-        return self._signed(cells)
+        curves = None if outcome.curves is None else outcome.curves.astype("<f8").tobytes()
+        return self._signed((
+            outcome.number, key_of(parameters, self.code), *point.values, point.solver, as_json(point.settings),
+            *(getattr(outcome, name) for name in self.design.readings), outcome.status, outcome.message, outcome.reason,
+            outcome.seconds, flight, *([curves] if self.design.curves else []), versions, parameters,
+        ))  # fmt: skip
 
     def _signed(self, cells: Sequence[Any]) -> tuple[Any, ...]:
         """Return cells with their checksum; cells that the tables refuse, and will say so, get none."""
@@ -241,18 +190,17 @@ class Store:
             if is_damage(error):
                 raise damage(self.file, self.design, self.code, str(error)) from None
             words = getattr(error, "strerror", None) or str(error)
-            safe = isinstance(error, OSError) or result_code(error) in SAFE
-            kept = (
-                "the points stored so far are safe, the same command goes on from there"
-                if safe
-                else "what was stored is read through when the same command goes on from there"
-            )
+            # What SQLite refuses before it has changed anything.
+            safe = sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM
+            kept = "what was stored is read through when the same command goes on from there"
+            if isinstance(error, OSError) or result_code(error) in safe:
+                kept = "the points stored so far are safe, the same command goes on from there"
             raise SweepError(f"{self.folder} cannot be written ({words}); {kept}") from None
 
     def _keep(self, outcome: Outcome) -> str:
         """Write the flight of a point and return its file's name from the folder."""
         key = self.design.point(outcome.number).key(self.code)
-        name = f"{FLIGHTS}/{key[:2]}/{key}.npz"
+        name = f"trajectories/{key[:2]}/{key}.npz"
         path = self.folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(path) as part, part.open("wb") as file:
@@ -261,13 +209,9 @@ class Store:
         return name
 
 
-def read_curves(blob: bytes) -> dict[str, FloatArray]:
-    """Return the curves of a row by name, each of shape (P,)."""
-    return dict(zip(CURVES, np.frombuffer(blob, dtype="<f8").reshape(len(CURVES), -1), strict=True))
-
-
-def _bytes(curves: FloatArray | None) -> bytes | None:
-    return None if curves is None else curves.astype("<f8").tobytes()
+def read_curves(blob: bytes) -> FloatArray:
+    """Return the curves of a row, shape (4, P), in the order of ``CURVES``."""
+    return np.frombuffer(blob, dtype="<f8").reshape(len(CURVES), -1)
 
 
 def _check_folder(folder: Path) -> None:

@@ -10,8 +10,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -37,18 +35,20 @@ from flipproof.chapters.maps.study import (
 from flipproof.chapters.solvers import SCHEMES
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import Run
+from flipproof.output.columns import rows_csv
 from flipproof.sweep.axes import DAMPING, FILL, Value
-from flipproof.sweep.command import Begin, completed
+from flipproof.sweep.command import Begin, fill
 from flipproof.sweep.files import write_whole
-from flipproof.sweep.planned import Row, design_of_runs, read_runs
-from flipproof.sweep.salvage import salvage
-from flipproof.sweep.work import code_identity
+from flipproof.sweep.planned import design_of_runs, read_runs
+from flipproof.sweep.store import Store
+from flipproof.sweep.work import CURVES, Outcome
 from slicemodel import Scenario
 
 STEPS: Final = 1000
 """Points of a scheme's grid where the map does not say another: the published program's."""
 
 NAMES: Final = (*LADDER, *EXTRA)
+VALUES: Final[Mapping[Axis, str]] = {"gamma": "gamma/omega0", "step": "omega0*dt", "restitution": "restitution"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,54 +77,46 @@ class Plan:
         restitution = {"restitution": self.values} if self.axis == "restitution" else {}
         return {**restitution, DAMPING: [self.throw.damping_rate], FILL: self.fills}
 
-    def study(self, rows: Mapping[Run, Row]) -> ValidityMap:
+    def study(self, rows: Mapping[Run, Outcome]) -> ValidityMap:
         """Return the map that the rows of its runs make."""
         readings = {run: _reading(row) for run, row in rows.items()}
         return study_readings(self.throw, self.axis, self.fills, self.values, readings, steps=STEPS, points=None)
 
 
-def make_map(
-    plan: Plan,
-    out: Path,
-    begin: Begin,
-    *,
-    jobs: int | None = None,
-    dask: str | None = None,
-    export_to: Path | None = None,
-    damaged: Path | None = None,
-) -> str:
+def make_map(plan: Plan, out: Path, begin: Begin, **how: Any) -> str:
     """Make every run of the map that has no row in ``out``, draw the map; return lines that tell what is there.
 
-    Parameters and errors as for ``flipproof.sweep.command.sweep``.
+    Parameters and errors as for ``flipproof.sweep.command.fill``.
     """
     runs = plan.runs()
-    source = f"flipproof map --axis {plan.axis} --size {len(plan.fills)}x{len(plan.values)}"
-    design = design_of_runs(runs, plan.varied(), CURVE, source)
-    if damaged:
-        return salvage(damaged, out, design, code_identity())
-    with completed(design, out, begin, jobs=jobs, dask=dask, export_to=export_to) as (store, summary):
+
+    def end(store: Store, summary: str) -> str:
         study = plan.study(read_runs(store, runs))
         drawing = draw(figure_map(study))
         write_whole(out / "map.svg", drawing.svg.encode())
         write_whole(out / "map.png", drawing.png)
         write_whole(out / "map.csv", map_csv(study).encode())
         write_whole(out / "map.json", json.dumps(map_facts(study, plan.throw), indent=1, allow_nan=False).encode())
-    shares = ", ".join(f"{name} {count}" for name, count in _dominating(study).items() if count)
-    return f"{summary}\ncells by largest fair share: {shares or 'none'}; see {out / 'map.png'}"
+        shares = ", ".join(f"{name} {count}" for name, count in _dominating(study).items() if count)
+        return f"{summary}\ncells by largest fair share: {shares or 'none'}; see {out / 'map.png'}"
+
+    source = f"flipproof map --axis {plan.axis} --size {len(plan.fills)}x{len(plan.values)}"
+    return fill(design_of_runs(runs, plan.varied(), CURVE, source), out, begin, end, **how)
 
 
 def map_csv(study: ValidityMap) -> str:
     """Return one row per cell as CSV; a number that could not be computed is an empty cell with a reason."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(
-        [FILL, _value_name(study.axis)]
-        + [f"plateau {name}" for name in NAMES]
-        + [f"fair share of {name}" for name in RUNGS]
-        + [f"largest difference of {name} from {LADDER[-1]}" for name in NAMES]
-        + [f"step error of {name}" for name in SCHEMES]
-        + ["largest fair share", "reason"]
-    )
+    header = [
+        FILL,
+        VALUES[study.axis],
+        *(f"plateau {name}" for name in NAMES),
+        *(f"fair share of {name}" for name in RUNGS),
+        *(f"largest difference of {name} from {LADDER[-1]}" for name in NAMES),
+        *(f"step error of {name}" for name in SCHEMES),
+        "largest fair share",
+        "reason",
+    ]
+    rows = []
     dominant = study.dominant
     for at in np.ndindex(dominant.shape):
         numbers = [study.level[name][at] for name in NAMES] + study.shares[(slice(None), *at)].tolist()
@@ -132,8 +124,8 @@ def map_csv(study: ValidityMap) -> str:
         shown = [repr(float(number)) if np.isfinite(number) else "" for number in numbers]
         largest = RUNGS[dominant[at]] if dominant[at] >= 0 else ""
         place = [repr(float(study.fills[at[1]])), repr(float(study.values[at[0]]))]
-        writer.writerow([*place, *shown, largest, study.reason[at]])
-    return text.getvalue()
+        rows.append([*place, *shown, largest, study.reason[at]])
+    return rows_csv(header, rows)
 
 
 def map_facts(study: ValidityMap, throw: Scenario) -> dict[str, Any]:
@@ -141,7 +133,7 @@ def map_facts(study: ValidityMap, throw: Scenario) -> dict[str, Any]:
     return {
         "throw": throw.to_mapping(),
         "x": FILL,
-        "y": _value_name(study.axis),
+        "y": VALUES[study.axis],
         "ladder": list(LADDER),
         "cells by largest fair share": _dominating(study),
         "cells without": int((study.dominant < 0).sum()),
@@ -162,12 +154,9 @@ def _dominating(study: ValidityMap) -> dict[str, int]:
     return {name: int((study.dominant == k).sum()) for k, name in enumerate(RUNGS)}
 
 
-def _value_name(axis: Axis) -> str:
-    return {"gamma": "gamma/omega0", "step": "omega0*dt", "restitution": "restitution"}[axis]
-
-
-def _reading(row: Row) -> Reading:
+def _reading(row: Outcome) -> Reading:
     if row.status != "ok":
         return Reading(problem=word(row.reason) if row.status == "failed" else row.status)
     assert row.plateau is not None
-    return Reading(level=row.plateau, omega=row.curves["omega"])
+    assert row.curves is not None
+    return Reading(level=row.plateau, omega=row.curves[CURVES.index("omega")])

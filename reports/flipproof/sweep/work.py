@@ -10,9 +10,8 @@ from __future__ import annotations
 import functools
 import math
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from importlib import metadata
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 from flipproof.foreign.content import content_of
 from flipproof.frame.solvers import Run, find, make
 from flipproof.frame.sources import fingerprint
-from flipproof.output.provenance import provenance
+from flipproof.output.provenance import provenance, version_of
 from flipproof.sweep.design import Point
 from ode_reference.solver import COLUMN
 from slicemodel.observables import centre_of_mass_velocity, plateau
@@ -127,11 +126,7 @@ class Returned:
 @functools.cache
 def code_identity() -> str:
     """Return version and fingerprint of the code that makes points, such as "0.1.0+3f2a9c41d0be"."""
-    try:
-        version = metadata.version("flipproof")
-    except metadata.PackageNotFoundError:
-        version = "checkout"
-    return f"{version}+{fingerprint(*SOURCES):.12}"
+    return f"{version_of('flipproof')}+{fingerprint(*SOURCES):.12}"
 
 
 @functools.cache
@@ -143,28 +138,25 @@ def versions() -> Mapping[str, str]:
 def make_batch(code: str, points: Sequence[Point], keep: bool, curves: int = 0) -> Returned:
     """Make points by one process; if the caller's ``code``, or that of the points' solver, is not that here, make none.
 
-    Parameters
-    ----------
-    code : str - ``code_identity()`` where the sweep is written
-    keep : bool - return the flights too
-    curves : int - points of the curves to return; 0: none
+    ``keep``: return the flights too; ``curves``: points of the curves to return, 0 for none.
     """
     began = time.perf_counter()
     here = code_identity()
-    outcomes: list[Outcome | Landed] = []
-    if here == code and points and points[0].solver == LAND:
+    outcomes = list(_made(points, keep, curves)) if here == code and not _changed(points) else []
+    changed = _changed(points)  # while they were made, too: then nobody knows by which
+    return Returned(here, versions(), () if changed else outcomes, time.perf_counter() - began, changed)
+
+
+def _made(points: Sequence[Point], keep: bool, curves: int) -> Iterator[Outcome | Landed]:
+    if points and points[0].solver == LAND:
         from flipproof.landing.work import make_landings
 
-        return Returned(here, versions(), make_landings(points), time.perf_counter() - began)
-    if changed := _changed(points):
-        return Returned(here, versions(), (), time.perf_counter() - began, changed)
-    for begin in range(0, len(points) if here == code else 0, TOGETHER):
+        yield from make_landings(points)
+        return
+    for begin in range(0, len(points), TOGETHER):
         some = points[begin : begin + TOGETHER]
-        made = None if keep or curves else make_together(some)
-        outcomes += made or [make_point(point, keep, curves) for point in some]
-    if changed := _changed(points):  # while they were made: nobody knows by which
-        return Returned(here, versions(), (), time.perf_counter() - began, changed)
-    return Returned(here, versions(), outcomes, time.perf_counter() - began)
+        together = None if keep or curves else make_together(some)
+        yield from together or [make_point(point, keep, curves) for point in some]
 
 
 def _changed(points: Sequence[Point]) -> str:
@@ -222,10 +214,13 @@ def make_point(point: Point, keep: bool = False, curves: int = 0) -> Outcome:
         return Outcome(number=point.number, status="failed", reason=f"{type(error).__name__}: {error}", seconds=seconds)
     if made.trajectory is None:
         return Outcome(number=point.number, status="failed", reason=made.reason, seconds=made.seconds)
-    kept = _arrays(made.trajectory) if keep else None
-    whole = made.trajectory.status in WHOLE
-    shown = curves_of(made.trajectory, curves) if curves and whole else None
-    return _read(point.number, made.trajectory, made.seconds, kept, shown)
+    flight = made.trajectory
+    outcome = _read(point.number, flight, made.seconds)
+    return replace(
+        outcome,
+        arrays=_arrays(flight) if keep and len(flight.t) else None,
+        curves=curves_of(flight, curves) if curves and flight.status in WHOLE else None,
+    )
 
 
 def curves_of(flight: Trajectory, points: int) -> FloatArray:
@@ -239,16 +234,10 @@ def curves_of(flight: Trajectory, points: int) -> FloatArray:
     return np.array([np.interp(times, flight.t, curve) for curve in (flight.omega, flight.theta, flight.r_cm, v_cm)])
 
 
-def _read(
-    number: int,
-    flight: Trajectory,
-    seconds: float,
-    arrays: Arrays | None = None,
-    curves: FloatArray | None = None,
-) -> Outcome:
+def _read(number: int, flight: Trajectory, seconds: float) -> Outcome:
     if len(flight.t) == 0:
         return Outcome(number=number, status="failed", reason=f"{flight.status}: {flight.message}", seconds=seconds)
-    values: dict[str, float | None] = dict.fromkeys(("plateau", "omega_end", "theta_end", "r_cm_end"))
+    values: dict[str, Any] = dict.fromkeys(("plateau", "omega_end", "theta_end", "r_cm_end"))
     reasons = []
     if flight.status in WHOLE:
         # A number out of range is missing with a reason here; it must not also appear as a warning.
@@ -269,17 +258,10 @@ def _read(
     if flight.impacts is None:
         reasons.append(f"{flight.method} counts no impacts")
     return Outcome(
-        number=number,
-        **values,
-        t_end=float(flight.t[-1]),
-        impacts=None if flight.impacts is None else len(flight.impacts),
-        status=flight.status,
-        message=flight.message,
-        reason="; ".join(reasons),
-        seconds=seconds,
-        arrays=arrays,
-        curves=curves,
-    )
+        number=number, **values, t_end=float(flight.t[-1]),
+        impacts=None if flight.impacts is None else len(flight.impacts), status=flight.status,
+        message=flight.message, reason="; ".join(reasons), seconds=seconds,
+    )  # fmt: skip
 
 
 def _arrays(flight: Trajectory) -> dict[str, NDArray[Any]]:

@@ -46,7 +46,7 @@ def spin_of(film, noise=0.0, seed=0, **options):
 
 
 def part_of(film, frames):
-    arrays = ("t", "theta", "omega", "cap", "base", "centre")
+    arrays = ("t", "cap", "base", "centre")
     return replace(film, **{name: getattr(film, name)[frames] for name in arrays})
 
 

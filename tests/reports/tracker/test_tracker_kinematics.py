@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import savgol_filter
 
-from flipproof.film.tracker.angles import check_angles
+from flipproof.film.tracker.bench import check_angles
 from flipproof.film.tracker.kinematics import angle, frame_grid, omega_from_tracks
 from flipproof.film.tracker.smoothing import apply, central_difference, interpolation, local_polynomial, moving_average
 from flipproof.film.tracker.table import Track, TrackTable

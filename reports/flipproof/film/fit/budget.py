@@ -1,8 +1,7 @@
 """What a fit with somebody else's solver costs, and which search a given time allows.
 
-flipproof's own equations make a flight in less than a millisecond and a usual search in seconds. A solver in a process
-of its own may take a thousand times as long. One flight is timed, and the search is chosen by what that allows: the
-usual one, a coarse one, or none, with the number of minutes that it would need.
+flipproof's own equations make a flight in less than a millisecond and a usual search in seconds; a solver in a process
+of its own may take a thousand times as long.
 """
 
 from __future__ import annotations
@@ -24,9 +23,6 @@ MINUTES: Final = 10.0
 FLIGHTS: Final = MappingProxyType({USUAL: (-2400, 1800), COARSE: (-100, 250)})
 """Search -> flights that it makes at most, about: the first number, and the second for each fitted parameter."""
 
-TIMED: Final = 3
-"""Flights that are timed; the fastest counts, since the first one loads the solver."""
-
 
 @dataclass(frozen=True, slots=True)
 class Budget:
@@ -37,10 +33,16 @@ class Budget:
     seconds: float
 
     @property
+    def time(self) -> str:
+        """What the search takes at most, in words."""
+        seconds = self.flights * self.seconds
+        return f"{seconds:.0f} s" if seconds < 90.0 else f"{seconds / 60.0:.0f} min"
+
+    @property
     def words(self) -> str:
         """What the search will take."""
         kind = "" if self.effort == USUAL else "; a coarse search, since --minutes allows no more"
-        return f"{self.seconds:.2g} s a flight, at most about {self.flights} flights: {_minutes(self)}{kind}"
+        return f"{self.seconds:.2g} s a flight, at most about {self.flights} flights: {self.time}{kind}"
 
 
 def affordable(problem: Problem, minutes: float = MINUTES) -> Budget:
@@ -56,7 +58,7 @@ def affordable(problem: Problem, minutes: float = MINUTES) -> Budget:
     from flipproof.foreign.solving import solve
 
     took = []
-    for _ in range(TIMED):
+    for _ in range(3):  # the fastest counts, since the first one loads the solver
         began = time.perf_counter()
         solve(problem.throw, spec=problem.solver, times=problem.measured.t)
         took.append(time.perf_counter() - began)
@@ -71,11 +73,6 @@ def chosen(problem: Problem, seconds: float, minutes: float) -> Budget:
             return budget
     raise ValueError(
         f"model = {problem.solver!r} takes {seconds:.2g} s a flight; even a coarse fit makes about {budget.flights} of "
-        f"them, {_minutes(budget)}, more than --minutes {minutes:g}: take fewer --slices, a longer step in the solver, "
+        f"them, {budget.time}, more than --minutes {minutes:g}: take fewer --slices, a longer step in the solver, "
         f"or more --minutes; flipproof place says which of flipproof's own equations fits as well in seconds"
     )
-
-
-def _minutes(budget: Budget) -> str:
-    seconds = budget.flights * budget.seconds
-    return f"{seconds:.0f} s" if seconds < 90.0 else f"{seconds / 60.0:.0f} min"

@@ -11,12 +11,11 @@ import numpy as np
 
 from flipproof.film.fit.estimate import Estimate
 from flipproof.film.fit.problem import package_of
-from flipproof.film.fit.temperature import fits
+from flipproof.film.fit.region import fits
 from flipproof.film.fit.uncertainty import Interval, intervals
 
 INDISTINCT: Final = 4.0
 """Difference of AIC up to which two equations are said to do equally well."""
-
 
 COUNTED: Final = ("eq8", "free-flight")
 """Equations of the reference whose intervals held the truth in at least 90 of 100 twins (``benchmarks/twins.py``)."""
@@ -28,8 +27,6 @@ class Contender:
 
     Parameters
     ----------
-    estimate : Estimate
-    intervals : tuple of Interval
     misfit : float - root mean square residual in units of the noise
     fits : whether noise alone makes residuals this large
     aic : float - Akaike's criterion less that of the best, chi^2 taken in units of what the best equation leaves if
@@ -54,13 +51,7 @@ class Contender:
 
 
 def compare(estimates: Sequence[Estimate]) -> tuple[Contender, ...]:
-    """Return the fits of one measurement by several equations, the best first.
-
-    Raises
-    ------
-    ValueError
-        If the measurements or the assumed noise are not the same.
-    """
+    """Return the fits by several equations, the best first; fits of different measurements or noise are refused."""
     first = estimates[0].problem
     for estimate in estimates[1:]:
         if estimate.problem.measured is not first.measured or estimate.problem.noise != first.noise:
@@ -84,10 +75,8 @@ def compare(estimates: Sequence[Estimate]) -> tuple[Contender, ...]:
 def verdict(contenders: Sequence[Contender]) -> str:
     """Return what a comparison says, in plain words."""
     best, *others = contenders
-    if best.estimate.problem.measured.quantity == "omega":
-        noise = "the noise of its neighbours' differences"
-    else:
-        noise = "the camera's noise"
+    angle = best.estimate.problem.measured.quantity == "theta"
+    noise = "the camera's noise" if angle else "the noise of its neighbours' differences"
     words = [
         f"{best.solver} leaves {best.misfit:.3g} times {noise}"
         + (": it explains the flight." if best.fits else ", more than chance: it does not explain the flight.")
@@ -97,7 +86,8 @@ def verdict(contenders: Sequence[Contender]) -> str:
     equal = [one.solver for one in others if one.aic <= INDISTINCT]
     worse = [one for one in others if one.aic > INDISTINCT]
     if equal:
-        words.append(f"The data cannot tell it from {_listed(equal)}.")
+        *first, last = equal
+        words.append(f"The data cannot tell it from {', '.join(first)}{' and ' if first else ''}{last}.")
     words += [f"{one.solver} leaves {one.misfit:.3g} times the noise (AIC {one.aic:.0f} higher)." for one in worse]
     if worse:
         words.append(
@@ -105,10 +95,6 @@ def verdict(contenders: Sequence[Contender]) -> str:
             f"number. The least is best; up to {INDISTINCT:g} more is no difference."
         )
     return " ".join(words)
-
-
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def promise(solver: str, *, fits: bool) -> str:
@@ -131,9 +117,7 @@ def told(interval: Interval) -> str:
         return f"the data cannot tell it: the interval all but covers [{low:.3g}, {high:.3g}], all that was searched"
     if interval.verdict == "bounded below":
         return f"bounded from below only: the search ended at {high:.3g}"
-    if interval.verdict == "bounded above":
-        return f"bounded from above only: {low:.3g} is not excluded"
-    return ""
+    return f"bounded from above only: {low:.3g} is not excluded" if interval.verdict == "bounded above" else ""
 
 
 def digits(interval: Interval) -> int:

@@ -13,27 +13,18 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from scipy.ndimage import minimum_filter
 
 from flipproof.film.fit.landscape import Landscape, Tick, loss
 from flipproof.film.fit.problem import Problem
-from flipproof.film.fit.region import Points, explored, roughness
-from flipproof.film.fit.temperature import fits, temperature
+from flipproof.film.fit.region import Points, explored, fits, roughness, temperature
 from slicemodel.trajectory import FloatArray
-
-MISFIT: Final = 2.0
-"""Typical residual, in standard deviations of the noise, beyond which the equation is taken not to fit."""
 
 LIKELY: Final = 5.024
 """97.5 % point of chi^2 with one degree of freedom: two intervals that miss in 2.5 % each miss in 5 % together."""
 
 REACH: Final = 15.0
 """chi^2 above the lowest up to which parameters are explored at the least: 0.06 % of two lie beyond, 0.5 % of four."""
-
-NEARLY: Final = 30.0
-"""chi^2 above the lowest up to which the neighbourhood of a descent's end is explored from."""
-
-SPREAD: Final = 1.5
-"""Standard deviation of the points around a descent's end, in units of that of its estimate."""
 
 DRAWN: Final = 2000
 """Points that the posterior is drawn with."""
@@ -67,7 +58,6 @@ class Estimate:
 
     Parameters
     ----------
-    problem : Problem
     x : (K,) - coordinates of the lowest chi^2
     chi2 : float - Huber's loss at ``x`` in units of the noise
     temperature : float - variance that the intervals rest on, in units of the noise's
@@ -90,12 +80,6 @@ class Estimate:
     flights: int
 
     @property
-    def values(self) -> dict[str, float]:
-        """Estimated parameters [SI] by name."""
-        pairs = zip(self.problem.free, self.x, strict=True)
-        return {name: self.problem.value(name, float(c)) for name, c in pairs}
-
-    @property
     def freedom(self) -> int:
         """Values less parameters."""
         return self.problem.points - len(self.x)
@@ -108,12 +92,8 @@ class Estimate:
 def estimate(problem: Problem, effort: Effort = USUAL, *, tick: Tick = lambda _: None, seed: int = 0) -> Estimate:
     """Return the least-squares estimate and what else the data allow.
 
-    Parameters
-    ----------
-    problem : Problem
-    effort : Effort - how many flights the search may make
-    tick : callable - called with the number of flights made
-    seed : int - of the noise that is simulated to correct intervals for roughness
+    ``tick`` is called with the number of flights made; ``seed`` is that of the noise that is simulated to correct
+    intervals for roughness.
     """
     land = Landscape(problem, tick=tick)
     scanned, ends = _descents(land, effort.grid, effort.starts)
@@ -127,10 +107,11 @@ def estimate(problem: Problem, effort: Effort = USUAL, *, tick: Tick = lambda _:
     residuals = land.residuals(ends)
     steps = problem.coarse_steps()
     typical = float((1.4826 * np.median(np.abs(residuals), axis=1)).min())
-    land = land.rescaled(typical if typical > MISFIT else 1.0)
+    land.scale = typical if typical > 2.0 else 1.0
     levels = loss(residuals / land.scale)
     order = np.argsort(levels)
-    known = Points.flown(land, np.concatenate((scanned, ends, _around(land, ends[levels <= levels.min() + NEARLY]))))
+    around = _around(land, ends[levels <= levels.min() + 30.0])
+    known = Points.flown(land, np.concatenate((scanned, ends, around)))
     best, lowest = ends[order[0]], float(levels[order[0]])
     variance, rough, needed = temperature(land, best, steps), 1.0, REACH
     for _ in range(4):
@@ -138,7 +119,12 @@ def estimate(problem: Problem, effort: Effort = USUAL, *, tick: Tick = lambda _:
         known = explored(land, known, within, effort.points)
         cloud = known.x[known.drawn(variance, DRAWN)]
         steps = np.clip(0.5 * cloud.std(axis=0), problem.coarse_steps() / 40.0, problem.coarse_steps())
-        best, lowest = _polished(land, known, best, lowest, steps)
+        first = int(np.argmin(known.chi2))
+        if known.chi2[first] < lowest:
+            best, lowest = known.x[first], float(known.chi2[first])
+        x, level = land.descend(best, steps, 8)
+        if level < lowest:
+            best, lowest = x, level
         variance = temperature(land, best, steps)
         rough = roughness(known, variance, seed)
         needed = max(REACH, 1.2 * LIKELY * rough)
@@ -163,26 +149,15 @@ def _descents(land: Landscape, counts: tuple[int, int], starts: int) -> tuple[Fl
 
 
 def _around(land: Landscape, ends: FloatArray) -> FloatArray:
-    """Return points around the ends of descents, spread as far and as aslant as a smooth landscape would allow."""
+    """Return points around the ends of descents, spread by 1.5 times what a smooth landscape would allow, as aslant."""
     rng = np.random.default_rng(len(ends))
     found = []
     for x in ends:
         slopes = land.jacobian(x, land.problem.coarse_steps())
         # A prior as wide as the bounds keeps the curvature invertible where the data say nothing.
         curvature = slopes.T @ slopes + np.diag((land.high - land.low) ** -2.0)
-        found.append(rng.multivariate_normal(x, SPREAD**2 * np.linalg.inv(curvature), size=16 * len(x)))
+        found.append(rng.multivariate_normal(x, 1.5**2 * np.linalg.inv(curvature), size=16 * len(x)))
     return np.clip(np.concatenate(found), land.low, land.high)
-
-
-def _polished(
-    land: Landscape, known: Points, best: FloatArray, lowest: float, steps: FloatArray
-) -> tuple[FloatArray, float]:
-    """Return the lowest point known after a descent from it, and its chi^2."""
-    first = int(np.argmin(known.chi2))
-    if known.chi2[first] < lowest:
-        best, lowest = known.x[first], float(known.chi2[first])
-    x, level = land.descend(best, steps, 8)
-    return (x, level) if level < lowest else (best, lowest)
 
 
 def scan(land: Landscape, counts: tuple[int, int] = USUAL.grid) -> FloatArray:
@@ -190,8 +165,6 @@ def scan(land: Landscape, counts: tuple[int, int] = USUAL.grid) -> FloatArray:
 
     At each point the other coordinates have been fitted by two Gauss-Newton steps with one set of difference quotients.
     """
-    from scipy.ndimage import minimum_filter
-
     axes = [np.linspace(land.low[k], land.high[k], count + 2)[1:-1] for k, count in enumerate(counts)]
     pairs = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     others = np.tile(land.problem.start()[2:], (len(pairs), 1))
@@ -204,14 +177,13 @@ def _levelled(land: Landscape, points: FloatArray) -> tuple[FloatArray, FloatArr
     """Return points with all coordinates but drag and restitution fitted, and chi^2 there."""
     others = np.arange(2, points.shape[1])
     if not others.size:
-        return points, land.many(points)
+        return points, loss(land.residuals(points))
     steps = land.problem.coarse_steps()
     moved = np.repeat(points, len(others), axis=0)
     moved[np.arange(len(moved)), np.tile(others, len(points))] += np.tile(steps[others], len(points))
     residuals = land.residuals(points)
-    slopes = (land.residuals(moved).reshape(len(points), len(others), -1) - residuals[:, np.newaxis]) / steps[
-        others, np.newaxis
-    ]
+    rise = land.residuals(moved).reshape(len(points), len(others), -1) - residuals[:, np.newaxis]
+    slopes = rise / steps[others, np.newaxis]
     best, lowest = points, loss(residuals)
     for _ in range(2):
         moves = [np.linalg.lstsq(j.T, -r, rcond=None)[0] for j, r in zip(slopes, residuals, strict=True)]

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.film.fit.compare import Contender
 from flipproof.film.fit.problem import SYMBOLS, UNITS
+from flipproof.output.columns import columns_csv
 
 MEASURED = {"color": "#000000", "marker": ".", "linestyle": "none", "markersize": 2.5, "zorder": 5}
 
@@ -21,34 +20,27 @@ def figure_residuals(contenders: Sequence[Contender]) -> Figure:
     problem = contenders[0].estimate.problem
     measured = problem.measured
     angle = measured.quantity == "theta"
-    rows = 1 + len(contenders)
-    heights = [2.2] + [1.0] * len(contenders)
-    figure, axes = new_figure(
-        rows, size=(8.0, 3.2 + 1.4 * len(contenders)), sharex=True, gridspec_kw={"height_ratios": heights}
-    )
-    for k, one in enumerate(contenders):
-        fitted = measured.values - one.estimate.residual()
-        axes[0].plot(measured.t, fitted, label=one.solver, **solver_style(one.solver, k))
-        _residual(axes[k + 1], one, k, 1e3 if angle else 1.0)
-    axes[0].plot(measured.t, measured.values, label="measured", **MEASURED)
-    axes[0].set_ylabel("θ [rad]" if angle else "ω [rad/s]")
-    axes[0].legend()
-    axes[0].set_title(f"{measured.label}: measured and fitted", fontsize=10, loc="left")
-    axes[-1].set_xlabel("time from release [s]")
+    scale = 1e3 if angle else 1.0
+    noise = scale * problem.noise
+    figure, (above, *below) = new_figure(
+        1 + len(contenders), size=(8.0, 3.2 + 1.4 * len(contenders)), sharex=True,
+        gridspec_kw={"height_ratios": [2.2] + [1.0] * len(contenders)},
+    )  # fmt: skip
+    for k, (axes, one) in enumerate(zip(below, contenders, strict=True)):
+        residual, look = one.estimate.residual(), solver_style(one.solver, k)
+        above.plot(measured.t, measured.values - residual, label=one.solver, **look)
+        axes.axhspan(-2 * noise, 2 * noise, color="#dddddd", linewidth=0)
+        axes.axhline(0.0, color="#444444", linewidth=0.8)
+        axes.plot(measured.t, scale * residual, ".", color=look["color"], markersize=4)
+        words = f"{one.solver}: {one.misfit:.3g} times the noise (grey: twice the noise either way)"
+        axes.set_title(words, fontsize=9, loc="left")
+    above.plot(measured.t, measured.values, label="measured", **MEASURED)
+    above.set_ylabel("θ [rad]" if angle else "ω [rad/s]")
+    above.legend()
+    above.set_title(f"{measured.label}: measured and fitted", fontsize=10, loc="left")
+    below[-1].set_xlabel("time from release [s]")
     figure.supylabel(f"measured − fitted [{'mrad' if angle else 'rad/s'}]", fontsize=10, y=0.3)
     return figure
-
-
-def _residual(axes: Axes, one: Contender, k: int, scale: float) -> None:
-    problem = one.estimate.problem
-    noise = scale * problem.noise
-    axes.axhspan(-2 * noise, 2 * noise, color="#dddddd", linewidth=0)
-    axes.axhline(0.0, color="#444444", linewidth=0.8)
-    colour = solver_style(one.solver, k)["color"]
-    axes.plot(problem.measured.t, scale * one.estimate.residual(), ".", color=colour, markersize=4)
-    axes.set_title(
-        f"{one.solver}: {one.misfit:.3g} times the noise (grey: twice the noise either way)", fontsize=9, loc="left"
-    )
 
 
 @styled
@@ -79,10 +71,8 @@ def figure_allowed(contenders: Sequence[Contender]) -> Figure:
 def residual_table(contenders: Sequence[Contender]) -> str:
     """Return measured, fitted and residual of every equation as CSV text."""
     measured = contenders[0].estimate.problem.measured
-    names, columns = ["t", measured.quantity], [measured.t, measured.values]
+    columns = {"t": measured.t, measured.quantity: measured.values}
     for one in contenders:
         residual = one.estimate.residual()
-        names += [f"fitted {one.solver}", f"residual {one.solver}"]
-        columns += [measured.values - residual, residual]
-    rows = [",".join(f"{value:.9g}" for value in row) for row in np.column_stack(columns)]
-    return "\n".join([",".join(names), *rows]) + "\n"
+        columns |= {f"fitted {one.solver}": measured.values - residual, f"residual {one.solver}": residual}
+    return columns_csv(columns)

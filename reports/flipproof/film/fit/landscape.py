@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from flipproof.film.fit.problem import Problem
 from slicemodel.trajectory import FloatArray
@@ -15,30 +16,19 @@ HUBER: Final = 3.0
 """Residuals beyond this many standard deviations count linearly (Huber's loss), so that a slipped marker does not
 decide; within it nothing changes."""
 
-Index = NDArray[np.intp]
 Tick = Callable[[int], object]
 
 
 class Landscape:
-    """chi^2 of a problem, and how often it was asked for.
+    """chi^2 of a problem, and how often it was asked for; ``tick`` is called with the number of flights made.
 
-    Parameters
-    ----------
-    problem : Problem
-    scale : float - residuals are divided by ``problem.noise * scale`` before the loss
-    tick : callable - called with the number of flights that were made
+    Residuals are divided by ``problem.noise * scale`` before the loss.
     """
 
-    def __init__(self, problem: Problem, *, scale: float = 1.0, tick: Tick = lambda _: None) -> None:
-        self.problem, self.scale, self.tick = problem, scale, tick
+    def __init__(self, problem: Problem, *, tick: Tick = lambda _: None) -> None:
+        self.problem, self.tick = problem, tick
         self.low, self.high = problem.bounds()
-        self.flights = 0
-
-    def rescaled(self, scale: float) -> Landscape:
-        """Return the same landscape in other units of residuals; flights are counted on."""
-        other = Landscape(self.problem, scale=scale, tick=self.tick)
-        other.flights = self.flights
-        return other
+        self.scale, self.flights = 1.0, 0
 
     def residuals(self, points: FloatArray) -> FloatArray:
         """Return the residuals at many points (M, K) in standard deviations, shape (M, P)."""
@@ -51,19 +41,8 @@ class Landscape:
         """Return the residuals at ``x`` in standard deviations, shape (P,)."""
         return np.asarray(self.residuals(x[np.newaxis])[0])
 
-    def many(self, points: FloatArray) -> FloatArray:
-        """Return chi^2 at many points (M, K), shape (M,)."""
-        return loss(self.residuals(points)) if len(points) else np.empty(0)
-
-    def chi2(self, x: FloatArray) -> float:
-        """Return the sum of Huber's loss over the residuals at ``x``."""
-        return float(loss(self.residual(x)))
-
     def jacobian(self, x: FloatArray, steps: FloatArray) -> FloatArray:
-        """Return d residual / d x by central difference quotients over ``steps``, shape (P, K).
-
-        At a bound the quotient is one-sided.
-        """
+        """Return d residual / d x by central difference quotients over ``steps``, at bounds one-sided, shape (P, K)."""
         up = np.minimum(x + np.diag(steps), self.high)
         down = np.maximum(x - np.diag(steps), self.low)
         above, below = np.split(self.residuals(np.concatenate((up, down))), 2)
@@ -72,31 +51,15 @@ class Landscape:
     def descend(self, x: FloatArray, steps: FloatArray, flights: int) -> tuple[FloatArray, float]:
         """Minimise chi^2 from ``x``; return where it ended, and chi^2 there.
 
-        Parameters
-        ----------
-        steps : (K,) - of the difference quotients
-        flights : int - trial points at the most
+        ``steps`` (K,) are those of the difference quotients, ``flights`` the trial points at the most.
         """
-        from scipy.optimize import least_squares
-
-        def slopes(here: FloatArray) -> FloatArray:
-            return self.jacobian(here, steps)
-
         # The solver wants its start strictly inside.
         margin = 1e-9 * (self.high - self.low)
         found = least_squares(
-            self.residual,
-            np.clip(x, self.low + margin, self.high - margin),
-            jac=slopes,
-            bounds=(self.low, self.high),
-            x_scale=steps,
-            loss="huber",
-            f_scale=HUBER,
-            ftol=1e-5,
-            xtol=1e-5,
-            gtol=1e-8,
-            max_nfev=flights,
-        )
+            self.residual, np.clip(x, self.low + margin, self.high - margin), bounds=(self.low, self.high),
+            jac=partial(self.jacobian, steps=steps), x_scale=steps, loss="huber", f_scale=HUBER, ftol=1e-5,
+            xtol=1e-5, gtol=1e-8, max_nfev=flights,
+        )  # fmt: skip
         return np.asarray(found.x), 2.0 * float(found.cost)
 
 

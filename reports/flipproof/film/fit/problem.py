@@ -31,21 +31,11 @@ SYMBOLS: Final[Mapping[str, str]] = {"drag": "α", "restitution": "e", "omega0":
 FEWEST: Final = 12
 """Frames of a flight that can be fitted at the least."""
 
-MOST_DAMPING: Final = 5.0
-"""Largest damping rate that is searched, in units of |omega0|: there a slice creeps less than a fifth of its distance
-from the centre in the time the bottle turns by 2 rad."""
-
 SLICES: Final = 50
 """Slices that a throw is cut into, unless it is cut into fewer."""
 
 FAR: Final = 1e6
 """Residual, in standard deviations, of a flight that the solver could not finish."""
-
-STILL: Final = 8.0
-"""Angle, or angular velocity, in standard deviations of its noise, up to which nothing is taken to turn."""
-
-STEP: Final = 5e-4
-"""Longest step of a scheme [s]: the paper's own, 1000 of them in half a second."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +44,6 @@ class Measurement:
 
     Parameters
     ----------
-    label : str
     t : (P,) - seconds from release, increasing, the first at least 0
     values : (P,) - theta [rad] or omega [rad/s]
     quantity : "theta" or "omega"
@@ -113,15 +102,10 @@ class Problem:
 
     Parameters
     ----------
-    measured : Measurement
-    throw : Scenario
-        Everything that is not fitted, cut into the slices of the fit; its duration is that of the flight.
-    solver : str
-        A scheme of ``slicemodel`` or a model of ``ode_reference``.
-    free : tuple of str
-        Names of the fitted parameters, from ``ALWAYS`` and ``ALSO``.
-    noise : float
-        Standard deviation of one value [rad or rad/s].
+    throw : Scenario - all that is not fitted, cut into the slices of the fit; its duration is that of the flight
+    solver : str - a scheme of ``slicemodel``, a model of ``ode_reference`` or somebody else's
+    free : tuple of str - names of the fitted parameters, from ``ALWAYS`` and ``ALSO``
+    noise : float - standard deviation of one value [rad or rad/s]
     """
 
     measured: Measurement
@@ -136,11 +120,6 @@ class Problem:
         return len(self.measured.t)
 
     @property
-    def most_damping(self) -> float:
-        """Largest damping rate that is searched [1/s]."""
-        return MOST_DAMPING * abs(self.throw.omega0)
-
-    @property
     def _damping_scale(self) -> float:
         return abs(self.throw.omega0) / 20.0
 
@@ -149,8 +128,10 @@ class Problem:
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Return lowest and highest admissible coordinates, each of shape (K,)."""
         reach = 0.3 * abs(self.throw.omega0)
+        # At a damping rate of 5 omega0 a slice creeps less than a fifth of its distance from the centre in the time the
+        # bottle turns by 2 rad.
         limits = {
-            "drag": (0.0, math.asinh(self.most_damping / self._damping_scale)),
+            "drag": (0.0, math.asinh(5.0 * abs(self.throw.omega0) / self._damping_scale)),
             "restitution": (0.0, 1.0),
             "omega0": (self.throw.omega0 - reach, self.throw.omega0 + reach),
             "theta0": (self.throw.theta0 - 0.5, self.throw.theta0 + 0.5),
@@ -174,12 +155,6 @@ class Problem:
         if name == "drag":
             return math.asinh(value / (2.0 * self.throw.slice_mass * self._damping_scale))
         return float(value)
-
-    def slope(self, name: str, coordinate: float) -> float:
-        """Return d(parameter) / d(coordinate)."""
-        if name == "drag":
-            return 2.0 * self.throw.slice_mass * self._damping_scale * math.cosh(coordinate)
-        return 1.0
 
     def start(self) -> FloatArray:
         """Return the coordinates of the throw itself, moved inside the bounds, shape (K,)."""
@@ -223,21 +198,25 @@ def predict(throws: Sequence[Scenario], solver: str, measured: Measurement) -> F
 def flights(throws: Sequence[Scenario], solver: str, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return theta and omega of throws of equal duration at ``times`` by the settings of a fit, each of shape (M, P).
 
-    A scheme runs on a grid of ``STEP`` and is interpolated; the reference and somebody else's solver are asked for the
-    times themselves. Where the latter gives no answer, theta and omega are NaN.
-
-    Raises
-    ------
-    ValueError
-        If the solver is an engine, or a curve in a file.
+    A scheme runs in steps of 0.5 ms and is interpolated; the reference and somebody else's solver are asked for the
+    times themselves. Where the latter gives no answer, theta and omega are NaN. Refuses solvers as ``package_of``.
     """
     package = package_of(solver)
     if package == FOREIGN:
-        return foreign_flights(throws, solver, times)
+        from flipproof.foreign.solving import solve
+        from flipproof.foreign.specs import ForeignError
+
+        found = np.full((2, len(throws), len(times)), np.nan)
+        for k, throw in enumerate(throws):
+            with suppress(ForeignError):
+                run = solve(throw, spec=solver, times=times)
+                found[:, k] = run.theta, run.omega
+        return found[0], found[1]
     if package == "slicemodel":
         from slicemodel.batch import solve_batch
 
-        steps = math.ceil(throws[0].duration / STEP) + 1
+        # The paper's own step, 1000 of them in half a second.
+        steps = math.ceil(throws[0].duration / 5e-4) + 1
         batch = solve_batch(throws, solver, steps)
         return sampled(np.linspace(0.0, throws[0].duration, steps), batch.theta, batch.omega, times)
     from ode_reference import solve as solve_one
@@ -265,27 +244,8 @@ def sampled(grid: FloatArray, theta: FloatArray, omega: FloatArray, times: Float
     return between, (1 - s) * omega[:, k] + s * omega[:, k + 1]
 
 
-def foreign_flights(throws: Sequence[Scenario], spec: str, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return theta and omega of throws by somebody else's solver at ``times``, each of shape (M, P)."""
-    from flipproof.foreign.solving import solve
-    from flipproof.foreign.specs import ForeignError
-
-    found = np.full((2, len(throws), len(times)), np.nan)
-    for k, throw in enumerate(throws):
-        with suppress(ForeignError):
-            run = solve(throw, spec=spec, times=times)
-            found[:, k] = run.theta, run.omega
-    return found[0], found[1]
-
-
 def package_of(solver: str) -> str:
-    """Return the package of a solver that can be fitted.
-
-    Raises
-    ------
-    ValueError
-        If there is no such solver, or it is an engine, or a curve in a file.
-    """
+    """Return the package of a solver that can be fitted; an engine, a curve in a file, an unknown name are refused."""
     from flipproof.foreign.specs import check_asked
     from flipproof.frame.solvers import catalogue, find
 
@@ -299,20 +259,13 @@ def package_of(solver: str) -> str:
 
 
 def pose(
-    measured: Measurement,
-    throw: Scenario,
-    solver: str,
-    *,
-    also: tuple[str, ...] = (),
-    slices: int | None = None,
+    measured: Measurement, throw: Scenario, solver: str, *, also: Sequence[str] = (), slices: int | None = None
 ) -> Problem:
     """Return the problem of fitting ``solver`` to ``measured``.
 
     Parameters
     ----------
-    measured : Measurement
     throw : Scenario - what is known of the throw; its duration gives way to the measured one
-    solver : str
     also : names from ``ALSO`` - fitted too; they start from the measurement's first frames
     slices : int or None - None: ``SLICES``, or the throw's if fewer
 
@@ -346,10 +299,11 @@ def _refuse_still(measured: Measurement, noise: float) -> None:
     name, unit, values = measured.quantity, measured.unit, measured.values
     angle = name == "theta"
     most = float(np.ptp(values) if angle else np.max(np.abs(values)))
-    if most <= STILL * noise:
+    enough = 8.0
+    if most <= enough * noise:
         raise ValueError(
             f"{measured.label}: nothing turns: {name} {'changes by' if angle else 'is at most'} {most:.2g} {unit} in "
-            f"{len(values)} frames; more than {STILL:g} times its noise of {noise:.2g} {unit} is needed"
+            f"{len(values)} frames; more than {enough:g} times its noise of {noise:.2g} {unit} is needed"
         )
     if not angle and float(np.ptp(values)) == 0.0:
         raise ValueError(
@@ -361,9 +315,8 @@ def _refuse_still(measured: Measurement, noise: float) -> None:
 def first_frames(measured: Measurement) -> dict[str, float]:
     """Return omega0, and theta0 if the angle was measured, by a parabola through the first eighth of the flight."""
     count = max(6, len(measured.t) // 8)
-    t, values = measured.t[:count], measured.values[:count]
-    degree = 2 if measured.quantity == "theta" else 1
-    polynomial = np.polynomial.Polynomial.fit(t, values, degree)
-    if measured.quantity == "theta":
-        return {"theta0": float(polynomial(0.0)), "omega0": float(polynomial.deriv()(0.0))}
-    return {"omega0": float(polynomial(0.0))}
+    angle = measured.quantity == "theta"
+    found = np.polynomial.Polynomial.fit(measured.t[:count], measured.values[:count], 2 if angle else 1)
+    if angle:
+        return {"theta0": float(found(0.0)), "omega0": float(found.deriv()(0.0))}
+    return {"omega0": float(found(0.0))}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -17,19 +17,16 @@ QUANTITIES: Final[tuple[Quantity, ...]] = ("theta", "omega")
 """What is fitted, the first that a table has: the noise of measured angles is independent from frame to frame."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Averaged:
-    """What the paper does to a measured angle (section 3): central differences, then the mean of ``points``."""
+def averaged_omega(t: FloatArray, theta: FloatArray, points: int) -> FloatArray:
+    """Return omega [rad/s] as the paper makes it of an angle (section 3): central differences, then the mean of points.
 
-    points: int
-
-    def __call__(self, t: FloatArray, theta: FloatArray) -> FloatArray:
-        """Return omega [rad/s], shape (P,); near the ends over as many points as there are on the shorter side."""
-        omega = np.gradient(theta, t)
-        total = np.concatenate(([0.0], np.cumsum(omega)))
-        place = np.arange(len(t))
-        reach = np.minimum(self.points // 2, np.minimum(place, len(t) - 1 - place))
-        return np.asarray((total[place + reach + 1] - total[place - reach]) / (2 * reach + 1))
+    Near the ends the mean is over as many points as there are on the shorter side.
+    """
+    omega = np.gradient(theta, t)
+    total = np.concatenate(([0.0], np.cumsum(omega)))
+    place = np.arange(len(t))
+    reach = np.minimum(points // 2, np.minimum(place, len(t) - 1 - place))
+    return np.asarray((total[place + reach + 1] - total[place - reach]) / (2 * reach + 1))
 
 
 def read_flight(
@@ -45,7 +42,6 @@ def read_flight(
 
     Parameters
     ----------
-    path : Path
     quantity : what to fit; None: theta if the table has it
     release, landing : [s] by the table's clock; None: its first and last row
     noise : standard deviation of one value, if known
@@ -58,13 +54,14 @@ def read_flight(
         Naming file, line and column.
     """
     names, rows = read_cells(path)
-    if "t" not in names:
-        raise ValueError(f"{path}: the header has no column t; it has {shortened(', '.join(names), 80)}")
     there = [name for name in QUANTITIES if name in names]
+    has = f"; it has {shortened(', '.join(names), 80)}"
+    if "t" not in names:
+        raise ValueError(f"{path}: the header has no column t{has}")
     if not there:
-        raise ValueError(f"{path}: the header has neither theta nor omega; it has {shortened(', '.join(names), 80)}")
-    if quantity is not None and quantity not in there:
-        raise ValueError(f"{path}: the header has no column {quantity}; it has {shortened(', '.join(names), 80)}")
+        raise ValueError(f"{path}: the header has neither theta nor omega{has}")
+    if quantity and quantity not in there:
+        raise ValueError(f"{path}: the header has no column {quantity}{has}")
     chosen = quantity or there[0]
     places = names.index("t"), names.index(chosen)
     table = np.array(
@@ -75,77 +72,41 @@ def read_flight(
     if not (np.diff(t) > 0).all():
         late = int(np.flatnonzero(~(np.diff(t) > 0))[0])
         raise ValueError(f"{path}: t does not increase: {t[late + 1]:g} s follows {t[late]:g} s")
-    return cut(path.name, t, values, chosen, release=release, landing=landing, noise=noise, averaged=averaged)
+    if averaged is not None and (averaged < 1 or averaged % 2 == 0):
+        raise ValueError(f"averaged = {averaged} is not an odd number of points in [1, inf)")
+    if averaged is not None and chosen == "theta":
+        raise ValueError("averaged tells how omega was made of theta; the fitted column is theta")
+    if not len(t):
+        raise ValueError(f"{path.name}: has no row of numbers")
+    began, ended = t[0] if release is None else release, t[-1] if landing is None else landing
+    if not began < ended:
+        raise ValueError(f"{path.name}: landing = {ended:g} s does not follow release = {began:g} s")
+    # A frame at the very release may be a rounding before it.
+    inside = (t >= began - 1e-9) & (t <= ended + 1e-9)
+    return Measurement(
+        label=path.name,
+        t=np.maximum(t[inside] - began, 0.0),
+        values=values[inside],
+        quantity=chosen,
+        noise=noise,
+        operator=None if averaged is None else partial(averaged_omega, points=averaged),
+    )
 
 
-def read_tracker(
-    path: Path,
-    *,
-    cap: str,
-    base: str,
-    length_unit: str = "",
-    release: float | None = None,
-    landing: float | None = None,
-    noise: float | None = None,
-) -> tuple[Measurement, str]:
-    """Read an export of Tracker by ``flipproof.film.tracker`` and return the flight in it, and how its ends were found.
+def read_tracker(path: Path, *, noise: float | None = None, **asked: Any) -> tuple[Measurement, str]:
+    """Return the flight in an export of Tracker, and how its ends were found; raise as ``tracker.bench.measure``.
 
     The angles are those of Eq. 1 in the frames in which cap and base were tracked; none is interpolated or smoothed.
-
-    Raises
-    ------
-    ValueError
-        As ``flipproof.film.tracker.bench.measure``.
+    ``asked`` are fields of ``tracker.bench.Request``: cap, base, length_unit, release, landing.
     """
     from flipproof.film.tracker.bench import Request, measure
 
-    found = measure(
-        Request(files=(path,), cap=cap, base=base, length_unit=length_unit, release=release, landing=landing)
-    )
+    found = measure(Request(files=(path,), **asked))
     spin, flight = found.spin, found.flight
     tracked = flight.inside & spin.measured
-    measured = Measurement(
-        label=path.name,
-        t=np.maximum(spin.t[tracked] - flight.release, 0.0),
-        values=spin.theta[tracked],
-        quantity="theta",
-        noise=noise,
-    )
+    t = np.maximum(spin.t[tracked] - flight.release, 0.0)
     words = (
         f"release at {flight.release:.4f} s ({flight.release_how}), landing at {flight.landing:.4f} s "
         f"({flight.landing_how})"
     )
-    return measured, words
-
-
-def cut(
-    label: str,
-    t: FloatArray,
-    values: FloatArray,
-    quantity: Quantity,
-    *,
-    release: float | None,
-    landing: float | None,
-    noise: float | None,
-    averaged: int | None,
-) -> Measurement:
-    """Return the rows from release to landing as a measurement whose clock starts at the release."""
-    if averaged is not None and (averaged < 1 or averaged % 2 == 0):
-        raise ValueError(f"averaged = {averaged} is not an odd number of points in [1, inf)")
-    if averaged is not None and quantity == "theta":
-        raise ValueError("averaged tells how omega was made of theta; the fitted column is theta")
-    if not len(t):
-        raise ValueError(f"{label}: has no row of numbers")
-    began, ended = t[0] if release is None else release, t[-1] if landing is None else landing
-    if not began < ended:
-        raise ValueError(f"{label}: landing = {ended:g} s does not follow release = {began:g} s")
-    # A frame at the very release may be a rounding before it.
-    inside = (t >= began - 1e-9) & (t <= ended + 1e-9)
-    return Measurement(
-        label=label,
-        t=np.maximum(t[inside] - began, 0.0),
-        values=values[inside],
-        quantity=quantity,
-        noise=noise,
-        operator=None if averaged is None else Averaged(points=averaged),
-    )
+    return Measurement(label=path.name, t=t, values=spin.theta[tracked], noise=noise), words

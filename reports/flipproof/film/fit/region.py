@@ -10,22 +10,14 @@ and the farthest of them below a bound of chi^2 are the ends of a profile likeli
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2 as distribution
+from scipy.stats.qmc import Halton
 
-from flipproof.film.fit.landscape import Landscape, loss
+from flipproof.film.fit.landscape import HUBER, Landscape, loss
 from slicemodel.trajectory import FloatArray
-
-BOXES: Final = 40
-"""Boxes at the most."""
-
-FEWEST: Final = 12
-"""Points for each parameter that a box is drawn around at the least."""
-
-MARGIN: Final = 0.15
-"""By what share of its extent a box reaches beyond the points that it is drawn around, on either side."""
 
 Draws = NDArray[np.intp]
 
@@ -53,8 +45,9 @@ class Points:
 
     def with_more(self, other: Points) -> Points:
         """Return these points and those of ``other``."""
-        names = ("x", "rows", "chi2")
-        return Points(**{name: np.concatenate((getattr(self, name), getattr(other, name))) for name in names})
+        pairs = (self.x, other.x), (self.rows, other.rows), (self.chi2, other.chi2)
+        x, rows, chi2 = (np.concatenate(pair) for pair in pairs)
+        return Points(x=x, rows=rows, chi2=chi2)
 
     def below(self, level: float, fewest: int, first: int = 0) -> Points:
         """Return the points from ``first`` on of chi^2 up to ``level``, and at least the ``fewest`` lowest of them."""
@@ -80,11 +73,14 @@ class Box:
 
     @classmethod
     def around(cls, x: FloatArray, least: FloatArray) -> Box:
-        """Return the box around points (S, K), whose standard deviations count as ``least`` (K,) or more."""
+        """Return the box around points (S, K), whose standard deviations count as ``least`` (K,) or more.
+
+        On either side it reaches beyond them by 15 % of their extent.
+        """
         centre = np.asarray(x.mean(axis=0), dtype=np.float64)
         axes = np.asarray(np.linalg.cholesky(np.cov(x.T) + np.diag(least**2)), dtype=np.float64)
         low, high = _extent(centre, axes, x)
-        reach = MARGIN * (high - low)
+        reach = 0.15 * (high - low)
         return cls(centre, axes, low - reach, high + reach)
 
     def at(self, shares: FloatArray) -> FloatArray:
@@ -105,20 +101,15 @@ def _extent(centre: FloatArray, axes: FloatArray, x: FloatArray) -> tuple[FloatA
 
 
 def explored(land: Landscape, seeds: Points, within: float, count: int) -> Points:
-    """Return points spread evenly over where chi^2 exceeds its lowest value by at most ``within``.
+    """Return ``count`` points or more, spread evenly over where chi^2 exceeds its lowest value by at most ``within``.
 
-    Parameters
-    ----------
-    seeds : Points - to begin with
-    count : int - points at the least
+    ``seeds`` are the points to begin with; at least 12 for each parameter tell where a box lies.
     """
-    from scipy.stats.qmc import Halton
-
     dimensions = len(land.low)
     sequence, least = Halton(dimensions, scramble=False), 1e-12 * (land.high - land.low)
-    fewest = FEWEST * dimensions
+    fewest = 12 * dimensions
     pool, box, first = seeds, None, 0
-    for _ in range(BOXES):
+    for _ in range(40):
         level = float(pool.chi2.min()) + within
         near = pool.below(level, fewest).x
         if box is None or not box.fits(near):
@@ -130,7 +121,48 @@ def explored(land: Landscape, seeds: Points, within: float, count: int) -> Point
     return pool.below(float(pool.chi2.min()) + within, fewest, first)
 
 
-def roughness(region: Points, variance: float, seed: int, draws: int = 400) -> float:
+# ---------------------------------------------------------------------- how much wider than noise intervals are
+
+
+def temperature(land: Landscape, x: FloatArray, steps: FloatArray) -> float:
+    """Return the variance that intervals must rest on, in units of that of the residuals' scale.
+
+    Independent noise that the equation explains: chi^2 per degree of freedom, which says what the noise really is.
+    Otherwise (a misfit, or an omega whose neighbours share noise) the ratio of two variances of an estimate: the one
+    that the residuals' own autocovariance gives (sandwich formula) and the one that independent residuals would have;
+    the larger of those of drag and restitution, and at least the first.
+    """
+    residual = np.clip(land.residual(x), -HUBER, HUBER)
+    freedom = len(residual) - len(x)
+    independent = float(residual @ residual) / freedom
+    correlated = land.problem.measured.quantity == "omega"
+    if not correlated and fits(land.scale**2 * independent * freedom, freedom):
+        return independent
+    slopes = land.jacobian(x, steps)
+    # A prior as wide as the bounds keeps the curvature invertible where the data say nothing.
+    inverse = np.linalg.inv(slopes.T @ slopes + np.diag((land.high - land.low) ** -2.0))
+    meat = slopes.T @ autocovariance(residual) @ slopes
+    shared = np.diag(inverse @ meat @ inverse) / np.diag(inverse)
+    return max(independent, float(shared[:2].max()))
+
+
+def fits(chi2: float, freedom: int) -> bool:
+    """Return whether noise alone makes a chi^2 this large more often than in one of a thousand cases."""
+    return bool(distribution.sf(chi2, freedom) > 0.001)
+
+
+def autocovariance(residual: FloatArray) -> FloatArray:
+    """Return the covariance matrix of the residuals, the same for equal lags, tapered to 0 (Bartlett), shape (P, P)."""
+    count = len(residual)
+    reach = max(1, round(4.0 * (count / 100.0) ** (2.0 / 9.0)) * 3)
+    lags = np.arange(count)
+    taper = np.clip(1.0 - lags / (reach + 1.0), 0.0, None)
+    products = np.array([residual[: count - k] @ residual[k:] / count if taper[k] else 0.0 for k in lags])
+    row = taper * products
+    return np.asarray(row[np.abs(lags[:, np.newaxis] - lags)])
+
+
+def roughness(region: Points, variance: float, seed: int) -> float:
     """Return by what factor a fit on this landscape lowers chi^2 more than one on a smooth one, at least 1.
 
     A fit of K parameters on a smooth landscape lowers the chi^2 of the truth by K on average; one that may choose among
@@ -139,16 +171,13 @@ def roughness(region: Points, variance: float, seed: int, draws: int = 400) -> f
     chi^2 among all flown points is looked up, once with what was flown there and once with the plane through it; no
     flight is made.
 
-    Parameters
-    ----------
-    variance : float - of the noise in units of the residuals'
-    draws : int - simulated measurements
+    ``variance`` is that of the noise in units of the residuals'.
     """
     rng = np.random.default_rng(seed)
     plane = np.column_stack((np.ones(len(region.x)), region.x - region.x.mean(axis=0)))
     smooth = plane @ np.linalg.lstsq(plane, region.rows, rcond=None)[0]
-    truths = region.drawn(variance, draws)
-    noise = np.sqrt(variance) * rng.normal(size=(draws, region.rows.shape[1]))
+    truths = region.drawn(variance, 400)
+    noise = np.sqrt(variance) * rng.normal(size=(len(truths), region.rows.shape[1]))
     rough, even = (_fall(rows, truths, noise) for rows in (region.rows, smooth))
     return max(1.0, rough / even) if even > 0 else 1.0
 

@@ -3,21 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Literal
 
 import numpy as np
 
 from flipproof.film.fit.estimate import Estimate
 from slicemodel.trajectory import FloatArray
-
-LEVEL: Final = 0.975
-"""Probability of one interval, so that those of drag and restitution hold together in 95 % (Bonferroni)."""
-
-NOTHING: Final = 0.75
-"""Part of the searched range that an interval covers when the data are said not to tell the parameter."""
-
-EDGE: Final = 0.02
-"""Part of the searched range within which an end of an interval counts as that of the range."""
 
 Verdict = Literal["told", "bounded above", "bounded below", "not told"]
 
@@ -28,7 +19,6 @@ class Interval:
 
     Parameters
     ----------
-    name : str
     value : float - estimate (lowest chi^2)
     low, high : float - ends of the interval
     deviation : float - standard deviation of what the data allow
@@ -57,17 +47,22 @@ def intervals(estimate: Estimate) -> tuple[Interval, ...]:
     """
     problem = estimate.problem
     low, high = problem.bounds()
-    tails = (1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0
+    level = 0.975  # of one, so that those of drag and restitution hold together in 95 % (Bonferroni)
+    tails = (1.0 - level) / 2.0, (1.0 + level) / 2.0
     found = []
     for k, name in enumerate(problem.free):
         middle, *tail = np.quantile(estimate.cloud[:, k], (0.5, *tails))
         ends = middle + np.sqrt(estimate.roughness) * (np.array(tail) - middle)
         ends = np.array([min(ends[0], estimate.reach[0, k]), max(ends[1], estimate.reach[1, k])])
         ends = np.clip(ends, low[k], high[k])
-        near = EDGE * (high[k] - low[k])
+        # An end within 2 % of the searched range is that of the range; three quarters of it are not told.
+        near = 0.02 * (high[k] - low[k])
         at_low, at_high = ends[0] - low[k] < near, high[k] - ends[1] < near
         ends[0], ends[1] = low[k] if at_low else ends[0], high[k] if at_high else ends[1]
-        wide = ends[1] - ends[0] >= NOTHING * (high[k] - low[k])
+        wide = ends[1] - ends[0] >= 0.75 * (high[k] - low[k])
+        verdict: Verdict = "bounded below" if at_high else "bounded above" if at_low else "told"
+        if wide or (at_low and at_high):
+            verdict = "not told"
         found.append(
             Interval(
                 name=name,
@@ -76,18 +71,10 @@ def intervals(estimate: Estimate) -> tuple[Interval, ...]:
                 high=problem.value(name, float(ends[1])),
                 deviation=float(np.std([problem.value(name, float(c)) for c in estimate.cloud[:, k]])),
                 searched=(problem.value(name, float(low[k])), problem.value(name, float(high[k]))),
-                verdict=_verdict(bool(at_low), bool(at_high), bool(wide)),
+                verdict=verdict,
             )
         )
     return tuple(found)
-
-
-def _verdict(at_low: bool, at_high: bool, wide: bool) -> Verdict:
-    if wide or (at_low and at_high):
-        return "not told"
-    if at_high:
-        return "bounded below"
-    return "bounded above" if at_low else "told"
 
 
 def correlation(estimate: Estimate) -> FloatArray:

@@ -2,41 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from flipproof.film.tracker.angles import check_angles
 from flipproof.film.tracker.calibration import GRAVITY, Calibration, check, check_gravity, check_place
-from flipproof.film.tracker.headings import stated_unit
-from flipproof.film.tracker.kinematics import MOST_GAP, WINDOW, MeasuredSpin, angle, frame_grid, omega_from_tracks
+from flipproof.film.tracker.kinematics import (
+    MOST_GAP,
+    WINDOW,
+    MeasuredSpin,
+    angle,
+    direction,
+    frame_grid,
+    omega_from_tracks,
+)
 from flipproof.film.tracker.moments import Flight, NoFlightError, find_flight
 from flipproof.film.tracker.parabola import Parabola, distance_from_cap, fit_axis, fit_track, least_squares
 from flipproof.film.tracker.reader import read_track_table
-from flipproof.film.tracker.table import METRES, RADIANS, TrackFileError, TrackTable
+from flipproof.film.tracker.table import METRES, RADIANS, SECONDS, TrackFileError, TrackTable
 from slicemodel.trajectory import FloatArray
-
-TIMES: Final = {"s": 1.0, "ms": 1e-3}
-"""Time units by name, in seconds."""
-
-LONGER: Final = 1.25
-"""A flight found without knowing gravity must be so much longer to be believed instead."""
 
 CLEARLY: Final = 4.0
 """Standard deviations by which the film's gravity must miss the known one."""
 
-GRAVITY_NEAR: Final = 0.005
-"""Relative error of gravity that does not shift the ends of a flight."""
-
-HAND_TIME: Final = 0.034
-FLIGHT_TIME: Final = 0.042
-"""Time before and after the release whose frames tell omega there [s]: water has hardly begun to move."""
-
-LEAST_FRAMES: Final = 6
-"""Frames after the release that tell omega at the least, however slow the camera."""
+AGREES: Final = 0.1
+"""Relative difference of turning rates that passes as agreement."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,7 +83,7 @@ class Request:
         for name, unit, known in (
             ("length_unit", self.length_unit, ("", *METRES)),
             ("angle_unit", self.angle_unit, ("", *RADIANS)),
-            ("time_unit", self.time_unit, tuple(TIMES)),
+            ("time_unit", self.time_unit, tuple(SECONDS)),
         ):
             if unit not in known:
                 raise ValueError(f"{name} = {unit!r} is unknown; known: {', '.join(word for word in known if word)}")
@@ -144,7 +137,7 @@ def measure(request: Request) -> Measurement:
     """
     table = read_track_table(*request.files)
     metres = METRES[_length_unit(request, table)]
-    seconds = TIMES[request.time_unit]
+    seconds = SECONDS[request.time_unit]
     if request.frame_rate is not None:
         seconds = 1.0 / (request.frame_rate * frame_grid(table)[0])
 
@@ -159,35 +152,30 @@ def measure(request: Request) -> Measurement:
     spin = spin_cut(flight.cuts)
     notes = [*spin.notes, "the derivative does not reach across release and landing; the five-point average does"]
     if request.angle_track is not None:
-        if not request.angle_unit:
-            raise ValueError(
-                f"the angle of track {request.angle_track!r} needs its unit: --angle-unit deg or rad (Tracker exports "
-                "degrees unless told otherwise)"
-            )
         notes.append(check_angles(table, spin, request.angle_track, request.angle_unit))
     inside = flight.inside & spin.measured
     cap, base = spin.cap * metres, spin.base * metres
     axis = fit_axis(spin.t, cap, base, inside, flight.release)
     calibration = check(spin, flight, metres, request.length)
-    _check_r_cm(request, calibration.length * metres)
+    length = calibration.length * metres
+    if request.r_cm is not None and request.r_cm > length:
+        raise ValueError(f"r_cm = {request.r_cm:g} m is outside (0, {length:.4g}], the distance from cap to base")
     points = _centre(request, table, spin, metres)
     track = None if points is None else fit_track(spin.t[flight.inside], points[flight.inside], flight.release)
     omega0, deviation = _first_omega(spin, flight)
-    warnings = [*calibration.warnings]
-    warning = check_gravity(axis.g, axis.sd_g)
-    if warning:
-        warnings.append(warning)
+    late = flight.inside & (spin.t >= (flight.release + flight.landing) / 2) & ~np.isnan(spin.omega)
+    off = check_gravity(axis.g, axis.sd_g)
     # g is known better than a liquid bottle's video tells it, and r_CM hangs on it.
     steady = fit_axis(spin.t, cap, base, inside, flight.release, gravity=GRAVITY)
     r_cm = np.where(flight.inside, distance_from_cap(steady, spin.t, cap, base), np.nan)
-    if not warning:
-        warnings += check_place(r_cm, calibration.length * metres)
+    warnings = (*calibration.warnings, *([off] if off else check_place(r_cm, length)))
     if points is not None:
         notes.append(_offset_words(points, steady.at(spin.t), spin, flight))
     return Measurement(
         request=request, table=table, spin=spin, flight=flight, calibration=calibration, metres=metres, axis=axis,
         track=track, track_points=points, omega0=omega0, omega0_deviation=deviation,
-        mean=_late_mean(spin, flight, omega0), r_cm=r_cm, warnings=tuple(warnings), notes=tuple(notes),
+        mean=float(spin.omega[late].mean() / omega0) if late.any() else np.nan, r_cm=r_cm, warnings=warnings,
+        notes=tuple(notes),
     )  # fmt: skip
 
 
@@ -216,11 +204,12 @@ def _flight(request: Request, spin: MeasuredSpin, metres: float) -> Flight:
         flight, fit = found(gravity)
     except NoFlightError:
         flight, fit = free, free_fit
-    longer = free.inside.sum() > LONGER * flight.inside.sum()
+    # A flight found without knowing gravity must be much longer to be believed instead.
+    longer = free.inside.sum() > 1.25 * flight.inside.sum()
     if longer and abs(free_fit.g - gravity) > CLEARLY * free_fit.sd_g:
         flight, fit = free, free_fit
     for _ in range(3):
-        if abs(fit.g - gravity) <= max(CLEARLY * fit.sd_g, GRAVITY_NEAR * abs(gravity)):
+        if abs(fit.g - gravity) <= max(CLEARLY * fit.sd_g, 0.005 * abs(gravity)):  # which shifts no end of a flight
             break
         gravity = fit.g
         try:
@@ -230,16 +219,8 @@ def _flight(request: Request, spin: MeasuredSpin, metres: float) -> Flight:
     return flight
 
 
-def _check_r_cm(request: Request, length: float) -> None:
-    if request.r_cm is not None and request.r_cm > length:
-        raise ValueError(f"r_cm = {request.r_cm:g} m is outside (0, {length:.4g}], the distance from cap to base")
-
-
 def _length_unit(request: Request, table: TrackTable) -> str:
-    names: Sequence[str] = [
-        name for name in (request.cap, request.base, request.ice_top, request.centre) if name is not None
-    ]
-    stated = stated_unit(table, names, ("x", "y"), METRES)
+    stated = table.length_unit([name for name in (request.cap, request.base, request.ice_top, request.centre) if name])
     if stated and request.length_unit and stated != request.length_unit:
         raise TrackFileError(
             f"{table.source}: the headings state lengths in {stated}, the request says {request.length_unit}; leave "
@@ -261,9 +242,7 @@ def _centre(request: Request, table: TrackTable, spin: MeasuredSpin, metres: flo
     if len(given) > 1:
         raise ValueError(f"{' and '.join(given)} all say where the centre of mass is; give one of them")
     if request.r_cm is not None:
-        theta = angle(spin.cap, spin.base)
-        axis = np.column_stack((np.sin(theta), -np.cos(theta)))
-        return np.asarray(spin.cap * metres + request.r_cm * axis)
+        return np.asarray(spin.cap * metres + request.r_cm * direction(angle(spin.cap, spin.base)))
     name = request.ice_top or request.centre
     if name is None:
         return None
@@ -274,8 +253,7 @@ def _centre(request: Request, table: TrackTable, spin: MeasuredSpin, metres: flo
 
 def _offset_words(points: FloatArray, found: FloatArray, spin: MeasuredSpin, flight: Flight) -> str:
     """Return how far along the axis the tracked centre of mass lies from the one that the axis tells, in words."""
-    theta = spin.theta[flight.inside]
-    axis = np.column_stack((np.sin(theta), -np.cos(theta)))
+    axis = direction(spin.theta[flight.inside])
     offset = 1e3 * float(np.nanmedian(np.einsum("ij,ij->i", (points - found)[flight.inside], axis)))
     side = "base" if offset > 0 else "cap"
     return (
@@ -293,10 +271,12 @@ def _first_omega(spin: MeasuredSpin, flight: Flight) -> tuple[float, float]:
     The deviation holds the noise and what half the time in flight tells otherwise beyond its noise: where the water
     moves early, a cubic is no longer the flight, and the noise of a good film says nothing of that.
     """
-    omega0, noise = _fitted_omega(spin, flight, FLIGHT_TIME)
+    # In so many seconds of flight water has hardly begun to move.
+    time = 0.042
+    omega0, noise = _fitted_omega(spin, flight, time)
     if omega0 == 0.0:
         raise ValueError("the bottle does not turn at the release; name another release")
-    shorter, noise_of_shorter = _fitted_omega(spin, flight, FLIGHT_TIME / 2)
+    shorter, noise_of_shorter = _fitted_omega(spin, flight, time / 2)
     # Of two least-squares fits, one to a part of the other's frames, the difference has the difference of variances.
     by_shape = max((shorter - omega0) ** 2 - (noise_of_shorter**2 - noise**2), 0.0)
     return omega0, float(np.sqrt(noise**2 + by_shape))
@@ -305,8 +285,7 @@ def _first_omega(spin: MeasuredSpin, flight: Flight) -> tuple[float, float]:
 def _fitted_omega(spin: MeasuredSpin, flight: Flight, flight_time: float) -> tuple[float, float]:
     """Return omega at the release by the frames up to ``flight_time`` [s] after it, and its deviation by noise."""
     first = int(np.flatnonzero(flight.inside)[0])
-    hand = int(HAND_TIME / spin.frame_time)
-    ahead = max(int(flight_time / spin.frame_time), LEAST_FRAMES)
+    hand, ahead = int(0.034 / spin.frame_time), max(int(flight_time / spin.frame_time), 6)
     near = np.arange(max(first - hand, 0), min(first + ahead + 1, len(spin.t)))
     near = near[spin.measured[near] & ((near < first) | flight.inside[near])]
     tau = spin.t[near] - spin.t[first]
@@ -319,7 +298,51 @@ def _fitted_omega(spin: MeasuredSpin, flight: Flight, flight_time: float) -> tup
     return float(solution[1]), float(spin.theta_noise * np.sqrt(np.linalg.inv(matrix.T @ matrix)[1, 1]))
 
 
-def _late_mean(spin: MeasuredSpin, flight: Flight, omega0: float) -> float:
-    middle = (flight.release + flight.landing) / 2
-    late = flight.inside & (spin.t >= middle) & ~np.isnan(spin.omega)
-    return float(spin.omega[late].mean() / omega0) if late.any() else float("nan")
+def check_angles(table: TrackTable, spin: MeasuredSpin, track: str, unit: str) -> str:
+    """Compare a track's own angle (of a tape or a vector from cap to base) with theta of Eq. 1; say how they agree.
+
+    Raises
+    ------
+    ValueError
+        If the track has no angle or its unit is not given, or if it turns at another rate than the bottle, or its omega
+        is not d theta/dt; the message says if another unit would fit.
+    """
+    if not unit:
+        raise ValueError(
+            f"the angle of track {track!r} needs its unit: --angle-unit deg or rad (Tracker exports degrees unless "
+            "told otherwise)"
+        )
+    columns = table.track(track).columns
+    name = next((name for name in ("theta", "thetar") if name in columns), None)
+    if name is None:
+        raise ValueError(f"track {track!r} has no column theta, only {', '.join(columns)}; show it in Tracker's table")
+    rows = np.flatnonzero(spin.lines > 0)
+    known = ~np.isnan(columns[name])
+    theta = spin.theta[rows][known]
+    both = ~np.isnan(theta)
+    if both.sum() < 3:
+        raise ValueError(f"track {track!r} has an angle in {both.sum()} frames of the bottle's; 3 are needed")
+    turned = theta[both] - theta[both].mean()
+    ratios = {}
+    for each, radians in RADIANS.items():
+        angle_there = np.unwrap(columns[name][known] * radians)[both]
+        ratios[each] = float((angle_there - angle_there.mean()) @ turned) / max(float(turned @ turned), 1e-300)
+    _refuse(f"{name} of track {track!r}", ratios, unit, "the bottle's own turning (Eq. 1)")
+    words = f"{name} of {track} in {unit} turns {ratios[unit]:.3f} times as fast as Eq. 1 says"
+    rates, omega = columns.get("omega", np.full(len(rows), np.nan)), spin.omega[rows]
+    both = ~np.isnan(rates) & ~np.isnan(omega)
+    if both.sum() > 2:
+        ratio = float(rates[both] @ omega[both]) / max(float(omega[both] @ omega[both]), 1e-300)
+        ratios = {each: ratio * radians for each, radians in RADIANS.items()}
+        _refuse(f"omega of track {track!r}", ratios, unit, "d theta/dt")
+        words += f", its omega is {ratios[unit]:.3f} times d theta/dt"
+    return words
+
+
+def _refuse(what: str, ratios: Mapping[str, float], unit: str, against: str) -> None:
+    """Refuse a ratio that is not 1 in the given unit, and name the unit in which it is."""
+    if abs(ratios[unit] - 1) <= AGREES:
+        return
+    fits = [each for each, ratio in ratios.items() if abs(ratio - 1) <= AGREES]
+    advice = f"it seems to be in {fits[0]}: --angle-unit {fits[0]}" if fits else "it belongs to something else"
+    raise ValueError(f"{what} in {unit} is {ratios[unit]:.3g} times {against}; {advice}")

@@ -18,21 +18,6 @@ SCALE: Final = 0.02
 PATTERN: Final = 0.01
 """Amplitude, relative to the length, beyond which a pattern in it is named."""
 
-OUTLIER: Final = 6.0
-"""Standard deviations by which the length of a single frame must miss to be named."""
-
-CERTAIN: Final = 5.0
-"""Standard deviations below zero at which g leaves no doubt."""
-
-FIRST: Final = 5
-"""Frames after the release that tell where the centre of mass starts."""
-
-NO_GRAVITY: Final = 1e-3
-"""Magnitude of g below which nothing falls either way [m/s^2]."""
-
-LEAST_R_CM: Final = 0.45
-"""Place of C_M on the axis at release, from the cap as part of the length: water and ice lie on the base then."""
-
 GRAVITY: Final = 9.81
 """What the parabola should give [m/s^2]."""
 
@@ -74,10 +59,10 @@ def check(spin: MeasuredSpin, flight: Flight, metres: float, length: float | Non
     theta, t = spin.theta[inside], spin.t[inside]
     median = float(np.median(apart))
     spread = float(1.4826 * np.median(np.abs(apart - median)))
-    expected = max(spin.theta_noise * median, 1e-12 * median)
+    expected = float(spin.theta_noise * median)
     # Printed digits and a bottle that bends leave a thousandth of the length unexplained.
     allowed = max(expected, 1e-3 * median)
-    far = np.abs(apart - median) > OUTLIER * max(spread, allowed)
+    far = np.abs(apart - median) > 6.0 * max(spread, allowed)
     # A distance that follows twice the angle is a scale of x other than that of y.
     time = (t - t[0]) / max(float(t[-1] - t[0]), 1e-12)
     matrix = np.column_stack((np.ones_like(t), np.cos(2 * theta), np.sin(2 * theta), time))
@@ -113,25 +98,17 @@ def check(spin: MeasuredSpin, flight: Flight, metres: float, length: float | Non
             "them in Tracker or empty their cells"
         )
     return Calibration(
-        length=median,
-        spread=spread,
-        expected=float(spin.theta_noise * median),
-        stretch=stretch,
-        drift=drift,
-        lines=lines,
+        length=median, spread=spread, expected=expected, stretch=stretch, drift=drift, lines=lines,
         warnings=tuple(warnings),
-    )
+    )  # fmt: skip
 
 
 def check_gravity(g: float, deviation: float) -> str:
     """Return a warning if the fitted g [m/s^2] is far from ``GRAVITY``, "" if it is not.
 
-    Raises
-    ------
-    ValueError
-        If the bottle falls upwards: then y points down, and theta and omega are those of the mirror image.
+    A bottle that falls upwards is refused: then y points down, and theta and omega are those of the mirror image.
     """
-    if g < -max(CERTAIN * deviation, NO_GRAVITY):
+    if g < -max(5.0 * deviation, 1e-3):  # below 1e-3 m/s^2 nothing falls either way
         raise ValueError(
             f"the parabola gives g = {g:.3g} m/s^2: y points down; turn the axes in Tracker so that y points up, and "
             "export again"
@@ -149,14 +126,12 @@ def check_gravity(g: float, deviation: float) -> str:
 def check_place(r_cm: FloatArray, length: float) -> list[str]:
     """Return warnings if the centre of mass starts nearer to the cap than to the base, or leaves the bottle.
 
-    Parameters
-    ----------
-    r_cm : (P,) - from the cap, NaN outside the flight; ``length`` of the bottle in the same unit
+    ``r_cm`` (P,) counts from the cap, NaN outside the flight, in the unit of the bottle's ``length``.
     """
     known = r_cm[~np.isnan(r_cm)]
     warnings = []
-    start = float(np.median(known[:FIRST])) / length if len(known) else 1.0
-    if start < LEAST_R_CM:
+    start = float(np.median(known[:5])) / length if len(known) else 1.0
+    if start < 0.45:
         warnings.append(
             f"at release the centre of mass lies {start:.2f} of the length from the cap, though water and ice lie on "
             "the base then: are cap and base exchanged?"

@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import codecs
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Final
 
 from flipproof.film.tracker.table import TrackFileError, column_name
@@ -20,41 +19,56 @@ MOST_BYTES: Final = 50_000_000
 """Larger files are no export: an hour at 240 frames/s with ten columns holds about this."""
 
 EXPORT: Final = "in Tracker use File > Export > Data File"
-
-DELIMITERS: Final = ("\t", ";", ",", " ")
-"""In this order: the first that stands in the row of column names. A name holds no tab; it may hold a space."""
-
-SIGNS: Final = MappingProxyType({".": "point", ",": "comma"})
-
 MULTI: Final = ("#multi:", "multi:")
-
 TIMES: Final = ("t", "time")
 
 MINUS: Final = "\u2212"
 """Minus sign that Java prints in some languages."""
 
-POINT: Final = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
-COMMA: Final = re.compile(r"[+-]?(?:[0-9]+(?:,[0-9]*)?|,[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
+NUMBERS: Final = {
+    ".": re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?"),
+    ",": re.compile(r"[+-]?(?:[0-9]+(?:,[0-9]*)?|,[0-9]+)(?:[eE][+-]?[0-9]{1,4})?"),
+}
+"""Decimal sign -> what a number looks like."""
+
 GROUPED: Final = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 NOT_TEXT: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\u0085\u2028\u2029\ufffd]")
+END: Final = re.compile(r"\r\n|\n|\r")
 
 MARKS: Final = (
     (codecs.BOM_UTF8, "utf-8", "UTF-8 with byte-order mark"),
     (codecs.BOM_UTF16_LE, "utf-16-le", "UTF-16"),
     (codecs.BOM_UTF16_BE, "utf-16-be", "UTF-16"),
+    (b"", "utf-8", "UTF-8"),
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One line that is neither blank nor a comment; ``number`` counts from 1."""
+    """One line of a file that is neither blank nor a comment; ``number`` counts from 1."""
 
+    path: Path
     number: int
     text: str
 
+    def error(self, words: str) -> TrackFileError:
+        """Return the error that says what is wrong with this line."""
+        return TrackFileError(f"{self.path}, line {self.number}: {words}")
 
-def read_text(path: Path) -> tuple[str, str]:
-    """Return the text of a file and its encoding in words.
+    def cells(self, delimiter: str) -> list[str]:
+        """Return the cells without surrounding spaces; a line with quotation marks is refused."""
+        if '"' in self.text:
+            raise self.error("has quotation marks; save the table without them")
+        return [cell.strip(" ") for cell in self.text.split(delimiter)]
+
+
+Rows = list[tuple[Line, list[str]]]
+
+
+def read_lines(path: Path) -> tuple[list[Line], str]:
+    """Return the lines of a file without blank ones and comments, and its encoding in words.
+
+    Comments begin with ``//``, or with ``#`` other than that of ``#multi:``.
 
     Raises
     ------
@@ -75,45 +89,34 @@ def read_text(path: Path) -> tuple[str, str]:
         raise TrackFileError(f"{path}: has more than {MOST_BYTES // 1_000_000} MB and is no table of tracks")
     if content.startswith(b"PK\x03\x04"):
         raise TrackFileError(f"{path}: is a zip archive (a Tracker project or a spreadsheet), not text; {EXPORT}")
-    text, encoding = _decoded(path, content)
+    mark, codec, encoding = next(found for found in MARKS if content.startswith(found[0]))
+    body = content[len(mark) :]
+    try:
+        text = body.decode(codec)
+    except UnicodeDecodeError as error:
+        line = _last_line(path, body[: error.start].decode(codec, errors="ignore"))
+        if mark:
+            advice = f", as its first bytes say; the file is damaged: {EXPORT} again"
+        else:
+            advice = (
+                "; names with accents were saved in another encoding: open the file in an editor and save it as UTF-8, "
+                "or rename the track and export again"
+            )
+        raise line.error(f"is not {encoding} (byte 0x{body[error.start]:02X}){advice}") from None
     bad = NOT_TEXT.search(text)
     if bad:
-        raise TrackFileError(
-            f"{path}, line {_line_at(text, bad.start())}: holds the character U+{ord(bad[0]):04X}, which no table has; "
-            f"the file is damaged or in another encoding: save it as UTF-8, or {EXPORT} again"
+        raise _last_line(path, text[: bad.start()]).error(
+            f"holds the character U+{ord(bad[0]):04X}, which no table has; the file is damaged or in another encoding: "
+            f"save it as UTF-8, or {EXPORT} again"
         )
     if text.lstrip().startswith("<"):
         raise TrackFileError(f"{path}: is XML (a Tracker project), not a table; {EXPORT}")
-    return text, encoding
+    lines = (Line(path, number, line) for number, line in enumerate(END.split(text), start=1))
+    return [line for line in lines if line.text.strip() and not _is_comment(line.text.lstrip())], encoding
 
 
-def _decoded(path: Path, content: bytes) -> tuple[str, str]:
-    mark, codec, words = next((found for found in MARKS if content.startswith(found[0])), (b"", "utf-8", "UTF-8"))
-    body = content[len(mark) :]
-    try:
-        return body.decode(codec), words
-    except UnicodeDecodeError as error:
-        before = body[: error.start].decode(codec, errors="ignore")
-        shown = f"byte 0x{body[error.start]:02X}"
-        if mark:
-            raise TrackFileError(
-                f"{path}, line {_line_at(before, len(before))}: is not {words} ({shown}), as its first bytes say; the "
-                f"file is damaged: {EXPORT} again"
-            ) from None
-        raise TrackFileError(
-            f"{path}, line {_line_at(before, len(before))}: is not {words} ({shown}); names with accents were saved in "
-            "another encoding: open the file in an editor and save it as UTF-8, or rename the track and export again"
-        ) from None
-
-
-def _line_at(text: str, position: int) -> int:
-    return len(re.findall(r"\r\n|\n|\r", text[:position])) + 1
-
-
-def lines_of(text: str) -> list[Line]:
-    """Return the lines of a text without blank ones and comments (``//``, and ``#`` other than ``#multi:``)."""
-    numbered = (Line(k, line) for k, line in enumerate(re.split(r"\r\n|\n|\r", text), start=1))
-    return [line for line in numbered if line.text.strip() and not _is_comment(line.text.lstrip())]
+def _last_line(path: Path, text: str) -> Line:
+    return Line(path, len(END.findall(text)) + 1, "")
 
 
 def _is_comment(text: str) -> bool:
@@ -123,15 +126,14 @@ def _is_comment(text: str) -> bool:
 def delimiter_of(path: Path, lines: Sequence[Line]) -> tuple[str, int]:
     """Return the delimiter and the index of the row of column names, the first one that begins with t.
 
-    Raises
-    ------
-    TrackFileError
+    The delimiter is the first of tab, semicolon, comma and space that stands there: a name holds no tab, but may hold
+    a space.
     """
     if not lines:
         raise TrackFileError(f"{path}: holds no table; {EXPORT}")
     for k, line in enumerate(lines):
         text = line.text.strip(" ")
-        delimiter = next((sign for sign in DELIMITERS if sign in text), "")
+        delimiter = next((sign for sign in "\t;, " if sign in text), "")
         if delimiter and column_name(text.split(delimiter)[0])[0].lower() in TIMES:
             return delimiter, k
     raise TrackFileError(
@@ -140,54 +142,30 @@ def delimiter_of(path: Path, lines: Sequence[Line]) -> tuple[str, int]:
     )
 
 
-def cells_of(path: Path, line: Line, delimiter: str) -> list[str]:
-    """Return the cells of a line without surrounding spaces.
-
-    Raises
-    ------
-    TrackFileError
-        If the line has quotation marks.
-    """
-    if '"' in line.text:
-        raise TrackFileError(f"{path}, line {line.number}: has quotation marks; save the table without them")
-    return [cell.strip(" ") for cell in line.text.split(delimiter)]
-
-
-def decimal_of(path: Path, rows: Iterable[tuple[Line, Sequence[str]]]) -> str:
-    """Return the decimal sign that all numbers of a file share.
-
-    Raises
-    ------
-    TrackFileError
-        If both signs occur, or every comma may as well group thousands.
-    """
-    first: dict[str, int] = {}
-    only_grouped = True
+def decimal_of(rows: Rows) -> str:
+    """Return the decimal sign that all numbers share; both signs, or commas that may group thousands, are refused."""
+    words = {".": "point", ",": "comma"}
+    first: dict[str, Line] = {}
     for line, cells in rows:
         for cell in cells:
-            for sign in SIGNS:
+            for sign in words:
                 if sign in cell:
-                    first.setdefault(sign, line.number)
-            only_grouped = only_grouped and ("," not in cell or GROUPED.fullmatch(cell) is not None)
+                    first.setdefault(sign, line)
     if len(first) == 2:
-        (earlier, line_of_earlier), (later, line_of_later) = sorted(first.items(), key=lambda item: item[1])
-        raise TrackFileError(
-            f"{path}, line {line_of_later}: a number has a decimal {SIGNS[later]}, one in line {line_of_earlier} "
-            f"a decimal {SIGNS[earlier]}; use one of them throughout"
+        (earlier, before), (later, line) = first.items()
+        raise line.error(
+            f"a number has a decimal {words[later]}, one in line {before.number} a decimal {words[earlier]}; use one "
+            "of them throughout"
         )
-    if "," in first and only_grouped:
-        raise TrackFileError(
-            f"{path}, line {first[',']}: commas may be decimal or group thousands; write decimal points"
-        )
+    if "," in first and all(GROUPED.fullmatch(cell) for _, cells in rows for cell in cells if "," in cell):
+        raise first[","].error("commas may be decimal or group thousands; write decimal points")
     return next(iter(first), ".")
 
 
 def number(text: str, decimal: str) -> float | None:
     """Return the number of a cell, None if it is none; ``9,636E-2`` with a decimal comma is 0.09636."""
     text = text.replace(MINUS, "-")
-    if not (POINT if decimal == "." else COMMA).fullmatch(text):
-        return None
-    return float(text.replace(",", "."))
+    return float(text.replace(",", ".")) if NUMBERS[decimal].fullmatch(text) else None
 
 
 def last_digit(text: str, decimal: str) -> float:

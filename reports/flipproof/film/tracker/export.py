@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final
@@ -10,14 +10,8 @@ from typing import Final
 import numpy as np
 
 from slicemodel import Scenario, Trajectory
-from slicemodel.landing import LabMotion, lab_motion, landing
+from slicemodel.landing import lab_motion, landing
 from slicemodel.trajectory import FloatArray
-
-MOST_FRAMES: Final = 1_000_000
-"""Of an exported table."""
-
-DATA_COLUMNS: Final = ("t", "xcap", "ycap", "xbase", "ybase", "xcm", "ycm")
-"""Pairs that Tracker's data track asks for, one point mass each."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,10 +72,10 @@ def tracker_number(value: float, digits: int, decimal: str) -> str:
     if value == 0:
         return f"0{decimal}0"
     if 0.1 <= abs(value) < 1000:
-        text = repr(float(value)) if not digits else f"{value:#.{digits}g}"
+        text = f"{value:#.{digits}g}" if digits else repr(float(value))
     else:
-        mantissa, _, exponent = (np.format_float_scientific(value, trim="0") if not digits
-                                 else f"{value:.{digits - 1}E}".replace("E", "e")).partition("e")  # fmt: skip
+        printed = f"{value:.{digits - 1}e}" if digits else np.format_float_scientific(value, trim="0")
+        mantissa, _, exponent = printed.partition("e")
         text = f"{mantissa}E{int(exponent)}"
     return text.replace(".", decimal)
 
@@ -110,19 +104,14 @@ def tracker_text(t: FloatArray, tracks: Mapping[str, Mapping[str, FloatArray]], 
 
 
 def frame_times(scenario: Scenario, frame_rate: float) -> FloatArray:
-    """Return the times of a camera's frames from release to landing [s].
-
-    Raises
-    ------
-    ValueError
-        If the rate is not in [1, 1e5] per second, or if there are more frames than a table should have.
-    """
+    """Return the times of a camera's frames from release to landing [s], at a rate in [1, 1e5] per second."""
     if not 1 <= frame_rate <= 1e5:
         raise ValueError(f"frame_rate = {frame_rate!r} 1/s is outside [1, 100000]")
-    if scenario.duration * frame_rate > MOST_FRAMES:
+    most = 1_000_000
+    if scenario.duration * frame_rate > most:
         raise ValueError(
-            f"duration = {scenario.duration:g} s at {frame_rate:g} frames/s makes more than {MOST_FRAMES} frames "
-            f"(admissible: durations up to {MOST_FRAMES / frame_rate:g} s)"
+            f"duration = {scenario.duration:g} s at {frame_rate:g} frames/s makes more than {most} frames "
+            f"(admissible: durations up to {most / frame_rate:g} s)"
         )
     times = np.arange(int(scenario.duration * frame_rate * (1 + 1e-12)) + 1) / frame_rate
     return np.minimum(times, scenario.duration)
@@ -138,13 +127,7 @@ def at_times(run: Trajectory, times: FloatArray) -> Trajectory:
 
 
 def until_landing(run: Trajectory, frames: Trajectory, height: float) -> tuple[Trajectory, str]:
-    """Return the frames before the bottle comes down on a table, and how it does, in words.
-
-    Raises
-    ------
-    ValueError
-        If it does not come down during the run.
-    """
+    """Return the frames before the bottle comes down on a table, and how it does, in words; refuse if it does not."""
     found = landing(run, height)
     if found is None:
         raise ValueError(
@@ -163,7 +146,7 @@ def data_track_text(
     metres: float = 1.0,
     delimiter: str = "\t",
 ) -> str:
-    """Return cap, base and C_M of a run in the lab (Eq. 2) as the table of a data track.
+    """Return cap, base and C_M of a run in the lab (Eq. 2) as the table of a data track, with nine decimals.
 
     Parameters
     ----------
@@ -171,15 +154,10 @@ def data_track_text(
     origin : place of the cap at release on the video's axes [m]
     metres : length of the video's unit [m]
     """
-    motion: LabMotion = lab_motion(run)
+    motion = lab_motion(run)
     columns = [run.t + start]
     for points in (motion.cap, motion.base, motion.centre):
         columns += list(((points + origin) / metres).T)
-    return table_text(DATA_COLUMNS, columns, delimiter)
-
-
-def table_text(names: Sequence[str], columns: Sequence[FloatArray], delimiter: str) -> str:
-    """Return a table with one line of names and nine decimals."""
-    rows = [delimiter.join(names)]
+    rows = [delimiter.join(("t", "xcap", "ycap", "xbase", "ybase", "xcm", "ycm"))]
     rows += [delimiter.join(f"{value:.9f}" for value in row) for row in np.round(np.column_stack(columns), 9) + 0.0]
     return "\n".join(rows) + "\n"

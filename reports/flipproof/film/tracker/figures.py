@@ -17,32 +17,25 @@ PAPER, SMOOTH, FILLED = "#999999", "#D55E00", "#CC79A7"
 def figure_tracks(measured: Measurement) -> Figure:
     """Coordinates of cap and base over time with the parabola of C_M, as in Fig. 3a."""
     figure, panels = new_figure(2, size=(8.0, 6.0), sharex=True)
-    spin = measured.spin
-    inside = measured.flight.inside
-    for axes, k, name in zip(panels, (0, 1), "xy", strict=True):
+    spin, inside, fit = measured.spin, measured.flight.inside, measured.track or measured.axis
+    for k, (axes, name) in enumerate(zip(panels, "xy", strict=True)):
         _shade(axes, measured)
         for points, colour, label in ((spin.cap, CAP, "cap"), (spin.base, BASE, "base")):
             axes.plot(spin.t, points[:, k] * measured.metres, ".", color=colour, markersize=3.5, label=label)
         if measured.track is not None and measured.track_points is not None:
             axes.plot(spin.t, measured.track_points[:, k], "*", color=CENTRE, markersize=3.5, label="C_M as tracked")
-        fit = measured.track or measured.axis
         label = f"C_M, fit of Eq. 2{'ab'[k]}" if measured.track else "C_M, found from the axis"
         axes.plot(spin.t[inside], fit.at(spin.t[inside])[:, k], "-", color=FIT, linewidth=1.6, label=label)
         axes.set_ylabel(f"{name} [m]")
-    fit = measured.track or measured.axis
     panels[0].set_title(f"v₀x = {fit.v0x:.3f} ± {fit.sd_v0x:.2g} m/s", fontsize=10, loc="left")
     panels[1].set_title(
         f"v₀y = {fit.v0y:.3f} ± {fit.sd_v0y:.2g} m/s, g = {fit.g:.2f} ± {fit.sd_g:.2g} m/s²", fontsize=10, loc="left"
     )
     panels[1].set_xlabel("time t [s]")
     handles, labels = panels[0].get_legend_handles_labels()
-    del labels
-    figure.legend(handles, [_plain(handle.get_label()) for handle in handles], loc="outside lower center", ncols=4)
+    labels = [label.replace("Eq. 2a", "Eq. 2a and 2b") for label in labels]
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
     return figure
-
-
-def _plain(label: object) -> str:
-    return str(label).replace("C_M, fit of Eq. 2a", "C_M, fit of Eq. 2a and 2b")
 
 
 @styled
@@ -125,10 +118,5 @@ def _shade(axes: Axes, measured: Measurement) -> None:
     axes.margins(x=0.01)
 
 
-FIGURES = {
-    "tracks": figure_tracks,
-    "spin": figure_spin,
-    "normalised": figure_normalised,
-    "axis": figure_axis,
-}
+FIGURES = {"tracks": figure_tracks, "spin": figure_spin, "normalised": figure_normalised, "axis": figure_axis}
 """Every figure of a measurement by name."""

@@ -14,24 +14,13 @@ from typing import Final
 
 import numpy as np
 
-from flipproof.film.tracker.smoothing import (
-    BoolArray,
-    apply,
-    central_difference,
-    interpolation,
-    local_polynomial,
-    moving_average,
-    noise,
-    spread,
-)
+from flipproof.film.tracker import smoothing
+from flipproof.film.tracker.smoothing import BoolArray, apply, spread
 from flipproof.film.tracker.table import TrackTable
 from slicemodel.trajectory import FloatArray
 
 WINDOW: Final = 11
 """Frames of the Savitzky-Golay derivative."""
-
-DEGREE: Final = 2
-"""Degree of its polynomial."""
 
 MOST_GAP: Final = 3
 """Longest gap in frames over which theta is interpolated."""
@@ -39,14 +28,7 @@ MOST_GAP: Final = 3
 MOST_FRAMES: Final = 20_000
 """Frames of a record at the most: 80 s at 240 frames/s; a flip lasts half a second."""
 
-UNEVEN: Final = 0.2
-"""Part of a frame time by which a time may miss its frame if it is printed that coarsely."""
-
-EVEN: Final = 0.02
-"""The same, whatever the digits."""
-
-MOST_UNSEEN_TURN: Final = np.pi
-"""Angle [rad] that a bottle may turn unseen at its last known rate before the number of turns is a guess."""
+Numbers = np.ndarray[tuple[int], np.dtype[np.int64]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -81,7 +63,7 @@ class MeasuredSpin:
     frame_time: float
     cap: FloatArray
     base: FloatArray
-    lines: np.ndarray[tuple[int], np.dtype[np.int64]]
+    lines: Numbers
     notes: tuple[str, ...] = ()
 
 
@@ -97,17 +79,14 @@ def omega_from_tracks(
 ) -> MeasuredSpin:
     """Return theta (Eq. 1) and omega of a bottle whose cap and base were tracked.
 
-    The flight inside the record comes from ``flipproof.film.tracker.moments.find_flight``; with its
-    ``cuts`` a second call gives an omega that does not mix hand, flight and table.
-
     Parameters
     ----------
-    table : from ``flipproof.film.tracker.reader.read_track_table``
     cap, base : names of the two tracks
     window : odd number of frames of the Savitzky-Golay derivative
     most_gap : longest gap in frames that is interpolated
     time_unit : the file's time unit in seconds
-    cuts : times [s] of frames after which the motion may bend; the Savitzky-Golay derivative does not reach across
+    cuts : times [s] of frames after which the motion may bend; the Savitzky-Golay derivative does not reach across.
+        Those of ``flipproof.film.tracker.moments.find_flight`` keep hand, flight and table apart
 
     Raises
     ------
@@ -123,38 +102,34 @@ def omega_from_tracks(
     if tracks[0] is tracks[1]:
         raise ValueError(f"cap and base are both {cap!r}; two tracks are needed")
     frame_time, frames, how = frame_grid(table)
-    size = int(frames[-1]) + 1
-    ends = []
-    for track in tracks:
-        points = np.full((size, 2), np.nan)
-        points[frames] = track.points()
-        ends.append(points)
-    lines = np.zeros(size, dtype=np.int64)
+    ends = np.full((2, frames[-1] + 1, 2), np.nan)
+    ends[:, frames] = [track.points() for track in tracks]
+    lines = np.zeros(frames[-1] + 1, dtype=np.int64)
     lines[frames] = table.lines
-    measured = ~np.isnan(ends[0]).any(axis=1) & ~np.isnan(ends[1]).any(axis=1)
+    measured: BoolArray = np.asarray(~np.isnan(ends).any(axis=(0, 2)))
     if measured.sum() < window:
         raise ValueError(
             f"{table.source}: {cap} and {base} were tracked together in {measured.sum()} frames; {window} are needed"
         )
-    t = (table.t[0] + frame_time * np.arange(size)) * time_unit
-    raw = angle(ends[0], ends[1])
+    t = (table.t[0] + frame_time * np.arange(len(lines))) * time_unit
+    raw = angle(*ends)
     if np.isnan(raw[measured]).any():
         k = int(np.flatnonzero(np.isnan(raw) & measured)[0])
         raise ValueError(f"{table.source}, line {lines[k]}: cap and base are at one point; correct it in Tracker")
     dt = frame_time * time_unit
-    theta = unwrapped(raw, t, dt, table.source)
-    fill, filled = interpolation(measured, most_gap)
-    theta = apply(fill, theta)
+    fill, filled = smoothing.interpolation(measured, most_gap)
+    theta = apply(fill, unwrapped(raw, t, dt, table.source))
     present = measured | filled
-    noise_of_theta = noise(theta, measured, window)
-    if not noise_of_theta >= 0.0:
+    noise = smoothing.noise(theta, measured, window)
+    if not noise >= 0.0:
         raise ValueError(
             f"{table.source}: no run of frames with both {cap} and {base} is long enough to tell the noise; track more "
             "frames in a row"
         )
-    smooth = local_polynomial(present, window, DEGREE, 1, [int(np.rint((cut - t[0]) / dt)) + 1 for cut in cuts])
-    paper = central_difference(present) @ moving_average(present)
-    notes = [how, f"omega is the derivative of a local polynomial of degree {DEGREE} over {window} frames"]
+    starts = [int(np.rint((cut - t[0]) / dt)) + 1 for cut in cuts]
+    smooth = smoothing.local_polynomial(present, window, 2, 1, starts)
+    paper = smoothing.central_difference(present) @ smoothing.moving_average(present)
+    notes = [how, f"omega is the derivative of a local polynomial of degree 2 over {window} frames"]
     if filled.any():
         notes.append(
             f"theta was interpolated in {filled.sum()} frames (gaps of at most {most_gap}): cubic through two measured "
@@ -166,12 +141,12 @@ def omega_from_tracks(
         t=t,
         theta=theta,
         omega=apply(smooth, theta) / dt,
-        band=spread(smooth @ fill) * noise_of_theta / dt,
+        band=spread(smooth @ fill) * noise / dt,
         omega_paper=apply(paper, theta) / dt,
-        band_paper=spread(paper @ fill) * noise_of_theta / dt,
+        band_paper=spread(paper @ fill) * noise / dt,
         interpolated=filled,
         measured=measured,
-        theta_noise=noise_of_theta,
+        theta_noise=noise,
         frame_time=dt,
         cap=ends[0],
         base=ends[1],
@@ -181,30 +156,25 @@ def omega_from_tracks(
 
 
 def angle(cap: FloatArray, base: FloatArray) -> FloatArray:
-    """Return the angle of cap -> base from the downward vertical (Eq. 1), in (-pi, pi] [rad].
+    """Return the angle of cap -> base, both (P, 2), from the downward vertical (Eq. 1), shape (P,) in (-pi, pi] [rad].
 
-    Parameters
-    ----------
-    cap, base : shape (P, 2)
-
-    Returns
-    -------
-    shape (P,); NaN where a point is missing or both are one
+    NaN where a point is missing or both are one.
     """
     x, y = (base - cap).T
     return np.where(np.hypot(x, y) > 0, np.arctan2(x, -y), np.nan)
 
 
-def frame_grid(table: TrackTable) -> tuple[float, np.ndarray[tuple[int], np.dtype[np.int64]], str]:
+def direction(theta: FloatArray) -> FloatArray:
+    """Return the unit vectors of cap -> base at angles (P,), shape (P, 2)."""
+    return np.column_stack((np.sin(theta), -np.cos(theta)))
+
+
+def frame_grid(table: TrackTable) -> tuple[float, Numbers, str]:
     """Return the frame time, the frame number of every row, and how the times were read.
 
     Rows may be missing. The frame time is the slope of a straight line through the times over their frame numbers, so
-    that times printed with few digits do not spoil it.
-
-    Raises
-    ------
-    ValueError
-        If the steps between rows are no multiples of one frame time: a camera with variable frame rate.
+    that times printed with few digits do not spoil it. Steps that are no multiples of one frame time are refused: a
+    camera with variable frame rate.
     """
     t = table.t
     if len(t) < 2:
@@ -225,9 +195,10 @@ def frame_grid(table: TrackTable) -> tuple[float, np.ndarray[tuple[int], np.dtyp
         frames[1:] = np.cumsum(apart)
         slope, start = (float(value) for value in np.polyfit(frames, t, 1))
     missed = np.abs(t - (start + slope * frames))
-    # E notation drops zeros of its own: what most times are rounded to, all may be.
+    # E notation drops zeros of its own: what most times are rounded to, all may be. A time may miss its frame by what
+    # its digits leave open, up to a fifth of the frame time, and by a fiftieth of it whatever its digits.
     printed = 1.1 * np.maximum(table.resolution, np.median(table.resolution))
-    excess = missed - np.maximum(np.minimum(printed, UNEVEN * slope), EVEN * slope)
+    excess = missed - np.maximum(np.minimum(printed, 0.2 * slope), 0.02 * slope)
     worst = int(excess.argmax())
     if excess[worst] > 0:
         raise ValueError(
@@ -241,14 +212,8 @@ def frame_grid(table: TrackTable) -> tuple[float, np.ndarray[tuple[int], np.dtyp
 def unwrapped(raw: FloatArray, t: FloatArray, frame_time: float, source: str) -> FloatArray:
     """Return an angle without jumps of 2 pi: every value takes the turn nearest to what the rate so far predicts.
 
-    Parameters
-    ----------
-    raw : shape (P,) - angles in any turn [rad]; NaN where missing
-
-    Raises
-    ------
-    ValueError
-        If a gap is so long at the known rate that the number of turns is a guess.
+    ``raw`` (P,) holds angles in any turn [rad], NaN where missing. A gap that is so long at the known rate that the
+    number of turns is a guess is refused.
     """
     theta = raw.copy()
     known = np.flatnonzero(~np.isnan(raw))
@@ -259,7 +224,7 @@ def unwrapped(raw: FloatArray, t: FloatArray, frame_time: float, source: str) ->
         rate = float(np.polyfit(recent - before, theta[recent], 1)[0]) if len(recent) > 1 else 0.0
         expected = theta[before] + rate * (k - before)
         theta[k] += 2 * np.pi * np.rint((expected - theta[k]) / (2 * np.pi))
-        if k - before > 1 and abs(rate) * (k - before) > MOST_UNSEEN_TURN:
+        if k - before > 1 and abs(rate) * (k - before) > np.pi:
             raise ValueError(
                 f"{source}: between t = {t[before]:.4g} s and {t[k]:.4g} s the bottle turns unseen by about "
                 f"{abs(rate) * (k - before):.1f} rad ({abs(rate) / frame_time:.3g} rad/s), which leaves the number of "

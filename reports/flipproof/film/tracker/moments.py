@@ -20,17 +20,8 @@ from flipproof.film.tracker.parabola import LEAST_POINTS, axis_equations, least_
 from flipproof.film.tracker.smoothing import BoolArray
 from slicemodel.trajectory import FloatArray
 
-LEAST_TURN: Final = 1.2
-"""Angle [rad] that a stretch must turn through: a bottle that does not turn has no parabola of its own."""
-
-MOST_EDGES: Final = 120
-"""First and last frames that are tried."""
-
-NOISES: Final = 1.6
-"""A stretch fits if it leaves at most this many times the noise."""
-
 FLOOR: Final = 0.003
-"""The same as part of the bottle's length: lenses and markers beside the axis leave as much."""
+"""What a stretch may leave beside noise, as part of the bottle's length: so much do lenses and markers off the axis."""
 
 LARGEST: Final = 0.03
 """Beyond this part of the length, nothing in the record flies."""
@@ -38,16 +29,8 @@ LARGEST: Final = 0.03
 DEVIATIONS: Final = 3.5
 """Standard deviations by which the frame after the flight misses the parabola."""
 
-SIDE: Final = 0.0376
-"""Time on either side of a landing [s]: nine frames of 240 a second; at least ``LEAST_SIDE`` frames."""
-
 LEAST_SIDE: Final = 4
-
-NEAR: Final = 0.0334
-"""Time around the end of the stretch in which a landing or a release is looked for [s]."""
-
-HAND: Final = 0.0585
-"""Time of the hand that the onset explains [s]."""
+"""Frames on either side of a landing or a release at the least, however slow the camera."""
 
 Index = NDArray[np.int64]
 
@@ -66,7 +49,7 @@ class Flight:
     inside : bool (P,) - frames from release to landing
     release_how, landing_how : how each was found, in words
     landed : False if the record ends in flight
-    before_release : [s] - time of the frame before the first in flight
+    cuts : times of the last frames before the motion bends: in the hand and in flight [s]
     """
 
     release: float
@@ -75,12 +58,7 @@ class Flight:
     release_how: str
     landing_how: str
     landed: bool
-    before_release: float
-
-    @property
-    def cuts(self) -> tuple[float, ...]:
-        """Return the times of the last frames before the motion bends: in the hand and in flight [s]."""
-        return self.before_release, self.landing
+    cuts: tuple[float, float]
 
 
 def find_flight(
@@ -109,18 +87,15 @@ def find_flight(
     for name, given in (("release", release), ("landing", landing)):
         if given is not None and not spin.t[0] - spin.frame_time <= given <= spin.t[-1] + spin.frame_time:
             raise ValueError(f"{name} = {given:g} s is outside the record [{spin.t[0]:.4g}, {spin.t[-1]:.4g}] s")
-    whole = spin.measured.copy()
-    whole &= (spin.t >= release - 1e-9) if release is not None else True
-    whole &= (spin.t <= landing + 1e-9) if landing is not None else True
-    points = np.flatnonzero(whole).astype(np.int64)
+    begin, end = -np.inf if release is None else release - 1e-9, np.inf if landing is None else landing + 1e-9
+    points = np.flatnonzero(spin.measured & (spin.t >= begin) & (spin.t <= end)).astype(np.int64)
     if len(points) < LEAST_POINTS:
         raise ValueError(f"the given release and landing leave {len(points)} tracked frames; {LEAST_POINTS} are needed")
-    if release is not None and landing is not None:
-        first, last, words = int(points[0]), int(points[-1]), ""
-        landed = True
-    else:
-        first, last, words = _stretch(spin, points, gravity)
-        landed = landing is not None or last < int(points[-1])
+    first, last = int(points[0]), int(points[-1])
+    landed = landing is not None
+    if release is None or landing is None:
+        first, last = _stretch(spin, points, gravity)
+        landed = landed or last < int(points[-1])
     landing_how = "given"
     if landing is None and table_height is not None:
         last, landing_how = _at_table(spin, first, table_height)
@@ -128,7 +103,7 @@ def find_flight(
     elif landing is None and not landed:
         landing_how = "the record ends in flight"
     elif landing is None:
-        last, landing_how = _sharpened(spin, first, last, f"the last frame before the axis leaves the parabola {words}")
+        last, landing_how = _sharpened(spin, first, last)
     release_how = "given"
     if release is None and first == points[0]:
         release_how = "the record begins in flight"
@@ -136,19 +111,21 @@ def find_flight(
         first, release_how = _onset(spin, first, last, gravity)
     inside = np.zeros(len(spin.t), dtype=np.bool_)
     inside[first : last + 1] = True
+    end = landing if landing is not None else float(spin.t[last])
     return Flight(
         release=release if release is not None else float(spin.t[first]),
-        landing=landing if landing is not None else float(spin.t[last]),
+        landing=end,
         inside=inside,
         release_how=release_how,
         landing_how=landing_how,
         landed=landed,
-        before_release=float(spin.t[first] - spin.frame_time),
+        cuts=(float(spin.t[first] - spin.frame_time), end),
     )
 
 
-def _frames(spin: MeasuredSpin, time: float, least: int) -> int:
-    return max(int(time / spin.frame_time), least)
+def _frames(spin: MeasuredSpin, time: float) -> int:
+    """Return the frames of a time [s]: those here are 8 to 14 frames of 240 a second."""
+    return max(int(time / spin.frame_time), LEAST_SIDE)
 
 
 def _noise(spin: MeasuredSpin) -> tuple[float, float]:
@@ -164,21 +141,19 @@ def _equations(spin: MeasuredSpin, points: Index, gravity: float | None) -> tupl
     return (matrix, values) if gravity is None else (matrix[:, :4], values - matrix[:, 4] * gravity)
 
 
-def _stretch(spin: MeasuredSpin, points: Index, gravity: float | None) -> tuple[int, int, str]:
-    """Return first and last frame of the longest stretch that one parabola fits, and the criterion in words."""
+def _stretch(spin: MeasuredSpin, points: Index, gravity: float | None) -> tuple[int, int]:
+    """Return first and last frame of the longest stretch that one parabola fits."""
     length, noise = _noise(spin)
     matrix, values = _equations(spin, points, gravity)
-    allowed = max(NOISES * noise, FLOOR * length)
-    found = None
-    while found is None:
-        found = _longest(matrix, values, spin.theta[points], allowed)
-        if found is None and allowed >= LARGEST * length:
+    allowed = max(1.6 * noise, FLOOR * length)
+    while (found := _longest(matrix, values, spin.theta[points], allowed)) is None:
+        if allowed >= LARGEST * length:
             raise NoFlightError(
                 "no stretch of the record is free flight: no parabola stays on the bottle's axis within "
                 f"{LARGEST:.0%} of its length; check that y points up and that cap and base are not exchanged, or "
                 "name release and landing"
             )
-        allowed *= 1.0 if found is not None else 1.5
+        allowed *= 1.5
     first, last = found
     for _ in range(4):
         trim = (last - first) // 7
@@ -188,31 +163,30 @@ def _stretch(spin: MeasuredSpin, points: Index, gravity: float | None) -> tuple[
         if wider == (first, last):
             break
         first, last = wider
-    words = f"by {DEVIATIONS:g} standard deviations"
-    return int(points[first]), int(points[last]), words
+    return int(points[first]), int(points[last])
 
 
 def _longest(matrix: FloatArray, values: FloatArray, theta: FloatArray, allowed: float) -> tuple[int, int] | None:
     """Return the longest [first, last] whose best parabola leaves at most ``allowed``, None if there is none."""
     size, unknowns = matrix.shape
-    square = np.concatenate(
-        (np.zeros((1, unknowns, unknowns)), np.cumsum(matrix[:, :, None] * matrix[:, None, :], axis=0))
-    )
-    mixed = np.concatenate((np.zeros((1, unknowns)), np.cumsum(matrix * values[:, None], axis=0)))
-    plain = np.concatenate(([0.0], np.cumsum(values * values)))
-    edges = np.unique(np.linspace(0, size, min(size + 1, MOST_EDGES)).astype(np.int64))
+    whole = np.column_stack((matrix, values))
+    products = np.zeros((size + 1, unknowns + 1, unknowns + 1))
+    np.cumsum(whole[:, :, None] * whole[:, None, :], axis=0, out=products[1:])
+    edges = np.unique(np.linspace(0, size, min(size + 1, 120)).astype(np.int64))
     first, after = (index.ravel() for index in np.meshgrid(edges, edges, indexing="ij"))
     enough = after - first >= max(2 * LEAST_POINTS, 12)
     first, after = first[enough], after[enough]
-    enough = np.abs(theta[after - 1] - theta[first]) >= LEAST_TURN
+    # A bottle that does not turn has no parabola of its own.
+    enough = np.abs(theta[after - 1] - theta[first]) >= 1.2
     first, after = first[enough], after[enough]
     if not len(first):
         return None
-    a, b = square[after] - square[first], mixed[after] - mixed[first]
+    sums = products[after] - products[first]
+    a, b = sums[:, :-1, :-1], sums[:, :-1, -1]
     scale = 1.0 / np.sqrt(np.maximum(np.einsum("kii->ki", a), 1e-300))
     scaled = a * scale[:, :, None] * scale[:, None, :] + 1e-11 * np.eye(unknowns)
     solution = np.linalg.solve(scaled, (b * scale)[..., None])[..., 0] * scale
-    left = np.maximum(plain[after] - plain[first] - np.einsum("ki,ki->k", solution, b), 0.0)
+    left = np.maximum(sums[:, -1, -1] - np.einsum("ki,ki->k", solution, b), 0.0)
     fits = left <= allowed * allowed * (after - first - unknowns)
     if not fits.any():
         return None
@@ -242,45 +216,41 @@ def _walk(off: FloatArray, start: int, step: int) -> int:
 
 def _onset(spin: MeasuredSpin, first: int, last: int, gravity: float | None) -> tuple[int, str]:
     """Return the frame of the release: the onset before which a constant acceleration explains the frames best."""
-    hand, near = _frames(spin, HAND, LEAST_SIDE), _frames(spin, NEAR, LEAST_SIDE)
-    points = np.flatnonzero(spin.measured & (np.arange(len(spin.t)) >= first - hand))
-    points = points[points <= last].astype(np.int64)
+    hand, near = _frames(spin, 0.0585), _frames(spin, 0.0334)
+    frames = np.arange(len(spin.t))
+    points = frames[spin.measured & (frames >= first - hand) & (frames <= last)]
     matrix, values = _equations(spin, points, gravity)
-    axis = spin.base[points] - spin.cap[points]
-    normal = np.column_stack((-axis[:, 1], axis[:, 0])) / np.hypot(*axis.T)[:, None]
     cost = {}
     for k in range(max(first - near, int(points[0])), min(first + 2 * near, last - LEAST_POINTS) + 1):
         before = np.maximum(spin.t[k] - spin.t[points], 0.0)
-        pull = 0.5 * normal * (before * before)[:, None]
+        pull = 0.5 * matrix[:, :2] * (before * before)[:, None]
         _, _, rest = least_squares(np.column_stack((matrix, pull)), values)
         cost[k] = float(rest @ rest)
-    k = min(cost, key=lambda frame: cost[frame])
+    k = min(cost, key=cost.__getitem__)
     noise = cost[k] / max(len(values) - matrix.shape[1] - 3, 1)
     likely = [frame for frame in cost if cost[frame] <= cost[k] + 4 * noise]
     margin = max(k - min(likely), max(likely) - k, 1)
-    frames = "1 frame" if margin == 1 else f"{margin} frames"
-    return k, f"the onset from which the bottle's axis stays on one parabola, to within {frames}"
+    within = "1 frame" if margin == 1 else f"{margin} frames"
+    return k, f"the onset from which the bottle's axis stays on one parabola, to within {within}"
 
 
-def _sharpened(spin: MeasuredSpin, first: int, last: int, how: str) -> tuple[int, str]:
+def _sharpened(spin: MeasuredSpin, first: int, last: int) -> tuple[int, str]:
     """Return the frame near ``last`` at which the tracks bend most, if they do, else ``last``."""
     length, _ = _noise(spin)
     signal = np.column_stack((spin.theta * length, spin.cap, spin.base))
     known: BoolArray = np.asarray(~np.isnan(signal).any(axis=1))
     noise = max(spin.theta_noise, 1e-9) * length * np.array([1.0, *[np.sqrt(0.5)] * 4])
-    side, near = _frames(spin, SIDE, LEAST_SIDE), _frames(spin, NEAR, LEAST_SIDE)
+    side, near = _frames(spin, 0.0376), _frames(spin, 0.0334)
     found: dict[int, tuple[float, float]] = {}
     for k in range(max(last - 3 * near, first + side), min(last + near, len(spin.t) - side - 1) + 1):
         left, right = np.arange(k - side + 1, k + 1), np.arange(k + 1, k + side + 1)
         left, right = left[known[left]], right[known[right]]
         if min(len(left), len(right)) >= max(side - 2, LEAST_SIDE):
             found[k] = _bend(signal, noise, k + 0.5, left, right)
-    if not found:
-        return last, how
-    sharpest = max(found, key=lambda k: found[k][1])
-    jump = found[sharpest][1]
+    sharpest = max(found, key=lambda k: found[k][1], default=last)
+    jump = found[sharpest][1] if found else 0.0
     if jump < 2 * DEVIATIONS:
-        return last, how
+        return last, f"the last frame before the axis leaves the parabola by {DEVIATIONS:g} standard deviations"
     k = min((k for k in found if abs(k - sharpest) <= side // 2), key=lambda k: found[k][0])
     before, after = _rate(spin, np.arange(k - side + 1, k + 1)), _rate(spin, np.arange(k + 1, k + side + 1))
     return k, (

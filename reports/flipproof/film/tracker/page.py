@@ -13,6 +13,7 @@ import numpy as np
 
 from flipproof.film.tracker.bench import Measurement
 from flipproof.film.tracker.parabola import Parabola
+from flipproof.output.columns import columns_csv
 from flipproof.page.templating import environment
 
 COLUMNS = {
@@ -40,25 +41,16 @@ def csv_text(measured: Measurement) -> str:
         spin.t, spin.theta, spin.omega, spin.band, spin.omega_paper, spin.band_paper, measured.r_cm, spin.measured,
         spin.interpolated, measured.flight.inside, measured.reduced_time, spin.omega / measured.omega0, spin.lines,
     )  # fmt: skip
-    whole = {"measured", "interpolated", "in_flight", "line"}
-    rows = [",".join(COLUMNS)]
-    for row in zip(*columns, strict=True):
-        cells = (
-            str(int(value)) if name in whole else "" if math.isnan(value) else f"{value:.9g}"
-            for name, value in zip(COLUMNS, row, strict=True)
-        )
-        rows.append(",".join(cells))
-    return "\n".join(rows) + "\n"
+    shown = (column if column.dtype.kind == "f" else column.astype(int) for column in columns)
+    return columns_csv(dict(zip(COLUMNS, shown, strict=True)))
 
 
 def summary(measured: Measurement) -> dict[str, Any]:
     """Return every number of a measurement, ready for JSON."""
     spin, flight = measured.spin, measured.flight
-    request = asdict(measured.request)
-    request["files"] = [str(path) for path in measured.request.files]
     return {
-        "request": request,
-        "files": [dialect.words for dialect in measured.table.dialects],
+        "request": asdict(measured.request) | {"files": [str(path) for path in measured.request.files]},
+        "files": list(measured.table.dialects),
         "tracks": list(measured.table.tracks),
         "frames": {
             "count": len(spin.t),
@@ -95,7 +87,7 @@ def lines(measured: Measurement) -> list[str]:
     how = "C_M as tracked" if measured.track else "found from the axis"
     found = [
         f"{measured.table.source}: {len(spin.t)} frames at {1 / spin.frame_time:.4g}/s, {spin.measured.sum()} with cap "
-        f"and base, {spin.interpolated.sum()} interpolated ({'; '.join(d.words for d in measured.table.dialects)})",
+        f"and base, {spin.interpolated.sum()} interpolated ({'; '.join(measured.table.dialects)})",
         f"release  t = {flight.release:.4f} s ({flight.release_how})",
         f"landing  t = {flight.landing:.4f} s ({flight.landing_how})",
         f"omega_0  {measured.omega0:.2f} +- {measured.omega0_deviation:.2g} rad/s; second half of the flight: "
@@ -122,14 +114,12 @@ def write(measured: Measurement, folder: Path, provenance: Mapping[str, str]) ->
         (folder / f"{name}.svg").write_text(drawing.svg, encoding="utf-8")
         (folder / f"{name}.png").write_bytes(drawing.png)
     numbers = summary(measured) | {"provenance": dict(provenance)}
-    (folder / "summary.json").write_text(
-        json.dumps(_finite(numbers), indent=2, ensure_ascii=False) + "\n", encoding="utf-8"
-    )
-    templates = environment()
-    page = templates.get_template("track.html.j2").render(
-        measured=measured, fit=measured.track or measured.axis, summary=numbers, figures=drawn, provenance=provenance
-    )
-    (folder / "index.html").write_text(page, encoding="utf-8")
+    text = json.dumps(_finite(numbers), indent=2, ensure_ascii=False) + "\n"
+    (folder / "summary.json").write_text(text, encoding="utf-8")
+    fit = measured.track or measured.axis
+    page = environment().get_template("track.html.j2")
+    html = page.render(measured=measured, fit=fit, summary=numbers, figures=drawn, provenance=provenance)
+    (folder / "index.html").write_text(html, encoding="utf-8")
 
 
 def _finite(value: Any) -> Any:

@@ -48,9 +48,7 @@ class Parabola:
     def at(self, t: FloatArray) -> FloatArray:
         """Return the place of the centre of mass, shape (P, 2), at times t [s]."""
         tau = t - self.start
-        return np.column_stack(
-            (self.x0 + self.v0x * tau, self.y0 + self.v0y * tau - 0.5 * self.g * tau * tau)
-        )  # fmt: skip
+        return np.column_stack((self.x0 + self.v0x * tau, self.y0 + self.v0y * tau - 0.5 * self.g * tau * tau))
 
 
 def fit_track(t: FloatArray, points: FloatArray, start: float) -> Parabola:
@@ -59,13 +57,8 @@ def fit_track(t: FloatArray, points: FloatArray, start: float) -> Parabola:
     Parameters
     ----------
     t : (P,) [s]
-    points : (P, 2) - NaN where missing
+    points : (P, 2) - NaN where missing; fewer than ``LEAST_POINTS`` others are refused
     start : time of the release [s]
-
-    Raises
-    ------
-    ValueError
-        If fewer than ``LEAST_POINTS`` points are there.
     """
     known = ~np.isnan(points).any(axis=1)
     if known.sum() < LEAST_POINTS:
@@ -96,10 +89,7 @@ def least_squares(matrix: FloatArray, values: FloatArray) -> tuple[FloatArray, F
 def axis_equations(t: FloatArray, cap: FloatArray, base: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return matrix (P, 5) and right-hand side (P,) of the axis condition for (x0, y0, v0x, v0y, g).
 
-    Parameters
-    ----------
-    t : (P,) - times since the release [s]
-    cap, base : (P, 2) - no value missing
+    ``t`` (P,) counts from the release [s]; no value of ``cap`` and ``base`` (P, 2) is missing.
     """
     axis = base - cap
     axis = axis / np.hypot(*axis.T)[:, None]
@@ -113,12 +103,7 @@ def fit_axis(
 ) -> Parabola:
     """Find the parabola of the centre of mass from cap and base alone, over the frames ``inside``.
 
-    With ``gravity`` given, g is not fitted.
-
-    Raises
-    ------
-    ValueError
-        If fewer than ``LEAST_POINTS`` frames are inside.
+    With ``gravity`` given, g is not fitted. Fewer than ``LEAST_POINTS`` frames are refused.
     """
     if inside.sum() < LEAST_POINTS:
         raise ValueError(f"the flight has {inside.sum()} tracked frames; {LEAST_POINTS} are needed")
@@ -128,14 +113,11 @@ def fit_axis(
     else:
         solution, deviations, rest = least_squares(matrix[:, :4], values - matrix[:, 4] * gravity)
         solution, deviations = np.append(solution, gravity), np.append(deviations, 0.0)
-    x0, y0, v0x, v0y, g = (float(value) for value in solution)
-    sd: dict[str, Any] = dict(
-        zip(("sd_x0", "sd_y0", "sd_v0x", "sd_v0y", "sd_g"), (float(value) for value in deviations), strict=True)
-    )
-    return Parabola(
-        start=start, x0=x0, y0=y0, v0x=v0x, v0y=v0y, g=g, **sd,
-        residual=float(np.sqrt(np.mean(rest * rest))), points=int(inside.sum()),
-    )  # fmt: skip
+    names = ("x0", "y0", "v0x", "v0y", "g")
+    found: dict[str, Any] = dict(zip(names, solution.tolist(), strict=True))
+    found |= {f"sd_{name}": sd for name, sd in zip(names, deviations.tolist(), strict=True)}
+    residual = float(np.sqrt(np.mean(rest * rest)))
+    return Parabola(start=start, **found, residual=residual, points=int(inside.sum()))
 
 
 def distance_from_cap(parabola: Parabola, t: FloatArray, cap: FloatArray, base: FloatArray) -> FloatArray:

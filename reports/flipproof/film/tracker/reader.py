@@ -16,8 +16,10 @@ into the wrong column.
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
@@ -25,27 +27,24 @@ import numpy as np
 
 from flipproof.film.tracker.dialect import (
     EXPORT,
+    MULTI,
     TIMES,
     Line,
-    cells_of,
+    Rows,
     decimal_of,
     delimiter_of,
     last_digit,
-    lines_of,
     number,
-    read_text,
+    read_lines,
 )
-from flipproof.film.tracker.headings import Heading, headings_of, names_line, track_names
-from flipproof.film.tracker.table import Dialect, Track, TrackFileError, TrackTable, column_name, plain
+from flipproof.film.tracker.table import Track, TrackFileError, TrackTable, column_name, plain
 from slicemodel.scenario import shortened
-from slicemodel.trajectory import FloatArray
 
 LARGEST: Final = 1e9
 """Largest magnitude of a number that a table of positions, angles and times may hold, in any unit."""
 
-MISSING: Final = ("", "nan", "NaN")
-
-Rows = list[tuple[Line, list[str]]]
+Heading = tuple[str, str, str]
+"""Of a column: the track it belongs to, its plain name, its unit ("" if none is stated)."""
 
 
 def read_track_table(path: Path | str, *more: Path | str) -> TrackTable:
@@ -67,51 +66,111 @@ def read_track_table(path: Path | str, *more: Path | str) -> TrackTable:
 
 
 def _read(path: Path) -> TrackTable:
-    text, encoding = read_text(path)
-    lines = lines_of(text)
+    lines, encoding = read_lines(path)
     delimiter, k = delimiter_of(path, lines)
-    columns_line = lines[k]
-    above = names_line(path, lines[:k], columns_line)
-    rows = [(line, cells_of(path, line, delimiter)) for line in lines[k + 1 :]]
-    titles = cells_of(path, columns_line, delimiter)
-    if delimiter == " ":
-        titles, rows = _without_alignment(path, columns_line, lines[k + 1 :])
-    trailing = len(titles) > 1 and not titles[-1]
+    header, below = lines[k], lines[k + 1 :]
+    above = _names_line(lines[:k], header)
+    rows = [(line, line.cells(delimiter)) for line in below]
+    titles = header.cells(delimiter)
+    if delimiter == " " and not _one_space_ends_a_cell(titles, [cells for _, cells in rows]):
+        titles, rows = header.text.split(), [(line, line.text.split()) for line in below]
     pieces = len(titles)
-    titles = titles[:-1] if trailing else titles
-    _refuse_unnamed(path, columns_line, titles)
-    _refuse_second_table(path, rows)
-    rows = _of_one_length(path, rows, len(titles), delimiter)
-    decimal = decimal_of(path, rows)
-    names = track_names(path, above, delimiter, titles, pieces)
-    headings = headings_of(path, columns_line, titles, names)
-    return _table(path, headings, rows, Dialect(encoding=encoding, delimiter=delimiter, decimal=decimal))
-
-
-def _without_alignment(path: Path, columns: Line, lines: Sequence[Line]) -> tuple[list[str], Rows]:
-    """Return the cells of a table with spaces: one space ends a cell, unless spaces align columns and none is empty."""
-    strict = [cells_of(path, line, " ") for line in (columns, *lines)]
-    titles = strict[0]
-    full = len(titles) - (not titles[-1])
-    lengths = {len(cells) for cells in strict[1:]}
-    if titles[0] and (lengths == {full} or (lengths == {full + 1} and not any(cells[-1] for cells in strict[1:]))):
-        return titles, list(zip(lines, strict[1:], strict=True))
-    return columns.text.split(), [(line, line.text.split()) for line in lines]
-
-
-def _refuse_unnamed(path: Path, line: Line, titles: Sequence[str]) -> None:
-    for k, title in enumerate(titles, start=1):
-        if not title:
-            raise TrackFileError(f"{path}, line {line.number}: column {k} has no name; {EXPORT} again")
-
-
-def _refuse_second_table(path: Path, rows: Rows) -> None:
+    titles = titles[:-1] if pieces > 1 and not titles[-1] else titles
+    if "" in titles:
+        raise header.error(f"column {titles.index('') + 1} has no name; {EXPORT} again")
     for line, cells in rows:
         if column_name(cells[0])[0].lower() in TIMES:
-            raise TrackFileError(
-                f"{path}, line {line.number}: a second row of column names; two exports were joined: put each "
-                "into a file of its own"
-            )
+            raise line.error("a second row of column names; two exports were joined: put each into a file of its own")
+    rows = _of_one_length(path, rows, len(titles), delimiter)
+    decimal = decimal_of(rows)
+    headings = _headings(header, titles, _track_names(above, delimiter, titles, pieces))
+    sign = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "space"}[delimiter]
+    dialect = f"{encoding}, {sign}-delimited, decimal {'point' if decimal == '.' else 'comma'}"
+    return _table(path, headings, rows, decimal, dialect)
+
+
+# ---------------------------------------------------------------------- the rows above the numbers
+
+
+def _names_line(above: Sequence[Line], header: Line) -> Line | None:
+    """Return the row of track names: at most one line besides ``#multi:`` stands above the column names."""
+    multi = [line for line in above if line.text.strip(" \t;,").lower() in MULTI]
+    others = [line for line in above if line not in multi]
+    if len(multi) > 1 or (multi and multi[0] is not above[0]):
+        raise multi[-1].error(
+            "'#multi:' belongs in the first line, once; two exports may have been joined: put them into two files"
+        )
+    if len(others) > 1:
+        raise others[1].error(
+            f"a second line stands between the track names (line {others[0].number}) and the column names (line "
+            f"{header.number}); delete it or begin it with //"
+        )
+    return others[0] if others else None
+
+
+def _one_space_ends_a_cell(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> bool:
+    """Return whether one space ends a cell; else spaces align the columns, and no cell is empty."""
+    full = len(titles) - (not titles[-1])
+    lengths = {len(cells) for cells in rows}
+    closed = lengths == {full + 1} and not any(cells[-1] for cells in rows)
+    return bool(titles[0]) and (lengths == {full} or closed)
+
+
+def _track_names(line: Line | None, delimiter: str, titles: Sequence[str], pieces: int) -> list[str]:
+    """Return the track of every column after the first, from the row of track names; "" without one.
+
+    ``pieces`` counts the cells of the row of column names, with the empty one behind a closing delimiter.
+    """
+    count = len(titles)
+    if line is None:
+        return [""] * (count - 1)
+    cells = line.cells(delimiter)
+    # The name of the only track may stand alone in its row.
+    if delimiter == " " and not line.text.startswith(" "):
+        return [line.text.strip(" ")] * (count - 1)
+    if cells[0] and not any(cells[1:]) and len(cells) in (1, count, count + 1):
+        return [cells[0]] * (count - 1)
+    if cells[0] or not any(cells[1:]):
+        raise line.error(f"is neither track names nor column names; {EXPORT} again, or begin it with //")
+    starts = [k for k, cell in enumerate(cells) if cell]
+    spans = list(pairwise([*starts, count]))
+    groups = [titles[begin:end] for begin, end in spans]
+    # An editor that cut the delimiters at the end of the line leaves a table whose tracks must agree among themselves.
+    cut = len(cells) < pieces and all(group == groups[0] for group in groups)
+    if starts[0] != 1 or starts[-1] >= count or not (len(cells) == pieces or cut):
+        raise line.error(
+            f"track names do not fit the columns below ({len(cells)} cells above {pieces}); a name must not hold the "
+            "delimiter, and one delimiter must follow it per column"
+        )
+    twice, times = Counter(plain(cells[k]) for k in starts).most_common(1)[0]
+    if times > 1:
+        raise line.error(f"two tracks are named {twice!r}; rename one in Tracker and export again")
+    return [cells[begin] for begin, end in spans for _ in range(begin, end)]
+
+
+def _headings(line: Line, titles: Sequence[str], names: Sequence[str]) -> list[Heading]:
+    """Return the headings of the columns after the first; without track names ``xcap`` is column x of track cap."""
+    headings = [(track, *column_name(title)) for track, title in zip(names, titles[1:], strict=True)]
+    if not any(names) and not {"x", "y"} & {name for _, name, _ in headings}:
+        headings = [_of_data_track(line, name, unit) for _, name, unit in headings]
+    for (track, name), times in Counter((track, name) for track, name, _ in headings).items():
+        if times > 1 or name.lower() in TIMES:
+            of = f" of track {track!r}" if track else ", and no line above names the tracks"
+            raise line.error(f"column {name!r} occurs twice{of}; export each column once")
+    return headings
+
+
+def _of_data_track(line: Line, name: str, unit: str) -> Heading:
+    match = re.fullmatch(r"([xy])(\w+)", name)
+    if match is None:
+        raise line.error(
+            f"column {name!r} belongs to no track; the tracks' names stand in the line above the column names, or the "
+            "columns are pairs such as xcap ycap"
+        )
+    return match[2], match[1], unit
+
+
+# ---------------------------------------------------------------------- the numbers
 
 
 def _of_one_length(path: Path, rows: Rows, columns: int, delimiter: str) -> Rows:
@@ -119,68 +178,65 @@ def _of_one_length(path: Path, rows: Rows, columns: int, delimiter: str) -> Rows
     if not rows:
         raise TrackFileError(f"{path}: has column names but no rows; {EXPORT} with all cells")
     lengths = Counter(len(cells) for _, cells in rows)
+    empty = not any(cells[-1] for _, cells in rows)
     if lengths == {columns: len(rows)}:
-        if not any(cells[-1] for _, cells in rows):
-            raise TrackFileError(
-                f"{path}, line {rows[0][0].number}: the last column is empty in every row, as if a column were lost "
-                "and a delimiter closed every row; delete the name of the column, or export again"
+        if empty:
+            raise rows[0][0].error(
+                "the last column is empty in every row, as if a column were lost and a delimiter closed every row; "
+                "delete the name of the column, or export again"
             )
         return rows
-    if lengths == {columns + 1: len(rows)} and not any(cells[-1] for _, cells in rows):
+    if lengths == {columns + 1: len(rows)} and empty:
         return [(line, cells[:-1]) for line, cells in rows]
     if delimiter == "," and lengths.keys() <= set(range(columns + 1, 2 * columns + 1)):
-        raise TrackFileError(
-            f"{path}, line {rows[0][0].number}: has {len(rows[0][1])} cells for {columns} columns; the comma seems to "
-            "be delimiter and decimal sign at once: choose tab or semicolon as delimiter when exporting"
+        raise rows[0][0].error(
+            f"has {len(rows[0][1])} cells for {columns} columns; the comma seems to be delimiter and decimal sign at "
+            "once: choose tab or semicolon as delimiter when exporting"
         )
     usual = columns + 1 if lengths[columns + 1] > lengths[columns] else columns
     line, cells = next((line, cells) for line, cells in rows if len(cells) != usual or (usual > columns and cells[-1]))
     closing = " and a closing delimiter" if usual > columns else ""
-    raise TrackFileError(
-        f"{path}, line {line.number}: has {len(cells)} cells for {columns} columns{closing}; give a missing value an "
-        "empty cell between its delimiters, or delete the line"
+    raise line.error(
+        f"has {len(cells)} cells for {columns} columns{closing}; give a missing value an empty cell between its "
+        "delimiters, or delete the line"
     )
 
 
-def _table(path: Path, headings: Sequence[Heading], rows: Rows, dialect: Dialect) -> TrackTable:
-    values = np.array([[_value(path, line, cell, dialect) for cell in cells] for line, cells in rows])
+def _table(path: Path, headings: Sequence[Heading], rows: Rows, decimal: str, dialect: str) -> TrackTable:
+    values = np.array([[_value(line, cell, decimal) for cell in cells] for line, cells in rows])
     t = values[:, 0]
     for k, (line, _) in enumerate(rows):
         if math.isnan(t[k]):
-            raise TrackFileError(f"{path}, line {line.number}: has no time; delete the line or write its time")
+            raise line.error("has no time; delete the line or write its time")
         if k and not t[k] > t[k - 1]:
-            raise TrackFileError(
-                f"{path}, line {line.number}: the time {t[k]:g} does not follow {t[k - 1]:g} of line "
-                f"{rows[k - 1][0].number}; rows must be in order of time, each once"
+            raise line.error(
+                f"the time {t[k]:g} does not follow {t[k - 1]:g} of line {rows[k - 1][0].number}; rows must be in "
+                "order of time, each once"
             )
-    tracks: dict[str, Track] = {}
-    for name in dict.fromkeys(heading.track for heading in headings):
-        mine = {heading.name: (k, heading.unit) for k, heading in enumerate(headings, start=1) if heading.track == name}
-        tracks[name] = Track(
-            name=name,
-            columns={column: values[:, k] for column, (k, _) in mine.items()},
-            units={column: unit for column, (_, unit) in mine.items() if unit},
-        )
-    resolution = np.array([last_digit(cells[0], dialect.decimal) for _, cells in rows])
-    lines = np.array([line.number for line, _ in rows])
+    tracks = {track: Track(name=track, columns={}, units={}) for track, _, _ in headings}
+    for k, (track, name, unit) in enumerate(headings, start=1):
+        tracks[track].columns[name] = values[:, k]
+        if unit:
+            tracks[track].units[name] = unit
     return TrackTable(
-        source=str(path), dialects=(dialect,), t=t, resolution=resolution, tracks=tracks, lines=lines
-    )  # fmt: skip
+        source=str(path),
+        dialects=(dialect,),
+        t=t,
+        resolution=np.array([last_digit(cells[0], decimal) for _, cells in rows]),
+        tracks=tracks,
+        lines=np.array([line.number for line, _ in rows]),
+    )
 
 
-def _value(path: Path, line: Line, cell: str, dialect: Dialect) -> float:
-    if cell in MISSING:
+def _value(line: Line, cell: str, decimal: str) -> float:
+    if cell in ("", "nan", "NaN"):
         return math.nan
-    value = number(cell, dialect.decimal)
+    value = number(cell, decimal)
     shown = shortened(cell, 30)
     if value is None:
-        raise TrackFileError(
-            f"{path}, line {line.number}: {shown!r} is not a number; leave the cell empty if the point was not tracked"
-        )
+        raise line.error(f"{shown!r} is not a number; leave the cell empty if the point was not tracked")
     if not abs(value) <= LARGEST:
-        raise TrackFileError(
-            f"{path}, line {line.number}: {shown} is outside [-{LARGEST:g}, {LARGEST:g}], which no video needs"
-        )
+        raise line.error(f"{shown} is outside [-{LARGEST:g}, {LARGEST:g}], which no video needs")
     return value
 
 
@@ -195,24 +251,19 @@ def _joined(tables: Sequence[TrackTable]) -> TrackTable:
             f"{source}: the times {t[k]:g} and {t[k + 1]:g} of different files are nearly the same frame; export all "
             "tracks from one clip with one number format, best as one file with several tracks"
         )
-    tracks: dict[str, Track] = {}
+    places = [np.searchsorted(t, table.t) for table in tables]
     lines, resolution = np.zeros(len(t), dtype=np.int64), np.zeros(len(t))
-    for table in reversed(tables):
-        place = np.searchsorted(t, table.t)
+    for table, place in reversed(list(zip(tables, places, strict=True))):
         lines[place], resolution[place] = table.lines, table.resolution
-    for table in tables:
-        place = np.searchsorted(t, table.t)
+    tracks: dict[str, Track] = {}
+    for table, place in zip(tables, places, strict=True):
         for name, track in table.tracks.items():
             known = name or Path(table.source).stem
             if any(plain(known) == plain(other) for other in tracks):
                 raise TrackFileError(f"{source}: two files hold a track named {known!r}; rename one in Tracker")
-            columns = {column: _placed(values, place, len(t)) for column, values in track.columns.items()}
+            columns = {column: np.full(len(t), np.nan) for column in track.columns}
+            for column, values in track.columns.items():
+                columns[column][place] = values
             tracks[known] = Track(name=known, columns=columns, units=track.units)
     dialects = tuple(dialect for table in tables for dialect in table.dialects)
     return TrackTable(source=source, dialects=dialects, t=t, resolution=resolution, tracks=tracks, lines=lines)
-
-
-def _placed(values: FloatArray, place: np.ndarray[tuple[int], np.dtype[np.intp]], size: int) -> FloatArray:
-    column = np.full(size, np.nan)
-    column[place] = values
-    return column

@@ -8,20 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import lil_array
 
 from slicemodel.trajectory import FloatArray
 
 BoolArray = NDArray[np.bool_]
-
-AVERAGED: Final = 5
-"""Points of the paper's moving average."""
-
-LEAST_WINDOW: Final = 5
-"""A local polynomial needs this many samples to say anything about noise."""
 
 
 def segments(present: BoolArray, starts: Sequence[int] = ()) -> list[tuple[int, int]]:
@@ -45,8 +40,6 @@ def interpolation(measured: BoolArray, most_gap: int) -> tuple[Any, BoolArray]:
     map : sparse (P, P) - reads measured samples only; rows of longer gaps are empty
     filled : (P,)
     """
-    from scipy.sparse import lil_array
-
     points = np.flatnonzero(measured)
     fill = lil_array((len(measured), len(measured)))
     fill[points, points] = 1.0
@@ -70,45 +63,37 @@ def local_polynomial(present: BoolArray, window: int, degree: int, derivative: i
     The window stands in the middle where it can. Near the ends of a segment the polynomial of the outermost window is
     read off beside its middle, where it has one degree more: there a parabola misses a curved theta by some ten times
     what it misses in the middle, and the wider band says what that costs. A segment shorter than the window takes
-    the largest odd one that fits; below ``LEAST_WINDOW`` samples its rows are empty. ``starts`` begin segments of their
-    own.
+    the largest odd one that fits; below 5 samples, which tell nothing about noise, its rows are empty. ``starts`` begin
+    segments of their own.
     """
-    from scipy.sparse import lil_array
-
     operator = lil_array((len(present), len(present)))
     for begin, end in segments(present, starts):
         width = min(window, end - begin - (end - begin + 1) % 2)
-        if width < LEAST_WINDOW:
+        if width < 5:
             continue
         middle = width // 2
-        weights = [_weights(width, degree if at == middle else degree + 1, derivative, at) for at in range(width)]
+        weights = []
+        for at in range(width):
+            powers = np.vander(np.arange(width) - float(at), degree + (at != middle) + 1, increasing=True)
+            weights.append(np.linalg.pinv(powers)[derivative])
         for k in range(begin, end):
             first = min(max(k - middle, begin), end - width)
             operator[k, first : first + width] = weights[k - first]
     return operator.tocsr()
 
 
-def _weights(width: int, degree: int, derivative: int, at: int) -> FloatArray:
-    powers = np.vander(np.arange(width, dtype=np.float64) - at, degree + 1, increasing=True)
-    return np.asarray(np.linalg.pinv(powers)[derivative])
-
-
 def moving_average(present: BoolArray) -> Any:
-    """Return the map to the mean over ``AVERAGED`` samples, fewer at the ends of a segment: as many on either side."""
-    from scipy.sparse import lil_array
-
+    """Return the map to the paper's mean over 5 samples, fewer at the ends of a segment: as many on either side."""
     operator = lil_array((len(present), len(present)))
     for begin, end in segments(present):
         for k in range(begin, end):
-            reach = min(AVERAGED // 2, k - begin, end - 1 - k)
+            reach = min(2, k - begin, end - 1 - k)
             operator[k, k - reach : k + reach + 1] = 1.0 / (2 * reach + 1)
     return operator.tocsr()
 
 
 def central_difference(present: BoolArray) -> Any:
     """Return the map to the central difference per sample, one-sided at the ends of a segment."""
-    from scipy.sparse import lil_array
-
     operator = lil_array((len(present), len(present)))
     for begin, end in segments(present):
         if end - begin < 2:

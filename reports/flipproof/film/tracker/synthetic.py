@@ -9,18 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flipproof.film.tracker.kinematics import direction
 from slicemodel import Trajectory
 from slicemodel.observables import centre_of_mass_at_rest
 from slicemodel.trajectory import FloatArray
-
-HAND_ACCELERATION = (-6.0, 24.0)
-"""Acceleration of the centre of mass in the hand [m/s^2], far from free fall."""
-
-HAND_SPIN_UP = 90.0
-"""Angular acceleration in the hand [rad/s^2]."""
-
-ROCKING = 0.03
-"""Time in which the bottle rocks upright after landing [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -31,8 +23,6 @@ class SyntheticVideo:
     """
 
     t: FloatArray
-    theta: FloatArray
-    omega: FloatArray
     cap: FloatArray
     base: FloatArray
     centre: FloatArray
@@ -40,54 +30,42 @@ class SyntheticVideo:
     landing: float
 
 
-def synthetic_video(
-    run: Trajectory, *, frame_rate: float = 240.0, before: float = 0.1, after: float = 0.12, start: float = 0.0
-) -> SyntheticVideo:
-    """Return what a camera with no noise would see of a throw: ``before`` seconds of hand, the flight, the table.
+def synthetic_video(run: Trajectory) -> SyntheticVideo:
+    """Return what a camera of 240 frames/s without noise would see: 0.1 s of hand, the flight, 0.12 s of table.
 
-    In the hand the centre of mass and the angle accelerate evenly and meet the release in place and velocity. On the
-    table the base stays where it is and the bottle rocks to the nearest upright position.
+    In the hand the centre of mass and the angle accelerate evenly, by (-6, 24) m/s^2, far from free fall, and
+    90 rad/s^2, and meet the release in place and velocity. On the table the base stays where it is and the bottle rocks
+    to the nearest upright position in some 0.03 s.
     """
     scenario = run.scenario
     length, gravity = scenario.bottle.length, scenario.gravity
     velocity = np.array(scenario.launch_velocity)
-    r_cm0 = centre_of_mass_at_rest(scenario)
     flight = float(run.t[-1])
-    tau = np.arange(-np.floor(before * frame_rate), np.floor((flight + after) * frame_rate) + 1) / frame_rate
+    tau = np.arange(-24, np.floor((flight + 0.12) * 240.0) + 1) / 240.0
     inside = np.clip(tau, 0.0, flight)
     theta = np.interp(inside, run.t, run.theta)
     r_cm = np.interp(inside, run.t, run.r_cm)
-    omega = np.interp(inside, run.t, run.omega)
     held, down = tau < 0, tau > flight
-    spin_up = np.sign(scenario.omega0) * HAND_SPIN_UP
-    theta[held] += scenario.omega0 * tau[held] + 0.5 * spin_up * tau[held] ** 2
-    omega[held] += spin_up * tau[held]
-    upright = 2 * np.pi * np.rint(theta[down][:1] / (2 * np.pi)) if down.any() else np.zeros(1)
-    fade = np.exp(-(tau[down] - flight) / ROCKING)
-    lean = theta[down] - upright
-    theta[down], omega[down] = upright + lean * fade, -lean * fade / ROCKING
-    origin = r_cm0 * np.array([np.sin(scenario.theta0), -np.cos(scenario.theta0)])
-    acceleration = np.where(held[:, None], HAND_ACCELERATION, (0.0, -gravity))
+    theta[held] += scenario.omega0 * tau[held] + 0.5 * np.sign(scenario.omega0) * 90.0 * tau[held] ** 2
+    upright = 2 * np.pi * np.rint(theta[down][0] / (2 * np.pi))
+    theta[down] = upright + (theta[down] - upright) * np.exp(-(tau[down] - flight) / 0.03)
+    origin = centre_of_mass_at_rest(scenario) * np.array([np.sin(scenario.theta0), -np.cos(scenario.theta0)])
+    acceleration = np.where(held[:, None], (-6.0, 24.0), (0.0, -gravity))
     clock = np.where(held, tau, inside)[:, None]
     centre = origin + velocity * clock + 0.5 * acceleration * clock**2
-    axis = np.column_stack((np.sin(theta), -np.cos(theta)))
+    axis = direction(theta)
     cap = centre - r_cm[:, None] * axis
     base = cap + length * axis
-    if down.any():
-        first = int(np.flatnonzero(down)[0])
-        touch = int(max(first - 1, 0))
-        base[down] = base[touch]
-        cap[down] = base[down] - length * axis[down]
-        centre[down] = cap[down] + r_cm[down, None] * axis[down]
+    base[down] = base[int(down.argmax()) - 1]
+    cap[down] = base[down] - length * axis[down]
+    centre[down] = cap[down] + r_cm[down, None] * axis[down]
     return SyntheticVideo(
-        t=tau - tau[0] + start,
-        theta=theta,
-        omega=omega,
+        t=tau - tau[0],
         cap=cap,
         base=base,
         centre=centre,
-        release=float(-tau[0] + start),
-        landing=float(flight - tau[0] + start),
+        release=float(-tau[0]),
+        landing=float(flight - tau[0]),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
@@ -15,33 +15,13 @@ from slicemodel.scenario import unknown_name
 from slicemodel.trajectory import FloatArray
 
 METRES: Final = MappingProxyType({"m": 1.0, "cm": 0.01, "mm": 0.001})
-"""Length units by name, in metres."""
-
 RADIANS: Final = MappingProxyType({"deg": np.pi / 180, "rad": 1.0})
-"""Angle units by name, in radians."""
-
-GREEK: Final = MappingProxyType({"θ": "theta", "ω": "omega", "α": "alpha", "φ": "phi"})
-WITH_UNIT: Final = re.compile(r"(?P<name>.*?)\s*(?:\((?P<round>[^()]*)\)|\[(?P<square>[^\[\]]*)\])\s*")
+SECONDS: Final = MappingProxyType({"s": 1.0, "ms": 1e-3})
+"""Units of lengths, angles and times by name, in SI."""
 
 
 class TrackFileError(ValueError):
     """A file that cannot be read as a table of tracks; the message names file, line and a way out."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Dialect:
-    """How a file is written: its encoding, what stands between cells, and its decimal sign."""
-
-    encoding: str
-    delimiter: str
-    decimal: str
-
-    @property
-    def words(self) -> str:
-        """Return the dialect in words."""
-        signs = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "space"}
-        decimal = {".": "decimal point", ",": "decimal comma"}
-        return f"{self.encoding}, {signs[self.delimiter]}-delimited, {decimal[self.decimal]}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -52,17 +32,11 @@ class Track:
     """
 
     name: str
-    columns: Mapping[str, FloatArray]
-    units: Mapping[str, str]
+    columns: dict[str, FloatArray]
+    units: dict[str, str]
 
     def column(self, name: str) -> FloatArray:
-        """Return a column, shape (P,).
-
-        Raises
-        ------
-        ValueError
-            If the track has none of that name.
-        """
+        """Return a column, shape (P,); a name that the track does not have is refused."""
         if name not in self.columns:
             raise ValueError(
                 f"track {self.name!r} has no column {name!r}, only {', '.join(self.columns)}; "
@@ -84,7 +58,7 @@ class TrackTable:
     Parameters
     ----------
     source : str - the files, as they are named in messages
-    dialects : how each file is written
+    dialects : how each file is written: its encoding, what stands between cells, and its decimal sign
     t : (P,) - times in the file's unit, increasing
     resolution : (P,) - half a unit of the last digit with which each time is printed
     tracks : by name
@@ -92,19 +66,16 @@ class TrackTable:
     """
 
     source: str
-    dialects: tuple[Dialect, ...]
+    dialects: tuple[str, ...]
     t: FloatArray
     resolution: FloatArray
     tracks: Mapping[str, Track]
     lines: NDArray[np.int64]
 
     def track(self, name: str) -> Track:
-        """Return a track by name; spaces and underscores are the same, as Tracker's own copying makes them.
+        """Return a track by name, the nearest of which is named if there is none.
 
-        Raises
-        ------
-        TrackFileError
-            If there is none; the message names the nearest, or all.
+        Spaces and underscores are the same, as Tracker's own copying makes them.
         """
         found = [track for key, track in self.tracks.items() if plain(key) == plain(name)]
         if len(found) == 1:
@@ -116,6 +87,16 @@ class TrackTable:
             )
         raise TrackFileError(f"{self.source}: {unknown_name('track', name, self.tracks)}")
 
+    def length_unit(self, names: Sequence[str]) -> str:
+        """Return the unit that the headings of x and y of some tracks state, "" if none does; two are refused."""
+        stated = {unit for name in names for column, unit in self.track(name).units.items() if column in ("x", "y")}
+        if len(stated) > 1 or not stated <= METRES.keys():
+            raise TrackFileError(
+                f"{self.source}: the columns x, y state the units {', '.join(sorted(stated))}; one of "
+                f"{', '.join(METRES)} for all is needed"
+            )
+        return next(iter(stated), "")
+
 
 def plain(name: str) -> str:
     """Return a track's name with underscores as spaces."""
@@ -124,11 +105,11 @@ def plain(name: str) -> str:
 
 def column_name(heading: str) -> tuple[str, str]:
     """Return the plain name and the unit ("" if none) of a heading: ``v_{x}`` is vx, ``x (cm)`` is x in cm."""
-    match = WITH_UNIT.fullmatch(heading)
+    match = re.fullmatch(r"(?P<name>.*?)\s*(?:\((?P<round>[^()]*)\)|\[(?P<square>[^\[\]]*)\])\s*", heading)
     unit = ""
     if match and match["name"]:
         heading, unit = match["name"], (match["round"] or match["square"] or "").strip()
     name = re.sub(r"[\\{}_\s]", "", heading)
-    for letter, word in GREEK.items():
+    for letter, word in {"θ": "theta", "ω": "omega", "α": "alpha", "φ": "phi"}.items():
         name = name.replace(letter, word)
     return name, unit

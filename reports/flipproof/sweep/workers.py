@@ -1,4 +1,4 @@
-"""Workers of a Dask cluster behind the same ``Executor`` as the processes of this machine.
+"""Where the batches of a sweep go: worker processes of this machine, or those of a Dask cluster.
 
 Flights come back to this program as arrays: workers on other machines need no folder in common with it, but the same
 version of flipproof.
@@ -7,19 +7,40 @@ version of flipproof.
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
+from flipproof.frame.processes import WorkerDiedError, processes
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.local import Workers
 
 CONNECT = 10.0
 """Seconds in which the scheduler must answer."""
 
-DEPTH = 2
-"""Batches in flight for each thread of a worker: one is made while the next is on its way."""
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Workers:
+    """Where batches go.
+
+    Parameters
+    ----------
+    capacity : callable - how many batches to keep in flight now; 0: nobody is there at the moment
+    died : exceptions of a future that mean that its worker died
+    """
+
+    executor: Executor
+    capacity: Callable[[], int]
+    died: tuple[type[Exception], ...]
+
+
+@contextmanager
+def local_workers(jobs: int | None) -> Iterator[Workers]:
+    """Give worker processes, one per core unless told otherwise; the sweep itself decides what a death means."""
+    with processes(jobs) as pool:
+        yield Workers(executor=pool, capacity=lambda: pool.count, died=(WorkerDiedError,))
 
 
 @contextmanager
@@ -45,7 +66,8 @@ def dask_workers(address: str) -> Iterator[Workers]:
     executor = client.get_executor(pure=False)
 
     def capacity() -> int:
-        return DEPTH * sum(client.ncores().values()) if client.status == "running" else 0
+        # One batch is made while the next is on its way.
+        return 2 * sum(client.ncores().values()) if client.status == "running" else 0
 
     try:
         yield Workers(executor=executor, capacity=capacity, died=(distributed.KilledWorker,))
