@@ -13,7 +13,7 @@ from flipproof.paper import cases, parameters, runs, tables
 from flipproof.paper.cases import FAMILIES, HALF_FULL, all_cases, bottle_of_aspect, family
 from flipproof.paper.examples import EXAMPLES
 from flipproof.paper.parameters import CHOSEN, PARAMETERS, number, numbers, paper_throw
-from flipproof.paper.runs import PUBLISHED, SOLVERS, plan_groups
+from flipproof.paper.runs import PUBLISHED, SOLVERS, Planned, plan_figures
 from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass_at_rest
 
@@ -164,7 +164,7 @@ def test_four_throws_are_those_of_the_published_vectors():
 
 
 def test_the_plan_flies_every_case_with_its_own_slices():
-    plan = [each.run for group in plan_groups() for each in group]
+    plan = [each.run for each in plan_figures()]
     assert len({run.label for run in plan}) == len(plan)
     by_tag = {run.label: run for run in plan}
     for solver in SOLVERS:
@@ -179,12 +179,13 @@ def test_the_plan_flies_every_case_with_its_own_slices():
 
 
 def test_a_plan_for_some_cases_has_no_others():
-    assert {each.run.label for each in plan_groups({cases.ICE})[0]} == {f"paper, {solver}, ice" for solver in SOLVERS}
+    assert {each.run.label for each in plan_figures({cases.ICE})} == {f"paper, {solver}, ice" for solver in SOLVERS}
 
 
 def test_thinning_keeps_both_ends():
     run = runs.Run(PUBLISHED, paper_throw().with_slices(3), {"steps": 10})
-    whole, thinned = (runs.make_thinned([(run, every)])[0].trajectory for every in (1, 3))
+    planned = [Planned((PUBLISHED, str(every)), run, every) for every in (1, 3)]
+    whole, thinned = (made.trajectory for made in runs.make_group(planned).values())
     np.testing.assert_array_equal(thinned.t, whole.t[::3])
     np.testing.assert_array_equal(thinned.r, whole.r[::3])
     assert thinned.t[-1] == whole.t[-1]

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal
 
+from flipproof.frame.flights import Call
+from flipproof.frame.flights import Flights as Answers
 from flipproof.frame.solvers import Made, Run
-from flipproof.paper.cases import Case, family
+from flipproof.paper.cases import family
 from flipproof.paper.claims_cost import MANY_STEPS, many_steps_key, same_steps_key
 from flipproof.paper.claims_slices import FINEST, MANY_SLICES, finest_key
 from flipproof.paper.observe import Flights
 from flipproof.paper.parameters import numbers, paper_steps, paper_throw
-from flipproof.paper.runs import GROUP, PUBLISHED, SOLVERS, PaperRuns, scenario_of
+from flipproof.paper.runs import PUBLISHED, SOLVERS, Pair, Planned, group_calls, scenario_of
 from slicemodel import Scenario, Trajectory
-
-EVENT_DRIVEN: Final = SOLVERS[1:]
 
 HALVED: Final = ("filling", "long", "drag", "spin", "angle", "aspect")
 """Families flown with half the slices too; in the others their number is the subject."""
@@ -25,72 +25,85 @@ SLICES: Final = {"slices": "", "slices at 5 /s": " at 5 /s"}
 
 REBOUNDS: Final = ("beta", "beta at 5 /s")
 
-HALF_STEPS: Final = (*HALVED, *REBOUNDS, *SLICES)
-"""Families that the published program flies with half its time steps too."""
-
-LOOKED_INTO: Final = ("long", "drag", *REBOUNDS)
-"""Families of which statements read more than omega and theta, so that slices are kept."""
-
 WEIGHTLESS: Final = "eq8-weightless"
 STEADY_FILLING: Final = 0.1
 WEIGHTLESS_KEY: Final = f"filling {STEADY_FILLING:g}"
 """The bottle that does not slow down without weight, and the key of its flight."""
 
-EXACT_STEP: Final = "exact-step"
-"""The scheme that solves Eq. 8 as printed at the paper's number of time steps."""
-
-HALF_WORDS: Final = ", half the slices"
-HALF_STEPS_WORDS: Final = ", half the steps"
-
-Pair = tuple[str, str]
+Half = Literal["", "slices", "steps"]
+HALVES: Final[tuple[Half, ...]] = ("slices", "steps")
+"""What a run has half as many of as those of the figures: "" for nothing."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class ClaimRuns:
-    """Runs of the figures, those that only the statements need, and those with half the slices or half the steps."""
+    """All runs that statements read, those of the figures among them, by what is halved, solver and key."""
 
-    paper: PaperRuns
-    further: Mapping[Pair, Made]
-    halved: Mapping[Pair, Made]
-    half_steps: Mapping[Pair, Made] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, paper: PaperRuns, plan: ClaimPlan, made: Mapping[Run, Made]) -> ClaimRuns:
-        """Return the runs of the figures and those of the plan."""
-        return cls(
-            paper=paper,
-            further={pair: made[run] for pair, run in plan.further.items()},
-            halved={pair: made[run] for pair, run in plan.halved.items()}
-            | {pair: made[run] for pair, (run, _) in plan.half_slices.items()},
-            half_steps={pair: made[run] for pair, (run, _) in plan.half_steps.items()},
-        )
+    made: Mapping[Half, Mapping[Pair, Made]]
 
     def flights(self, solver: str) -> Flights:
         """Return the flights of one equation, with those at half the slices and half the steps where there are any."""
-        usual = {**_of(solver, self.paper.made), **_of(solver, self.further)}
 
-        def coarse(made: Mapping[Pair, Made]) -> Flights | None:
-            own = _of(solver, made)
-            return _flights(solver, {**usual, **own}) if own else None
+        def of(half: Half) -> dict[str, Made]:
+            return {key: each for (name, key), each in self.made.get(half, {}).items() if name == solver}
 
-        return replace(_flights(solver, usual), halved=coarse(self.halved), half_steps=coarse(self.half_steps))
+        def flights(made: Mapping[str, Made]) -> Flights:
+            runs = {key: each.trajectory for key, each in made.items() if each.trajectory is not None}
+            reasons = {key: each.reason for key, each in made.items() if each.trajectory is None}
+            return Flights(solver=solver, runs=runs, reasons=reasons)
+
+        usual = of("")
+        halved, half_steps = (flights(usual | own) if (own := of(half)) else None for half in HALVES)
+        return replace(flights(usual), halved=halved, half_steps=half_steps)
 
     def trajectory(self, solver: str, key: str) -> Trajectory | None:
         """Return one trajectory, or None if it was not planned or failed."""
-        made = self.further.get((solver, key)) or self.paper.made.get((solver, key))
+        made = self.made[""].get((solver, key))
         return None if made is None else made.trajectory
 
 
-def _of(solver: str, made: Mapping[Pair, Made]) -> dict[str, Made]:
-    return {key: outcome for (name, key), outcome in made.items() if name == solver}
+@dataclass(frozen=True, slots=True)
+class ClaimPlan:
+    """What the statements need beside the runs of the figures: runs that are kept whole, and calls that thin theirs."""
+
+    runs: Mapping[Half, Mapping[Pair, Run]]
+    calls: Mapping[Half, list[Call]]
+
+    @property
+    def requests(self) -> list[Run | Call]:
+        """What is to be made."""
+        return [
+            *(call for calls in self.calls.values() for call in calls),
+            *(run for runs in self.runs.values() for run in runs.values()),
+        ]
+
+    def made(self, answers: Answers, figures: Mapping[Pair, Made]) -> ClaimRuns:
+        """Return what became of it, with the runs of the figures."""
+        made: dict[Half, dict[Pair, Made]] = {"": dict(figures), "slices": {}, "steps": {}}
+        for half, runs in self.runs.items():
+            made[half] |= {pair: answers[run] for pair, run in runs.items()}
+        for half, calls in self.calls.items():
+            for call in calls:
+                made[half] |= answers.answer(call)
+        return ClaimRuns(made)
 
 
-def _flights(solver: str, made: Mapping[str, Made]) -> Flights:
-    return Flights(
-        solver=solver,
-        runs={key: outcome.trajectory for key, outcome in made.items() if outcome.trajectory is not None},
-        reasons={key: outcome.reason for key, outcome in made.items() if outcome.trajectory is None},
+def plan_claims() -> ClaimPlan:
+    """Return what the statements need beside the runs of the figures."""
+    return ClaimPlan(
+        runs={"slices": plan_halved(), "": plan_further()},
+        calls={half: group_calls(plan_published(half), "the paper's statements") for half in HALVES},
     )
+
+
+def _run(solver: str, key: str, scenario: Scenario, steps: int | None = None, half: Half = "") -> Run:
+    """Return one run: of a scheme with its steps, or of an equation."""
+    settings: dict[str, Any] = {} if steps is None else {"steps": steps, "store": "summary"}
+    return Run(solver, scenario, settings, f"claims, {solver}, {key}{f', half the {half}' if half else ''}")
+
+
+def _halved(scenario: Scenario) -> Scenario:
+    return scenario.with_slices(max(1, scenario.n_slices // 2))
 
 
 def plan_further() -> dict[Pair, Run]:
@@ -98,94 +111,52 @@ def plan_further() -> dict[Pair, Run]:
     runs: dict[Pair, Run] = {}
     for name, damping in SLICES.items():
         many = next(case for case in family(name) if case.value == MANY_SLICES)
-        for solver in EVENT_DRIVEN:
+        for solver in SOLVERS[1:]:
             finest = finest_key(damping)
             runs[solver, finest] = _run(solver, finest, many.scenario.with_slices(FINEST))
     for filling in numbers("figure-S1-filling"):
-        throw, key, same = paper_throw(filling), many_steps_key(filling), same_steps_key(filling)
-        runs[PUBLISHED, key] = _run(PUBLISHED, key, throw, steps=MANY_STEPS)
-        runs["eq8", same] = _run(EXACT_STEP, same, throw, steps=paper_steps())
-    light = paper_throw(STEADY_FILLING)
-    runs[WEIGHTLESS, WEIGHTLESS_KEY] = _run(WEIGHTLESS, WEIGHTLESS_KEY, light)
+        key = many_steps_key(filling)
+        runs[PUBLISHED, key] = _run(PUBLISHED, key, paper_throw(filling), steps=MANY_STEPS)
+        runs |= _same_steps(filling)
+    runs[WEIGHTLESS, WEIGHTLESS_KEY] = _run(WEIGHTLESS, WEIGHTLESS_KEY, paper_throw(STEADY_FILLING))
     return runs
 
 
-def _run(solver: str, key: str, scenario: Scenario, steps: int | None = None, words: str = "") -> Run:
-    """Return one run: of a scheme with its steps, or of an equation."""
-    settings: dict[str, Any] = {} if steps is None else {"steps": steps, "store": "summary"}
-    return Run(solver, scenario, settings, label=f"claims, {solver}, {key}{words}")
+def _same_steps(filling: float, half: Half = "") -> dict[Pair, Run]:
+    """Return the run of the scheme that solves Eq. 8 as printed at the paper's number of time steps."""
+    key, throw = same_steps_key(filling), paper_throw(filling)
+    scenario = _halved(throw) if half else throw
+    return {("eq8", key): _run("exact-step", key, scenario, steps=paper_steps(), half=half)}
 
 
 def plan_halved() -> dict[Pair, Run]:
     """Return the event-driven flights with half the slices of the figures'."""
-    cases: dict[str, Case] = {case.key: case for name in HALVED for case in family(name)}
+    cases = {case.key: case for name in HALVED for case in family(name)}
     runs: dict[Pair, Run] = {}
-    for solver in EVENT_DRIVEN:
+    for solver in SOLVERS[1:]:
         for key, case in cases.items():
             usual = scenario_of(solver, case)
             if usual is not None and usual.n_slices > 1:
-                half = usual.with_slices(usual.n_slices // 2)
-                runs[solver, key] = _run(solver, key, half, words=HALF_WORDS)
+                runs[solver, key] = _run(solver, key, _halved(usual), half="slices")
     for filling in numbers("figure-S1-filling"):
-        same, usual = same_steps_key(filling), paper_throw(filling)
-        half = usual.with_slices(usual.n_slices // 2)
-        runs["eq8", same] = _run(EXACT_STEP, same, half, steps=paper_steps(), words=HALF_WORDS)
+        runs |= _same_steps(filling, half="slices")
     return runs
 
 
-def plan_published(half: str) -> dict[Pair, tuple[Run, int]]:
-    """Return the flights of the published program with half its slices or steps, and every how many points are kept.
+def plan_published(half: Half) -> list[Planned]:
+    """Return the flights of the published program with half its "slices" or "steps".
 
-    Parameters
-    ----------
-    half : "slices" or "steps"
+    Slices are kept where statements read more than omega and theta.
     """
-    kept = {case.key for name in LOOKED_INTO for case in family(name)}
-    runs: dict[Pair, tuple[Run, int]] = {}
-    for name in HALVED if half == "slices" else HALF_STEPS:
+    kept = {case.key for name in ("long", "drag", *REBOUNDS) for case in family(name)}
+    planned = {}
+    for name in HALVED if half == "slices" else (*HALVED, *REBOUNDS, *SLICES):
         for case in family(name):
-            scenario, steps, thin = case.scenario, case.steps, case.thin
-            if half == "slices":
-                scenario = scenario.with_slices(max(1, scenario.n_slices // 2))
-            else:
+            scenario, steps, thin = _halved(case.scenario), case.steps, case.thin
+            if half == "steps":
                 # As many points are kept as there are, up to the rounding that keeps the last one.
-                steps, thin = 1 + (case.steps - 1) // 2, 1
-            settings = {"steps": steps, "store": "full" if case.key in kept else "summary"}
-            words = HALF_WORDS if half == "slices" else HALF_STEPS_WORDS
-            label = f"claims, {PUBLISHED}, {case.key}{words}"
-            runs[PUBLISHED, case.key] = Run(PUBLISHED, scenario, settings, label), thin
-    return runs
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ClaimPlan:
-    """What the statements need beside the runs of the figures, by solver and key of the case.
-
-    Of the published program's runs with half the slices or half the steps every so many points are kept.
-    """
-
-    further: Mapping[Pair, Run]
-    halved: Mapping[Pair, Run]
-    half_slices: Mapping[Pair, tuple[Run, int]]
-    half_steps: Mapping[Pair, tuple[Run, int]]
-
-    @property
-    def runs(self) -> list[Run]:
-        """The runs that are kept whole."""
-        return [*self.halved.values(), *self.further.values()]
-
-    @property
-    def groups(self) -> list[list[tuple[Run, int]]]:
-        """The runs that are thinned, in groups of which a worker makes one at a time."""
-        jobs = [*self.half_slices.values(), *self.half_steps.values()]
-        return [jobs[k : k + GROUP] for k in range(0, len(jobs), GROUP)]
-
-
-def plan_claims() -> ClaimPlan:
-    """Return what the statements need beside the runs of the figures."""
-    return ClaimPlan(
-        further=plan_further(),
-        halved=plan_halved(),
-        half_slices=plan_published("slices"),
-        half_steps=plan_published("steps"),
-    )
+                scenario, steps, thin = case.scenario, 1 + (case.steps - 1) // 2, 1
+            run = _run(PUBLISHED, case.key, scenario, steps, half)
+            run = replace(run, settings={**run.settings, "store": "full" if case.key in kept else "summary"})
+            planned[case.key] = Planned((PUBLISHED, case.key), run, thin)
+    return list(planned.values())

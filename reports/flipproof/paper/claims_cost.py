@@ -2,38 +2,24 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from operator import itemgetter
 from typing import Final
 
 from flipproof.chapters.errata.erratum import SQUARE
 from flipproof.chapters.errata.programs import exponents_of_cost
-from flipproof.paper.claim import Claim, Read, states
-from flipproof.paper.observe import (
-    Flights,
-    distance,
-    level,
-    level_by_points,
-)
+from flipproof.paper.claim import states
+from flipproof.paper.observe import Flights, distance, level, level_by_points
 from flipproof.paper.parameters import numbers, paper_steps
 from flipproof.paper.runs import PUBLISHED
-from flipproof.paper.statements import OMEGA, Reading
-
-MORE: Final = 0.1
-"""By how much one exponent must exceed another to be the larger."""
-
-ENOUGH: Final = 0.01
-"""Root-mean-square change of omega / omega_0 that more time steps may still make."""
+from flipproof.paper.statements import OMEGA, Read, Reading, Statement, at_least, at_most
 
 MANY_STEPS: Final = 10_000
-FEWER_STEPS: Final = 100
-HALF: Final = 0.5
 
-NO_CLOCK: Final = "it chooses its own time steps and slices cost it otherwise; the sentence is about the programs"
 SQUARE_WHY: Final = "An exponent of a square is 2; a tenth of it is allowed either way."
 
 
-def _of_programs(id_: str, place: str, says: str, means: str, why: str) -> Callable[[Read], Claim]:
+def _of_programs(id_: str, place: str, says: str, means: str, why: str) -> Callable[[Read], Statement]:
     """Return a decorator for the cost of the programs: first MATLAB, which times itself (tic, toc), then Python."""
     return states(
         id_,
@@ -43,7 +29,7 @@ def _of_programs(id_: str, place: str, says: str, means: str, why: str) -> Calla
         throw="any; the count does not depend on it. The MATLAB program is counted: it is the one that times itself",
         why=why,
         judges=(PUBLISHED,),
-        silent=NO_CLOCK,
+        silent="it chooses its own time steps and slices cost it otherwise; the sentence is about the programs",
         otherwise={"in the Python program, which copies no history": {"program": "Python"}},
     )
 
@@ -65,10 +51,9 @@ def same_steps_key(filling: float) -> str:
     "The exponent of N in the counted work is 1.8 to 2.2.",
     SQUARE_WHY,
 )
-def _cost_of_slices(flights: Flights, program: str = "MATLAB") -> tuple[Reading, ...]:
-    del flights
-    of_n, _ = _exponents(program)
-    return (_square("exponent of N in the work", of_n, program),)
+def _cost_of_slices(_: Flights, program: str = "MATLAB") -> Iterator[Reading]:
+    of_n, _p = _exponents(program)
+    yield Reading("exponent of N in the work", of_n, "", SQUARE, note=_counted(program))
 
 
 @_of_programs(
@@ -79,19 +64,17 @@ def _cost_of_slices(flights: Flights, program: str = "MATLAB") -> tuple[Reading,
     "The exponent of P in the counted work is 1.8 to 2.2.",
     SQUARE_WHY,
 )
-def _cost_of_intervals(flights: Flights, program: str = "MATLAB") -> tuple[Reading, ...]:
-    del flights
-    _, of_p = _exponents(program)
-    return (_square("exponent of P in the work", of_p, program),)
-
-
-def _square(name: str, exponent: float, program: str) -> Reading:
-    note = f"array elements that the {program} program touches, 250 to 1000 of each; no clock"
-    return Reading(name=name, value=exponent, unit="", admissible=SQUARE, note=note)
+def _cost_of_intervals(_: Flights, program: str = "MATLAB") -> Iterator[Reading]:
+    _n, of_p = _exponents(program)
+    yield Reading("exponent of P in the work", of_p, "", SQUARE, note=_counted(program))
 
 
 def _exponents(program: str) -> tuple[float, float]:
     return exponents_of_cost(copies_history=program == "MATLAB")
+
+
+def _counted(program: str) -> str:
+    return f"array elements that the {program} program touches, 250 to 1000 of each; no clock"
 
 
 @_of_programs(
@@ -101,18 +84,10 @@ def _exponents(program: str) -> tuple[float, float]:
     "The exponent of P in the counted work exceeds that of N by 0.1 at least.",
     "The sentence is a comparison; 0.1 is what counting from 250 to 1000 leaves open.",
 )
-def _cost_of_steps(flights: Flights, program: str = "MATLAB") -> tuple[Reading, ...]:
-    del flights
+def _cost_of_steps(_: Flights, program: str = "MATLAB") -> Iterator[Reading]:
     of_n, of_p = _exponents(program)
-    return (
-        Reading(
-            name="exponent of P minus exponent of N in the work",
-            value=of_p - of_n,
-            unit="",
-            admissible=(MORE, math.inf),
-            note=f"{of_p:.2f} and {of_n:.2f} in the {program} program",
-        ),
-    )
+    note = f"{of_p:.2f} and {of_n:.2f} in the {program} program"
+    yield Reading("exponent of P minus exponent of N in the work", of_p - of_n, "", at_least(0.1), note=note)
 
 
 @states(
@@ -127,37 +102,29 @@ def _cost_of_steps(flights: Flights, program: str = "MATLAB") -> tuple[Reading, 
     judges=(PUBLISHED, "eq8"),
     silent="it is only solved event by event, with time steps of its own choice",
 )
-def _steps_are_enough(flights: Flights) -> tuple[Reading, ...]:
-    off = {}
+def _steps_are_enough(flights: Flights) -> Iterator[Reading]:
+    off, against, fewer = {}, "the event-driven solution", ""
     for filling in numbers("figure-S1-filling"):
+        own = flights.at("filling", filling)
         if flights.solver == PUBLISHED:
-            off[filling] = distance(flights.at("filling", filling), flights.run(many_steps_key(filling)))
+            off[filling] = distance(own, flights.run(many_steps_key(filling)))
         else:
-            off[filling] = distance(flights.run(same_steps_key(filling)), flights.at("filling", filling))
-    worst = max(off, key=lambda filling: off[filling])
-    against = f"P = {MANY_STEPS}" if flights.solver == PUBLISHED else "the event-driven solution"
-    return (
-        Reading(
-            name=f"distance of P = {paper_steps()} from {against}",
-            value=off[worst],
-            unit=OMEGA,
-            admissible=(-math.inf, ENOUGH),
-            note=f"largest at M̃ = {worst:g}; "
-            + ", ".join(f"{off[filling]:.2g} at {filling:g}" for filling in off if filling != worst)
-            + _fewer_steps(flights),
-        ),
-    )
+            off[filling] = distance(flights.run(same_steps_key(filling)), own)
+    if flights.solver == PUBLISHED:
+        against, fewer = f"P = {MANY_STEPS}", _fewer_steps(flights)
+    worst, most = max(off.items(), key=itemgetter(1))
+    others = ", ".join(f"{off[filling]:.2g} at {filling:g}" for filling in off if filling != worst)
+    note = f"largest at M̃ = {worst:g}; {others}{fewer}"
+    yield Reading(f"distance of P = {paper_steps()} from {against}", most, OMEGA, at_most(0.01), note=note)
 
 
 def _fewer_steps(flights: Flights) -> str:
     """Return what a tenth of the steps does, and to the paper's plateau: its points then span a fifth of the flight."""
-    if flights.solver != PUBLISHED:
-        return ""
-    fewer = flights.at(f"steps {HALF:g}", FEWER_STEPS)
-    apart = distance(fewer, flights.at("filling", HALF))
+    fewer = flights.at("steps 0.5", 100)
+    apart = distance(fewer, flights.at("filling", 0.5))
     return (
-        f"; P = {FEWER_STEPS} is {apart:.2g} off at {HALF:g}, and there the average over points is "
-        f"{level_by_points(fewer):.3f}, the mean over time {level(fewer):.3f}"
+        f"; P = 100 is {apart:.2g} off at 0.5, and there the average over points is {level_by_points(fewer):.3f}, "
+        f"the mean over time {level(fewer):.3f}"
     )
 
 

@@ -3,40 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import partial
 from itertools import pairwise
+from operator import itemgetter
 from typing import Final
 
+from flipproof.paper import observe
 from flipproof.paper.claim import FLAT_WHY, SUPERIMPOSED_WHY, states
-from flipproof.paper.claims_slices import AT_LEAST_FLAT, flat_plateau
-from flipproof.paper.observe import (
-    SUPERIMPOSED,
-    Flights,
-    climb,
-    distance,
-    drop_time,
-    largest_share_near_cap,
-    late_rise,
-    normalised,
-)
+from flipproof.paper.claims_slices import flat_plateau
+from flipproof.paper.observe import FLAT, SUPERIMPOSED, Flights
 from flipproof.paper.parameters import numbers
-from flipproof.paper.statements import OMEGA, Reading
+from flipproof.paper.statements import OMEGA, Reading, at_least, at_most
 
-SUDDEN: Final = 0.25
-"""Share of the flight within which a sudden drop is half done."""
+STRONG_DRAGS: Final = [drag for drag in numbers("figure-6-drag") if drag >= 0.0125]
+"""The drags of Fig. 6 that count as strong [kg/s]."""
 
-STRONG_DRAG: Final = 0.0125
-GOOD_DRAG: Final = 0.01
-NEXT_DRAGS: Final = (0.0075, 0.0125)
-"""The values that the paper names on either side of the one it settles on [kg/s]."""
-
-HALF: Final = 0.5
 HALF_DRAG: Final = "half full, β = −0.5, α as named (Fig. 6)"
-
-
-def strong_drags() -> list[float]:
-    """Return the drags of Fig. 6 that count as strong [kg/s]."""
-    return [drag for drag in numbers("figure-6-drag") if drag >= STRONG_DRAG]
 
 
 @states(
@@ -48,19 +31,12 @@ def strong_drags() -> list[float]:
     throw=HALF_DRAG,
     why=SUPERIMPOSED_WHY,
 )
-def _sensitive_to_drag(flights: Flights) -> tuple[Reading, ...]:
-    settled = flights.at("drag", GOOD_DRAG)
-    off = {drag: distance(flights.at("drag", drag), settled) for drag in NEXT_DRAGS}
-    least = min(off, key=lambda drag: off[drag])
-    return (
-        Reading(
-            name="distance of the curves for α = 0.0075 and 0.0125 from that for 0.01, the smaller",
-            value=off[least],
-            unit=OMEGA,
-            admissible=(SUPERIMPOSED, math.inf),
-            note=", ".join(f"{value:.3f} for {drag:g}" for drag, value in off.items()),
-        ),
-    )
+def _sensitive_to_drag(flights: Flights) -> Iterator[Reading]:
+    settled = flights.at("drag", 0.01)
+    off = {drag: observe.distance(flights.at("drag", drag), settled) for drag in (0.0075, 0.0125)}
+    name = "distance of the curves for α = 0.0075 and 0.0125 from that for 0.01, the smaller"
+    note = ", ".join(f"{value:.3f} for {drag:g}" for drag, value in off.items())
+    yield Reading(name, min(off.values()), OMEGA, at_least(SUPERIMPOSED), note=note)
 
 
 @states(
@@ -71,56 +47,33 @@ def _sensitive_to_drag(flights: Flights) -> tuple[Reading, ...]:
     throw=HALF_DRAG,
     why="Half is a choice of ours for “impeded”.",
 )
-def _strong_drag_impedes(flights: Flights) -> tuple[Reading, ...]:
-    free = largest_share_near_cap(flights.at("drag", 0.0))
-    return tuple(
-        Reading(
-            name=f"most water in the cap's half at once for α = {drag:g}, by that for α = 0",
-            value=largest_share_near_cap(flights.at("drag", drag)) / free,
-            unit="",
-            admissible=(-math.inf, HALF),
-            note=f"{100 * free:.0f} % of the water for α = 0",
-        )
-        for drag in strong_drags()
-    )
+def _strong_drag_impedes(flights: Flights) -> Iterator[Reading]:
+    free = observe.largest_share_near_cap(flights.at("drag", 0.0))
+    for drag in STRONG_DRAGS:
+        share = observe.largest_share_near_cap(flights.at("drag", drag)) / free
+        name = f"most water in the cap's half at once for α = {drag:g}, by that for α = 0"
+        yield Reading(name, share, "", at_most(0.5), note=f"{100 * free:.0f} % of the water for α = 0")
 
 
-def _angle_grows_again_with_drag(flights: Flights) -> tuple[Reading, ...]:
-    turned = {case.value: math.degrees(float(run.theta[-1])) for case, run in flights.members("drag")}
-    rising = [turned[b] - turned[a] for a, b in pairwise(sorted(turned)) if b >= STRONG_DRAG]
+def _angle_grows_again_with_drag(flights: Flights) -> Iterator[Reading]:
+    turned = flights.measured("drag", lambda run: math.degrees(float(run.theta[-1])))
+    rising = [turned[b] - turned[a] for a, b in pairwise(sorted(turned)) if b in STRONG_DRAGS]
     note = ", ".join(f"{angle:.0f}° for {drag:g}" for drag, angle in turned.items())
-    return (
-        Reading(name="θ(T) for α = 0 minus that for 0.01", value=turned[0.0] - turned[GOOD_DRAG], unit="°",
-                admissible=(0.0, math.inf), note=note),
-        Reading(name="growth of θ(T) from one α to the next from 0.0125 on, the least", value=min(rising), unit="°",
-                admissible=(0.0, math.inf)),
-    )  # fmt: skip
+    yield Reading("θ(T) for α = 0 minus that for 0.01", turned[0.0] - turned[0.01], "°", at_least(0.0), note=note)
+    yield Reading("growth of θ(T) from one α to the next from 0.0125 on, the least", min(rising), "°", at_least(0.0))
 
 
-def _strong_drag_turns_back(flights: Flights) -> tuple[Reading, ...]:
-    lowest = {drag: float(normalised(flights.at("drag", drag)).min()) for drag in strong_drags()}
-    drag = min(lowest, key=lambda each: lowest[each])
-    return (
-        Reading(
-            name="lowest ω",
-            value=lowest[drag],
-            unit=OMEGA,
-            admissible=(-math.inf, 0.0),
-            note=f"for α = {drag:g}; Eq. 12 keeps the sign of ω, so that θ can never turn back",
-        ),
-    )
+def _strong_drag_turns_back(flights: Flights) -> Iterator[Reading]:
+    lowest = {drag: float(observe.normalised(flights.at("drag", drag)).min()) for drag in STRONG_DRAGS}
+    drag, least = min(lowest.items(), key=itemgetter(1))
+    note = f"for α = {drag:g}; Eq. 12 keeps the sign of ω, so that θ can never turn back"
+    yield Reading("lowest ω", least, OMEGA, at_most(0.0), note=note)
 
 
-def _strong_drag_oscillates(flights: Flights) -> tuple[Reading, ...]:
-    return tuple(
-        Reading(
-            name=f"largest climb over the lowest ω until then, α = {drag:g}",
-            value=climb(flights.at("drag", drag)),
-            unit=OMEGA,
-            admissible=AT_LEAST_FLAT,
-        )
-        for drag in strong_drags()
-    )
+def _strong_drag_oscillates(flights: Flights) -> Iterator[Reading]:
+    for drag in STRONG_DRAGS:
+        name = f"largest climb over the lowest ω until then, α = {drag:g}"
+        yield Reading(name, observe.climb(flights.at("drag", drag)), OMEGA, at_least(FLAT))
 
 
 _oscillates: Final = states(
@@ -155,17 +108,15 @@ _turns_back: Final = states(
     throw=HALF_DRAG,
     why=FLAT_WHY,
 )
-def _no_drag_rises_late(flights: Flights) -> tuple[Reading, ...]:
-    rise = late_rise(flights.at("drag", 0.0))
-    return (Reading(name="late rise over the plateau for α = 0", value=rise, unit=OMEGA, admissible=AT_LEAST_FLAT),)
+def _no_drag_rises_late(flights: Flights) -> Iterator[Reading]:
+    rise = observe.late_rise(flights.at("drag", 0.0))
+    yield Reading("late rise over the plateau for α = 0", rise, OMEGA, at_least(FLAT))
 
 
-def _moderate_drag_is_flat(flights: Flights, drag: float) -> tuple[Reading, ...]:
+def _moderate_drag_is_flat(flights: Flights, drag: float) -> Iterator[Reading]:
     run = flights.at("drag", drag)
-    return (
-        *flat_plateau(run),
-        Reading(name="time to half the drop", value=drop_time(run), unit="of T", admissible=(-math.inf, SUDDEN)),
-    )
+    yield from flat_plateau(run)
+    yield Reading("time to half the drop", observe.drop_time(run), "of T", at_most(0.25))
 
 
 MODERATE: Final = tuple(
@@ -182,7 +133,5 @@ MODERATE: Final = tuple(
 )
 
 
-OF_DRAG: Final = (
-    _sensitive_to_drag, _strong_drag_impedes, _turns_back, _oscillates, _no_drag_rises_late, *MODERATE,
-)  # fmt: skip
+OF_DRAG: Final = (_sensitive_to_drag, _strong_drag_impedes, _turns_back, _oscillates, _no_drag_rises_late, *MODERATE)
 """Statements on Fig. 6, in the order of the paper."""

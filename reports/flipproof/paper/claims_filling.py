@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import pairwise
+from operator import itemgetter
 from typing import Final
 
 from flipproof.paper.claim import SUPERIMPOSED_WHY, states
-from flipproof.paper.observe import (
-    SUPERIMPOSED,
-    Flights,
-    level,
-    level_by_points,
-)
-from flipproof.paper.statements import OMEGA, Reading
+from flipproof.paper.observe import SUPERIMPOSED, Flights, level, level_by_points
+from flipproof.paper.statements import OMEGA, Read, Reading, Statement, at_least, at_most
 
 OPTIMUM: Final = (0.2, 0.5)
 """Fillings that the paper finds best, and its range of omega_f / omega_0 there: the same two numbers."""
@@ -21,37 +19,11 @@ OPTIMUM: Final = (0.2, 0.5)
 INTERMEDIATE: Final = (0.2, 0.75)
 """Fillings that count as intermediate: those of the experiment but for 0.1, rounded outwards to the optimum."""
 
-NO_SLOW_DOWN: Final = (0.9, math.inf)
-"""omega_f / omega_0 of a bottle that does not slow down."""
-
-LITTLE: Final = 0.05
-TENTH: Final = 0.1
-"""Fillings between which the paper's model, unlike its experiment, begins to slow down."""
-
 CLEAR: Final = 0.8
 """omega / omega_0 below which a bottle is clearly slower."""
 
-MEASURED: Final = (0.25, 0.33, 0.5)
-"""Fillings of the experiment that are intermediate and for which the text gives a range of omega_f / omega_0."""
-
-LESS_MEASURED: Final = 0.75
-"""Filling of the experiment for which the text says only that omega is already significantly reduced."""
-
-SLOW_DOWN: Final = (-math.inf, CLEAR)
-"""omega_f / omega_0 of a bottle that clearly slows down."""
-
-MOST: Final = 0.5
-
-DIFFERENT: Final = 0.005
-"""Difference of two plateaus, as a share of omega_0, below which two definitions agree."""
-
 FILLINGS: Final = "α = 0.01 kg/s, β = −0.5, m = 1 g, T = 0.5 s, M̃ as named (Fig. 7)"
 SLOW_WHY: Final = "“Slower” is a word of ours for ω below 0.8 ω₀, “not slower” for above 0.9 ω₀."
-
-
-def levels(flights: Flights) -> dict[float, float]:
-    """Return omega_f / omega_0 by filling."""
-    return {case.value: level(run) for case, run in flights.members("filling")}
 
 
 @states(
@@ -62,82 +34,67 @@ def levels(flights: Flights) -> dict[float, float]:
     throw=FILLINGS,
     why="“Most” is more than half; the range is the paper's, the choice of fillings ours.",
 )
-def _plateau_range(flights: Flights) -> tuple[Reading, ...]:
+def _plateau_range(flights: Flights) -> Iterator[Reading]:
     low, high = INTERMEDIATE
-    found = {filling: value for filling, value in levels(flights).items() if low <= filling <= high}
-    inside = [OPTIMUM[0] <= value <= OPTIMUM[1] for value in found.values()]
-    return (
-        Reading(
-            name=f"share of the {len(found)} fillings from {low:g} to {high:g} with ω_f/ω₀ in 0.2 to 0.5",
-            value=sum(inside) / len(inside),
-            unit="",
-            admissible=(math.nextafter(MOST, 1.0), math.inf),
-            note=f"ω_f/ω₀ from {min(found.values()):.3f} to {max(found.values()):.3f}" + _by_points(flights),
-        ),
-    )
+    found = flights.measured("filling", level, low, high).values()
+    share = sum(OPTIMUM[0] <= value <= OPTIMUM[1] for value in found) / len(found)
+    name = f"share of the {len(found)} fillings from {low:g} to {high:g} with ω_f/ω₀ in 0.2 to 0.5"
+    note = f"ω_f/ω₀ from {min(found):.3f} to {max(found):.3f}" + _by_points(flights)
+    yield Reading(name, share, "", at_least(math.nextafter(0.5, 1.0)), note=note)
 
 
 def _by_points(flights: Flights) -> str:
-    """Return where the paper's average over points and the mean over time differ."""
-    differ = {
-        case.value: (level(run), level_by_points(run))
-        for case, run in flights.members("filling")
-        if abs(level(run) - level_by_points(run)) > DIFFERENT
-    }
-    if not differ:
-        return "; the paper's average over points agrees with the mean over time"
-    return "; by the paper's points " + ", ".join(
-        f"{points:.3f} instead of {time:.3f} at M̃ = {filling:g}" for filling, (time, points) in differ.items()
+    """Return where the paper's average over points and the mean over time differ by more than 0.005 of omega_0."""
+    time, points = (flights.measured("filling", read) for read in (level, level_by_points))
+    differ = ", ".join(
+        f"{points[filling]:.3f} instead of {time[filling]:.3f} at M̃ = {filling:g}"
+        for filling in time
+        if abs(time[filling] - points[filling]) > 0.005
+    )
+    return (
+        f"; by the paper's points {differ}"
+        if differ
+        else ("; the paper's average over points agrees with the mean over time")
     )
 
 
-def plateau_at(flights: Flights, filling: float, admissible: tuple[float, float]) -> tuple[Reading, ...]:
-    """Return the plateau at one filling."""
-    run = flights.at("filling", filling)
-    return (Reading(name=f"ω_f at M̃ = {filling:g}", value=level(run), unit=OMEGA, admissible=admissible),)
+def _plateau_at(flights: Flights, filling: float, admissible: tuple[float, float]) -> Iterator[Reading]:
+    yield Reading(f"ω_f at M̃ = {filling:g}", level(flights.at("filling", filling)), OMEGA, admissible)
 
 
-@states(
+_keeps_spin_at: Final = partial(_plateau_at, admissible=at_least(0.9))
+_slows_at: Final = partial(_plateau_at, admissible=at_most(CLEAR))
+
+
+def _about_slowing(id_: str, says: str, place: str = "section 5, Fig. 7a") -> Callable[[Read], Statement]:
+    """Return a decorator for a bottle that slows down in the model, a limit that the paper admits."""
+    means = "ω_f is at most 0.8 ω₀."
+    return states(id_, place=place, says=says, means=means, throw=FILLINGS, why=SLOW_WHY, kind="admitted limit")
+
+
+_slow_down_when_full: Final = _about_slowing(
     "full-slows",
-    place="section 5, Fig. 7a; section 6",
-    says="At M̃ = 1 the model slows down, although nothing can slosh.",
-    means="ω_f is at most 0.8 ω₀.",
-    throw=FILLINGS,
-    why=SLOW_WHY,
-    kind="admitted limit",
-)
-def _slow_down_when_full(flights: Flights) -> tuple[Reading, ...]:
-    return plateau_at(flights, 1.0, SLOW_DOWN)
+    "At M̃ = 1 the model slows down, although nothing can slosh.",
+    "section 5, Fig. 7a; section 6",
+)(partial(_slows_at, filling=1.0))
 
+_slow_down_at_a_tenth: Final = _about_slowing(
+    "tenth-slows", "At M̃ = 0.1 the model clearly slows down, unlike the bottle that was thrown."
+)(partial(_slows_at, filling=0.1))
 
-@states(
+_no_slow_down_when_nearly_empty: Final = states(
     "empty-keeps-spin",
     place="section 5, Fig. 7a",
     says="At M̃ = 0.05 the bottle does not slow down.",
     means="ω_f is at least 0.9 ω₀.",
     throw=FILLINGS,
     why=SLOW_WHY,
-)
-def _no_slow_down_when_nearly_empty(flights: Flights) -> tuple[Reading, ...]:
-    return plateau_at(flights, LITTLE, NO_SLOW_DOWN)
-
-
-@states(
-    "tenth-slows",
-    place="section 5, Fig. 7a",
-    says="At M̃ = 0.1 the model clearly slows down, unlike the bottle that was thrown.",
-    means="ω_f is at most 0.8 ω₀.",
-    throw=FILLINGS,
-    why=SLOW_WHY,
-    kind="admitted limit",
-)
-def _slow_down_at_a_tenth(flights: Flights) -> tuple[Reading, ...]:
-    return plateau_at(flights, TENTH, SLOW_DOWN)
+)(partial(_keeps_spin_at, filling=0.05))
 
 
 def filling_of_slow_down(flights: Flights) -> float:
     """Return the least filling with omega_f = 0.8 omega_0, interpolated between flights; NaN if there is none."""
-    found = sorted(levels(flights).items())
+    found = sorted(flights.measured("filling", level).items())
     for (low, above), (high, below) in pairwise(found):
         if above >= CLEAR > below:
             return low + (high - low) * (above - CLEAR) / (above - below)
@@ -155,21 +112,12 @@ def filling_of_slow_down(flights: Flights) -> float:
     why=f"The interval is the paper's. {SLOW_WHY}",
     kind="admitted limit",
 )
-def _change_at_low_filling(flights: Flights) -> tuple[Reading, ...]:
-    return (
-        Reading(
-            name="filling at which ω_f falls to 0.8 ω₀",
-            value=filling_of_slow_down(flights),
-            unit="",
-            admissible=(LITTLE, TENTH),
-            note="interpolated between the fillings flown: 0.05, 0.09, 0.095, 0.1, 0.13, 0.135, 0.14, 0.15, 0.2; that "
-            "adds an error of up to 0.002",
-        ),
+def _change_at_low_filling(flights: Flights) -> Iterator[Reading]:
+    note = (
+        "interpolated between the fillings flown: 0.05, 0.09, 0.095, 0.1, 0.13, 0.135, 0.14, 0.15, 0.2; that "
+        "adds an error of up to 0.002"
     )
-
-
-def _agreement_at_a_tenth(flights: Flights) -> tuple[Reading, ...]:
-    return plateau_at(flights, TENTH, NO_SLOW_DOWN)
+    yield Reading("filling at which ω_f falls to 0.8 ω₀", filling_of_slow_down(flights), "", (0.05, 0.1), note=note)
 
 
 @states(
@@ -181,13 +129,15 @@ def _agreement_at_a_tenth(flights: Flights) -> tuple[Reading, ...]:
     throw=FILLINGS,
     why=f"{SUPERIMPOSED_WHY} Low and high fillings are left out: there the same paragraph itself reports "
     "significant differences.",
-    otherwise={"with M̃ = 0.1, where the text says of the experiment: very close to ice": _agreement_at_a_tenth},
+    otherwise={
+        "with M̃ = 0.1, where the text says of the experiment: very close to ice": partial(_keeps_spin_at, filling=0.1)
+    },
 )
-def _agreement_is_excellent(flights: Flights) -> tuple[Reading, ...]:
+def _agreement_is_excellent(flights: Flights) -> Iterator[Reading]:
     low, high = OPTIMUM
-    widened = (low - SUPERIMPOSED, high + SUPERIMPOSED)
-    measured = (reading for filling in MEASURED for reading in plateau_at(flights, filling, widened))
-    return (*measured, *plateau_at(flights, LESS_MEASURED, SLOW_DOWN))
+    for filling in (0.25, 0.33, 0.5):
+        yield from _plateau_at(flights, filling, (low - SUPERIMPOSED, high + SUPERIMPOSED))
+    yield from _slows_at(flights, 0.75)
 
 
 @states(
@@ -198,20 +148,13 @@ def _agreement_is_excellent(flights: Flights) -> tuple[Reading, ...]:
     throw=FILLINGS,
     why="The sentence is a comparison: its threshold is zero.",
 )
-def _best_filling(flights: Flights) -> tuple[Reading, ...]:
-    found = levels(flights)
-    inside = {filling: value for filling, value in found.items() if OPTIMUM[0] <= filling <= OPTIMUM[1]}
-    outside = {filling: value for filling, value in found.items() if filling not in inside}
-    best, rival = (min(each, key=lambda filling: each[filling]) for each in (inside, outside))
-    return (
-        Reading(
-            name="lowest ω_f outside 0.2 to 0.5 minus lowest inside",
-            value=outside[rival] - inside[best],
-            unit=OMEGA,
-            admissible=(0.0, math.inf),
-            note=f"{inside[best]:.3f} at M̃ = {best:g}, {outside[rival]:.3f} at {rival:g}",
-        ),
-    )
+def _best_filling(flights: Flights) -> Iterator[Reading]:
+    found = flights.measured("filling", level)
+    inside = flights.measured("filling", level, *OPTIMUM)
+    best, lowest = min(inside.items(), key=itemgetter(1))
+    rival, other = min(((filling, found[filling]) for filling in found if filling not in inside), key=itemgetter(1))
+    note = f"{lowest:.3f} at M̃ = {best:g}, {other:.3f} at {rival:g}"
+    yield Reading("lowest ω_f outside 0.2 to 0.5 minus lowest inside", other - lowest, OMEGA, at_least(0.0), note=note)
 
 
 OF_FILLINGS: Final = (

@@ -3,41 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
+from operator import itemgetter
 from typing import Final
 
 from flipproof.frame.findings import Finding
 from flipproof.paper.claim import states
-from flipproof.paper.observe import (
-    Flights,
-    MissingFlightError,
-)
+from flipproof.paper.observe import Flights, MissingFlightError
 from flipproof.paper.parameters import paper_throw
-from flipproof.paper.statements import Reading
+from flipproof.paper.statements import Reading, at_least, at_most
 from slicemodel import Bottle, Trajectory
 from slicemodel.landing import Moment, moment_at, next_upright
-from slicemodel.observables import (
-    centre_of_mass_at_rest,
-    static_toppling_angle,
-)
-
-PEAK_DEGREES: Final = (44.9, 45.5)
-"""The paper's 45 degrees: 45.2 within 0.3."""
-
-PEAK_FILLING: Final = (0.13, 0.15)
-
-ABOVE: Final = 0.75
-"""Filling above which the paper finds the dynamic angle in agreement with the static one."""
-
-AGREEMENT: Final = 3.0
-"""Degrees within which two toppling angles agree: a twentieth of the axis of Fig. 9b."""
-
-FALLING: Final = 0.2
-"""Speed of the centre of mass that counts [m/s]."""
-
-FALLING_FILLINGS: Final = (0.25, 0.6)
+from slicemodel.observables import centre_of_mass_at_rest, static_toppling_angle
 
 LONG: Final = "throws of Fig. 7, flown on to 1.2 s"
 ON_LANDING: Final = "at t = 0.5 s instead of θ = 2π"
@@ -88,13 +67,10 @@ def toppling_peak() -> tuple[float, float]:
     why="The last digits that the paper prints.",
     of_geometry=True,
 )
-def _toppling_peak(flights: Flights) -> tuple[Reading, ...]:
-    del flights
+def _toppling_peak(_: Flights) -> Iterator[Reading]:
     filling, angle = toppling_peak()
-    return (
-        Reading(name="filling of the largest θ_c, Eq. 13b", value=filling, unit="", admissible=PEAK_FILLING),
-        Reading(name="largest θ_c, Eq. 13b", value=math.degrees(angle), unit="°", admissible=PEAK_DEGREES),
-    )
+    yield Reading("filling of the largest θ_c, Eq. 13b", filling, "", (0.13, 0.15))
+    yield Reading("largest θ_c, Eq. 13b", math.degrees(angle), "°", (44.9, 45.5))
 
 
 def lowered_by(run: Trajectory, when: When = upright) -> float:
@@ -111,19 +87,12 @@ def lowered_by(run: Trajectory, when: When = upright) -> float:
     why="The sentence is a comparison: its threshold is zero.",
     otherwise={ON_LANDING: {"when": at_landing_time}},
 )
-def _dynamic_angle_is_lower(flights: Flights, when: When = upright) -> tuple[Reading, ...]:
-    lower = {case.value: lowered_by(run, when) for case, run in flights.members("long") if case.value <= ABOVE}
-    least = min(lower, key=lambda filling: lower[filling])
-    above = [f"{filling:g}" for filling, value in lower.items() if value <= 0.0]
-    return (
-        Reading(
-            name="static minus dynamic θ_c, the least up to M̃ = 0.75",
-            value=lower[least],
-            unit="°",
-            admissible=(0.0, math.inf),
-            note=f"at M̃ = {least:g}; " + (f"not lower at {', '.join(above)}" if above else "lower at all fillings"),
-        ),
-    )
+def _dynamic_angle_is_lower(flights: Flights, when: When = upright) -> Iterator[Reading]:
+    lower = flights.measured("long", partial(lowered_by, when=when), high=0.75)
+    at, least = min(lower.items(), key=itemgetter(1))
+    above = ", ".join(f"{filling:g}" for filling, value in lower.items() if value <= 0.0)
+    note = f"at M̃ = {at:g}; " + (f"not lower at {above}" if above else "lower at all fillings")
+    yield Reading("static minus dynamic θ_c, the least up to M̃ = 0.75", least, "°", at_least(0.0), note=note)
 
 
 @states(
@@ -135,18 +104,11 @@ def _dynamic_angle_is_lower(flights: Flights, when: When = upright) -> tuple[Rea
     why="3° is a choice of ours: a twentieth of the axis of Fig. 9b.",
     otherwise={ON_LANDING: {"when": at_landing_time}},
 )
-def _dynamic_angle_agrees_when_full(flights: Flights, when: When = upright) -> tuple[Reading, ...]:
-    off = {case.value: abs(lowered_by(run, when)) for case, run in flights.members("long") if case.value > ABOVE}
-    worst = max(off, key=lambda filling: off[filling])
-    return (
-        Reading(
-            name="largest difference of static and dynamic θ_c above M̃ = 0.75",
-            value=off[worst],
-            unit="°",
-            admissible=(-math.inf, AGREEMENT),
-            note=f"at M̃ = {worst:g}",
-        ),
-    )
+def _dynamic_angle_agrees_when_full(flights: Flights, when: When = upright) -> Iterator[Reading]:
+    off = flights.measured("long", lambda run: abs(lowered_by(run, when)), low=0.9)
+    at, most = max(off.items(), key=itemgetter(1))
+    name = "largest difference of static and dynamic θ_c above M̃ = 0.75"
+    yield Reading(name, most, "°", at_most(3.0), note=f"at M̃ = {at:g}")
 
 
 @states(
@@ -163,20 +125,13 @@ def _dynamic_angle_agrees_when_full(flights: Flights, when: When = upright) -> t
         "as negative dr_CM/dt at t = 0.5 s": {"base": -1.0, "when": at_landing_time},
     },
 )
-def _centre_of_mass_falls(flights: Flights, when: When = upright, base: float = 1.0) -> tuple[Reading, ...]:
-    low, high = FALLING_FILLINGS
-    velocity = {case.value: when(run).v_cm for case, run in flights.members("long") if low <= case.value <= high}
+def _centre_of_mass_falls(flights: Flights, when: When = upright, base: float = 1.0) -> Iterator[Reading]:
+    velocity = flights.measured("long", lambda run: when(run).v_cm, 0.25, 0.6)
     worst = min(velocity, key=lambda filling: base * velocity[filling])
-    return (
-        Reading(
-            name=f"v_CM towards the base, the {'least' if base > 0 else 'largest'} from M̃ = 0.25 to 0.6",
-            value=velocity[worst],
-            unit="m/s",
-            admissible=(FALLING, math.inf) if base > 0 else (-math.inf, -FALLING),
-            note=f"at M̃ = {worst:g}; "
-            + ", ".join(f"{v:+.2f} at {filling:g}" for filling, v in velocity.items()).replace("-", "\N{MINUS SIGN}"),
-        ),
-    )
+    all_ = ", ".join(f"{v:+.2f} at {filling:g}" for filling, v in velocity.items()).replace("-", "\N{MINUS SIGN}")
+    name = f"v_CM towards the base, the {'least' if base > 0 else 'largest'} from M̃ = 0.25 to 0.6"
+    admissible = at_least(0.2) if base > 0 else at_most(-0.2)
+    yield Reading(name, velocity[worst], "m/s", admissible, note=f"at M̃ = {worst:g}; {all_}")
 
 
 OF_LANDING: Final = (_toppling_peak, _dynamic_angle_is_lower, _dynamic_angle_agrees_when_full, _centre_of_mass_falls)

@@ -3,46 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from operator import attrgetter, itemgetter
 from typing import Final
 
 import numpy as np
 
-from flipproof.paper.claim import FLAT_WHY, Claim, Read, states
-from flipproof.paper.observe import (
-    FLAT,
-    SUPERIMPOSED,
-    Flights,
-    MissingFlightError,
-    climb,
-    departures,
-    distance,
-    late_mean,
-    late_rise,
-    level,
-    normalised,
-)
+from flipproof.paper import observe
+from flipproof.paper.claim import FLAT_WHY, states
+from flipproof.paper.observe import FLAT, SUPERIMPOSED, Flights, MissingFlightError
 from flipproof.paper.parameters import numbers
 from flipproof.paper.runs import PUBLISHED
-from flipproof.paper.statements import OMEGA, Reading
+from flipproof.paper.statements import OMEGA, Read, Reading, Statement, at_least, at_most
 from slicemodel import Trajectory
-
-AT_LEAST_FLAT: Final = (FLAT, math.inf)
-AT_MOST_FLAT: Final = (-math.inf, FLAT)
-
-LOW: Final = 0.5
-"""Share of omega_0 that a low plateau does not exceed; the upper end of the paper's own range."""
 
 DETECTED: Final = 0.005
 """Share of omega_0 by which a minimum must move to be seen: a two-hundredth of the axis of Fig. 5d."""
 
-FEW_SLICES: Final = (2.0, 5.0)
 MANY_SLICES: Final = 100.0
 FINEST: Final = 200
 """Slices of an event-driven flight that the others are held against."""
 
 
-def _figure_5(id_: str, says: str, means: str, why: str, place: str = "Fig. 5") -> Callable[[Read], Claim]:
+def _figure_5(id_: str, says: str, means: str, why: str, place: str = "Fig. 5") -> Callable[[Read], Statement]:
     """Return a decorator for Fig. 5: at the drag of its caption, and at the damping rate of all later figures."""
     return states(
         id_,
@@ -73,19 +56,16 @@ def finest_key(damping: str) -> str:
     "The sentence is an inequality: its threshold is zero.",
     "Fig. 5a",
 )
-def _sticking_slices(flights: Flights, damping: str = "") -> tuple[Reading, ...]:
-    left = departures(flights.at("beta" + damping, 0.0))
+def _sticking_slices(flights: Flights, damping: str = "") -> Iterator[Reading]:
+    left = observe.departures(flights.at("beta" + damping, 0.0))
+    value, band, note = 0.0, 0.0, "no slice leaves an end"
+    if left:
+        worst = max(left, key=attrgetter("outward"))
+        value, band = worst.outward, worst.step
+        against = sum(departure.outward > departure.step for departure in left)
+        note = f"{against} of {len(left)} departures against both; this one at t = {worst.time:.3f} s"
     name = "largest outward acceleration, centrifugal and weight, of a slice that leaves its end"
-    if not left:
-        return (Reading(name=name, value=0.0, unit="m/s²", admissible=(-math.inf, 0.0), note="no slice leaves an end"),)
-    worst = max(left, key=lambda departure: departure.outward)
-    against = sum(departure.outward > departure.step for departure in left)
-    note = f"{against} of {len(left)} departures against both; this one at t = {worst.time:.3f} s"
-    return (
-        Reading(
-            name=name, value=worst.outward, unit="m/s²", admissible=(-math.inf, 0.0), band=worst.step, note=note
-        ),
-    )  # fmt: skip
+    yield Reading(name, value, "m/s²", at_most(0.0), band, note)
 
 
 @_figure_5(
@@ -95,17 +75,11 @@ def _sticking_slices(flights: Flights, damping: str = "") -> tuple[Reading, ...]
     "The sentence is a comparison: its threshold is zero.",
     "Fig. 5b",
 )
-def _elastic_rises_late(flights: Flights, damping: str = "") -> tuple[Reading, ...]:
-    elastic, *others = (late_mean(flights.at("beta" + damping, beta)) for beta in (-1.0, 0.0, -0.5))
-    return (
-        Reading(
-            name="late ω for β = −1 minus the larger of the others",
-            value=elastic - max(others),
-            unit=OMEGA,
-            admissible=(0.0, math.inf),
-            note=f"{elastic:.3f} against {others[0]:.3f} for β = 0 and {others[1]:.3f} for β = −0.5",
-        ),
-    )
+def _elastic_rises_late(flights: Flights, damping: str = "") -> Iterator[Reading]:
+    elastic, sticky, half = (observe.late_mean(flights.at("beta" + damping, beta)) for beta in (-1.0, 0.0, -0.5))
+    note = f"{elastic:.3f} against {sticky:.3f} for β = 0 and {half:.3f} for β = −0.5"
+    more = elastic - max(sticky, half)
+    yield Reading("late ω for β = −1 minus the larger of the others", more, OMEGA, at_least(0.0), note=note)
 
 
 @_figure_5(
@@ -115,29 +89,20 @@ def _elastic_rises_late(flights: Flights, damping: str = "") -> tuple[Reading, .
     "The share is that of ω for “superimposed”, a word of ours: 0.05 of what the axis shows.",
     "Fig. 5b",
 )
-def _angle_hardly_depends_on_rebound(flights: Flights, damping: str = "") -> tuple[Reading, ...]:
+def _angle_hardly_depends_on_rebound(flights: Flights, damping: str = "") -> Iterator[Reading]:
     sticky, half = (flights.at("beta" + damping, beta) for beta in (0.0, -0.5))
     apart = np.abs(half.theta - np.interp(half.t, sticky.t, sticky.theta))
+    most, time = float(apart.max()), half.t[int(apart.argmax())]
     turned = abs(float(half.theta[-1] - half.theta[0]))
-    return (
-        Reading(
-            name="largest difference of θ for β = 0 and β = −0.5",
-            value=float(apart.max()) / turned,
-            unit="of the angle turned",
-            admissible=(-math.inf, SUPERIMPOSED),
-            note=f"{math.degrees(float(apart.max())):.1f}° of {math.degrees(turned):.0f}°, "
-            f"at t = {half.t[int(apart.argmax())]:.3f} s",
-        ),
-    )
+    name, unit = "largest difference of θ for β = 0 and β = −0.5", "of the angle turned"
+    note = f"{math.degrees(most):.1f}° of {math.degrees(turned):.0f}°, at t = {time:.3f} s"
+    yield Reading(name, most / turned, unit, at_most(SUPERIMPOSED), note=note)
 
 
-def flat_plateau(run: Trajectory) -> tuple[Reading, Reading]:
-    """Return whether omega does not rise late over its plateau, and never climbs again once it is low."""
-    return (
-        Reading(name="late rise over the plateau", value=late_rise(run), unit=OMEGA, admissible=AT_MOST_FLAT),
-        Reading(name="largest climb over the lowest ω until then", value=climb(run), unit=OMEGA,
-                admissible=AT_MOST_FLAT),
-    )  # fmt: skip
+def flat_plateau(run: Trajectory) -> Iterator[Reading]:
+    """Yield whether omega does not rise late over its plateau, and never climbs again once it is low."""
+    yield Reading("late rise over the plateau", observe.late_rise(run), OMEGA, at_most(FLAT))
+    yield Reading("largest climb over the lowest ω until then", observe.climb(run), OMEGA, at_most(FLAT))
 
 
 @_figure_5(
@@ -148,10 +113,10 @@ def flat_plateau(run: Trajectory) -> tuple[Reading, Reading]:
     f"0.5 is the upper end of the paper's own range in Fig. 7b. {FLAT_WHY}",
     "Fig. 5c",
 )
-def _half_elastic_is_flat(flights: Flights, damping: str = "") -> tuple[Reading, ...]:
+def _half_elastic_is_flat(flights: Flights, damping: str = "") -> Iterator[Reading]:
     run = flights.at("beta" + damping, -0.5)
-    low = Reading(name="plateau ω_f", value=level(run), unit=OMEGA, admissible=(-math.inf, LOW))
-    return (low, *flat_plateau(run))
+    yield Reading("plateau ω_f", observe.level(run), OMEGA, at_most(0.5))
+    yield from flat_plateau(run)
 
 
 @_figure_5(
@@ -161,16 +126,9 @@ def _half_elastic_is_flat(flights: Flights, damping: str = "") -> tuple[Reading,
     FLAT_WHY,
     "Fig. 5c",
 )
-def _other_rebounds_rise_late(flights: Flights, damping: str = "") -> tuple[Reading, ...]:
-    return tuple(
-        Reading(
-            name=f"late rise for β = {beta:g}".replace("-", "−"),
-            value=late_rise(flights.at("beta" + damping, beta)),
-            unit=OMEGA,
-            admissible=AT_LEAST_FLAT,
-        )
-        for beta in (0.0, -1.0)
-    )
+def _other_rebounds_rise_late(flights: Flights, damping: str = "") -> Iterator[Reading]:
+    for beta, name in ((0.0, "late rise for β = 0"), (-1.0, "late rise for β = −1")):
+        yield Reading(name, observe.late_rise(flights.at("beta" + damping, beta)), OMEGA, at_least(FLAT))
 
 
 # ---------------------------------------------------------------------- slices
@@ -183,26 +141,15 @@ def _other_rebounds_rise_late(flights: Flights, damping: str = "") -> tuple[Read
     "The sentence is a comparison: its threshold is zero.",
     "Fig. 5d",
 )
-def _few_slices(flights: Flights, damping: str = "") -> tuple[Reading, ...]:
+def _few_slices(flights: Flights, damping: str = "") -> Iterator[Reading]:
     finest = _finest(flights, damping)
-    off = {
-        case.value: distance(run, finest)
-        for case, run in flights.members("slices" + damping)
-        if run.scenario.n_slices < finest.scenario.n_slices
-    }
-    few = [off[count] for count in FEW_SLICES]
-    many = [value for count, value in off.items() if count not in FEW_SLICES]
-    return (
-        Reading(
-            name=f"distance from {finest.scenario.n_slices} slices: the smaller of N = 2 and 5 "
-            "minus the largest from N = 10 on",
-            value=min(few) - max(many),
-            unit=OMEGA,
-            admissible=(0.0, math.inf),
-            band=off[max(off)],
-            note=", ".join(f"N = {count:g}: {value:.3f}" for count, value in off.items()),
-        ),
-    )
+    most = finest.scenario.n_slices
+    off = flights.measured("slices" + damping, lambda run: observe.distance(run, finest), high=most - 1)
+    least = min(off[2.0], off[5.0])
+    far = max(value for count, value in off.items() if count not in (2.0, 5.0))
+    name = f"distance from {most} slices: the smaller of N = 2 and 5 minus the largest from N = 10 on"
+    note = ", ".join(f"N = {count:g}: {value:.3f}" for count, value in off.items())
+    yield Reading(name, least - far, OMEGA, at_least(0.0), off[max(off)], note)
 
 
 @_figure_5(
@@ -212,24 +159,19 @@ def _few_slices(flights: Flights, damping: str = "") -> tuple[Reading, ...]:
     "0.005 ω₀ is a two-hundredth of the axis of Fig. 5d: less cannot be seen there.",
     "Fig. 5d",
 )
-def _minimum_shifts(flights: Flights, damping: str = "") -> tuple[Reading, ...]:
-    finest = float(normalised(_finest(flights, damping)).min())
-    shift = {
-        case.value: abs(float(normalised(run).min()) - finest)
-        for case, run in flights.members("slices" + damping)
-        if 10.0 <= case.value <= MANY_SLICES
-    }
+def _minimum_shifts(flights: Flights, damping: str = "") -> Iterator[Reading]:
+    finest = float(observe.normalised(_finest(flights, damping)).min())
+    shift = flights.measured(
+        "slices" + damping, lambda run: abs(float(observe.normalised(run).min()) - finest), 10.0, MANY_SLICES
+    )
     if MANY_SLICES not in shift:
         raise MissingFlightError(f"{flights.solver} has not flown {MANY_SLICES:g} slices")
     last = shift.pop(MANY_SLICES)
-    most = max(shift, key=lambda count: shift[count])
+    count, most = max(shift.items(), key=itemgetter(1))
     # What the finest cut is still off by is at most what the one before it is off from it.
-    return (
-        Reading(name="largest shift of the minimum, N = 10 to 99", value=shift[most], unit=OMEGA,
-                admissible=(DETECTED, math.inf), band=last, note=f"at N = {most:g}"),
-        Reading(name="shift of the minimum, N = 100", value=last, unit=OMEGA, admissible=(-math.inf, DETECTED),
-                band=last),
-    )  # fmt: skip
+    name = "largest shift of the minimum, N = 10 to 99"
+    yield Reading(name, most, OMEGA, at_least(DETECTED), last, f"at N = {count:g}")
+    yield Reading("shift of the minimum, N = 100", last, OMEGA, at_most(DETECTED), last)
 
 
 def _finest(flights: Flights, damping: str) -> Trajectory:

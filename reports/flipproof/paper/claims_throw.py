@@ -3,34 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import pairwise
+from operator import itemgetter
 from typing import Final
 
+from flipproof.paper import observe
 from flipproof.paper.claim import FLAT_WHY, SUPERIMPOSED_WHY, states
-from flipproof.paper.observe import (
-    FLAT,
-    SUPERIMPOSED,
-    Flights,
-    climb,
-    delayed_distance,
-    distance,
-    drop_time,
-    level,
-    shape_distance,
-)
+from flipproof.paper.observe import FLAT, SUPERIMPOSED, Flights
 from flipproof.paper.parameters import number, numbers, paper_steps, paper_throw
-from flipproof.paper.statements import OMEGA, Reading
+from flipproof.paper.statements import OMEGA, Reading, at_least, at_most
 from slicemodel import Trajectory
-from slicemodel.observables import (
-    release_angular_velocity,
-)
+from slicemodel.observables import release_angular_velocity
 
 ORDER: Final = math.sqrt(10.0)
 """Factor up to which two numbers are of one order of magnitude."""
 
 LEAST_SPIN: Final = 10.0
 """Angular velocity below which, by section 5, a bottle just falls [rad/s]."""
+
+ONE_STEP: Final = 1.0 / (paper_steps() - 1)
+"""One time step of the paper as a share of the flight: the least that counts as a difference in time."""
 
 HALF_FULL: Final = "half full, α = 0.01 kg/s, β = −0.5"
 
@@ -46,19 +39,12 @@ HALF_FULL: Final = "half full, α = 0.01 kg/s, β = −0.5"
     of_geometry=True,
     otherwise={"as an equation, to a quarter": {"factor": 1.25}},
 )
-def _release_spin(flights: Flights, factor: float = ORDER) -> tuple[Reading, ...]:
-    del flights
+def _release_spin(_: Flights, factor: float = ORDER) -> Iterator[Reading]:
     spin = release_angular_velocity(paper_throw(), number("launch-speed"))
     usual = number("release-spin")
-    return (
-        Reading(
-            name="v₀ / r_CM(0) for v₀ = 2 m/s and M̃ = 0.5",
-            value=spin,
-            unit="rad/s",
-            admissible=(usual / factor, factor * usual),
-            note="the formula holds for a bottle swung about its cap",
-        ),
-    )
+    note = "the formula holds for a bottle swung about its cap"
+    name = "v₀ / r_CM(0) for v₀ = 2 m/s and M̃ = 0.5"
+    yield Reading(name, spin, "rad/s", (usual / factor, factor * usual), note=note)
 
 
 @states(
@@ -70,20 +56,14 @@ def _release_spin(flights: Flights, factor: float = ORDER) -> tuple[Reading, ...
     why="Of one order of magnitude: within a factor of √10.",
     of_geometry=True,
 )
-def _spin_scale(flights: Flights) -> tuple[Reading, ...]:
-    del flights
-    throw = paper_throw()
-    length = throw.bottle.length / 2
-    return (
-        Reading(
-            name="√(g/ℓ) for ℓ = L/2",
-            value=math.sqrt(throw.gravity / length),
-            unit="rad/s",
-            admissible=(LEAST_SPIN / ORDER, ORDER * LEAST_SPIN),
-            note=f"ℓ = {length:g} m; {math.sqrt(throw.gravity / 0.1):.1f} rad/s for the paper's rounded 0.1 m. In free "
-            "flight gravity cancels and no such scale exists",
-        ),
+def _spin_scale(_: Flights) -> Iterator[Reading]:
+    gravity, length = paper_throw().gravity, paper_throw().bottle.length / 2
+    note = (
+        f"ℓ = {length:g} m; {math.sqrt(gravity / 0.1):.1f} rad/s for the paper's rounded 0.1 m. In free "
+        "flight gravity cancels and no such scale exists"
     )
+    admissible = (LEAST_SPIN / ORDER, ORDER * LEAST_SPIN)
+    yield Reading("√(g/ℓ) for ℓ = L/2", math.sqrt(gravity / length), "rad/s", admissible, note=note)
 
 
 @states(
@@ -94,25 +74,21 @@ def _spin_scale(flights: Flights) -> tuple[Reading, ...]:
     throw=f"{HALF_FULL}; 20, 25 and 30 rad/s",
     why=f"{SUPERIMPOSED_WHY} T/1000 is one time step of the paper.",
 )
-def _fast_spin_changes_only_time(flights: Flights) -> tuple[Reading, ...]:
+def _fast_spin_changes_only_time(flights: Flights) -> Iterator[Reading]:
     usual = number("release-spin")
-    runs = {case.value: run for case, run in flights.members("spin") if case.value >= usual}
-    plateaus, drops = ({spin: read(run) for spin, run in runs.items()} for read in (level, drop_time))
-    spins = sorted(runs)
-    worst = max(spins, key=lambda spin: abs(plateaus[spin] - plateaus[usual]))
-    return (
-        Reading(name="largest change of ω_f/ω₀ above 20 rad/s", value=abs(plateaus[worst] - plateaus[usual]),
-                unit=OMEGA, admissible=(-math.inf, SUPERIMPOSED), note=f"at {worst:g} rad/s"),
-        Reading(name="by how much each faster spin drops earlier, the least",
-                value=min(drops[a] - drops[b] for a, b in pairwise(spins)),
-                unit="of T", admissible=(one_step(), math.inf),
-                note=", ".join(f"{drops[spin]:.3f} at {spin:g} rad/s" for spin in spins)),
-    )  # fmt: skip
+    levels, drops = (flights.measured("spin", read, low=usual) for read in (observe.level, observe.drop_time))
+    change = {spin: abs(levels[spin] - levels[usual]) for spin in sorted(levels)}
+    worst, most = max(change.items(), key=itemgetter(1))
+    note = f"at {worst:g} rad/s"
+    yield Reading("largest change of ω_f/ω₀ above 20 rad/s", most, OMEGA, at_most(SUPERIMPOSED), note=note)
+    note = ", ".join(f"{drops[spin]:.3f} at {spin:g} rad/s" for spin in sorted(drops))
+    name = "by how much each faster spin drops earlier, the least"
+    yield Reading(name, _least_delay(drops), "of T", at_least(ONE_STEP), note=note)
 
 
-def one_step() -> float:
-    """Return one time step of the paper as a share of the flight: the least that counts as a difference in time."""
-    return 1.0 / (paper_steps() - 1)
+def _least_delay(drops: dict[float, float]) -> float:
+    """Return by how much the drop comes earlier from one spin or angle to the next, the least."""
+    return min(drops[a] - drops[b] for a, b in pairwise(sorted(drops)))
 
 
 @states(
@@ -124,17 +100,11 @@ def one_step() -> float:
     throw=f"{HALF_FULL}; 10 and 15 rad/s",
     why=FLAT_WHY,
 )
-def _slow_spin_is_not_monotonic(flights: Flights) -> tuple[Reading, ...]:
-    return tuple(
-        Reading(
-            name=f"largest climb over the lowest ω until then, {spin:g} rad/s",
-            value=climb(flights.at("spin", spin)),
-            unit=OMEGA,
-            admissible=(FLAT, math.inf),
-        )
-        for spin in numbers("figure-8a-spin")
-        if LEAST_SPIN <= spin < number("release-spin")
-    )
+def _slow_spin_is_not_monotonic(flights: Flights) -> Iterator[Reading]:
+    for spin in numbers("figure-8a-spin"):
+        if LEAST_SPIN <= spin < number("release-spin"):
+            name = f"largest climb over the lowest ω until then, {spin:g} rad/s"
+            yield Reading(name, observe.climb(flights.at("spin", spin)), OMEGA, at_least(FLAT))
 
 
 @states(
@@ -146,25 +116,18 @@ def _slow_spin_is_not_monotonic(flights: Flights) -> tuple[Reading, ...]:
     throw=f"{HALF_FULL}; θ₀ = 0, 30, 60, 90 and 120°, of which the text names 0 and 90°",
     why=SUPERIMPOSED_WHY,
     otherwise={
-        "with the delay taken out by a shift of t": {"apart": delayed_distance},
-        "with the delay left in": {"apart": distance},
+        "with the delay taken out by a shift of t": {"apart": observe.delayed_distance},
+        "with the delay left in": {"apart": observe.distance},
     },
 )
 def _angle_hardly_matters(
-    flights: Flights, apart: Callable[[Trajectory, Trajectory], float] = shape_distance
-) -> tuple[Reading, ...]:
+    flights: Flights, apart: Callable[[Trajectory, Trajectory], float] = observe.shape_distance
+) -> Iterator[Reading]:
     usual = flights.at("angle", number("release-angle"))
-    off = {case.value: apart(run, usual) for case, run in flights.members("angle")}
-    worst = max(off, key=lambda angle: off[angle])
-    return (
-        Reading(
-            name="largest distance from the curve of π/2",
-            value=off[worst],
-            unit=OMEGA,
-            admissible=(-math.inf, SUPERIMPOSED),
-            note=f"at θ₀ = {math.degrees(worst):.0f}°",
-        ),
-    )
+    off = flights.measured("angle", lambda run: apart(run, usual))
+    worst, most = max(off.items(), key=itemgetter(1))
+    note = f"at θ₀ = {math.degrees(worst):.0f}°"
+    yield Reading("largest distance from the curve of π/2", most, OMEGA, at_most(SUPERIMPOSED), note=note)
 
 
 @states(
@@ -175,20 +138,11 @@ def _angle_hardly_matters(
     throw=f"{HALF_FULL}; θ₀ = 0, 30, 60 and 90°",
     why="T/1000 is one time step of the paper.",
 )
-def _drop_is_later_near_vertical(flights: Flights) -> tuple[Reading, ...]:
-    drops = {
-        case.value: drop_time(run) for case, run in flights.members("angle") if case.value <= number("release-angle")
-    }
-    angles = sorted(drops)
-    return (
-        Reading(
-            name="by how much each smaller θ₀ drops later, the least",
-            value=min(drops[a] - drops[b] for a, b in pairwise(angles)),
-            unit="of T",
-            admissible=(one_step(), math.inf),
-            note=", ".join(f"{drops[angle]:.3f} at {math.degrees(angle):.0f}°" for angle in angles),
-        ),
-    )
+def _drop_is_later_near_vertical(flights: Flights) -> Iterator[Reading]:
+    drops = flights.measured("angle", observe.drop_time, high=number("release-angle"))
+    note = ", ".join(f"{drops[angle]:.3f} at {math.degrees(angle):.0f}°" for angle in sorted(drops))
+    name = "by how much each smaller θ₀ drops later, the least"
+    yield Reading(name, _least_delay(drops), "of T", at_least(ONE_STEP), note=note)
 
 
 @states(
@@ -199,20 +153,13 @@ def _drop_is_later_near_vertical(flights: Flights) -> tuple[Reading, ...]:
     throw=f"{HALF_FULL}; the text names no aspect ratio",
     why=SUPERIMPOSED_WHY,
 )
-def _aspect_ratio_does_not_matter(flights: Flights) -> tuple[Reading, ...]:
+def _aspect_ratio_does_not_matter(flights: Flights) -> Iterator[Reading]:
     bottle = paper_throw().bottle
     own = flights.at("aspect", bottle.length / (2 * bottle.radius))
-    off = {case.value: distance(run, own) for case, run in flights.members("aspect")}
-    worst = max(off, key=lambda aspect: off[aspect])
-    return (
-        Reading(
-            name="largest distance from the curve of the paper's bottle",
-            value=off[worst],
-            unit=OMEGA,
-            admissible=(-math.inf, SUPERIMPOSED),
-            note=f"at L / 2R = {worst:g}",
-        ),
-    )
+    off = flights.measured("aspect", lambda run: observe.distance(run, own))
+    worst, most = max(off.items(), key=itemgetter(1))
+    name = "largest distance from the curve of the paper's bottle"
+    yield Reading(name, most, OMEGA, at_most(SUPERIMPOSED), note=f"at L / 2R = {worst:g}")
 
 
 OF_RELEASE: Final = (_release_spin, _spin_scale)

@@ -1,8 +1,8 @@
-"""The runs behind the paper's figures and claims: planned without repeats, made in a pool, looked up by case."""
+"""The runs behind the paper's figures: planned without repeats, made in a pool, looked up by case."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Final
@@ -26,6 +26,9 @@ event-driven solver; with recoil the order of the impacts decides it."""
 GROUP: Final = 12
 """Runs that a worker holds at a time: all of them would take it gigabytes."""
 
+Pair = tuple[str, str]
+"""A solver and the key of a case."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperRuns:
@@ -39,8 +42,8 @@ class PaperRuns:
         Of every solver over numbers of slices and steps; empty if they were not asked for.
     """
 
-    made: Mapping[tuple[str, str], Made]
-    costs: tuple[Cost, ...]
+    made: Mapping[Pair, Made]
+    costs: tuple[Cost, ...] = ()
 
     @classmethod
     def of(cls, flights: Flights, figures: Iterable[Call], costs: Iterable[Call] = ()) -> PaperRuns:
@@ -65,6 +68,16 @@ class PaperRuns:
         ]
 
 
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """A run, the pair by which it is looked up, and what is kept of it: every how many points, and slices if whole."""
+
+    pair: Pair
+    run: Run
+    thin: int = 1
+    whole: bool = True
+
+
 def scenario_of(solver: str, case: Case) -> Scenario | None:
     """Return the throw of a case as this solver flies it; None if it is not flown."""
     if solver != PUBLISHED and not case.slices_vary and case.steps < paper_steps() and case.scenario != paper_throw():
@@ -72,35 +85,19 @@ def scenario_of(solver: str, case: Case) -> Scenario | None:
     return case.scenario
 
 
-def plan_groups(keys: Iterable[str] | None = None) -> list[list[Planned]]:
-    """Return every run that the figures need, in groups of which a worker makes one at a time."""
-    planned = list(_planned(keys))
-    return [planned[k : k + GROUP] for k in range(0, len(planned), GROUP)]
-
-
-@dataclass(frozen=True, slots=True)
-class Planned:
-    """A run of the figures, with the case that it is of."""
-
-    solver: str
-    case: Case
-    run: Run
-
-    @property
-    def pair(self) -> tuple[str, str]:
-        """The solver and the key of its case."""
-        return self.solver, self.case.key
-
-
-def _planned(keys: Iterable[str] | None) -> Iterator[Planned]:
+def plan_figures(keys: Iterable[str] | None = None) -> list[Planned]:
+    """Return every run that the figures need; of the cases with these keys only, if any are given."""
     cases = all_cases()
     wanted = set(cases if keys is None else keys)
+    planned = []
     for solver in reversed(SOLVERS):
         for key, case in cases.items():
             scenario = scenario_of(solver, case) if key in wanted else None
             if scenario is not None:
                 run = Run(solver, scenario, _settings(solver, case), label=f"paper, {solver}, {key}")
-                yield Planned(solver, case, run)
+                thin = case.thin if solver == PUBLISHED else 1
+                planned.append(Planned((solver, key), run, thin, case.whole))
+    return planned
 
 
 def _settings(solver: str, case: Case) -> dict[str, Any]:
@@ -110,9 +107,15 @@ def _settings(solver: str, case: Case) -> dict[str, Any]:
     return {} if points == paper_steps() else {"times": np.linspace(0.0, case.scenario.duration, points)}
 
 
+def group_calls(planned: list[Planned], words: str) -> list[Call]:
+    """Return the calls that make these runs, each a group of which a worker makes one at a time."""
+    groups = (planned[k : k + GROUP] for k in range(0, len(planned), GROUP))
+    return [Call(make_group, (group,), f"{words}, {group[-1].pair[1]}") for group in groups]
+
+
 def figure_calls(keys: Iterable[str] | None = None) -> list[Call]:
     """Return the calls that make the runs of the figures; of the cases with these keys only, if any are given."""
-    return [Call(make_group, (group,), f"the paper's figures, {group[-1].case.key}") for group in plan_groups(keys)]
+    return group_calls(plan_figures(keys), "the paper's figures")
 
 
 def cost_calls() -> list[Call]:
@@ -122,32 +125,20 @@ def cost_calls() -> list[Call]:
     return [published, *(Call(measure_event_driven, (name,), f"the cost of {name}", timed=True) for name in others)]
 
 
-def make_group(group: Iterable[Planned]) -> dict[tuple[str, str], Made]:
+def make_group(group: Iterable[Planned]) -> dict[Pair, Made]:
     """Make runs one after the other and keep of each what is looked at."""
-    found = {}
-    for each in group:
-        made = _thinned(make(each.run), each.case.thin if each.solver == PUBLISHED else 1)
-        found[each.pair] = made if each.case.whole else _without_slices(made)
-    return found
+    return {each.pair: _kept(make(each.run), each) for each in group}
 
 
-def make_thinned(runs: Iterable[tuple[Run, int]]) -> list[Made]:
-    """Make runs one after the other and keep every so many of their points."""
-    return [_thinned(make(run), every) for run, every in runs]
-
-
-def _thinned(made: Made, every: int) -> Made:
-    run = made.trajectory
-    if run is None or every == 1:
-        return made
-    kept = {name: getattr(run, name)[::every].copy() for name in ("t", "theta", "omega", "r", "v", "r_cm", "inertia")}
-    return replace(made, trajectory=replace(run, **kept))
-
-
-def _without_slices(made: Made) -> Made:
-    """Drop what nobody looks at: slices at every time are nearly all of a run's memory."""
+def _kept(made: Made, planned: Planned) -> Made:
+    """Return a run with what is kept of it: slices at every time are nearly all of its memory."""
     run = made.trajectory
     if run is None:
         return made
-    none = np.empty((0, run.scenario.n_slices))
-    return replace(made, trajectory=replace(run, r=none, v=none))
+    if planned.thin > 1:
+        names = ("t", "theta", "omega", "r", "v", "r_cm", "inertia")
+        run = replace(run, **{name: getattr(run, name)[:: planned.thin].copy() for name in names})
+    if not planned.whole:
+        none = np.empty((0, run.scenario.n_slices))
+        run = replace(run, r=none, v=none)
+    return replace(made, trajectory=run)

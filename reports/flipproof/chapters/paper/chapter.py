@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Exhibit, Study
-from flipproof.paper.claim_runs import ClaimRuns, plan_claims
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Study
+from flipproof.paper.claim_runs import plan_claims
 from flipproof.paper.figures import exhibits_paper
-from flipproof.paper.runs import PaperRuns, figure_calls, make_thinned
+from flipproof.paper.runs import PaperRuns, figure_calls
 from flipproof.paper.verdicts import PaperVerdicts, judge_paper
 
 
@@ -23,17 +23,12 @@ class Paper:
 
 
 def study(ask: Ask) -> Study[Paper]:
-    """Make the throws of the figures, and those that statements need beside them; then judge in a worker."""
+    """Make the throws of the figures, and those that statements need beside them; then judge."""
     del ask
-    figures = figure_calls()
-    plan = plan_claims()
-    halved = [Call(make_thinned, (group,), "the paper's statements") for group in plan.groups]
-    flights = yield [*figures, *halved, *plan.runs]
+    figures, plan = figure_calls(), plan_claims()
+    flights = yield [*figures, *plan.requests]
     runs = PaperRuns.of(flights, figures)
-    made = {each.run: each for call in halved for each in flights.answer(call)} | {
-        run: flights[run] for run in plan.runs
-    }
-    return Paper(runs, judge_paper(ClaimRuns.of(runs, plan, made)))
+    return Paper(runs, judge_paper(plan.made(flights, runs.made)))
 
 
 def claims(found: Paper) -> Claims:
