@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -14,285 +16,265 @@ from flipproof.paper.figures_panels import (
     Axis,
     Grid,
     Line,
-    Panel,
+    Recipe,
     dots,
     every_third,
     exhibit_grid,
     listed,
     ramp,
     ranked,
-    stretched,
+    row_of,
 )
+from flipproof.paper.observe import normalised, steady_level
 from flipproof.paper.parameters import number, numbers
-from flipproof.paper.runs import PUBLISHED, SOLVERS, PaperRuns
+from flipproof.paper.runs import PUBLISHED, PaperRuns
 from slicemodel import Trajectory
-from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray
 
-Quantity = Callable[[Trajectory], tuple[FloatArray, FloatArray]]
-Label = Callable[[Case], str]
-
-TIME: Final = Axis(label="time t [s]", column="t [s]", low=0.0, high=number("duration"))
-RELATIVE_TIME: Final = Axis(label="t / T [1]", column="t/T [1]", low=0.0, high=1.0)
-OMEGA: Final = Axis(label="ω [rad/s]", column="omega [rad/s]", low=0.0, high=1.1 * number("release-spin"))
-RELATIVE_OMEGA: Final = Axis(label="ω / ω₀ [1]", column="omega/omega_0 [1]", low=0.0, high=1.1)
-THETA: Final = Axis(label="θ [rad]", column="theta [rad]", low=0.0, high=3 * math.pi)
+TIME: Final = Axis("time t [s]", "t [s]", 0.0, number("duration"))
+SHARE: Final = Axis("t / T [1]", "t/T [1]", 0.0, 1.0)
 
 
-def omega_over_time(run: Trajectory) -> tuple[FloatArray, FloatArray]:
-    """Return t [s] and omega [rad/s]."""
-    return every_third(run.t), every_third(run.omega)
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """What is drawn over time.
+
+    Parameters
+    ----------
+    x, y : Axis
+    curve : flight -> abscissa and ordinate
+    plotted : str - what is drawn against what, for the alternative text
+    said : str - the number that stands for a curve there
+    number, digits : how it is read off a flight, and its digits after the point
+    """
+
+    x: Axis
+    y: Axis
+    curve: Callable[[Trajectory], tuple[FloatArray, FloatArray]]
+    plotted: str
+    said: str
+    number: Callable[[Trajectory], float]
+    digits: int = 3
 
 
-def theta_over_time(run: Trajectory) -> tuple[FloatArray, FloatArray]:
-    """Return t [s] and theta [rad]."""
-    return every_third(run.t), every_third(run.theta)
+THETA: Final = Quantity(
+    TIME,
+    Axis("θ [rad]", "theta [rad]", 0.0, 3 * math.pi),
+    lambda run: (run.t, run.theta),
+    "theta against time",
+    "Theta at 0.5 s in rad",
+    lambda run: float(run.theta[-1]),
+    digits=1,
+)
+OMEGA: Final = Quantity(
+    TIME,
+    Axis("ω [rad/s]", "omega [rad/s]", 0.0, 1.1 * number("release-spin")),
+    lambda run: (run.t, run.omega),
+    "omega against time",
+    "Mean omega over omega_0 of the second half",
+    steady_level,
+)
+RELATIVE: Final = Quantity(
+    SHARE,
+    Axis("ω / ω₀ [1]", "omega/omega_0 [1]", 0.0, 1.1),
+    lambda run: (run.t / run.scenario.duration, normalised(run)),
+    "omega over omega_0 against t over T",
+    "Mean of the second half",
+    steady_level,
+)
 
 
-def relative_omega(run: Trajectory) -> tuple[FloatArray, FloatArray]:
-    """Return t / T and omega / omega_0."""
-    return every_third(run.t / run.scenario.duration), every_third(run.omega / run.scenario.omega0)
+@dataclass(frozen=True, slots=True)
+class Curves:
+    """A figure of one quantity over time.
+
+    Parameters
+    ----------
+    quantity : Quantity
+    label : case -> what varies, with its value
+    rows : (family, heading, words that tell its numbers from those of other rows)
+    title, caption : str
+    height : float - of a row [inches]
+    legend_columns : int
+    """
+
+    quantity: Quantity
+    label: Callable[[Case], str]
+    rows: tuple[tuple[str, str, str], ...]
+    title: str
+    caption: str
+    height: float = 3.0
+    legend_columns: int = 6
 
 
-def row_of(runs: PaperRuns, name: str, quantity: Quantity, label: Label, heading: str = "") -> tuple[Panel, ...]:
-    """Return one panel for each solver with the curves of a family."""
-    # Ranks come from the values, so that a throw that one solver does not fly leaves the others their colours.
-    values = sorted(case.value for case in family(name))
-    return tuple(
-        Panel(
-            solver=solver,
-            heading=heading,
-            lines=tuple(
-                Line(label=label(case), x=x, y=y, look=ranked(values.index(case.value), len(values)))
-                for case, run in runs.members(solver, name)
-                for x, y in [quantity(run)]
-            ),
-        )
-        for solver in SOLVERS
-    )
+def _of(symbol: str, unit: str = "", shown: Callable[[float], float] = float) -> Callable[[Case], str]:
+    return lambda case: f"{symbol} = {shown(case.value):g}{unit}".replace("-", "−")
 
 
-def plateaus(runs: PaperRuns, name: str, label: Label) -> str:
-    """Return the mean of omega / omega_0 over the second half of every flight of a family, as words for each solver."""
-    return listed(
-        {
-            solver: {
-                label(case): plateau(run.t, run.omega, run.scenario.omega0) for case, run in runs.members(solver, name)
-            }
-            for solver in SOLVERS
-        }
-    )
-
-
-def turns(runs: PaperRuns, name: str, label: Label) -> str:
-    """Return theta at the end of every flight of a family [rad], as words for each solver."""
-    return listed(
-        {solver: {label(case): float(run.theta[-1]) for case, run in runs.members(solver, name)} for solver in SOLVERS},
-        digits=1,
-    )
-
-
-def _of(symbol: str, unit: str = "") -> Label:
-    return lambda case: f"{symbol} = {case.value:g}{unit}".replace("-", "−")
-
-
-BETA: Final = _of("β")
-SLICES: Final = _of("N")
-ALPHA: Final = _of("α", " kg/s")
-FILLING: Final = _of("M̃")
-READINGS: Final = (("beta", "α = 1 (caption), α/2m = 10 /s"), ("beta at 5 /s", "α = 0.5, α/2m = 5 /s"))
-
+BETA: Final = (
+    ("beta", "α = 1 (caption), α/2m = 10 /s", "with alpha 1"),
+    ("beta at 5 /s", "α = 0.5, α/2m = 5 /s", "with alpha 0.5"),
+)
 TWO_READINGS: Final = (
     "The caption's α = 1 and the damping rate of all later figures do not agree for ten slices; the upper row takes "
     "the first, the lower row the second. "
 )
 
-
-def exhibits_5b(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angle for three rebounds."""
-    rows = tuple(row_of(runs, name, theta_over_time, BETA, heading) for name, heading in READINGS)
-    grid = Grid(rows=rows, x=TIME, y=(THETA, THETA))
-    yield exhibit_grid(
-        "5b", "what the rebound β does to the angle θ(t)",
+CURVES: Final = {
+    "5b": Curves(
+        THETA,
+        _of("β"),
+        BETA,
+        "what the rebound β does to the angle θ(t)",
         f"{TWO_READINGS}Look at the end of the flight: does the elastic bottle (β = −1) turn ahead of the others?",
-        f"Line plots of theta against time, two rows by three solvers. Theta at 0.5 s in rad with alpha 1: "
-        f"{turns(runs, 'beta', BETA)}. With alpha 0.5: {turns(runs, 'beta at 5 /s', BETA)}.",
-        grid,
-    )  # fmt: skip
-
-
-def exhibits_5c(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angular velocity for three rebounds."""
-    rows = tuple(row_of(runs, name, omega_over_time, BETA, heading) for name, heading in READINGS)
-    grid = Grid(rows=rows, x=TIME, y=tuple(stretched(OMEGA, row) for row in rows))
-    yield exhibit_grid(
-        "5c", "what the rebound β does to the angular velocity ω(t)",
+        height=2.5,
+    ),
+    "5c": Curves(
+        OMEGA,
+        _of("β"),
+        BETA,
+        "what the rebound β does to the angular velocity ω(t)",
         f"{TWO_READINGS}The paper has ω low and flat for β = −0.5 only, and bumpy for β = −1. In free flight no bottle "
         "speeds up late, whatever its β.",
-        "Line plots of omega against time, two rows by three solvers. Mean omega over omega_0 of the second half with "
-        f"alpha 1: {plateaus(runs, 'beta', BETA)}. With alpha 0.5: {plateaus(runs, 'beta at 5 /s', BETA)}.",
-        grid,
-    )  # fmt: skip
-
-
-def exhibits_5d(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angular velocity for several numbers of slices."""
-    rows = (
-        row_of(runs, "slices", omega_over_time, SLICES, "α/2m = 10 /s kept"),
-        row_of(runs, "slices at 5 /s", omega_over_time, SLICES, "α/2m = 5 /s kept"),
-        row_of(runs, "slices at alpha 1", omega_over_time, SLICES, "α = 1 kept"),
-    )
-    grid = Grid(rows=rows, x=TIME, y=tuple(stretched(OMEGA, row) for row in rows), legend_columns=7)
-    yield exhibit_grid(
-        "5d", "what the number of slices N does to ω(t)",
+        height=2.5,
+    ),
+    "5d": Curves(
+        OMEGA,
+        _of("N"),
+        (
+            ("slices", "α/2m = 10 /s kept", "at 10 per second"),
+            ("slices at 5 /s", "α/2m = 5 /s kept", "at 5 per second"),
+            ("slices at alpha 1", "α = 1 kept", "with alpha 1"),
+        ),
+        "what the number of slices N does to ω(t)",
         "In the upper rows the damping rate α/2m is kept and the curves close up with N. With α itself kept (bottom "
         "row, another scale) the published program stands still at N = 20, where α/2m equals ω₀, and spins up beyond "
         "ω₀ with more, so that the paper cannot have meant that.",
-        "Line plots of omega against time, three rows by three solvers. Mean omega over omega_0 of the second half at "
-        f"10 per second: {plateaus(runs, 'slices', SLICES)}. At 5 per second: "
-        f"{plateaus(runs, 'slices at 5 /s', SLICES)}. With alpha 1: {plateaus(runs, 'slices at alpha 1', SLICES)}.",
-        grid,
-    )  # fmt: skip
-
-
-def exhibits_6b(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angle for several drags."""
-    grid = Grid(rows=(row_of(runs, "drag", theta_over_time, ALPHA),), x=TIME, y=(THETA,), height=3.0)
-    yield exhibit_grid(
-        "6b", "what the drag α does to the angle θ(t)",
+        height=2.5,
+        legend_columns=7,
+    ),
+    "6b": Curves(
+        THETA,
+        _of("α", " kg/s"),
+        (("drag", "", ""),),
+        "what the drag α does to the angle θ(t)",
         "The less a bottle has turned at the end, the longer its ω stayed low.",
-        f"Line plots of theta against time by three solvers. Theta at 0.5 s in rad: {turns(runs, 'drag', ALPHA)}.",
-        grid,
-    )  # fmt: skip
-
-
-def exhibits_6c(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angular velocity for several drags."""
-    grid = Grid(rows=(row_of(runs, "drag", omega_over_time, ALPHA),), x=TIME, y=(OMEGA,), height=3.0)
-    yield exhibit_grid(
-        "6c", "what the drag α does to the angular velocity ω(t)",
+    ),
+    "6c": Curves(
+        OMEGA,
+        _of("α", " kg/s"),
+        (("drag", "", ""),),
+        "what the drag α does to the angular velocity ω(t)",
         "Is there one α whose curve drops and then stays flat? In the published program there is, near the paper's "
         "choice of 0.01, because its α weakens the centrifugal force instead of damping; in free flight every curve "
         "stays low.",
-        "Line plots of omega against time by three solvers. Mean omega over omega_0 of the second half: "
-        f"{plateaus(runs, 'drag', ALPHA)}.",
-        grid,
-    )  # fmt: skip
-
-
-def exhibits_7a(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angular velocity for all fillings."""
-    grid = Grid(
-        rows=(row_of(runs, "filling", relative_omega, FILLING),), x=RELATIVE_TIME, y=(RELATIVE_OMEGA,), height=3.2
-    )
-    yield exhibit_grid(
-        "7a", "what the filling M̃ does to ω(t)",
+    ),
+    "7a": Curves(
+        RELATIVE,
+        _of("M̃"),
+        (("filling", "", ""),),
+        "what the filling M̃ does to ω(t)",
         "Look at M̃ = 0.1, which the experiment leaves at ω₀: the published program and Eq. 8 slow it down, free flight "
         "hardly does. And at M̃ = 1, which no solver keeps, because slices may overlap.",
-        "Line plots of omega over omega_0 against t over T by three solvers. Mean of the second half: "
-        f"{plateaus(runs, 'filling', FILLING)}.",
-        grid,
-    )  # fmt: skip
-
-
-def _eight(runs: PaperRuns, name: str, family_name: str, label: Label, title: str, caption: str) -> Iterator[Exhibit]:
-    rows = (row_of(runs, family_name, relative_omega, label),)
-    axis = stretched(RELATIVE_OMEGA, rows[0])
-    alt = (
-        "Line plots of omega over omega_0 against t over T by three solvers. Mean of the second half: "
-        f"{plateaus(runs, family_name, label)}."
-    )
-    yield exhibit_grid(name, title, caption, alt, Grid(rows=rows, x=RELATIVE_TIME, y=(axis,), height=3.0))
-
-
-def exhibits_8a(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angular velocity for several releases by spin."""
-    yield from _eight(
-        runs, "8a", "spin", lambda case: f"ω₀ = {case.value:g} rad/s", "what the spin at release ω₀ does",
+        height=3.2,
+    ),
+    "8a": Curves(
+        RELATIVE,
+        _of("ω₀", " rad/s"),
+        (("spin", "", ""),),
+        "what the spin at release ω₀ does",
         "Without the gravity that Eq. 8 keeps, the spin only sets the pace: in free flight the curves fall one after "
         "the other, and none rises again. At 5 rad/s the published program's water does not move at all: its α takes "
         "(α/2m)² off ω², and here the two are equal.",
-    )  # fmt: skip
-
-
-def exhibits_8b(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angular velocity for several angles at release."""
-    yield from _eight(
-        runs, "8b", "angle", lambda case: f"θ₀ = {math.degrees(case.value):.0f}°", "what the angle at release θ₀ does",
+    ),
+    "8b": Curves(
+        RELATIVE,
+        _of("θ₀", "°", math.degrees),
+        (("angle", "", ""),),
+        "what the angle at release θ₀ does",
         "In free flight the angle does nothing at all: a falling bottle cannot know where down is. What is seen in the "
         "other two is the gravity that Eq. 8 keeps.",
-    )  # fmt: skip
-
-
-def exhibits_8c(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angular velocity for several aspect ratios."""
-    yield from _eight(
-        runs, "8c", "aspect", lambda case: f"L / 2R = {case.value:g}", "what the aspect ratio does at equal volume",
+    ),
+    "8c": Curves(
+        RELATIVE,
+        _of("L / 2R"),
+        (("aspect", "", ""),),
+        "what the aspect ratio does at equal volume",
         "The paper's curves nearly coincide. The ratio is L / 2R, 3.5 for the paper's bottle, with volume, mass and "
         "water kept.",
-    )  # fmt: skip
+    ),
+}
+"""Figure -> what it shows."""
+
+
+def exhibits_curves(name: str, runs: PaperRuns) -> Iterator[Exhibit]:
+    """Yield one figure of ``CURVES``."""
+    shown = CURVES[name]
+    quantity, label = shown.quantity, shown.label
+
+    def lines(solver: str, of: str) -> Iterator[Line]:
+        # Ranks come from the values, so that a throw that one solver does not fly leaves the others their colours.
+        values = sorted(case.value for case in family(of))
+        for case, run in runs.members(solver, of):
+            x, y = map(every_third, quantity.curve(run))
+            yield Line(label(case), x, y, ranked(values.index(case.value), len(values)))
+
+    def words(of: str) -> str:
+        return listed(
+            lambda solver: {label(case): quantity.number(run) for case, run in runs.members(solver, of)},
+            quantity.digits,
+        )
+
+    rows = tuple(row_of(quantity.y, partial(lines, of=of), heading) for of, heading, _ in shown.rows)
+    count = {1: "", 2: ", two rows", 3: ", three rows"}[len(rows)]
+    told = ". ".join(
+        f"{f'{quantity.said} {which}'.rstrip() if k == 0 else which.capitalize()}: {words(of)}"
+        for k, (of, _, which) in enumerate(shown.rows)
+    )
+    alt = f"Line plots of {quantity.plotted}{count} by three solvers. {told}."
+    grid = Grid(quantity.x, rows, shown.height, legend_columns=shown.legend_columns)
+    yield exhibit_grid(name, shown.title, shown.caption, alt, grid)
 
 
 def exhibits_s1a(runs: PaperRuns) -> Iterator[Exhibit]:
     """Yield the angular velocity for several numbers of time steps."""
-    panels = []
-    for solver in SOLVERS:
-        lines = [line for filling in numbers("figure-S1-filling") for line in _steps(runs, solver, filling)]
-        panels.append(Panel(solver=solver, heading="", lines=tuple(lines)))
-    grid = Grid(rows=(tuple(panels),), x=RELATIVE_TIME, y=(RELATIVE_OMEGA,), height=3.2, legend_columns=3)
+    row = row_of(RELATIVE.y, partial(_steps, runs))
     yield exhibit_grid(
         "S1a", "what the number of time steps P does",
         "How far does a curve of fewer steps lie from that of 1000? Eq. 8 and free flight choose their own steps; for "
         "them P is only the number of points given out, drawn as points on the same curve for the half-full bottle: 10 "
         "open, 100 small.",
         f"Line plots of omega over omega_0 by three solvers. Distance of the published program from its own curve of "
-        f"1000 steps, as a fraction of omega_0: {_step_words(runs)}.",
-        grid,
+        f"1000 steps, as a fraction of omega_0: {', '.join(_step_words(runs))}.",
+        Grid(SHARE, (row,), height=3.2, legend_columns=3),
     )  # fmt: skip
 
 
-def _steps(runs: PaperRuns, solver: str, filling: float) -> Iterator[Line]:
-    fillings = numbers("figure-S1-filling")
-    for case, run in runs.members(solver, f"steps {filling:g}"):
-        finest = case.steps == max(numbers("figure-S1-steps"))
-        x, y = relative_omega(run)
-        label = f"M̃ = {filling:g}, P = {case.value:g}"
-        rank = fillings.index(filling)
-        if solver == PUBLISHED or finest:
-            dash = sorted(numbers("figure-S1-steps"), reverse=True).index(case.value)
-            look = ranked(rank, len(fillings), dash)
-        else:
-            fewest = case.value == min(numbers("figure-S1-steps"))
-            look = dots(ramp(rank, len(fillings)), filled=not fewest, size=6.0 if fewest else 2.5)
-        yield Line(label=label, x=x, y=y, look=look)
+def _steps(runs: PaperRuns, solver: str) -> Iterator[Line]:
+    fillings, every = numbers("figure-S1-filling"), sorted(numbers("figure-S1-steps"), reverse=True)
+    for rank, filling in enumerate(fillings):
+        for case, run in runs.members(solver, f"steps {filling:g}"):
+            if solver == PUBLISHED or case.value == every[0]:
+                look = ranked(rank, len(fillings), every.index(case.value))
+            else:
+                fewest = case.value == every[-1]
+                look = dots(ramp(rank, len(fillings)), filled=not fewest, size=6.0 if fewest else 2.5)
+            x, y = map(every_third, RELATIVE.curve(run))
+            yield Line(f"M̃ = {filling:g}, P = {case.value:g}", x, y, look)
 
 
-def _step_words(runs: PaperRuns) -> str:
-    words = []
+def _step_words(runs: PaperRuns) -> Iterator[str]:
     for filling in numbers("figure-S1-filling"):
-        found: dict[float, Trajectory] = {
-            case.value: run for case, run in runs.members(PUBLISHED, f"steps {filling:g}")
-        }
-        if not found:
-            continue
-        finest = found[max(found)]
-        for steps, run in sorted(found.items())[:-1]:
+        found = {case.value: run for case, run in runs.members(PUBLISHED, f"steps {filling:g}")}
+        *fewer, most = sorted(found) or [0.0]
+        for steps in fewer:
+            run, finest = found[steps], found[most]
             there = np.interp(run.t, finest.t, finest.omega)
             far = float(np.abs(run.omega - there).max()) / run.scenario.omega0
-            words.append(f"filling {filling:g} with {steps:g} steps {far:.2g}")
-    return ", ".join(words)
+            yield f"filling {filling:g} with {steps:g} steps {far:.2g}"
 
 
-RECIPES: Final[dict[str, tuple[tuple[str, ...], Callable[[PaperRuns], Iterator[Exhibit]]]]] = {
-    "5b": (("beta", "beta at 5 /s"), exhibits_5b),
-    "5c": (("beta", "beta at 5 /s"), exhibits_5c),
-    "5d": (("slices", "slices at 5 /s", "slices at alpha 1"), exhibits_5d),
-    "6b": (("drag",), exhibits_6b),
-    "6c": (("drag",), exhibits_6c),
-    "7a": (("filling",), exhibits_7a),
-    "8a": (("spin",), exhibits_8a),
-    "8b": (("angle",), exhibits_8b),
-    "8c": (("aspect",), exhibits_8c),
-    "S1a": (("steps 0.25", "steps 0.5", "steps 0.75"), exhibits_s1a),
-}
+RECIPES: Final[dict[str, Recipe]] = {
+    name: (tuple(of for of, _, _ in shown.rows), partial(exhibits_curves, name)) for name, shown in CURVES.items()
+} | {"S1a": (tuple(f"steps {filling:g}" for filling in numbers("figure-S1-filling")), exhibits_s1a)}
 """Figure -> the families it needs, and how it is made."""
