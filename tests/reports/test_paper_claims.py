@@ -13,15 +13,25 @@ from flipproof.frame.flights import Flights as Answers
 from flipproof.frame.flights import Outcome
 from flipproof.frame.solvers import Run, make
 from flipproof.page.templating import environment
-from flipproof.paper import claim_runs, claims_filling, claims_landing, observe
+from flipproof.paper import claims_filling, claims_landing, observe
 from flipproof.paper.cases import FAMILIES, all_cases, family
 from flipproof.paper.claim import judge
-from flipproof.paper.claim_runs import ClaimRuns, plan_claims, plan_further, plan_halved, plan_published
+from flipproof.paper.claim_runs import plan_further, plan_halved, plan_published
 from flipproof.paper.claims_cost import many_steps_key, same_steps_key
 from flipproof.paper.claims_slices import finest_key
 from flipproof.paper.observe import Flights, MissingFlightError
 from flipproof.paper.parameters import numbers, paper_throw
-from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS, Planned, plan_figures, scenario_of
+from flipproof.paper.runs import (
+    BANDS,
+    HALVES,
+    PUBLISHED,
+    SOLVERS,
+    PaperRuns,
+    Planned,
+    group_calls,
+    plan_figures,
+    scenario_of,
+)
 from flipproof.paper.statements import Reading, Statement
 from flipproof.paper.verdicts import CLAIMS, STEADY, claim_weight_slows_the_tenth, judge_all, judge_paper
 from slicemodel.observables import centre_of_mass, plateau
@@ -522,7 +532,7 @@ def test_statements_stand_once_each_with_all_their_words():
 
 def test_further_runs_repeat_none_of_the_figures():
     figures = {each.run for each in plan_figures()}
-    further, halved = plan_further(), plan_halved()
+    further, halved = ({each.name[:2]: each.run for each in plan} for plan in (plan_further(), plan_halved()))
     assert not figures & {*further.values(), *halved.values()}
     for (solver, key), run in halved.items():
         if key in all_cases():
@@ -536,35 +546,36 @@ def test_further_runs_repeat_none_of_the_figures():
 
 
 def test_the_published_program_is_flown_with_half_its_slices_and_with_half_its_steps():
-    slices, steps = ({each.pair: each for each in plan_published(half)} for half in claim_runs.HALVES)
+    slices, steps = ({each.name[1]: each for each in plan_published(half)} for half in HALVES)
     assert set(slices) < set(steps)
-    planned = [each.run for each in (*slices.values(), *steps.values())]
-    assert len(set(planned)) == len(planned)
-    for (solver, key), each in slices.items():
+    planned = [*slices.values(), *steps.values()]
+    assert len({each.run for each in planned}) == len(planned)
+    assert {each.name[0] for each in planned} == {PUBLISHED}
+    for key, each in slices.items():
         usual = all_cases()[key]
-        assert (solver, each.run.settings["steps"], each.thin) == (PUBLISHED, usual.steps, usual.thin)
+        assert (each.run.settings["steps"], each.thin) == (usual.steps, usual.thin)
         assert each.run.scenario.n_slices == usual.scenario.n_slices // 2
         assert each.run.scenario.damping_rate == pytest.approx(usual.scenario.damping_rate)
-    for (_, key), each in steps.items():
+    for key, each in steps.items():
         assert each.run.scenario == all_cases()[key].scenario
         assert (each.run.settings["steps"] - 1) * 2 == pytest.approx(all_cases()[key].steps - 1, abs=1)
         assert (each.run.settings["steps"] - 1) % each.thin == 0  # the landing is kept
-    assert steps[PUBLISHED, "drag 0.0125"].run.settings["store"] == "full"
+    assert steps["drag 0.0125"].run.settings["store"] == "full"
 
 
-def test_gathering_keeps_what_belongs_together(monkeypatch):
-    def run(label, spin):
-        scenario = replace(THROW, duration=0.01, omega0=spin)
-        return Run(PUBLISHED, scenario, {"steps": 5, "store": "summary"}, label=label)
+def test_gathering_keeps_what_belongs_together():
+    def planned(solver, spin, half, *, grouped):
+        run = Run(PUBLISHED, replace(THROW, duration=0.01, omega0=spin), {"steps": 5, "store": "summary"})
+        return Planned((solver, "a", half), run, grouped=grouped)
 
-    half = {"slices": run("three", 15.0), "steps": run("four", 16.0)}
-    monkeypatch.setattr(claim_runs, "plan_further", lambda: {(PUBLISHED, "a"): run("one", 20.0)})
-    monkeypatch.setattr(claim_runs, "plan_halved", lambda: {("eq8", "a"): run("two", 10.0)})
-    monkeypatch.setattr(claim_runs, "plan_published", lambda of: [Planned((PUBLISHED, "a"), half[of])])
-    plan = plan_claims()
-    made = {run: make(run) for of in plan.runs.values() for run in of.values()}
-    called = {call: Outcome(call.function(*call.arguments)) for of in plan.calls.values() for call in of}
-    runs = plan.made(Answers(made, called), {})
+    plan = [
+        planned(PUBLISHED, 20.0, "", grouped=False), planned("eq8", 10.0, "slices", grouped=False),
+        planned(PUBLISHED, 15.0, "slices", grouped=True), planned(PUBLISHED, 16.0, "steps", grouped=True),
+    ]  # fmt: skip
+    calls = group_calls(plan, "some")
+    made = {each.run: make(each.run) for each in plan if not each.grouped}
+    called = {call: Outcome(call.function(*call.arguments)) for call in calls}
+    runs = PaperRuns.of(Answers(made, called), calls, plan)
     assert runs.trajectory(PUBLISHED, "a").scenario.omega0 == 20.0
     assert runs.flights("eq8").halved.runs["a"].scenario.omega0 == 10.0
     assert runs.flights("eq8").half_steps is None
@@ -582,28 +593,20 @@ def runs():
     wanted = [name for name in FAMILIES if name not in ("flight", "slices at alpha 1")]
     cases = {case.key: case for name in wanted for case in FAMILIES[name]}
     drags = {case.key for case in FAMILIES["drag"]}
-    made = {}
 
-    def store(key):
-        return "full" if key in drags or "beta" in key else "summary"
+    def made(each):
+        key = each.name[1]
+        store = "full" if key in drags or "beta" in key else "summary"
+        return each.name, make(replace(each.run, settings={**each.run.settings, "store": store}))
 
-    halves = {
-        half: {
-            each.pair: make(replace(each.run, settings={**each.run.settings, "store": store(each.pair[1])}))
-            for each in plan_published(half)
-        }
-        for half in claim_runs.HALVES
-    }
-    for key, case in cases.items():
-        made[PUBLISHED, key] = make(
-            Run(PUBLISHED, case.scenario, {"steps": case.steps, "store": store(key)}, label=key)
-        )
-    made |= {pair: make(run) for pair, run in plan_further().items() if pair[0] in (PUBLISHED, "eq8-weightless")}
+    planned = [each for each in plan_figures(cases) if each.name[0] == PUBLISHED]
+    planned += [each for half in HALVES for each in plan_published(half)]
+    runs = dict(map(made, planned))
+    runs |= {each.name: make(each.run) for each in plan_further() if each.name[0] in (PUBLISHED, "eq8-weightless")}
     tenth = paper_throw(0.1).with_slices(50)
-    made["free-flight", "filling 0.1"] = make(Run("free-flight", tenth, label="tenth"))
-    runs = ClaimRuns({"": made, **halves})
-    assert not [each.reason for of in runs.made.values() for each in of.values() if each.trajectory is None]
-    return runs
+    runs["free-flight", "filling 0.1", ""] = make(Run("free-flight", tenth, label="tenth"))
+    assert not [each.reason for each in runs.values() if each.trajectory is None]
+    return PaperRuns(made=runs)
 
 
 @pytest.fixture(scope="module")
@@ -674,17 +677,18 @@ def test_weight_is_what_slows_the_bottle_filled_to_a_tenth(runs):
     assert found["free-flight"].value == pytest.approx(0.88, abs=0.01)
     assert found["eq8-weightless"].value == pytest.approx(0.88, abs=0.01)
     assert found[PUBLISHED].value == pytest.approx(0.63, abs=0.005)
-    swapped = ClaimRuns({"": {("free-flight", "filling 0.1"): runs.made[""][PUBLISHED, "filling 0.1"]}})
+    program = runs.made[PUBLISHED, "filling 0.1", ""]
+    swapped = PaperRuns(made={("free-flight", "filling 0.1", ""): program})
     assert claim_weight_slows_the_tenth(swapped, "free-flight").failed
     assert claim_weight_slows_the_tenth(swapped, "eq8-weightless").verdict == "not evaluated"
 
 
 def test_free_flight_does_not_know_where_down_is():
     made = {
-        ("free-flight", case.key): make(Run("free-flight", case.scenario.with_slices(5), label=case.key))
+        ("free-flight", case.key, ""): make(Run("free-flight", case.scenario.with_slices(5), label=case.key))
         for case in family("angle")
     }
-    flights = ClaimRuns({"": made}).flights("free-flight")
+    flights = PaperRuns(made=made).flights("free-flight")
     angle, drop = judge(BY_ID["release-angle"], flights), judge(BY_ID["drop-later"], flights)
     assert (angle.verdict, drop.verdict) == ("holds", "fails")
     assert angle.value < 1e-9

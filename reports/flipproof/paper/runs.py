@@ -1,16 +1,17 @@
-"""The runs behind the paper's figures: planned without repeats, made in a pool, looked up by case."""
+"""The runs behind the paper's figures and statements: planned without repeats, made in a pool, looked up by name."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 
 from flipproof.frame.flights import Call, Flights
 from flipproof.frame.solvers import Made, Run, make
+from flipproof.paper import observe
 from flipproof.paper.cases import Case, all_cases, family
 from flipproof.paper.costs import Cost, measure_event_driven, measure_published
 from flipproof.paper.parameters import paper_steps, paper_throw
@@ -23,37 +24,70 @@ BANDS: Final[Mapping[str, float]] = MappingProxyType({"eq8": 1e-7, "free-flight"
 """How far omega / omega_0 may move when the rest speed is cut tenfold, or the release changed in the eleventh digit, by
 event-driven solver; with recoil the order of the impacts decides it."""
 
-GROUP: Final = 12
-"""Runs that a worker holds at a time: all of them would take it gigabytes."""
+Half = Literal["", "slices", "steps"]
+HALVES: Final[tuple[Half, ...]] = ("slices", "steps")
+"""What a run has half as many of as that of the figures: "" for nothing."""
 
-Pair = tuple[str, str]
-"""A solver and the key of a case."""
+Name = tuple[str, str, Half]
+"""A solver, the key of a case, and what is halved."""
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """A run, the name by which it is looked up, and what is kept of it: every how many points, and slices if whole.
+
+    One that is not ``grouped`` is made by itself and kept as it is.
+    """
+
+    name: Name
+    run: Run
+    thin: int = 1
+    whole: bool = True
+    grouped: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperRuns:
-    """Every run of the paper's figures.
+    """Every run of the paper's figures, and those that statements need beside them.
 
     Parameters
     ----------
-    made : mapping (solver, key of a case) -> Made
-        Without the pairs that are not planned.
+    made : mapping name -> Made
+        Without the runs that are not planned.
     costs : tuple of Cost
         Of every solver over numbers of slices and steps; empty if they were not asked for.
     """
 
-    made: Mapping[Pair, Made]
+    made: Mapping[Name, Made]
     costs: tuple[Cost, ...] = ()
 
     @classmethod
-    def of(cls, flights: Flights, figures: Iterable[Call], costs: Iterable[Call] = ()) -> PaperRuns:
-        """Return what became of ``figure_calls`` and ``cost_calls``."""
-        made = {pair: made for call in figures for pair, made in flights.answer(call).items()}
-        return cls(made=made, costs=tuple(cost for call in costs for cost in flights.answer(call)))
+    def of(
+        cls, answers: Flights, calls: Iterable[Call], planned: Iterable[Planned] = (), costs: Iterable[Call] = ()
+    ) -> PaperRuns:
+        """Return what became of ``group_calls``, of runs that are not grouped, and of ``cost_calls``."""
+        made = {each.name: answers[each.run] for each in planned if not each.grouped}
+        made |= {name: made for call in calls for name, made in answers.answer(call).items()}
+        return cls(made=made, costs=tuple(cost for call in costs for cost in answers.answer(call)))
+
+    def flights(self, solver: str) -> observe.Flights:
+        """Return the flights of one equation, with those at half the slices and half the steps where there are any."""
+
+        def of(wanted: Half) -> dict[str, Made]:
+            return {key: each for (by, key, half), each in self.made.items() if by == solver and half == wanted}
+
+        def flights(made: Mapping[str, Made]) -> observe.Flights:
+            runs = {key: each.trajectory for key, each in made.items() if each.trajectory is not None}
+            reasons = {key: each.reason for key, each in made.items() if each.trajectory is None}
+            return observe.Flights(solver=solver, runs=runs, reasons=reasons)
+
+        usual = of("")
+        halved, half_steps = (flights(usual | own) if (own := of(half)) else None for half in HALVES)
+        return replace(flights(usual), halved=halved, half_steps=half_steps)
 
     def trajectory(self, solver: str, key: str) -> Trajectory | None:
         """Return the trajectory of a case, or None if it was not planned or failed."""
-        made = self.made.get((solver, key))
+        made = self.made.get((solver, key, ""))
         return None if made is None else made.trajectory
 
     def members(self, solver: str, name: str) -> list[tuple[Case, Trajectory]]:
@@ -64,18 +98,8 @@ class PaperRuns:
     def failures(self) -> list[str]:
         """Return solver, case and reason of every run that gave no trajectory."""
         return [
-            f"{solver}, {key}: {made.reason}" for (solver, key), made in self.made.items() if made.trajectory is None
+            f"{solver}, {key}: {made.reason}" for (solver, key, _), made in self.made.items() if made.trajectory is None
         ]
-
-
-@dataclass(frozen=True, slots=True)
-class Planned:
-    """A run, the pair by which it is looked up, and what is kept of it: every how many points, and slices if whole."""
-
-    pair: Pair
-    run: Run
-    thin: int = 1
-    whole: bool = True
 
 
 def scenario_of(solver: str, case: Case) -> Scenario | None:
@@ -96,7 +120,7 @@ def plan_figures(keys: Iterable[str] | None = None) -> list[Planned]:
             if scenario is not None:
                 run = Run(solver, scenario, _settings(solver, case), label=f"paper, {solver}, {key}")
                 thin = case.thin if solver == PUBLISHED else 1
-                planned.append(Planned((solver, key), run, thin, case.whole))
+                planned.append(Planned((solver, key, ""), run, thin, case.whole))
     return planned
 
 
@@ -107,15 +131,12 @@ def _settings(solver: str, case: Case) -> dict[str, Any]:
     return {} if points == paper_steps() else {"times": np.linspace(0.0, case.scenario.duration, points)}
 
 
-def group_calls(planned: list[Planned], words: str) -> list[Call]:
-    """Return the calls that make these runs, each a group of which a worker makes one at a time."""
-    groups = (planned[k : k + GROUP] for k in range(0, len(planned), GROUP))
-    return [Call(make_group, (group,), f"{words}, {group[-1].pair[1]}") for group in groups]
-
-
-def figure_calls(keys: Iterable[str] | None = None) -> list[Call]:
-    """Return the calls that make the runs of the figures; of the cases with these keys only, if any are given."""
-    return group_calls(plan_figures(keys), "the paper's figures")
+def group_calls(planned: Iterable[Planned], words: str) -> list[Call]:
+    """Return the calls that make the runs that are grouped, of each group a worker one at a time."""
+    grouped = [each for each in planned if each.grouped]
+    # All at once would take a worker gigabytes.
+    groups = (grouped[k : k + 12] for k in range(0, len(grouped), 12))
+    return [Call(make_group, (group,), f"{words}, {group[-1].name[1]}") for group in groups]
 
 
 def cost_calls() -> list[Call]:
@@ -125,9 +146,9 @@ def cost_calls() -> list[Call]:
     return [published, *(Call(measure_event_driven, (name,), f"the cost of {name}", timed=True) for name in others)]
 
 
-def make_group(group: Iterable[Planned]) -> dict[Pair, Made]:
+def make_group(group: Iterable[Planned]) -> dict[Name, Made]:
     """Make runs one after the other and keep of each what is looked at."""
-    return {each.pair: _kept(make(each.run), each) for each in group}
+    return {each.name: _kept(make(each.run), each) for each in group}
 
 
 def _kept(made: Made, planned: Planned) -> Made:

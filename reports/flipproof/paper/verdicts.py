@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Final
 
 from flipproof.frame.findings import Finding
 from flipproof.paper.claim import judge
-from flipproof.paper.claim_runs import STEADY_FILLING, WEIGHTLESS, WEIGHTLESS_KEY, ClaimRuns
+from flipproof.paper.claim_runs import STEADY_FILLING, WEIGHTLESS, WEIGHTLESS_KEY
 from flipproof.paper.claims_cost import OF_COST
 from flipproof.paper.claims_drag import OF_DRAG
 from flipproof.paper.claims_filling import OF_FILLINGS
@@ -19,7 +19,7 @@ from flipproof.paper.claims_slices import OF_SLICES
 from flipproof.paper.claims_throw import OF_RELEASE, OF_THROWS
 from flipproof.paper.experiment import CAVEAT, Observation, closest_overall, compare_all, standing
 from flipproof.paper.observe import Flights, steady_level
-from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS
+from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS, PaperRuns
 from flipproof.paper.statements import OMEGA, Judgement, Statement
 
 NAMES: Final[Mapping[str, str]] = MappingProxyType(
@@ -105,7 +105,7 @@ class PaperVerdicts:
         }
 
 
-def judge_paper(runs: ClaimRuns) -> PaperVerdicts:
+def judge_paper(runs: PaperRuns) -> PaperVerdicts:
     """Return what becomes of the paper's statements by the runs that were made for them."""
     flights = [runs.flights(solver) for solver in SOLVERS]
     return PaperVerdicts(
@@ -124,7 +124,7 @@ def judge_all(flights: list[Flights]) -> tuple[Statement, ...]:
     )
 
 
-def claim_weight_slows_the_tenth(runs: ClaimRuns, solver: str) -> Finding:
+def claim_weight_slows_the_tenth(runs: PaperRuns, solver: str) -> Finding:
     """At a filling of 0.1 the bottle keeps 0.88 of its spin where no weight acts on its water, 0.63 in the program."""
     run = runs.trajectory(solver, WEIGHTLESS_KEY)
     low, high = STEADY[solver]

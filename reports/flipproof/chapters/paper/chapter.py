@@ -10,7 +10,7 @@ from typing import Final
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Study
 from flipproof.paper.claim_runs import plan_claims
 from flipproof.paper.figures import exhibits_paper
-from flipproof.paper.runs import PaperRuns, figure_calls
+from flipproof.paper.runs import PaperRuns, group_calls, plan_figures
 from flipproof.paper.verdicts import PaperVerdicts, judge_paper
 
 
@@ -25,10 +25,11 @@ class Paper:
 def study(ask: Ask) -> Study[Paper]:
     """Make the throws of the figures, and those that statements need beside them; then judge."""
     del ask
-    figures, plan = figure_calls(), plan_claims()
-    flights = yield [*figures, *plan.requests]
-    runs = PaperRuns.of(flights, figures)
-    return Paper(runs, judge_paper(plan.made(flights, runs.made)))
+    plan = plan_claims()
+    calls = [*group_calls(plan_figures(), "the paper's figures"), *group_calls(plan, "the paper's statements")]
+    flights = yield [*calls, *(each.run for each in plan if not each.grouped)]
+    runs = PaperRuns.of(flights, calls, plan)
+    return Paper(runs, judge_paper(runs))
 
 
 def claims(found: Paper) -> Claims:
