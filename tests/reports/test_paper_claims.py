@@ -11,7 +11,7 @@ from made_up import trajectory_of
 from flipproof.chapters.paper.chapter import CHAPTER
 from flipproof.frame.flights import Flights as Answers
 from flipproof.frame.flights import Outcome
-from flipproof.frame.solvers import Run, make
+from flipproof.frame.solvers import Missing, Run, make
 from flipproof.page.templating import environment
 from flipproof.paper import claims_filling, claims_landing, observe
 from flipproof.paper.cases import FAMILIES, all_cases, family
@@ -19,7 +19,7 @@ from flipproof.paper.claim import judge
 from flipproof.paper.claim_runs import plan_further, plan_halved, plan_published
 from flipproof.paper.claims_cost import many_steps_key, same_steps_key
 from flipproof.paper.claims_slices import finest_key
-from flipproof.paper.observe import Flights, MissingFlightError
+from flipproof.paper.observe import Flights
 from flipproof.paper.parameters import numbers, paper_throw
 from flipproof.paper.runs import (
     BANDS,
@@ -493,9 +493,9 @@ def test_a_missing_or_broken_flight_leaves_a_claim_undecided_and_says_why():
     assert not judgement.marginal
     run = flight(THROW, FLAT)
     stopped = replace(run, status="overflow", message="at t = 0.2 s")
-    with pytest.raises(MissingFlightError, match=r"'filling 0.1' by eq8: overflow, at t = 0.2 s"):
+    with pytest.raises(Missing, match=r"'filling 0.1' by eq8: overflow, at t = 0.2 s"):
         Flights(solver="eq8", runs={"filling 0.1": stopped}).run("filling 0.1")
-    with pytest.raises(MissingFlightError, match=r"no case at 0\.37"):
+    with pytest.raises(Missing, match=r"no case at 0\.37"):
         Flights(solver="eq8", runs={}).at("filling", 0.37)
 
 

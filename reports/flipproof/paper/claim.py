@@ -12,7 +12,8 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any, Final
 
-from flipproof.paper.observe import Flights, MissingFlightError
+from flipproof.frame.solvers import Missing
+from flipproof.paper.observe import Flights
 from flipproof.paper.runs import BANDS
 from flipproof.paper.statements import OMEGA, Judgement, Read, Reading, Statement
 
@@ -57,7 +58,7 @@ def _judge(read: Read, flights: Flights) -> Judgement:
     flights = replace(flights, seen={})
     try:
         return Judgement(solver=flights.solver, readings=banded(read, flights), flown=flights.flown)
-    except MissingFlightError as reason:
+    except Missing as reason:
         return Judgement(solver=flights.solver, aside=str(reason))
 
 
@@ -66,7 +67,7 @@ def banded(read: Read, flights: Flights) -> tuple[Reading, ...]:
 
     Raises
     ------
-    MissingFlightError
+    Missing
         If a flight is not there.
     """
     readings = tuple(read(flights))

@@ -19,16 +19,15 @@ from flipproof.paper.statements import OMEGA, Reading, at_least, at_most
 STRONG_DRAGS: Final = [drag for drag in numbers("figure-6-drag") if drag >= 0.0125]
 """The drags of Fig. 6 that count as strong [kg/s]."""
 
-HALF_DRAG: Final = "half full, β = −0.5, α as named (Fig. 6)"
+_of_drag: Final = partial(states, throw="half full, β = −0.5, α as named (Fig. 6)")
 
 
-@states(
+@_of_drag(
     "alpha-sensitive",
     place="section 5, Fig. 6",
     says="The outcome is highly sensitive to α.",
     means="The curves for α = 0.0075 and for 0.0125, a quarter less and more than the settled 0.01, are both "
     "farther than 0.05 ω₀ (root mean square) from it.",
-    throw=HALF_DRAG,
     why=SUPERIMPOSED_WHY,
 )
 def _sensitive_to_drag(flights: Flights) -> Iterator[Reading]:
@@ -39,12 +38,11 @@ def _sensitive_to_drag(flights: Flights) -> Iterator[Reading]:
     yield Reading(name, min(off.values()), OMEGA, at_least(SUPERIMPOSED), note=note)
 
 
-@states(
+@_of_drag(
     "strong-drag-impedes",
     place="section 5, Fig. 6a",
     says="For α ≥ 0.0125 drag keeps water from spreading over the whole bottle.",
     means="At most half as much water as for α = 0 is ever in the cap's half of the bottle at once.",
-    throw=HALF_DRAG,
     why="Half is a choice of ours for “impeded”.",
 )
 def _strong_drag_impedes(flights: Flights) -> Iterator[Reading]:
@@ -76,22 +74,20 @@ def _strong_drag_oscillates(flights: Flights) -> Iterator[Reading]:
         yield Reading(name, observe.climb(flights.at("drag", drag)), OMEGA, at_least(FLAT))
 
 
-_oscillates: Final = states(
+_oscillates: Final = _of_drag(
     "strong-drag-oscillates",
     place="section 5, Fig. 6c",
     says="For α ≥ 0.0125 ω oscillates.",
     means="ω climbs by 0.1 ω₀ or more over its lowest value until then.",
-    throw=HALF_DRAG,
     why=FLAT_WHY,
 )(_strong_drag_oscillates)
 
-_turns_back: Final = states(
+_turns_back: Final = _of_drag(
     "strong-drag-turns-back",
     place="section 5, Fig. 6b",
     says="For α ≥ 0.0125 θ varies non-monotonically.",
     means="The slope of θ(t), which is ω, falls and rises again by 0.1 ω₀ or more. θ itself cannot turn back: by "
     "Eq. 12 ω keeps its sign. This sense rests on the number of the next statement.",
-    throw=HALF_DRAG,
     why=FLAT_WHY,
     otherwise={
         "as θ(T) over α, which falls up to 0.01 and grows from 0.0125 on": _angle_grows_again_with_drag,
@@ -100,12 +96,11 @@ _turns_back: Final = states(
 )(_strong_drag_oscillates)
 
 
-@states(
+@_of_drag(
     "no-drag-rises",
     place="section 5, Fig. 6",
     says="For α = 0 ω increases late.",
     means="ω over the last tenth of the flight lies at least 0.1 ω₀ over the plateau.",
-    throw=HALF_DRAG,
     why=FLAT_WHY,
 )
 def _no_drag_rises_late(flights: Flights) -> Iterator[Reading]:
@@ -120,13 +115,12 @@ def _moderate_drag_is_flat(flights: Flights, drag: float) -> Iterator[Reading]:
 
 
 MODERATE: Final = tuple(
-    states(
+    _of_drag(
         f"moderate-drag-flat-{drag:g}",
         place="section 5, Fig. 6c",
         says=f"For α from 0.0075 to 0.01 ω drops suddenly to a flat plateau: at α = {drag:g}.",
         means="Half the drop is done by T/4, the last tenth of the flight lies at most 0.1 ω₀ over the plateau, "
         "and ω never climbs by more than 0.1 ω₀ over its lowest value until then.",
-        throw=HALF_DRAG,
         why=f"A quarter of the flight is a choice of ours for “sudden”. {FLAT_WHY}",
     )(partial(_moderate_drag_is_flat, drag=drag))
     for drag in (0.0075, 0.01)

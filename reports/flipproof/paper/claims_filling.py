@@ -22,16 +22,15 @@ INTERMEDIATE: Final = (0.2, 0.75)
 CLEAR: Final = 0.8
 """omega / omega_0 below which a bottle is clearly slower."""
 
-FILLINGS: Final = "α = 0.01 kg/s, β = −0.5, m = 1 g, T = 0.5 s, M̃ as named (Fig. 7)"
+_of_filling: Final = partial(states, throw="α = 0.01 kg/s, β = −0.5, m = 1 g, T = 0.5 s, M̃ as named (Fig. 7)")
 SLOW_WHY: Final = "“Slower” is a word of ours for ω below 0.8 ω₀, “not slower” for above 0.9 ω₀."
 
 
-@states(
+@_of_filling(
     "plateau-range",
     place="section 5, Fig. 7b",
     says="In most cases ω_f/ω₀ is 0.2 to 0.5 at intermediate fillings.",
     means="So at more than half of the fillings from 0.2 to 0.75; ω_f is the lowest mean over T/50.",
-    throw=FILLINGS,
     why="“Most” is more than half; the range is the paper's, the choice of fillings ours.",
 )
 def _plateau_range(flights: Flights) -> Iterator[Reading]:
@@ -69,7 +68,7 @@ _slows_at: Final = partial(_plateau_at, admissible=at_most(CLEAR))
 def _about_slowing(id_: str, says: str, place: str = "section 5, Fig. 7a") -> Callable[[Read], Statement]:
     """Return a decorator for a bottle that slows down in the model, a limit that the paper admits."""
     means = "ω_f is at most 0.8 ω₀."
-    return states(id_, place=place, says=says, means=means, throw=FILLINGS, why=SLOW_WHY, kind="admitted limit")
+    return _of_filling(id_, place=place, says=says, means=means, why=SLOW_WHY, kind="admitted limit")
 
 
 _slow_down_when_full: Final = _about_slowing(
@@ -82,12 +81,11 @@ _slow_down_at_a_tenth: Final = _about_slowing(
     "tenth-slows", "At M̃ = 0.1 the model clearly slows down, unlike the bottle that was thrown."
 )(partial(_slows_at, filling=0.1))
 
-_no_slow_down_when_nearly_empty: Final = states(
+_no_slow_down_when_nearly_empty: Final = _of_filling(
     "empty-keeps-spin",
     place="section 5, Fig. 7a",
     says="At M̃ = 0.05 the bottle does not slow down.",
     means="ω_f is at least 0.9 ω₀.",
-    throw=FILLINGS,
     why=SLOW_WHY,
 )(partial(_keeps_spin_at, filling=0.05))
 
@@ -101,14 +99,13 @@ def filling_of_slow_down(flights: Flights) -> float:
     return math.nan
 
 
-@states(
+@_of_filling(
     "low-filling-change",
     place="section 5, Fig. 7a",
     says="The model begins to slow down between M̃ = 0.05 and 0.1, the experiment between 0.1 and 0.2; the paper "
     "calls that not critical.",
     means="ω_f falls to 0.8 ω₀ at a filling from 0.05 to 0.1. Where weight plays no part the change comes at about "
     "h/L = ε/(1 + ε), M̃ = 0.1417: up to there resting water lies below the centre of mass.",
-    throw=FILLINGS,
     why=f"The interval is the paper's. {SLOW_WHY}",
     kind="admitted limit",
 )
@@ -120,13 +117,12 @@ def _change_at_low_filling(flights: Flights) -> Iterator[Reading]:
     yield Reading("filling at which ω_f falls to 0.8 ω₀", filling_of_slow_down(flights), "", (0.05, 0.1), note=note)
 
 
-@states(
+@_of_filling(
     "agreement-excellent",
     place="section 5, Fig. 4d and 7b",
     says="The agreement of measured and computed plateaus is excellent.",
     means="ω_f/ω₀ is in 0.2 to 0.5, widened by 0.05, at M̃ = 0.25, 0.33 and 0.5, and at most 0.8 at 0.75. That is "
     "all the data the text gives there: a range, and “significant reduction”; no measured number is printed.",
-    throw=FILLINGS,
     why=f"{SUPERIMPOSED_WHY} Low and high fillings are left out: there the same paragraph itself reports "
     "significant differences.",
     otherwise={
@@ -140,12 +136,11 @@ def _agreement_is_excellent(flights: Flights) -> Iterator[Reading]:
     yield from _slows_at(flights, 0.75)
 
 
-@states(
+@_of_filling(
     "best-filling",
     place="section 5, Fig. 7b",
     says="Fillings from 0.2 to 0.5 make the rotation slowest.",
     means="The lowest ω_f is at one of them.",
-    throw=FILLINGS,
     why="The sentence is a comparison: its threshold is zero.",
 )
 def _best_filling(flights: Flights) -> Iterator[Reading]:

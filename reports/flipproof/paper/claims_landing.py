@@ -10,8 +10,9 @@ from operator import itemgetter
 from typing import Final
 
 from flipproof.frame.findings import Finding
+from flipproof.frame.solvers import Missing
 from flipproof.paper.claim import states
-from flipproof.paper.observe import Flights, MissingFlightError
+from flipproof.paper.observe import Flights
 from flipproof.paper.parameters import paper_throw
 from flipproof.paper.statements import Reading, at_least, at_most
 from slicemodel import Bottle, Trajectory
@@ -29,13 +30,13 @@ def upright(run: Trajectory) -> Moment:
 
     Raises
     ------
-    MissingFlightError
+    Missing
         If it does not turn that far.
     """
     moment = next_upright(run)
     if moment is None:
         filling, duration = run.scenario.fill_fraction, run.scenario.duration
-        raise MissingFlightError(f"M̃ = {filling:g} does not reach θ = 2π in {duration:g} s")
+        raise Missing(f"M̃ = {filling:g} does not reach θ = 2π in {duration:g} s")
     return moment
 
 

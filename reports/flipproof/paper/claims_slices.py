@@ -9,9 +9,10 @@ from typing import Final
 
 import numpy as np
 
+from flipproof.frame.solvers import Missing
 from flipproof.paper import observe
 from flipproof.paper.claim import FLAT_WHY, states
-from flipproof.paper.observe import FLAT, SUPERIMPOSED, Flights, MissingFlightError
+from flipproof.paper.observe import FLAT, SUPERIMPOSED, Flights
 from flipproof.paper.parameters import numbers
 from flipproof.paper.runs import PUBLISHED
 from flipproof.paper.statements import OMEGA, Read, Reading, Statement, at_least, at_most
@@ -165,7 +166,7 @@ def _minimum_shifts(flights: Flights, damping: str = "") -> Iterator[Reading]:
         "slices" + damping, lambda run: abs(float(observe.normalised(run).min()) - finest), 10.0, MANY_SLICES
     )
     if MANY_SLICES not in shift:
-        raise MissingFlightError(f"{flights.solver} has not flown {MANY_SLICES:g} slices")
+        raise Missing(f"{flights.solver} has not flown {MANY_SLICES:g} slices")
     last = shift.pop(MANY_SLICES)
     count, most = max(shift.items(), key=itemgetter(1))
     # What the finest cut is still off by is at most what the one before it is off from it.

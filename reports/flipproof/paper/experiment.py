@@ -13,10 +13,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from flipproof.frame.solvers import Missing
 from flipproof.paper.cases import ICE
 from flipproof.paper.claim import banded
 from flipproof.paper.claims_filling import CLEAR, filling_of_slow_down
-from flipproof.paper.observe import FLAT, Flights, MissingFlightError, climb, normalised, steady_level
+from flipproof.paper.observe import FLAT, Flights, climb, normalised, steady_level
 from flipproof.paper.parameters import paper_throw
 from flipproof.paper.runs import SOLVERS
 from flipproof.paper.statements import OMEGA, Reading
@@ -237,7 +238,7 @@ def compare(observation: Observation, flights: Flights) -> Reading:
     flights = replace(flights, seen={})
     try:
         (reading,) = banded(read, flights)
-    except MissingFlightError as reason:
+    except Missing as reason:
         return Reading(observation.means, math.nan, observation.unit, bounds, note=str(reason))
     return replace(reading, note="; ".join(filter(None, (observation.numbers(flights), flights.flown))))
 

@@ -11,20 +11,9 @@ from typing import Final
 import numpy as np
 
 from flipproof.frame.exhibit import Exhibit
+from flipproof.paper import figures_panels as panels
 from flipproof.paper.cases import Case, family
-from flipproof.paper.figures_panels import (
-    Axis,
-    Grid,
-    Line,
-    Recipe,
-    dots,
-    every_third,
-    exhibit_grid,
-    listed,
-    ramp,
-    ranked,
-    row_of,
-)
+from flipproof.paper.figures_panels import Axis, Grid, Line
 from flipproof.paper.observe import normalised, steady_level
 from flipproof.paper.parameters import number, numbers
 from flipproof.paper.runs import PUBLISHED, PaperRuns
@@ -84,37 +73,37 @@ RELATIVE: Final = Quantity(
 )
 
 
+def _of(symbol: str, unit: str = "", shown: Callable[[float], float] = float) -> Callable[[Case], str]:
+    return lambda case: f"{symbol} = {shown(case.value):g}{unit}".replace("-", "−")
+
+
+VARIED: Final = {
+    "beta": (_of("β"), "α = 1 (caption), α/2m = 10 /s", "with alpha 1"),
+    "beta at 5 /s": (_of("β"), "α = 0.5, α/2m = 5 /s", "with alpha 0.5"),
+    "slices": (_of("N"), "α/2m = 10 /s kept", "at 10 per second"),
+    "slices at 5 /s": (_of("N"), "α/2m = 5 /s kept", "at 5 per second"),
+    "slices at alpha 1": (_of("N"), "α = 1 kept", "with alpha 1"),
+    "drag": (_of("α", " kg/s"), "", ""),
+    "filling": (_of("M̃"), "", ""),
+    "spin": (_of("ω₀", " rad/s"), "", ""),
+    "angle": (_of("θ₀", "°", math.degrees), "", ""),
+    "aspect": (_of("L / 2R"), "", ""),
+}
+"""Family -> label of a curve, heading of its row, and words that tell its numbers from those of other rows."""
+
+
 @dataclass(frozen=True, slots=True)
 class Curves:
-    """A figure of one quantity over time.
-
-    Parameters
-    ----------
-    quantity : Quantity
-    label : case -> what varies, with its value
-    rows : (family, heading, words that tell its numbers from those of other rows)
-    title, caption : str
-    height : float - of a row [inches]
-    legend_columns : int
-    """
+    """A figure of one quantity over time: a row for each family, ``height`` inches high."""
 
     quantity: Quantity
-    label: Callable[[Case], str]
-    rows: tuple[tuple[str, str, str], ...]
+    families: tuple[str, ...]
     title: str
     caption: str
     height: float = 3.0
     legend_columns: int = 6
 
 
-def _of(symbol: str, unit: str = "", shown: Callable[[float], float] = float) -> Callable[[Case], str]:
-    return lambda case: f"{symbol} = {shown(case.value):g}{unit}".replace("-", "−")
-
-
-BETA: Final = (
-    ("beta", "α = 1 (caption), α/2m = 10 /s", "with alpha 1"),
-    ("beta at 5 /s", "α = 0.5, α/2m = 5 /s", "with alpha 0.5"),
-)
 TWO_READINGS: Final = (
     "The caption's α = 1 and the damping rate of all later figures do not agree for ten slices; the upper row takes "
     "the first, the lower row the second. "
@@ -123,16 +112,14 @@ TWO_READINGS: Final = (
 CURVES: Final = {
     "5b": Curves(
         THETA,
-        _of("β"),
-        BETA,
+        ("beta", "beta at 5 /s"),
         "what the rebound β does to the angle θ(t)",
         f"{TWO_READINGS}Look at the end of the flight: does the elastic bottle (β = −1) turn ahead of the others?",
         height=2.5,
     ),
     "5c": Curves(
         OMEGA,
-        _of("β"),
-        BETA,
+        ("beta", "beta at 5 /s"),
         "what the rebound β does to the angular velocity ω(t)",
         f"{TWO_READINGS}The paper has ω low and flat for β = −0.5 only, and bumpy for β = −1. In free flight no bottle "
         "speeds up late, whatever its β.",
@@ -140,12 +127,7 @@ CURVES: Final = {
     ),
     "5d": Curves(
         OMEGA,
-        _of("N"),
-        (
-            ("slices", "α/2m = 10 /s kept", "at 10 per second"),
-            ("slices at 5 /s", "α/2m = 5 /s kept", "at 5 per second"),
-            ("slices at alpha 1", "α = 1 kept", "with alpha 1"),
-        ),
+        ("slices", "slices at 5 /s", "slices at alpha 1"),
         "what the number of slices N does to ω(t)",
         "In the upper rows the damping rate α/2m is kept and the curves close up with N. With α itself kept (bottom "
         "row, another scale) the published program stands still at N = 20, where α/2m equals ω₀, and spins up beyond "
@@ -155,15 +137,13 @@ CURVES: Final = {
     ),
     "6b": Curves(
         THETA,
-        _of("α", " kg/s"),
-        (("drag", "", ""),),
+        ("drag",),
         "what the drag α does to the angle θ(t)",
         "The less a bottle has turned at the end, the longer its ω stayed low.",
     ),
     "6c": Curves(
         OMEGA,
-        _of("α", " kg/s"),
-        (("drag", "", ""),),
+        ("drag",),
         "what the drag α does to the angular velocity ω(t)",
         "Is there one α whose curve drops and then stays flat? In the published program there is, near the paper's "
         "choice of 0.01, because its α weakens the centrifugal force instead of damping; in free flight every curve "
@@ -171,8 +151,7 @@ CURVES: Final = {
     ),
     "7a": Curves(
         RELATIVE,
-        _of("M̃"),
-        (("filling", "", ""),),
+        ("filling",),
         "what the filling M̃ does to ω(t)",
         "Look at M̃ = 0.1, which the experiment leaves at ω₀: the published program and Eq. 8 slow it down, free flight "
         "hardly does. And at M̃ = 1, which no solver keeps, because slices may overlap.",
@@ -180,8 +159,7 @@ CURVES: Final = {
     ),
     "8a": Curves(
         RELATIVE,
-        _of("ω₀", " rad/s"),
-        (("spin", "", ""),),
+        ("spin",),
         "what the spin at release ω₀ does",
         "Without the gravity that Eq. 8 keeps, the spin only sets the pace: in free flight the curves fall one after "
         "the other, and none rises again. At 5 rad/s the published program's water does not move at all: its α takes "
@@ -189,16 +167,14 @@ CURVES: Final = {
     ),
     "8b": Curves(
         RELATIVE,
-        _of("θ₀", "°", math.degrees),
-        (("angle", "", ""),),
+        ("angle",),
         "what the angle at release θ₀ does",
         "In free flight the angle does nothing at all: a falling bottle cannot know where down is. What is seen in the "
         "other two is the gravity that Eq. 8 keeps.",
     ),
     "8c": Curves(
         RELATIVE,
-        _of("L / 2R"),
-        (("aspect", "", ""),),
+        ("aspect",),
         "what the aspect ratio does at equal volume",
         "The paper's curves nearly coincide. The ratio is L / 2R, 3.5 for the paper's bottle, with volume, mass and "
         "water kept.",
@@ -210,36 +186,35 @@ CURVES: Final = {
 def exhibits_curves(name: str, runs: PaperRuns) -> Iterator[Exhibit]:
     """Yield one figure of ``CURVES``."""
     shown = CURVES[name]
-    quantity, label = shown.quantity, shown.label
-
-    def lines(solver: str, of: str) -> Iterator[Line]:
-        # Ranks come from the values, so that a throw that one solver does not fly leaves the others their colours.
-        values = sorted(case.value for case in family(of))
-        for case, run in runs.members(solver, of):
-            x, y = map(every_third, quantity.curve(run))
-            yield Line(label(case), x, y, ranked(values.index(case.value), len(values)))
-
-    def words(of: str) -> str:
-        return listed(
-            lambda solver: {label(case): quantity.number(run) for case, run in runs.members(solver, of)},
-            quantity.digits,
-        )
-
-    rows = tuple(row_of(quantity.y, partial(lines, of=of), heading) for of, heading, _ in shown.rows)
-    count = {1: "", 2: ", two rows", 3: ", three rows"}[len(rows)]
-    told = ". ".join(
-        f"{f'{quantity.said} {which}'.rstrip() if k == 0 else which.capitalize()}: {words(of)}"
-        for k, (of, _, which) in enumerate(shown.rows)
-    )
-    alt = f"Line plots of {quantity.plotted}{count} by three solvers. {told}."
+    quantity = shown.quantity
+    rows = tuple(panels.row_of(quantity.y, partial(_lines, runs, quantity, of), VARIED[of][1]) for of in shown.families)
+    count = ("", ", two rows", ", three rows")[len(rows) - 1]
+    told: list[str] = []
+    for of in shown.families:
+        words = VARIED[of][2]
+        words = words.capitalize() if told else f"{quantity.said} {words}".rstrip()
+        told.append(f"{words}: {panels.listed(partial(_numbers, runs, quantity, of), quantity.digits)}.")
+    alt = f"Line plots of {quantity.plotted}{count} by three solvers. {' '.join(told)}"
     grid = Grid(quantity.x, rows, shown.height, legend_columns=shown.legend_columns)
-    yield exhibit_grid(name, shown.title, shown.caption, alt, grid)
+    yield panels.exhibit_grid(name, shown.title, shown.caption, alt, grid)
+
+
+def _lines(runs: PaperRuns, quantity: Quantity, of: str, solver: str) -> Iterator[Line]:
+    # Ranks come from the values, so that a throw that one solver does not fly leaves the others their colours.
+    values = sorted(case.value for case in family(of))
+    for case, run in runs.members(solver, of):
+        x, y = map(panels.every_third, quantity.curve(run))
+        yield Line(VARIED[of][0](case), x, y, panels.ranked(values.index(case.value), len(values)))
+
+
+def _numbers(runs: PaperRuns, quantity: Quantity, of: str, solver: str) -> dict[str, float]:
+    return {VARIED[of][0](case): quantity.number(run) for case, run in runs.members(solver, of)}
 
 
 def exhibits_s1a(runs: PaperRuns) -> Iterator[Exhibit]:
     """Yield the angular velocity for several numbers of time steps."""
-    row = row_of(RELATIVE.y, partial(_steps, runs))
-    yield exhibit_grid(
+    row = panels.row_of(RELATIVE.y, partial(_steps, runs))
+    yield panels.exhibit_grid(
         "S1a", "what the number of time steps P does",
         "How far does a curve of fewer steps lie from that of 1000? Eq. 8 and free flight choose their own steps; for "
         "them P is only the number of points given out, drawn as points on the same curve for the half-full bottle: 10 "
@@ -255,11 +230,11 @@ def _steps(runs: PaperRuns, solver: str) -> Iterator[Line]:
     for rank, filling in enumerate(fillings):
         for case, run in runs.members(solver, f"steps {filling:g}"):
             if solver == PUBLISHED or case.value == every[0]:
-                look = ranked(rank, len(fillings), every.index(case.value))
+                look = panels.ranked(rank, len(fillings), every.index(case.value))
             else:
                 fewest = case.value == every[-1]
-                look = dots(ramp(rank, len(fillings)), filled=not fewest, size=6.0 if fewest else 2.5)
-            x, y = map(every_third, RELATIVE.curve(run))
+                look = panels.dots(panels.ramp(rank, len(fillings)), filled=not fewest, size=6.0 if fewest else 2.5)
+            x, y = map(panels.every_third, RELATIVE.curve(run))
             yield Line(f"M̃ = {filling:g}, P = {case.value:g}", x, y, look)
 
 
@@ -274,7 +249,7 @@ def _step_words(runs: PaperRuns) -> Iterator[str]:
             yield f"filling {filling:g} with {steps:g} steps {far:.2g}"
 
 
-RECIPES: Final[dict[str, Recipe]] = {
-    name: (tuple(of for of, _, _ in shown.rows), partial(exhibits_curves, name)) for name, shown in CURVES.items()
+RECIPES: Final[dict[str, panels.Recipe]] = {
+    name: (shown.families, partial(exhibits_curves, name)) for name, shown in CURVES.items()
 } | {"S1a": (tuple(f"steps {filling:g}" for filling in numbers("figure-S1-filling")), exhibits_s1a)}
 """Figure -> the families it needs, and how it is made."""

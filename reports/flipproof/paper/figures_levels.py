@@ -12,20 +12,9 @@ import numpy as np
 
 from flipproof.figures.style import solver_style
 from flipproof.frame.exhibit import Exhibit
+from flipproof.paper import figures_panels as panels
 from flipproof.paper.costs import Cost
-from flipproof.paper.figures_panels import (
-    Axis,
-    Band,
-    Grid,
-    Line,
-    Recipe,
-    Row,
-    dots,
-    exhibit_grid,
-    listed,
-    ranked,
-    row_of,
-)
+from flipproof.paper.figures_panels import Axis, Grid, Line
 from flipproof.paper.observe import level_by_points, steady_level
 from flipproof.paper.parameters import paper_throw
 from flipproof.paper.runs import PUBLISHED, SOLVERS, PaperRuns
@@ -47,12 +36,12 @@ class Points:
     def line(self, solver: str) -> Line:
         """Return the points of one solver."""
         found = self.values[solver]
-        look = dots(solver_style(solver)["color"], filled=self.filled, joined=self.filled)
+        look = panels.dots(solver_style(solver)["color"], filled=self.filled, joined=self.filled)
         return Line(self.label, np.array(list(found)), np.array(list(found.values())), look)
 
     def words(self, digits: int) -> str:
         """Return the numbers as words."""
-        return listed(lambda solver: {f"{fill:g}": value for fill, value in self.values[solver].items()}, digits)
+        return panels.listed(lambda solver: {f"{fill:g}": value for fill, value in self.values[solver].items()}, digits)
 
 
 def _points(
@@ -69,8 +58,8 @@ def _points(
     )
 
 
-def _row(y: Axis, points: Sequence[Points], *extra: Line) -> Row:
-    return row_of(y, lambda solver: (*extra, *(each.line(solver) for each in points)))
+def _row(y: Axis, points: Sequence[Points], *extra: Line) -> panels.Row:
+    return panels.row_of(y, lambda solver: (*extra, *(each.line(solver) for each in points)))
 
 
 def exhibits_7b(runs: PaperRuns) -> Iterator[Exhibit]:
@@ -78,8 +67,8 @@ def exhibits_7b(runs: PaperRuns) -> Iterator[Exhibit]:
     lowest = _points(runs, "around the minimum, as the paper has it", "filling", level_by_points, filled=True)
     second = _points(runs, "mean of the second half", "filling", steady_level, filled=False)
     row = _row(Axis("ω_f / ω₀ [1]", "omega_f/omega_0 [1]", 0.0, 1.05), (lowest, second))
-    best = Band("x", 0.2, 0.5, "best filling as the paper has it")
-    yield exhibit_grid(
+    best = panels.Band("x", 0.2, 0.5, "best filling as the paper has it")
+    yield panels.exhibit_grid(
         "7b", "the level ω falls to, over the filling",
         "Filled: mean of the 21 points around the minimum. Open: mean of the second half of the flight; where the two "
         "part there is no plateau. Shaded: the paper's best filling.",
@@ -98,7 +87,7 @@ def exhibits_9b(runs: PaperRuns) -> Iterator[Exhibit]:
     best = int(rest.argmax())
     axis = Axis("toppling angle θ_c [degrees]", "theta_c [degrees]", 0.0, 50.0)
     row = _row(axis, (upright, landed), Line("at rest, Eq. 13b", fine, rest, red))
-    yield exhibit_grid(
+    yield panels.exhibit_grid(
         "9b", "critical toppling angle θ_c over the filling",
         f"Red: water at rest, highest ({rest[best]:.1f}°) at M̃ = {fine[best]:.2f}. Points: water where the solver has "
         "it, filled where the bottle stands upright again (θ = 2π, as the text says), open at T = 0.5 s (as the "
@@ -117,10 +106,10 @@ def exhibits_9c(runs: PaperRuns) -> Iterator[Exhibit]:
     most = 1.1 * max([*found, 0.25])
     row = _row(Axis("v_CM in the bottle [m/s], to the base", "v_CM [m/s]", -most, most), (upright, landed))
     bands = (
-        Band("x", 0.25, 0.6, "where the paper has it beyond 0.2 m/s"),
-        Band("y", -0.2, 0.2, "slower than 0.2 m/s"),
+        panels.Band("x", 0.25, 0.6, "where the paper has it beyond 0.2 m/s"),
+        panels.Band("y", -0.2, 0.2, "slower than 0.2 m/s"),
     )
-    yield exhibit_grid(
+    yield panels.exhibit_grid(
         "9c", "velocity of the centre of mass on landing",
         "Velocity dr_CM/dt along the bottle, positive towards the base as in the table of statements; the paper has it "
         "negative and does not say which way it counts, nor whether "
@@ -170,18 +159,18 @@ def _cost_exhibit(costs: Sequence[Cost], name: str, title: str, x: Axis, over: s
             own = [cost for cost in costs if cost.solver == solver and getattr(cost, kept) == value]
             if len(own) > 1:
                 x, y = np.array(sorted((getattr(cost, over), getattr(cost, of)) for cost in own), dtype=np.float64).T
-                look = {**ranked(rank, len(every)), "marker": "o", "markersize": 4.0}
+                look = {**panels.ranked(rank, len(every)), "marker": "o", "markersize": 4.0}
                 yield Line(f"{'P' if kept == 'steps' else 'N'} = {value}", x, y, look)
 
     work = Axis("work [slice evaluations]", "work [1]", log=True)
     seconds = Axis("processor time [s]", "processor time [s]", log=True)
-    rows = (row_of(work, partial(lines, of="work")), row_of(seconds, partial(lines, of="seconds")))
+    rows = (panels.row_of(work, partial(lines, of="work")), panels.row_of(seconds, partial(lines, of="seconds")))
     own = [cost for cost in costs if cost.solver == PUBLISHED]
     most = max(getattr(cost, kept) for cost in own)
     ends = sorted((getattr(cost, over), cost.work) for cost in own if getattr(cost, kept) == most)
     (few, less), (many, more) = ends[0], ends[-1]
     exponent = math.log(more / less) / math.log(many / few)
-    return exhibit_grid(
+    return panels.exhibit_grid(
         name, title,
         "Counted work above, processor time of this machine below. The published program's work is N P by "
         "construction, straight and of slope 1; its time is this program's compiled loop and bends where the fixed "
@@ -193,7 +182,7 @@ def _cost_exhibit(costs: Sequence[Cost], name: str, title: str, x: Axis, over: s
     )  # fmt: skip
 
 
-RECIPES: Final[dict[str, Recipe]] = {
+RECIPES: Final[dict[str, panels.Recipe]] = {
     "7b": (("filling",), exhibits_7b),
     "9b": (("filling", "long"), exhibits_9b),
     "9c": (("filling", "long"), exhibits_9c),

@@ -7,20 +7,10 @@ from functools import partial
 from typing import Final
 
 from flipproof.frame.exhibit import Exhibit
+from flipproof.paper import figures_panels as panels
 from flipproof.paper.cases import Case, family
 from flipproof.paper.figures_curves import TIME
-from flipproof.paper.figures_panels import (
-    DASHED,
-    Axis,
-    Grid,
-    Line,
-    Recipe,
-    every_third,
-    exhibit_grid,
-    listed,
-    ranked,
-    row_of,
-)
+from flipproof.paper.figures_panels import Axis, Grid, Line
 from flipproof.paper.parameters import number, numbers
 from flipproof.paper.runs import PaperRuns
 
@@ -76,10 +66,10 @@ def _exhibit(
         run = runs.trajectory(solver, case.key)
         if run is None or len(run.r) == 0:
             return
-        t, slices = every_third(run.t), chosen(run.scenario.n_slices)
+        t, slices = panels.every_third(run.t), chosen(run.scenario.n_slices)
         for k, (i, label) in enumerate(slices.items()):
-            yield Line(label, t, every_third(run.r[:, i]), ranked(k, len(slices), dash=0))
-        yield Line("centre of mass", t, every_third(run.r_cm), DASHED)
+            yield Line(label, t, panels.every_third(run.r[:, i]), panels.ranked(k, len(slices), dash=0))
+        yield Line("centre of mass", t, panels.every_third(run.r_cm), panels.DASHED)
 
     def ends(solver: str) -> dict[str, float]:
         return {
@@ -88,15 +78,15 @@ def _exhibit(
         }
 
     rows = tuple(
-        row_of(POSITION, partial(lines, case=case), heading.format(case.value).replace("-", "−"))
+        panels.row_of(POSITION, partial(lines, case=case), heading.format(case.value).replace("-", "−"))
         for case in family(of)
         if case.value in values
     )
-    return exhibit_grid(
+    return panels.exhibit_grid(
         name, title,
         f"Cap on top, base below, the centre of mass dashed. {caption}",
         f"Line plots of slice positions against time, a row for each {symbol}, a column for each solver. Centre of "
-        f"mass from the cap at the end, as a fraction of the length, by {symbol}: {listed(ends)}.",
+        f"mass from the cap at the end, as a fraction of the length, by {symbol}: {panels.listed(ends)}.",
         Grid(TIME, rows, height=2.1),
     )  # fmt: skip
 
@@ -109,5 +99,8 @@ def _three_slices(n: int) -> dict[int, str]:
     return {0: "first slice", n // 2 - 1: "middle slice (number N/2)", n - 1: "last slice"}
 
 
-RECIPES: Final[dict[str, Recipe]] = {"5a": (("beta", "beta at 5 /s"), exhibits_5a), "6a": (("drag",), exhibits_6a)}
+RECIPES: Final[dict[str, panels.Recipe]] = {
+    "5a": (("beta", "beta at 5 /s"), exhibits_5a),
+    "6a": (("drag",), exhibits_6a),
+}
 """Figure -> the families it needs, and how it is made."""

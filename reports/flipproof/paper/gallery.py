@@ -28,24 +28,19 @@ def make_gallery(
     out: Path,
     progress: Progress,
     provenance: Mapping[str, str],
-    *,
-    jobs: int | None = None,
-    store: RunStore | None = None,
+    jobs: int | None,
+    store: RunStore,
 ) -> str:
     """Make the figures and write them to ``out``; return one line that tells what is there.
 
     Parameters
     ----------
-    names : sequence of str
-        Figures such as "7b"; none: all.
-    out : path
-        Folder; an older gallery in it is replaced when the new one is complete.
+    names : sequence of str - figures such as "7b"; none: all
+    out : path - folder; an older gallery in it is replaced when the new one is complete
     progress : callable (made, planned, label)
     provenance : mapping
-    jobs : int or None
-        Worker processes; None: one per core.
-    store : RunStore or None
-        Where runs are looked for and kept, as those of a report are.
+    jobs : int or None - worker processes; None: one per core
+    store : RunStore - where runs are looked for and kept, as those of a report are
 
     Raises
     ------
@@ -55,7 +50,6 @@ def make_gallery(
     began = time.perf_counter()
     wanted = check_figures(names) or ORDER
     check_replaceable(out, "paper")
-    store = store or RunStore(None)
     with replaced_folder(out, "paper") as folder:
         with workers(jobs) as pool:
             runs = gather_figures(wanted, pool, progress, store)
@@ -102,14 +96,7 @@ def gather_figures(
 
 def render_gallery(exhibits: Sequence[Exhibit], runs: PaperRuns, provenance: Mapping[str, str]) -> str:
     """Return the page."""
-    return (
-        environment()
-        .get_template("paper_figures.html.j2")
-        .render(
-            exhibits=exhibits,
-            problems=runs.failures(),
-            header=HEADER,
-            rows=list(parameter_rows()),
-            provenance=provenance,
-        )
+    template = environment().get_template("paper_figures.html.j2")
+    return template.render(
+        exhibits=exhibits, problems=runs.failures(), header=HEADER, rows=parameter_rows(), provenance=provenance
     )

@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from flipproof.frame.solvers import Missing
 from flipproof.paper.cases import family
 from slicemodel import Trajectory
 from slicemodel.observables import PLATEAU_SHARE, plateau, plateau_of_points, plateau_of_width
@@ -19,10 +20,6 @@ FLAT: Final = 0.1
 
 SUPERIMPOSED: Final = 0.05
 """Root-mean-square difference, as a share of omega_0, up to which two curves count as one."""
-
-
-class MissingFlightError(LookupError):
-    """A flight that a statement needs is not there, or is not complete; the message says why."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,14 +48,14 @@ class Flights:
 
         Raises
         ------
-        MissingFlightError
+        Missing
             If it was not made, or did not reach its end.
         """
         if key not in self.runs:
-            raise MissingFlightError(self.reasons.get(key, f"{key!r} was not flown by {self.solver}"))
+            raise Missing(self.reasons.get(key, f"{key!r} was not flown by {self.solver}"))
         run = self.seen[key] = self.runs[key]
         if not run.ok:
-            raise MissingFlightError(f"{key!r} by {self.solver}: {run.status}, {run.message}")
+            raise Missing(f"{key!r} by {self.solver}: {run.status}, {run.message}")
         return run
 
     def at(self, name: str, value: float) -> Trajectory:
@@ -66,13 +63,13 @@ class Flights:
 
         Raises
         ------
-        MissingFlightError
+        Missing
             If the family has no such case, or its flight is not there.
         """
         for case in family(name):
             if abs(case.value - value) <= 1e-9 * max(1.0, abs(value)):
                 return self.run(case.key)
-        raise MissingFlightError(f"family {name!r} has no case at {value:g}")
+        raise Missing(f"family {name!r} has no case at {value:g}")
 
     def measured(
         self, name: str, of: Callable[[Trajectory], float], low: float = -math.inf, high: float = math.inf
@@ -81,7 +78,7 @@ class Flights:
 
         Raises
         ------
-        MissingFlightError
+        Missing
             If any flight is not there, but for those whose number of slices is too large for this solver.
         """
         cases = [case for case in family(name) if not case.slices_vary or case.key in self.runs]

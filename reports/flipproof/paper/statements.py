@@ -21,14 +21,6 @@ CLASSES: Final[Mapping[Verdict, str]] = {
 }  # fmt: skip
 """How a page marks a verdict: sign and colour class beside the word."""
 
-LIMIT_WORDS: Final[Mapping[Verdict, str]] = {
-    "holds": "has this limit",
-    "fails": "is free of it",
-    "cannot be decided": "cannot be decided",
-    "not judged": "not judged",
-}
-"""The verdict on a limit that the paper admits: to have it is no success, to be free of it no failure."""
-
 NEAR: Final = 0.1
 """Share of a threshold within which a number is marginal. Thresholds chosen here have one significant digit: another
 reader could as well have chosen one a tenth higher or lower."""
@@ -163,17 +155,11 @@ class Reading:
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the reading as JSON-ready data; numbers that are not finite become null."""
-        return {
-            "name": self.name,
-            "value": finite_or_none(self.value),
-            "unit": self.unit,
-            "band": finite_or_none(self.band),
-            "admissible": [finite_or_none(bound) for bound in self.admissible],
-            "margin": finite_or_none(self.margin),
-            "marginal": self.marginal,
-            "verdict": self.verdict,
-            "note": self.note,
-        }
+        names = ("name", "value", "unit", "band", "admissible", "margin", "marginal", "verdict", "note")
+        mapping = {name: getattr(self, name) for name in names}
+        for name in ("value", "band", "margin"):
+            mapping[name] = finite_or_none(mapping[name])
+        return mapping | {"admissible": [finite_or_none(bound) for bound in self.admissible]}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -253,7 +239,7 @@ class Judgement:
 
 
 Read = Callable[..., Iterator[Reading]]
-"""Flights of one equation -> what is read off them; raises ``MissingFlightError`` where there is nothing to read."""
+"""Flights of one equation -> what is read off them; raises ``Missing`` where there is nothing to read."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -295,7 +281,10 @@ class Statement:
 
     def word(self, judgement: Judgement) -> str:
         """Return a verdict on this statement in words, with "marginal" where it is."""
-        verdict = LIMIT_WORDS[judgement.verdict] if self.kind == "admitted limit" else judgement.verdict
+        verdict: str = judgement.verdict
+        if self.kind == "admitted limit":
+            # To have a limit that the paper admits is no success, to be free of it no failure.
+            verdict = {"holds": "has this limit", "fails": "is free of it"}.get(verdict, verdict)
         return f"{verdict}, marginal" if judgement.marginal else verdict
 
     def sign(self, judgement: Judgement) -> str:
