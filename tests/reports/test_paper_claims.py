@@ -13,12 +13,9 @@ from flipproof.frame.flights import Flights as Answers
 from flipproof.frame.flights import Outcome
 from flipproof.frame.solvers import Missing, Run, make
 from flipproof.page.templating import environment
-from flipproof.paper import claims_filling, claims_landing, observe
+from flipproof.paper import claims_landing, claims_throw, observe
 from flipproof.paper.cases import FAMILIES, all_cases, family
 from flipproof.paper.claim import judge
-from flipproof.paper.claim_runs import plan_further, plan_halved, plan_published
-from flipproof.paper.claims_cost import many_steps_key, same_steps_key
-from flipproof.paper.claims_slices import finest_key
 from flipproof.paper.observe import Flights
 from flipproof.paper.parameters import numbers, paper_throw
 from flipproof.paper.runs import (
@@ -28,9 +25,14 @@ from flipproof.paper.runs import (
     SOLVERS,
     PaperRuns,
     Planned,
+    finest_key,
     group_calls,
+    many_steps_key,
     plan_figures,
-    scenario_of,
+    plan_further,
+    plan_halved,
+    plan_published,
+    same_steps_key,
 )
 from flipproof.paper.statements import Reading, Statement
 from flipproof.paper.verdicts import CLAIMS, STEADY, claim_weight_slows_the_tenth, judge_all, judge_paper
@@ -460,8 +462,8 @@ def test_the_senses_of_non_monotonic_angles():
 
 
 def test_the_filling_of_the_slow_down_is_interpolated():
-    assert claims_filling.filling_of_slow_down(of_filling(slowing(0.125))) == pytest.approx(0.125, abs=1e-3)
-    assert math.isnan(claims_filling.filling_of_slow_down(of_filling(always(0.5))))
+    assert claims_throw.filling_of_slow_down(of_filling(slowing(0.125))) == pytest.approx(0.125, abs=1e-3)
+    assert math.isnan(claims_throw.filling_of_slow_down(of_filling(always(0.5))))
 
 
 # ---------------------------------------------------------------------- bands and missing flights
@@ -534,9 +536,9 @@ def test_further_runs_repeat_none_of_the_figures():
     figures = {each.run for each in plan_figures()}
     further, halved = ({each.name[:2]: each.run for each in plan} for plan in (plan_further(), plan_halved()))
     assert not figures & {*further.values(), *halved.values()}
-    for (solver, key), run in halved.items():
+    for (_, key), run in halved.items():
         if key in all_cases():
-            usual = scenario_of(solver, all_cases()[key])
+            usual = all_cases()[key].scenario
             assert run.scenario.n_slices == usual.n_slices // 2
             assert run.scenario.damping_rate == pytest.approx(usual.damping_rate)
     for damping in ("", " at 5 /s"):

@@ -11,10 +11,8 @@ from flipproof.chapters.errata.programs import exponents_of_cost
 from flipproof.paper.claim import states
 from flipproof.paper.observe import Flights, distance, level, level_by_points
 from flipproof.paper.parameters import numbers, paper_steps
-from flipproof.paper.runs import PUBLISHED
+from flipproof.paper.runs import MANY_STEPS, PUBLISHED, many_steps_key, same_steps_key
 from flipproof.paper.statements import OMEGA, Read, Reading, Statement, at_least, at_most
-
-MANY_STEPS: Final = 10_000
 
 SQUARE_WHY: Final = "An exponent of a square is 2; a tenth of it is allowed either way."
 
@@ -32,16 +30,6 @@ def _of_programs(id_: str, place: str, says: str, means: str, why: str) -> Calla
         silent="it chooses its own time steps and slices cost it otherwise; the sentence is about the programs",
         otherwise={"in the Python program, which copies no history": {"program": "Python"}},
     )
-
-
-def many_steps_key(filling: float) -> str:
-    """Return the key of the flight with ``MANY_STEPS`` steps."""
-    return f"filling {filling:g}, P {MANY_STEPS}"
-
-
-def same_steps_key(filling: float) -> str:
-    """Return the key of the flight by the exact step of Eq. 8 at the paper's number of time steps."""
-    return f"filling {filling:g}, exact-step"
 
 
 @_of_programs(

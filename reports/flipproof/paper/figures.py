@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 from flipproof.frame.exhibit import Exhibit
-from flipproof.paper import figures_bottle, figures_curves, figures_levels, figures_slices
+from flipproof.paper import figures_bottle, figures_curves, figures_levels
 from flipproof.paper.cases import family
 from flipproof.paper.runs import PaperRuns
 
@@ -20,7 +20,7 @@ TIMED: Final = ("S1b", "S1c")
 """Figures that need the measured costs."""
 
 
-RECIPES: Final = figures_bottle.RECIPES | figures_slices.RECIPES | figures_curves.RECIPES | figures_levels.RECIPES
+RECIPES: Final = figures_bottle.RECIPES | figures_curves.RECIPES | figures_levels.RECIPES
 """Figure -> the families of throws that it shows, and what makes its exhibits."""
 
 

@@ -1,9 +1,9 @@
-"""Figures 5b-d, 6b-c, 7a, 8a-c and S1a: a quantity over time for every throw of a family, solver by solver."""
+"""Figures 5, 6, 7a, 8 and S1a: what happens over time in every throw of a family, solver by solver."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Final
@@ -249,7 +249,81 @@ def _step_words(runs: PaperRuns) -> Iterator[str]:
             yield f"filling {filling:g} with {steps:g} steps {far:.2g}"
 
 
+# ---------------------------------------------------------------------- paths of slices
+
+POSITION: Final = Axis(
+    "r [m], cap at 0", "r [m]", low=-0.02 * number("length"), high=1.1 * number("length"), upside_down=True
+)
+"""The range of the Python program's own plot, the cap on top."""
+
+
+def exhibits_5a(runs: PaperRuns) -> Iterator[Exhibit]:
+    """Yield the paths of ten slices for three rebounds, once for each reading of the drag."""
+    slices = {i: f"slice {i + 1}" for i in range(round(number("figure-5-slices")))}
+    for suffix, of, words in (
+        ("", "beta", "α = 1 as the caption says, α/2m = 10 /s"),
+        ("-5-per-second", "beta at 5 /s", "α = 0.5, the damping rate α/2m = 5 /s of all later figures"),
+    ):
+        yield _paths(
+            runs, f"5a{suffix}", of, numbers("figure-5-rebound"), slices, "beta",
+            f"what the rebound β does to ten slices ({words})",
+            "Slice 1 starts on the base, slice 10 on top of the water. Look at the ends: with β = 0 slices stay "
+            "where they hit until something pulls them off. In free flight nothing does; in the other two it is "
+            "gravity, which Eq. 8 keeps.",
+        )  # fmt: skip
+
+
+def exhibits_6a(runs: PaperRuns) -> Iterator[Exhibit]:
+    """Yield the paths of the first, the middle and the last slice for the drags that the text names."""
+    n = round(number("figure-6-slices"))
+    slices = {0: "first slice", n // 2 - 1: "middle slice (number N/2)", n - 1: "last slice"}
+    yield _paths(
+        runs, "6a", "drag", (0.0, 0.0075, 0.01, 0.0125), slices, "alpha",
+        "what the drag α does to the first, the middle and the last slice",
+        "The first slice starts on the base, the last one on top of the water. The more drag, the later the last one "
+        "reaches the cap.",
+    )  # fmt: skip
+
+
+def _paths(
+    runs: PaperRuns,
+    name: str,
+    of: str,
+    values: tuple[float, ...],
+    slices: Mapping[int, str],
+    symbol: str,
+    title: str,
+    caption: str,
+) -> Exhibit:
+    """Return a row of panels for each of the ``values`` of a family; ``slices`` are those drawn, with their names."""
+
+    def lines(solver: str, case: Case) -> Iterator[Line]:
+        run = runs.trajectory(solver, case.key)
+        if run is not None:
+            t = panels.every_third(run.t)
+            for k, (i, label) in enumerate(slices.items()):
+                yield Line(label, t, panels.every_third(run.r[:, i]), panels.ranked(k, len(slices), dash=0))
+            yield Line("centre of mass", t, panels.every_third(run.r_cm), panels.DASHED)
+
+    def ends(solver: str) -> dict[str, float]:
+        flown = runs.members(solver, of)
+        return {f"{case.value:g}": float(run.r_cm[-1] / run.scenario.bottle.length) for case, run in flown}
+
+    cases = [case for case in family(of) if case.value in values]
+    rows = tuple(panels.row_of(POSITION, partial(lines, case=case), VARIED[of][0](case)) for case in cases)
+    return panels.exhibit_grid(
+        name, title,
+        f"Cap on top, base below, the centre of mass dashed. {caption}",
+        f"Line plots of slice positions against time, a row for each {symbol}, a column for each solver. Centre of "
+        f"mass from the cap at the end, as a fraction of the length, by {symbol}: {panels.listed(ends)}.",
+        Grid(TIME, rows, height=2.1),
+    )  # fmt: skip
+
+
 RECIPES: Final[dict[str, panels.Recipe]] = {
-    name: (shown.families, partial(exhibits_curves, name)) for name, shown in CURVES.items()
-} | {"S1a": (tuple(f"steps {filling:g}" for filling in numbers("figure-S1-filling")), exhibits_s1a)}
+    **{name: (shown.families, partial(exhibits_curves, name)) for name, shown in CURVES.items()},
+    "5a": (("beta", "beta at 5 /s"), exhibits_5a),
+    "6a": (("drag",), exhibits_6a),
+    "S1a": (tuple(f"steps {filling:g}" for filling in numbers("figure-S1-filling")), exhibits_s1a),
+}
 """Figure -> the families it needs, and how it is made."""

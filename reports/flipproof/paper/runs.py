@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Final, Literal
@@ -14,7 +14,7 @@ from flipproof.frame.solvers import Made, Run, make
 from flipproof.paper import observe
 from flipproof.paper.cases import Case, all_cases, family
 from flipproof.paper.costs import Cost, measure_event_driven, measure_published
-from flipproof.paper.parameters import paper_steps, paper_throw
+from flipproof.paper.parameters import numbers, paper_steps, paper_throw
 from slicemodel import Scenario, Trajectory
 
 PUBLISHED: Final = "published-python"
@@ -23,6 +23,24 @@ SOLVERS: Final = (PUBLISHED, "eq8", "free-flight")
 BANDS: Final[Mapping[str, float]] = MappingProxyType({"eq8": 1e-7, "free-flight": 3e-3})
 """How far omega / omega_0 may move when the rest speed is cut tenfold, or the release changed in the eleventh digit, by
 event-driven solver; with recoil the order of the impacts decides it."""
+
+MANY_STEPS: Final = 10_000
+MANY_SLICES: Final = 100.0
+FINEST: Final = 200
+"""Slices of an event-driven flight that the others are held against."""
+
+HALVED: Final = ("filling", "long", "drag", "spin", "angle", "aspect")
+"""Families flown with half the slices too; in the others their number is the subject."""
+
+SLICES: Final = {"slices": "", "slices at 5 /s": " at 5 /s"}
+"""Families in which the number of slices is the subject, and the words for their damping."""
+
+REBOUNDS: Final = ("beta", "beta at 5 /s")
+
+WEIGHTLESS: Final = "eq8-weightless"
+STEADY_FILLING: Final = 0.1
+WEIGHTLESS_KEY: Final = f"filling {STEADY_FILLING:g}"
+"""The bottle that does not slow down without weight, and the key of its flight."""
 
 Half = Literal["", "slices", "steps"]
 HALVES: Final[tuple[Half, ...]] = ("slices", "steps")
@@ -102,26 +120,26 @@ class PaperRuns:
         ]
 
 
-def scenario_of(solver: str, case: Case) -> Scenario | None:
-    """Return the throw of a case as this solver flies it; None if it is not flown."""
-    if solver != PUBLISHED and not case.slices_vary and case.steps < paper_steps() and case.scenario != paper_throw():
-        return None  # output times do not change these solvers: one throw shows that
-    return case.scenario
+def flies(solver: str, case: Case) -> bool:
+    """Return whether a solver flies a case: where it chooses its steps, one throw shows what fewer output times do."""
+    return solver == PUBLISHED or case.slices_vary or case.steps >= paper_steps() or case.scenario == paper_throw()
 
 
 def plan_figures(keys: Iterable[str] | None = None) -> list[Planned]:
     """Return every run that the figures need; of the cases with these keys only, if any are given."""
     cases = all_cases()
-    wanted = set(cases if keys is None else keys)
-    planned = []
-    for solver in reversed(SOLVERS):
-        for key, case in cases.items():
-            scenario = scenario_of(solver, case) if key in wanted else None
-            if scenario is not None:
-                run = Run(solver, scenario, _settings(solver, case), label=f"paper, {solver}, {key}")
-                thin = case.thin if solver == PUBLISHED else 1
-                planned.append(Planned((solver, key, ""), run, thin, case.whole))
-    return planned
+    wanted = cases if keys is None else {key: case for key, case in cases.items() if key in set(keys)}
+    return [
+        Planned(
+            (solver, key, ""),
+            Run(solver, case.scenario, _settings(solver, case), label=f"paper, {solver}, {key}"),
+            thin=case.thin if solver == PUBLISHED else 1,
+            whole=case.whole,
+        )
+        for solver in reversed(SOLVERS)
+        for key, case in wanted.items()
+        if flies(solver, case)
+    ]
 
 
 def _settings(solver: str, case: Case) -> dict[str, Any]:
@@ -163,3 +181,87 @@ def _kept(made: Made, planned: Planned) -> Made:
         none = np.empty((0, run.scenario.n_slices))
         run = replace(run, r=none, v=none)
     return replace(made, trajectory=run)
+
+
+# ---------------------------------------------------------------------- what statements need beside the figures
+
+
+def many_steps_key(filling: float) -> str:
+    """Return the key of the flight with ``MANY_STEPS`` steps."""
+    return f"filling {filling:g}, P {MANY_STEPS}"
+
+
+def same_steps_key(filling: float) -> str:
+    """Return the key of the flight by the exact step of Eq. 8 at the paper's number of time steps."""
+    return f"filling {filling:g}, exact-step"
+
+
+def finest_key(damping: str) -> str:
+    """Return the key of the flight with the most slices.
+
+    ``damping`` is "" for the drag of the caption of Fig. 5, " at 5 /s" for the damping of all later figures.
+    """
+    return f"slices finest{damping}"
+
+
+def plan_claims() -> list[Planned]:
+    """Return the runs of all statements: those that are not grouped, and those of the published program."""
+    return [*plan_halved(), *plan_further(), *(each for half in HALVES for each in plan_published(half))]
+
+
+def _planned(solver: str, key: str, scenario: Scenario, half: Half = "", *, by: str = "", **settings: Any) -> Planned:
+    """Return the run of an equation, made by the scheme ``by`` if there is one."""
+    label = f"claims, {by or solver}, {key}" + (f", half the {half}" if half else "")
+    return Planned((solver, key, half), Run(by or solver, scenario, settings, label), grouped=False)
+
+
+def _halved(scenario: Scenario) -> Scenario:
+    return scenario.with_slices(max(1, scenario.n_slices // 2))
+
+
+def _same_steps(filling: float, half: Half = "") -> Planned:
+    """Return the run of the scheme that solves Eq. 8 as printed at the paper's number of time steps."""
+    throw = _halved(paper_throw(filling)) if half else paper_throw(filling)
+    key = same_steps_key(filling)
+    return _planned("eq8", key, throw, half, by="exact-step", steps=paper_steps(), store="summary")
+
+
+def plan_further() -> Iterator[Planned]:
+    """Yield the runs that no figure needs: finer in slices and in time, and without weight."""
+    for name, damping in SLICES.items():
+        many = next(case for case in family(name) if case.value == MANY_SLICES)
+        for solver in SOLVERS[1:]:
+            yield _planned(solver, finest_key(damping), many.scenario.with_slices(FINEST))
+    for filling in numbers("figure-S1-filling"):
+        key = many_steps_key(filling)
+        yield _planned(PUBLISHED, key, paper_throw(filling), steps=MANY_STEPS, store="summary")
+        yield _same_steps(filling)
+    yield _planned(WEIGHTLESS, WEIGHTLESS_KEY, paper_throw(STEADY_FILLING))
+
+
+def plan_halved() -> Iterator[Planned]:
+    """Yield the event-driven flights with half the slices of the figures'."""
+    cases = {case.key: case for name in HALVED for case in family(name)}
+    for solver in SOLVERS[1:]:
+        for key, case in cases.items():
+            if flies(solver, case) and case.scenario.n_slices > 1:
+                yield _planned(solver, key, _halved(case.scenario), "slices")
+    for filling in numbers("figure-S1-filling"):
+        yield _same_steps(filling, "slices")
+
+
+def plan_published(half: Half) -> Iterator[Planned]:
+    """Yield the flights of the published program with half its "slices" or "steps".
+
+    Slices are kept where statements read more than omega and theta.
+    """
+    whole = {case.key for name in ("long", "drag", *REBOUNDS) for case in family(name)}
+    families = HALVED if half == "slices" else (*HALVED, *REBOUNDS, *SLICES)
+    for key, case in {case.key: case for name in families for case in family(name)}.items():
+        scenario, steps, thin = _halved(case.scenario), case.steps, case.thin
+        if half == "steps":
+            # As many points are kept as there are, up to the rounding that keeps the last one.
+            scenario, steps, thin = case.scenario, 1 + (case.steps - 1) // 2, 1
+        store = "full" if key in whole else "summary"
+        planned = _planned(PUBLISHED, key, scenario, half, steps=steps, store=store)
+        yield replace(planned, thin=thin, grouped=True)

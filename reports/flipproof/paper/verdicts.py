@@ -10,16 +10,13 @@ from typing import Any, ClassVar, Final
 
 from flipproof.frame.findings import Finding
 from flipproof.paper.claim import judge
-from flipproof.paper.claim_runs import STEADY_FILLING, WEIGHTLESS, WEIGHTLESS_KEY
 from flipproof.paper.claims_cost import OF_COST
-from flipproof.paper.claims_drag import OF_DRAG
-from flipproof.paper.claims_filling import OF_FILLINGS
 from flipproof.paper.claims_landing import OF_LANDING, claim_filling_of_change
-from flipproof.paper.claims_slices import OF_SLICES
-from flipproof.paper.claims_throw import OF_RELEASE, OF_THROWS
+from flipproof.paper.claims_model import OF_DRAG, OF_SLICES
+from flipproof.paper.claims_throw import OF_FILLINGS, OF_RELEASE, OF_THROWS
 from flipproof.paper.experiment import CAVEAT, Observation, closest_overall, compare_all, standing
 from flipproof.paper.observe import Flights, steady_level
-from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS, PaperRuns
+from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS, STEADY_FILLING, WEIGHTLESS, WEIGHTLESS_KEY, PaperRuns
 from flipproof.paper.statements import OMEGA, Judgement, Statement
 
 NAMES: Final[Mapping[str, str]] = MappingProxyType(

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Final
 
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Study
-from flipproof.paper.claim_runs import plan_claims
 from flipproof.paper.figures import exhibits_paper
-from flipproof.paper.runs import PaperRuns, group_calls, plan_figures
+from flipproof.paper.runs import PaperRuns, group_calls, plan_claims, plan_figures
 from flipproof.paper.verdicts import PaperVerdicts, judge_paper
 
 
