@@ -13,7 +13,8 @@ from flipproof.frame.flights import Flights as Answers
 from flipproof.frame.flights import Outcome
 from flipproof.frame.solvers import Missing, Run, make
 from flipproof.page.templating import environment
-from flipproof.paper import claims_landing, claims_throw, observe
+from flipproof.paper import claims_figures_6_7, observe
+from flipproof.paper import claims_figures_8_9 as landing
 from flipproof.paper.cases import FAMILIES, all_cases, family
 from flipproof.paper.claim import judge
 from flipproof.paper.observe import Flights
@@ -323,7 +324,7 @@ def of_landing(r_cm_of, v_cm_of):
 
 
 def test_landing_claims_read_the_moment_the_bottle_is_upright():
-    static = claims_landing.static_toppling_angle
+    static = landing.static_toppling_angle
 
     def higher(by):
         return lambda case: 0.28 - 0.04 / math.tan(static(case.scenario) - math.radians(by(case.value)))
@@ -365,7 +366,7 @@ def test_more_steps_must_not_move_the_curve():
 
 
 def test_toppling_angle_peaks_at_45_degrees_where_the_paper_says():
-    filling, angle = claims_landing.toppling_peak()
+    filling, angle = landing.toppling_peak()
     assert filling == pytest.approx(0.14, abs=0.01)
     assert math.degrees(angle) == pytest.approx(45.2, abs=0.3)
     # At the optimum the derivative of (1 - eps) M / 2 + eps / 2 vanishes: (M + b)^2 = b (1 + b), with b = M_b / M_max.
@@ -376,27 +377,27 @@ def test_toppling_angle_peaks_at_45_degrees_where_the_paper_says():
 def test_water_at_rest_reaches_the_centre_of_mass_where_the_toppling_angle_peaks():
     """h/L = eps/(1 + eps) and M^2 + 2 b M - b = 0 against the scenario's own centre of mass and slices, to 1e-6."""
     bottle = paper_throw().bottle
-    filling = claims_landing.filling_of_change(bottle)
+    filling = landing.filling_of_change(bottle)
     assert filling == pytest.approx(0.1416585, abs=1e-7)
     epsilon = bottle.mass / (bottle.mass + filling * bottle.capacity)
     assert filling == pytest.approx(epsilon / (1.0 + epsilon), abs=1e-12)
-    assert claims_landing.toppling_peak()[0] == pytest.approx(filling, abs=1e-6)
-    assert claims_landing.surface_over_centre(filling) == pytest.approx(0.0, abs=1e-12)
-    assert claims_landing.surface_over_centre(filling - 1e-6) < 0.0 < claims_landing.surface_over_centre(filling + 1e-6)
+    assert landing.toppling_peak()[0] == pytest.approx(filling, abs=1e-6)
+    assert landing.surface_over_centre(filling) == pytest.approx(0.0, abs=1e-12)
+    assert landing.surface_over_centre(filling - 1e-6) < 0.0 < landing.surface_over_centre(filling + 1e-6)
     # The same with slices: the topmost one lies on the centre of mass, up to half its own height.
     for off in (-2e-6, 2e-6):
         throw = replace(paper_throw(), water_mass=(filling + off) * bottle.capacity, n_slices=1_000_000)
         r = throw.initial_positions()
         over = float(centre_of_mass(throw, r)) - (float(r[-1]) - throw.slice_height / 2)
         assert math.copysign(1.0, over) == math.copysign(1.0, off)
-    found = claims_landing.claim_filling_of_change()
+    found = landing.claim_filling_of_change()
     assert (found.verdict, found.failed) == ("pass", False)
     assert found.value < 1e-6
 
 
 def test_a_wrong_filling_of_change_fails(monkeypatch):
-    monkeypatch.setattr(claims_landing, "filling_of_change", always(0.14166))
-    assert claims_landing.claim_filling_of_change().failed
+    monkeypatch.setattr(landing, "filling_of_change", always(0.14166))
+    assert landing.claim_filling_of_change().failed
 
 
 @pytest.mark.parametrize(("filling", "over"), [(0.12, 0), (0.13, 0), (0.14, 1), (0.15, 2), (0.16, 3)])
@@ -462,8 +463,8 @@ def test_the_senses_of_non_monotonic_angles():
 
 
 def test_the_filling_of_the_slow_down_is_interpolated():
-    assert claims_throw.filling_of_slow_down(of_filling(slowing(0.125))) == pytest.approx(0.125, abs=1e-3)
-    assert math.isnan(claims_throw.filling_of_slow_down(of_filling(always(0.5))))
+    assert claims_figures_6_7.filling_of_slow_down(of_filling(slowing(0.125))) == pytest.approx(0.125, abs=1e-3)
+    assert math.isnan(claims_figures_6_7.filling_of_slow_down(of_filling(always(0.5))))
 
 
 # ---------------------------------------------------------------------- bands and missing flights

@@ -16,7 +16,7 @@ import numpy as np
 from flipproof.frame.solvers import Missing
 from flipproof.paper.cases import ICE
 from flipproof.paper.claim import banded
-from flipproof.paper.claims_throw import CLEAR, filling_of_slow_down
+from flipproof.paper.claims_figures_6_7 import CLEAR, filling_of_slow_down
 from flipproof.paper.observe import FLAT, Flights, climb, normalised, steady_level
 from flipproof.paper.parameters import paper_throw
 from flipproof.paper.runs import SOLVERS

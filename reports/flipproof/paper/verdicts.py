@@ -9,11 +9,9 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Final
 
 from flipproof.frame.findings import Finding
+from flipproof.paper import claims_figure_5, claims_figures_6_7, claims_figures_8_9
 from flipproof.paper.claim import judge
-from flipproof.paper.claims_cost import OF_COST
-from flipproof.paper.claims_landing import OF_LANDING, claim_filling_of_change
-from flipproof.paper.claims_model import OF_DRAG, OF_SLICES
-from flipproof.paper.claims_throw import OF_FILLINGS, OF_RELEASE, OF_THROWS
+from flipproof.paper.claims_figures_8_9 import claim_filling_of_change
 from flipproof.paper.experiment import CAVEAT, Observation, closest_overall, compare_all, standing
 from flipproof.paper.observe import Flights, steady_level
 from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS, STEADY_FILLING, WEIGHTLESS, WEIGHTLESS_KEY, PaperRuns
@@ -24,8 +22,13 @@ NAMES: Final[Mapping[str, str]] = MappingProxyType(
 )
 """Equation -> its name over a column."""
 
-CLAIMS: Final = (*OF_RELEASE, *OF_SLICES, *OF_COST, *OF_DRAG, *OF_FILLINGS, *OF_THROWS, *OF_LANDING)
-"""All statements, in the order of the paper."""
+CLAIMS: Final = tuple(
+    each
+    for module in (claims_figure_5, claims_figures_6_7, claims_figures_8_9)
+    for each in vars(module).values()
+    if isinstance(each, Statement)
+)
+"""All statements, in the order of the paper: that in which they are written down."""
 
 STEADY: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
     {WEIGHTLESS: (0.87, 0.89), "free-flight": (0.87, 0.89), PUBLISHED: (0.62, 0.64)}

@@ -1,27 +1,72 @@
-"""What section 5 says of the parameters of the model: rebound and slices (Fig. 5), drag (Fig. 6)."""
+"""What section 5 says of release, rebound and slices, up to Fig. 5, and of the cost of the model (Supp. Fig. 1)."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from functools import partial
-from itertools import pairwise
 from operator import attrgetter, itemgetter
 from typing import Final
 
 import numpy as np
 
+from flipproof.chapters.errata.erratum import SQUARE
+from flipproof.chapters.errata.programs import exponents_of_cost
 from flipproof.frame.solvers import Missing
 from flipproof.paper import observe
-from flipproof.paper.claim import FLAT_WHY, SUPERIMPOSED_WHY, states
+from flipproof.paper.claim import FLAT_WHY, states
 from flipproof.paper.observe import FLAT, SUPERIMPOSED, Flights
-from flipproof.paper.parameters import numbers
-from flipproof.paper.runs import MANY_SLICES, PUBLISHED, finest_key
+from flipproof.paper.parameters import number, numbers, paper_steps, paper_throw
+from flipproof.paper.runs import MANY_SLICES, MANY_STEPS, PUBLISHED, finest_key, many_steps_key, same_steps_key
 from flipproof.paper.statements import OMEGA, Read, Reading, Statement, at_least, at_most
 from slicemodel import Trajectory
+from slicemodel.observables import release_angular_velocity
+
+ORDER: Final = math.sqrt(10.0)
+"""Factor up to which two numbers are of one order of magnitude."""
 
 DETECTED: Final = 0.005
 """Share of omega_0 by which a minimum must move to be seen: a two-hundredth of the axis of Fig. 5d."""
+
+
+@states(
+    "release-spin",
+    place="section 5, “Numerical model”, with section 3",
+    says="ω₀ = v₀ / r_CM(0), with v₀ of about 2 m/s “as an order of magnitude”. The 20 rad/s of the runs was "
+    "measured, not derived from it.",
+    means="v₀ / r_CM(0) is of the order of the measured 20 rad/s.",
+    throw="half full, water at rest",
+    why="Of one order of magnitude: within a factor of √10.",
+    of_geometry=True,
+    otherwise={"as an equation, to a quarter": {"factor": 1.25}},
+)
+def _release_spin(_: Flights, factor: float = ORDER) -> Iterator[Reading]:
+    spin = release_angular_velocity(paper_throw(), number("launch-speed"))
+    usual = number("release-spin")
+    note = "the formula holds for a bottle swung about its cap"
+    name = "v₀ / r_CM(0) for v₀ = 2 m/s and M̃ = 0.5"
+    yield Reading(name, spin, "rad/s", (usual / factor, factor * usual), note=note)
+
+
+@states(
+    "spin-scale",
+    place="section 5, below Eq. 9d",
+    says="Eq. 8 sets the scale ω ~ √(g/ℓ) ~ 10 rad/s, ℓ being of the order of L/2.",
+    means="√(g/ℓ) with ℓ = L/2 is of the order of 10 rad/s.",
+    throw="the paper's bottle; no throw enters",
+    why="Of one order of magnitude: within a factor of √10.",
+    of_geometry=True,
+)
+def _spin_scale(_: Flights) -> Iterator[Reading]:
+    gravity, length = paper_throw().gravity, paper_throw().bottle.length / 2
+    note = (
+        f"ℓ = {length:g} m; {math.sqrt(gravity / 0.1):.1f} rad/s for the paper's rounded 0.1 m. In free "
+        "flight gravity cancels and no such scale exists"
+    )
+    admissible = (10.0 / ORDER, 10.0 * ORDER)
+    yield Reading("√(g/ℓ) for ℓ = L/2", math.sqrt(gravity / length), "rad/s", admissible, note=note)
+
+
+# ---------------------------------------------------------------------- rebound and slices (Fig. 5)
 
 
 def _figure_5(id_: str, says: str, means: str, why: str, place: str = "Fig. 5") -> Callable[[Read], Statement]:
@@ -35,9 +80,6 @@ def _figure_5(id_: str, says: str, means: str, why: str, place: str = "Fig. 5") 
         why=why,
         otherwise={"with α/2m = 5 /s instead of the caption's α = 1": {"damping": " at 5 /s"}},
     )
-
-
-# ---------------------------------------------------------------------- rebound
 
 
 @_figure_5(
@@ -122,9 +164,6 @@ def _other_rebounds_rise_late(flights: Flights, damping: str = "") -> Iterator[R
         yield Reading(name, observe.late_rise(flights.at("beta" + damping, beta)), OMEGA, at_least(FLAT))
 
 
-# ---------------------------------------------------------------------- slices
-
-
 @_figure_5(
     "few-slices",
     "Only N = 2 and N = 5 differ significantly.",
@@ -172,130 +211,106 @@ def _finest(flights: Flights, damping: str) -> Trajectory:
     return flights.run(finest_key(damping))
 
 
-OF_SLICES: Final = (
-    _sticking_slices,
-    _elastic_rises_late,
-    _angle_hardly_depends_on_rebound,
-    _half_elastic_is_flat,
-    _other_rebounds_rise_late,
-    _few_slices,
-    _minimum_shifts,
+# ---------------------------------------------------------------------- cost (Supp. Fig. 1)
+
+SQUARE_WHY: Final = "An exponent of a square is 2; a tenth of it is allowed either way."
+
+
+def _of_programs(id_: str, place: str, says: str, means: str, why: str) -> Callable[[Read], Statement]:
+    """Return a decorator for the cost of the programs: first MATLAB, which times itself (tic, toc), then Python."""
+    return states(
+        id_,
+        place=f"section 5, {place}",
+        says=says,
+        means=means,
+        throw="any; the count does not depend on it. The MATLAB program is counted: it is the one that times itself",
+        why=why,
+        judges=(PUBLISHED,),
+        silent="it chooses its own time steps and slices cost it otherwise; the sentence is about the programs",
+        otherwise={"in the Python program, which copies no history": {"program": "Python"}},
+    )
+
+
+@_of_programs(
+    "cost-slices",
+    "Supp. Fig. 1b",
+    "Computing time grows roughly as N², N being the number of slices.",
+    "The exponent of N in the counted work is 1.8 to 2.2.",
+    SQUARE_WHY,
 )
-"""Statements on Fig. 5, in the order of the paper."""
+def _cost_of_slices(_: Flights, program: str = "MATLAB") -> Iterator[Reading]:
+    of_n, _p = _exponents(program)
+    yield Reading("exponent of N in the work", of_n, "", SQUARE, note=_counted(program))
 
 
-# ---------------------------------------------------------------------- drag
-
-STRONG_DRAGS: Final = [drag for drag in numbers("figure-6-drag") if drag >= 0.0125]
-"""The drags of Fig. 6 that count as strong [kg/s]."""
-
-_of_drag: Final = partial(states, throw="half full, β = −0.5, α as named (Fig. 6)")
-
-
-@_of_drag(
-    "alpha-sensitive",
-    place="section 5, Fig. 6",
-    says="The outcome is highly sensitive to α.",
-    means="The curves for α = 0.0075 and for 0.0125, a quarter less and more than the settled 0.01, are both "
-    "farther than 0.05 ω₀ (root mean square) from it.",
-    why=SUPERIMPOSED_WHY,
+@_of_programs(
+    "cost-intervals",
+    "Supp. Fig. 1c",
+    "Computing time grows roughly as N², N being N_t, the number of time intervals of section 5 (the P that the "
+    "sentence before calls most critical).",
+    "The exponent of P in the counted work is 1.8 to 2.2.",
+    SQUARE_WHY,
 )
-def _sensitive_to_drag(flights: Flights) -> Iterator[Reading]:
-    settled = flights.at("drag", 0.01)
-    off = {drag: observe.distance(flights.at("drag", drag), settled) for drag in (0.0075, 0.0125)}
-    name = "distance of the curves for α = 0.0075 and 0.0125 from that for 0.01, the smaller"
-    note = ", ".join(f"{value:.3f} for {drag:g}" for drag, value in off.items())
-    yield Reading(name, min(off.values()), OMEGA, at_least(SUPERIMPOSED), note=note)
+def _cost_of_intervals(_: Flights, program: str = "MATLAB") -> Iterator[Reading]:
+    _n, of_p = _exponents(program)
+    yield Reading("exponent of P in the work", of_p, "", SQUARE, note=_counted(program))
 
 
-@_of_drag(
-    "strong-drag-impedes",
-    place="section 5, Fig. 6a",
-    says="For α ≥ 0.0125 drag keeps water from spreading over the whole bottle.",
-    means="At most half as much water as for α = 0 is ever in the cap's half of the bottle at once.",
-    why="Half is a choice of ours for “impeded”.",
+def _exponents(program: str) -> tuple[float, float]:
+    return exponents_of_cost(copies_history=program == "MATLAB")
+
+
+def _counted(program: str) -> str:
+    return f"array elements that the {program} program touches, 250 to 1000 of each; no clock"
+
+
+@_of_programs(
+    "cost-steps",
+    "Supp. Fig. 1b, 1c",
+    "Of N and P, P is what limits computing time.",
+    "The exponent of P in the counted work exceeds that of N by 0.1 at least.",
+    "The sentence is a comparison; 0.1 is what counting from 250 to 1000 leaves open.",
 )
-def _strong_drag_impedes(flights: Flights) -> Iterator[Reading]:
-    free = observe.largest_share_near_cap(flights.at("drag", 0.0))
-    for drag in STRONG_DRAGS:
-        share = observe.largest_share_near_cap(flights.at("drag", drag)) / free
-        name = f"most water in the cap's half at once for α = {drag:g}, by that for α = 0"
-        yield Reading(name, share, "", at_most(0.5), note=f"{100 * free:.0f} % of the water for α = 0")
+def _cost_of_steps(_: Flights, program: str = "MATLAB") -> Iterator[Reading]:
+    of_n, of_p = _exponents(program)
+    note = f"{of_p:.2f} and {of_n:.2f} in the {program} program"
+    yield Reading("exponent of P minus exponent of N in the work", of_p - of_n, "", at_least(0.1), note=note)
 
 
-def _angle_grows_again_with_drag(flights: Flights) -> Iterator[Reading]:
-    turned = flights.measured("drag", lambda run: math.degrees(float(run.theta[-1])))
-    rising = [turned[b] - turned[a] for a, b in pairwise(sorted(turned)) if b in STRONG_DRAGS]
-    note = ", ".join(f"{angle:.0f}° for {drag:g}" for drag, angle in turned.items())
-    yield Reading("θ(T) for α = 0 minus that for 0.01", turned[0.0] - turned[0.01], "°", at_least(0.0), note=note)
-    yield Reading("growth of θ(T) from one α to the next from 0.0125 on, the least", min(rising), "°", at_least(0.0))
-
-
-def _strong_drag_turns_back(flights: Flights) -> Iterator[Reading]:
-    lowest = {drag: float(observe.normalised(flights.at("drag", drag)).min()) for drag in STRONG_DRAGS}
-    drag, least = min(lowest.items(), key=itemgetter(1))
-    note = f"for α = {drag:g}; Eq. 12 keeps the sign of ω, so that θ can never turn back"
-    yield Reading("lowest ω", least, OMEGA, at_most(0.0), note=note)
-
-
-def _strong_drag_oscillates(flights: Flights) -> Iterator[Reading]:
-    for drag in STRONG_DRAGS:
-        name = f"largest climb over the lowest ω until then, α = {drag:g}"
-        yield Reading(name, observe.climb(flights.at("drag", drag)), OMEGA, at_least(FLAT))
-
-
-_oscillates: Final = _of_drag(
-    "strong-drag-oscillates",
-    place="section 5, Fig. 6c",
-    says="For α ≥ 0.0125 ω oscillates.",
-    means="ω climbs by 0.1 ω₀ or more over its lowest value until then.",
-    why=FLAT_WHY,
-)(_strong_drag_oscillates)
-
-_turns_back: Final = _of_drag(
-    "strong-drag-turns-back",
-    place="section 5, Fig. 6b",
-    says="For α ≥ 0.0125 θ varies non-monotonically.",
-    means="The slope of θ(t), which is ω, falls and rises again by 0.1 ω₀ or more. θ itself cannot turn back: by "
-    "Eq. 12 ω keeps its sign. This sense rests on the number of the next statement.",
-    why=FLAT_WHY,
-    otherwise={
-        "as θ(T) over α, which falls up to 0.01 and grows from 0.0125 on": _angle_grows_again_with_drag,
-        "by the letter, as θ(t) turning back": _strong_drag_turns_back,
-    },
-)(_strong_drag_oscillates)
-
-
-@_of_drag(
-    "no-drag-rises",
-    place="section 5, Fig. 6",
-    says="For α = 0 ω increases late.",
-    means="ω over the last tenth of the flight lies at least 0.1 ω₀ over the plateau.",
-    why=FLAT_WHY,
+@states(
+    "steps-enough",
+    place="section 5, Supp. Fig. 1a",
+    says="P = 1000 time steps are enough.",
+    means="More steps change ω by at most 0.01 ω₀ (root mean square). For Eq. 8 the exact step at P = 1000 is held "
+    "against the solution event by event.",
+    throw="M̃ = 0.25, 0.5 and 0.75, α = 0.01 kg/s, β = −0.5",
+    why="0.01 ω₀ is a hundredth of the axis: a fifth of “superimposed”.",
+    of_steps=True,
+    judges=(PUBLISHED, "eq8"),
+    silent="it is only solved event by event, with time steps of its own choice",
 )
-def _no_drag_rises_late(flights: Flights) -> Iterator[Reading]:
-    rise = observe.late_rise(flights.at("drag", 0.0))
-    yield Reading("late rise over the plateau for α = 0", rise, OMEGA, at_least(FLAT))
+def _steps_are_enough(flights: Flights) -> Iterator[Reading]:
+    off, against, fewer = {}, "the event-driven solution", ""
+    for filling in numbers("figure-S1-filling"):
+        own = flights.at("filling", filling)
+        if flights.solver == PUBLISHED:
+            off[filling] = observe.distance(own, flights.run(many_steps_key(filling)))
+        else:
+            off[filling] = observe.distance(flights.run(same_steps_key(filling)), own)
+    if flights.solver == PUBLISHED:
+        against, fewer = f"P = {MANY_STEPS}", _fewer_steps(flights)
+    worst, most = max(off.items(), key=itemgetter(1))
+    others = ", ".join(f"{off[filling]:.2g} at {filling:g}" for filling in off if filling != worst)
+    note = f"largest at M̃ = {worst:g}; {others}{fewer}"
+    yield Reading(f"distance of P = {paper_steps()} from {against}", most, OMEGA, at_most(0.01), note=note)
 
 
-def _moderate_drag_is_flat(flights: Flights, drag: float) -> Iterator[Reading]:
-    run = flights.at("drag", drag)
-    yield from flat_plateau(run)
-    yield Reading("time to half the drop", observe.drop_time(run), "of T", at_most(0.25))
-
-
-MODERATE: Final = tuple(
-    _of_drag(
-        f"moderate-drag-flat-{drag:g}",
-        place="section 5, Fig. 6c",
-        says=f"For α from 0.0075 to 0.01 ω drops suddenly to a flat plateau: at α = {drag:g}.",
-        means="Half the drop is done by T/4, the last tenth of the flight lies at most 0.1 ω₀ over the plateau, "
-        "and ω never climbs by more than 0.1 ω₀ over its lowest value until then.",
-        why=f"A quarter of the flight is a choice of ours for “sudden”. {FLAT_WHY}",
-    )(partial(_moderate_drag_is_flat, drag=drag))
-    for drag in (0.0075, 0.01)
-)
-
-
-OF_DRAG: Final = (_sensitive_to_drag, _strong_drag_impedes, _turns_back, _oscillates, _no_drag_rises_late, *MODERATE)
-"""Statements on Fig. 6, in the order of the paper."""
+def _fewer_steps(flights: Flights) -> str:
+    """Return what a tenth of the steps does, and to the paper's plateau: its points then span a fifth of the flight."""
+    fewer = flights.at("steps 0.5", 100)
+    apart = observe.distance(fewer, flights.at("filling", 0.5))
+    points, time = observe.level_by_points(fewer), observe.level(fewer)
+    return (
+        f"; P = 100 is {apart:.2g} off at 0.5, and there the average over points is {points:.3f}, "
+        f"the mean over time {time:.3f}"
+    )
