@@ -19,20 +19,13 @@ class Case:
 
     Parameters
     ----------
-    key : str
-        Names the throw; cases of several families with one key are one throw.
-    value : float
-        What varies in the family, in the paper's sense and in SI units (beta is negative).
-    scenario : Scenario
-        With the paper's number of slices.
-    steps : int
-        P, points in time of the published program and of the output of the other solvers.
-    slices_vary : bool
-        Whether the number of slices is the subject, so that no solver may take another.
-    whole : bool
-        Whether slices are looked at, so that all solvers must store them.
-    thin : int
-        Every how many of its points are kept; a divisor of ``steps`` - 1.
+    key : str - names the throw; cases of several families with one key are one throw
+    value : float - what varies in the family, in the paper's sense and in SI units (beta is negative)
+    scenario : Scenario - with the paper's number of slices
+    steps : int - P, points in time of the published program and of the output of the other solvers
+    slices_vary : bool - whether the number of slices is the subject, so that no solver may take another
+    whole : bool - whether slices are looked at, so that all solvers must store them
+    thin : int - every how many of its points are kept; a divisor of ``steps`` - 1
     """
 
     key: str
@@ -60,8 +53,7 @@ def bottle_of_aspect(aspect: float) -> Bottle:
 
     Parameters
     ----------
-    aspect : float
-        L / 2R, positive.
+    aspect : float - L / 2R, positive
     """
     bottle = paper_throw().bottle
     own = bottle.length / (2 * bottle.radius)
@@ -147,7 +139,6 @@ def all_cases() -> dict[str, Case]:
     found: dict[str, Case] = {}
     for members in FAMILIES.values():
         for case in members:
-            known = found.get(case.key)
-            if known is None or (case.whole and not known.whole):
+            if case.whole or case.key not in found:
                 found[case.key] = case
     return found

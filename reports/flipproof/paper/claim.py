@@ -50,11 +50,12 @@ def judge(statement: Statement, flights: Flights) -> Judgement:
         return Judgement(solver=flights.solver, silent=statement.silent)
     if statement.of_steps:
         flights = replace(flights, half_steps=None)
-    others = tuple((words, _judge(read, flights)) for words, read in statement.otherwise)
-    return replace(_judge(statement.read, flights), others=others)
+    others = tuple((words, judge_sense(read, flights)) for words, read in statement.otherwise)
+    return replace(judge_sense(statement.read, flights), others=others)
 
 
-def _judge(read: Read, flights: Flights) -> Judgement:
+def judge_sense(read: Read, flights: Flights) -> Judgement:
+    """Return the judgement of one equation in one sense of the text."""
     flights = replace(flights, seen={})
     try:
         return Judgement(solver=flights.solver, readings=banded(read, flights), flown=flights.flown)

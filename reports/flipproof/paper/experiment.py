@@ -13,9 +13,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from flipproof.frame.solvers import Missing
 from flipproof.paper.cases import ICE
-from flipproof.paper.claim import banded
+from flipproof.paper.claim import judge_sense
 from flipproof.paper.claims_figures_6_7 import CLEAR, filling_of_slow_down
 from flipproof.paper.observe import FLAT, Flights, climb, normalised, steady_level
 from flipproof.paper.parameters import paper_throw
@@ -27,9 +26,6 @@ CAVEAT: Final = (
     "What is compared here is the text of the paper, not its data: the curves of its Fig. 4 are not available as "
     "numbers, and a statement such as “close to” is given a width that is chosen here."
 )
-
-ROUND_OFF: Final = 1e-12
-"""Misses that differ by less are one: arithmetic alone explains the rest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,7 +75,8 @@ class Observation:
         if not misses or not self.ranked:
             return ()
         least, band = min(misses.values())
-        return tuple(solver for solver, (miss, own) in misses.items() if miss <= least + band + own + ROUND_OFF)
+        # Arithmetic alone explains a difference below 1e-12.
+        return tuple(solver for solver, (miss, own) in misses.items() if miss <= least + band + own + 1e-12)
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the statement as JSON-ready data."""
@@ -235,12 +232,11 @@ def compare(observation: Observation, flights: Flights) -> Reading:
     def read(each: Flights) -> Iterator[Reading]:
         yield Reading(observation.means, observation.read(each), observation.unit, bounds)
 
-    flights = replace(flights, seen={})
-    try:
-        (reading,) = banded(read, flights)
-    except Missing as reason:
-        return Reading(observation.means, math.nan, observation.unit, bounds, note=str(reason))
-    return replace(reading, note="; ".join(filter(None, (observation.numbers(flights), flights.flown))))
+    judgement = judge_sense(read, flights)
+    if judgement.aside:
+        return Reading(observation.means, math.nan, observation.unit, bounds, note=judgement.aside)
+    note = "; ".join(filter(None, (observation.numbers(flights), judgement.flown)))
+    return replace(judgement.readings[0], note=note)
 
 
 def compare_all(flights: Sequence[Flights]) -> tuple[Observation, ...]:

@@ -40,11 +40,9 @@ class Line:
 
     Parameters
     ----------
-    label : str
-        The same in every panel for the same throw.
+    label : str - the same in every panel for the same throw
     x, y : arrays of equal shape (P,)
-    look : mapping
-        Keywords of matplotlib's ``plot``: ``ranked``, ``dots`` and ``DASHED`` make them.
+    look : mapping - keywords of matplotlib's ``plot``: ``ranked``, ``dots`` and ``DASHED`` make them
     """
 
     label: str

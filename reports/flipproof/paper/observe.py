@@ -90,12 +90,8 @@ class Flights:
         """Slices of the flights looked at, and their time steps where they were chosen; empty if there were none."""
         slices = [run.scenario.n_slices for run in self.seen.values() if not run.scenario.frozen]
         steps = [run.settings["steps"] for run in self.seen.values() if run.settings.get("steps")]
-        return ", ".join(f"{name} = {_span(counts)}" for name, counts in (("N", slices), ("P", steps)) if counts)
-
-
-def _span(counts: list[int]) -> str:
-    low, high = min(counts), max(counts)
-    return f"{low}" if low == high else f"{low} to {high}"
+        ends = ((name, min(counts), max(counts)) for name, counts in (("N", slices), ("P", steps)) if counts)
+        return ", ".join(f"{name} = {low}" + (f" to {high}" if high > low else "") for name, low, high in ends)
 
 
 # ---------------------------------------------------------------------- numbers of one flight
@@ -152,9 +148,17 @@ def drop_time(run: Trajectory) -> float:
     return float(run.t[k - 1] + share * (run.t[k] - run.t[k - 1])) / run.scenario.duration
 
 
-def distance(run: Trajectory, other: Trajectory) -> float:
-    """Return the root-mean-square difference of two omega / omega_0 over t / T."""
-    return _distance_at(run, other, run.t / run.scenario.duration)
+def distance(run: Trajectory, other: Trajectory, stretch: float = 1.0, delay: float = 0.0) -> float:
+    """Return the root-mean-square difference of two omega / omega_0 over t / T; NaN without stretch or delay.
+
+    The other flight is read ``stretch`` times faster and ``delay`` earlier.
+    """
+    if not math.isfinite(stretch + delay):
+        return math.nan
+    there = run.t / run.scenario.duration / stretch - delay
+    both = (there >= 0.0) & (there <= 1.0)
+    curve = np.interp(there[both], other.t / other.scenario.duration, normalised(other))
+    return float(np.sqrt(np.mean((normalised(run)[both] - curve) ** 2)))
 
 
 def shape_distance(run: Trajectory, other: Trajectory) -> float:
@@ -162,25 +166,12 @@ def shape_distance(run: Trajectory, other: Trajectory) -> float:
 
     What is left is a difference of shape: one curve that takes longer to fall, all along, is the same.
     """
-    stretch = drop_time(run) / drop_time(other)
-    if not math.isfinite(stretch):
-        return float("nan")
-    return _distance_at(run, other, run.t / run.scenario.duration / stretch)
+    return distance(run, other, stretch=drop_time(run) / drop_time(other))
 
 
 def delayed_distance(run: Trajectory, other: Trajectory) -> float:
     """Return ``distance`` with one flight moved in time so that both reach half their drop at once; NaN as above."""
-    delay = drop_time(run) - drop_time(other)
-    if not math.isfinite(delay):
-        return float("nan")
-    return _distance_at(run, other, run.t / run.scenario.duration - delay)
-
-
-def _distance_at(run: Trajectory, other: Trajectory, there: FloatArray) -> float:
-    """Return the root-mean-square difference of ``run`` from ``other`` read at its shares ``there`` of the flight."""
-    both = (there >= 0.0) & (there <= 1.0)
-    curve = np.interp(there[both], other.t / other.scenario.duration, normalised(other))
-    return float(np.sqrt(np.mean((normalised(run)[both] - curve) ** 2)))
+    return distance(run, other, delay=drop_time(run) - drop_time(other))
 
 
 def largest_share_near_cap(run: Trajectory) -> float:

@@ -192,8 +192,7 @@ def paper_throw(filling: float = 0.5) -> Scenario:
 
     Parameters
     ----------
-    filling : float
-        M_tilde = M_w / M_max, in (0, 1].
+    filling : float - M_tilde = M_w / M_max, in (0, 1]
 
     Raises
     ------

@@ -70,10 +70,8 @@ class PaperRuns:
 
     Parameters
     ----------
-    made : mapping name -> Made
-        Without the runs that are not planned.
-    costs : tuple of Cost
-        Of every solver over numbers of slices and steps; empty if they were not asked for.
+    made : name -> Made, of the runs that are planned
+    costs : of every solver over numbers of slices and steps; empty if they were not asked for
     """
 
     made: Mapping[Name, Made]
