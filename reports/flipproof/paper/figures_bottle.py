@@ -85,12 +85,6 @@ def _draw_bottle(axes: Axes, pose: Pose, cap: FloatArray) -> None:
     axes.plot(*centre, "o", color=RED, markersize=5, label="centre of mass", linestyle="none")
 
 
-def _set_range(axes: Axes, x: tuple[float, float], y: tuple[float, float]) -> None:
-    axes.set_aspect("equal")
-    axes.set_xlim(*x)
-    axes.set_ylim(*y)
-
-
 # ---------------------------------------------------------------------- Fig. 2b
 
 
@@ -104,8 +98,7 @@ def figure_rest_and_motion(poses: tuple[Pose, ...]) -> Figure:
         _draw_bottle(axes, pose, np.array([0.14, length / 2]) - pose.along(length / 2))
         for x, words in ((-0.12, "at rest"), (0.14, f"after {MOMENT:g} s")):
             axes.text(x, -0.035, words, ha="center", va="top", fontsize=9)
-        _set_range(axes, (-0.2, 0.32), (-0.08, 0.33))
-        axes.set_xlabel("x [m]")
+        axes.set(aspect="equal", xlim=(-0.2, 0.32), ylim=(-0.08, 0.33), xlabel="x [m]")
         head(axes, pose.solver)
     row[0].set_ylabel("y [m]")
     legend_below(figure, row, 1)
@@ -166,7 +159,7 @@ def figure_vectors(rows: tuple[tuple[Vectors, ...], ...]) -> Figure:
                 width=0.006, headwidth=4.0,
             )  # fmt: skip
             axes.plot(*motion.centre.T, color=RED, linewidth=1.2, label="centre of mass")
-            _set_range(axes, (low[0], high[0]), (low[1], high[1]))
+            axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
             box = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
             axes.text(0.98, 0.97, heading, transform=axes.transAxes, ha="right", va="top", fontsize=9, bbox=box)
             if k == 0:
@@ -230,8 +223,7 @@ def figure_tipping(poses: tuple[Pose, ...]) -> Figure:
         _draw_bottle(axes, pose, cap_of_tipping(pose))
         axes.plot([0.0, 0.0], [0.0, 0.36], color=RED, linestyle=":", linewidth=1.4)
         axes.text(0.16, 0.33, f"θ_c = {math.degrees(pose.theta):.1f}°", ha="right", va="top", fontsize=10)
-        _set_range(axes, (-0.24, 0.17), (-0.03, 0.37))
-        axes.set_xlabel("x [m]")
+        axes.set(aspect="equal", xlim=(-0.24, 0.17), ylim=(-0.03, 0.37), xlabel="x [m]")
         if pose.solver:
             head(axes, pose.solver)
         else:

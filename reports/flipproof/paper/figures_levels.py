@@ -44,17 +44,13 @@ class Points:
         return panels.listed(lambda solver: {f"{fill:g}": value for fill, value in self.values[solver].items()}, digits)
 
 
-def _points(
-    runs: PaperRuns, label: str, family: str, of: Callable[[Trajectory], float | None], *, filled: bool
-) -> Points:
-    values = {solver: {case.value: of(run) for case, run in runs.members(solver, family)} for solver in SOLVERS}
+def _points(runs: PaperRuns, label: str, family: str, of: Callable[[Trajectory], float], *, filled: bool) -> Points:
+    """Return the points where there is a number, which is finite."""
+    found = {solver: {case.value: of(run) for case, run in runs.members(solver, family)} for solver in SOLVERS}
     return Points(
         label,
         filled,
-        {
-            solver: {filling: value for filling, value in found.items() if value is not None and math.isfinite(value)}
-            for solver, found in values.items()
-        },
+        {solver: {at: value for at, value in by.items() if math.isfinite(value)} for solver, by in found.items()},
     )
 
 
@@ -122,9 +118,9 @@ def exhibits_9c(runs: PaperRuns) -> Iterator[Exhibit]:
 
 
 def _at_two_moments(runs: PaperRuns, of: Callable[[Moment], float]) -> tuple[Points, Points]:
-    def upright(run: Trajectory) -> float | None:
+    def upright(run: Trajectory) -> float:
         moment = next_upright(run)
-        return None if moment is None else of(moment)
+        return math.nan if moment is None else of(moment)
 
     def landed(run: Trajectory) -> float:
         return of(moment_at(run, float(run.t[-1])))
