@@ -13,7 +13,6 @@ import numpy as np
 from flipproof.figures.style import solver_style
 from flipproof.frame.exhibit import Exhibit
 from flipproof.paper import figures_panels as panels
-from flipproof.paper.costs import Cost
 from flipproof.paper.figures_panels import Axis, Grid, Line
 from flipproof.paper.observe import level_by_points, steady_level
 from flipproof.paper.parameters import paper_throw
@@ -134,20 +133,13 @@ def _at_two_moments(runs: PaperRuns, of: Callable[[Moment], float]) -> tuple[Poi
 # ---------------------------------------------------------------------- computing time
 
 
-def exhibits_s1b(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield what a run costs over its number of slices."""
-    axis = Axis("slices N [1]", "N [1]", log=True)
-    yield _cost_exhibit(runs.costs, "S1b", "what a run costs over its number of slices N", axis, "slices", "steps")
-
-
-def exhibits_s1c(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield what a run costs over its number of time steps."""
-    axis = Axis("time steps or output times P [1]", "P [1]", log=True)
-    yield _cost_exhibit(runs.costs, "S1c", "what a run costs over its number of time steps P", axis, "steps", "slices")
-
-
-def _cost_exhibit(costs: Sequence[Cost], name: str, title: str, x: Axis, over: str, kept: str) -> Exhibit:
-    """Return cost ``over`` one of slices and steps, a curve for each value of the other one."""
+def exhibits_cost(over: str, runs: PaperRuns) -> Iterator[Exhibit]:
+    """Yield what a run costs over its number of "slices" or "steps", a curve for each value of the other one."""
+    name, words, x, kept, symbol = {
+        "slices": ("S1b", "slices N", Axis("slices N [1]", "N [1]", log=True), "steps", "P"),
+        "steps": ("S1c", "time steps P", Axis("time steps or output times P [1]", "P [1]", log=True), "slices", "N"),
+    }[over]
+    costs = runs.costs
     every = sorted({getattr(cost, kept) for cost in costs})
 
     def lines(solver: str, of: str) -> Iterator[Line]:
@@ -156,18 +148,17 @@ def _cost_exhibit(costs: Sequence[Cost], name: str, title: str, x: Axis, over: s
             if len(own) > 1:
                 x, y = np.array(sorted((getattr(cost, over), getattr(cost, of)) for cost in own), dtype=np.float64).T
                 look = {**panels.ranked(rank, len(every)), "marker": "o", "markersize": 4.0}
-                yield Line(f"{'P' if kept == 'steps' else 'N'} = {value}", x, y, look)
+                yield Line(f"{symbol} = {value}", x, y, look)
 
     work = Axis("work [slice evaluations]", "work [1]", log=True)
     seconds = Axis("processor time [s]", "processor time [s]", log=True)
     rows = (panels.row_of(work, partial(lines, of="work")), panels.row_of(seconds, partial(lines, of="seconds")))
     own = [cost for cost in costs if cost.solver == PUBLISHED]
-    most = max(getattr(cost, kept) for cost in own)
-    ends = sorted((getattr(cost, over), cost.work) for cost in own if getattr(cost, kept) == most)
+    ends = sorted((getattr(cost, over), cost.work) for cost in own if getattr(cost, kept) == every[-1])
     (few, less), (many, more) = ends[0], ends[-1]
     exponent = math.log(more / less) / math.log(many / few)
-    return panels.exhibit_grid(
-        name, title,
+    yield panels.exhibit_grid(
+        name, f"what a run costs over its number of {words}",
         "Counted work above, processor time of this machine below. The published program's work is N P by "
         "construction, straight and of slope 1; its time is this program's compiled loop and bends where the fixed "
         "cost of a run dominates. The others evaluate their right-hand side as often as the impacts ask; their output "
@@ -182,7 +173,7 @@ RECIPES: Final[dict[str, panels.Recipe]] = {
     "7b": (("filling",), exhibits_7b),
     "9b": (("filling", "long"), exhibits_9b),
     "9c": (("filling", "long"), exhibits_9c),
-    "S1b": ((), exhibits_s1b),
-    "S1c": ((), exhibits_s1c),
+    "S1b": ((), partial(exhibits_cost, "slices")),
+    "S1c": ((), partial(exhibits_cost, "steps")),
 }
 """Figure -> the families it needs, and how it is made."""
