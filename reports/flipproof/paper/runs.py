@@ -32,10 +32,8 @@ FINEST: Final = 200
 HALVED: Final = ("filling", "long", "drag", "spin", "angle", "aspect")
 """Families flown with half the slices too; in the others their number is the subject."""
 
-SLICES: Final = {"slices": "", "slices at 5 /s": " at 5 /s"}
-"""Families in which the number of slices is the subject, and the words for their damping."""
-
-REBOUNDS: Final = ("beta", "beta at 5 /s")
+DAMPINGS: Final = ("", " at 5 /s")
+"""What the names of families end in: at the drag of the caption of Fig. 5, and at the damping of all later figures."""
 
 WEIGHTLESS: Final = "eq8-weightless"
 STEADY_FILLING: Final = 0.1
@@ -158,8 +156,8 @@ def group_calls(planned: Iterable[Planned], words: str) -> list[Call]:
 def cost_calls() -> list[Call]:
     """Return the calls that measure what runs cost."""
     published = Call(measure_published, (PUBLISHED,), "the cost of the published program", timed=True)
-    others = (solver for solver in SOLVERS if solver != PUBLISHED)
-    return [published, *(Call(measure_event_driven, (name,), f"the cost of {name}", timed=True) for name in others)]
+    others = (Call(measure_event_driven, (name,), f"the cost of {name}", timed=True) for name in SOLVERS[1:])
+    return [published, *others]
 
 
 def make_group(group: Iterable[Planned]) -> dict[Name, Made]:
@@ -195,10 +193,7 @@ def same_steps_key(filling: float) -> str:
 
 
 def finest_key(damping: str) -> str:
-    """Return the key of the flight with the most slices.
-
-    ``damping`` is "" for the drag of the caption of Fig. 5, " at 5 /s" for the damping of all later figures.
-    """
+    """Return the key of the flight with the most slices at one of ``DAMPINGS``."""
     return f"slices finest{damping}"
 
 
@@ -226,8 +221,8 @@ def _same_steps(filling: float, half: Half = "") -> Planned:
 
 def plan_further() -> Iterator[Planned]:
     """Yield the runs that no figure needs: finer in slices and in time, and without weight."""
-    for name, damping in SLICES.items():
-        many = next(case for case in family(name) if case.value == MANY_SLICES)
+    for damping in DAMPINGS:
+        many = next(case for case in family(f"slices{damping}") if case.value == MANY_SLICES)
         for solver in SOLVERS[1:]:
             yield _planned(solver, finest_key(damping), many.scenario.with_slices(FINEST))
     for filling in numbers("figure-S1-filling"):
@@ -253,8 +248,9 @@ def plan_published(half: Half) -> Iterator[Planned]:
 
     Slices are kept where statements read more than omega and theta.
     """
-    whole = {case.key for name in ("long", "drag", *REBOUNDS) for case in family(name)}
-    families = HALVED if half == "slices" else (*HALVED, *REBOUNDS, *SLICES)
+    rebounds, slices = ([f"{name}{damping}" for damping in DAMPINGS] for name in ("beta", "slices"))
+    whole = {case.key for name in ("long", "drag", *rebounds) for case in family(name)}
+    families = HALVED if half == "slices" else (*HALVED, *rebounds, *slices)
     for key, case in {case.key: case for name in families for case in family(name)}.items():
         scenario, steps, thin = _halved(case.scenario), case.steps, case.thin
         if half == "steps":
