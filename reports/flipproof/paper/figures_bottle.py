@@ -105,8 +105,7 @@ def figure_rest_and_motion(poses: tuple[Pose, ...]) -> Figure:
     return figure
 
 
-def exhibits_2b(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the bottle at rest and in motion: ten slices at the usual damping rate."""
+def _exhibits_2b(runs: PaperRuns) -> Iterator[Exhibit]:
     poses = {}
     for solver in SOLVERS:
         run = runs.trajectory(solver, "beta -0.5, 5 /s")
@@ -172,8 +171,7 @@ def figure_vectors(rows: tuple[tuple[Vectors, ...], ...]) -> Figure:
     return figure
 
 
-def exhibits_3b(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the flights of ice and water as vectors, one every 20 ms."""
+def _exhibits_3b(runs: PaperRuns) -> Iterator[Exhibit]:
     rows = []
     for case in family("flight"):
         heading = "ice, half full" if case.scenario.frozen else f"M̃ = {case.value:g}"
@@ -233,8 +231,7 @@ def figure_tipping(poses: tuple[Pose, ...]) -> Figure:
     return figure
 
 
-def exhibits_9a(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the definition of the critical toppling angle, at rest and with the water where each solver leaves it."""
+def _exhibits_9a(runs: PaperRuns) -> Iterator[Exhibit]:
     flown = [run for solver in SOLVERS if (run := runs.trajectory(solver, HALF_FULL)) is not None]
     poses = [at_rest(run.scenario, static_toppling_angle(run.scenario)) for run in flown[-1:]]
     for run in flown:
@@ -253,8 +250,8 @@ def exhibits_9a(runs: PaperRuns) -> Iterator[Exhibit]:
 
 
 RECIPES: Final[dict[str, Recipe]] = {
-    "2b": (("beta at 5 /s",), exhibits_2b),
-    "3b": (("flight",), exhibits_3b),
-    "9a": (("filling",), exhibits_9a),
+    "2b": (("beta at 5 /s",), _exhibits_2b),
+    "3b": (("flight",), _exhibits_3b),
+    "9a": (("filling",), _exhibits_9a),
 }
 """Figure -> the families it needs, and how it is made."""

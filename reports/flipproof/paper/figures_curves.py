@@ -183,7 +183,7 @@ CURVES: Final = {
 """Figure -> what it shows."""
 
 
-def exhibits_curves(name: str, runs: PaperRuns) -> Iterator[Exhibit]:
+def _exhibits_curves(name: str, runs: PaperRuns) -> Iterator[Exhibit]:
     """Yield one figure of ``CURVES``."""
     shown = CURVES[name]
     quantity = shown.quantity
@@ -211,8 +211,7 @@ def _numbers(runs: PaperRuns, quantity: Quantity, of: str, solver: str) -> dict[
     return {VARIED[of][0](case): quantity.number(run) for case, run in runs.members(solver, of)}
 
 
-def exhibits_s1a(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angular velocity for several numbers of time steps."""
+def _exhibits_s1a(runs: PaperRuns) -> Iterator[Exhibit]:
     row = panels.row_of(RELATIVE.y, partial(_steps, runs))
     yield panels.exhibit_grid(
         "S1a", "what the number of time steps P does",
@@ -257,7 +256,7 @@ POSITION: Final = Axis(
 """The range of the Python program's own plot, the cap on top."""
 
 
-def exhibits_5a(runs: PaperRuns) -> Iterator[Exhibit]:
+def _exhibits_5a(runs: PaperRuns) -> Iterator[Exhibit]:
     """Yield the paths of ten slices for three rebounds, once for each reading of the drag."""
     slices = {i: f"slice {i + 1}" for i in range(round(number("figure-5-slices")))}
     for suffix, of, words in (
@@ -273,8 +272,7 @@ def exhibits_5a(runs: PaperRuns) -> Iterator[Exhibit]:
         )  # fmt: skip
 
 
-def exhibits_6a(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the paths of the first, the middle and the last slice for the drags that the text names."""
+def _exhibits_6a(runs: PaperRuns) -> Iterator[Exhibit]:
     n = round(number("figure-6-slices"))
     slices = {0: "first slice", n // 2 - 1: "middle slice (number N/2)", n - 1: "last slice"}
     yield _paths(
@@ -321,9 +319,9 @@ def _paths(
 
 
 RECIPES: Final[dict[str, panels.Recipe]] = {
-    **{name: (shown.families, partial(exhibits_curves, name)) for name, shown in CURVES.items()},
-    "5a": (("beta", "beta at 5 /s"), exhibits_5a),
-    "6a": (("drag",), exhibits_6a),
-    "S1a": (tuple(f"steps {filling:g}" for filling in numbers("figure-S1-filling")), exhibits_s1a),
+    **{name: (shown.families, partial(_exhibits_curves, name)) for name, shown in CURVES.items()},
+    "5a": (("beta", "beta at 5 /s"), _exhibits_5a),
+    "6a": (("drag",), _exhibits_6a),
+    "S1a": (tuple(f"steps {filling:g}" for filling in numbers("figure-S1-filling")), _exhibits_s1a),
 }
 """Figure -> the families it needs, and how it is made."""

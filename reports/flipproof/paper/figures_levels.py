@@ -57,8 +57,7 @@ def _row(y: Axis, points: Sequence[Points], *extra: Line) -> panels.Row:
     return panels.row_of(y, lambda solver: (*extra, *(each.line(solver) for each in points)))
 
 
-def exhibits_7b(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the level that omega falls to over the filling, by two definitions."""
+def _exhibits_7b(runs: PaperRuns) -> Iterator[Exhibit]:
     lowest = _points(runs, "around the minimum, as the paper has it", "filling", level_by_points, filled=True)
     second = _points(runs, "mean of the second half", "filling", steady_level, filled=False)
     row = _row(Axis("ω_f / ω₀ [1]", "omega_f/omega_0 [1]", 0.0, 1.05), (lowest, second))
@@ -73,8 +72,7 @@ def exhibits_7b(runs: PaperRuns) -> Iterator[Exhibit]:
     )  # fmt: skip
 
 
-def exhibits_9b(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the critical toppling angle over the filling, at rest and in flight."""
+def _exhibits_9b(runs: PaperRuns) -> Iterator[Exhibit]:
     upright, landed = _at_two_moments(runs, lambda moment: math.degrees(moment.toppling_angle))
     fine = np.linspace(0.01, 1.0, 200)
     rest = np.degrees([static_toppling_angle(paper_throw(float(filling))) for filling in fine])
@@ -94,8 +92,7 @@ def exhibits_9b(runs: PaperRuns) -> Iterator[Exhibit]:
     )  # fmt: skip
 
 
-def exhibits_9c(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the velocity of the centre of mass on landing over the filling."""
+def _exhibits_9c(runs: PaperRuns) -> Iterator[Exhibit]:
     upright, landed = _at_two_moments(runs, lambda moment: moment.v_cm)
     found = [abs(v) for points in (upright, landed) for values in points.values.values() for v in values.values()]
     most = 1.1 * max([*found, 0.25])
@@ -133,7 +130,7 @@ def _at_two_moments(runs: PaperRuns, of: Callable[[Moment], float]) -> tuple[Poi
 # ---------------------------------------------------------------------- computing time
 
 
-def exhibits_cost(over: str, runs: PaperRuns) -> Iterator[Exhibit]:
+def _exhibits_cost(over: str, runs: PaperRuns) -> Iterator[Exhibit]:
     """Yield what a run costs over its number of "slices" or "steps", a curve for each value of the other one."""
     name, words, x, kept, symbol = {
         "slices": ("S1b", "slices N", Axis("slices N [1]", "N [1]", log=True), "steps", "P"),
@@ -170,10 +167,10 @@ def exhibits_cost(over: str, runs: PaperRuns) -> Iterator[Exhibit]:
 
 
 RECIPES: Final[dict[str, panels.Recipe]] = {
-    "7b": (("filling",), exhibits_7b),
-    "9b": (("filling", "long"), exhibits_9b),
-    "9c": (("filling", "long"), exhibits_9c),
-    "S1b": ((), partial(exhibits_cost, "slices")),
-    "S1c": ((), partial(exhibits_cost, "steps")),
+    "7b": (("filling",), _exhibits_7b),
+    "9b": (("filling", "long"), _exhibits_9b),
+    "9c": (("filling", "long"), _exhibits_9c),
+    "S1b": ((), partial(_exhibits_cost, "slices")),
+    "S1c": ((), partial(_exhibits_cost, "steps")),
 }
 """Figure -> the families it needs, and how it is made."""
