@@ -170,11 +170,9 @@ def _by_points(flights: Flights) -> str:
         for filling in time
         if abs(time[filling] - points[filling]) > 0.005
     )
-    return (
-        f"; by the paper's points {differ}"
-        if differ
-        else ("; the paper's average over points agrees with the mean over time")
-    )
+    if differ:
+        return f"; by the paper's points {differ}"
+    return "; the paper's average over points agrees with the mean over time"
 
 
 def _plateau_at(flights: Flights, filling: float, admissible: tuple[float, float]) -> Iterator[Reading]:
@@ -192,9 +190,7 @@ def _about_slowing(id_: str, says: str, place: str = "section 5, Fig. 7a") -> Ca
 
 
 _slow_down_when_full: Final = _about_slowing(
-    "full-slows",
-    "At M̃ = 1 the model slows down, although nothing can slosh.",
-    "section 5, Fig. 7a; section 6",
+    "full-slows", "At M̃ = 1 the model slows down, although nothing can slosh.", "section 5, Fig. 7a; section 6"
 )(partial(_slows_at, filling=1.0))
 
 _no_slow_down_when_nearly_empty: Final = _of_filling(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from functools import cache, partial
 from itertools import pairwise
 from operator import itemgetter
@@ -158,10 +157,8 @@ def toppling_peak() -> tuple[float, float]:
     """Return filling and angle [rad] at which Eq. 13b has its maximum, found by optimisation."""
     from scipy.optimize import minimize_scalar
 
-    throw = paper_throw()
-
     def lowered(filling: float) -> float:
-        return -static_toppling_angle(replace(throw, water_mass=filling * throw.bottle.capacity, n_slices=1))
+        return -static_toppling_angle(paper_throw(filling))
 
     found = minimize_scalar(lowered, bounds=(1e-3, 1.0), method="bounded", options={"xatol": 1e-9})
     return float(found.x), -float(found.fun)
@@ -259,7 +256,7 @@ def filling_of_change(bottle: Bottle) -> float:
 
 def surface_over_centre(filling: float) -> float:
     """Return by how much the surface of the resting water is nearer to the cap than the centre of mass [m]."""
-    throw = replace(paper_throw(), water_mass=filling * paper_throw().bottle.capacity, n_slices=1)
+    throw = paper_throw(filling)
     return centre_of_mass_at_rest(throw) - (1.0 - filling) * throw.bottle.length
 
 
