@@ -47,6 +47,6 @@ def command_paper(options: argparse.Namespace) -> int:
             bar.set_postfix_str(label, refresh=False)
             bar.update(made - bar.n)
 
-        words = make_gallery(names, options.out, progress, made_by, options.jobs, store)
+        words = make_gallery(names, options.out, progress, made_by, jobs=options.jobs, store=store)
     print(words)
     return 0
