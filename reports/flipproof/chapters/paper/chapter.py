@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Study
+from flipproof.frame.chapter import Ask, Chapter, Study
 from flipproof.paper.figures import exhibits_paper
 from flipproof.paper.runs import PaperRuns, group_calls, plan_claims, plan_figures
 from flipproof.paper.verdicts import PaperVerdicts, judge_paper
@@ -31,22 +30,12 @@ def study(ask: Ask) -> Study[Paper]:
     return Paper(runs, judge_paper(runs))
 
 
-def claims(found: Paper) -> Claims:
-    """Yield what the weight must do, and what every equation says of every statement."""
-    yield from found.verdicts.findings()
-
-
-def figures(found: Paper) -> Iterator[Exhibit]:
-    """Yield the paper's figures, drawn anew."""
-    yield from exhibits_paper(found.runs)
-
-
 CHAPTER: Final = Chapter(
     name="paper",
     title="The paper's figures and claims",
     study=study,
-    claims=claims,
-    figures=figures,
+    claims=lambda found: found.verdicts.findings(),
+    figures=lambda found: exhibits_paper(found.runs),
     template=Path(__file__).with_name("part.html.j2"),
     work={"full": None},
     summary=lambda found: {"paper": found.verdicts.to_mapping()},
