@@ -11,7 +11,7 @@ from made_up import trajectory_of
 from flipproof.chapters.paper.chapter import CHAPTER
 from flipproof.frame.flights import Flights as Answers
 from flipproof.frame.flights import Outcome
-from flipproof.frame.solvers import Missing, Run, make
+from flipproof.frame.solvers import Made, Missing, Run, make
 from flipproof.page.templating import environment
 from flipproof.paper import claims_figures_6_7, observe
 from flipproof.paper import claims_figures_8_9 as landing
@@ -55,6 +55,11 @@ def flight(scenario, curve, *, points=1001, theta=None, **told):
     return trajectory_of(scenario, t, **known | told)
 
 
+def flown(runs, solver=PUBLISHED):
+    """Return flights that were made, by their keys."""
+    return Flights(solver=solver, made={key: Made(Run(solver, run.scenario), run, 0.0) for key, run in runs.items()})
+
+
 def always(answer):
     """Return a function that gives one answer to everything."""
     return lambda _: answer
@@ -82,7 +87,7 @@ def flights_of(names, curve_of, solver=PUBLISHED, **further):
         for name in names
         for case in family(name)
     }
-    return Flights(solver=solver, runs={**runs, **further})
+    return flown({**runs, **further}, solver)
 
 
 def verdict_of(name, flights):
@@ -146,7 +151,7 @@ def test_what_a_judgement_looked_at_is_remembered():
     usual.run("filling 0.1")
     assert usual.flown == "N = 2"
     stepped = replace(flight(THROW.with_slices(50), FLAT), settings={"steps": 1000})
-    other = replace(usual, runs={**usual.runs, "filling 0.2": stepped}, seen={})
+    other = replace(usual, made=usual.made | flown({"filling 0.2": stepped}).made, seen={})
     other.at("filling", 0.1), other.at("filling", 0.2)
     assert other.flown == "N = 2 to 50, P = 1000"
 
@@ -287,7 +292,7 @@ def test_strong_drag_impedes_by_where_the_water_gets():
             r = np.full((2, 10), 0.2)
             r[1, :near] = 0.05
             runs[case.key] = flight(case.scenario.with_slices(10), FLAT, points=2, r=r, v=np.zeros_like(r))
-        return Flights(solver=PUBLISHED, runs=runs)
+        return flown(runs)
 
     assert verdict_of("strong-drag-impedes", flights(0.4)) == "holds"
     assert verdict_of("strong-drag-impedes", flights(0.8)) == "fails"
@@ -301,9 +306,9 @@ def test_sticking_slices_may_leave_only_where_their_weight_wins(weight_wins, ver
     r[60:, 0] -= 0.01
     theta = np.full(points, math.pi if weight_wins else 0.0)  # upside down, or upright
     run = flight(case.scenario, lambda s: 0.2 + 0 * s, points=points, r=r, v=np.zeros_like(r), theta=theta)
-    assert verdict_of("beta-0-sticks", Flights(solver=PUBLISHED, runs={case.key: run})) == verdict
+    assert verdict_of("beta-0-sticks", flown({case.key: run})) == verdict
     still = flight(case.scenario, FLAT, points=3, r=r[:3], v=np.zeros((3, n)))
-    assert verdict_of("beta-0-sticks", Flights(solver=PUBLISHED, runs={case.key: still})) == "holds"
+    assert verdict_of("beta-0-sticks", flown({case.key: still})) == "holds"
 
 
 def of_landing(r_cm_of, v_cm_of):
@@ -314,7 +319,7 @@ def of_landing(r_cm_of, v_cm_of):
         t = np.linspace(0.0, scenario.duration, 201)
         r_cm = r_cm_of(case) + v_cm_of(case) * (t - 1.5 * math.pi / scenario.omega0)
         runs[case.key] = flight(scenario, lambda s: 1.0 + 0 * s, points=201, r_cm=r_cm)
-    return Flights(solver=PUBLISHED, runs=runs)
+    return flown(runs)
 
 
 def test_landing_claims_read_the_moment_the_bottle_is_upright():
@@ -346,7 +351,7 @@ def test_landing_claims_read_the_moment_the_bottle_is_upright():
 
 def test_a_bottle_that_never_stands_upright_leaves_the_landing_undecided():
     runs = {case.key: flight(case.scenario.with_slices(1), lambda s: 0.1 + 0 * s) for case in family("long")}
-    judgement = judge(BY_ID["dynamic-lower"], Flights(solver=PUBLISHED, runs=runs))
+    judgement = judge(BY_ID["dynamic-lower"], flown(runs))
     assert judgement.verdict == "cannot be decided"
     assert "does not reach θ = 2π" in judgement.aside
 
@@ -358,7 +363,7 @@ def test_more_steps_must_not_move_the_curve():
 
     assert verdict_of("steps-enough", flights(0.301)) == "holds"
     assert verdict_of("steps-enough", flights(0.4)) == "fails"
-    assert verdict_of("steps-enough", Flights(solver="free-flight", runs={})) == "not judged"
+    assert verdict_of("steps-enough", flown({}, "free-flight")) == "not judged"
 
 
 # ---------------------------------------------------------------------- geometry and counts
@@ -370,7 +375,7 @@ def test_toppling_angle_peaks_at_45_degrees_where_the_paper_says():
     assert math.degrees(angle) == pytest.approx(45.2, abs=0.3)
     # At the optimum the derivative of (1 - eps) M / 2 + eps / 2 vanishes: (M + b)^2 = b (1 + b), with b = M_b / M_max.
     assert filling == pytest.approx(math.sqrt(0.028 * 1.028) - 0.028, abs=1e-6)
-    assert judge(BY_ID["toppling-peak"], Flights(solver="geometry", runs={})).verdict == "holds"
+    assert judge(BY_ID["toppling-peak"], flown({}, "geometry")).verdict == "holds"
 
 
 def test_water_at_rest_reaches_the_centre_of_mass_where_the_toppling_angle_peaks():
@@ -410,7 +415,7 @@ def test_free_flight_throws_water_to_the_cap_from_that_filling_on(filling, over)
 
 
 def test_launch_speed_and_spin_of_the_paper_agree_in_order_of_magnitude_only():
-    judgement = judge(BY_ID["release-spin"], Flights(solver="geometry", runs={}))
+    judgement = judge(BY_ID["release-spin"], flown({}, "geometry"))
     assert judgement.verdict == "holds"
     assert judgement.value == pytest.approx(9.7, abs=0.05)
     assert judgement.readings[0].admissible == pytest.approx((20.0 / math.sqrt(10.0), 20.0 * math.sqrt(10.0)))
@@ -420,13 +425,13 @@ def test_launch_speed_and_spin_of_the_paper_agree_in_order_of_magnitude_only():
 
 
 def test_the_scale_of_spin_is_that_of_gravity_over_half_a_bottle():
-    judgement = judge(BY_ID["spin-scale"], Flights(solver="geometry", runs={}))
+    judgement = judge(BY_ID["spin-scale"], flown({}, "geometry"))
     assert judgement.verdict == "holds"
     assert judgement.value == pytest.approx(math.sqrt(9.81 / 0.14))
 
 
 def test_work_of_the_programs_is_linear_in_slices_and_square_in_intervals_only_where_history_is_copied():
-    flights = Flights(solver=PUBLISHED, runs={})
+    flights = flown({})
     found = {name: judge(BY_ID[name], flights) for name in ("cost-slices", "cost-intervals", "cost-steps")}
     python = {name: dict(each.others)["in the Python program, which copies no history"] for name, each in found.items()}
     assert {name: each.verdict for name, each in found.items()} == {
@@ -488,22 +493,23 @@ def test_half_the_slices_give_the_band_and_tolerances_are_added():
 
 
 def test_a_missing_or_broken_flight_leaves_a_claim_undecided_and_says_why():
-    nothing = Flights(solver="eq8", runs={}, reasons={"filling 0.1": "ValueError: no such bottle"})
-    judgement = judge(BY_ID["tenth-slows"], nothing)
+    failed = Made(Run("eq8", THROW, label="the tenth"), None, 0.0, "ValueError: no such bottle")
+    judgement = judge(BY_ID["tenth-slows"], Flights(solver="eq8", made={"filling 0.1": failed}))
     assert judgement.verdict == "cannot be decided"
-    assert judgement.words == "ValueError: no such bottle"
+    assert judgement.words == "the tenth: ValueError: no such bottle"
     assert not judgement.marginal
-    run = flight(THROW, FLAT)
-    stopped = replace(run, status="overflow", message="at t = 0.2 s")
-    with pytest.raises(Missing, match=r"'filling 0.1' by eq8: overflow, at t = 0.2 s"):
-        Flights(solver="eq8", runs={"filling 0.1": stopped}).run("filling 0.1")
+    stopped = replace(flight(THROW, FLAT), status="overflow", message="at t = 0.2 s")
+    with pytest.raises(Missing, match=r"eq8: overflow: at t = 0.2 s"):
+        flown({"filling 0.1": stopped}, "eq8").run("filling 0.1")
+    with pytest.raises(Missing, match=r"'filling 0.1' was not flown by eq8"):
+        flown({}, "eq8").run("filling 0.1")
     with pytest.raises(Missing, match=r"no case at 0\.37"):
-        Flights(solver="eq8", runs={}).at("filling", 0.37)
+        flown({}, "eq8").at("filling", 0.37)
 
 
 def test_other_readings_of_the_text_stand_beside_the_verdict():
     def missing(flights):
-        yield flights.run("never")
+        yield flights.run("a third")
 
     twofold = Statement(
         id="x", place="", says="", means="", throw="", why="",
@@ -513,13 +519,13 @@ def test_other_readings_of_the_text_stand_beside_the_verdict():
             ("a third", missing),
         ),
     )  # fmt: skip
-    judgement = judge(twofold, Flights(solver="s", runs={}, reasons={"never": "not flown"}))
+    judgement = judge(twofold, flown({}, "s"))
     assert judgement.verdict == "holds"
     assert [(sense, each.verdict) for sense, each in judgement.others] == [
         ("the other way", "fails"), ("a third", "cannot be decided")
     ]  # fmt: skip
     assert judgement.words.endswith(
-        "the other way: fails, second 2 s, margin −1 s; a third: cannot be decided, not flown"
+        "the other way: fails, second 2 s, margin −1 s; a third: cannot be decided, 'a third' was not flown by s"
     )
     assert [each["sense"] for each in judgement.to_mapping()["others"]] == ["the other way", "a third"]
 
@@ -574,10 +580,10 @@ def test_gathering_keeps_what_belongs_together():
     called = {call: Outcome(call.function(*call.arguments)) for call in calls}
     runs = PaperRuns.of(Answers(made, called), calls, plan)
     assert runs.trajectory(PUBLISHED, "a").scenario.omega0 == 20.0
-    assert runs.flights("eq8").halved.runs["a"].scenario.omega0 == 10.0
+    assert runs.flights("eq8").halved.run("a").scenario.omega0 == 10.0
     assert runs.flights("eq8").half_steps is None
-    assert runs.flights(PUBLISHED).halved.runs["a"].scenario.omega0 == 15.0
-    assert runs.flights(PUBLISHED).half_steps.runs["a"].scenario.omega0 == 16.0
+    assert runs.flights(PUBLISHED).halved.run("a").scenario.omega0 == 15.0
+    assert runs.flights(PUBLISHED).half_steps.run("a").scenario.omega0 == 16.0
     assert runs.trajectory("eq8", "b") is None
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from made_up import trajectory_of
 
+from flipproof.frame.solvers import Made, Run
 from flipproof.paper import experiment
 from flipproof.paper.cases import ICE, family
 from flipproof.paper.experiment import OBSERVATIONS, Observation, closest_overall, compare, standing
@@ -29,7 +30,8 @@ def flight(scenario, level, climb=0.0, lands=360.0):
 def flights(level_of, *, ice=1.0, climb=0.0, lands=360.0):
     runs = {case.key: flight(case.scenario, level_of(case.value), climb, lands) for case in family("filling")}
     runs[ICE] = flight(paper_throw(), ice)
-    return Flights(solver=PUBLISHED, runs=runs)
+    made = {key: Made(Run(PUBLISHED, run.scenario), run, 0.0) for key, run in runs.items()}
+    return Flights(solver=PUBLISHED, made=made)
 
 
 def experimental(filling):
@@ -129,9 +131,9 @@ def test_the_equation_that_agrees_most_often_is_the_closest_overall():
 
 
 def test_a_missing_flight_is_no_number_and_says_why():
-    found = compare(BY_ID["five-times"], Flights(solver="eq8", runs={}, reasons={"filling 0.05": "no bottle"}))
+    found = compare(BY_ID["five-times"], Flights(solver="eq8", made={}))
     assert found.verdict == "cannot be decided"
-    assert found.note == "no bottle"
+    assert found.note == "'filling 0.05' was not flown by eq8"
     mapping = comparison(found, reading(0.7), reading(0.8)).to_mapping()
     assert mapping["equations"][PUBLISHED]["value"] is None
     assert mapping["closest"] == ["free-flight"]

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from flipproof.frame.solvers import Missing
+from flipproof.frame.solvers import Made, Missing
 from flipproof.paper.cases import family
 from slicemodel import Trajectory
 from slicemodel.observables import PLATEAU_SHARE, plateau, plateau_of_points, plateau_of_width
@@ -29,16 +29,14 @@ class Flights:
     Parameters
     ----------
     solver : str
-    runs : key -> Trajectory
-    reasons : key -> why there is no flight
+    made : key -> Made
     halved : the same flights with half the slices wherever their number is not the subject; None if there are none
     half_steps : the same flights with half the time steps; None if the equation chooses its own
     seen : those that were looked at
     """
 
     solver: str
-    runs: Mapping[str, Trajectory]
-    reasons: Mapping[str, str] = field(default_factory=dict)
+    made: Mapping[str, Made]
     halved: Flights | None = None
     half_steps: Flights | None = None
     seen: dict[str, Trajectory] = field(default_factory=dict)
@@ -51,11 +49,9 @@ class Flights:
         Missing
             If it was not made, or did not reach its end.
         """
-        if key not in self.runs:
-            raise Missing(self.reasons.get(key, f"{key!r} was not flown by {self.solver}"))
-        run = self.seen[key] = self.runs[key]
-        if not run.ok:
-            raise Missing(f"{key!r} by {self.solver}: {run.status}, {run.message}")
+        if key not in self.made:
+            raise Missing(f"{key!r} was not flown by {self.solver}")
+        run = self.seen[key] = self.made[key].whole
         return run
 
     def at(self, name: str, value: float) -> Trajectory:
@@ -81,7 +77,7 @@ class Flights:
         Missing
             If any flight is not there, but for those whose number of slices is too large for this solver.
         """
-        cases = [case for case in family(name) if not case.slices_vary or case.key in self.runs]
+        cases = [case for case in family(name) if not case.slices_vary or case.key in self.made]
         flown = [(case.value, self.run(case.key)) for case in cases]
         return {value: of(run) for value, run in flown if low <= value <= high}
 

@@ -90,14 +90,11 @@ class PaperRuns:
         def of(wanted: Half) -> dict[str, Made]:
             return {key: each for (by, key, half), each in self.made.items() if by == solver and half == wanted}
 
-        def flights(made: Mapping[str, Made]) -> observe.Flights:
-            runs = {key: each.trajectory for key, each in made.items() if each.trajectory is not None}
-            reasons = {key: each.reason for key, each in made.items() if each.trajectory is None}
-            return observe.Flights(solver=solver, runs=runs, reasons=reasons)
-
         usual = of("")
-        halved, half_steps = (flights(usual | own) if (own := of(half)) else None for half in HALVES)
-        return replace(flights(usual), halved=halved, half_steps=half_steps)
+        halved, half_steps = (
+            observe.Flights(solver=solver, made=usual | own) if (own := of(half)) else None for half in HALVES
+        )
+        return observe.Flights(solver=solver, made=usual, halved=halved, half_steps=half_steps)
 
     def trajectory(self, solver: str, key: str) -> Trajectory | None:
         """Return the trajectory of a case, or None if it was not planned or failed."""

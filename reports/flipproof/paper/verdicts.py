@@ -117,7 +117,7 @@ def judge_paper(runs: PaperRuns) -> PaperVerdicts:
 
 def judge_all(flights: list[Flights]) -> tuple[Statement, ...]:
     """Return every statement with its judgements, in the order of the paper."""
-    geometry = [Flights(solver="geometry", runs={})]
+    geometry = [Flights(solver="geometry", made={})]
     return tuple(
         replace(each, judgements=tuple(judge(each, by) for by in (geometry if each.of_geometry else flights)))
         for each in CLAIMS
