@@ -139,6 +139,6 @@ def all_cases() -> dict[str, Case]:
     found: dict[str, Case] = {}
     for members in FAMILIES.values():
         for case in members:
-            if case.whole or case.key not in found:
+            if case.key not in found or (case.whole and not found[case.key].whole):
                 found[case.key] = case
     return found

@@ -145,9 +145,9 @@ def drop_time(run: Trajectory) -> float:
 
 
 def distance(run: Trajectory, other: Trajectory, stretch: float = 1.0, delay: float = 0.0) -> float:
-    """Return the root-mean-square difference of two omega / omega_0 over t / T; NaN without stretch or delay.
+    """Return the root-mean-square difference of two omega / omega_0 over s = t / T.
 
-    The other flight is read ``stretch`` times faster and ``delay`` earlier.
+    The other one is stretched in time and put off: it is read at s / stretch - delay. NaN if these are not finite.
     """
     if not math.isfinite(stretch + delay):
         return math.nan
