@@ -9,11 +9,10 @@ import pytest
 
 import slicemodel
 from flipproof.chapters.vectors import published as vectors
-from flipproof.paper import cases, parameters, runs, tables
+from flipproof.paper import cases, parameters, runs
 from flipproof.paper.cases import FAMILIES, HALF_FULL, all_cases, bottle_of_aspect, family
-from flipproof.paper.examples import EXAMPLES
 from flipproof.paper.parameters import CHOSEN, PARAMETERS, number, numbers, paper_throw
-from flipproof.paper.runs import PUBLISHED, SOLVERS, plan_groups
+from flipproof.paper.runs import PUBLISHED, SOLVERS, Planned, plan_figures
 from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass_at_rest
 
@@ -42,7 +41,7 @@ def test_the_table_has_what_the_paper_states():
 
 
 def test_every_entry_says_where_it_comes_from():
-    assert len(PARAMETERS) == len({entry.name for entry in PARAMETERS.values()})
+    assert len(PARAMETERS) == len(parameters._ROWS)  # no name stands twice
     for entry in PARAMETERS.values():
         assert entry.source
         assert entry.words.endswith(".")
@@ -51,10 +50,11 @@ def test_every_entry_says_where_it_comes_from():
 
 
 def test_the_table_of_words_is_whole():
-    lines = tables.parameters_csv().splitlines()
-    assert len(lines) == 1 + len(PARAMETERS)
-    assert lines[0].startswith("name,symbol,value,unit,")
-    assert 'figure-8b-angle,theta_0,"0, 0.5236, 1.0472, 1.5708, 2.0944",rad' in tables.parameters_csv()
+    rows = parameters.parameter_rows()
+    assert len(rows) == len(PARAMETERS)
+    assert {len(row) for row in rows} == {len(parameters.HEADER)}
+    (angles,) = (row for row in rows if row[0] == "figure-8b-angle")
+    assert angles[2:4] == ("0, 0.5236, 1.0472, 1.5708, 2.0944", "rad")
 
 
 @pytest.mark.parametrize(("ask", "words"), [
@@ -164,7 +164,7 @@ def test_four_throws_are_those_of_the_published_vectors():
 
 
 def test_the_plan_flies_every_case_with_its_own_slices():
-    plan = [each.run for group in plan_groups() for each in group]
+    plan = [each.run for each in plan_figures()]
     assert len({run.label for run in plan}) == len(plan)
     by_tag = {run.label: run for run in plan}
     for solver in SOLVERS:
@@ -179,12 +179,13 @@ def test_the_plan_flies_every_case_with_its_own_slices():
 
 
 def test_a_plan_for_some_cases_has_no_others():
-    assert {each.run.label for each in plan_groups({cases.ICE})[0]} == {f"paper, {solver}, ice" for solver in SOLVERS}
+    assert {each.run.label for each in plan_figures({cases.ICE})} == {f"paper, {solver}, ice" for solver in SOLVERS}
 
 
 def test_thinning_keeps_both_ends():
     run = runs.Run(PUBLISHED, paper_throw().with_slices(3), {"steps": 10})
-    whole, thinned = (runs.make_thinned([(run, every)])[0].trajectory for every in (1, 3))
+    planned = [Planned((PUBLISHED, str(every), ""), run, every) for every in (1, 3)]
+    whole, thinned = (made.trajectory for made in runs.make_group(planned).values())
     np.testing.assert_array_equal(thinned.t, whole.t[::3])
     np.testing.assert_array_equal(thinned.r, whole.r[::3])
     assert thinned.t[-1] == whole.t[-1]
@@ -193,12 +194,25 @@ def test_thinning_keeps_both_ends():
 # ------------------------------------------------------- examples
 
 
+EXAMPLES = {
+    "2b_5_ten_slices": "beta -0.5, 5 /s", "5_caption": "beta -0.5", "5_sticking": "beta 0", "5_elastic": "beta -1",
+    "6_no_drag": "drag 0", "6_much_drag": "drag 0.0125", "7_filling_0.05": "filling 0.05",
+    "7_filling_0.10": "filling 0.1", "7_filling_0.33": "filling 0.33", "7_filling_0.50": HALF_FULL,
+    "7_filling_1.00": "filling 1", "8a_slow_spin": "spin 10", "8b_upright": "angle 0", "8c_slim": "aspect 7",
+    "9_landing": "filling 0.25, long", "3_ice": cases.ICE,
+}  # fmt: skip
+"""Name of a file -> key of the case that it must hold."""
+
+
 def test_the_examples_are_the_papers_throws():
-    there = {file.name for file in EXAMPLE_FOLDER.glob("paper_*.toml")}
-    assert there == set(EXAMPLES)
-    for name, example in EXAMPLES.items():
-        assert (EXAMPLE_FOLDER / name).read_text(encoding="utf-8") == example.text()
-        assert Scenario.from_toml(EXAMPLE_FOLDER / name) == example.scenario
+    files = {file.stem.removeprefix("paper_"): file for file in EXAMPLE_FOLDER.glob("paper_*.toml")}
+    assert set(files) == set(EXAMPLES)
+    for name, key in EXAMPLES.items():
+        first, second, text = files[name].read_text(encoding="utf-8").split("\n", 2)
+        assert first.startswith("# Fig. ")
+        assert second == "# Every key may be left out. SI units; alpha is drag, beta is -restitution."
+        assert text.lstrip() == all_cases()[key].scenario.to_toml()
+        assert Scenario.from_toml(files[name]) == all_cases()[key].scenario
 
 
 def test_parameters_cannot_be_changed():

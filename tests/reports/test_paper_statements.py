@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from flipproof.paper.claims import CLAIMS
 from flipproof.paper.statements import Judgement, Reading, Statement
+from flipproof.paper.verdicts import CLAIMS
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ def test_a_judgement_fails_with_its_first_failing_reading_and_holds_with_all():
     assert Judgement(solver="s", readings=(good, open_)).deciding is open_
     judgement = Judgement(solver="s", readings=(good, open_, bad))
     assert (judgement.verdict, judgement.deciding, judgement.value) == ("fails", bad, 2.0)
-    assert judgement.threshold == "0 to 1"
+    assert bad.threshold_text == "0 to 1"
     nothing = Judgement(solver="s", aside="no flight")
     assert nothing.verdict == "cannot be decided"
     assert math.isnan(nothing.value)
@@ -140,7 +140,7 @@ def test_a_limit_that_the_paper_admits_is_neither_success_nor_failure():
         for s, v in (("a", 0.4), ("b", 0.95))
     )
     limit = Statement(
-        id="x", place="section 1", says="A.", means="B.", throw="any", why="C.", kind="admitted limit",
+        id="x", place="section 1", says="A.", means="B.", throw="any", why="C.", read=iter, kind="admitted limit",
         judgements=(inside, outside),
     )  # fmt: skip
     claimed = replace(limit, kind="claim")
@@ -151,7 +151,7 @@ def test_a_limit_that_the_paper_admits_is_neither_success_nor_failure():
     assert [claimed.colour(each) for each in claimed.judgements] == ["pass", "fail"]
     assert [claimed.sign(each) for each in claimed.judgements] == ["✓", "✗"]
     assert limit.to_mapping()["kind"] == "admitted limit"
-    assert "has this limit" in limit.findings()[0].title
+    assert "has this limit" in next(limit.findings()).title
     assert {each.id for each in CLAIMS if each.kind == "admitted limit"} == {
         "full-slows", "tenth-slows", "low-filling-change"
     }  # fmt: skip
@@ -161,14 +161,16 @@ def test_every_statement_says_where_it_stands_what_is_measured_on_which_throw_an
     for each in CLAIMS:
         assert all((each.place, each.says, each.means, each.throw, each.why)), each.id
         assert each.place.startswith("section"), each.id
+        assert each.says.endswith("."), each.id
+        assert each.means.endswith("."), each.id
         assert not each.judges or each.silent, each.id
-    assert len({each.id for each in CLAIMS}) == len(CLAIMS)
+    assert len({each.id for each in CLAIMS}) == len(CLAIMS) == 36
 
 
 def test_findings_of_statements_cannot_fail_a_report():
     bad = Judgement(solver="s", readings=(Reading(name="x", value=2.0, unit="m", admissible=(0.0, 1.0)),))
     statement = Statement(
-        id="a", place="section 1", says="A.", means="B.", throw="any", why="C.", kind="claim",
+        id="a", place="section 1", says="A.", means="B.", throw="any", why="C.", read=iter, kind="claim",
         judgements=(bad, Judgement(solver="t")),
     )  # fmt: skip
     first, second = statement.findings()

@@ -1,4 +1,4 @@
-"""A statement before it is judged, and how it is judged: readings of the flights of one equation, with their bands.
+"""How a statement is judged: by readings of the flights of one equation, with their bands.
 
 The number of slices is cut in half for a second reading, and so is the number of time steps where an equation does not
 choose its own; what that changes, and what tolerances change in omega, is the band of a number.
@@ -7,17 +7,15 @@ choose its own; what that changes, and what tolerances change in omega, is the b
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
 from typing import Any, Final
 
-from flipproof.paper.observe import Flights, MissingFlightError
+from flipproof.frame.solvers import Missing
+from flipproof.paper.observe import Flights
 from flipproof.paper.runs import BANDS
-from flipproof.paper.statements import OMEGA, Judgement, Kind, Reading
-
-Read = Callable[..., tuple[Reading, ...]]
-"""Flights of one equation -> what is read off them; options, if it has any, are other senses of the text."""
+from flipproof.paper.statements import OMEGA, Judgement, Read, Reading, Statement
 
 FLAT_WHY: Final = "“Flat” is a word of ours for a rise of at most 0.1 ω₀: 2 rad/s of the 20 on the axis."
 SUPERIMPOSED_WHY: Final = (
@@ -25,72 +23,43 @@ SUPERIMPOSED_WHY: Final = (
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Claim:
-    """A statement before it is judged.
-
-    Parameters
-    ----------
-    id, place, says, means, throw, why, kind : as in ``Statement``
-    read : flights of one equation -> readings; raises ``MissingFlightError`` where there is nothing to read
-    otherwise : (words, read) of every other sense that the text allows
-    of_geometry : whether no motion enters
-    of_steps : whether the number of time steps is the subject, so that halving it is no band
-    judges : equations that it says something about; all of them if empty
-    silent : why it says nothing about the others
-    """
-
-    id: str
-    place: str
-    says: str
-    means: str
-    throw: str
-    why: str
-    read: Read
-    kind: Kind = "claim"
-    otherwise: tuple[tuple[str, Read], ...] = ()
-    of_geometry: bool = False
-    of_steps: bool = False
-    judges: tuple[str, ...] = ()
-    silent: str = ""
-
-
 def states(
     id_: str, *, otherwise: Mapping[str, Mapping[str, Any] | Read] = MappingProxyType({}), **about: Any
-) -> Callable[[Read], Claim]:
+) -> Callable[[Read], Statement]:
     """Return a decorator that makes a statement of what reads its numbers.
 
     Parameters
     ----------
     otherwise : words -> another sense of the text: options of the same function, or another one
-    about : as in ``Claim``
+    about : as in ``Statement``
     """
 
-    def stated(read: Read) -> Claim:
+    def stated(read: Read) -> Statement:
         senses = (
             (words, partial(read, **sense) if isinstance(sense, Mapping) else sense)
             for words, sense in otherwise.items()
         )
-        return Claim(id=id_, read=read, otherwise=tuple(senses), **about)
+        return Statement(id=id_, read=read, otherwise=tuple(senses), **about)
 
     return stated
 
 
-def judge(claim: Claim, flights: Flights) -> Judgement:
+def judge(statement: Statement, flights: Flights) -> Judgement:
     """Return the judgement of one equation; a flight that is missing leaves it undecided and says why."""
-    if claim.judges and flights.solver not in claim.judges:
-        return Judgement(solver=flights.solver, silent=claim.silent)
-    if claim.of_steps:
+    if statement.judges and flights.solver not in statement.judges:
+        return Judgement(solver=flights.solver, silent=statement.silent)
+    if statement.of_steps:
         flights = replace(flights, half_steps=None)
-    judgement = _judge(claim.read, flights)
-    return replace(judgement, others=tuple((words, _judge(read, flights)) for words, read in claim.otherwise))
+    others = tuple((words, judge_sense(read, flights)) for words, read in statement.otherwise)
+    return replace(judge_sense(statement.read, flights), others=others)
 
 
-def _judge(read: Read, flights: Flights) -> Judgement:
-    watched, seen = flights.watched()
+def judge_sense(read: Read, flights: Flights) -> Judgement:
+    """Return the judgement of one equation in one sense of the text."""
+    flights = replace(flights, seen={})
     try:
-        return Judgement(solver=flights.solver, readings=banded(read, watched), flown=seen.words)
-    except MissingFlightError as reason:
+        return Judgement(solver=flights.solver, readings=banded(read, flights), flown=flights.flown)
+    except Missing as reason:
         return Judgement(solver=flights.solver, aside=str(reason))
 
 
@@ -99,22 +68,17 @@ def banded(read: Read, flights: Flights) -> tuple[Reading, ...]:
 
     Raises
     ------
-    MissingFlightError
+    Missing
         If a flight is not there.
     """
-    readings = read(flights)
-    coarser = [read(each) for each in (flights.halved, flights.half_steps) if each is not None]
+    readings = tuple(read(flights))
+    coarser = [tuple(read(each)) for each in (flights.halved, flights.half_steps) if each is not None]
     return tuple(
         replace(
             reading,
             band=reading.band
-            + tolerance_band(flights.solver, reading)
+            + (BANDS.get(flights.solver, 0.0) if reading.unit == OMEGA else 0.0)
             + sum(abs(reading.value - others[k].value) for others in coarser),
         )
         for k, reading in enumerate(readings)
     )
-
-
-def tolerance_band(solver: str, reading: Reading) -> float:
-    """Return what the tolerances of the solver leave open in a number that is a share of omega_0; else 0."""
-    return BANDS.get(solver, 0.0) if reading.unit == OMEGA else 0.0

@@ -4,34 +4,27 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any, Final
+from functools import partial
+from itertools import product
+from typing import Any
 
 import numpy as np
 
 from flipproof.frame.solvers import solve
 from flipproof.paper.parameters import numbers, paper_steps, paper_throw
-from slicemodel import Scenario
-
-REPEATS: Final = 5
-"""Times that the published program is timed; the least time counts."""
-
-EVENT_SLICES: Final = (10, 100, 500)
-"""Numbers of slices of the timed event-driven runs."""
+from slicemodel import Scenario, Trajectory
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Cost:
     """One timed run.
 
     Parameters
     ----------
     solver : str
-    slices, steps : int
-        N, and P: steps of the published program, output times of an event-driven solver.
-    work : int
-        Slice steps N P of the published program; slices times Taylor series otherwise.
-    seconds : float
-        Processor time, compiled.
+    slices, steps : int - N, and P: steps of the published program, output times of an event-driven solver
+    work : int - slice steps N P of the published program; slices times Taylor series otherwise
+    seconds : float - processor time, compiled
     """
 
     solver: str
@@ -41,36 +34,36 @@ class Cost:
     seconds: float
 
 
+def _numbers(of: str) -> list[int]:
+    return [round(value) for value in numbers(f"figure-S1-{of}")]
+
+
 def measure_published(solver: str) -> tuple[Cost, ...]:
-    """Time the published program over the slices and steps of Supp. Fig. 1; the least of a few runs."""
+    """Time the published program over the slices and steps of Supp. Fig. 1; the least of five runs."""
     throw = paper_throw()
-    _seconds(solver, throw, {"steps": 2, "store": "summary"})  # compiles
+    _seconds(solver, throw, steps=2, store="summary")  # compiles
     costs = []
-    for slices in (round(value) for value in numbers("figure-S1-slices")):
-        for steps in (round(value) for value in numbers("figure-S1-steps")):
-            settings = {"steps": steps, "store": "summary"}
-            least = min(_seconds(solver, throw.with_slices(slices), settings)[0] for _ in range(REPEATS))
-            costs.append(Cost(solver=solver, slices=slices, steps=steps, work=slices * steps, seconds=least))
+    for slices, steps in product(_numbers("slices"), _numbers("steps")):
+        run = partial(_seconds, solver, throw.with_slices(slices), steps=steps, store="summary")
+        costs.append(Cost(solver, slices, steps, slices * steps, min(run()[0] for _ in range(5))))
     return tuple(costs)
 
 
 def measure_event_driven(solver: str) -> tuple[Cost, ...]:
     """Time an event-driven solver over slices, and over the number of output times that stands for P there."""
     throw = paper_throw()
-    _seconds(solver, throw.with_slices(1), {"times": [throw.duration / 100]})  # loads the compiled flow
+    _seconds(solver, throw.with_slices(1), times=[throw.duration / 100])  # loads the compiled flow
     costs = []
-    for slices in EVENT_SLICES:
-        for steps in (round(value) for value in numbers("figure-S1-steps")):
-            if steps < paper_steps() and slices != EVENT_SLICES[1]:
-                continue  # output times do not change the steps of these solvers: one number of slices shows that
+    for slices, steps in product((10, 100, 500), _numbers("steps")):
+        # Output times do not change the steps of these solvers: one number of slices shows that.
+        if steps >= paper_steps() or slices == 100:
             times = np.linspace(0.0, throw.duration, steps)
-            seconds, run = _seconds(solver, throw.with_slices(slices), {"times": times})
-            work = slices * int(run.diagnostics["evaluations"])
-            costs.append(Cost(solver=solver, slices=slices, steps=steps, work=work, seconds=seconds))
+            seconds, run = _seconds(solver, throw.with_slices(slices), times=times)
+            costs.append(Cost(solver, slices, steps, slices * int(run.diagnostics["evaluations"]), seconds))
     return tuple(costs)
 
 
-def _seconds(solver: str, scenario: Scenario, settings: dict[str, Any]) -> tuple[float, Any]:
+def _seconds(solver: str, scenario: Scenario, **settings: Any) -> tuple[float, Trajectory]:
     began = time.process_time()
     run = solve(solver, scenario, **settings)
     return time.process_time() - began, run

@@ -6,44 +6,31 @@ The measurements themselves are not published as numbers: a statement of the tex
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from operator import itemgetter
 from typing import Any, Final
 
 import numpy as np
 
 from flipproof.paper.cases import ICE
-from flipproof.paper.claim import banded
-from flipproof.paper.claim_runs import ClaimRuns
-from flipproof.paper.claims_filling import CLEAR, filling_of_slow_down
-from flipproof.paper.observe import FLAT, Flights, MissingFlightError, climb, normalised
+from flipproof.paper.claim import judge_sense
+from flipproof.paper.claims_figures_6_7 import CLEAR, filling_of_slow_down
+from flipproof.paper.observe import FLAT, Flights, climb, normalised, steady_level
 from flipproof.paper.parameters import paper_throw
 from flipproof.paper.runs import SOLVERS
-from flipproof.paper.statements import OMEGA, Reading, Verdict
-from slicemodel import Trajectory
-from slicemodel.observables import plateau, static_toppling_angle
+from flipproof.paper.statements import OMEGA, Reading
+from slicemodel.observables import static_toppling_angle
 
 CAVEAT: Final = (
     "What is compared here is the text of the paper, not its data: the curves of its Fig. 4 are not available as "
     "numbers, and a statement such as “close to” is given a width that is chosen here."
 )
 
-UP_TO_FIVE: Final = 0.05
-"""Share of omega_0 by which a lowest mean may miss a fifth."""
-
-VIDEOS: Final = (0.1, 0.25, 0.33, 0.5, 0.75)
-"""Fillings of the bottles that were thrown and filmed."""
-
-Value = Callable[[Flights], float]
-
-
-ROUND_OFF: Final = 1e-12
-"""Misses that differ by less are one: arithmetic alone explains the rest."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Observation:
-    """One statement of the text about the experiment.
+    """One statement of the text about the experiment, with the number of every equation.
 
     Parameters
     ----------
@@ -56,39 +43,22 @@ class Observation:
     numbers : flights -> the numbers behind, in words
     remark : str - what else must be known to judge a miss
     ranked : bool - whether a smaller miss comes closer
+    readings : solver -> Reading; a solver without flights has NaN and the reason as its note
     """
 
     id: str
     place: str
     says: str
     means: str
-    read: Value
+    read: Callable[[Flights], float]
     unit: str
     measured: tuple[float, float]
     why: str
     slack: float = 0.0
-    numbers: Callable[[Flights], str] | None = None
+    numbers: Callable[[Flights], str] = lambda _: ""
     remark: str = ""
     ranked: bool = True
-
-    def miss(self, value: float) -> float:
-        """Return by how much a number lies outside what the text gives; 0 inside."""
-        low, high = self.measured
-        return max(0.0, low - value, value - high)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Comparison:
-    """One statement with the number of every equation.
-
-    Parameters
-    ----------
-    observation : Observation
-    readings : solver -> Reading; a solver without flights has NaN and the reason as its note
-    """
-
-    observation: Observation
-    readings: Mapping[str, Reading]
+    readings: Mapping[str, Reading] = field(default_factory=dict)
 
     @property
     def closest(self) -> tuple[str, ...]:
@@ -96,77 +66,35 @@ class Comparison:
 
         None if none flew, or if misses are no measure.
         """
+        low, high = self.measured
         misses = {
-            solver: (self.observation.miss(reading.value), reading.band)
+            solver: (max(0.0, low - reading.value, reading.value - high), reading.band)
             for solver, reading in self.readings.items()
             if math.isfinite(reading.value)
         }
-        if not misses or not self.observation.ranked:
+        if not misses or not self.ranked:
             return ()
         least, band = min(misses.values())
-        return tuple(solver for solver, (miss, own) in misses.items() if miss <= least + band + own + ROUND_OFF)
-
-    def verdict(self, solver: str) -> Verdict:
-        """Return whether an equation agrees with the text."""
-        return self.readings[solver].verdict
+        # Arithmetic alone explains a difference below 1e-12.
+        return tuple(solver for solver, (miss, own) in misses.items() if miss <= least + band + own + 1e-12)
 
     def to_mapping(self) -> dict[str, Any]:
-        """Return the comparison as JSON-ready data."""
-        return {
-            "id": self.observation.id,
-            "place": self.observation.place,
-            "says": self.observation.says,
-            "means": self.observation.means,
-            "why": self.observation.why,
-            "remark": self.observation.remark,
+        """Return the statement as JSON-ready data."""
+        return {name: getattr(self, name) for name in ("id", "place", "says", "means", "why", "remark")} | {
             "closest": list(self.closest),
             "equations": {solver: reading.to_mapping() for solver, reading in self.readings.items()},
         }
 
 
-def steady_level(run: Trajectory) -> float:
-    """Return the mean of omega / omega_0 over the second half of the flight, the average of Fig. 4d."""
-    return plateau(run.t, run.omega, run.scenario.omega0)
-
-
-def ice_drift(flights: Flights) -> float:
-    """Return the largest |omega / omega_0 - 1| of the bottle of ice."""
-    return float(np.abs(normalised(flights.run(ICE)) - 1.0).max())
-
-
-def level_of(filling: float) -> Value:
-    """Return a reader of the average at one filling."""
-
-    def read(flights: Flights) -> float:
-        return steady_level(flights.at("filling", filling))
-
-    return read
-
-
-def slowest_filling(flights: Flights) -> float:
-    """Return the filling with the lowest average."""
-    levels = {case.value: steady_level(run) for case, run in flights.members("filling")}
-    return min(levels, key=lambda filling: levels[filling])
-
-
-def lowest_level(flights: Flights) -> float:
-    """Return the lowest average of all fillings."""
-    return min(steady_level(run) for _, run in flights.members("filling"))
-
-
-def climb_at_a_third(flights: Flights) -> float:
-    """Return by how much the bottle of 0.33 spins up again after it has slowed down."""
-    return climb(flights.at("filling", 0.33))
-
-
-def least_turned(flights: Flights) -> float:
-    """Return the smallest angle at landing of the fillings filmed [degrees]."""
-    return min(_landing_angles(flights).values())
+def _levels(flights: Flights) -> dict[float, float]:
+    """Return the average of Fig. 4d by filling."""
+    return flights.measured("filling", steady_level)
 
 
 def _landing_angles(flights: Flights) -> dict[float, float]:
-    """Return theta at the paper's time of landing by filling filmed [degrees]."""
-    return {filling: math.degrees(float(flights.at("filling", filling).theta[-1])) for filling in VIDEOS}
+    """Return theta at the paper's time of landing, by filling of the bottles that were thrown and filmed [degrees]."""
+    filmed = (0.1, 0.25, 0.33, 0.5, 0.75)
+    return {filling: math.degrees(float(flights.at("filling", filling).theta[-1])) for filling in filmed}
 
 
 def landing_angles_words(flights: Flights) -> str:
@@ -196,7 +124,7 @@ OBSERVATIONS: Final = (
         place="section 3, Fig. 4a",
         says="A bottle of ice keeps its angular velocity, about 20 rad/s.",
         means="largest |ω/ω₀ − 1|; every flight is released at 20 rad/s",
-        read=ice_drift,
+        read=lambda flights: float(np.abs(normalised(flights.run(ICE)) - 1.0).max()),
         unit="",
         measured=(0.0, 0.0),
         slack=0.01,
@@ -207,7 +135,7 @@ OBSERVATIONS: Final = (
         place="section 3, Fig. 4b",
         says="At M̃ = 0.33 ω first decays quickly and then stays constant.",
         means="largest climb of ω over its lowest value until then",
-        read=climb_at_a_third,
+        read=lambda flights: climb(flights.at("filling", 0.33)),
         unit=OMEGA,
         measured=(0.0, 0.0),
         slack=FLAT,
@@ -218,7 +146,7 @@ OBSERVATIONS: Final = (
         place="section 3, Fig. 4c, 4d",
         says="M̃ = 0.10 behaves very much like ice.",
         means="mean ω over the second half of the flight",
-        read=level_of(0.1),
+        read=lambda flights: steady_level(flights.at("filling", 0.1)),
         unit=OMEGA,
         measured=(1.0, 1.0),
         slack=FLAT,
@@ -229,7 +157,7 @@ OBSERVATIONS: Final = (
         place="section 3, Fig. 4d",
         says="ω/ω₀ is lowest between M̃ = 0.25 and 0.50.",
         means="filling with the lowest mean ω over the second half of the flight",
-        read=slowest_filling,
+        read=lambda flights: min(_levels(flights).items(), key=itemgetter(1))[0],
         unit="",
         measured=(0.25, 0.5),
         why="The range is the paper's.",
@@ -239,7 +167,7 @@ OBSERVATIONS: Final = (
         place="section 3, Fig. 4d",
         says="At M̃ = 0.75 ω is already clearly reduced.",
         means="mean ω over the second half of the flight, at most 0.8",
-        read=level_of(0.75),
+        read=lambda flights: steady_level(flights.at("filling", 0.75)),
         unit=OMEGA,
         measured=(0.0, CLEAR),
         why="“Significant” is taken as a fifth of ω₀.",
@@ -249,10 +177,10 @@ OBSERVATIONS: Final = (
         place="section 6",
         says="ω becomes up to five times lower than that of a rigid filling.",
         means="lowest mean ω over the second half of the flight, of all fillings",
-        read=lowest_level,
+        read=lambda flights: min(_levels(flights).values()),
         unit=OMEGA,
         measured=(0.2, 0.2),
-        slack=UP_TO_FIVE,
+        slack=0.05,
         why="A fifth, with 0.05 ω₀ either way.",
     ),
     Observation(
@@ -272,7 +200,7 @@ OBSERVATIONS: Final = (
         place="section 3, below Fig. 3",
         says="The bottle spins by more than half a revolution: θ exceeds π.",
         means="smallest θ at T = 0.5 s, of the fillings filmed",
-        read=least_turned,
+        read=lambda flights: min(_landing_angles(flights).values()),
         unit="°",
         measured=(180.0, math.inf),
         why="The sentence is an inequality.",
@@ -299,49 +227,38 @@ OBSERVATIONS: Final = (
 def compare(observation: Observation, flights: Flights) -> Reading:
     """Return the number of one equation with its band; NaN with the reason where a flight is missing."""
     low, high = observation.measured
-    admissible = (low - observation.slack, high + observation.slack)
+    bounds = (low - observation.slack, high + observation.slack)
 
-    def read(each: Flights) -> tuple[Reading, ...]:
-        value = observation.read(each)
-        return (Reading(name=observation.means, value=value, unit=observation.unit, admissible=admissible),)
+    def read(each: Flights) -> Iterator[Reading]:
+        yield Reading(observation.means, observation.read(each), observation.unit, bounds)
 
-    watched, seen = flights.watched()
-    try:
-        reading = banded(read, watched)[0]
-    except MissingFlightError as reason:
-        return Reading(
-            name=observation.means, value=math.nan, unit=observation.unit, admissible=admissible, note=str(reason)
-        )
-    numbers = observation.numbers(flights) if observation.numbers else ""
-    return replace(reading, note="; ".join(words for words in (numbers, seen.words) if words))
+    judgement = judge_sense(read, flights)
+    if judgement.aside:
+        return Reading(observation.means, math.nan, observation.unit, bounds, note=judgement.aside)
+    note = "; ".join(filter(None, (observation.numbers(flights), judgement.flown)))
+    return replace(judgement.readings[0], note=note)
 
 
-def compare_all(runs: ClaimRuns) -> tuple[Comparison, ...]:
+def compare_all(flights: Sequence[Flights]) -> tuple[Observation, ...]:
     """Return every statement about the experiment with the numbers of all equations."""
-    flights = {solver: runs.flights(solver) for solver in SOLVERS}
     return tuple(
-        Comparison(
-            observation=observation,
-            readings={solver: compare(observation, each) for solver, each in flights.items()},
-        )
-        for observation in OBSERVATIONS
+        replace(each, readings={equation.solver: compare(each, equation) for equation in flights})
+        for each in OBSERVATIONS
     )
 
 
-def agreement(comparisons: tuple[Comparison, ...]) -> dict[str, int]:
-    """Return how many statements each equation agrees with."""
+def standing(observations: Sequence[Observation]) -> dict[str, tuple[int, int]]:
+    """Return with how many statements each equation agrees, and for how many it is the closest, or one of those."""
     return {
-        solver: sum(comparison.verdict(solver) == "holds" for comparison in comparisons) for solver in SOLVERS
-    }  # fmt: skip
+        solver: (
+            sum(each.readings[solver].verdict == "holds" for each in observations),
+            sum(solver in each.closest for each in observations),
+        )
+        for solver in SOLVERS
+    }
 
 
-def times_closest(comparisons: tuple[Comparison, ...]) -> dict[str, int]:
-    """Return for how many statements each equation is the closest, or one of those."""
-    return {solver: sum(solver in comparison.closest for comparison in comparisons) for solver in SOLVERS}
-
-
-def closest_overall(comparisons: tuple[Comparison, ...]) -> tuple[str, ...]:
+def closest_overall(observations: Sequence[Observation]) -> tuple[str, ...]:
     """Return the equation that agrees with most statements; among several, those that are most often the closest."""
-    agrees, closest = agreement(comparisons), times_closest(comparisons)
-    best = max((agrees[solver], closest[solver]) for solver in SOLVERS)
-    return tuple(solver for solver in SOLVERS if (agrees[solver], closest[solver]) == best)
+    found = standing(observations)
+    return tuple(solver for solver in SOLVERS if found[solver] == max(found.values()))

@@ -6,22 +6,18 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 from flipproof.frame.exhibit import Exhibit
-from flipproof.paper import figures_bottle, figures_curves, figures_levels, figures_slices
+from flipproof.paper import figures_bottle, figures_curves, figures_levels
 from flipproof.paper.cases import family
 from flipproof.paper.runs import PaperRuns
 
-ORDER: Final = (
-    "2b", "3b", "5a", "5b", "5c", "5d", "6a", "6b", "6c", "7a", "7b", "8a", "8b", "8c", "9a", "9b", "9c",
-    "S1a", "S1b", "S1c",
-)  # fmt: skip
+RECIPES: Final = dict(sorted((figures_bottle.RECIPES | figures_curves.RECIPES | figures_levels.RECIPES).items()))
+"""Figure -> the families of throws that it shows, and what makes its exhibits."""
+
+ORDER: Final = tuple(RECIPES)
 """The figures in the paper's order. Figures 1, 2a, 3a and 4 are photographs, notation and measurements."""
 
 TIMED: Final = ("S1b", "S1c")
 """Figures that need the measured costs."""
-
-
-RECIPES: Final = figures_bottle.RECIPES | figures_slices.RECIPES | figures_curves.RECIPES | figures_levels.RECIPES
-"""Figure -> the families of throws that it shows, and what makes its exhibits."""
 
 
 def check_figures(names: Iterable[str]) -> tuple[str, ...]:

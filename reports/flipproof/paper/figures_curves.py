@@ -1,298 +1,327 @@
-"""Figures 5b-d, 6b-c, 7a, 8a-c and S1a: a quantity over time for every throw of a family, solver by solver."""
+"""Figures 5, 6, 7a, 8 and S1a: what happens over time in every throw of a family, solver by solver."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
 
 from flipproof.frame.exhibit import Exhibit
+from flipproof.paper import figures_panels as panels
 from flipproof.paper.cases import Case, family
-from flipproof.paper.figures_panels import (
-    Axis,
-    Grid,
-    Line,
-    Panel,
-    dots,
-    every_third,
-    exhibit_grid,
-    listed,
-    ramp,
-    ranked,
-    stretched,
-)
+from flipproof.paper.figures_panels import Axis, Grid, Line
+from flipproof.paper.observe import normalised, steady_level
 from flipproof.paper.parameters import number, numbers
-from flipproof.paper.runs import PUBLISHED, SOLVERS, PaperRuns
+from flipproof.paper.runs import PUBLISHED, PaperRuns
 from slicemodel import Trajectory
-from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray
 
-Quantity = Callable[[Trajectory], tuple[FloatArray, FloatArray]]
-Label = Callable[[Case], str]
-
-TIME: Final = Axis(label="time t [s]", column="t [s]", low=0.0, high=number("duration"))
-RELATIVE_TIME: Final = Axis(label="t / T [1]", column="t/T [1]", low=0.0, high=1.0)
-OMEGA: Final = Axis(label="ω [rad/s]", column="omega [rad/s]", low=0.0, high=1.1 * number("release-spin"))
-RELATIVE_OMEGA: Final = Axis(label="ω / ω₀ [1]", column="omega/omega_0 [1]", low=0.0, high=1.1)
-THETA: Final = Axis(label="θ [rad]", column="theta [rad]", low=0.0, high=3 * math.pi)
+TIME: Final = Axis("time t [s]", "t [s]", 0.0, number("duration"))
+SHARE: Final = Axis("t / T [1]", "t/T [1]", 0.0, 1.0)
 
 
-def omega_over_time(run: Trajectory) -> tuple[FloatArray, FloatArray]:
-    """Return t [s] and omega [rad/s]."""
-    return every_third(run.t), every_third(run.omega)
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """What is drawn over time.
+
+    Parameters
+    ----------
+    x, y : Axis
+    curve : flight -> abscissa and ordinate
+    plotted : str - what is drawn against what, for the alternative text
+    said : str - the number that stands for a curve there
+    number, digits : how it is read off a flight, and its digits after the point
+    """
+
+    x: Axis
+    y: Axis
+    curve: Callable[[Trajectory], tuple[FloatArray, FloatArray]]
+    plotted: str
+    said: str
+    number: Callable[[Trajectory], float]
+    digits: int = 3
 
 
-def theta_over_time(run: Trajectory) -> tuple[FloatArray, FloatArray]:
-    """Return t [s] and theta [rad]."""
-    return every_third(run.t), every_third(run.theta)
+THETA: Final = Quantity(
+    TIME,
+    Axis("θ [rad]", "theta [rad]", 0.0, 3 * math.pi),
+    lambda run: (run.t, run.theta),
+    "theta against time",
+    "Theta at 0.5 s in rad",
+    lambda run: float(run.theta[-1]),
+    digits=1,
+)
+OMEGA: Final = Quantity(
+    TIME,
+    Axis("ω [rad/s]", "omega [rad/s]", 0.0, 1.1 * number("release-spin")),
+    lambda run: (run.t, run.omega),
+    "omega against time",
+    "Mean omega over omega_0 of the second half",
+    steady_level,
+)
+RELATIVE: Final = Quantity(
+    SHARE,
+    Axis("ω / ω₀ [1]", "omega/omega_0 [1]", 0.0, 1.1),
+    lambda run: (run.t / run.scenario.duration, normalised(run)),
+    "omega over omega_0 against t over T",
+    "Mean of the second half",
+    steady_level,
+)
 
 
-def relative_omega(run: Trajectory) -> tuple[FloatArray, FloatArray]:
-    """Return t / T and omega / omega_0."""
-    return every_third(run.t / run.scenario.duration), every_third(run.omega / run.scenario.omega0)
+def _of(symbol: str, unit: str = "", shown: Callable[[float], float] = float) -> Callable[[Case], str]:
+    return lambda case: f"{symbol} = {shown(case.value):g}{unit}".replace("-", "−")
 
 
-def row_of(runs: PaperRuns, name: str, quantity: Quantity, label: Label, heading: str = "") -> tuple[Panel, ...]:
-    """Return one panel for each solver with the curves of a family."""
-    # Ranks come from the values, so that a throw that one solver does not fly leaves the others their colours.
-    values = sorted(case.value for case in family(name))
-    return tuple(
-        Panel(
-            solver=solver,
-            heading=heading,
-            lines=tuple(
-                Line(label=label(case), x=x, y=y, look=ranked(values.index(case.value), len(values)))
-                for case, run in runs.members(solver, name)
-                for x, y in [quantity(run)]
-            ),
-        )
-        for solver in SOLVERS
-    )
+VARIED: Final = {
+    "beta": (_of("β"), "α = 1 (caption), α/2m = 10 /s", "with alpha 1"),
+    "beta at 5 /s": (_of("β"), "α = 0.5, α/2m = 5 /s", "with alpha 0.5"),
+    "slices": (_of("N"), "α/2m = 10 /s kept", "at 10 per second"),
+    "slices at 5 /s": (_of("N"), "α/2m = 5 /s kept", "at 5 per second"),
+    "slices at alpha 1": (_of("N"), "α = 1 kept", "with alpha 1"),
+    "drag": (_of("α", " kg/s"), "", ""),
+    "filling": (_of("M̃"), "", ""),
+    "spin": (_of("ω₀", " rad/s"), "", ""),
+    "angle": (_of("θ₀", "°", math.degrees), "", ""),
+    "aspect": (_of("L / 2R"), "", ""),
+}
+"""Family -> label of a curve, heading of its row, and words that tell its numbers from those of other rows."""
 
 
-def plateaus(runs: PaperRuns, name: str, label: Label) -> str:
-    """Return the mean of omega / omega_0 over the second half of every flight of a family, as words for each solver."""
-    return listed(
-        {
-            solver: {
-                label(case): plateau(run.t, run.omega, run.scenario.omega0) for case, run in runs.members(solver, name)
-            }
-            for solver in SOLVERS
-        }
-    )
+@dataclass(frozen=True, slots=True)
+class Curves:
+    """A figure of one quantity over time: a row for each family, ``height`` inches high."""
 
+    quantity: Quantity
+    families: tuple[str, ...]
+    title: str
+    caption: str
+    height: float = 3.0
+    legend_columns: int = 6
 
-def turns(runs: PaperRuns, name: str, label: Label) -> str:
-    """Return theta at the end of every flight of a family [rad], as words for each solver."""
-    return listed(
-        {solver: {label(case): float(run.theta[-1]) for case, run in runs.members(solver, name)} for solver in SOLVERS},
-        digits=1,
-    )
-
-
-def _of(symbol: str, unit: str = "") -> Label:
-    return lambda case: f"{symbol} = {case.value:g}{unit}".replace("-", "−")
-
-
-BETA: Final = _of("β")
-SLICES: Final = _of("N")
-ALPHA: Final = _of("α", " kg/s")
-FILLING: Final = _of("M̃")
-READINGS: Final = (("beta", "α = 1 (caption), α/2m = 10 /s"), ("beta at 5 /s", "α = 0.5, α/2m = 5 /s"))
 
 TWO_READINGS: Final = (
     "The caption's α = 1 and the damping rate of all later figures do not agree for ten slices; the upper row takes "
     "the first, the lower row the second. "
 )
 
-
-def exhibits_5b(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angle for three rebounds."""
-    rows = tuple(row_of(runs, name, theta_over_time, BETA, heading) for name, heading in READINGS)
-    grid = Grid(rows=rows, x=TIME, y=(THETA, THETA))
-    yield exhibit_grid(
-        "5b", "what the rebound β does to the angle θ(t)",
+CURVES: Final = {
+    "5b": Curves(
+        THETA,
+        ("beta", "beta at 5 /s"),
+        "what the rebound β does to the angle θ(t)",
         f"{TWO_READINGS}Look at the end of the flight: does the elastic bottle (β = −1) turn ahead of the others?",
-        f"Line plots of theta against time, two rows by three solvers. Theta at 0.5 s in rad with alpha 1: "
-        f"{turns(runs, 'beta', BETA)}. With alpha 0.5: {turns(runs, 'beta at 5 /s', BETA)}.",
-        grid,
-    )  # fmt: skip
-
-
-def exhibits_5c(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angular velocity for three rebounds."""
-    rows = tuple(row_of(runs, name, omega_over_time, BETA, heading) for name, heading in READINGS)
-    grid = Grid(rows=rows, x=TIME, y=tuple(stretched(OMEGA, row) for row in rows))
-    yield exhibit_grid(
-        "5c", "what the rebound β does to the angular velocity ω(t)",
+        height=2.5,
+    ),
+    "5c": Curves(
+        OMEGA,
+        ("beta", "beta at 5 /s"),
+        "what the rebound β does to the angular velocity ω(t)",
         f"{TWO_READINGS}The paper has ω low and flat for β = −0.5 only, and bumpy for β = −1. In free flight no bottle "
         "speeds up late, whatever its β.",
-        "Line plots of omega against time, two rows by three solvers. Mean omega over omega_0 of the second half with "
-        f"alpha 1: {plateaus(runs, 'beta', BETA)}. With alpha 0.5: {plateaus(runs, 'beta at 5 /s', BETA)}.",
-        grid,
-    )  # fmt: skip
-
-
-def exhibits_5d(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angular velocity for several numbers of slices."""
-    rows = (
-        row_of(runs, "slices", omega_over_time, SLICES, "α/2m = 10 /s kept"),
-        row_of(runs, "slices at 5 /s", omega_over_time, SLICES, "α/2m = 5 /s kept"),
-        row_of(runs, "slices at alpha 1", omega_over_time, SLICES, "α = 1 kept"),
-    )
-    grid = Grid(rows=rows, x=TIME, y=tuple(stretched(OMEGA, row) for row in rows), legend_columns=7)
-    yield exhibit_grid(
-        "5d", "what the number of slices N does to ω(t)",
+        height=2.5,
+    ),
+    "5d": Curves(
+        OMEGA,
+        ("slices", "slices at 5 /s", "slices at alpha 1"),
+        "what the number of slices N does to ω(t)",
         "In the upper rows the damping rate α/2m is kept and the curves close up with N. With α itself kept (bottom "
         "row, another scale) the published program stands still at N = 20, where α/2m equals ω₀, and spins up beyond "
         "ω₀ with more, so that the paper cannot have meant that.",
-        "Line plots of omega against time, three rows by three solvers. Mean omega over omega_0 of the second half at "
-        f"10 per second: {plateaus(runs, 'slices', SLICES)}. At 5 per second: "
-        f"{plateaus(runs, 'slices at 5 /s', SLICES)}. With alpha 1: {plateaus(runs, 'slices at alpha 1', SLICES)}.",
-        grid,
-    )  # fmt: skip
-
-
-def exhibits_6b(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angle for several drags."""
-    grid = Grid(rows=(row_of(runs, "drag", theta_over_time, ALPHA),), x=TIME, y=(THETA,), height=3.0)
-    yield exhibit_grid(
-        "6b", "what the drag α does to the angle θ(t)",
+        height=2.5,
+        legend_columns=7,
+    ),
+    "6b": Curves(
+        THETA,
+        ("drag",),
+        "what the drag α does to the angle θ(t)",
         "The less a bottle has turned at the end, the longer its ω stayed low.",
-        f"Line plots of theta against time by three solvers. Theta at 0.5 s in rad: {turns(runs, 'drag', ALPHA)}.",
-        grid,
-    )  # fmt: skip
-
-
-def exhibits_6c(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angular velocity for several drags."""
-    grid = Grid(rows=(row_of(runs, "drag", omega_over_time, ALPHA),), x=TIME, y=(OMEGA,), height=3.0)
-    yield exhibit_grid(
-        "6c", "what the drag α does to the angular velocity ω(t)",
+    ),
+    "6c": Curves(
+        OMEGA,
+        ("drag",),
+        "what the drag α does to the angular velocity ω(t)",
         "Is there one α whose curve drops and then stays flat? In the published program there is, near the paper's "
         "choice of 0.01, because its α weakens the centrifugal force instead of damping; in free flight every curve "
         "stays low.",
-        "Line plots of omega against time by three solvers. Mean omega over omega_0 of the second half: "
-        f"{plateaus(runs, 'drag', ALPHA)}.",
-        grid,
-    )  # fmt: skip
-
-
-def exhibits_7a(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angular velocity for all fillings."""
-    grid = Grid(
-        rows=(row_of(runs, "filling", relative_omega, FILLING),), x=RELATIVE_TIME, y=(RELATIVE_OMEGA,), height=3.2
-    )
-    yield exhibit_grid(
-        "7a", "what the filling M̃ does to ω(t)",
+    ),
+    "7a": Curves(
+        RELATIVE,
+        ("filling",),
+        "what the filling M̃ does to ω(t)",
         "Look at M̃ = 0.1, which the experiment leaves at ω₀: the published program and Eq. 8 slow it down, free flight "
         "hardly does. And at M̃ = 1, which no solver keeps, because slices may overlap.",
-        "Line plots of omega over omega_0 against t over T by three solvers. Mean of the second half: "
-        f"{plateaus(runs, 'filling', FILLING)}.",
-        grid,
-    )  # fmt: skip
-
-
-def _eight(runs: PaperRuns, name: str, family_name: str, label: Label, title: str, caption: str) -> Iterator[Exhibit]:
-    rows = (row_of(runs, family_name, relative_omega, label),)
-    axis = stretched(RELATIVE_OMEGA, rows[0])
-    alt = (
-        "Line plots of omega over omega_0 against t over T by three solvers. Mean of the second half: "
-        f"{plateaus(runs, family_name, label)}."
-    )
-    yield exhibit_grid(name, title, caption, alt, Grid(rows=rows, x=RELATIVE_TIME, y=(axis,), height=3.0))
-
-
-def exhibits_8a(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angular velocity for several releases by spin."""
-    yield from _eight(
-        runs, "8a", "spin", lambda case: f"ω₀ = {case.value:g} rad/s", "what the spin at release ω₀ does",
+        height=3.2,
+    ),
+    "8a": Curves(
+        RELATIVE,
+        ("spin",),
+        "what the spin at release ω₀ does",
         "Without the gravity that Eq. 8 keeps, the spin only sets the pace: in free flight the curves fall one after "
         "the other, and none rises again. At 5 rad/s the published program's water does not move at all: its α takes "
         "(α/2m)² off ω², and here the two are equal.",
-    )  # fmt: skip
-
-
-def exhibits_8b(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angular velocity for several angles at release."""
-    yield from _eight(
-        runs, "8b", "angle", lambda case: f"θ₀ = {math.degrees(case.value):.0f}°", "what the angle at release θ₀ does",
+    ),
+    "8b": Curves(
+        RELATIVE,
+        ("angle",),
+        "what the angle at release θ₀ does",
         "In free flight the angle does nothing at all: a falling bottle cannot know where down is. What is seen in the "
         "other two is the gravity that Eq. 8 keeps.",
-    )  # fmt: skip
-
-
-def exhibits_8c(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angular velocity for several aspect ratios."""
-    yield from _eight(
-        runs, "8c", "aspect", lambda case: f"L / 2R = {case.value:g}", "what the aspect ratio does at equal volume",
+    ),
+    "8c": Curves(
+        RELATIVE,
+        ("aspect",),
+        "what the aspect ratio does at equal volume",
         "The paper's curves nearly coincide. The ratio is L / 2R, 3.5 for the paper's bottle, with volume, mass and "
         "water kept.",
-    )  # fmt: skip
+    ),
+}
+"""Figure -> what it shows."""
 
 
-def exhibits_s1a(runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield the angular velocity for several numbers of time steps."""
-    panels = []
-    for solver in SOLVERS:
-        lines = [line for filling in numbers("figure-S1-filling") for line in _steps(runs, solver, filling)]
-        panels.append(Panel(solver=solver, heading="", lines=tuple(lines)))
-    grid = Grid(rows=(tuple(panels),), x=RELATIVE_TIME, y=(RELATIVE_OMEGA,), height=3.2, legend_columns=3)
-    yield exhibit_grid(
+def _exhibits_curves(name: str, runs: PaperRuns) -> Iterator[Exhibit]:
+    """Yield one figure of ``CURVES``."""
+    shown = CURVES[name]
+    quantity = shown.quantity
+    rows = tuple(panels.row_of(quantity.y, partial(_lines, runs, quantity, of), VARIED[of][1]) for of in shown.families)
+    count = ("", ", two rows", ", three rows")[len(rows) - 1]
+    told: list[str] = []
+    for of in shown.families:
+        words = VARIED[of][2]
+        words = words.capitalize() if told else f"{quantity.said} {words}".rstrip()
+        told.append(f"{words}: {panels.listed(partial(_numbers, runs, quantity, of), quantity.digits)}.")
+    alt = f"Line plots of {quantity.plotted}{count} by three solvers. {' '.join(told)}"
+    grid = Grid(quantity.x, rows, shown.height, legend_columns=shown.legend_columns)
+    yield panels.exhibit_grid(name, shown.title, shown.caption, alt, grid)
+
+
+def _lines(runs: PaperRuns, quantity: Quantity, of: str, solver: str) -> Iterator[Line]:
+    # Ranks come from the values, so that a throw that one solver does not fly leaves the others their colours.
+    values = sorted(case.value for case in family(of))
+    for case, run in runs.members(solver, of):
+        x, y = map(panels.every_third, quantity.curve(run))
+        yield Line(VARIED[of][0](case), x, y, panels.ranked(values.index(case.value), len(values)))
+
+
+def _numbers(runs: PaperRuns, quantity: Quantity, of: str, solver: str) -> dict[str, float]:
+    return {VARIED[of][0](case): quantity.number(run) for case, run in runs.members(solver, of)}
+
+
+def _exhibits_s1a(runs: PaperRuns) -> Iterator[Exhibit]:
+    row = panels.row_of(RELATIVE.y, partial(_steps, runs))
+    yield panels.exhibit_grid(
         "S1a", "what the number of time steps P does",
         "How far does a curve of fewer steps lie from that of 1000? Eq. 8 and free flight choose their own steps; for "
         "them P is only the number of points given out, drawn as points on the same curve for the half-full bottle: 10 "
         "open, 100 small.",
         f"Line plots of omega over omega_0 by three solvers. Distance of the published program from its own curve of "
-        f"1000 steps, as a fraction of omega_0: {_step_words(runs)}.",
-        grid,
+        f"1000 steps, as a fraction of omega_0: {', '.join(_step_words(runs))}.",
+        Grid(SHARE, (row,), height=3.2, legend_columns=3),
     )  # fmt: skip
 
 
-def _steps(runs: PaperRuns, solver: str, filling: float) -> Iterator[Line]:
-    fillings = numbers("figure-S1-filling")
-    for case, run in runs.members(solver, f"steps {filling:g}"):
-        finest = case.steps == max(numbers("figure-S1-steps"))
-        x, y = relative_omega(run)
-        label = f"M̃ = {filling:g}, P = {case.value:g}"
-        rank = fillings.index(filling)
-        if solver == PUBLISHED or finest:
-            dash = sorted(numbers("figure-S1-steps"), reverse=True).index(case.value)
-            look = ranked(rank, len(fillings), dash)
-        else:
-            fewest = case.value == min(numbers("figure-S1-steps"))
-            look = dots(ramp(rank, len(fillings)), filled=not fewest, size=6.0 if fewest else 2.5)
-        yield Line(label=label, x=x, y=y, look=look)
+def _steps(runs: PaperRuns, solver: str) -> Iterator[Line]:
+    fillings, every = numbers("figure-S1-filling"), sorted(numbers("figure-S1-steps"), reverse=True)
+    for rank, filling in enumerate(fillings):
+        for case, run in runs.members(solver, f"steps {filling:g}"):
+            if solver == PUBLISHED or case.value == every[0]:
+                look = panels.ranked(rank, len(fillings), every.index(case.value))
+            else:
+                fewest = case.value == every[-1]
+                look = panels.dots(panels.ramp(rank, len(fillings)), filled=not fewest, size=6.0 if fewest else 2.5)
+            x, y = map(panels.every_third, RELATIVE.curve(run))
+            yield Line(f"M̃ = {filling:g}, P = {case.value:g}", x, y, look)
 
 
-def _step_words(runs: PaperRuns) -> str:
-    words = []
+def _step_words(runs: PaperRuns) -> Iterator[str]:
     for filling in numbers("figure-S1-filling"):
-        found: dict[float, Trajectory] = {
-            case.value: run for case, run in runs.members(PUBLISHED, f"steps {filling:g}")
-        }
-        if not found:
-            continue
-        finest = found[max(found)]
-        for steps, run in sorted(found.items())[:-1]:
+        found = {case.value: run for case, run in runs.members(PUBLISHED, f"steps {filling:g}")}
+        *fewer, most = sorted(found) or [0.0]
+        for steps in fewer:
+            run, finest = found[steps], found[most]
             there = np.interp(run.t, finest.t, finest.omega)
             far = float(np.abs(run.omega - there).max()) / run.scenario.omega0
-            words.append(f"filling {filling:g} with {steps:g} steps {far:.2g}")
-    return ", ".join(words)
+            yield f"filling {filling:g} with {steps:g} steps {far:.2g}"
 
 
-RECIPES: Final[dict[str, tuple[tuple[str, ...], Callable[[PaperRuns], Iterator[Exhibit]]]]] = {
-    "5b": (("beta", "beta at 5 /s"), exhibits_5b),
-    "5c": (("beta", "beta at 5 /s"), exhibits_5c),
-    "5d": (("slices", "slices at 5 /s", "slices at alpha 1"), exhibits_5d),
-    "6b": (("drag",), exhibits_6b),
-    "6c": (("drag",), exhibits_6c),
-    "7a": (("filling",), exhibits_7a),
-    "8a": (("spin",), exhibits_8a),
-    "8b": (("angle",), exhibits_8b),
-    "8c": (("aspect",), exhibits_8c),
-    "S1a": (("steps 0.25", "steps 0.5", "steps 0.75"), exhibits_s1a),
+# ---------------------------------------------------------------------- paths of slices
+
+POSITION: Final = Axis(
+    "r [m], cap at 0", "r [m]", low=-0.02 * number("length"), high=1.1 * number("length"), upside_down=True
+)
+"""The range of the Python program's own plot, the cap on top."""
+
+
+def _exhibits_5a(runs: PaperRuns) -> Iterator[Exhibit]:
+    """Yield the paths of ten slices for three rebounds, once for each reading of the drag."""
+    slices = {i: f"slice {i + 1}" for i in range(round(number("figure-5-slices")))}
+    for suffix, of, words in (
+        ("", "beta", "α = 1 as the caption says, α/2m = 10 /s"),
+        ("-5-per-second", "beta at 5 /s", "α = 0.5, the damping rate α/2m = 5 /s of all later figures"),
+    ):
+        yield _paths(
+            runs, f"5a{suffix}", of, numbers("figure-5-rebound"), slices, "beta",
+            f"what the rebound β does to ten slices ({words})",
+            "Slice 1 starts on the base, slice 10 on top of the water. Look at the ends: with β = 0 slices stay "
+            "where they hit until something pulls them off. In free flight nothing does; in the other two it is "
+            "gravity, which Eq. 8 keeps.",
+        )  # fmt: skip
+
+
+def _exhibits_6a(runs: PaperRuns) -> Iterator[Exhibit]:
+    n = round(number("figure-6-slices"))
+    slices = {0: "first slice", n // 2 - 1: "middle slice (number N/2)", n - 1: "last slice"}
+    yield _paths(
+        runs, "6a", "drag", (0.0, 0.0075, 0.01, 0.0125), slices, "alpha",
+        "what the drag α does to the first, the middle and the last slice",
+        "The first slice starts on the base, the last one on top of the water. The more drag, the later the last one "
+        "reaches the cap.",
+    )  # fmt: skip
+
+
+def _paths(
+    runs: PaperRuns,
+    name: str,
+    of: str,
+    values: tuple[float, ...],
+    slices: Mapping[int, str],
+    symbol: str,
+    title: str,
+    caption: str,
+) -> Exhibit:
+    """Return a row of panels for each of the ``values`` of a family; ``slices`` are those drawn, with their names."""
+
+    def lines(solver: str, case: Case) -> Iterator[Line]:
+        run = runs.trajectory(solver, case.key)
+        if run is not None:
+            t = panels.every_third(run.t)
+            for k, (i, label) in enumerate(slices.items()):
+                yield Line(label, t, panels.every_third(run.r[:, i]), panels.ranked(k, len(slices), dash=0))
+            yield Line("centre of mass", t, panels.every_third(run.r_cm), panels.DASHED)
+
+    def ends(solver: str) -> dict[str, float]:
+        flown = runs.members(solver, of)
+        return {f"{case.value:g}": float(run.r_cm[-1] / run.scenario.bottle.length) for case, run in flown}
+
+    cases = [case for case in family(of) if case.value in values]
+    rows = tuple(panels.row_of(POSITION, partial(lines, case=case), VARIED[of][0](case)) for case in cases)
+    return panels.exhibit_grid(
+        name, title,
+        f"Cap on top, base below, the centre of mass dashed. {caption}",
+        f"Line plots of slice positions against time, a row for each {symbol}, a column for each solver. Centre of "
+        f"mass from the cap at the end, as a fraction of the length, by {symbol}: {panels.listed(ends)}.",
+        Grid(TIME, rows, height=2.1),
+    )  # fmt: skip
+
+
+RECIPES: Final[dict[str, panels.Recipe]] = {
+    **{name: (shown.families, partial(_exhibits_curves, name)) for name, shown in CURVES.items()},
+    "5a": (("beta", "beta at 5 /s"), _exhibits_5a),
+    "6a": (("drag",), _exhibits_6a),
+    "S1a": (tuple(f"steps {filling:g}" for filling in numbers("figure-S1-filling")), _exhibits_s1a),
 }
 """Figure -> the families it needs, and how it is made."""

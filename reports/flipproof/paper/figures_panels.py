@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
-from typing import Any, Final
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -16,35 +16,33 @@ from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.spoken import SPOKEN
 from flipproof.output.columns import columns_csv
-from flipproof.paper.runs import BANDS
+from flipproof.paper.runs import BANDS, SOLVERS, PaperRuns
 from slicemodel.trajectory import FloatArray
+
+Recipe = tuple[tuple[str, ...], Callable[[PaperRuns], Iterator[Exhibit]]]
+"""The families of throws that a figure shows, and what makes its exhibits."""
 
 COLUMN: Final = 3.2
 """Width of a panel [inches]."""
 
-NAMES: Final = {name: SPOKEN[name] for name in ("published-python", "eq8", "free-flight")}
-"""Solver -> its name over a column."""
-
 DASHES: Final = ("-", (0, (5, 1.5)), (0, (2, 1)), (0, (6, 1.5, 1.5, 1.5)))
 
-LIGHTEST: Final = 0.75
-"""Part of the colour map that is used: beyond it lines are too pale on white, and too dark on black."""
+RAMP: Final = ListedColormap(mpl.colormaps["viridis"](np.linspace(0.0, 0.75, 256)))
+"""Colours of ordered values, dark to light: beyond 0.75 lines are too pale on white, and too dark on black."""
 
-RAMP: Final = ListedColormap(mpl.colormaps["viridis"](np.linspace(0.0, LIGHTEST, 256)))
-"""Colours of ordered values, dark to light."""
+DASHED: Final = {"color": "black", "linestyle": "--", "linewidth": 1.6, "zorder": 3}
+"""Look of what is no throw of its own."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Line:
     """One curve or row of points.
 
     Parameters
     ----------
-    label : str
-        The same in every panel for the same throw.
+    label : str - the same in every panel for the same throw
     x, y : arrays of equal shape (P,)
-    look : mapping
-        Keywords of matplotlib's ``plot``: ``ranked``, ``dots`` and ``DASHED`` make them.
+    look : mapping - keywords of matplotlib's ``plot``: ``ranked``, ``dots`` and ``DASHED`` make them
     """
 
     label: str
@@ -53,8 +51,53 @@ class Line:
     look: Mapping[str, Any]
 
 
-DASHED: Final = {"color": "black", "linestyle": "--", "linewidth": 1.6, "zorder": 3}
-"""Look of what is no throw of its own."""
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """What an axis shows with its unit in brackets, the same as the head of a column, and its range.
+
+    The upper end of a range moves up if a curve needs it. ``upside_down`` is for distances from the cap.
+    """
+
+    label: str
+    column: str
+    low: float | None = None
+    high: float | None = None
+    upside_down: bool = False
+    log: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A row of panels: their common vertical axis, the curves by solver, and what stands beside the axis."""
+
+    y: Axis
+    lines: Mapping[str, tuple[Line, ...]]
+    heading: str = ""
+
+
+class Band(NamedTuple):
+    """A shaded range along "x" or "y"; its label says whose it is."""
+
+    along: str
+    low: float
+    high: float
+    label: str
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Rows of panels over one horizontal axis, each ``height`` inches high; bands are shaded in every panel."""
+
+    x: Axis
+    rows: tuple[Row, ...]
+    height: float = 2.5
+    bands: tuple[Band, ...] = ()
+    legend_columns: int = 6
+
+
+def row_of(y: Axis, lines_of: Callable[[str], Iterable[Line]], heading: str = "") -> Row:
+    """Return a row with the curves of every solver."""
+    return Row(y, {solver: tuple(lines_of(solver)) for solver in SOLVERS}, heading)
 
 
 def ranked(place: int, of: int, dash: int | None = None) -> dict[str, Any]:
@@ -73,103 +116,39 @@ def dots(colour: Any, *, filled: bool = True, joined: bool = False, size: float 
 
 def ramp(place: int, of: int) -> tuple[float, float, float, float]:
     """Return the colour of the ``place``-th of ``of`` ordered values, dark to light."""
-    red, green, blue, alpha = RAMP(place / max(of - 1, 1))
-    return red, green, blue, alpha
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Panel:
-    """One pair of axes: the solver's column, the row's heading, and its curves."""
-
-    solver: str
-    heading: str
-    lines: tuple[Line, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Axis:
-    """What an axis shows with its unit in brackets, the same as the head of a column, and its range.
-
-    ``upside_down`` is for distances from the cap.
-    """
-
-    label: str
-    column: str
-    low: float | None = None
-    high: float | None = None
-    upside_down: bool = False
-    log: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Band:
-    """A shaded range along "x" or "y"; its label says whose it is."""
-
-    along: str
-    low: float
-    high: float
-    label: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Grid:
-    """Panels row by row, each row with a panel for every solver, and the axes they share.
-
-    Parameters
-    ----------
-    rows : tuple of rows of panels
-    x : Axis
-    y : tuple of Axis
-        One for each row.
-    height : float
-        Of a row [inches].
-    bands : tuple of Band
-        Shaded in every panel.
-    legend_columns : int
-    """
-
-    rows: tuple[tuple[Panel, ...], ...]
-    x: Axis
-    y: tuple[Axis, ...]
-    height: float = 2.5
-    bands: tuple[Band, ...] = ()
-    legend_columns: int = 6
+    return RAMP(place / max(of - 1, 1))
 
 
 @styled
 def figure_grid(grid: Grid) -> Figure:
     """Draw a grid with one legend for all panels."""
-    columns = max(len(row) for row in grid.rows)
+    columns = len(grid.rows[0].lines)
     size = (COLUMN * columns, 1.0 + grid.height * len(grid.rows))
     figure, axes = new_figure(len(grid.rows), columns, size=size, sharex=True, sharey="row", squeeze=False)
-    for k, (row, y) in enumerate(zip(grid.rows, grid.y, strict=True)):
-        for panel, place in zip(row, axes[k], strict=True):
-            _draw_panel(place, panel, first=k == 0)
+    for row, places in zip(grid.rows, axes, strict=True):
+        for lines, place in zip(row.lines.values(), places, strict=True):
+            for line in lines:
+                place.plot(line.x, line.y, label=line.label, **line.look)
             for band in grid.bands:
                 shade, colour = (place.axvspan, "#999999") if band.along == "x" else (place.axhspan, "#E69F00")
                 shade(band.low, band.high, color=colour, alpha=0.18, linewidth=0, label=band.label, zorder=0)
-            _set_range(place, grid.x, y)
+            _set_range(place, grid.x, row)
         # Beside the row, not in it: there it would cover curves.
-        axes[k][0].set_ylabel("\n".join(filter(None, (row[0].heading, y.label))))
-    for place in axes[-1]:
-        place.set_xlabel(grid.x.label)
-    legend_below(figure, (place for row in axes for place in row), grid.legend_columns)
+        places[0].set_ylabel("\n".join(filter(None, (row.heading, row.y.label))))
+    for solver, top, bottom in zip(grid.rows[0].lines, axes[0], axes[-1], strict=True):
+        head(top, solver)
+        bottom.set_xlabel(grid.x.label)
+    legend_below(figure, axes.flat, grid.legend_columns)
     return figure
-
-
-def _draw_panel(axes: Axes, panel: Panel, *, first: bool) -> None:
-    for line in panel.lines:
-        axes.plot(line.x, line.y, label=line.label, **line.look)
-    if first:
-        head(axes, panel.solver)
 
 
 def head(axes: Axes, solver: str) -> None:
     """Write the solver's name over a column, in its colour."""
-    axes.set_title(NAMES[solver], fontsize=11, fontweight="bold", color=solver_style(solver)["color"])
+    axes.set_title(SPOKEN[solver], fontsize=11, fontweight="bold", color=solver_style(solver)["color"])
 
 
-def _set_range(axes: Axes, x: Axis, y: Axis) -> None:
+def _set_range(axes: Axes, x: Axis, row: Row) -> None:
+    y = row.y
     if x.log:
         axes.set_xscale("log")
     if y.log:
@@ -178,13 +157,14 @@ def _set_range(axes: Axes, x: Axis, y: Axis) -> None:
     if x.low is not None and x.high is not None:
         axes.set_xlim(x.low, x.high)
     if y.low is not None and y.high is not None:
-        axes.set_ylim(*((y.high, y.low) if y.upside_down else (y.low, y.high)))
+        high = stretched(y.high, row)
+        axes.set_ylim(*((high, y.low) if y.upside_down else (y.low, high)))
 
 
-def stretched(axis: Axis, rows: Iterable[Panel]) -> Axis:
-    """Return the axis with its upper end moved up, if any curve of these panels needs it."""
-    highest = max((float(line.y.max()) for panel in rows for line in panel.lines if len(line.y)), default=0.0)
-    return axis if axis.high is None or highest <= axis.high else replace(axis, high=1.05 * highest)
+def stretched(high: float, row: Row) -> float:
+    """Return the upper end of an axis, moved up if any curve of its row needs it."""
+    highest = max((float(line.y.max()) for lines in row.lines.values() for line in lines if len(line.y)), default=0.0)
+    return high if highest <= high else 1.05 * highest
 
 
 def legend_below(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
@@ -204,15 +184,8 @@ def exhibit(
     name: str, title: str, caption: str, alt: str, maker: Callable[..., Figure], data: tuple[Any, ...], table: str
 ) -> Exhibit:
     """Return what is shown as Fig. ``name`` of the paper; after a hyphen stands which of several it is."""
-    return Exhibit(
-        name=f"paper-{name}",
-        title=f"Fig. {name.partition('-')[0]}: {title}",
-        caption=caption,
-        alt=alt,
-        maker=maker,
-        data=data,
-        table=table,
-    )
+    title = f"Fig. {name.partition('-')[0]}: {title}"
+    return Exhibit(name=f"paper-{name}", title=title, caption=caption, alt=alt, maker=maker, data=data, table=table)
 
 
 def exhibit_grid(name: str, title: str, caption: str, alt: str, grid: Grid) -> Exhibit:
@@ -222,26 +195,21 @@ def exhibit_grid(name: str, title: str, caption: str, alt: str, grid: Grid) -> E
 
 def table_grid(grid: Grid) -> str:
     """Return what is drawn as CSV: a column for each curve, beside the abscissa that it shares with others."""
-    abscissae: list[FloatArray] = []
-    members: list[dict[str, FloatArray]] = []
-    for row, y in zip(grid.rows, grid.y, strict=True):
-        for panel in row:
-            for line in panel.lines:
-                k = next((k for k, x in enumerate(abscissae) if np.array_equal(x, line.x)), len(abscissae))
-                if k == len(abscissae):
-                    abscissae.append(line.x)
-                    members.append({})
-                members[k][_header(y, panel, line)] = line.y
+    groups: list[tuple[FloatArray, dict[str, FloatArray]]] = []
+    for row in grid.rows:
+        name, _, unit = row.y.column.partition(" [")
+        for solver, lines in row.lines.items():
+            for line in lines:
+                curves = next((curves for x, curves in groups if np.array_equal(x, line.x)), None)
+                if curves is None:
+                    curves = {}
+                    groups.append((line.x, curves))
+                curves[f"{', '.join(filter(None, (name, solver, row.heading, line.label)))} [{unit}"] = line.y
     columns: dict[str, FloatArray] = {}
-    for k, (x, curves) in enumerate(zip(abscissae, members, strict=True)):
+    for k, (x, curves) in enumerate(groups):
         columns[grid.x.column if k == 0 else f"{grid.x.column} of the next {len(curves)}, group {k + 1}"] = x
         columns |= curves
     return columns_csv(columns)
-
-
-def _header(y: Axis, panel: Panel, line: Line) -> str:
-    name, _, unit = y.column.partition(" [")
-    return f"{', '.join(filter(None, (name, panel.solver, panel.heading, line.label)))} [{unit}"
 
 
 def every_third(values: FloatArray) -> FloatArray:
@@ -253,23 +221,19 @@ def every_third(values: FloatArray) -> FloatArray:
 
 
 def settings_words() -> str:
-    """Return how the runs were made: slices and bands."""
-    own = ", ".join(f"{_plain(BANDS[solver])} ({NAMES[solver]})" for solver in BANDS)
+    """Return how the runs were made: slices and bands, each as "1e-7" or "0.003"."""
+    own = ", ".join(f"{f'{band:g}'.replace('e-0', 'e-')} ({SPOKEN[solver]})" for solver, band in BANDS.items())
     return (
         f"Every solver has the paper's own slices, and the published program its steps; Eq. 8 and free flight are "
         f"solved exactly between impacts. As fractions of ω₀ the event-driven ω is certain to {own}."
     )
 
 
-def listed(values: Mapping[str, Mapping[str, float]], digits: int = 3) -> str:
-    """Return solver -> label -> number as words."""
+def listed(values_of: Callable[[str], Mapping[str, float]], digits: int = 3) -> str:
+    """Return label -> number of every solver as words; a solver without any is left out."""
+    found = {solver: values_of(solver) for solver in SOLVERS}
     return "; ".join(
-        f"{NAMES[solver]}: " + ", ".join(f"{label} {value:.{digits}f}" for label, value in found.items())
-        for solver, found in values.items()
-        if found
+        f"{SPOKEN[solver]}: " + ", ".join(f"{label} {value:.{digits}f}" for label, value in values.items())
+        for solver, values in found.items()
+        if values
     )
-
-
-def _plain(value: float) -> str:
-    """Return a small number as "1e-7" or "0.003"."""
-    return f"{value:g}".replace("e-0", "e-")

@@ -13,12 +13,12 @@ from flipproof.frame.exhibit import Exhibit, drawn
 from flipproof.frame.gather import gather
 from flipproof.frame.pool import Progress, workers
 from flipproof.frame.store import RunStore
+from flipproof.output.columns import rows_csv
 from flipproof.output.folder import check_replaceable, replaced_folder
 from flipproof.page.templating import environment
 from flipproof.paper.figures import ORDER, TIMED, check_figures, exhibits_paper, keys_of
-from flipproof.paper.parameters import paper_throw
-from flipproof.paper.runs import PaperRuns, cost_calls, figure_calls
-from flipproof.paper.tables import HEADER, parameter_rows, parameters_csv
+from flipproof.paper.parameters import HEADER, paper_throw, parameter_rows
+from flipproof.paper.runs import PaperRuns, cost_calls, group_calls, plan_figures
 
 PAGE = "index.html"
 
@@ -28,24 +28,19 @@ def make_gallery(
     out: Path,
     progress: Progress,
     provenance: Mapping[str, str],
-    *,
-    jobs: int | None = None,
-    store: RunStore | None = None,
+    jobs: int | None,
+    store: RunStore,
 ) -> str:
     """Make the figures and write them to ``out``; return one line that tells what is there.
 
     Parameters
     ----------
-    names : sequence of str
-        Figures such as "7b"; none: all.
-    out : path
-        Folder; an older gallery in it is replaced when the new one is complete.
+    names : sequence of str - figures such as "7b"; none: all
+    out : path - folder; an older gallery in it is replaced when the new one is complete
     progress : callable (made, planned, label)
     provenance : mapping
-    jobs : int or None
-        Worker processes; None: one per core.
-    store : RunStore or None
-        Where runs are looked for and kept, as those of a report are.
+    jobs : int or None - worker processes; None: one per core
+    store : RunStore - where runs are looked for and kept, as those of a report are
 
     Raises
     ------
@@ -55,12 +50,24 @@ def make_gallery(
     began = time.perf_counter()
     wanted = check_figures(names) or ORDER
     check_replaceable(out, "paper")
-    store = store or RunStore(None)
     with replaced_folder(out, "paper") as folder:
         with workers(jobs) as pool:
             runs = gather_figures(wanted, pool, progress, store)
             exhibits = drawn(list(exhibits_paper(runs, wanted)), pool=store.remembering(pool))
-        write_gallery(exhibits, runs, folder, {**provenance, **store.facts()})
+        for exhibit in exhibits:
+            (folder / f"{exhibit.name}.svg").write_text(exhibit.drawing.svg, encoding="utf-8")
+            (folder / f"{exhibit.name}.png").write_bytes(exhibit.drawing.png)
+            (folder / f"{exhibit.name}.csv").write_text(exhibit.table or "", encoding="utf-8")
+        (folder / "parameters.csv").write_text(rows_csv(HEADER, parameter_rows()), encoding="utf-8")
+        facts = {**provenance, **store.facts()}
+        (folder / PAGE).write_text(render_gallery(exhibits, runs, facts), encoding="utf-8")
+        summary = {
+            "figures": {exhibit.name: exhibit.title for exhibit in exhibits},
+            "flights": len(runs.made),
+            "failed": runs.failures(),
+            "provenance": facts,
+        }
+        (folder / "summary.json").write_text(json.dumps(summary, indent=1), encoding="utf-8")
     failed = f", {len(runs.failures())} flights failed" if runs.failures() else ""
     figures = f"{len(exhibits)} figure{'' if len(exhibits) == 1 else 's'}"
     seconds = time.perf_counter() - began
@@ -73,10 +80,11 @@ def gather_figures(
     """Return the runs of some figures: a chapter of their own, driven as those of a report are."""
 
     def study(_: Ask) -> Study[PaperRuns]:
-        figures, costs = figure_calls(keys_of(wanted)), cost_calls() if set(wanted) & set(TIMED) else []
+        figures = group_calls(plan_figures(keys_of(wanted)), "the paper's figures")
+        costs = cost_calls() if set(wanted) & set(TIMED) else []
         flights = yield figures
         flights = (yield costs) if costs else flights  # alone, so that no other run takes their time
-        return PaperRuns.of(flights, figures, costs)
+        return PaperRuns.of(flights, figures, costs=costs)
 
     chapter = Chapter(name="figures", title="The paper's figures", study=study)
     part = Part(chapter.name, chapter.title, "", (chapter,))
@@ -86,33 +94,9 @@ def gather_figures(
     return runs
 
 
-def write_gallery(exhibits: Sequence[Exhibit], runs: PaperRuns, folder: Path, provenance: Mapping[str, str]) -> None:
-    """Write figures, numbers and page into an empty folder."""
-    for exhibit in exhibits:
-        (folder / f"{exhibit.name}.svg").write_text(exhibit.drawing.svg, encoding="utf-8")
-        (folder / f"{exhibit.name}.png").write_bytes(exhibit.drawing.png)
-        (folder / f"{exhibit.name}.csv").write_text(exhibit.table or "", encoding="utf-8")
-    (folder / "parameters.csv").write_text(parameters_csv(), encoding="utf-8")
-    (folder / PAGE).write_text(render_gallery(exhibits, runs, provenance), encoding="utf-8")
-    (folder / "summary.json").write_text(json.dumps(_summary(exhibits, runs, provenance), indent=1), encoding="utf-8")
-
-
 def render_gallery(exhibits: Sequence[Exhibit], runs: PaperRuns, provenance: Mapping[str, str]) -> str:
     """Return the page."""
-    templates = environment()
-    return templates.get_template("paper_figures.html.j2").render(
-        exhibits=exhibits,
-        problems=runs.failures(),
-        header=HEADER,
-        rows=list(parameter_rows()),
-        provenance=provenance,
+    template = environment().get_template("paper_figures.html.j2")
+    return template.render(
+        exhibits=exhibits, problems=runs.failures(), header=HEADER, rows=parameter_rows(), provenance=provenance
     )
-
-
-def _summary(exhibits: Sequence[Exhibit], runs: PaperRuns, provenance: Mapping[str, str]) -> dict[str, object]:
-    return {
-        "figures": {exhibit.name: exhibit.title for exhibit in exhibits},
-        "flights": len(runs.made),
-        "failed": runs.failures(),
-        "provenance": dict(provenance),
-    }

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from flipproof.paper.cases import Case, family
+from flipproof.frame.solvers import Made, Missing
+from flipproof.paper.cases import family
 from slicemodel import Trajectory
-from slicemodel.observables import PLATEAU_SHARE, Plateau, plateau_of_points, plateau_of_width
+from slicemodel.observables import PLATEAU_SHARE, plateau, plateau_of_points, plateau_of_width
 from slicemodel.trajectory import BASE, CAP, FloatArray
 
 FLAT: Final = 0.1
@@ -19,16 +20,6 @@ FLAT: Final = 0.1
 
 SUPERIMPOSED: Final = 0.05
 """Root-mean-square difference, as a share of omega_0, up to which two curves count as one."""
-
-LATE: Final = 0.9
-"""Share of the flight after which omega is called late."""
-
-LEFT: Final = 1e-3
-"""Distance from an end at which a slice has left it [m]."""
-
-
-class MissingFlightError(LookupError):
-    """A flight that a statement needs is not there, or is not complete; the message says why."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,97 +29,65 @@ class Flights:
     Parameters
     ----------
     solver : str
-    runs : key -> Trajectory
-    reasons : key -> why there is no flight
+    made : key -> Made
     halved : the same flights with half the slices wherever their number is not the subject; None if there are none
     half_steps : the same flights with half the time steps; None if the equation chooses its own
+    seen : those that were looked at
     """
 
     solver: str
-    runs: Mapping[str, Trajectory]
-    reasons: Mapping[str, str]
+    made: Mapping[str, Made]
     halved: Flights | None = None
     half_steps: Flights | None = None
-
-    def watched(self) -> tuple[Flights, Watched]:
-        """Return the same flights, and a record of those that are looked at from now on."""
-        watched = Watched(self.runs)
-        return replace(self, runs=watched), watched
+    seen: dict[str, Trajectory] = field(default_factory=dict)
 
     def run(self, key: str) -> Trajectory:
         """Return one flight.
 
         Raises
         ------
-        MissingFlightError
+        Missing
             If it was not made, or did not reach its end.
         """
-        if key not in self.runs:
-            raise MissingFlightError(self.reasons.get(key, f"{key!r} was not flown by {self.solver}"))
-        run = self.runs[key]
-        if not run.ok:
-            raise MissingFlightError(f"{key!r} by {self.solver}: {run.status}, {run.message}")
+        if key not in self.made:
+            raise Missing(f"{key!r} was not flown by {self.solver}")
+        run = self.seen[key] = self.made[key].whole
         return run
-
-    def members(self, name: str) -> list[tuple[Case, Trajectory]]:
-        """Return the flights of a family of cases, in the order of the family.
-
-        Raises
-        ------
-        MissingFlightError
-            If any but those whose number of slices is too large for this solver is not there.
-        """
-        cases = [case for case in family(name) if not case.slices_vary or case.key in self.runs]
-        return [(case, self.run(case.key)) for case in cases]
 
     def at(self, name: str, value: float) -> Trajectory:
         """Return the flight of a family where what varies has this value.
 
         Raises
         ------
-        MissingFlightError
+        Missing
             If the family has no such case, or its flight is not there.
         """
         for case in family(name):
             if abs(case.value - value) <= 1e-9 * max(1.0, abs(value)):
                 return self.run(case.key)
-        raise MissingFlightError(f"family {name!r} has no case at {value:g}")
+        raise Missing(f"family {name!r} has no case at {value:g}")
 
+    def measured(
+        self, name: str, of: Callable[[Trajectory], float], low: float = -math.inf, high: float = math.inf
+    ) -> dict[float, float]:
+        """Return a number of every flight of a family with ``low`` <= value <= ``high``, in the order of the family.
 
-class Watched(Mapping[str, Trajectory]):
-    """Flights that remember which of them were looked at."""
-
-    def __init__(self, runs: Mapping[str, Trajectory]) -> None:
-        self._runs = runs
-        self._seen: dict[str, Trajectory] = {}
-
-    def __getitem__(self, key: str) -> Trajectory:
-        """Return a flight and remember it."""
-        return self._seen.setdefault(key, self._runs[key])
-
-    def __contains__(self, key: object) -> bool:
-        """Return whether there is such a flight, without looking at it."""
-        return key in self._runs
-
-    def __iter__(self) -> Iterator[str]:
-        """Iterate over the keys."""
-        return iter(self._runs)
-
-    def __len__(self) -> int:
-        """Return the number of flights."""
-        return len(self._runs)
+        Raises
+        ------
+        Missing
+            If any flight is not there, but for those whose number of slices is too large for this solver.
+        """
+        cases = [case for case in family(name) if not case.slices_vary or case.key in self.made]
+        flown = [(case.value, self.run(case.key)) for case in cases]
+        return {value: of(run) for value, run in flown if low <= value <= high}
 
     @property
-    def words(self) -> str:
+    def flown(self) -> str:
         """Slices of the flights looked at, and their time steps where they were chosen; empty if there were none."""
-        slices = [run.scenario.n_slices for run in self._seen.values() if not run.scenario.frozen]
-        steps = [run.settings["steps"] for run in self._seen.values() if run.settings.get("steps")]
-        return ", ".join(f"{name} = {_span(counts)}" for name, counts in (("N", slices), ("P", steps)) if counts)
-
-
-def _span(counts: list[int]) -> str:
-    low, high = min(counts), max(counts)
-    return f"{low}" if low == high else f"{low} to {high}"
+        slices = [run.scenario.n_slices for run in self.seen.values() if not run.scenario.frozen]
+        steps = [run.settings["steps"] for run in self.seen.values() if run.settings.get("steps")]
+        ends = ((name, min(counts), max(counts)) for name, counts in (("N", slices), ("P", steps)) if counts)
+        return ", ".join(f"{name} = {low}" + (f" to {high}" if high > low else "") for name, low, high in ends)
 
 
 # ---------------------------------------------------------------------- numbers of one flight
@@ -139,14 +98,10 @@ def normalised(run: Trajectory) -> FloatArray:
     return run.omega / run.scenario.omega0
 
 
-def plateau_of(run: Trajectory) -> Plateau:
-    """Return omega_f / omega_0 without its grid: the lowest mean over 2 % of the flight."""
-    return plateau_of_width(run.t, run.omega, run.scenario.omega0, PLATEAU_SHARE * run.scenario.duration)
-
-
 def level(run: Trajectory) -> float:
-    """Return omega_f / omega_0."""
-    return plateau_of(run).level
+    """Return omega_f / omega_0 without its grid: the lowest mean over 2 % of the flight."""
+    width = PLATEAU_SHARE * run.scenario.duration
+    return plateau_of_width(run.t, run.omega, run.scenario.omega0, width).level
 
 
 def level_by_points(run: Trajectory) -> float:
@@ -154,10 +109,14 @@ def level_by_points(run: Trajectory) -> float:
     return plateau_of_points(run.t, run.omega, run.scenario.omega0).level
 
 
+def steady_level(run: Trajectory) -> float:
+    """Return the mean of omega / omega_0 over the second half of the flight, the average of Fig. 4d."""
+    return plateau(run.t, run.omega, run.scenario.omega0)
+
+
 def late_mean(run: Trajectory) -> float:
     """Return the mean of omega / omega_0 over the last tenth of the flight."""
-    late = run.t >= LATE * run.scenario.duration
-    return float(normalised(run)[late].mean())
+    return float(normalised(run)[run.t >= 0.9 * run.scenario.duration].mean())
 
 
 def late_rise(run: Trajectory) -> float:
@@ -185,9 +144,17 @@ def drop_time(run: Trajectory) -> float:
     return float(run.t[k - 1] + share * (run.t[k] - run.t[k - 1])) / run.scenario.duration
 
 
-def distance(run: Trajectory, other: Trajectory) -> float:
-    """Return the root-mean-square difference of two omega / omega_0 over t / T."""
-    return _distance_at(run, other, run.t / run.scenario.duration)
+def distance(run: Trajectory, other: Trajectory, stretch: float = 1.0, delay: float = 0.0) -> float:
+    """Return the root-mean-square difference of two omega / omega_0 over s = t / T.
+
+    The other one is stretched in time and put off: it is read at s / stretch - delay. NaN if these are not finite.
+    """
+    if not math.isfinite(stretch + delay):
+        return math.nan
+    there = run.t / run.scenario.duration / stretch - delay
+    both = (there >= 0.0) & (there <= 1.0)
+    curve = np.interp(there[both], other.t / other.scenario.duration, normalised(other))
+    return float(np.sqrt(np.mean((normalised(run)[both] - curve) ** 2)))
 
 
 def shape_distance(run: Trajectory, other: Trajectory) -> float:
@@ -195,25 +162,12 @@ def shape_distance(run: Trajectory, other: Trajectory) -> float:
 
     What is left is a difference of shape: one curve that takes longer to fall, all along, is the same.
     """
-    stretch = drop_time(run) / drop_time(other)
-    if not math.isfinite(stretch):
-        return float("nan")
-    return _distance_at(run, other, run.t / run.scenario.duration / stretch)
+    return distance(run, other, stretch=drop_time(run) / drop_time(other))
 
 
 def delayed_distance(run: Trajectory, other: Trajectory) -> float:
     """Return ``distance`` with one flight moved in time so that both reach half their drop at once; NaN as above."""
-    delay = drop_time(run) - drop_time(other)
-    if not math.isfinite(delay):
-        return float("nan")
-    return _distance_at(run, other, run.t / run.scenario.duration - delay)
-
-
-def _distance_at(run: Trajectory, other: Trajectory, there: FloatArray) -> float:
-    """Return the root-mean-square difference of ``run`` from ``other`` read at its shares ``there`` of the flight."""
-    both = (there >= 0.0) & (there <= 1.0)
-    curve = np.interp(there[both], other.t / other.scenario.duration, normalised(other))
-    return float(np.sqrt(np.mean((normalised(run)[both] - curve) ** 2)))
+    return distance(run, other, delay=drop_time(run) - drop_time(other))
 
 
 def largest_share_near_cap(run: Trajectory) -> float:
@@ -222,40 +176,29 @@ def largest_share_near_cap(run: Trajectory) -> float:
 
 
 class Departure(NamedTuple):
-    """A slice that leaves the end it lay on: when, which, and the outward force of Eq. 8 on it by mass [m/s^2].
+    """When a slice leaves the end it lay on, and the outward force of Eq. 8 on it by mass [m/s^2].
 
-    ``centrifugal`` is omega^2 (r - r_CM) and ``weight`` g cos(theta), both positive where they press on the end;
-    ``step`` is what their sum changes between two output times.
+    ``outward`` is omega^2 (r - r_CM) + g cos(theta), positive where it presses on the end, so that the weight has not
+    won; ``step`` is what it changes between two output times.
     """
 
     time: float
-    slice: int
-    end: int
-    centrifugal: float
-    weight: float
+    outward: float
     step: float
-
-    @property
-    def outward(self) -> float:
-        """Return centrifugal force plus weight; positive where the weight has not won."""
-        return self.centrifugal + self.weight
 
 
 def departures(run: Trajectory) -> list[Departure]:
-    """Return every departure of a slice from an end; its time is that at which it began to move away."""
+    """Return every departure of a slice from an end, by 1 mm; its time is that at which it began to move away."""
     scenario = run.scenario
+    pull = (run.omega**2)[:, np.newaxis] * (run.r - run.r_cm[:, np.newaxis])
+    weight = (scenario.gravity * np.cos(run.theta))[:, np.newaxis]
     found = []
     for end, wall in ((BASE, scenario.r_max), (CAP, scenario.r_min)):
-        gap = end * (wall - run.r)
-        centrifugal = end * (run.omega**2)[:, np.newaxis] * (run.r - run.r_cm[:, np.newaxis])
-        weight = end * scenario.gravity * np.cos(run.theta)
-        near = gap <= LEFT
+        gap, outward = end * (wall - run.r), end * (pull + weight)
+        near = gap <= 1e-3
         for k, i in zip(*np.nonzero(near[:-1] & ~near[1:]), strict=True):
             rests = np.flatnonzero(np.diff(gap[: k + 1, i]) <= 0.0)
             began = int(rests[-1]) + 1 if rests.size else 0
-            outward = centrifugal[:, i] + weight
-            change = abs(float(outward[min(began + 1, len(outward) - 1)] - outward[began]))
-            found.append(
-                Departure(float(run.t[began]), int(i), end, float(centrifugal[began, i]), float(weight[began]), change)
-            )
+            force, later = outward[[began, min(began + 1, len(outward) - 1)], i].tolist()
+            found.append(Departure(float(run.t[began]), force, abs(later - force)))
     return sorted(found)

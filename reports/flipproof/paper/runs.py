@@ -1,19 +1,20 @@
-"""The runs behind the paper's figures and claims: planned without repeats, made in a pool, looked up by case."""
+"""The runs behind the paper's figures and statements: planned without repeats, made in a pool, looked up by name."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 
 from flipproof.frame.flights import Call, Flights
 from flipproof.frame.solvers import Made, Run, make
+from flipproof.paper import observe
 from flipproof.paper.cases import Case, all_cases, family
 from flipproof.paper.costs import Cost, measure_event_driven, measure_published
-from flipproof.paper.parameters import paper_steps, paper_throw
+from flipproof.paper.parameters import numbers, paper_steps, paper_throw
 from slicemodel import Scenario, Trajectory
 
 PUBLISHED: Final = "published-python"
@@ -23,34 +24,81 @@ BANDS: Final[Mapping[str, float]] = MappingProxyType({"eq8": 1e-7, "free-flight"
 """How far omega / omega_0 may move when the rest speed is cut tenfold, or the release changed in the eleventh digit, by
 event-driven solver; with recoil the order of the impacts decides it."""
 
-GROUP: Final = 12
-"""Runs that a worker holds at a time: all of them would take it gigabytes."""
+MANY_STEPS: Final = 10_000
+MANY_SLICES: Final = 100.0
+FINEST: Final = 200
+"""Slices of an event-driven flight that the others are held against."""
+
+HALVED: Final = ("filling", "long", "drag", "spin", "angle", "aspect")
+"""Families flown with half the slices too; in the others their number is the subject."""
+
+DAMPINGS: Final = ("", " at 5 /s")
+"""What the names of families end in: at the drag of the caption of Fig. 5, and at the damping of all later figures."""
+
+WEIGHTLESS: Final = "eq8-weightless"
+STEADY_FILLING: Final = 0.1
+WEIGHTLESS_KEY: Final = f"filling {STEADY_FILLING:g}"
+"""The bottle that does not slow down without weight, and the key of its flight."""
+
+Half = Literal["", "slices", "steps"]
+HALVES: Final[tuple[Half, ...]] = ("slices", "steps")
+"""What a run has half as many of as that of the figures: "" for nothing."""
+
+Name = tuple[str, str, Half]
+"""A solver, the key of a case, and what is halved."""
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """A run, the name by which it is looked up, and what is kept of it: every how many points, and slices if whole.
+
+    One that is not ``grouped`` is made by itself and kept as it is.
+    """
+
+    name: Name
+    run: Run
+    thin: int = 1
+    whole: bool = True
+    grouped: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperRuns:
-    """Every run of the paper's figures.
+    """Every run of the paper's figures, and those that statements need beside them.
 
     Parameters
     ----------
-    made : mapping (solver, key of a case) -> Made
-        Without the pairs that are not planned.
-    costs : tuple of Cost
-        Of every solver over numbers of slices and steps; empty if they were not asked for.
+    made : name -> Made, of the runs that are planned
+    costs : of every solver over numbers of slices and steps; empty if they were not asked for
     """
 
-    made: Mapping[tuple[str, str], Made]
-    costs: tuple[Cost, ...]
+    made: Mapping[Name, Made]
+    costs: tuple[Cost, ...] = ()
 
     @classmethod
-    def of(cls, flights: Flights, figures: Iterable[Call], costs: Iterable[Call] = ()) -> PaperRuns:
-        """Return what became of ``figure_calls`` and ``cost_calls``."""
-        made = {pair: made for call in figures for pair, made in flights.answer(call).items()}
-        return cls(made=made, costs=tuple(cost for call in costs for cost in flights.answer(call)))
+    def of(
+        cls, answers: Flights, calls: Iterable[Call], planned: Iterable[Planned] = (), costs: Iterable[Call] = ()
+    ) -> PaperRuns:
+        """Return what became of ``group_calls``, of runs that are not grouped, and of ``cost_calls``."""
+        made = {each.name: answers[each.run] for each in planned if not each.grouped}
+        made |= {name: made for call in calls for name, made in answers.answer(call).items()}
+        return cls(made=made, costs=tuple(cost for call in costs for cost in answers.answer(call)))
+
+    def flights(self, solver: str) -> observe.Flights:
+        """Return the flights of one equation, with those at half the slices and half the steps where there are any."""
+
+        def of(wanted: Half) -> dict[str, Made]:
+            return {key: each for (by, key, half), each in self.made.items() if by == solver and half == wanted}
+
+        usual = of("")
+        halved, half_steps = (
+            observe.Flights(solver=solver, made=usual | own) if (own := of(half)) else None for half in HALVES
+        )
+        return observe.Flights(solver=solver, made=usual, halved=halved, half_steps=half_steps)
 
     def trajectory(self, solver: str, key: str) -> Trajectory | None:
         """Return the trajectory of a case, or None if it was not planned or failed."""
-        made = self.made.get((solver, key))
+        made = self.made.get((solver, key, ""))
         return None if made is None else made.trajectory
 
     def members(self, solver: str, name: str) -> list[tuple[Case, Trajectory]]:
@@ -61,46 +109,30 @@ class PaperRuns:
     def failures(self) -> list[str]:
         """Return solver, case and reason of every run that gave no trajectory."""
         return [
-            f"{solver}, {key}: {made.reason}" for (solver, key), made in self.made.items() if made.trajectory is None
+            f"{solver}, {key}: {made.reason}" for (solver, key, _), made in self.made.items() if made.trajectory is None
         ]
 
 
-def scenario_of(solver: str, case: Case) -> Scenario | None:
-    """Return the throw of a case as this solver flies it; None if it is not flown."""
-    if solver != PUBLISHED and not case.slices_vary and case.steps < paper_steps() and case.scenario != paper_throw():
-        return None  # output times do not change these solvers: one throw shows that
-    return case.scenario
+def flies(solver: str, case: Case) -> bool:
+    """Return whether a solver flies a case: where it chooses its steps, one throw shows what fewer output times do."""
+    return solver == PUBLISHED or case.slices_vary or case.steps >= paper_steps() or case.scenario == paper_throw()
 
 
-def plan_groups(keys: Iterable[str] | None = None) -> list[list[Planned]]:
-    """Return every run that the figures need, in groups of which a worker makes one at a time."""
-    planned = list(_planned(keys))
-    return [planned[k : k + GROUP] for k in range(0, len(planned), GROUP)]
-
-
-@dataclass(frozen=True, slots=True)
-class Planned:
-    """A run of the figures, with the case that it is of."""
-
-    solver: str
-    case: Case
-    run: Run
-
-    @property
-    def pair(self) -> tuple[str, str]:
-        """The solver and the key of its case."""
-        return self.solver, self.case.key
-
-
-def _planned(keys: Iterable[str] | None) -> Iterator[Planned]:
+def plan_figures(keys: Iterable[str] | None = None) -> list[Planned]:
+    """Return every run that the figures need; of the cases with these keys only, if any are given."""
     cases = all_cases()
-    wanted = set(cases if keys is None else keys)
-    for solver in reversed(SOLVERS):
-        for key, case in cases.items():
-            scenario = scenario_of(solver, case) if key in wanted else None
-            if scenario is not None:
-                run = Run(solver, scenario, _settings(solver, case), label=f"paper, {solver}, {key}")
-                yield Planned(solver, case, run)
+    wanted = cases if keys is None else {key: case for key, case in cases.items() if key in set(keys)}
+    return [
+        Planned(
+            (solver, key, ""),
+            Run(solver, case.scenario, _settings(solver, case), label=f"paper, {solver}, {key}"),
+            thin=case.thin if solver == PUBLISHED else 1,
+            whole=case.whole,
+        )
+        for solver in reversed(SOLVERS)
+        for key, case in wanted.items()
+        if flies(solver, case)
+    ]
 
 
 def _settings(solver: str, case: Case) -> dict[str, Any]:
@@ -110,44 +142,117 @@ def _settings(solver: str, case: Case) -> dict[str, Any]:
     return {} if points == paper_steps() else {"times": np.linspace(0.0, case.scenario.duration, points)}
 
 
-def figure_calls(keys: Iterable[str] | None = None) -> list[Call]:
-    """Return the calls that make the runs of the figures; of the cases with these keys only, if any are given."""
-    return [Call(make_group, (group,), f"the paper's figures, {group[-1].case.key}") for group in plan_groups(keys)]
+def group_calls(planned: Iterable[Planned], words: str) -> list[Call]:
+    """Return the calls that make the runs that are grouped, of each group a worker one at a time."""
+    grouped = [each for each in planned if each.grouped]
+    # All at once would take a worker gigabytes.
+    groups = (grouped[k : k + 12] for k in range(0, len(grouped), 12))
+    return [Call(make_group, (group,), f"{words}, {group[-1].name[1]}") for group in groups]
 
 
 def cost_calls() -> list[Call]:
     """Return the calls that measure what runs cost."""
     published = Call(measure_published, (PUBLISHED,), "the cost of the published program", timed=True)
-    others = (solver for solver in SOLVERS if solver != PUBLISHED)
-    return [published, *(Call(measure_event_driven, (name,), f"the cost of {name}", timed=True) for name in others)]
+    others = (Call(measure_event_driven, (name,), f"the cost of {name}", timed=True) for name in SOLVERS[1:])
+    return [published, *others]
 
 
-def make_group(group: Iterable[Planned]) -> dict[tuple[str, str], Made]:
+def make_group(group: Iterable[Planned]) -> dict[Name, Made]:
     """Make runs one after the other and keep of each what is looked at."""
-    found = {}
-    for each in group:
-        made = _thinned(make(each.run), each.case.thin if each.solver == PUBLISHED else 1)
-        found[each.pair] = made if each.case.whole else _without_slices(made)
-    return found
+    return {each.name: _kept(make(each.run), each) for each in group}
 
 
-def make_thinned(runs: Iterable[tuple[Run, int]]) -> list[Made]:
-    """Make runs one after the other and keep every so many of their points."""
-    return [_thinned(make(run), every) for run, every in runs]
-
-
-def _thinned(made: Made, every: int) -> Made:
-    run = made.trajectory
-    if run is None or every == 1:
-        return made
-    kept = {name: getattr(run, name)[::every].copy() for name in ("t", "theta", "omega", "r", "v", "r_cm", "inertia")}
-    return replace(made, trajectory=replace(run, **kept))
-
-
-def _without_slices(made: Made) -> Made:
-    """Drop what nobody looks at: slices at every time are nearly all of a run's memory."""
+def _kept(made: Made, planned: Planned) -> Made:
+    """Return a run with what is kept of it: slices at every time are nearly all of its memory."""
     run = made.trajectory
     if run is None:
         return made
-    none = np.empty((0, run.scenario.n_slices))
-    return replace(made, trajectory=replace(run, r=none, v=none))
+    if planned.thin > 1:
+        names = ("t", "theta", "omega", "r", "v", "r_cm", "inertia")
+        run = replace(run, **{name: getattr(run, name)[:: planned.thin].copy() for name in names})
+    if not planned.whole:
+        none = np.empty((0, run.scenario.n_slices))
+        run = replace(run, r=none, v=none)
+    return replace(made, trajectory=run)
+
+
+# ---------------------------------------------------------------------- what statements need beside the figures
+
+
+def many_steps_key(filling: float) -> str:
+    """Return the key of the flight with ``MANY_STEPS`` steps."""
+    return f"filling {filling:g}, P {MANY_STEPS}"
+
+
+def same_steps_key(filling: float) -> str:
+    """Return the key of the flight by the exact step of Eq. 8 at the paper's number of time steps."""
+    return f"filling {filling:g}, exact-step"
+
+
+def finest_key(damping: str) -> str:
+    """Return the key of the flight with the most slices at one of ``DAMPINGS``."""
+    return f"slices finest{damping}"
+
+
+def plan_claims() -> list[Planned]:
+    """Return the runs of all statements: those that are not grouped, and those of the published program."""
+    return [*plan_halved(), *plan_further(), *(each for half in HALVES for each in plan_published(half))]
+
+
+def _planned(solver: str, key: str, scenario: Scenario, half: Half = "", *, by: str = "", **settings: Any) -> Planned:
+    """Return the run of an equation, made by the scheme ``by`` if there is one."""
+    label = f"claims, {by or solver}, {key}" + (f", half the {half}" if half else "")
+    return Planned((solver, key, half), Run(by or solver, scenario, settings, label), grouped=False)
+
+
+def _halved(scenario: Scenario) -> Scenario:
+    return scenario.with_slices(max(1, scenario.n_slices // 2))
+
+
+def _same_steps(filling: float, half: Half = "") -> Planned:
+    """Return the run of the scheme that solves Eq. 8 as printed at the paper's number of time steps."""
+    throw = _halved(paper_throw(filling)) if half else paper_throw(filling)
+    key = same_steps_key(filling)
+    return _planned("eq8", key, throw, half, by="exact-step", steps=paper_steps(), store="summary")
+
+
+def plan_further() -> Iterator[Planned]:
+    """Yield the runs that no figure needs: finer in slices and in time, and without weight."""
+    for damping in DAMPINGS:
+        many = next(case for case in family(f"slices{damping}") if case.value == MANY_SLICES)
+        for solver in SOLVERS[1:]:
+            yield _planned(solver, finest_key(damping), many.scenario.with_slices(FINEST))
+    for filling in numbers("figure-S1-filling"):
+        key = many_steps_key(filling)
+        yield _planned(PUBLISHED, key, paper_throw(filling), steps=MANY_STEPS, store="summary")
+        yield _same_steps(filling)
+    yield _planned(WEIGHTLESS, WEIGHTLESS_KEY, paper_throw(STEADY_FILLING))
+
+
+def plan_halved() -> Iterator[Planned]:
+    """Yield the event-driven flights with half the slices of the figures'."""
+    cases = {case.key: case for name in HALVED for case in family(name)}
+    for solver in SOLVERS[1:]:
+        for key, case in cases.items():
+            if flies(solver, case) and case.scenario.n_slices > 1:
+                yield _planned(solver, key, _halved(case.scenario), "slices")
+    for filling in numbers("figure-S1-filling"):
+        yield _same_steps(filling, "slices")
+
+
+def plan_published(half: Half) -> Iterator[Planned]:
+    """Yield the flights of the published program with half its "slices" or "steps".
+
+    Slices are kept where statements read more than omega and theta.
+    """
+    rebounds, slices = ([f"{name}{damping}" for damping in DAMPINGS] for name in ("beta", "slices"))
+    whole = {case.key for name in ("long", "drag", *rebounds) for case in family(name)}
+    families = HALVED if half == "slices" else (*HALVED, *rebounds, *slices)
+    for key, case in {case.key: case for name in families for case in family(name)}.items():
+        scenario, steps, thin = _halved(case.scenario), case.steps, case.thin
+        if half == "steps":
+            # As many points are kept as there are, up to the rounding that keeps the last one.
+            scenario, steps, thin = case.scenario, 1 + (case.steps - 1) // 2, 1
+        store = "full" if key in whole else "summary"
+        planned = _planned(PUBLISHED, key, scenario, half, steps=steps, store=store)
+        yield replace(planned, thin=thin, grouped=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
@@ -21,21 +21,19 @@ CLASSES: Final[Mapping[Verdict, str]] = {
 }  # fmt: skip
 """How a page marks a verdict: sign and colour class beside the word."""
 
-LIMIT_WORDS: Final[Mapping[Verdict, str]] = {
-    "holds": "has this limit",
-    "fails": "is free of it",
-    "cannot be decided": "cannot be decided",
-    "not judged": "not judged",
-}
-"""The verdict on a limit that the paper admits: to have it is no success, to be free of it no failure."""
-
 NEAR: Final = 0.1
 """Share of a threshold within which a number is marginal. Thresholds chosen here have one significant digit: another
 reader could as well have chosen one a tenth higher or lower."""
 
 
-DIGITS: Final = 3
-"""Digits of a number from which on its band is not worth a word."""
+def at_least(bound: float) -> tuple[float, float]:
+    """Return the interval of numbers that are not below ``bound``."""
+    return bound, math.inf
+
+
+def at_most(bound: float) -> tuple[float, float]:
+    """Return the interval of numbers that are not above ``bound``."""
+    return -math.inf, bound
 
 
 def _with_unit(number: str, unit: str) -> str:
@@ -48,7 +46,7 @@ def _signed(digits: str) -> str:
     return digits.replace("-", "\N{MINUS SIGN}") if float(digits) else digits.lstrip("-")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Reading:
     """One number that a statement stands or falls with.
 
@@ -144,7 +142,7 @@ class Reading:
         if 0.0 < self.band < math.inf:
             shown = -math.floor(math.log10(self.band))
             size = math.floor(math.log10(abs(self.value))) if self.value else -math.inf
-            if size + shown < DIGITS:
+            if size + shown < 3:
                 places = max(0, shown)
                 number, band = f"{self.value:.{places}f}", f" ± {self.band:.{places}f}"
         return _with_unit(f"{_signed(number)}{band}", self.unit)
@@ -157,17 +155,11 @@ class Reading:
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the reading as JSON-ready data; numbers that are not finite become null."""
-        return {
-            "name": self.name,
-            "value": finite_or_none(self.value),
-            "unit": self.unit,
-            "band": finite_or_none(self.band),
-            "admissible": [finite_or_none(bound) for bound in self.admissible],
-            "margin": finite_or_none(self.margin),
-            "marginal": self.marginal,
-            "verdict": self.verdict,
-            "note": self.note,
-        }
+        names = ("name", "value", "unit", "band", "admissible", "margin", "marginal", "verdict", "note")
+        mapping = {name: getattr(self, name) for name in names}
+        for name in ("value", "band", "margin"):
+            mapping[name] = finite_or_none(mapping[name])
+        return mapping | {"admissible": [finite_or_none(bound) for bound in self.admissible]}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -204,7 +196,7 @@ class Judgement:
     @property
     def marginal(self) -> bool:
         """Return whether a reading at the edge of its threshold carries the verdict."""
-        return self.deciding is not None and self.deciding.marginal
+        return bool(self.deciding and self.deciding.marginal)
 
     @property
     def deciding(self) -> Reading | None:
@@ -220,16 +212,6 @@ class Judgement:
     def value(self) -> float:
         """The deciding number; NaN if there is none."""
         return self.deciding.value if self.deciding else math.nan
-
-    @property
-    def band(self) -> float:
-        """The band of the deciding number; NaN if there is none."""
-        return self.deciding.band if self.deciding else math.nan
-
-    @property
-    def threshold(self) -> str:
-        """The threshold of the deciding number; empty if there is none."""
-        return self.deciding.threshold_text if self.deciding else ""
 
     @property
     def words(self) -> str:
@@ -256,6 +238,10 @@ class Judgement:
         }
 
 
+Read = Callable[..., Iterator[Reading]]
+"""Flights of one equation -> what is read off them; raises ``Missing`` where there is nothing to read."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Statement:
     """What the paper says about its results, and what becomes of it.
@@ -268,8 +254,14 @@ class Statement:
     means : str - what is measured, and what it must be
     throw : str - on which throw
     why : str - why the threshold is what it is
+    read : flights of one equation -> readings
     kind : "claim", or "admitted limit" for a shortcoming of the model that the paper itself names
-    judgements : one for each equation, or a single one of "geometry"
+    otherwise : (words, read) of every other sense that the text allows
+    of_geometry : whether no motion enters
+    of_steps : whether the number of time steps is the subject, so that halving it is no band
+    judges : equations that it says something about; all of them if empty
+    silent : why it says nothing about the others
+    judgements : one for each equation, or a single one of "geometry"; none before it is judged
     """
 
     id: str
@@ -278,12 +270,21 @@ class Statement:
     means: str
     throw: str
     why: str
-    kind: Kind
-    judgements: tuple[Judgement, ...]
+    read: Read
+    kind: Kind = "claim"
+    otherwise: tuple[tuple[str, Read], ...] = ()
+    of_geometry: bool = False
+    of_steps: bool = False
+    judges: tuple[str, ...] = ()
+    silent: str = ""
+    judgements: tuple[Judgement, ...] = ()
 
     def word(self, judgement: Judgement) -> str:
         """Return a verdict on this statement in words, with "marginal" where it is."""
-        verdict = LIMIT_WORDS[judgement.verdict] if self.kind == "admitted limit" else judgement.verdict
+        verdict: str = judgement.verdict
+        if self.kind == "admitted limit":
+            # To have a limit that the paper admits is no success, to be free of it no failure.
+            verdict = {"holds": "has this limit", "fails": "is free of it"}.get(verdict, verdict)
         return f"{verdict}, marginal" if judgement.marginal else verdict
 
     def sign(self, judgement: Judgement) -> str:
@@ -296,28 +297,21 @@ class Statement:
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the statement as JSON-ready data."""
-        return {
-            "id": self.id,
-            "place": self.place,
-            "kind": self.kind,
-            "says": self.says,
-            "means": self.means,
-            "throw": self.throw,
-            "why": self.why,
-            "judgements": [judgement.to_mapping() for judgement in self.judgements],
+        names = ("id", "place", "kind", "says", "means", "throw", "why")
+        return {name: getattr(self, name) for name in names} | {
+            "judgements": [judgement.to_mapping() for judgement in self.judgements]
         }
 
-    def findings(self) -> tuple[Finding, ...]:
-        """Return one finding for each judgement; observations, since what fails is the paper's and not this project."""
-        return tuple(
-            Finding(
+    def findings(self) -> Iterator[Finding]:
+        """Yield one finding for each judgement; observations, since what fails is the paper's and not this project."""
+        for judgement in self.judgements:
+            number = judgement.deciding
+            yield Finding(
                 id=f"paper-{self.id}-{judgement.solver}",
                 title=f"{self.place}: {self.says} By {judgement.solver}: {self.word(judgement)}",
-                value=None if math.isnan(judgement.value) else judgement.value,
-                unit=judgement.deciding.unit if judgement.deciding else "",
+                value=None if number is None or math.isnan(number.value) else number.value,
+                unit=number.unit if number else "",
                 kind="observation",
-                band=None if math.isnan(judgement.band) else judgement.band,
+                band=None if number is None or math.isnan(number.band) else number.band,
                 note=judgement.words,
             )
-            for judgement in self.judgements
-        )

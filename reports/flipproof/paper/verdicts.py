@@ -2,23 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 from flipproof.frame.findings import Finding
-from flipproof.paper.claim_runs import ClaimRuns
-from flipproof.paper.claims import STEADY, claim_weight_slows_the_tenth, judge_all
-from flipproof.paper.claims_landing import claim_filling_of_change
-from flipproof.paper.experiment import CAVEAT, Comparison, agreement, closest_overall, compare_all, times_closest
-from flipproof.paper.runs import SOLVERS
-from flipproof.paper.statements import Judgement, Statement, Verdict
+from flipproof.paper import claims_figure_5, claims_figures_6_7, claims_figures_8_9
+from flipproof.paper.claim import judge
+from flipproof.paper.claims_figures_8_9 import claim_filling_of_change
+from flipproof.paper.experiment import CAVEAT, Observation, closest_overall, compare_all, standing
+from flipproof.paper.observe import Flights, steady_level
+from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS, STEADY_FILLING, WEIGHTLESS, WEIGHTLESS_KEY, PaperRuns
+from flipproof.paper.statements import OMEGA, Judgement, Statement
 
 NAMES: Final[Mapping[str, str]] = MappingProxyType(
     {"published-python": "published program", "eq8": "Eq. 8 as printed", "free-flight": "free flight"}
 )
 """Equation -> its name over a column."""
+
+CLAIMS: Final = tuple(
+    each
+    for module in (claims_figure_5, claims_figures_6_7, claims_figures_8_9)
+    for each in vars(module).values()
+    if isinstance(each, Statement)
+)
+"""All statements, in the order of the paper: that in which they are written down."""
+
+STEADY: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
+    {WEIGHTLESS: (0.87, 0.89), "free-flight": (0.87, 0.89), PUBLISHED: (0.62, 0.64)}
+)
+"""Mean of omega / omega_0 over the second half of the flight of a bottle filled to 0.1: without weight, and with."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,27 +46,14 @@ class PaperVerdicts:
     comparisons : every statement about the experiment, beside the number of each equation
     weights : findings of what the weight does to the bottle filled to 0.1, and from which filling on water leaves the
         base; these must hold
-    slices : slices of an event-driven flight at the most
     """
 
     statements: tuple[Statement, ...]
-    comparisons: tuple[Comparison, ...]
+    comparisons: tuple[Observation, ...]
     weights: tuple[Finding, ...]
-
-    @property
-    def solvers(self) -> tuple[str, ...]:
-        """The equations in the order of the columns."""
-        return SOLVERS
-
-    @property
-    def names(self) -> Mapping[str, str]:
-        """The heading of each column."""
-        return NAMES
-
-    @property
-    def caveat(self) -> str:
-        """What the comparison with the experiment is worth."""
-        return CAVEAT
+    solvers: ClassVar = SOLVERS
+    names: ClassVar = NAMES
+    caveat: ClassVar = CAVEAT
 
     def judgements(self, solver: str, *, limits: bool = False) -> list[Judgement]:
         """Return what an equation has judged: the claims, or the limits that the paper admits."""
@@ -62,40 +64,37 @@ class PaperVerdicts:
             if judgement.solver == solver and (statement.kind == "admitted limit") is limits
         ]
 
-    def count(self, solver: str, verdict: Verdict) -> int:
-        """Return how many claims an equation gives this verdict; limits that the paper admits are not counted."""
-        return sum(judgement.verdict == verdict for judgement in self.judgements(solver))
-
     @property
     def lead(self) -> str:
-        """Return in two sentences for each equation how many claims survive, and how many admitted limits it has."""
+        """In two sentences for each equation how many claims survive, and how many admitted limits it has."""
         return " ".join(self._lead_of(solver) for solver in SOLVERS)
 
     def _lead_of(self, solver: str) -> str:
         claims, limits = self.judgements(solver), self.judgements(solver, limits=True)
+        of = Counter(judgement.verdict for judgement in claims)
         marginal = sum(judgement.marginal for judgement in claims)
         has = sum(judgement.verdict == "holds" for judgement in limits)
         return (
-            f"{NAMES[solver].capitalize()}: {self.count(solver, 'holds')} claims hold, {self.count(solver, 'fails')} "
-            f"fail, {self.count(solver, 'cannot be decided')} cannot be decided; {marginal} of these are marginal. It "
-            f"has {has} of the {len(limits)} limits that the paper admits."
+            f"{NAMES[solver].capitalize()}: {of['holds']} claims hold, {of['fails']} fail, {of['cannot be decided']} "
+            f"cannot be decided; {marginal} of these are marginal. It has {has} of the {len(limits)} limits that the "
+            "paper admits."
         )
 
     @property
     def closest(self) -> str:
-        """Return in words which equation comes closest to what the text says of the experiment."""
-        agrees, nearest = agreement(self.comparisons), times_closest(self.comparisons)
+        """Which equation comes closest to what the text says of the experiment, in words."""
         best = " and ".join(NAMES[solver] for solver in closest_overall(self.comparisons))
         each = "; ".join(
-            f"{NAMES[solver]} agrees with {agrees[solver]} and is the closest, or level with it, for {nearest[solver]}"
-            for solver in SOLVERS
+            f"{NAMES[solver]} agrees with {agrees} and is the closest, or level with it, for {nearest}"
+            for solver, (agrees, nearest) in standing(self.comparisons).items()
         )
         return f"Closest to the experiment as the text tells it: {best}. Of {len(self.comparisons)} statements, {each}."
 
-    def findings(self) -> tuple[Finding, ...]:
-        """Return all findings: observations for the paper's statements, regressions for what the weight does."""
-        judged = tuple(finding for statement in self.statements for finding in statement.findings())
-        return (*self.weights, *judged)
+    def findings(self) -> Iterator[Finding]:
+        """Yield all findings: regressions for what the weight does, observations for the paper's statements."""
+        yield from self.weights
+        for statement in self.statements:
+            yield from statement.findings()
 
     def to_mapping(self) -> dict[str, Any]:
         """Return everything as JSON-ready data."""
@@ -106,10 +105,37 @@ class PaperVerdicts:
         }
 
 
-def judge_paper(runs: ClaimRuns) -> PaperVerdicts:
+def judge_paper(runs: PaperRuns) -> PaperVerdicts:
     """Return what becomes of the paper's statements by the runs that were made for them."""
+    flights = [runs.flights(solver) for solver in SOLVERS]
     return PaperVerdicts(
-        statements=judge_all(runs),
-        comparisons=compare_all(runs),
+        statements=judge_all(flights),
+        comparisons=compare_all(flights),
         weights=(*(claim_weight_slows_the_tenth(runs, solver) for solver in STEADY), claim_filling_of_change()),
+    )
+
+
+def judge_all(flights: list[Flights]) -> tuple[Statement, ...]:
+    """Return every statement with its judgements, in the order of the paper."""
+    geometry = [Flights(solver="geometry", made={})]
+    return tuple(
+        replace(each, judgements=tuple(judge(each, by) for by in (geometry if each.of_geometry else flights)))
+        for each in CLAIMS
+    )
+
+
+def claim_weight_slows_the_tenth(runs: PaperRuns, solver: str) -> Finding:
+    """At a filling of 0.1 the bottle keeps 0.88 of its spin where no weight acts on its water, 0.63 in the program."""
+    run = runs.trajectory(solver, WEIGHTLESS_KEY)
+    low, high = STEADY[solver]
+    return Finding(
+        id=f"paper-weight-{solver}",
+        title=f"{solver}: filled to {STEADY_FILLING:g} the bottle keeps {(low + high) / 2:.2f} of its spin",
+        value=None if run is None else steady_level(run),
+        unit=OMEGA,
+        kind="regression",
+        admissible=(low, high),
+        band=BANDS.get(solver),
+        note="mean over the second half of the flight"
+        + ("" if run is None else f"; N = {run.scenario.n_slices}, γ = {run.scenario.damping_rate:.3g} /s"),
     )

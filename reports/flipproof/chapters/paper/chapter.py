@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Exhibit, Study
-from flipproof.paper.claim_runs import ClaimRuns, plan_claims
+from flipproof.frame.chapter import Ask, Chapter, Study
 from flipproof.paper.figures import exhibits_paper
-from flipproof.paper.runs import PaperRuns, figure_calls, make_thinned
+from flipproof.paper.runs import PaperRuns, group_calls, plan_claims, plan_figures
 from flipproof.paper.verdicts import PaperVerdicts, judge_paper
 
 
@@ -23,35 +21,21 @@ class Paper:
 
 
 def study(ask: Ask) -> Study[Paper]:
-    """Make the throws of the figures, and those that statements need beside them; then judge in a worker."""
+    """Make the throws of the figures, and those that statements need beside them; then judge."""
     del ask
-    figures = figure_calls()
     plan = plan_claims()
-    halved = [Call(make_thinned, (group,), "the paper's statements") for group in plan.groups]
-    flights = yield [*figures, *halved, *plan.runs]
-    runs = PaperRuns.of(flights, figures)
-    made = {each.run: each for call in halved for each in flights.answer(call)} | {
-        run: flights[run] for run in plan.runs
-    }
-    return Paper(runs, judge_paper(ClaimRuns.of(runs, plan, made)))
-
-
-def claims(found: Paper) -> Claims:
-    """Yield what the weight must do, and what every equation says of every statement."""
-    yield from found.verdicts.findings()
-
-
-def figures(found: Paper) -> Iterator[Exhibit]:
-    """Yield the paper's figures, drawn anew."""
-    yield from exhibits_paper(found.runs)
+    calls = [*group_calls(plan_figures(), "the paper's figures"), *group_calls(plan, "the paper's statements")]
+    flights = yield [*calls, *(each.run for each in plan if not each.grouped)]
+    runs = PaperRuns.of(flights, calls, plan)
+    return Paper(runs, judge_paper(runs))
 
 
 CHAPTER: Final = Chapter(
     name="paper",
     title="The paper's figures and claims",
     study=study,
-    claims=claims,
-    figures=figures,
+    claims=lambda found: found.verdicts.findings(),
+    figures=lambda found: exhibits_paper(found.runs),
     template=Path(__file__).with_name("part.html.j2"),
     work={"full": None},
     summary=lambda found: {"paper": found.verdicts.to_mapping()},
