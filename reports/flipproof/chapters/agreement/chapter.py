@@ -13,19 +13,12 @@ from flipproof.chapters.agreement.study import Agreement, study_agreement
 from flipproof.chapters.differences.chapter import MODEL_FLOOR
 from flipproof.chapters.reference.chapter import witnessed
 from flipproof.chapters.solvers import FREE, LOCATED
-from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Flights, Missing, Run, Study
-from flipproof.frame.flights import attempt
+from flipproof.frame.chapter import Ask, Chapter, Claims, Flights, Missing, Run, Study, attempt, observed
 from flipproof.frame.twins import twins, usual_rest_speed
 from slicemodel.trajectory import FloatArray
 
 SOLVE_IVP: Final = "solve_ivp"
 """Name of the witness: ``scipy.integrate.solve_ivp`` over all 2N + 1 equations (``ode_reference.witness``)."""
-
-COARSER: Final = {"rtol": 1e-9, "atol": 1e-12}
-"""Tolerances of a second run of the witness, at the usual rest speed: by how much that differs is its own band."""
-
-SOLVERS: Final = {FREE: ("pymunk", LOCATED, "mujoco"), "eq8": ("pymunk rotating",)}
-"""Equation -> the engine runs that solve it, beside the equation itself and the witness, on the same throw."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,12 +30,16 @@ class Agreed:
 
 
 def study(ask: Ask) -> Study[Agreed]:
-    """Compare, for free flight and for Eq. 8, the solvers that reached the end and know their band."""
+    """Compare, for free flight and for Eq. 8, the solvers that reached the end and know their band.
+
+    Beside the equation itself and its witness these are engines. The witness's own band is by how much it differs from
+    itself at coarser tolerances and the usual rest speed.
+    """
     runs: dict[str, dict[str, Run]] = {}
     coarser: dict[str, Run] = {}
-    for equation, engines in SOLVERS.items():
+    for equation, engines in ((FREE, ("pymunk", LOCATED, "mujoco")), ("eq8", ("pymunk rotating",))):
         settings = witnessed(ask.throw, equation)
-        coarse = {**settings, **COARSER, "rest_speed": usual_rest_speed(equation)}
+        coarse = {**settings, "rtol": 1e-9, "atol": 1e-12, "rest_speed": usual_rest_speed(equation)}
         runs[equation] = {
             equation: ask.solvers[equation],
             SOLVE_IVP: Run(equation, ask.throw, settings, f"{equation}, {SOLVE_IVP}"),
@@ -81,26 +78,18 @@ def band_over_time(run: Run, others_of: Iterable[Run], flights: Flights) -> Floa
 
 
 def claims(found: Agreed) -> Claims:
-    """Yield the largest difference of a pair for each equation."""
+    """Yield for each equation the largest difference of a pair, and which solver differs from all others."""
     for equation, agreement in found.agreements.items():
-        yield claim_agreement(equation, agreement)
-
-
-def claim_agreement(equation: str, agreement: Agreement) -> Finding:
-    """Several solvers of one equation: the largest difference of a pair, and which solver differs from all others."""
-    widest = max(agreement.pairs, key=lambda pair: pair.largest)
-    return Finding(
-        id="agreement" if equation == FREE else f"agreement-{equation}",
-        title=f"{', '.join(agreement.names)}: {agreement.words}",
-        value=widest.largest,
-        unit="of ω₀",
-        kind="observation",
-        band=widest.bands,
-        note="; ".join(
-            f"{p.first} and {p.second} {p.largest:.1e}, {100 * p.share:.0f} % within" for p in agreement.pairs
+        widest = max(agreement.pairs, key=lambda pair: pair.largest)
+        pairs = [f"{p.first} and {p.second} {p.largest:.1e}, {100 * p.share:.0f} % within" for p in agreement.pairs]
+        yield observed(
+            "agreement" if equation == FREE else f"agreement-{equation}",
+            f"{', '.join(agreement.names)}: {agreement.words}",
+            widest.largest,
+            "of ω₀",
+            f"{'; '.join(pairs)}; up to {1e3 * agreement.until:.0f} ms",
+            band=widest.bands,
         )
-        + f"; up to {1e3 * agreement.until:.0f} ms",
-    )
 
 
 CHAPTER: Final = Chapter(

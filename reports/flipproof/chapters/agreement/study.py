@@ -12,15 +12,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Final
 
 import numpy as np
 
 from slicemodel import Trajectory
 from slicemodel.trajectory import FloatArray
-
-SHARE: Final = 0.95
-"""Share of the sampled times that must lie within the two bands together."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,12 +26,9 @@ class Pair:
     Parameters
     ----------
     first, second : str
-    largest : float
-        max |omega_second - omega_first| / |omega_0| before the horizon [1].
-    bands : float
-        The largest sum of the two printed bands [1].
-    share : float
-        Share of the sampled times within the sum of the bands [1].
+    largest : float - max |omega_second - omega_first| / |omega_0| before the horizon [1]
+    bands : float - the largest sum of the two printed bands [1]
+    share : float - of the sampled times within the sum of the bands [1]
     """
 
     first: str
@@ -46,18 +39,17 @@ class Pair:
 
     @property
     def agree(self) -> bool:
-        """Whether nearly all times lie within the bands; NaN agrees with nobody."""
-        return self.share >= SHARE
+        """Whether nearly all times, 95 %, lie within the bands; NaN agrees with nobody."""
+        return self.share >= 0.95
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Agreement:
-    """All pairs of several solvers. ``odd`` is the one that stands alone; None if none does, ``words`` says which."""
+    """All pairs of several solvers up to a time [s]; ``words`` say which one stands alone, if one does."""
 
     names: tuple[str, ...]
     pairs: tuple[Pair, ...]
     until: float
-    odd: str | None
     words: str
 
     def pair(self, a: str, b: str) -> Pair:
@@ -92,37 +84,22 @@ def study_agreement(
         if runs[name].scenario != first.scenario or not np.array_equal(runs[name].t, first.t):
             raise ValueError(f"{name} and {names[0]} are not runs of one throw at the same times")
     seen = first.t <= until
-    pairs = tuple(_pair(runs, bands, a, b, seen) for a, b in combinations(names, 2))
+    pairs = []
+    for a, b in combinations(names, 2):
+        gap = np.abs(runs[b].omega - runs[a].omega)[seen] / abs(first.scenario.omega0)
+        allowed = np.broadcast_to(np.asarray(bands[a]) + np.asarray(bands[b]), first.t.shape)[seen]
+        # Written as "inside", because NaN fails every comparison: what is not a number is not within a band.
+        share = float(np.mean(gap <= allowed))
+        pairs.append(Pair(first=a, second=b, largest=float(gap.max()), bands=float(allowed.max()), share=share))
+    return Agreement(names=names, pairs=tuple(pairs), until=float(first.t[seen][-1]), words=_words(names, pairs))
+
+
+def _words(names: tuple[str, ...], pairs: list[Pair]) -> str:
     apart = [{pair.first, pair.second} for pair in pairs if not pair.agree]
-    alone = [name for name in names if apart and all(name in two for two in apart)]
-    odd = alone[0] if len(alone) == 1 else None
-    return Agreement(names=names, pairs=pairs, until=float(first.t[seen][-1]), odd=odd, words=_words(apart, odd))
-
-
-def _pair(
-    runs: Mapping[str, Trajectory],
-    bands: Mapping[str, FloatArray | float],
-    a: str,
-    b: str,
-    seen: np.ndarray[tuple[int], np.dtype[np.bool_]],
-) -> Pair:
-    first, second = runs[a], runs[b]
-    gap = np.abs(second.omega - first.omega)[seen] / abs(first.scenario.omega0)
-    allowed = np.broadcast_to(np.asarray(bands[a]) + np.asarray(bands[b]), first.t.shape)[seen]
-    # Written as "inside", because NaN fails every comparison: what is not a number is not within a band.
-    return Pair(
-        first=a,
-        second=b,
-        largest=float(gap.max()),
-        bands=float(allowed.max()),
-        share=float(np.mean(gap <= allowed)),
-    )
-
-
-def _words(apart: list[set[str]], odd: str | None) -> str:
     if not apart:
         return "all agree within their bands"
-    if odd is not None:
-        return f"all but {odd} agree within their bands"
+    alone = [name for name in names if all(name in two for two in apart)]
+    if len(alone) == 1:
+        return f"all but {alone[0]} agree within their bands"
     named = "; ".join(" and ".join(sorted(two)) for two in apart)
     return f"outside their bands: {named}; no single one of them explains it"
