@@ -38,10 +38,6 @@ REFERENCE: Final = "ode_reference"
 """The program that lands event by event; every other name is an engine's."""
 
 
-KEPT: Final = 1024
-"""Touches that a process keeps."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Landed:
     """What became of a throw. A number that is not known is None, and ``reason`` says why.
@@ -114,17 +110,14 @@ def make_landing(point: Point) -> Landed:
         number=point.number,
         outcome=outcome.outcome,
         **touch_readings(touch),
-        certified=outcome.certified,
-        margin=outcome.margin,
-        slid=outcome.slid,
-        bounces=outcome.bounces,
+        **{name: getattr(outcome, name) for name in ("certified", "margin", "slid", "bounces")},
         status="ok" if outcome.decided else "undecided",
         reason=outcome.reason,
         seconds=time.perf_counter() - began,
     )
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=1024)
 def flown(scenario: Scenario, height: float) -> Touch:
     """Return the touch of a throw; laws and tables meet the same throwers, whose flights they share."""
     import ode_reference

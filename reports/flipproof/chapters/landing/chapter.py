@@ -2,48 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import Final
 
-from flipproof.chapters.landing import study as landing
 from flipproof.chapters.landing.claims import claims
 from flipproof.chapters.landing.figures import figures
-from flipproof.chapters.landing.study import PAGE, Found
+from flipproof.chapters.landing.study import Cases, Found, Size, aiming, counting, read
 from flipproof.chapters.landing.tables import page
-from flipproof.frame.chapter import Ask, Call, Chapter, Study
+from flipproof.frame.chapter import Ask, Call, Chapter, Flights, Study
 from flipproof.landing.design import Case
 from flipproof.landing.upright import make_case
 from flipproof.landing.work import Landed
 
-CHUNK: Final = 300
-"""Throws of a call, at the least: a call of a few is as soon made again as read from the store, and the laws of one
-filling, one after the other, share their flights."""
-
 
 def study(ask: Ask) -> Study[Found]:
     """Solve for the aims, throw about them, and throw about the best of them, a wave each."""
-    planned = Call(landing.aiming, (ask.throw, ask.work), "aims of the landing")
+    planned = Call(aiming, (ask.throw, ask.work), "aims of the landing")
     flights = yield [planned]
-    steps = landing.study(ask.throw, ask.work, flights.answer(planned))
-    wave = next(steps)
-    while True:
-        calls = [Call(make_cases, (some, ask.work.seed), f"landing, {wave.name}") for some in chunks(wave.cases)]
-        flights = yield calls
-        try:
-            wave = steps.send([rows for call in calls for rows in flights.answer(call)])
-        except StopIteration as end:
-            found: Found = end.value
-            return found
+    aims, unaimed = flights.answer(planned)
+    rows = yield from made("aims", aims, ask.work.seed)
+    throws = counting(ask.throw, ask.work, aims, rows)
+    rows = yield from made("throws", throws, ask.work.seed)
+    return read(ask.throw, ask.work, throws, rows, unaimed)
+
+
+def made(wave: str, cases: Cases, seed: int) -> Generator[list[Call], Flights, list[list[Landed]]]:
+    """Ask workers for the throws of some cases, and return their rows, case by case."""
+    calls = [Call(make_cases, (some, seed), f"landing, {wave}") for some in chunks(tuple(cases.values()))]
+    flights = yield calls
+    return [rows for call in calls for rows in flights.answer(call)]
 
 
 def chunks(cases: Sequence[Case]) -> list[tuple[Case, ...]]:
-    """Return the cases in their order, CHUNK throws together or more."""
+    """Return the cases in their order, 300 throws together or more.
+
+    A call of a few is as soon made again as read from the store, and the laws of one filling, one after the other,
+    share their flights.
+    """
     some: list[Case] = []
     made: list[tuple[Case, ...]] = []
     for case in cases:
         some.append(case)
-        if sum(each.throws for each in some) >= CHUNK:
+        if sum(each.throws for each in some) >= 300:
             made.append(tuple(some))
             some = []
     return [*made, tuple(some)] if some else made
@@ -62,5 +64,16 @@ CHAPTER: Final = Chapter(
     figures=figures,
     template=Path(__file__).with_name("part.html.j2"),
     page=page,
-    work={"full": PAGE},
+    # Less than a minute of one core.
+    work={
+        "full": Size(
+            families=("B",),
+            throws=100,
+            aim_throws=20,
+            offsets=tuple(math.radians(angle) for angle in (-20, -10, 0, 10, 20)),
+            axis_throws=50,
+            map_cells=(16, 16),
+            engine_throws=0,
+        )
+    },
 )

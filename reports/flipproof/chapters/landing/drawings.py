@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from flipproof.chapters.landing.study import OPTIMAL, Cell, Found, Kind
-from flipproof.chapters.landing.tables import FAMILIES, NAMES
+from flipproof.chapters.landing.study import AXIS_KINDS, KINDS, OPTIMAL, WATER_AND_ICE, Cell, Found, Kind
 from flipproof.figures.style import new_figure, shared_legend, styled
+from flipproof.landing.aim import FAMILIES
 
 LOOKS: Final[Mapping[Kind, dict[str, Any]]] = {
     "together": {"color": "#0072B2", "marker": "o", "linestyle": "-"},
@@ -30,12 +30,6 @@ SHADES: Final = {
 }  # fmt: skip
 """Colour of every outcome on the map; water and ice alike."""
 
-FALLEN: Final = "#B08D57"
-"""Colour of the energy of a landing that does not end upright."""
-
-TOP: Final = 4.0
-"""Largest energy that is drawn [E_s]."""
-
 
 @styled
 def figure_shares(found: Found) -> Figure:
@@ -46,7 +40,7 @@ def figure_shares(found: Found) -> Figure:
             _curve(axes, kind, found.curve(family, kind))
         axes.axvspan(*OPTIMAL, color="#0072B2", alpha=0.06, linewidth=0)
         axes.set_xlabel("fill fraction M_w / M_max [1]")
-        axes.set_title(FAMILIES[family], fontsize=10, loc="left")
+        axes.set_title(f"{family}: {FAMILIES[family]}", fontsize=10, loc="left")
         axes.set_ylim(0.0, 1.0)
     panels[0, 0].set_ylabel("P(upright) [1]")
     shared_legend(figure, panels[0, -1], columns=5)
@@ -59,14 +53,13 @@ def figure_axes(found: Found) -> Figure:
     names = {"restitution": "e_table [1]", "friction": "friction of the table [1]", "scatter": "scatter, times assumed"}
     figure, panels = new_figure(1, 3, size=(8.6, 3.8), sharey=True)
     for axes, (axis, label) in zip(panels, names.items(), strict=True):
-        for kind in ("together", "in-turn", "ice"):
+        for kind in AXIS_KINDS:
             _curve(axes, kind, found.along(axis, kind))
         axes.set_xlabel(label)
         axes.set_ylim(0.0, 1.0)
     panels[0].set_ylabel("P(upright) [1]")
-    panels[0].set_title(
-        f"filling {found.size.axis_filling:g}, family {found.size.families[-1]}", fontsize=10, loc="left"
-    )
+    title = f"filling {found.size.axis_filling:g}, family {found.size.families[-1]}"
+    panels[0].set_title(title, fontsize=10, loc="left")
     shared_legend(figure, panels[0])
     return figure
 
@@ -76,7 +69,7 @@ def _curve(axes: Axes, kind: Kind, curve: Sequence[tuple[float, Cell]]) -> None:
         return
     x = [value for value, _ in curve]
     low, high = np.array([cell.share.interval for _, cell in curve]).T
-    axes.plot(x, [cell.share.value for _, cell in curve], label=NAMES[kind], markersize=4.5, **LOOKS[kind])
+    axes.plot(x, [cell.share.value for _, cell in curve], label=KINDS[kind].words, markersize=4.5, **LOOKS[kind])
     axes.fill_between(x, low, high, color=LOOKS[kind]["color"], alpha=0.13, linewidth=0)
 
 
@@ -84,33 +77,25 @@ def _curve(axes: Axes, kind: Kind, curve: Sequence[tuple[float, Cell]]) -> None:
 def figure_map(found: Found) -> Figure:
     """Outcome of one throw without scatter over filling and omega_0; lines where the bottle touches upright."""
     figure, panels = new_figure(1, max(len(found.maps), 1), size=(8.6, 4.6), squeeze=False, sharey=True)
-    names = list(SHADES)
+    names, colours = list(SHADES), ListedColormap(list(SHADES.values()))
+    grid = found.size.map_axes
     for axes, (kind, outcomes) in zip(panels[0], found.maps.items(), strict=False):
         codes = np.vectorize(lambda name: names.index(name) if name in names else len(names) - 1)(outcomes.outcome)
-        axes.pcolormesh(
-            found.fillings, found.omegas, codes, cmap=ListedColormap(list(SHADES.values())), vmin=-0.5,
-            vmax=len(names) - 0.5, shading="nearest", rasterized=True,
-        )  # fmt: skip
+        ends = {"vmin": -0.5, "vmax": len(names) - 0.5}
+        axes.pcolormesh(*grid, codes, cmap=colours, **ends, shading="nearest", rasterized=True)
         turns = outcomes.theta / math.tau
         for level, style in ((1.0, "-"), (2.0, "--")):
             if np.isfinite(turns).any() and np.nanmin(turns) < level < np.nanmax(turns):
-                axes.contour(
-                    found.fillings, found.omegas, turns, levels=[level], colors="black", linestyles=style,
-                    linewidths=1.3,
-                )  # fmt: skip
-        axes.set_title(NAMES[kind], fontsize=10, loc="left")
+                axes.contour(*grid, turns, levels=[level], colors="black", linestyles=style, linewidths=1.3)
+        axes.set_title(KINDS[kind].words, fontsize=10, loc="left")
         axes.set_xlabel("fill fraction M_w / M_max [1]")
         axes.grid(visible=False)
     panels[0, 0].set_ylabel("ω₀ [rad/s]")
     shown = {str(name) for outcomes in found.maps.values() for name in outcomes.outcome.ravel()}
-    handles: list[Any] = [
-        Patch(facecolor=shade, edgecolor="#bbbbbb", label=name) for name, shade in SHADES.items() if name in shown
-    ]
-    handles += [
-        Line2D([], [], color="black", linestyle="-", label="touches at 360 degrees"),
-        Line2D([], [], color="black", linestyle="--", label="at 720 degrees"),
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=5)
+    patches = [Patch(facecolor=SHADES[name], edgecolor="#bbbbbb", label=name) for name in names if name in shown]
+    once = Line2D([], [], color="black", linestyle="-", label="touches at 360 degrees")
+    twice = Line2D([], [], color="black", linestyle="--", label="at 720 degrees")
+    figure.legend(handles=[*patches, once, twice], loc="outside lower center", ncols=5)
     return figure
 
 
@@ -120,16 +105,15 @@ def figure_static(found: Found) -> Figure:
     names = [name for name, counts in found.static.items() if sum(counts.values())]
     figure, axes = new_figure(size=(8.6, 3.9))
     width = 0.38
-    for side, (said, colour, label) in enumerate(
-        ((True, "#0072B2", "tilt below the toppling angle at touch"), (False, "#D55E00", "tilt above it"))
-    ):
+    sides = ((True, "#0072B2", "tilt below the toppling angle at touch"), (False, "#D55E00", "tilt above it"))
+    for side, (said, colour, label) in enumerate(sides):
         for k, name in enumerate(names):
             counts = found.static[name]
             total = counts[said, True] + counts[said, False]
             height = counts[said, True] / total if total else 0.0
             bar = axes.bar(k + (side - 0.5) * width, height, width, color=colour, label=label if k == 0 else None)
             axes.bar_label(bar, [f"{counts[said, True]} of {total}"], fontsize=7.5, padding=2)
-    axes.set_xticks(range(len(names)), [f"{NAMES[kind]}\nfamily {family}" for family, kind in names], fontsize=8)
+    axes.set_xticks(range(len(names)), [f"{KINDS[kind].words}\nfamily {family}" for family, kind in names], fontsize=8)
     axes.set_ylim(0.0, 1.1)
     axes.set_ylabel("share that stands [1]")
     shared_legend(figure, axes, columns=2)
@@ -140,20 +124,20 @@ def figure_static(found: Found) -> Figure:
 def figure_energy(found: Found) -> Figure:
     """Energy of a few landings over the saddle: below 1 the outcome is final."""
     figure, panels = new_figure(1, 2, size=(8.6, 4.0), sharey=True)
-    kinds: tuple[Kind, ...] = ("together", "ice")
-    for axes, kind in zip(panels, kinds, strict=True):
+    fallen = "#B08D57"
+    for axes, kind in zip(panels, WATER_AND_ICE, strict=True):
         for run in found.energies:
             if run.kind == kind:
-                colour = SHADES["upright"] if run.outcome == "upright" else FALLEN
-                axes.plot(run.t, np.minimum(run.energy, 2 * TOP), color=colour, linewidth=1.1, alpha=0.85)
+                colour = SHADES["upright"] if run.outcome == "upright" else fallen
+                axes.plot(run.t, np.minimum(run.energy, 8.0), color=colour, linewidth=1.1, alpha=0.85)
         axes.axhline(1.0, color="black", linewidth=1.2)
-        axes.set_title(NAMES[kind], fontsize=10, loc="left")
+        axes.set_title(KINDS[kind].words, fontsize=10, loc="left")
         axes.set_xlabel("time from the touch [s]")
-        axes.set_ylim(0.4, TOP)
+        axes.set_ylim(0.4, 4.0)
         axes.margins(x=0.0)
     panels[0].set_ylabel("energy over the table / saddle E_s [1]")
     handles = [Line2D([], [], color=SHADES["upright"], label="ends upright")]
-    handles += [Line2D([], [], color=FALLEN, label="ends lying or on the cap")]
+    handles += [Line2D([], [], color=fallen, label="ends lying or on the cap")]
     handles += [Line2D([], [], color="black", label="saddle: below it the outcome is final")]
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
