@@ -10,18 +10,14 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.chapters.alignment.figure import figure_gantt
-from flipproof.chapters.alignment.found import Alignment, Keyed, Rests, end_name
+from flipproof.chapters.alignment.found import Alignment, end_name
 from flipproof.chapters.alignment.study import study_alignment
 from flipproof.chapters.alignment.tube import Tube, study_tube
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Outcome, Study, attempt, judged
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Outcome, Study, attempt, observed
 from flipproof.output.columns import rows_csv
 
 PAIRS: Final = (("eq8", "midpoint"), ("eq8", "free-flight"))
 """Pairs whose impact sequences are aligned: two ways to the same equation, and two equations."""
-
-TUBE_TIME: Final = 2e-3
-TUBE_SHARE: Final = 0.01
-"""Half-widths of the tube in which two trajectories are compared: seconds, and share of omega_0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,40 +34,31 @@ class Events:
 
 
 def study(ask: Ask) -> Study[Events]:
-    """Align the impacts of the pairs."""
+    """Align the impacts of the pairs, and hold their omega in tubes of 2 ms and a hundredth of omega_0."""
     flights = yield [ask.solvers[name] for pair in PAIRS for name in pair]
-    dy = TUBE_SHARE * abs(ask.throw.omega0)
+    dy = 0.01 * abs(ask.throw.omega0)
 
     def both(pair: tuple[str, str]) -> Any:
         return (flights[ask.solvers[name]].flight for name in pair)
 
     return Events(
         {pair: attempt(lambda pair: study_alignment(*both(pair)), pair) for pair in PAIRS},
-        {pair: attempt(lambda pair: study_tube(*both(pair), dt=TUBE_TIME, dy=dy), pair) for pair in PAIRS},
+        {pair: attempt(lambda pair: study_tube(*both(pair), dt=2e-3, dy=dy), pair) for pair in PAIRS},
     )
 
 
 def claims(found: Events) -> Claims:
-    """Yield the share of the time that each second curve spends in the tube around the first."""
+    """Yield the share of the time that each second curve spends in the tube around the first: early is no failure."""
     for (first, second), tube in found.tubes.items():
-        title = f"tube of {first} and {second}"
-        yield judged(claim_tube, first, second, tube, id=f"tube-{first}-{second}", title=title, kind="observation")
+        if tube.found is None:
+            yield Absent(f"tube-{first}-{second}", f"tube of {first} and {second}", tube.reason, "observation")
+        else:
+            title = f"{second} in the tube around {first}: share of the time"
+            yield observed(f"tube-{first}-{second}", title, tube.found.share, "", tube.found.words)
     for (first, second), each in found.alignments.items():
         if each.found is None:
             title = f"alignment of {first} and {second}"
             yield Absent(f"alignment-{first}-{second}", title, each.reason, "observation")
-
-
-def claim_tube(first: str, second: str, tube: Tube) -> Finding:
-    """The share of the time that one curve spends in the tolerance tube around another: early is no failure."""
-    return Finding(
-        id=f"tube-{first}-{second}",
-        title=f"{second} in the tube around {first}: share of the time",
-        value=tube.share,
-        unit="",
-        kind="observation",
-        note=tube.words,
-    )
 
 
 def figures(found: Events) -> Iterator[Exhibit]:
@@ -80,54 +67,37 @@ def figures(found: Events) -> Iterator[Exhibit]:
         yield Exhibit(
             name=f"gantt-{first}-{second}",
             title=f"Contacts and impacts: {first} and {second}",
-            caption=(
-                "One row per slice. Bars are contacts, triangles are impacts; the upper lane of a row is the first "
-                "solver, the lower the second. Where the two lanes of a row look alike, both solvers have the same "
-                "contacts and impacts of that slice. At a fork the slice strikes one end in the first flight and the "
-                "other end in the second."
-            ),
+            caption="One row per slice. Bars are contacts, triangles are impacts; the upper lane of a row is the first "
+            "solver, the lower the second. Where the two lanes of a row look alike, both solvers have the same "
+            "contacts and impacts of that slice. At a fork the slice strikes one end in the first flight and the "
+            "other end in the second.",
             alt=f"Contacts and impacts of {first} above those of {second}, one row per slice. "
             f"{alignment.words}.".replace("ω₀", "omega_0"),
             maker=figure_gantt,
             data=(alignment,),
-            table=table(alignment),
+            table=rows_csv(
+                ("run", "what", "slice [1]", "end", "impact number of its slice there [1]", "from [s]", "to [s]"),
+                _rows(alignment),
+            ),
         )
 
 
-def table(alignment: Alignment) -> str:
-    """Return every contact and impact of the two runs, with what became of each impact."""
-    return rows_csv(
-        ("run", "what", "slice [1]", "end", "impact number of its slice there [1]", "from [s]", "to [s]"),
-        (*_contacts(alignment), *_impacts(alignment)),
-    )
-
-
-def _contacts(alignment: Alignment) -> Iterator[tuple[Any, ...]]:
-    for name, rests in zip((alignment.first, alignment.second), alignment.rests, strict=True):
-        yield from _rests(name, rests)
-
-
-def _rests(name: str, rests: Rests) -> Iterator[tuple[Any, ...]]:
-    for i, end, start, stop in zip(rests.slice, rests.end, rests.start, rests.stop, strict=True):
-        yield name, "contact", i, end_name(int(end)), None, start, stop
-
-
-def _impacts(alignment: Alignment) -> Iterator[tuple[Any, ...]]:
-    """Yield impacts; of a matched one the time in the first and in the second run."""
-    first, second, matched = alignment.first, alignment.second, alignment.matched
+def _rows(alignment: Alignment) -> Iterator[tuple[Any, ...]]:
+    """Yield every contact and impact of the two runs; of a matched impact the time in the first and in the second."""
+    first, second = both = alignment.first, alignment.second
+    for name, rests in zip(both, alignment.rests, strict=True):
+        for i, end, start, stop in rests:
+            yield name, "contact", i, end_name(end), None, start, stop
     kinds = np.where(alignment.shifted, "impact in both, shifted", "impact in both")
-    for k, kind in enumerate(kinds):
-        ends = (matched.slice[k], end_name(int(matched.end[k])), matched.k[k])
-        yield f"{first}; {second}", str(kind), *ends, matched.time[k], matched.time[k] + alignment.shift[k]
-    yield from _lone(first, f"impact missing in {second}", alignment.missing)
-    yield from _lone(second, f"impact missing in {first}", alignment.extra)
-    for name, after in zip((first, second), alignment.after_fork, strict=True):
-        yield from _lone(name, "impact after a fork", after)
-
-
-def _lone(name: str, what: str, impacts: Keyed) -> Iterator[tuple[Any, ...]]:
-    for time, i, end, k in zip(impacts.time, impacts.slice, impacts.end, impacts.k, strict=True):
-        yield name, what, i, end_name(int(end)), k, time, time
+    for hit, kind, shift in zip(alignment.matched, kinds, alignment.shift, strict=True):
+        yield f"{first}; {second}", str(kind), hit.slice, end_name(hit.end), hit.k, hit.time, hit.time + shift
+    for name, what, impacts in (
+        (first, f"impact missing in {second}", alignment.missing),
+        (second, f"impact missing in {first}", alignment.extra),
+        *((name, "impact after a fork", after) for name, after in zip(both, alignment.after_fork, strict=True)),
+    ):
+        for hit in impacts:
+            yield name, what, hit.slice, end_name(hit.end), hit.k, hit.time, hit.time
 
 
 CHAPTER: Final = Chapter(

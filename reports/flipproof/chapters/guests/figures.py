@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -15,38 +14,30 @@ from flipproof.frame.exhibit import Exhibit
 from flipproof.output.columns import curves_csv
 from slicemodel import Trajectory
 
-MOST_DRAWN: Final = 6
-"""Guests in a figure at the most; the tables have them all."""
-
-FLOOR: Final = 1e-12
-SHOWN: Final = ("published-limit", "eq8", "free-flight")
-"""Equations of the ladder that are drawn in their own colour."""
+FLOOR = 1e-12
+"""Least difference that is drawn [omega_0]."""
 
 
 def draw_guests(found: Guests) -> Iterator[Exhibit]:
-    """Yield the figures of the guests that flew."""
-    flown = [guest for guest in found.guests if guest.run is not None][:MOST_DRAWN]
+    """Yield the figures of the guests that flew, six at the most; the tables have them all."""
+    flown = [guest for guest in found.guests if guest.run is not None][:6]
     if flown:
         more = "" if len(flown) == len(found.guests) else f" Drawn are {len(flown)} of {len(found.guests)} guests."
         yield _draw_omega(flown, found.ladder, more)
-    apart = [guest for guest in flown if guest.differences]
-    if apart:
+    if apart := [guest for guest in flown if guest.differences]:
         yield _draw_differences(apart)
-    placed = [guest for guest in flown if guest.split is not None]
-    if placed:
+    if placed := [guest for guest in flown if guest.split is not None]:
         yield draw_waterfalls(placed)
-    refined = [guest for guest in flown if len(guest.errors) > 1]
-    if refined:
+    if refined := [guest for guest in flown if len(guest.errors) > 1]:
         yield _draw_convergence(refined)
-    kept = [guest for guest in flown if guest.visit.ice is not None or guest.energy is not None]
-    if kept:
+    if kept := [guest for guest in flown if guest.visit.ice is not None or guest.energy is not None]:
         yield _draw_ice_energy(kept)
 
 
 def _draw_omega(flown: Sequence[Guest], ladder: Mapping[str, Trajectory], more: str) -> Exhibit:
     guests = {guest.label: guest.run for guest in flown if guest.run is not None}
-    runs = {**guests, **ladder}
-    ends = ", ".join(f"{name} {run.omega[-1] / run.scenario.omega0:.3f}" for name, run in runs.items())
+    curves = {name: (run.t, run.omega / run.scenario.omega0) for name, run in {**guests, **ladder}.items()}
+    ends = ", ".join(f"{name} {omega[-1]:.3f}" for name, (_, omega) in curves.items())
     return Exhibit(
         name="guests-omega",
         title="Angular velocity of the guests and of the ladder",
@@ -54,8 +45,25 @@ def _draw_omega(flown: Sequence[Guest], ladder: Mapping[str, Trajectory], more: 
         alt=f"Line plot of omega over omega_0 against time. Values at the end: {ends}.",
         maker=figure_omega,
         data=(guests, dict(ladder)),
-        table=curves_csv({f"omega/omega_0 {n} [1]": (r.t, r.omega / r.scenario.omega0) for n, r in runs.items()}),
+        table=curves_csv({f"omega/omega_0 {name} [1]": curve for name, curve in curves.items()}),
     )
+
+
+@styled
+def figure_omega(guests: dict[str, Trajectory], ladder: dict[str, Trajectory]) -> Figure:
+    """Angular velocity of guests over that of the ladder, three of whose equations have their own colours."""
+    figure, axes = new_figure(size=(8.0, 4.6))
+    shown = ("published-limit", "eq8", "free-flight")
+    for k, (name, run) in enumerate(ladder.items()):
+        colour, dashes = solver_style(name)["color"] if name in shown else "#aaaaaa", (0, (4, 1 + k))
+        axes.plot(run.t, run.omega / run.scenario.omega0, color=colour, linestyle=dashes, linewidth=1.0, label=name)
+    for k, (name, run) in enumerate(guests.items()):
+        axes.plot(run.t, run.omega / run.scenario.omega0, color=ASSUMPTIONS[k], linewidth=1.8, label=name)
+    axes.set_xlabel("time t [s]")
+    axes.set_ylabel("angular velocity ω / ω₀ [1]")
+    axes.margins(x=0.01)
+    shared_legend(figure, axes)
+    return figure
 
 
 def _draw_differences(guests: Sequence[Guest]) -> Exhibit:
@@ -63,6 +71,11 @@ def _draw_differences(guests: Sequence[Guest]) -> Exhibit:
     for guest in guests:
         to = guest.differences.get(guest.equation or "")
         words.append(f"{guest.label}: " + ("none" if to is None else f"{to.first} {to.largest:.2g} of omega_0"))
+    curves = {
+        f"difference {guest.label} {rung} [omega_0]": (difference.t, difference.omega)
+        for guest in guests
+        for rung, difference in guest.differences.items()
+    }
     return Exhibit(
         name="guests-differences",
         title="How far each guest is from every equation",
@@ -72,14 +85,26 @@ def _draw_differences(guests: Sequence[Guest]) -> Exhibit:
         f"{'; '.join(words)}.",
         maker=figure_differences,
         data=(guests,),
-        table=curves_csv(
-            {
-                f"difference {guest.label} {rung} [omega_0]": (difference.t, difference.omega)
-                for guest in guests
-                for rung, difference in guest.differences.items()
-            }
-        ),
+        table=curves_csv(curves),
     )
+
+
+@styled
+def figure_differences(guests: Sequence[Guest]) -> Figure:
+    """Difference of each guest to every equation over time, a panel a guest."""
+    figure, grid = new_figure(len(guests), size=(8.0, 1.4 + 2.4 * len(guests)), sharex=True, squeeze=False)
+    for axes, guest in zip(grid[:, 0], guests, strict=True):
+        for k, (rung, difference) in enumerate(guest.differences.items()):
+            size = np.maximum(np.abs(difference.omega), FLOOR)
+            axes.semilogy(difference.t, size, color=ASSUMPTIONS[k % len(ASSUMPTIONS)], linewidth=1.2, label=rung)
+        if guest.band is not None:
+            axes.axhline(max(guest.band, FLOOR), color="#444444", linestyle=":", linewidth=1.0)
+        axes.set_title(guest.label, fontsize=10, loc="left")
+        axes.set_ylabel("|Δω| / ω₀ [1]")
+        axes.margins(x=0.01)
+    grid[-1, 0].set_xlabel("time t [s]")
+    shared_legend(figure, grid[0, 0], columns=4)
+    return figure
 
 
 def _draw_convergence(guests: Sequence[Guest]) -> Exhibit:
@@ -101,17 +126,33 @@ def _draw_convergence(guests: Sequence[Guest]) -> Exhibit:
     )
 
 
+@styled
+def figure_convergence(guests: Sequence[Guest]) -> Figure:
+    """Error against effort."""
+    figure, axes = new_figure(size=(8.0, 4.2))
+    for k, guest in enumerate(guests):
+        efforts = np.array([one.effort for one in guest.visit.efforts], dtype=float)
+        counted = guest.visit.traits is not None and guest.visit.traits.refined_by == "steps"
+        work, errors = efforts / efforts[0] if counted else efforts[0] / efforts, np.maximum(guest.errors, FLOOR)
+        look = {"marker": MARKERS[k % len(MARKERS)], "color": ASSUMPTIONS[k]}
+        axes.loglog(work, errors, label=f"{guest.label} → {guest.equation}", **look)
+    axes.set_xlabel("effort relative to the coarsest run [1]")
+    axes.set_ylabel("max |ω − ω of the equation| / ω₀ [1]")
+    shared_legend(figure, axes, columns=2)
+    return figure
+
+
 def _draw_ice_energy(guests: Sequence[Guest]) -> Exhibit:
-    words, columns = [], {}
+    words, curves = [], {}
     for guest in guests:
         ice, run = guest.visit.ice, guest.run
         drift = "not given" if ice is None else f"{ice.largest:.2g}"
         rise = "not given" if guest.rise is None else f"{guest.rise:.2g}"
         words.append(f"{guest.label}: drift in ice {drift}, largest rise of energy {rise}")
         if ice is not None:
-            columns[f"ice drift {guest.label} [1]"] = ice.t, ice.drift
+            curves[f"ice drift {guest.label} [1]"] = ice.t, ice.drift
         if guest.energy is not None and run is not None:
-            columns[f"E/E(0) {guest.label} [1]"] = run.t, guest.energy
+            curves[f"E/E(0) {guest.label} [1]"] = run.t, guest.energy
     return Exhibit(
         name="guests-ice-energy",
         title="Ice and energy",
@@ -120,77 +161,22 @@ def _draw_ice_energy(guests: Sequence[Guest]) -> Exhibit:
         alt=f"Drift in ice and energy over time. {'; '.join(words)}.",
         maker=figure_ice_energy,
         data=(guests,),
-        table=curves_csv(columns),
+        table=curves_csv(curves),
     )
-
-
-@styled
-def figure_omega(guests: dict[str, Trajectory], ladder: dict[str, Trajectory]) -> Figure:
-    """Angular velocity of guests over that of the ladder."""
-    figure, axes = new_figure(size=(8.0, 4.6))
-    for k, (name, run) in enumerate(ladder.items()):
-        colour = solver_style(name)["color"] if name in SHOWN else "#aaaaaa"
-        dashes = (0, (4, 1 + k))
-        axes.plot(run.t, run.omega / run.scenario.omega0, color=colour, linestyle=dashes, linewidth=1.0, label=name)
-    for k, (name, run) in enumerate(guests.items()):
-        axes.plot(run.t, run.omega / run.scenario.omega0, color=ASSUMPTIONS[k], linewidth=1.8, label=name)
-    axes.set_xlabel("time t [s]")
-    axes.set_ylabel("angular velocity ω / ω₀ [1]")
-    axes.margins(x=0.01)
-    shared_legend(figure, axes)
-    return figure
-
-
-@styled
-def figure_differences(guests: Sequence[Guest]) -> Figure:
-    """Difference of each guest to every equation over time, a panel a guest."""
-    figure, grid = new_figure(len(guests), size=(8.0, 1.4 + 2.4 * len(guests)), sharex=True, squeeze=False)
-    for axes, guest in zip(grid[:, 0], guests, strict=True):
-        for k, (rung, difference) in enumerate(guest.differences.items()):
-            size = np.maximum(np.abs(difference.omega), FLOOR)
-            axes.semilogy(difference.t, size, color=ASSUMPTIONS[k % len(ASSUMPTIONS)], linewidth=1.2, label=rung)
-        if guest.band is not None:
-            axes.axhline(max(guest.band, FLOOR), color="#444444", linestyle=":", linewidth=1.0)
-        axes.set_title(guest.label, fontsize=10, loc="left")
-        axes.set_ylabel("|Δω| / ω₀ [1]")
-        axes.margins(x=0.01)
-    grid[-1, 0].set_xlabel("time t [s]")
-    shared_legend(figure, grid[0, 0], columns=4)
-    return figure
-
-
-@styled
-def figure_convergence(guests: Sequence[Guest]) -> Figure:
-    """Error against effort."""
-    figure, axes = new_figure(size=(8.0, 4.2))
-    for k, guest in enumerate(guests):
-        efforts = np.array([one.effort for one in guest.visit.efforts], dtype=float)
-        counted = guest.visit.traits is not None and guest.visit.traits.refined_by == "steps"
-        work = efforts / efforts[0] if counted else efforts[0] / efforts
-        axes.loglog(
-            work, np.maximum(guest.errors, FLOOR), marker=MARKERS[k % len(MARKERS)], color=ASSUMPTIONS[k],
-            label=f"{guest.label} → {guest.equation}",
-        )  # fmt: skip
-    axes.set_xlabel("effort relative to the coarsest run [1]")
-    axes.set_ylabel("max |ω − ω of the equation| / ω₀ [1]")
-    shared_legend(figure, axes, columns=2)
-    return figure
 
 
 @styled
 def figure_ice_energy(guests: Sequence[Guest]) -> Figure:
     """Drift in ice (left), energy (right)."""
     figure, panels = new_figure(1, 2, size=(8.0, 4.0))
-    for k, guest in enumerate(guests):
-        colour = ASSUMPTIONS[k]
+    for guest, colour in zip(guests, ASSUMPTIONS, strict=False):
         if guest.visit.ice is not None:
             drift = np.maximum(guest.visit.ice.drift, 1e-18)
             panels[0].semilogy(guest.visit.ice.t, drift, color=colour, linewidth=1.4, label=guest.label)
         if guest.energy is not None and guest.run is not None:
             panels[1].plot(guest.run.t, guest.energy, color=colour, linewidth=1.4, label=guest.label)
-    panels[0].set_ylabel("|ω / ω₀ − 1| in ice [1]")
-    panels[1].set_ylabel("energy E / E(0) [1]")
-    for axes in panels:
+    for axes, label in zip(panels, ("|ω / ω₀ − 1| in ice [1]", "energy E / E(0) [1]"), strict=True):
+        axes.set_ylabel(label)
         axes.set_xlabel("time t [s]")
         axes.margins(x=0.01)
     shared_legend(figure, panels[0] if any(g.visit.ice is not None for g in guests) else panels[1], columns=3)

@@ -75,15 +75,17 @@ def switches_made(traits: Traits | None, certificate: Certificate | None, neares
     return None if nearest is None else switches_of(nearest)
 
 
-def sets_to_free(start: Switches) -> tuple[Switches, ...]:
-    """Return every set of assumptions on the way from ``start`` to free flight, in any order."""
-    off = [field.name for field in fields(Switches) if not getattr(start, field.name)]
-    return tuple(replace(start, **dict(zip(off, on, strict=True))) for on in product((False, True), repeat=len(off)))
-
-
 def plan_splits(starts: Iterable[Switches], throw: Scenario) -> list[Run]:
-    """Return the runs that the splits need; those of the waterfall of the same throw are among them."""
-    return list(dict.fromkeys(equation_run(throw, each) for start in starts for each in sets_to_free(start)))
+    """Return the runs that the splits need; those of the waterfall of the same throw are among them.
+
+    They are of every set of assumptions on the way from a start to free flight, in any order.
+    """
+    runs: dict[Run, None] = {}
+    for start in starts:
+        off = [field.name for field in fields(Switches) if not getattr(start, field.name)]
+        for on in product((False, True), repeat=len(off)):
+            runs[equation_run(throw, replace(start, **dict(zip(off, on, strict=True))))] = None
+    return list(runs)
 
 
 def split(run: Trajectory, start: Switches, flights: Flights) -> Split:
@@ -91,10 +93,8 @@ def split(run: Trajectory, start: Switches, flights: Flights) -> Split:
 
     Raises
     ------
-    Missing
-        If a run is not whole.
-    ArithmeticError
-        If rest and bars miss the whole difference by more than round-off.
+    Missing - if a run is not whole
+    ArithmeticError - if rest and bars miss the whole difference by more than round-off
     """
 
     def read(trajectory: Trajectory) -> float:

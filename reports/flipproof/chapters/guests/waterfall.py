@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -17,22 +17,18 @@ from flipproof.frame.exhibit import Exhibit
 from flipproof.output.columns import rows_csv
 from slicemodel.scenario import shortened
 
-HEIGHT = 0.36
-"""Height of a bar with its name [inch]."""
-
-LETTERS = 80
-"""Letters of a guest's name over its panels."""
-
 
 def draw_waterfalls(guests: Sequence[Guest]) -> Exhibit:
     """Return the waterfalls of guests that have one, a row of panels each."""
-    words = []
+    words, rows = [], []
     for guest in guests:
-        if guest.split is not None:
-            start, end, bars = guest.split.start, guest.split.end, guest.split.bars
-            parts = [f"{NAMES[name]} {share:+.3f}" for name, share in bars.items()]
-            words.append(f"{guest.label}: from {start:.3f} to {end:.3f} by {', '.join(['', *parts])[2:]}, "
-                         f"the rest {guest.split.rest:+.2g}".replace(" by ,", ","))  # fmt: skip
+        if (split := guest.split) is not None:
+            parts = ", ".join(f"{NAMES[name]} {share:+.3f}" for name, share in split.bars.items())
+            ends = f"from {split.start:.3f} to {split.end:.3f}" + (f" by {parts}" if parts else "")
+            words.append(f"{guest.label}: {ends}, the rest {split.rest:+.2g}")
+            bars = [(NAMES[name], share, *split.ranges[name]) for name, share in split.bars.items()]
+            steps = [("(the guest)", split.start), ("the rest", split.rest), *bars, ("(free flight)", split.end)]
+            rows += [(guest.slug, split.equation, *step, None, None)[:6] for step in steps]
     return Exhibit(
         name="guests-waterfall",
         title="Waterfall of each guest",
@@ -47,20 +43,9 @@ def draw_waterfalls(guests: Sequence[Guest]) -> Exhibit:
         data=(tuple(guests),),
         table=rows_csv(
             ("guest", "equation", "step", "fair share [1]", "least of all orders [1]", "largest of all orders [1]"),
-            (row for guest in guests for row in _rows(guest)),
+            rows,
         ),
     )
-
-
-def _rows(guest: Guest) -> Iterator[tuple[str | float | None, ...]]:
-    if guest.split is None:
-        return
-    split = guest.split
-    yield guest.slug, split.equation, "(the guest)", split.start, None, None
-    yield guest.slug, split.equation, "the rest", split.rest, None, None
-    for name, share in split.bars.items():
-        yield guest.slug, split.equation, NAMES[name], share, *split.ranges[name]
-    yield guest.slug, split.equation, "(free flight)", split.end, None, None
 
 
 @styled
@@ -68,13 +53,12 @@ def figure_waterfalls(guests: Sequence[Guest]) -> Figure:
     """Left: rest and shares, each bar from the value before to the value after. Right: shares with their ranges."""
     whole = [(guest, guest.split) for guest in guests if guest.split is not None]
     counts = [len(split.bars) + 3 for _, split in whole]
-    figure, grid = new_figure(
-        len(whole), 2, size=(8.0, 0.7 + sum(0.55 + HEIGHT * count for count in counts)), sharex="col", sharey="row",
-        squeeze=False, width_ratios=(1.5, 1.0), height_ratios=counts,
-    )  # fmt: skip
+    size = (8.0, 0.7 + sum(0.55 + 0.36 * count for count in counts))
+    shape: dict[str, Any] = {"squeeze": False, "width_ratios": (1.5, 1.0), "height_ratios": counts}
+    figure, grid = new_figure(len(whole), 2, size=size, sharex="col", sharey="row", **shape)
     for (ladder, orders), (guest, split) in zip(grid, whole, strict=True):
         _panels(ladder, orders, split, guest.band)
-        ladder.set_title(shortened(guest.label[::-1], LETTERS)[::-1], fontsize=10, loc="left")
+        ladder.set_title(shortened(guest.label[::-1], 80)[::-1], fontsize=10, loc="left")
     grid[-1, 0].set_xlabel("mean of ω/ω₀ over the second half [1]")
     grid[-1, 1].set_xlabel("change [1]")
     return figure
@@ -83,26 +67,24 @@ def figure_waterfalls(guests: Sequence[Guest]) -> Figure:
 def _panels(ladder: Axes, orders: Axes, split: Split, band: float | None) -> None:
     names = ["the guest", f"the rest, to {split.equation}", *(NAMES[name] for name in split.bars), "free flight"]
     places = list(range(len(names), 0, -1))
+    beside: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "fontsize": 9}
+    grey: dict[str, Any] = {"color": "#888888", "linewidth": 0.8}
     for place, value, away in ((places[0], split.start, 8), (places[-1], split.end, -16)):
         ladder.plot(value, place, "D", color=WHOLE, markersize=8)
-        ladder.annotate(
-            f"{value:.4f}", (value, place), xytext=(0, away), textcoords="offset points", ha="center", fontsize=9
-        )
+        ladder.annotate(f"{value:.4f}", (value, place), xytext=(0, away), **beside)
     level = split.start
-    ladder.plot([level, level], [places[1] + 0.3, places[0]], color="#888888", linewidth=0.8)
+    ladder.plot([level, level], [places[1] + 0.3, places[0]], **grey)
     for place, (name, share) in zip(places[1:-1], [("", split.rest), *split.bars.items()], strict=True):
         colour = UP if share >= 0 else DOWN
         look: dict[str, Any] = {"color": colour} if name else {"color": "none", "edgecolor": colour, "hatch": "////"}
         ladder.barh(place, share, left=level, height=0.6, xerr=None if name else band, capsize=3, **look)
         level += share
-        ladder.plot(
-            [level, level], [place - 1.0 + (0.3 if place > 2 else 0.0), place + 0.3], color="#888888", linewidth=0.8
-        )
-        orders.plot(split.ranges.get(name, (share, share)), [place, place], color="#BBBBBB", linewidth=4.0,
-                    solid_capstyle="butt")  # fmt: skip
+        ladder.plot([level, level], [place - 1.0 + (0.3 if place > 2 else 0.0), place + 0.3], **grey)
+        ends = split.ranges.get(name, (share, share))
+        orders.plot(ends, [place, place], color="#BBBBBB", linewidth=4.0, solid_capstyle="butt")
         orders.plot(share, place, "o" if name else "s", color="black" if name else WHOLE, markersize=6)
         said = f"{share:+.2g}".replace("-", "\N{MINUS SIGN}")
-        orders.annotate(said, (share, place), xytext=(0, 6), textcoords="offset points", ha="center", fontsize=9)
+        orders.annotate(said, (share, place), xytext=(0, 6), **beside)
     ladder.set_yticks(places, names)
     ladder.set_ylim(0.1, places[0] + 0.9)
     orders.axvline(0.0, color="#444444", linewidth=0.8)
