@@ -9,43 +9,35 @@ from matplotlib.figure import Figure
 
 from flipproof.figures.style import new_figure, shared_legend, shown_name, solver_style, styled
 from slicemodel import Trajectory
+from slicemodel.trajectory import FloatArray
+
+AXES = {
+    "omega": "angular velocity ω / ω₀ [1]",
+    "theta": "angle θ [degrees]",
+    "centre-of-mass": "centre of mass r_CM / L [1], cap = 0",
+}
 
 
-def _over_time(trajectories: Iterable[Trajectory], quantity: str, label: str) -> Figure:
+def values_of(run: Trajectory, quantity: str) -> FloatArray:
+    """Return a quantity of ``AXES`` over time, in the unit of its axis."""
+    if quantity == "omega":
+        return run.omega / run.scenario.omega0
+    return np.degrees(run.theta) if quantity == "theta" else run.r_cm / run.scenario.bottle.length
+
+
+@styled
+def figure_over_time(trajectories: Iterable[Trajectory], quantity: str) -> Figure:
+    """One quantity of ``AXES`` over time."""
     figure, axes = new_figure()
-    for k, trajectory in enumerate(trajectories):
-        scenario = trajectory.scenario
-        values = {
-            "omega": trajectory.omega / scenario.omega0,
-            "theta": np.degrees(trajectory.theta),
-            "r_cm": trajectory.r_cm / scenario.bottle.length,
-        }[quantity]
-        axes.plot(trajectory.t, values, label=shown_name(trajectory), **solver_style(trajectory.label, k))
+    for k, run in enumerate(trajectories):
+        axes.plot(run.t, values_of(run, quantity), label=shown_name(run), **solver_style(run.label, k))
     axes.set_xlabel("time t [s]")
-    axes.set_ylabel(label)
+    axes.set_ylabel(AXES[quantity])
     axes.margins(x=0.01)
     shared_legend(figure, axes)
+    if quantity == "omega":
+        axes.set_ylim(bottom=0.0)
     return figure
-
-
-@styled
-def figure_omega(trajectories: Iterable[Trajectory]) -> Figure:
-    """Angular velocity over time."""
-    figure = _over_time(trajectories, "omega", "angular velocity ω / ω₀ [1]")
-    figure.axes[0].set_ylim(bottom=0.0)
-    return figure
-
-
-@styled
-def figure_theta(trajectories: Iterable[Trajectory]) -> Figure:
-    """Angle of the bottle over time."""
-    return _over_time(trajectories, "theta", "angle θ [degrees]")
-
-
-@styled
-def figure_centre_of_mass(trajectories: Iterable[Trajectory]) -> Figure:
-    """Centre of mass over time."""
-    return _over_time(trajectories, "r_cm", "centre of mass r_CM / L [1], cap = 0")
 
 
 def chosen_slices(trajectory: Trajectory) -> list[tuple[int, str]]:
@@ -64,12 +56,9 @@ def figure_slices(trajectories: Sequence[Trajectory]) -> Figure:
     figure, grid = new_figure(len(chosen), size=size, sharex=True, sharey=True, squeeze=False)
     panels = grid[:, 0]
     for axes, (i, words) in zip(panels, chosen, strict=True):
-        for k, trajectory in enumerate(trajectories):
-            length = trajectory.scenario.bottle.length
-            axes.plot(
-                trajectory.t, trajectory.r[:, i] / length, label=shown_name(trajectory),
-                **solver_style(trajectory.label, k),
-            )  # fmt: skip
+        for k, run in enumerate(trajectories):
+            length = run.scenario.bottle.length
+            axes.plot(run.t, run.r[:, i] / length, label=shown_name(run), **solver_style(run.label, k))
         axes.set_title(f"slice {i}: {words}", fontsize=10, loc="left")
         axes.set_ylabel("r / L [1]")
         axes.set_ylim(1.03, -0.03)
