@@ -138,9 +138,7 @@ def claims(found: Differences) -> Claims:
     """Yield the largest difference of every pair: an observation with a band and a moment, and no share."""
     for d in found.pairs:
         more = "" if d.finer is None else f"; {d.finer[1]:.3g} at N = {d.finer[0]}"
-        note = (
-            f"largest difference of this pair, at t = {d.largest_time * 1e3:.1f} ms, N = {d.slices}{more}; {d.moment}"
-        )
+        note = f"largest difference of this pair, at t = {d.largest_time * 1e3:.1f} ms, N = {d.slices}{more}"
         id_, title = _id(d.first, d.second), f"{d.name}: {d.first} against {d.second}"
         yield observed(id_, title, d.largest, "of ω₀", f"{note}; {d.moment}", band=d.band)
     for (name, first, second), reason in found.missing.items():
