@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_up import trajectory_of
 
-from flipproof.chapters.agreement.study import study_agreement
+from flipproof.chapters.agreement.chapter import study_agreement
 from slicemodel import Scenario
 
 SCENARIO = Scenario(n_slices=1)

@@ -10,7 +10,7 @@ from made_up import trajectory_of
 
 import ode_reference
 import slicemodel
-from flipproof.chapters.alignment.figure import even_rows, figure_gantt
+from flipproof.chapters.alignment.chapter import even_rows, figure_gantt
 from flipproof.chapters.alignment.found import count_key, ordinal
 from flipproof.chapters.alignment.study import rest_intervals, study_alignment
 from flipproof.figures.style import draw

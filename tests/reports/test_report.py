@@ -168,7 +168,7 @@ def test_axes_carry_units(gathered):
 
 
 def test_the_same_data_draw_the_same_bytes(gathered):
-    from flipproof.chapters.flights.figures import figure_over_time
+    from flipproof.chapters.flights.chapter import figure_over_time
     from flipproof.figures.style import draw
 
     flights = flights_of(gathered)

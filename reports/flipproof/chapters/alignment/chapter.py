@@ -8,13 +8,18 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
-from flipproof.chapters.alignment.figure import figure_gantt
-from flipproof.chapters.alignment.found import Alignment, end_name
+from flipproof.chapters.alignment.found import SHIFT_BAND, Alignment, Table, end_name
 from flipproof.chapters.alignment.study import study_alignment
 from flipproof.chapters.alignment.tube import Tube, study_tube
+from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Outcome, Study, attempt, observed
 from flipproof.output.columns import rows_csv
+from slicemodel.trajectory import BASE, CAP
 
 PAIRS: Final = (("eq8", "midpoint"), ("eq8", "free-flight"))
 """Pairs whose impact sequences are aligned: two ways to the same equation, and two equations."""
@@ -98,6 +103,100 @@ def _rows(alignment: Alignment) -> Iterator[tuple[Any, ...]]:
     ):
         for hit in impacts:
             yield name, what, hit.slice, end_name(hit.end), hit.k, hit.time, hit.time
+
+
+LANES = 0.2, -0.2
+END_COLOURS = {BASE: "#0072B2", CAP: "#E69F00"}
+END_MARKERS = {BASE: "v", CAP: "^"}
+IMPACTS = {
+    "agrees": ("#444444", 3.5),
+    "shifted": ("#009E73", 5.0),
+    "missing": ("#D1001C", 6.5),
+    "extra": ("#A030C0", 6.5),
+    "after a fork": ("#BBBBBB", 3.5),
+}
+"""Colour and size of every kind of impact."""
+
+
+def even_rows(n_slices: int) -> list[int]:
+    """Return at most 16 slices, evenly chosen, the first and the last among them."""
+    return [int(i) for i in np.unique(np.linspace(0, n_slices - 1, min(16, n_slices)).round())]
+
+
+@styled
+def figure_gantt(alignment: Alignment) -> Figure:
+    """Contacts and impacts of two runs, one row per slice: the first run above, the second paler below."""
+    rows = {i: row for row, i in enumerate(even_rows(alignment.n_slices))}
+    figure, axes = new_figure(size=(8.0, 1.9 + 0.36 * len(rows)))
+    axes.grid(visible=False)
+    for row in range(1, len(rows), 2):
+        axes.axhspan(row - 0.5, row + 0.5, color="#f4f4f4", linewidth=0)
+    for rests, lane, opacity in zip(alignment.rests, LANES, (0.9, 0.4), strict=True):
+        for i, end, start, stop in rests:
+            if i in rows and start <= alignment.until:
+                bar: dict[str, Any] = {"height": 0.3, "color": END_COLOURS[end], "alpha": opacity, "linewidth": 0}
+                axes.barh(rows[i] + lane, min(stop, alignment.until) - start, left=start, **bar)
+    _draw_impacts(axes, alignment, rows)
+    for fork in alignment.forks:
+        if fork.slice in rows:
+            axes.plot(fork.time, rows[fork.slice], "*", color="black", markersize=9, zorder=5)
+    axes.set_yticks(range(len(rows)), [str(i) for i in rows])
+    axes.set_ylim(-0.6, len(rows) - 0.4)
+    axes.set_xlim(-0.01 * alignment.until, 1.01 * alignment.until)
+    axes.set_xlabel("time t [s]")
+    axes.set_ylabel("slice number [1], 0 starts on the base")
+    title = f"in each row: {alignment.first} above, {alignment.second} below; "
+    title += f"{len(alignment.swapped)} impacts in another order"
+    axes.set_title(title, fontsize=10, loc="left")
+    figure.legend(handles=_gantt_handles(alignment), loc="outside lower center", ncols=4)
+    return figure
+
+
+def _draw_impacts(axes: Axes, alignment: Alignment, rows: dict[int, int]) -> None:
+    """Mark every impact in its lane, and join the two of a shifted pair."""
+    matched, moved = alignment.matched, alignment.shifted
+    later = matched.copy()
+    later.time += alignment.shift
+    for here, there in zip(matched[moved], later[moved], strict=True):
+        if here.slice in rows:
+            heights = [rows[here.slice] + lane for lane in LANES]
+            axes.plot((here.time, there.time), heights, color=IMPACTS["shifted"][0], linewidth=0.6, alpha=0.7)
+    for chosen, kind in ((~moved, "agrees"), (moved, "shifted")):
+        _mark(axes, matched[chosen], rows, LANES[0], kind)
+        _mark(axes, later[chosen], rows, LANES[1], kind)
+    for after, lane in zip(alignment.after_fork, LANES, strict=True):
+        _mark(axes, after, rows, lane, "after a fork")
+    _mark(axes, alignment.missing, rows, LANES[0], "missing")
+    _mark(axes, alignment.extra, rows, LANES[1], "extra")
+
+
+def _mark(axes: Axes, impacts: Table, rows: dict[int, int], lane: float, kind: str) -> None:
+    colour, size = IMPACTS[kind]
+    above = 3 if kind == "agrees" else 4
+    for end, marker in END_MARKERS.items():
+        shown = impacts[(impacts.end == end) & np.isin(impacts.slice, list(rows))]
+        heights = [rows[i] + lane for i in shown.slice]
+        edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.3}
+        axes.plot(shown.time, heights, marker, color=colour, markersize=size, zorder=above, **edge)
+
+
+def _gantt_handles(alignment: Alignment) -> list[Patch | Line2D]:
+    labels = (
+        f"agrees within {SHIFT_BAND * 1e3:g} ms ({int((~alignment.shifted).sum())})",
+        f"shifted further ({int(alignment.shifted.sum())})",
+        f"missing in {alignment.second} ({len(alignment.missing)})",
+        f"extra in {alignment.second} ({len(alignment.extra)})",
+        "after a fork ({} + {})".format(*map(len, alignment.after_fork)),
+    )
+    colours = [colour for colour, _ in IMPACTS.values()]
+    return [
+        Patch(color=END_COLOURS[BASE], label="in contact with the base"),
+        Patch(color=END_COLOURS[CAP], label="in contact with the cap"),
+        Line2D([], [], linestyle="", marker="v", color="#444444", label="impact on the base"),
+        Line2D([], [], linestyle="", marker="^", color="#444444", label="impact on the cap"),
+        *(Line2D([], [], linestyle="", marker="o", color=c, label=x) for c, x in zip(colours, labels, strict=True)),
+        Line2D([], [], linestyle="", marker="*", markersize=9, color="black", label=f"fork ({len(alignment.forks)})"),
+    ]
 
 
 CHAPTER: Final = Chapter(

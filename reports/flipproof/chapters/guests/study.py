@@ -23,7 +23,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from flipproof.chapters.agreement.study import Agreement, study_agreement
+from flipproof.chapters.agreement.chapter import Agreement, study_agreement
 from flipproof.chapters.differences.chapter import run_bands
 from flipproof.chapters.differences.study import Difference, study_difference
 from flipproof.chapters.guests.split import Split, plan_splits, split, switches_made
