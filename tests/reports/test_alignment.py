@@ -96,7 +96,7 @@ def test_a_slice_that_flies_to_the_other_end_forks_and_its_later_keys_are_not_al
     aligned = align(USUAL, second)
     assert len(aligned.forks) == 1
     fork = aligned.forks[0]
-    assert (fork.slice, fork.first_end, fork.second_end, fork.time) == (0, CAP, BASE, 0.21)
+    assert (fork.first.slice, fork.first.end, fork.second.end, fork.time) == (0, CAP, BASE, 0.21)
     assert keys(aligned.matched) == [(0, BASE, 1), (1, BASE, 1), (2, CAP, 1)]
     assert [len(after) for after in aligned.after_fork] == [2, 2]
     assert (len(aligned.missing), len(aligned.extra)) == (0, 0)

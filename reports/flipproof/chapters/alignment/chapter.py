@@ -138,8 +138,8 @@ def figure_gantt(alignment: Alignment) -> Figure:
                 axes.barh(rows[i] + lane, min(stop, alignment.until) - start, left=start, **bar)
     _draw_impacts(axes, alignment, rows)
     for fork in alignment.forks:
-        if fork.slice in rows:
-            axes.plot(fork.time, rows[fork.slice], "*", color="black", markersize=9, zorder=5)
+        if fork.first.slice in rows:
+            axes.plot(fork.time, rows[fork.first.slice], "*", color="black", markersize=9, zorder=5)
     axes.set_yticks(range(len(rows)), [str(i) for i in rows])
     axes.set_ylim(-0.6, len(rows) - 0.4)
     axes.set_xlim(-0.01 * alignment.until, 1.01 * alignment.until)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,28 +21,22 @@ Table = Any
 """A NumPy record array: rows with named columns, such as ``impacts.time``."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Fork:
-    """The impact at which the two histories of a slice name different ends, each with its own time [s]."""
+class Fork(NamedTuple):
+    """The impacts, rows of a table, at which the two histories of a slice name different ends."""
 
-    slice: int
-    first_time: float
-    first_end: int
-    second_time: float
-    second_end: int
+    first: Any
+    second: Any
 
     @property
     def time(self) -> float:
         """The earlier of the two impacts [s]: the first sign of the fork."""
-        return min(self.first_time, self.second_time)
+        return float(min(self.first.time, self.second.time))
 
     @property
     def words(self) -> str:
         """The fork in words."""
-        return (
-            f"slice {self.slice}: {end_name(self.first_end)} at {self.first_time * 1e3:.1f} ms "
-            f"against {end_name(self.second_end)} at {self.second_time * 1e3:.1f} ms"
-        )
+        one, other = (f"{end_name(hit.end)} at {hit.time * 1e3:.1f} ms" for hit in self)
+        return f"slice {self.first.slice}: {one} against {other}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -64,9 +64,7 @@ def study_alignment(first: Trajectory, second: Trajectory) -> Alignment:
             else:
                 after[side].extend(both[side][len(pairs) :])
         if fork is not None:
-            one, other = a[fork[0]], b[fork[1]]
-            ends = {"first_end": int(one.end), "second_end": int(other.end)}
-            forks.append(Fork(slice=i, first_time=float(one.time), second_time=float(other.time), **ends))
+            forks.append(Fork(a[fork[0]], b[fork[1]]))
     for table, chosen in zip((a, b), kept, strict=True):
         _number(table, chosen)
     of_a, of_b = np.array(matched, dtype=np.int64).reshape(-1, 2).T

@@ -79,6 +79,10 @@ def study(ask: Ask) -> Study[Differences]:
         bands = run_bands(runs, flights)
     flown = {name: run for name, each in runs.items() if (run := flights.trajectory(each)) is not None}
 
+    def refined(*names: str) -> tuple[Trajectory, Trajectory] | None:
+        one, other = (flights.trajectory(more[name]) if name in more else None for name in names)
+        return (one, other) if one is not None and other is not None and one.ok and other.ok else None
+
     def compared(name: str, first: str, second: str) -> Difference:
         return study_difference(
             name,
@@ -86,7 +90,7 @@ def study(ask: Ask) -> Study[Differences]:
             flights[runs[second]].flight,
             impacts_of=flown.get(LIMITS.get(first, first)),
             band=bands[first] + bands[second] if first in bands and second in bands else None,
-            finer=_refined(first, second, more, flights),
+            finer=refined(first, second),
         )
 
     tried = {pair: attempt(lambda pair: compared(*pair), pair) for pair in PAIRS if set(pair[1:]) <= set(runs)}
@@ -128,14 +132,6 @@ def run_bands(runs: Mapping[str, Run], flights: Flights) -> dict[str, float]:
         if certificate.get("band") is not None:
             bands[name] = certificate["band"]
     return bands
-
-
-def _refined(
-    first: str, second: str, more: Mapping[str, Run], flights: Flights
-) -> tuple[Trajectory, Trajectory] | None:
-    """Return the runs of two solvers at more slices; None if either was not made so or is not whole."""
-    one, other = (flights.trajectory(more[name]) if name in more else None for name in (first, second))
-    return (one, other) if one is not None and other is not None and one.ok and other.ok else None
 
 
 def claims(found: Differences) -> Claims:

@@ -147,15 +147,6 @@ def _elasticity(_: Mapping[str, Made]) -> tuple[float, str]:
     return worlds.rebound_of_two(0.5, 0.5), others
 
 
-def _groove_end(_: Mapping[str, Made]) -> tuple[float, str]:
-    note = "one mass with elasticity 1 in a groove; the set-up check refuses a groove that ends inside the bottle"
-    return worlds.speed_after_groove_end(), note
-
-
-def _stagger(_: Mapping[str, Made]) -> tuple[float, str]:
-    return worlds.stagger(), "free fall: velocity against the slope of the positions; positive is ahead"
-
-
 def _slop(_: Mapping[str, Made]) -> tuple[float, str]:
     (default, left), without = worlds.depth_left(None), worlds.depth_left(0.0)[1]
     dropped = f"a disc dropped at 2 m/s (Δt = 10 ms) stays {left * 1e3:.1f} mm deep in the floor"
@@ -166,16 +157,6 @@ def _tunnel(_: Mapping[str, Made]) -> tuple[float, str]:
     back = worlds.speed_through_wall(1e-3)
     note = f"5 m/s and a wall of 10 mm at Δt = 10 ms; at 1 ms it comes back, {back:.3g}"
     return worlds.speed_through_wall(1e-2), note
-
-
-def _soft_limit(_: Mapping[str, Made]) -> tuple[float, str]:
-    back, beyond = worlds.rebound_of_limit()
-    return back, f"hit at 1 m/s; the mass goes {beyond * 1e3:.1f} mm beyond the limit first"
-
-
-def _soft_contact(_: Mapping[str, Made]) -> tuple[float, str]:
-    at_rest, deepest = worlds.depth_of_contact()
-    return at_rest * 1e3, f"1 kg at rest under its weight; {deepest * 1e3:.1f} mm when it lands at 1 m/s"
 
 
 WORDS: Final = {
@@ -203,11 +184,11 @@ FACTS: Final = (
     EngineFact("pymunk", "order-forgotten", "", (0.0, 0.1), _order_forgotten),
     EngineFact("pymunk", "joints", "of L", (1e-5, 1e-2), _joints),
     EngineFact("pymunk", "elasticity", "", (0.249, 0.251), _elasticity),
-    EngineFact("pymunk", "groove-end", "", (0.0, 1e-3), _groove_end),
-    EngineFact("pymunk", "stagger", "steps", (0.49, 0.51), _stagger),
+    EngineFact("pymunk", "groove-end", "", (0.0, 1e-3), worlds.groove_end),
+    EngineFact("pymunk", "stagger", "steps", (0.49, 0.51), worlds.stagger),
     EngineFact("pymunk", "slop", "m", (0.099, 0.101), _slop),
     EngineFact("pymunk", "tunnel", "", (0.99, 1.01), _tunnel),
-    EngineFact("mujoco", "mujoco-limit", "", (0.0, 0.3), _soft_limit),
-    EngineFact("mujoco", "mujoco-contact", "mm", (0.01, 10.0), _soft_contact),
+    EngineFact("mujoco", "mujoco-limit", "", (0.0, 0.3), worlds.soft_limit),
+    EngineFact("mujoco", "mujoco-contact", "mm", (0.01, 10.0), worlds.soft_contact),
 )
 """Every fact, in the order of the table."""

@@ -35,8 +35,8 @@ def rebound_of_two(first: float, second: float) -> float:
     return float(right.velocity.x - left.velocity.x) / 2.0
 
 
-def speed_after_groove_end() -> float:
-    """Return the largest speed back, over the speed before, of a mass that runs into the end of its groove."""
+def groove_end(_: object = None) -> tuple[float, str]:
+    """Return the largest speed back, over the speed before, of a mass that runs into the end of its groove; and how."""
     import pymunk
 
     space = pymunk.Space()
@@ -48,11 +48,12 @@ def speed_after_groove_end() -> float:
         back = max(back, -float(body.velocity.x))
     if not abs(body.position.x - 1.0) < 1e-3:
         raise LookupError(f"the mass is at {body.position.x:.3g} m, not at the groove's end")
-    return back
+    note = "one mass with elasticity 1 in a groove; the set-up check refuses a groove that ends inside the bottle"
+    return back, note
 
 
-def stagger() -> float:
-    """Return by how many steps the engine's velocity is ahead of its position, in free fall.
+def stagger(_: object = None) -> tuple[float, str]:
+    """Return by how many steps the engine's velocity is ahead of its position, in free fall; and how that is measured.
 
     The slope of the positions at t_n is (x_n+1 - x_n-1) / 2 dt, exact for a parabola; the engine's velocity is larger
     by g times the time it is ahead.
@@ -69,7 +70,8 @@ def stagger() -> float:
         height.append(float(body.position.y))
         speed.append(float(body.velocity.y))
     slope = (height[6] - height[4]) / (2.0 * dt)
-    return (speed[5] - slope) / (weight * dt)
+    ahead = (speed[5] - slope) / (weight * dt)
+    return ahead, "free fall: velocity against the slope of the positions; positive is ahead"
 
 
 def depth_left(slop: float | None) -> tuple[float, float]:
@@ -101,26 +103,28 @@ def speed_through_wall(dt: float) -> float:
     return float(body.velocity.x) / 5.0
 
 
-def rebound_of_limit() -> tuple[float, float]:
-    """Return speed back over speed before of a mass at MuJoCo's joint limit, and how far it goes beyond [m]."""
+def soft_limit(_: object = None) -> tuple[float, str]:
+    """Return speed back over speed before of a mass at MuJoCo's joint limit; and how far it goes beyond, in words."""
     xml = (
         '<mujoco><option gravity="0 0 0" timestep="1e-4"/><worldbody><body>'
         '<joint type="slide" axis="1 0 0" limited="true" range="-1 0.1"/>'
         '<geom size="0.01" mass="1" contype="0" conaffinity="0"/></body></worldbody></mujoco>'
     )
     path = list(_mujoco_path(xml, speed=1.0, duration=0.5))
-    return -min(v for _, v in path), max(x for x, _ in path) - 0.1
+    beyond = max(x for x, _ in path) - 0.1
+    return -min(v for _, v in path), f"hit at 1 m/s; the mass goes {beyond * 1e3:.1f} mm beyond the limit first"
 
 
-def depth_of_contact() -> tuple[float, float]:
-    """Return how deep a ball of 1 kg lies in MuJoCo's floor at rest, and at the deepest after landing at 1 m/s [m]."""
+def soft_contact(_: object = None) -> tuple[float, str]:
+    """Return how deep a ball of 1 kg lies in MuJoCo's floor at rest [mm]; and how deep after landing, in words."""
     xml = (
         '<mujoco><option timestep="1e-4"/><worldbody><geom type="plane" size="1 1 0.1"/>'
         '<body pos="0 0 0.02"><joint type="slide" axis="0 0 1"/><geom size="0.02" mass="1"/></body>'
         "</worldbody></mujoco>"
     )
     path = list(_mujoco_path(xml, speed=-1.0, duration=1.0))
-    return -path[-1][0], -min(x for x, _ in path)
+    deepest = -min(x for x, _ in path)
+    return -path[-1][0] * 1e3, f"1 kg at rest under its weight; {deepest * 1e3:.1f} mm when it lands at 1 m/s"
 
 
 def _mujoco_path(xml: str, *, speed: float, duration: float) -> Iterator[tuple[float, float]]:

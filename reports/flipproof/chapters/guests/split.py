@@ -9,8 +9,7 @@ ladder. A fair share is the mean over all orders of mending the assumptions (``f
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields, replace
-from itertools import product
+from dataclasses import dataclass
 from typing import Any
 
 from flipproof.chapters.waterfall.study import equation_run
@@ -76,16 +75,16 @@ def switches_made(traits: Traits | None, certificate: Certificate | None, neares
 
 
 def plan_splits(starts: Iterable[Switches], throw: Scenario) -> list[Run]:
-    """Return the runs that the splits need; those of the waterfall of the same throw are among them.
+    """Return the runs that the splits need; those of the waterfall of the same throw are among them."""
+    asked: dict[Run, None] = {}
 
-    They are of every set of assumptions on the way from a start to free flight, in any order.
-    """
-    runs: dict[Run, None] = {}
+    def ask(switches: Switches) -> float:
+        asked[equation_run(throw, switches)] = None
+        return 0.0
+
     for start in starts:
-        off = [field.name for field in fields(Switches) if not getattr(start, field.name)]
-        for on in product((False, True), repeat=len(off)):
-            runs[equation_run(throw, replace(start, **dict(zip(off, on, strict=True))))] = None
-    return list(runs)
+        ask(start), ask(FREE), changes_of(start, FREE, ask)
+    return list(asked)
 
 
 def split(run: Trajectory, start: Switches, flights: Flights) -> Split:

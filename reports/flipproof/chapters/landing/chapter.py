@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Sequence
+from itertools import accumulate, groupby
 from pathlib import Path
 from typing import Final
 
@@ -36,19 +37,14 @@ def made(wave: str, cases: Cases, seed: int) -> Generator[list[Call], Flights, l
 
 
 def chunks(cases: Sequence[Case]) -> list[tuple[Case, ...]]:
-    """Return the cases in their order, 300 throws together or more.
+    """Return the cases in their order, some 300 throws together.
 
     A call of a few is as soon made again as read from the store, and the laws of one filling, one after the other,
     share their flights.
     """
-    some: list[Case] = []
-    made: list[tuple[Case, ...]] = []
-    for case in cases:
-        some.append(case)
-        if sum(each.throws for each in some) >= 300:
-            made.append(tuple(some))
-            some = []
-    return [*made, tuple(some)] if some else made
+    starts = accumulate((case.throws for case in cases), initial=0)
+    groups = groupby(zip(cases, starts, strict=False), key=lambda pair: pair[1] // 300)
+    return [tuple(case for case, _ in some) for _, some in groups]
 
 
 def make_cases(cases: Sequence[Case], seed: int) -> list[list[Landed]]:
