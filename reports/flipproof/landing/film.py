@@ -89,8 +89,7 @@ def _scene(bottles: Sequence[Shown]) -> tuple[Any, Any, list[tuple[Line2D, PolyC
     energies.axhline(1.0, color="black", linewidth=1.0)
     energies.set_ylim(0.0, 4.0)
     energies.margins(x=0.0)
-    energies.set_xlabel("time from release [s]")
-    energies.set_ylabel("energy / saddle [1]")
+    energies.set(xlabel="time from release [s]", ylabel="energy / saddle [1]")
     energies.legend(loc="upper right", ncols=len(bottles))
     cursor = energies.axvline(0.0, color="black", linewidth=0.8, linestyle=":")
     title = figure.suptitle(" ", fontsize=10, family="monospace")
@@ -102,9 +101,7 @@ def _scene(bottles: Sequence[Shown]) -> tuple[Any, Any, list[tuple[Line2D, PolyC
 def _panel(axes: Axes, bottle: Shown, colour: str, width: float, height: float) -> tuple[Line2D, PolyCollection]:
     x, table = bottle.motion.centre[:, 0], 0.04
     middle = float(x.min() + x.max()) / 2
-    axes.set_xlim(middle - width / 2, middle + width / 2)
-    axes.set_ylim(-table, height)
-    axes.set_aspect("equal")
+    axes.set(xlim=(middle - width / 2, middle + width / 2), ylim=(-table, height), aspect="equal")
     axes.set_axis_off()
     axes.axhspan(-table, 0.0, color="#C8B79A")
     axes.set_title(f"{bottle.name}: {bottle.outcome.outcome}", fontsize=10, color=colour)

@@ -24,6 +24,17 @@ from slicemodel.trajectory import BASE, CAP
 PAIRS: Final = (("eq8", "midpoint"), ("eq8", "free-flight"))
 """Pairs whose impact sequences are aligned: two ways to the same equation, and two equations."""
 
+LANES = 0.2, -0.2
+END_COLOURS = {BASE: "#0072B2", CAP: "#E69F00"}
+IMPACTS = {
+    "agrees": ("#444444", 3.5),
+    "shifted": ("#009E73", 5.0),
+    "missing": ("#D1001C", 6.5),
+    "extra": ("#A030C0", 6.5),
+    "after a fork": ("#BBBBBB", 3.5),
+}
+"""Colour and size of every kind of impact."""
+
 
 @dataclass(frozen=True, slots=True)
 class Events:
@@ -105,19 +116,6 @@ def _rows(alignment: Alignment) -> Iterator[tuple[Any, ...]]:
             yield name, what, hit.slice, end_name(hit.end), hit.k, hit.time, hit.time
 
 
-LANES = 0.2, -0.2
-END_COLOURS = {BASE: "#0072B2", CAP: "#E69F00"}
-END_MARKERS = {BASE: "v", CAP: "^"}
-IMPACTS = {
-    "agrees": ("#444444", 3.5),
-    "shifted": ("#009E73", 5.0),
-    "missing": ("#D1001C", 6.5),
-    "extra": ("#A030C0", 6.5),
-    "after a fork": ("#BBBBBB", 3.5),
-}
-"""Colour and size of every kind of impact."""
-
-
 def even_rows(n_slices: int) -> list[int]:
     """Return at most 16 slices, evenly chosen, the first and the last among them."""
     return [int(i) for i in np.unique(np.linspace(0, n_slices - 1, min(16, n_slices)).round())]
@@ -143,8 +141,7 @@ def figure_gantt(alignment: Alignment) -> Figure:
     axes.set_yticks(range(len(rows)), [str(i) for i in rows])
     axes.set_ylim(-0.6, len(rows) - 0.4)
     axes.set_xlim(-0.01 * alignment.until, 1.01 * alignment.until)
-    axes.set_xlabel("time t [s]")
-    axes.set_ylabel("slice number [1], 0 starts on the base")
+    axes.set(xlabel="time t [s]", ylabel="slice number [1], 0 starts on the base")
     title = f"in each row: {alignment.first} above, {alignment.second} below; "
     title += f"{len(alignment.swapped)} impacts in another order"
     axes.set_title(title, fontsize=10, loc="left")
@@ -173,7 +170,7 @@ def _draw_impacts(axes: Axes, alignment: Alignment, rows: dict[int, int]) -> Non
 def _mark(axes: Axes, impacts: Table, rows: dict[int, int], lane: float, kind: str) -> None:
     colour, size = IMPACTS[kind]
     above = 3 if kind == "agrees" else 4
-    for end, marker in END_MARKERS.items():
+    for end, marker in ((BASE, "v"), (CAP, "^")):
         shown = impacts[(impacts.end == end) & np.isin(impacts.slice, list(rows))]
         heights = [rows[i] + lane for i in shown.slice]
         edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.3}

@@ -41,6 +41,9 @@ PAIRS: Final = (
 )
 """Name, first, second: down the ladder one assumption at a time, then the engine, then several together."""
 
+LEAST, MOST = 1e-6, 2.0
+"""Ends of the axis of the figure, as shares of omega_0."""
+
 MODEL_FLOOR: Final = 1e-9
 """Least band of a model, fraction of omega_0: the digits that independent methods share; none finer is claimed."""
 
@@ -93,7 +96,7 @@ def study(ask: Ask) -> Study[Differences]:
             finer=refined(first, second),
         )
 
-    tried = {pair: attempt(lambda pair: compared(*pair), pair) for pair in PAIRS if set(pair[1:]) <= set(runs)}
+    tried = {pair: attempt(compared, *pair) for pair in PAIRS if set(pair[1:]) <= set(runs)}
     pairs = tuple(outcome.found for outcome in tried.values() if outcome.found is not None)
     growths = []
     for difference in pairs:
@@ -176,36 +179,28 @@ def figures(found: Differences) -> Iterator[Exhibit]:
     )
 
 
-COLUMNS = 3
-LEAST, MOST = 1e-6, 2.0
-"""Ends of the axis, as shares of omega_0."""
-
-LINE, LIMIT = "#0072B2", "#B00020"
-
-
 @styled
 def draw(differences: Sequence[Difference]) -> Figure:
     """Draw a panel a pair on one logarithmic scale, with the parting band and when it is first passed."""
-    rows = -(-len(differences) // COLUMNS)
-    figure, grid = new_figure(
-        rows, COLUMNS, size=(8.0, 0.5 + 1.75 * rows), sharex=True, sharey=True, squeeze=False,
-    )  # fmt: skip
+    columns, line, limit = 3, "#0072B2", "#B00020"
+    rows = -(-len(differences) // columns)
+    size = (8.0, 0.5 + 1.75 * rows)
+    figure, grid = new_figure(rows, columns, size=size, sharex=True, sharey=True, squeeze=False)
     for axes, difference in zip(grid.flat, differences, strict=False):
-        axes.plot(difference.t, np.maximum(np.abs(difference.omega), LEAST / 10), color=LINE, linewidth=1.2)
-        axes.axhline(PARTING_BAND, color=LIMIT, linewidth=1.0, linestyle=":")
+        axes.plot(difference.t, np.maximum(np.abs(difference.omega), LEAST / 10), color=line, linewidth=1.2)
+        axes.axhline(PARTING_BAND, color=limit, linewidth=1.0, linestyle=":")
         if difference.parting_time is not None:
-            axes.plot(difference.parting_time, PARTING_BAND, "o", color=LIMIT, markeredgecolor="white", markersize=7)
+            axes.plot(difference.parting_time, PARTING_BAND, "o", color=limit, markeredgecolor="white", markersize=7)
         words = f"{textwrap.fill(difference.name, 32)}\nat most {percent(difference.largest)}"
         axes.set_title(words, fontsize=9, loc="left")
         axes.margins(x=0.02)
     for axes in grid.flat[len(differences) :]:
         axes.remove()
-    grid[0, 0].set_yscale("log")
-    grid[0, 0].set_ylim(LEAST, MOST)
+    grid[0, 0].set(yscale="log", ylim=(LEAST, MOST))
     for axes in grid[:, 0]:
         axes.set_ylabel("|difference| [1]")
-    for column in range(COLUMNS):
-        lowest = grid[(len(differences) - 1 - column) // COLUMNS, column]
+    for column in range(columns):
+        lowest = grid[(len(differences) - 1 - column) // columns, column]
         lowest.set_xlabel("time t [s]")
         lowest.tick_params(labelbottom=True)
     return figure

@@ -96,8 +96,7 @@ def figure_gallery(findings: Sequence[Finding], engines: Sequence[str]) -> Figur
     lines = sum(len(text) for text in texts) + 0.6 * len(texts) + 1.6
     figure, axes = new_figure(size=(8.0, 0.2 * lines + 0.1))
     axes.set_axis_off()
-    axes.set_xlim(0, 1)
-    axes.set_ylim(lines, 0)
+    axes.set(xlim=(0, 1), ylim=(lines, 0))
     for heading, x in columns.items():
         axes.text(x, 0.9, heading, fontsize=9, fontweight="bold", va="center")
     top = 1.5

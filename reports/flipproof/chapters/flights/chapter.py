@@ -196,8 +196,7 @@ def figure_over_time(trajectories: Iterable[Trajectory], quantity: str) -> Figur
     figure, axes = new_figure()
     for k, run in enumerate(trajectories):
         axes.plot(run.t, values_of(run, quantity), label=shown_name(run), **solver_style(run.label, k))
-    axes.set_xlabel("time t [s]")
-    axes.set_ylabel(AXES[quantity])
+    axes.set(xlabel="time t [s]", ylabel=AXES[quantity])
     axes.margins(x=0.01)
     shared_legend(figure, axes)
     if quantity == "omega":
@@ -225,8 +224,7 @@ def figure_slices(trajectories: Sequence[Trajectory]) -> Figure:
             length = run.scenario.bottle.length
             axes.plot(run.t, run.r[:, i] / length, label=shown_name(run), **solver_style(run.label, k))
         axes.set_title(f"slice {i}: {words}", fontsize=10, loc="left")
-        axes.set_ylabel("r / L [1]")
-        axes.set_ylim(1.03, -0.03)
+        axes.set(ylabel="r / L [1]", ylim=(1.03, -0.03))
         axes.margins(x=0.01)
     panels[-1].set_xlabel("time t [s]")
     shared_legend(figure, panels[0])

@@ -26,7 +26,7 @@ def study(ask: Ask) -> Study[Frozen]:
 
 def figures(found: Frozen) -> Iterator[Exhibit]:
     """Yield changes, defects and what they add up to."""
-    words = {"omega": "omega", "theta": "theta", "r_cm": "r_CM", "v_cm": "v_CM"}
+    words = dict(zip(QUANTITIES, ("omega", "theta", "r_CM", "v_CM"), strict=True))
     shares = ", ".join(f"{words[name]} {found.share[name]:.0%}" for name in QUANTITIES)
     peaks = ", ".join(
         f"{words[name]} {peak:.1e} m/s at {time * 1e3:.0f} ms"
@@ -64,20 +64,18 @@ def figures(found: Frozen) -> Iterator[Exhibit]:
     )
 
 
-WORDS = {"omega": "ω", "theta": "θ (gravity)", "r_cm": "r_CM", "v_cm": "v_CM (drag)"}
-COLOURS = dict(zip(QUANTITIES, ("#D55E00", "#0072B2", "#009E73", "#CC79A7"), strict=True))
-
-
 @styled
 def figure_frozen(study: Frozen) -> Figure:
     """Draw how every coefficient changes in a step, the defect that holding it causes, and what becomes of them."""
+    coefficients = dict(zip(QUANTITIES, ("ω", "θ (gravity)", "r_CM", "v_CM (drag)"), strict=True))
+    colours = dict(zip(QUANTITIES, ("#D55E00", "#0072B2", "#009E73", "#CC79A7"), strict=True))
     figure, panels = new_figure(3, size=(8.0, 8.6), sharex=True)
     changes, defects, errors = panels
     d_omega, d_theta, d_r_cm, damping = study.changes
     for words, values, colour, dash in (
-        ("|Δω| / ω", d_omega, COLOURS["omega"], "-"),
-        ("|Δθ| [rad]", d_theta, COLOURS["theta"], "-"),
-        ("|Δr_CM| / L", d_r_cm, COLOURS["r_cm"], "-"),
+        ("|Δω| / ω", d_omega, colours["omega"], "-"),
+        ("|Δθ| [rad]", d_theta, colours["theta"], "-"),
+        ("|Δr_CM| / L", d_r_cm, colours["r_cm"], "-"),
         ("γ / ω, not a change", damping, "#000000", ":"),
     ):
         changes.semilogy(study.t, _shown(values), color=colour, linewidth=1.2, linestyle=dash, label=words)
@@ -88,8 +86,8 @@ def figure_frozen(study: Frozen) -> Figure:
         if not values.any():
             continue
         time, peak = study.peak[quantity]
-        label = f"{WORDS[quantity]}: largest in {100 * study.share[quantity]:.0f} % of the steps"
-        colour = COLOURS[quantity]
+        label = f"{coefficients[quantity]}: largest in {100 * study.share[quantity]:.0f} % of the steps"
+        colour = colours[quantity]
         if quantity == "v_cm":  # jumps at every impact: its range within a window leaves the others to be seen
             t, least, most = envelope(study.t, values)
             label += f" (range within {1e3 * (t[1] - t[0]):.2g} ms)"
@@ -110,8 +108,7 @@ def figure_frozen(study: Frozen) -> Figure:
     if study.first_impact is not None:
         errors.axvline(study.first_impact, color=ASSUMPTIONS[4], linewidth=1.0, linestyle=":", label="first impact")
     errors.set_title("missed velocities added up, over slices that have not hit an end yet", fontsize=10, loc="left")
-    errors.set_ylabel("error [m/s], [1]")
-    errors.set_xlabel("time t [s]")
+    errors.set(ylabel="error [m/s], [1]", xlabel="time t [s]")
     for axes in panels:
         axes.margins(x=0.01)
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.3 if axes is errors else -0.06), ncols=2, fontsize=8.5)

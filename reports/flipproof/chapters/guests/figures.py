@@ -64,8 +64,7 @@ def figure_omega(guests: dict[str, Trajectory], ladder: dict[str, Trajectory]) -
         axes.plot(run.t, run.omega / run.scenario.omega0, color=colour, linestyle=dashes, linewidth=1.0, label=name)
     for k, (name, run) in enumerate(guests.items()):
         axes.plot(run.t, run.omega / run.scenario.omega0, color=ASSUMPTIONS[k], linewidth=1.8, label=name)
-    axes.set_xlabel("time t [s]")
-    axes.set_ylabel("angular velocity ω / ω₀ [1]")
+    axes.set(xlabel="time t [s]", ylabel="angular velocity ω / ω₀ [1]")
     axes.margins(x=0.01)
     shared_legend(figure, axes)
     return figure
@@ -141,8 +140,7 @@ def figure_convergence(guests: Sequence[Guest]) -> Figure:
         work, errors = efforts / efforts[0] if counted else efforts[0] / efforts, np.maximum(guest.errors, FLOOR)
         look = {"marker": MARKERS[k % len(MARKERS)], "color": ASSUMPTIONS[k]}
         axes.loglog(work, errors, label=f"{guest.label} → {guest.equation}", **look)
-    axes.set_xlabel("effort relative to the coarsest run [1]")
-    axes.set_ylabel("max |ω − ω of the equation| / ω₀ [1]")
+    axes.set(xlabel="effort relative to the coarsest run [1]", ylabel="max |ω − ω of the equation| / ω₀ [1]")
     shared_legend(figure, axes, columns=2)
     return figure
 
@@ -181,8 +179,7 @@ def figure_ice_energy(guests: Sequence[Guest]) -> Figure:
         if guest.energy is not None and guest.run is not None:
             panels[1].plot(guest.run.t, guest.energy, color=colour, linewidth=1.4, label=guest.label)
     for axes, label in zip(panels, ("|ω / ω₀ − 1| in ice [1]", "energy E / E(0) [1]"), strict=True):
-        axes.set_ylabel(label)
-        axes.set_xlabel("time t [s]")
+        axes.set(ylabel=label, xlabel="time t [s]")
         axes.margins(x=0.01)
     shared_legend(figure, panels[0] if any(g.visit.ice is not None for g in guests) else panels[1], columns=3)
     return figure

@@ -19,6 +19,9 @@ from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, observed, regression
 from flipproof.output.columns import curves_csv
 
+WIDTH_FLOOR = 1e-16
+"""Least width that is drawn."""
+
 
 def study(ask: Ask) -> Study[tuple[Horizon, ...]]:
     """Fly the ensembles of ``ask.work``."""
@@ -92,16 +95,6 @@ def figures(found: tuple[Horizon, ...]) -> Iterator[Exhibit]:
     )
 
 
-ROWS: tuple[tuple[tuple[Kind, ...], str], ...] = (
-    (("angle", "order"), "arithmetic: angle, order"),
-    (("release",), "flight: angle and spin"),
-)
-"""Kinds of ensembles in each row of the horizon plot."""
-
-ORDER_LINE = "#000000"
-WIDTH_FLOOR = 1e-16
-
-
 @styled
 def figure_horizon(studies: Sequence[Horizon]) -> Figure:
     """Width of every ensemble over time: above what arithmetic alone does, below what the flight amplifies.
@@ -109,16 +102,20 @@ def figure_horizon(studies: Sequence[Horizon]) -> Figure:
     At least one solver must have ensembles; one that has none is named in the legend.
     """
     red, grey = "#B00020", "#444444"
+    rows: dict[str, tuple[Kind, ...]] = {
+        "arithmetic: angle, order": ("angle", "order"),
+        "flight: angle and spin": ("release",),
+    }
     made = [study for study in studies if study.ensembles]
-    figure, axes = new_figure(len(ROWS), len(made), size=(8.0, 6.2), sharex=True, sharey=True, squeeze=False)
+    figure, axes = new_figure(len(rows), len(made), size=(8.0, 6.2), sharex=True, sharey=True, squeeze=False)
     sizes = sorted({e.size for study in made for e in study.ensembles if math.isfinite(e.size)})
     for column, study in enumerate(made):
         colour = solver_style(study.solver, column)["color"]
-        for row, (kinds, _) in enumerate(ROWS):
+        for row, kinds in enumerate(rows.values()):
             _draw_widths(axes[row, column], study.of_kind(*kinds), sizes, colour)
         axes[0, column].set_title(study.solver, fontsize=10, loc="left", color=colour)
         axes[-1, column].set_xlabel("time t [s]")
-    for at, (_, words) in zip(axes[:, 0], ROWS, strict=True):
+    for at, words in zip(axes[:, 0], rows, strict=True):
         at.set_ylabel(f"width of ω / ω₀ [1]\n{words}")
     finite = [e.width[np.isfinite(e.width)].max(initial=0.0) for study in made for e in study.ensembles]
     for at in axes.flat:
@@ -130,7 +127,7 @@ def figure_horizon(studies: Sequence[Horizon]) -> Figure:
     lines = zip(sizes, cycle(SIZE_LINES), strict=False)
     handles = [Line2D([], [], color=grey, linestyle=line, label=f"change of {size:.0e}") for size, line in lines]
     if any(study.of_kind("order") for study in made):
-        handles.append(Line2D([], [], color=ORDER_LINE, linewidth=1.8, label="other orders of the bodies"))
+        handles.append(Line2D([], [], color="black", linewidth=1.8, label="other orders of the bodies"))
     if any(study.horizon is not None for study in made):
         handles.append(Line2D([], [], linestyle="", marker="o", color=grey, label="horizon: band left"))
     idle = [study.solver for study in studies if not study.ensembles]
@@ -146,7 +143,7 @@ def _draw_widths(axes: Axes, ensembles: Sequence[Ensemble], sizes: Sequence[floa
         seen = np.isfinite(ensemble.width) & (ensemble.width > 0.0)
         shown = np.where(seen, np.maximum(ensemble.width, WIDTH_FLOOR), np.nan)
         if seen.any() and ensemble.kind == "order":
-            axes.plot(ensemble.t, shown, color=ORDER_LINE, linewidth=1.8)
+            axes.plot(ensemble.t, shown, color="black", linewidth=1.8)
         elif seen.any():
             line = SIZE_LINES[sizes.index(ensemble.size) % len(SIZE_LINES)]
             axes.plot(ensemble.t, shown, color=colour, linestyle=line, linewidth=1.2)

@@ -138,8 +138,7 @@ def draw(drifts: Sequence[Drift]) -> Figure:
         colour = known["color"] if known else next(others)
         axes.semilogy(ice.t, np.maximum(ice.drift, floor), color=colour, linewidth=1.5, label=words)
     axes.set_ylim(ICE_FLOOR / 3, 1e-2)
-    axes.set_xlabel("time t [s]")
-    axes.set_ylabel(f"|ω / ω₀ − 1| [1], zero drawn below {1000 * ICE_FLOOR:.0e}")
+    axes.set(xlabel="time t [s]", ylabel=f"|ω / ω₀ − 1| [1], zero drawn below {1000 * ICE_FLOOR:.0e}")
     axes.margins(x=0.01)
     shared_legend(figure, axes, columns=2)
     return figure

@@ -179,8 +179,7 @@ def figure_axes(found: Found) -> Figure:
     for axes, (axis, label) in zip(panels, names.items(), strict=True):
         for kind in AXIS_KINDS:
             _curve(axes, kind, found.along(axis, kind))
-        axes.set_xlabel(label)
-        axes.set_ylim(0.0, 1.0)
+        axes.set(xlabel=label, ylim=(0.0, 1.0))
     panels[0].set_ylabel("P(upright) [1]")
     title = f"filling {found.size.axis_filling:g}, family {found.size.families[-1]}"
     panels[0].set_title(title, fontsize=10, loc="left")
@@ -238,8 +237,7 @@ def figure_static(found: Found) -> Figure:
             bar = axes.bar(k + (side - 0.5) * width, height, width, color=colour, label=label if k == 0 else None)
             axes.bar_label(bar, [f"{counts[said, True]} of {total}"], fontsize=7.5, padding=2)
     axes.set_xticks(range(len(names)), [f"{KINDS[kind].words}\nfamily {family}" for family, kind in names], fontsize=8)
-    axes.set_ylim(0.0, 1.1)
-    axes.set_ylabel("share that stands [1]")
+    axes.set(ylim=(0.0, 1.1), ylabel="share that stands [1]")
     shared_legend(figure, axes, columns=2)
     return figure
 
@@ -256,8 +254,7 @@ def figure_energy(found: Found) -> Figure:
                 axes.plot(run.t, np.minimum(run.energy, 8.0), color=colour, linewidth=1.1, alpha=0.85)
         axes.axhline(1.0, color="black", linewidth=1.2)
         axes.set_title(KINDS[kind].words, fontsize=10, loc="left")
-        axes.set_xlabel("time from the touch [s]")
-        axes.set_ylim(0.4, 4.0)
+        axes.set(xlabel="time from the touch [s]", ylim=(0.4, 4.0))
         axes.margins(x=0.0)
     panels[0].set_ylabel("energy over the table / saddle E_s [1]")
     handles = [Line2D([], [], color=SHADES["upright"], label="ends upright")]
