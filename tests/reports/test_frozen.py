@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flipproof.chapters.frozen.chapter import envelope, figure_frozen
-from flipproof.chapters.frozen.study import QUANTITIES, study_frozen
+from flipproof.chapters.frozen.chapter import QUANTITIES, envelope, figure_frozen, study_frozen
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import solve
 from slicemodel import Bottle, Scenario

@@ -11,8 +11,7 @@ from made_up import command
 
 from flipproof.build import ask_of, gather_report
 from flipproof.chapters import chapters_named
-from flipproof.chapters.landing.chapter import chunks
-from flipproof.chapters.landing.claims import claims
+from flipproof.chapters.landing.chapter import chunks, claims
 from flipproof.chapters.landing.figures import figures, witnesses
 from flipproof.chapters.landing.study import AIMING, Key, Size, aiming, cell_of, filled, share_of, standing
 from flipproof.chapters.landing.tables import page, shares_csv

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import accumulate
+from itertools import accumulate, groupby
 from typing import Any, Final
 
 from flipproof.landing.aim import Aim
@@ -101,13 +101,11 @@ class Throws:
     @property
     def lines(self) -> tuple[range, ...]:
         """Numbers of the points of each program."""
-        lines: list[range] = []
-        begin = 0
-        for k, end in enumerate(self.ends):
-            last = k + 1 == len(self.cases)
-            if last or self.cases[k].program != self.cases[k + 1].program:
-                lines.append(range(begin, end))
-                begin = end
+        lines, begin = [], 0
+        for _, some in groupby(self.cases, key=lambda case: case.program):
+            end = begin + sum(case.throws for case in some)
+            lines.append(range(begin, end))
+            begin = end
         return tuple(lines)
 
     def point(self, number: int) -> Point:

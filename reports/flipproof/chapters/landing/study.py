@@ -49,9 +49,10 @@ KINDS: Final[Mapping[Kind, Landing]] = {
 }
 """The laws of water are models of one impact and are never averaged."""
 
+WATER: Final[tuple[Kind, ...]] = ("together", "in-turn", "compliant")
 WATER_AND_ICE: Final[tuple[Kind, ...]] = ("together", "ice")
 AXIS_KINDS: Final[tuple[Kind, ...]] = ("together", "in-turn", "ice")
-"""What is thrown beside one another everywhere, and along the axes of table and thrower."""
+"""The laws of water; what is thrown beside one another everywhere, and along the axes of table and thrower."""
 
 OPTIMAL: Final = (0.2, 0.5)
 """Fillings that the paper calls optimal (section 5)."""
