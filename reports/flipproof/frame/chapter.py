@@ -97,7 +97,7 @@ class Chapter(Generic[F]):
     study : callable (Ask) -> generator that yields runs and calls, and returns what was found
     claims : callable (found) -> findings
     figures : callable (found) -> exhibits
-    template : file of the chapter's part of the page; None: its figures alone
+    template : file of the chapter's part of the page; None: ``part.html.j2`` beside it, or its figures alone
     work : size of a report -> amount of work that the study is asked for; a size that is missing leaves the chapter out
     kind : {"regression", "observation"} - what it is if the study cannot be made at all; a regression fails the report
     summary : callable (found) -> entries of ``summary.json``

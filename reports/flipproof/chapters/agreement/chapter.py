@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import combinations
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -180,10 +179,4 @@ def claims(found: Agreed) -> Claims:
         )
 
 
-CHAPTER: Final = Chapter(
-    name="agreement",
-    title="One equation by several solvers",
-    study=study,
-    claims=claims,
-    template=Path(__file__).with_name("part.html.j2"),
-)
+CHAPTER: Final = Chapter(name="agreement", title="One equation by several solvers", study=study, claims=claims)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -197,10 +196,5 @@ def _gantt_handles(alignment: Alignment) -> list[Patch | Line2D]:
 
 
 CHAPTER: Final = Chapter(
-    name="alignment",
-    title="Contacts and impacts side by side",
-    study=study,
-    claims=claims,
-    figures=figures,
-    template=Path(__file__).with_name("part.html.j2"),
+    name="alignment", title="Contacts and impacts side by side", study=study, claims=claims, figures=figures
 )

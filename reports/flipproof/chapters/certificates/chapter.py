@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 from flipproof.chapters.solvers import WITNESSES
@@ -51,10 +50,4 @@ def claims(found: Certificates) -> Claims:
         yield observed(id_, title, certificate["band"], "of ω₀", "; ".join(words))
 
 
-CHAPTER: Final = Chapter(
-    name="certificates",
-    title="Certificates",
-    study=study,
-    claims=claims,
-    template=Path(__file__).with_name("part.html.j2"),
-)
+CHAPTER: Final = Chapter(name="certificates", title="Certificates", study=study, claims=claims)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -228,7 +227,6 @@ CHAPTER: Final = Chapter(
     study=study,
     claims=claims,
     figures=figures,
-    template=Path(__file__).with_name("part.html.j2"),
     work={"check": None, "quick": None, "full": None},
     summary=summary,
 )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Finding, Made, Outcome, Run, Study, attempt, judged
@@ -54,11 +53,4 @@ def claim_energy(run: Trajectory) -> Finding:
     return regression(f"energy-{run.method}", title, missed, "of the initial energy", (0.0, 1e-9))
 
 
-CHAPTER: Final = Chapter(
-    name="energy",
-    title="Where the energy goes",
-    study=study,
-    claims=claims,
-    kind="regression",
-    template=Path(__file__).with_name("part.html.j2"),
-)
+CHAPTER: Final = Chapter(name="energy", title="Where the energy goes", study=study, claims=claims, kind="regression")

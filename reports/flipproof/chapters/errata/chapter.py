@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from functools import partial
-from pathlib import Path
 from typing import Final
 
 from flipproof.chapters.errata import equations, programs
@@ -71,10 +70,5 @@ def claims(found: Mapping[str, Erratum]) -> Claims:
 
 
 CHAPTER: Final = Chapter(
-    name="errata",
-    title="Errata",
-    study=study,
-    claims=claims,
-    template=Path(__file__).with_name("part.html.j2"),
-    work={"check": None, "quick": None, "full": None},
+    name="errata", title="Errata", study=study, claims=claims, work={"check": None, "quick": None, "full": None}
 )

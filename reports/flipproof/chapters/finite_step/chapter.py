@@ -16,7 +16,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -140,9 +139,5 @@ def claims(found: StepCosts) -> Claims:
 
 
 CHAPTER: Final = Chapter(
-    name="finite-step",
-    title="What a step of finite length costs, taken apart",
-    study=study,
-    claims=claims,
-    template=Path(__file__).with_name("part.html.j2"),
+    name="finite-step", title="What a step of finite length costs, taken apart", study=study, claims=claims
 )

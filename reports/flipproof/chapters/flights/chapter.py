@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -236,7 +235,6 @@ CHAPTER: Final = Chapter(
     title="The flights",
     study=study,
     figures=figures,
-    template=Path(__file__).with_name("part.html.j2"),
     summary=lambda found: {"solvers": found.rows},
     tables=lambda found: {
         f"trajectories/{name}/data.csv": trajectory_csv(made.trajectory)

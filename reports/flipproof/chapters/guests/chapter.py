@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any, Final
 
 from flipproof.chapters.guests.figures import draw_guests
@@ -73,7 +72,6 @@ CHAPTER: Final = Chapter(
     claims=claim_guests,
     kind="regression",
     figures=draw_guests,
-    template=Path(__file__).with_name("part.html.j2"),
     work={},
     summary=lambda found: {"guests": [guest.to_mapping() for guest in found.guests]},
     tables=tables,

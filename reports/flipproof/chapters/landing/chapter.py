@@ -6,7 +6,6 @@ import itertools
 import math
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from itertools import accumulate, groupby
-from pathlib import Path
 from typing import Any, Final
 
 from flipproof.chapters.landing.figures import figures, witnesses
@@ -213,7 +212,6 @@ CHAPTER: Final = Chapter(
     study=study,
     claims=claims,
     figures=figures,
-    template=Path(__file__).with_name("part.html.j2"),
     page=page,
     # Less than a minute of one core.
     work={
