@@ -32,11 +32,9 @@ def land_throw(
 
     Parameters
     ----------
-    throw : Scenario
-        Its duration is the time within which the table has to be reached.
+    throw : Scenario - its duration is the time within which the table has to be reached
     table : Table
-    law : str or None
-        One law; None: every law that a program has.
+    law : str or None - one law; None: every law that a program has
     programs : names - "ode_reference", or engines of ``engine_check.land``
 
     Raises

@@ -24,14 +24,9 @@ SOLVE_IVP: Final = "solve_ivp"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pair:
-    """Two solvers of one equation.
+    """Two solvers of one equation: max |omega_second - omega_first| / |omega_0| before the horizon [1].
 
-    Parameters
-    ----------
-    first, second : str
-    largest : float - max |omega_second - omega_first| / |omega_0| before the horizon [1]
-    bands : float - the largest sum of the two printed bands [1]
-    share : float - of the sampled times within the sum of the bands [1]
+    ``bands`` is the largest sum of the two printed bands [1], ``share`` that of the sampled times within the sum.
     """
 
     first: str
@@ -67,12 +62,9 @@ def study_agreement(
 
     Parameters
     ----------
-    runs : mapping name -> Trajectory
-        Of one throw, at the same output times; at least two.
-    bands : mapping name -> float or array, shape (P,)
-        How far each omega(t) may be off by its own account [omega_0].
-    until : float
-        The horizon [s]: later times are not compared.
+    runs : mapping name -> Trajectory - of one throw, at the same output times; at least two
+    bands : mapping name -> float or array, shape (P,) - how far each omega(t) may be off by its own account [omega_0]
+    until : float - the horizon [s]: later times are not compared
 
     Raises
     ------

@@ -23,14 +23,9 @@ from slicemodel.trajectory import FloatArray
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tube:
-    """A run held against the tube around a reference, over the time of the reference.
+    """A run held against the tube around a reference: the share of the reference's time at which it is inside.
 
-    Parameters
-    ----------
-    share : float - of the time at which the run is inside
-    first_exit : float or None - when the run first leaves the tube [s]; None if it never does
-    largest : float - distance outside the tube where the run exists [rad/s]
-    words : str
+    It leaves the tube first at ``first_exit`` [s], None if it never does, and is at most ``largest`` outside [rad/s].
     """
 
     share: float

@@ -17,7 +17,7 @@ from flipproof.chapters.differences.study import largest_change
 from flipproof.chapters.engine_facts import worlds
 from flipproof.frame.findings import Finding, regression
 from flipproof.frame.solvers import Made, Run, without_gravity
-from slicemodel import Scenario, Trajectory
+from slicemodel import Scenario
 
 FEW_ITERATIONS: Final = 10
 LONG_DT, SHORT_DT = 1e-3, 1e-4
@@ -33,15 +33,10 @@ Measured = Callable[[Mapping[str, Made]], tuple[float, str]]
 
 @dataclass(frozen=True, slots=True)
 class EngineFact:
-    """One fact about an engine.
+    """One fact about an engine; its stable ``id`` is a key of ``WORDS``.
 
-    Parameters
-    ----------
-    engine : str
-    id : str - stable name, a key of ``WORDS``
-    unit : str - of the number that shows it
-    admissible : (low, high) - closed interval that holds the number if the fact holds
-    measure : callable - raises LookupError, with the reason, if a run that it needs is not whole
+    It holds if the number that ``measure`` returns lies in the closed interval ``admissible``, in ``unit``. That raises
+    LookupError, with the reason, if a run that it needs is not whole.
     """
 
     engine: str
@@ -83,26 +78,15 @@ def plan_engine_facts(throw: Scenario) -> dict[str, Run]:
             changes[f"order {seed}, {iterations} iterations"] = {"iterations": iterations, "shuffle": seed}
     # Unless told otherwise a joint removes a tenth of the error at each of 60 steps a second.
     changes["joints corrected as by default"] = {"error_bias": (1.0 - 0.1) ** 60}
+    throws = dict.fromkeys(changes, few) | {"no gravity": without_gravity(few)}
     return {
-        words: Run(
-            "pymunk",
-            without_gravity(few) if words == "no gravity" else few,
-            {**usual, **change},
-            f"engine fact, {words}",
-        )
+        words: Run("pymunk", throws[words], usual | change, f"engine fact, {words}")
         for words, change in changes.items()
     }
 
 
-def _whole(made: Mapping[str, Made], words: str) -> Trajectory:
-    flight = made[words].flight
-    if not flight.ok:
-        raise LookupError(f"{words}: {flight.message}")
-    return flight
-
-
 def _gravity(made: Mapping[str, Made]) -> tuple[float, str]:
-    usual, without = _whole(made, "usual"), _whole(made, "no gravity")
+    usual, without = made["usual"].whole, made["no gravity"].whole
     fallen = 0.5 * usual.scenario.gravity * float(usual.t[-1]) ** 2
     return largest_change(usual, without), f"the bottle falls by {fallen:.2f} m meanwhile"
 
@@ -121,12 +105,12 @@ def _smaller_step(made: Mapping[str, Made]) -> tuple[float, str]:
 
 def _widest(made: Mapping[str, Made], iterations: int) -> float:
     """Return the largest change of omega by another order."""
-    usual, *others = (_whole(made, f"order {seed}, {iterations} iterations") for seed in (0, *SHUFFLES))
+    usual, *others = (made[f"order {seed}, {iterations} iterations"].whole for seed in (0, *SHUFFLES))
     return max(largest_change(usual, other) for other in others)
 
 
 def _order(made: Mapping[str, Made]) -> tuple[float, str]:
-    again = largest_change(_whole(made, "usual"), _whole(made, f"order 0, {MANY} iterations"))
+    again = largest_change(made["usual"].whole, made[f"order 0, {MANY} iterations"].whole)
     return _widest(made, FEW), f"{len(SHUFFLES)} shuffled orders; the same order twice: {again:.1g}"
 
 
@@ -137,8 +121,8 @@ def _order_forgotten(made: Mapping[str, Made]) -> tuple[float, str]:
 
 
 def _joints(made: Mapping[str, Made]) -> tuple[float, str]:
-    default = _whole(made, "joints corrected as by default").diagnostics["constraint_drift"]
-    ours = _whole(made, "usual").diagnostics["constraint_drift"]
+    default = made["joints corrected as by default"].whole.diagnostics["constraint_drift"]
+    ours = made["usual"].whole.diagnostics["constraint_drift"]
     return float(default), f"{ours:.1e} with errors removed within one step"
 
 

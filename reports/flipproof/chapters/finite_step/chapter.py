@@ -1,11 +1,5 @@
 """What a step of finite length costs, taken apart: coefficients held over the step, a lag, rebounds that wait.
 
-    scheme             coefficients     J, r_CM, omega       rebounds
-    published-python   at the start     a step behind        wait for the grid      everything that its step does
-    the same           at the start     of the step          wait for the grid      without the lag
-    exact-step         at the start     of the step          wait, or located       by the exact roots, with v_CM
-    midpoint           at mid-step      of the step          wait, or located       at second order
-
 Before the first impact nothing waits, so that there a scheme without lag shows what holding the coefficients costs and
 nothing else. Each number is max |omega - omega of the scheme's own equation| / omega_0 at one number of steps. Across
 impacts the parts do not add up: they may cancel.
@@ -89,11 +83,6 @@ class StepCosts:
     more: tuple[StepCost, ...]
     slices: int
     finer_slices: int
-
-    @property
-    def rows(self) -> list[tuple[StepCost, StepCost | None]]:
-        """Each cost beside the same at more slices."""
-        return list(zip(self.costs, self.more or (None,) * len(self.costs), strict=True))
 
 
 def study(ask: Ask) -> Study[StepCosts]:

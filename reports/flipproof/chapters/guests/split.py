@@ -28,14 +28,9 @@ FREE = MODELS["free-flight"].switches
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Split:
-    """How a guest's plateau becomes that of free flight.
+    """How a guest's plateau ``start`` becomes that of its equation, ``placed``, and that of free flight, ``end``.
 
-    Parameters
-    ----------
-    equation : str - that the guest solves
-    start, placed, end : float - plateau of the guest, of its equation, of free flight
-    bars : mapping switch -> float - its fair share
-    ranges : mapping switch -> (float, float) - least and largest change by it in a single order
+    ``bars`` maps each switch to its fair share, ``ranges`` to the least and the largest change by it in a single order.
     """
 
     equation: str

@@ -178,8 +178,7 @@ def study_ensemble(kind: Kind, size: float, members: Sequence[Trajectory]) -> En
 
     Parameters
     ----------
-    members : sequence of Trajectory
-        Two or more, all on the same output times, as far as each goes; the unchanged flight first.
+    members : two Trajectories or more, on the same output times as far as each goes; the unchanged flight first
 
     Raises
     ------
