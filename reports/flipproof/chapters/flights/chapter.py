@@ -22,6 +22,12 @@ from slicemodel import Scenario, Trajectory
 from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray
 
+AXES = {
+    "omega": "angular velocity ω / ω₀ [1]",
+    "theta": "angle θ [degrees]",
+    "centre-of-mass": "centre of mass r_CM / L [1], cap = 0",
+}
+
 
 @dataclass(frozen=True, slots=True)
 class Flown:
@@ -173,13 +179,6 @@ def _apart(ends: Mapping[str, float], unit: str, digits: str) -> str:
     words = f"They end up to {finite[high] - finite[low]:{digits}}{unit} apart ({low} to {high})"
     pairs = [abs(finite[s] - finite[LIMITS[s]]) for s in SCHEMES if s in finite and LIMITS[s] in finite]
     return words + (f", a scheme and its own equation up to {max(pairs):{digits}}{unit}." if pairs else ".")
-
-
-AXES = {
-    "omega": "angular velocity ω / ω₀ [1]",
-    "theta": "angle θ [degrees]",
-    "centre-of-mass": "centre of mass r_CM / L [1], cap = 0",
-}
 
 
 def values_of(run: Trajectory, quantity: str) -> FloatArray:

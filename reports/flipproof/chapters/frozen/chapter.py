@@ -34,7 +34,6 @@ class Frozen:
 
     Parameters
     ----------
-    scheme, model : str - the scheme, and the equation it is held against
     t : (P - 1,) [s]; dt : float [s]
     changes : |d omega| / omega; |d theta| [rad]; |d r_CM| / L; and gamma / omega, what Eq. 9a takes to be small
     defect : quantity -> (P - 1,) [m/s]
@@ -50,8 +49,6 @@ class Frozen:
         velocity_error / cumulative shortly before the first impact; 1 if defects, added up, are the whole error.
     """
 
-    scheme: str
-    model: str
     t: FloatArray
     dt: float
     changes: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
@@ -94,8 +91,6 @@ def study_frozen(run: Trajectory, reference: Trajectory) -> Frozen:
     first = float(impacts.time[0]) if impacts is not None and len(impacts) else None
     k = 0 if first is None else int(np.searchsorted(run.t[1:], 0.9 * first)) - 1
     return Frozen(
-        scheme=run.method,
-        model=reference.method,
         t=t,
         dt=dt,
         changes=(
@@ -166,9 +161,9 @@ def figures(found: Frozen) -> Iterator[Exhibit]:
         "impact, so that a band shows the range of what holding it misses. Bottom: the missed velocities added up, "
         "beside the error of the velocity and of ω that they lead to."
         + ("" if found.explained is None else explained.format(found.explained)),
-        alt=f"Curves over time for {found.scheme} at a step of {found.dt * 1e3:.2g} ms. Share of the steps in which "
+        alt=f"Curves over time for exact-step at a step of {found.dt * 1e3:.2g} ms. Share of the steps in which "
         f"freezing costs most: {shares}. Largest velocity missed in one step: {peaks or 'none'}. Largest error of "
-        f"omega over omega_0 against {found.model}: {found.omega_error.max():.2g}.",
+        f"omega over omega_0 against eq8: {found.omega_error.max():.2g}.",
         maker=figure_frozen,
         data=(found,),
         table=columns_csv(
@@ -202,7 +197,7 @@ def figure_frozen(study: Frozen) -> Figure:
         ("γ / ω, not a change", damping, "#000000", ":"),
     ):
         changes.semilogy(study.t, _shown(values), color=colour, linewidth=1.2, linestyle=dash, label=words)
-    changes.set_title(f"change in one step of {study.dt * 1e3:.2g} ms, {study.scheme}", fontsize=10, loc="left")
+    changes.set_title(f"change in one step of {study.dt * 1e3:.2g} ms, exact-step", fontsize=10, loc="left")
     changes.set_ylabel("change per step [1]")
     for k, quantity in reversed(tuple(enumerate(QUANTITIES))):
         values = study.defect[quantity]
@@ -223,7 +218,7 @@ def figure_frozen(study: Frozen) -> Figure:
     defects.set_ylabel("rms over slices [m/s]")
     end = study.t + study.dt
     for values, colour, width, dash, words in (
-        (study.velocity_error, "#56B4E9", 1.5, "-", f"error of r' against {study.model} [m/s]"),
+        (study.velocity_error, "#56B4E9", 1.5, "-", "error of r' against eq8 [m/s]"),
         (study.cumulative, "#444444", 1.0, "-", "missed velocities added up [m/s]"),
         (study.omega_error, "#D55E00", 1.5, "--", "error of ω / ω₀ [1]"),
     ):

@@ -9,14 +9,12 @@ from typing import Final
 import numpy as np
 from matplotlib.figure import Figure
 
+from flipproof.chapters.solvers import ENGINE
 from flipproof.figures.style import ICE_FLOOR, STYLES, new_figure, shared_legend, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged, regression
 from flipproof.output.columns import curves_csv
 from slicemodel import Scenario, Trajectory
 from slicemodel.trajectory import FloatArray
-
-SOLVERS: Final = ("published-python", "exact-step", "published-limit", "eq8", "free-flight")
-ENGINE: Final = "pymunk"
 
 ADMISSIBLE: Final = {"slicemodel": 1e-12, "ode_reference": 1e-12, "engine_check": 1e-6}
 """max |omega/omega_0 - 1| by package: round-off where omega is computed from J, else the engine's own drift."""
@@ -47,7 +45,8 @@ class Ice:
 def study(ask: Ask) -> Study[Ice]:
     """Throw bottles of ice: every solver, and unless ``ask.work`` is false the engine with masses held by joints."""
     ice = replace(ask.throw, frozen=True)
-    rigid = {name: Run(name, ice, label=f"ice, {name}") for name in SOLVERS}
+    solvers = ("published-python", "exact-step", "published-limit", "eq8", "free-flight")
+    rigid = {name: Run(name, ice, label=f"ice, {name}") for name in solvers}
     rigid[f"{ENGINE} rigid"] = Run(ENGINE, ice, {"ice": "rigid"}, f"ice, {ENGINE} rigid")
     # The drift of welded ice hardly depends on its slices.
     welded = _welded(replace(ask.reference.with_slices(20), frozen=True)) if ask.work else {}

@@ -28,6 +28,19 @@ from flipproof.figures.style import new_figure, shared_legend, styled
 from flipproof.frame.exhibit import Exhibit
 from flipproof.landing.aim import FAMILIES
 
+LOOKS: Final[Mapping[Kind, dict[str, Any]]] = {
+    "together": {"color": "#0072B2", "marker": "o", "linestyle": "-"},
+    "in-turn": {"color": "#56B4E9", "marker": "^", "linestyle": "--"},
+    "compliant": {"color": "#CC79A7", "marker": "v", "linestyle": ":"},
+    "ice": {"color": "#444444", "marker": "s", "linestyle": "-"},
+    "ice, compliant": {"color": "#999999", "marker": "D", "linestyle": ":"},
+}
+
+SHADES: Final = {
+    "upright": "#0072B2", "lying": "#E8E2D4", "cap": "#E69F00", "undecided": "#CC79A7", "missed": "#FFFFFF"
+}  # fmt: skip
+"""Colour of every outcome on the map; water and ice alike."""
+
 
 def witnesses() -> Mapping[str, Any]:
     """Return the stored matrices of programs that landed the same touches, with the command that made them."""
@@ -139,20 +152,6 @@ def _witness_figure(stored: Mapping[str, Any]) -> Exhibit:
         data=(stored["cases"],),
         table=witnesses_csv(stored),
     )
-
-
-LOOKS: Final[Mapping[Kind, dict[str, Any]]] = {
-    "together": {"color": "#0072B2", "marker": "o", "linestyle": "-"},
-    "in-turn": {"color": "#56B4E9", "marker": "^", "linestyle": "--"},
-    "compliant": {"color": "#CC79A7", "marker": "v", "linestyle": ":"},
-    "ice": {"color": "#444444", "marker": "s", "linestyle": "-"},
-    "ice, compliant": {"color": "#999999", "marker": "D", "linestyle": ":"},
-}
-
-SHADES: Final = {
-    "upright": "#0072B2", "lying": "#E8E2D4", "cap": "#E69F00", "undecided": "#CC79A7", "missed": "#FFFFFF"
-}  # fmt: skip
-"""Colour of every outcome on the map; water and ice alike."""
 
 
 @styled
