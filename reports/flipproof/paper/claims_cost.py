@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from flipproof.chapters.errata.programs import SQUARE, exponents_of_cost
+from flipproof.chapters.errata.erratum import SQUARE
+from flipproof.chapters.errata.programs import exponents_of_cost
 from flipproof.paper.claim import Claim, Read, states
 from flipproof.paper.observe import (
     Flights,

@@ -12,7 +12,7 @@ from functools import partial
 from typing import Final
 
 from flipproof.chapters.errata import equations, programs
-from flipproof.chapters.errata.equations import ROUND_OFF, Erratum
+from flipproof.chapters.errata.erratum import ROUND_OFF, Erratum
 from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Study, observed
 from slicemodel import Scenario
 
