@@ -35,7 +35,7 @@ def rebound_of_two(first: float, second: float) -> float:
     return float(right.velocity.x - left.velocity.x) / 2.0
 
 
-def groove_end(_: object = None) -> tuple[float, str]:
+def groove_end(_: object) -> tuple[float, str]:
     """Return the largest speed back, over the speed before, of a mass that runs into the end of its groove; and how."""
     import pymunk
 
@@ -52,7 +52,7 @@ def groove_end(_: object = None) -> tuple[float, str]:
     return back, note
 
 
-def stagger(_: object = None) -> tuple[float, str]:
+def stagger(_: object) -> tuple[float, str]:
     """Return by how many steps the engine's velocity is ahead of its position, in free fall; and how that is measured.
 
     The slope of the positions at t_n is (x_n+1 - x_n-1) / 2 dt, exact for a parabola; the engine's velocity is larger
@@ -103,7 +103,7 @@ def speed_through_wall(dt: float) -> float:
     return float(body.velocity.x) / 5.0
 
 
-def soft_limit(_: object = None) -> tuple[float, str]:
+def soft_limit(_: object) -> tuple[float, str]:
     """Return speed back over speed before of a mass at MuJoCo's joint limit; and how far it goes beyond, in words."""
     xml = (
         '<mujoco><option gravity="0 0 0" timestep="1e-4"/><worldbody><body>'
@@ -115,7 +115,7 @@ def soft_limit(_: object = None) -> tuple[float, str]:
     return -min(v for _, v in path), f"hit at 1 m/s; the mass goes {beyond * 1e3:.1f} mm beyond the limit first"
 
 
-def soft_contact(_: object = None) -> tuple[float, str]:
+def soft_contact(_: object) -> tuple[float, str]:
     """Return how deep a ball of 1 kg lies in MuJoCo's floor at rest [mm]; and how deep after landing, in words."""
     xml = (
         '<mujoco><option timestep="1e-4"/><worldbody><geom type="plane" size="1 1 0.1"/>'

@@ -187,15 +187,17 @@ def figure_ice_energy(guests: Sequence[Guest]) -> Figure:
 
 def draw_waterfalls(guests: Sequence[Guest]) -> Exhibit:
     """Return the waterfalls of guests that have one, a row of panels each."""
-    words, rows = [], []
+    words: list[str] = []
+    rows: list[tuple[Any, ...]] = []
     for guest in guests:
         if (split := guest.split) is not None:
             parts = ", ".join(f"{NAMES[name]} {share:+.3f}" for name, share in split.bars.items())
             ends = f"from {split.start:.3f} to {split.end:.3f}" + (f" by {parts}" if parts else "")
             words.append(f"{guest.label}: {ends}, the rest {split.rest:+.2g}")
-            bars = [(NAMES[name], share, *split.ranges[name]) for name, share in split.bars.items()]
-            steps = [("(the guest)", split.start), ("the rest", split.rest), *bars, ("(free flight)", split.end)]
-            rows += [(guest.slug, split.equation, *step, None, None)[:6] for step in steps]
+            head = guest.slug, split.equation
+            rows += [(*head, "(the guest)", split.start, None, None), (*head, "the rest", split.rest, None, None)]
+            rows += [(*head, NAMES[name], share, *split.ranges[name]) for name, share in split.bars.items()]
+            rows.append((*head, "(free flight)", split.end, None, None))
     return Exhibit(
         name="guests-waterfall",
         title="Waterfall of each guest",

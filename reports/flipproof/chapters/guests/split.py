@@ -78,7 +78,9 @@ def plan_splits(starts: Iterable[Switches], throw: Scenario) -> list[Run]:
         return 0.0
 
     for start in starts:
-        ask(start), ask(FREE), changes_of(start, FREE, ask)
+        ask(start)
+        ask(FREE)
+        changes_of(start, FREE, ask)
     return list(asked)
 
 

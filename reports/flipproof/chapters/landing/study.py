@@ -243,14 +243,18 @@ def counting(throw: Scenario, size: Size, aims: Cases, rows: Rows) -> Cases:
     asked: dict[Key, Case] = {}
     last = size.families[-1]
     for (family, filling, frozen), aim in aim_of.items():
-        for kind, landing in KINDS.items() if filling in size.fillings else ():
+        if filling not in size.fillings:
+            continue
+        for kind, landing in KINDS.items():
             throws = size.throws if landing.program != COMPLIANT else size.engine_throws
             if landing.frozen == frozen and throws and (landing.program != COMPLIANT or family == last):
                 asked[Key("filling", filling, family, filling, kind)] = _case(size, aim, kind, throws)
     values = {"restitution": size.restitutions, "friction": size.frictions, "scatter": size.scatters}
     for kind, axis in product(AXIS_KINDS, values):
         place = last, size.axis_filling, KINDS[kind].frozen
-        for value in values[axis] if place in aim_of else ():
+        if place not in aim_of:
+            continue
+        for value in values[axis]:
             change: dict[str, Any] = {axis: size.scatter.times(value) if axis == "scatter" else value}
             case = replace(_case(size, aim_of[place], kind, size.axis_throws, AXES[axis]), **change)
             asked[Key(axis, value, last, size.axis_filling, kind)] = case
