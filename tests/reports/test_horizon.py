@@ -74,12 +74,6 @@ def test_a_member_that_ends_is_a_horizon_and_not_a_cut():
     assert both.ended == pytest.approx(T[100])
 
 
-def test_what_is_no_ensemble_is_refused():
-    other = replace(flight(0.0), t=T * 0.5)
-    with pytest.raises(ValueError, match="different output times"):
-        ensemble(flight(0.0), other)
-
-
 @pytest.mark.parametrize("reach", [Reach(), SMALL])
 def test_the_plan_changes_one_thing_at_a_time(reach):
     runs = planned(reach)

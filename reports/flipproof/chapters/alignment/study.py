@@ -31,21 +31,12 @@ IndexArray = NDArray[np.int64]
 def study_alignment(first: Trajectory, second: Trajectory) -> Alignment:
     """Align the impacts of two runs of one throw.
 
-    Parameters
-    ----------
-    first, second : Trajectory - with impacts and the same number of slices
-
     Raises
     ------
     ValueError
-        If a run has no record of impacts, or the numbers of slices differ.
+        If a run has no record of impacts.
     """
     n_slices = first.scenario.n_slices
-    if n_slices != second.scenario.n_slices:
-        raise ValueError(
-            f"{first.label} has {n_slices} slices and {second.label} {second.scenario.n_slices}; "
-            "impacts are aligned slice by slice"
-        )
     until = float(min(first.t[-1], second.t[-1]))
     (a, all_of_a), (b, all_of_b) = (_fast_impacts(run, until) for run in (first, second))
     matched: list[tuple[int, int]] = []

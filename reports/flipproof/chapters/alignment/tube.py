@@ -37,18 +37,8 @@ class Tube:
 def study_tube(reference: Trajectory, run: Trajectory, *, dt: float, dy: float) -> Tube:
     """Hold the omega of a run against the tube around that of the reference, both linear between their points.
 
-    Parameters
-    ----------
-    reference, run : Trajectory - time grids and lengths may differ
-    dt : float [s], dy : float [rad/s]
-
-    Raises
-    ------
-    ValueError
-        If a tolerance is negative.
+    Time grids and lengths may differ; ``dt`` [s] and ``dy`` [rad/s] are not negative.
     """
-    if not (dt >= 0 and dy >= 0):
-        raise ValueError(f"dt = {dt!r} s and dy = {dy!r} must not be negative")
     times = reference.t
     marks = np.concatenate([times, run.t, times - dt, times + dt])
     t = np.unique(marks[(marks >= times[0]) & (marks <= times[-1])])

@@ -196,12 +196,9 @@ def received(calls: Mapping[str, Call], flights: Flights) -> tuple[Visit, ...]:
 
 
 def visit(spec: str, throw: Scenario, times: FloatArray, timeout: float | None = None) -> Visit:
-    """Certify a solver, let it make the throw at each of its efforts, and in ice.
+    """Certify a solver, let it make the throw at each of its efforts, and in ice, at output times of shape (P,) [s].
 
-    Parameters
-    ----------
-    times : array, shape (P,) - output times [s]
-    timeout : float, optional - seconds one run may take, instead of what the solver says
+    ``timeout`` is how many seconds one run may take, instead of what the solver says.
     """
     problems: dict[str, str] = {}
 

@@ -174,21 +174,8 @@ def study_horizon(plan: Mapping[str, Sequence[Level]], made: Mapping[Run, Made])
 
 
 def study_ensemble(kind: Kind, size: float, members: Sequence[Trajectory]) -> Ensemble:
-    """Measure the width of an ensemble over time.
-
-    Parameters
-    ----------
-    members : two Trajectories or more, on the same output times as far as each goes; the unchanged flight first
-
-    Raises
-    ------
-    ValueError
-        If their times differ.
-    """
+    """Measure the width over time of two flights or more on the same output times, the unchanged one first."""
     t = max((member.t for member in members), key=len)
-    for member in members:
-        if not np.array_equal(member.t, t[: len(member.t)]):
-            raise ValueError(f"{member.method}: members of an ensemble have different output times")
     shortest = min(len(member.t) for member in members)
     width = np.full(len(t), np.inf)
     omega = [member.omega[:shortest] for member in members]
