@@ -65,11 +65,6 @@ def test_shares_add_up_and_peaks_lie_on_their_curves(study):
     assert study.changes[3][0] == pytest.approx(0.25)
 
 
-def test_a_reference_at_other_times_is_refused():
-    with pytest.raises(ValueError, match="at the times"):
-        study_frozen(solve("exact-step", THROW, steps=101, store="full"), solve("eq8", THROW))
-
-
 def test_the_figure_says_which_quantity_leads(study):
     figure = figure_frozen(study)
     labels = [text.get_text() for axes in figure.axes for text in axes.get_legend().get_texts()]

@@ -73,7 +73,6 @@ def erratum_sinh_sign(throw: Scenario) -> Erratum:
     """Eq. 9d has plus gamma v sinh where the derivative of Eq. 9c has minus: with it nothing is damped."""
     gamma, omega = throw.damping_rate or 1.0, throw.omega0
     h = 1e-4 / abs(omega)
-
     t = 0.1 / abs(omega)
     decay = math.exp(-gamma * t)
     sinh, cosh = gamma / omega * decay * math.sinh(omega * t), decay * math.cosh(omega * t)

@@ -108,7 +108,7 @@ def erratum_defaults() -> Erratum:
 
 
 class _Counted(np.ndarray):
-    """An array that counts the elements of every operation made with it, and of every copy asked for by ``kept``."""
+    """An array that counts the elements of every operation made with it."""
 
     elements = 0
 
@@ -128,8 +128,7 @@ def count_operations(n: int, steps: int, *, copies_history: bool) -> int:
     on the values, so no slice needs to hit an end.
     """
     _Counted.elements = 0
-    r = (np.linspace(0.1, 0.2, n)).view(_Counted)
-    v = (np.zeros(n)).view(_Counted)
+    r, v = np.linspace(0.1, 0.2, n).view(_Counted), np.zeros(n).view(_Counted)
     omega, gamma, dt = 20.0, 5.0, 1e-9
     for step in range(1, steps):
         r_cm = 0.05 * 0.14 + 0.95 * np.add.reduce(r) / n
