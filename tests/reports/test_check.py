@@ -145,7 +145,7 @@ def test_a_difference_without_one_of_its_runs_is_not_evaluated(monkeypatch, plac
         return Made(run, None, 0.0, "RuntimeError: no luck")
 
     monkeypatch.setattr(pool, "make", broken)
-    monkeypatch.setattr(errata, "study_errata", lambda _: ())
+    monkeypatch.setattr(errata, "study_errata", lambda _: {})
     found = check(THROW, ("thresholds",), baseline=place())
     assert len(found.failed) == len(found.findings) > 5
     assert all("no luck" in finding.note for finding in found.failed)

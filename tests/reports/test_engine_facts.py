@@ -7,8 +7,7 @@ from dataclasses import replace
 import pytest
 
 from flipproof.chapters.engine_facts import worlds
-from flipproof.chapters.engine_facts.chapter import draw_gallery
-from flipproof.chapters.engine_facts.figure import figure_gallery
+from flipproof.chapters.engine_facts.chapter import EngineFacts, figure_gallery, figures
 from flipproof.chapters.engine_facts.study import FACTS, plan_engine_facts
 from flipproof.frame.solvers import Made, make
 from slicemodel import Scenario
@@ -108,10 +107,10 @@ def test_the_gallery_has_fact_number_threshold_and_sign(facts):
         "stagger": replace(facts["stagger"], value=-0.5),
         "mujoco-limit": replace(facts["mujoco-limit"], value=None),
     }
-    findings = [changed[fact.id] for fact in FACTS]
+    findings = tuple(changed[fact.id] for fact in FACTS)
     texts = [text.get_text() for text in figure_gallery(findings, [f.engine for f in FACTS]).axes[0].texts]
     assert {"engine", "fact", "number", "threshold", "✓", "✗", "–", "≤ 1e-09", "-0.500 steps"} <= set(texts)
-    exhibit = draw_gallery(findings)
+    (exhibit,) = figures(EngineFacts(findings, None, None))
     assert "10 of 12" in exhibit.caption
     assert "-0.500 steps, threshold 0.49 to 0.51, fail" in exhibit.alt
     assert exhibit.drawing.svg.startswith("<?xml")

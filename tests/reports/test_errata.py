@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flipproof.chapters.errata import chapter as errata
 from flipproof.chapters.errata import equations, programs
-from flipproof.chapters.errata import study as errata
 from slicemodel import Bottle, Scenario
 
 THROW = Scenario()
@@ -15,7 +15,7 @@ THROW = Scenario()
 
 @pytest.fixture(scope="module")
 def audit():
-    return {item.id: item for item in errata.study_errata(THROW)}
+    return errata.study_errata(THROW)
 
 
 def test_every_item_is_an_erratum_with_words_and_a_number(audit):
@@ -130,6 +130,6 @@ def test_mechanics(audit):
 
 
 def test_what_cannot_be_computed_says_so():
-    item = errata._attempt("x", lambda: equations.erratum_eq11e(THROW, 2.0))  # more water than the bottle holds
+    item = errata.audited(lambda throw: equations.erratum_eq11e(throw, 2.0), THROW)  # more water than the bottle holds
     assert item.verdict == "not evaluated"
     assert item.note.startswith("ScenarioError: water_mass = 2.0 kg exceeds")

@@ -11,8 +11,7 @@ from made_up import command
 
 from flipproof.build import ask_of, gather_report
 from flipproof.chapters import chapters_named
-from flipproof.chapters.landing.chapter import chunks
-from flipproof.chapters.landing.claims import claims
+from flipproof.chapters.landing.chapter import chunks, claims
 from flipproof.chapters.landing.figures import figures, witnesses
 from flipproof.chapters.landing.study import AIMING, Key, Size, aiming, cell_of, filled, share_of, standing
 from flipproof.chapters.landing.tables import page, shares_csv
@@ -233,7 +232,7 @@ def test_a_flight_that_was_kept_is_the_flight(design):
 
 @pytest.fixture(scope="module")
 def found():
-    return drive(THROW, SMALL, lambda wave: [make_case(case, SMALL.seed) for case in wave.cases])
+    return drive(THROW, SMALL, lambda _, cases: [make_case(case, SMALL.seed) for case in cases.values()])
 
 
 def test_the_study_counts_what_it_threw(found):
@@ -254,15 +253,15 @@ def test_the_study_counts_what_it_threw(found):
 
 
 def test_throws_that_choose_an_aim_are_not_counted():
-    waves = []
+    streams = {}
 
-    def make(wave):
-        waves.append(wave)
-        return [make_case(case, SMALL.seed) for case in wave.cases]
+    def make(wave, cases):
+        streams[wave] = {case.stream for case in cases.values()}
+        return [make_case(case, SMALL.seed) for case in cases.values()]
 
     drive(THROW, SMALL, make)
-    assert {case.stream for case in waves[0].cases} == {AIMING}
-    assert AIMING not in {case.stream for case in waves[1].cases}
+    assert streams["aims"] == {AIMING}
+    assert AIMING not in streams["throws"]
 
 
 def test_every_finding_and_figure_says_what_is_assumed(found):
@@ -422,11 +421,12 @@ def test_the_chapter_makes_the_same_and_finds_it_in_the_store(found, tmp_path):
 
 
 def test_calls_hold_every_case_once_and_are_worth_keeping():
-    wave, unaimed = aiming(THROW, SMALL)
+    cases, unaimed = aiming(THROW, SMALL)
     assert unaimed == {}
-    many = chunks([replace(case, throws=120) for case in wave.cases])
-    assert [case for some in many for case in some] == [replace(case, throws=120) for case in wave.cases]
-    assert [sum(case.throws for case in some) for some in many] == [360, 360, 240]
+    long = [replace(case, throws=120) for case in cases.values()]
+    many = chunks(long)
+    assert [case for some in many for case in some] == long
+    assert [sum(case.throws for case in some) for some in many] == [360, 240, 360]
     assert chunks([]) == []
 
 

@@ -168,11 +168,11 @@ def test_axes_carry_units(gathered):
 
 
 def test_the_same_data_draw_the_same_bytes(gathered):
-    from flipproof.chapters.flights.figures import figure_omega
+    from flipproof.chapters.flights.chapter import figure_over_time
     from flipproof.figures.style import draw
 
     flights = flights_of(gathered)
-    first, second = (draw(figure_omega(flights)) for _ in range(2))
+    first, second = (draw(figure_over_time(flights, "omega")) for _ in range(2))
     assert first.svg == second.svg
 
 

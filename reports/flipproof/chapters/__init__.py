@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
-from typing import Final
+from pathlib import Path
+from typing import Any, Final
 
-from flipproof.frame.chapter import Part
+from flipproof.frame.chapter import Chapter, Part
 
 CONTENTS: Final[tuple[tuple[str, str, str, tuple[str, ...]], ...]] = (
     ("assumptions", "What each assumption costs",
@@ -56,15 +58,15 @@ more, ``measured``, before these.
 
 def parts() -> tuple[Part, ...]:
     """Return what a report consists of, its chapters imported."""
-    return tuple(
-        Part(
-            anchor,
-            title,
-            sentence,
-            tuple(import_module(name if "." in name else f"{__name__}.{name}.chapter").CHAPTER for name in names),
-        )
-        for anchor, title, sentence, names in CONTENTS
-    )
+    return tuple(Part(anchor, title, says, tuple(map(_chapter, names))) for anchor, title, says, names in CONTENTS)
+
+
+def _chapter(name: str) -> Chapter[Any]:
+    """Return the chapter of a module; ``part.html.j2`` beside it is its part of the page unless it names another."""
+    module = import_module(name if "." in name else f"{__name__}.{name}.chapter")
+    chapter: Chapter[Any] = module.CHAPTER
+    beside = Path(str(module.__file__)).with_name("part.html.j2")
+    return replace(chapter, template=beside) if chapter.template is None and beside.exists() else chapter
 
 
 def chapters_named(*names: str) -> tuple[Part, ...]:

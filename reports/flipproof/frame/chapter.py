@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
 from flipproof.frame.exhibit import Exhibit, Touch
-from flipproof.frame.findings import Finding, Kind
+from flipproof.frame.findings import Finding, Kind, observed, regression
 from flipproof.frame.flights import Call, Flights, Outcome, attempt
 from flipproof.frame.solvers import Made, Missing, Run
 from flipproof.frame.throws import REFERENCE
@@ -24,7 +24,7 @@ from slicemodel import Scenario
 
 __all__ = [
     "Absent", "Ask", "Call", "Chapter", "Claims", "Exhibit", "Finding", "Flights", "Kind", "Made", "Missing", "Outcome",
-    "Part", "Run", "Size", "Study", "Touch", "attempt", "judged",
+    "Part", "Run", "Size", "Study", "Touch", "attempt", "judged", "observed", "regression",
 ]  # fmt: skip
 """All that a chapter is written with."""
 
@@ -97,7 +97,7 @@ class Chapter(Generic[F]):
     study : callable (Ask) -> generator that yields runs and calls, and returns what was found
     claims : callable (found) -> findings
     figures : callable (found) -> exhibits
-    template : file of the chapter's part of the page; None: its figures alone
+    template : file of the chapter's part of the page; None: ``part.html.j2`` beside it, or its figures alone
     work : size of a report -> amount of work that the study is asked for; a size that is missing leaves the chapter out
     kind : {"regression", "observation"} - what it is if the study cannot be made at all; a regression fails the report
     summary : callable (found) -> entries of ``summary.json``

@@ -19,25 +19,14 @@ import numpy as np
 from ode_reference import turn
 from slicemodel import Scenario
 
-FAMILIES: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "A": "omega_0 as given, the height of the table solved for",
-        "B": "the time of flight as given, omega_0 solved for",
-    }
-)
+FAMILIES: Final[Mapping[str, str]] = MappingProxyType({"A": "ω₀ as thrown", "B": "time of flight as thrown"})
+"""Family of throws -> what all its bottles share."""
 
 LONGEST: Final = 2.0
 """Longest flight of family A [s]."""
 
 FASTEST: Final = 60.0
 """Largest omega_0 of family B [rad/s]."""
-
-GRID: Final = 2.0
-"""Spacing of the omega_0 at which family B looks for the first that turns far enough [rad/s]."""
-
-HALVINGS: Final = 24
-EVERY: Final = 1e-3
-"""Time between two looks at an angle in family A [s]."""
 
 SPARE: Final = 1.0
 """Time that scattered throws are given beyond the aimed flight [s]."""
@@ -79,7 +68,7 @@ def aimed(throw: Scenario, family: str, offset: float = 0.0) -> Aim:
 def _by_height(throw: Scenario, goal: float) -> Aim:
     if not throw.omega0 > 0.0:
         raise ValueError(f"omega0 = {throw.omega0:g} rad/s is outside (0, inf): the aim is a turn forwards")
-    t, theta, rim = turn(replace(throw, duration=LONGEST), EVERY)
+    t, theta, rim = turn(replace(throw, duration=LONGEST), 1e-3)
     reached = np.flatnonzero(theta >= goal)
     if not reached.size:
         raise ValueError(
@@ -94,8 +83,9 @@ def _by_height(throw: Scenario, goal: float) -> Aim:
 
 
 def _by_spin(throw: Scenario, goal: float) -> Aim:
+    """Halve 24 times the first interval, of a grid of 2 rad/s, in which a throw turns far enough."""
     slow, farthest = 0.0, -math.inf
-    for fast in np.arange(GRID, FASTEST + GRID / 2, GRID).tolist():
+    for fast in np.arange(2.0, FASTEST + 1.0, 2.0).tolist():
         angle = _end(throw, fast)[0]
         farthest = max(farthest, angle)
         if angle >= goal:
@@ -106,14 +96,11 @@ def _by_spin(throw: Scenario, goal: float) -> Aim:
             f"theta({throw.duration:g} s) stays below {math.degrees(farthest):.0f} degrees up to omega0 = {FASTEST:g} "
             f"rad/s at fill fraction {throw.fill_fraction:g}; the aim is {math.degrees(goal):.0f} degrees"
         )
-    for _ in range(HALVINGS):
+    for _ in range(24):
         middle = (slow + fast) / 2
         slow, fast = (slow, middle) if _end(throw, middle)[0] >= goal else (middle, fast)
-    return Aim(
-        throw=replace(throw, omega0=fast, duration=throw.duration + SPARE),
-        height=_end(throw, fast)[1],
-        time=throw.duration,
-    )
+    spun = replace(throw, omega0=fast, duration=throw.duration + SPARE)
+    return Aim(throw=spun, height=_end(throw, fast)[1], time=throw.duration)
 
 
 @lru_cache(maxsize=256)

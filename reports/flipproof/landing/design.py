@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import accumulate
+from itertools import accumulate, groupby
 from typing import Any, Final
 
 from flipproof.landing.aim import Aim
@@ -21,17 +21,10 @@ AXES: Final[tuple[Axis, ...]] = (Choices("cell", "whole", ()), Choices("place", 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """Throws about one aim, landed by one program under one law.
+    """Throws about one aim onto one table, landed by one program under one law.
 
-    Parameters
-    ----------
-    aim : Aim
-    law : str or None - None: the program's own, or ice
-    program : str - "ode_reference" or an engine of ``engine_check.land``
-    restitution, friction : float - of the table
-    scatter : Scatter
-    throws : int
-    stream : int - seeds of different streams have no throw in common
+    Without ``law`` it is the program's own, or ice; ``program`` is "ode_reference" or an engine of
+    ``engine_check.land``. Seeds of different streams have no throw in common.
     """
 
     aim: Aim
@@ -70,13 +63,7 @@ class Throws:
     """Every throw of some cases; a ``flipproof.sweep.design.Plan``.
 
     Throw k of any case of one stream is scattered by the seed (seed, stream, k): water and ice, fillings, laws and
-    tables meet the same throwers.
-
-    Parameters
-    ----------
-    cases : those of one program stand together: they make one line
-    seed : int
-    text : str - the command
+    tables meet the same throwers. Cases of one program stand together: they make one line. ``text`` is the command.
     """
 
     cases: tuple[Case, ...]
@@ -101,13 +88,11 @@ class Throws:
     @property
     def lines(self) -> tuple[range, ...]:
         """Numbers of the points of each program."""
-        lines: list[range] = []
-        begin = 0
-        for k, end in enumerate(self.ends):
-            last = k + 1 == len(self.cases)
-            if last or self.cases[k].program != self.cases[k + 1].program:
-                lines.append(range(begin, end))
-                begin = end
+        lines, begin = [], 0
+        for _, some in groupby(self.cases, key=lambda case: case.program):
+            end = begin + sum(case.throws for case in some)
+            lines.append(range(begin, end))
+            begin = end
         return tuple(lines)
 
     def point(self, number: int) -> Point:

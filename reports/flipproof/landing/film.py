@@ -21,22 +21,7 @@ from ode_reference.landing_flight import FLIGHT_DT, release
 from slicemodel import Outcome, Table, Touch
 from slicemodel.trajectory import FloatArray
 
-WATER: Final = "#56B4E9"
-ICE: Final = "#B9C7D3"
 COLOURS: Final = ("#0072B2", "#444444", "#D55E00", "#009E73")
-AFTER: Final = 0.7
-"""Time that is shown after the touch [s]."""
-
-EVERY: Final = 5e-4
-"""Time between two instants of the motion [s]."""
-
-TOP: Final = 4.0
-"""Largest energy that is drawn [E_s]."""
-
-TABLE: Final = 0.04
-"""Thickness of the table that is drawn [m]."""
-
-DPI: Final = 100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,22 +39,14 @@ class Shown:
 
 
 def shown(name: str, touch: Touch, table: Table, law: str | None, outcome: Outcome) -> Shown:
-    """Return a bottle from its release, or from its touch if it was not over the table at release, to its rest."""
+    """Return a bottle from its release, or from its touch if it was not over the table at release, to 0.7 s after."""
     scenario = touch.scenario
     bottle = scenario.bottle
     sine, cosine = math.sin(scenario.theta0), math.cos(scenario.theta0)
     room = -bottle.length / 2 * (cosine + abs(cosine)) - bottle.radius * abs(sine) - table.height
-    flown = room > 0.0
-    motion = path(
-        release(scenario) if flown else touch,
-        table,
-        law,
-        dt=FLIGHT_DT,
-        every=EVERY,
-        duration=(touch.time if flown else 0.0) + AFTER,
-        drop=room if flown else 0.0,
-    )
-    return Shown(name=name, touch=touch, outcome=outcome, motion=motion, begin=0.0 if flown else touch.time)
+    start, begin, drop = (release(scenario), 0.0, room) if room > 0.0 else (touch, touch.time, 0.0)
+    motion = path(start, table, law, dt=FLIGHT_DT, every=5e-4, duration=touch.time - begin + 0.7, drop=drop)
+    return Shown(name=name, touch=touch, outcome=outcome, motion=motion, begin=begin)
 
 
 def film_times(bottles: Sequence[Shown], slow: float, fps: int) -> FloatArray:
@@ -78,20 +55,13 @@ def film_times(bottles: Sequence[Shown], slow: float, fps: int) -> FloatArray:
     return np.linspace(0.0, end, max(round(end * slow * fps) + 1, 2))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Panel:
-    bottle: Shown
-    glass: Line2D
-    water: PolyCollection
-
-
 def draw_landing(bottles: Sequence[Shown], times: FloatArray, slow: float) -> Iterator[Picture]:
     """Yield every frame as red, green and blue, shape (height, width, 3); both sides are even, as MP4 needs."""
-    canvas, title, panels, cursor = _scene(bottles)
+    canvas, title, drawn, cursor = _scene(bottles)
     for time in times.tolist():
         title.set_text(f"t = {time:.3f} s, {slow:g} times slower")
-        for panel in panels:
-            _move(panel, time)
+        for bottle, (glass, water) in zip(bottles, drawn, strict=True):
+            _move(bottle, glass, water, time)
         cursor.set_xdata([time, time])
         canvas.draw()
         picture = np.asarray(canvas.buffer_rgba())
@@ -100,66 +70,53 @@ def draw_landing(bottles: Sequence[Shown], times: FloatArray, slow: float) -> It
 
 
 @styled
-def _scene(bottles: Sequence[Shown]) -> tuple[Any, Any, list[_Panel], Line2D]:
-    figure = Figure(figsize=(3.6 * max(len(bottles), 2), 6.4), dpi=DPI, layout="constrained")
+def _scene(bottles: Sequence[Shown]) -> tuple[Any, Any, list[tuple[Line2D, PolyCollection]], Line2D]:
+    """Return canvas, title, glass and water of every bottle, and the cursor of the energies; all panels one scale."""
+    figure = Figure(figsize=(3.6 * max(len(bottles), 2), 6.4), dpi=100, layout="constrained")
     canvas = cast(Any, FigureCanvasAgg(figure))
     above, below = figure.subfigures(2, 1, height_ratios=(2.0, 1.0), squeeze=False)[:, 0]
-    axes = list(above.subplots(1, len(bottles), squeeze=False)[0])
-    window = _window(bottles)
-    panels = [
-        _panel(place, bottle, COLOURS[k % len(COLOURS)], window)
-        for k, (place, bottle) in enumerate(zip(axes, bottles, strict=True))
-    ]
-    cursor = _energies(below.subplots(), bottles)
+    panels = above.subplots(1, len(bottles), squeeze=False)[0]
+    reach = max(b.touch.scenario.bottle.length / 2 + b.touch.scenario.bottle.radius for b in bottles)
+    width = max(float(np.ptp(b.motion.centre[:, 0])) for b in bottles) + 2 * reach
+    height = max(float(b.motion.centre[:, 1].max()) for b in bottles) + reach
+    energies = below.subplots()
+    drawn = []
+    for k, (axes, bottle) in enumerate(zip(panels, bottles, strict=True)):
+        colour = COLOURS[k % len(COLOURS)]
+        drawn.append(_panel(axes, bottle, colour, width, height))
+        energy = np.minimum(bottle.motion.energy / bottle.motion.saddle, 40.0)
+        energies.plot(bottle.begin + bottle.motion.t, energy, color=colour, linewidth=1.4, label=bottle.name)
+    energies.axhline(1.0, color="black", linewidth=1.0)
+    energies.set_ylim(0.0, 4.0)
+    energies.margins(x=0.0)
+    energies.set(xlabel="time from release [s]", ylabel="energy / saddle [1]")
+    energies.legend(loc="upper right", ncols=len(bottles))
+    cursor = energies.axvline(0.0, color="black", linewidth=0.8, linestyle=":")
     title = figure.suptitle(" ", fontsize=10, family="monospace")
     canvas.draw()
     figure.set_layout_engine("none")  # laid out by now; to do it again for every frame would make panels tremble
-    return canvas, title, panels, cursor
+    return canvas, title, drawn, cursor
 
 
-def _window(bottles: Sequence[Shown]) -> tuple[float, float]:
-    """Return width and height that hold every bottle's motion [m]: all panels have one scale."""
-    reach = max(b.touch.scenario.bottle.length / 2 + b.touch.scenario.bottle.radius for b in bottles)
-    width = max(float(np.ptp(b.motion.centre[:, 0])) for b in bottles)
-    height = max(float(b.motion.centre[:, 1].max()) for b in bottles)
-    return width + 2 * reach, height + reach
-
-
-def _panel(axes: Axes, bottle: Shown, colour: str, window: tuple[float, float]) -> _Panel:
-    x = bottle.motion.centre[:, 0]
-    middle, (width, height) = float(x.min() + x.max()) / 2, window
-    axes.set_xlim(middle - width / 2, middle + width / 2)
-    axes.set_ylim(-TABLE, height)
-    axes.set_aspect("equal")
+def _panel(axes: Axes, bottle: Shown, colour: str, width: float, height: float) -> tuple[Line2D, PolyCollection]:
+    x, table = bottle.motion.centre[:, 0], 0.04
+    middle = float(x.min() + x.max()) / 2
+    axes.set(xlim=(middle - width / 2, middle + width / 2), ylim=(-table, height), aspect="equal")
     axes.set_axis_off()
-    axes.axhspan(-TABLE, 0.0, color="#C8B79A")
+    axes.axhspan(-table, 0.0, color="#C8B79A")
     axes.set_title(f"{bottle.name}: {bottle.outcome.outcome}", fontsize=10, color=colour)
-    tint = ICE if bottle.touch.scenario.frozen else WATER
+    tint = "#B9C7D3" if bottle.touch.scenario.frozen else "#56B4E9"
     water = PolyCollection([], facecolors=tint, edgecolors="none")
     axes.add_collection(water)
     (glass,) = axes.plot([], [], color=GLASS, linewidth=1.4)
-    return _Panel(bottle=bottle, glass=glass, water=water)
+    return glass, water
 
 
-def _energies(axes: Axes, bottles: Sequence[Shown]) -> Line2D:
-    for k, bottle in enumerate(bottles):
-        energy = np.minimum(bottle.motion.energy / bottle.motion.saddle, 10 * TOP)
-        colour = COLOURS[k % len(COLOURS)]
-        axes.plot(bottle.begin + bottle.motion.t, energy, color=colour, linewidth=1.4, label=bottle.name)
-    axes.axhline(1.0, color="black", linewidth=1.0)
-    axes.set_ylim(0.0, TOP)
-    axes.margins(x=0.0)
-    axes.set_xlabel("time from release [s]")
-    axes.set_ylabel("energy / saddle [1]")
-    axes.legend(loc="upper right", ncols=len(bottles))
-    return axes.axvline(0.0, color="black", linewidth=0.8, linestyle=":")
-
-
-def _move(panel: _Panel, time: float) -> None:
+def _move(bottle: Shown, glass: Line2D, water: PolyCollection, time: float) -> None:
     """Draw a bottle at a time, or at its last one if it ended before, or at its first if it begins later."""
-    motion, scenario = panel.bottle.motion, panel.bottle.touch.scenario
-    k = int(np.clip(np.searchsorted(motion.t, time - panel.bottle.begin), 0, len(motion.t) - 1))
+    motion, scenario = bottle.motion, bottle.touch.scenario
+    k = int(np.clip(np.searchsorted(motion.t, time - bottle.begin), 0, len(motion.t) - 1))
     along = np.array([math.sin(motion.theta[k]), -math.cos(motion.theta[k])])
     cap = motion.centre[k] - scenario.bottle.length / 2 * along
-    panel.glass.set_data(*outline(scenario, cap, along).T)
-    panel.water.set_verts(list(slice_corners(scenario, motion.r[k], cap, along)))
+    glass.set_data(*outline(scenario, cap, along).T)
+    water.set_verts(list(slice_corners(scenario, motion.r[k], cap, along)))

@@ -65,12 +65,7 @@ def scattered(throw: Scenario, scatter: Scatter, seed: tuple[int, ...]) -> Scena
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Share:
-    """How many of ``throws`` ended upright, and how many nobody can say of; the 95 % interval counts those both ways.
-
-    Parameters
-    ----------
-    upright, undecided, throws : int
-    """
+    """How many of ``throws`` ended upright, and how many nobody can tell; the 95 % interval counts those both ways."""
 
     upright: int
     undecided: int

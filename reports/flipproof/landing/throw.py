@@ -32,11 +32,9 @@ def land_throw(
 
     Parameters
     ----------
-    throw : Scenario
-        Its duration is the time within which the table has to be reached.
+    throw : Scenario - its duration is the time within which the table has to be reached
     table : Table
-    law : str or None
-        One law; None: every law that a program has.
+    law : str or None - one law; None: every law that a program has
     programs : names - "ode_reference", or engines of ``engine_check.land``
 
     Raises
@@ -53,30 +51,21 @@ def land_throw(
         raise ValueError(f"law = {law!r} has no meaning for ice (scenario.frozen): leave it out")
     if law is not None and law not in LAWS:
         raise ValueError(unknown_name("law =", law, LAWS))
+    long = replace(throw, duration=throw.duration + SPARE)
+    bottles = {"ice": long} if throw.frozen else {"water": long, "ice": replace(long, frozen=True)}
     rows = []
-    for name, bottle in _bottles(throw):
+    for name, bottle in bottles.items():
         touch = ode_reference.fly(bottle, table)
         for program in programs:
-            for chosen in _laws(program, bottle.frozen, law):
+            laws: tuple[str | None, ...] = tuple(LAWS) if program == REFERENCE else LANDERS[program].laws
+            if bottle.frozen or not laws:
+                laws = (None,)
+            elif law is not None:
+                laws = tuple(known for known in laws if known == law)
+            for chosen in laws:
                 outcome = landed(touch, table, program, chosen)
                 rows.append(Row(name=name, touch=touch, program=program, law=chosen, outcome=outcome))
     return rows
-
-
-def _bottles(throw: Scenario) -> list[tuple[str, Scenario]]:
-    long = replace(throw, duration=throw.duration + SPARE)
-    if throw.frozen:
-        return [("ice", long)]
-    return [("water", long), ("ice", replace(long, frozen=True))]
-
-
-def _laws(program: str, frozen: bool, law: str | None) -> tuple[str | None, ...]:
-    from engine_check.landing import LANDERS
-
-    known = tuple(LAWS) if program == REFERENCE else LANDERS[program].laws
-    if frozen or not known:
-        return (None,)
-    return known if law is None else tuple(name for name in known if name == law)
 
 
 def told(rows: Sequence[Row], table: Table) -> str:
@@ -89,24 +78,20 @@ def told(rows: Sequence[Row], table: Table) -> str:
     for row in rows:
         if row.name not in said:
             said.add(row.name)
-            lines += _touch_lines(row.name, row.touch)
-        lines.append(f"  {_who(row):34} {_how(row.outcome)}")
+            lines.append(_touch_line(row.name, row.touch))
+        program = "event by event" if row.program == REFERENCE else row.program
+        lines.append(f"  {program if row.law is None else f'{program}, {row.law}':34} {_how(row.outcome)}")
     return "\n".join(lines)
 
 
-def _touch_lines(name: str, touch: Touch) -> list[str]:
+def _touch_line(name: str, touch: Touch) -> str:
     read = touch_readings(touch)
     stands = "below" if read["static_margin"] > 0.0 else "above"
-    return [
+    return (
         f"{name} touches at t = {touch.time:.4f} s: tilt {math.degrees(touch.tilt):+.1f} degrees, {stands} its "
         f"toppling angle by {math.degrees(abs(read['static_margin'])):.1f}; omega {touch.omega:.2f} rad/s; falls at "
         f"{read['touch_speed']:.2f} m/s; energy {read['touch_energy']:.2f} E_s (saddle {saddle(touch.scenario):.4f} J)"
-    ]
-
-
-def _who(row: Row) -> str:
-    program = "event by event" if row.program == REFERENCE else row.program
-    return program if row.law is None else f"{program}, {row.law}"
+    )
 
 
 def _how(outcome: Outcome) -> str:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from flipproof.chapters.landing.figures import figures
-from flipproof.chapters.landing.study import Found, Rows, Size, Wave, study
+from flipproof.chapters.landing.study import Cases, Found, Rows, Size, aiming, counting, read
 from flipproof.chapters.landing.tables import map_csv, share_line, shares_csv
 from flipproof.landing.design import Case, Throws
 from flipproof.landing.work import LANDING, Landed, make_landing
@@ -30,13 +30,8 @@ from flipproof.sweep.store import Store
 from flipproof.sweep.work import code_identity
 from slicemodel import Scenario
 
-KIND: Final = "landing"
 WAVES: Final = ("aims", "throws")
 """Folders of the sweeps, one a wave."""
-
-COLUMNS: Final = ("number", "status", "message", "reason", "seconds", *LANDING)
-
-Say = Callable[[str], None]
 
 
 def make_upright(
@@ -44,7 +39,7 @@ def make_upright(
     size: Size,
     out: Path,
     begin: Begin,
-    say: Say,
+    say: Callable[[str], None],
     *,
     jobs: int | None = None,
     dask: str | None = None,
@@ -71,23 +66,22 @@ def make_upright(
     _own(out)
     summaries = []
 
-    def designed(wave: Wave) -> Throws:
-        return Throws(cases=wave.cases, seed=size.seed, text=f"flipproof upright, {wave.name}")
+    def designed(wave: str, cases: Cases) -> Throws:
+        return Throws(cases=tuple(cases.values()), seed=size.seed, text=f"flipproof upright, {wave}")
 
-    def make(wave: Wave) -> Rows:
-        design = designed(wave)
-        say(f"{wave.name}: {design.size} throws")
-        last = export_to if wave.name == WAVES[-1] else None
-        with completed(design, out / wave.name, begin, jobs=jobs, dask=dask, export_to=last) as (store, summary):
+    def make(wave: str, cases: Cases) -> Rows:
+        design = designed(wave, cases)
+        say(f"{wave}: {design.size} throws")
+        last = export_to if wave == WAVES[-1] else None
+        with completed(design, out / wave, begin, jobs=jobs, dask=dask, export_to=last) as (store, summary):
             summaries.append(summary)
             return read_rows(store, design)
 
     if damaged:
-        steps = study(throw, size)
-        aims = next(steps)
-        lines = [_saved(files, out, aims.name, designed(aims))]
-        throws = steps.send(make(aims))
-        return "\n".join([*lines, _saved(files, out, throws.name, designed(throws))])
+        aims, _ = aiming(throw, size)
+        saved = _saved(files, out, "aims", designed("aims", aims))
+        throws = counting(throw, size, aims, make("aims", aims))
+        return f"{saved}\n{_saved(files, out, 'throws', designed('throws', throws))}"
     found = drive(throw, size, make)
     say("figures")
     write_whole(out / "upright.csv", shares_csv(found).encode())
@@ -120,16 +114,11 @@ def _saved(files: Mapping[str, Path], out: Path, wave: str, design: Throws) -> s
         return f"{wave}: {error}"
 
 
-def drive(throw: Scenario, size: Size, make: Callable[[Wave], Rows]) -> Found:
-    """Run the study, its waves made by ``make``."""
-    steps = study(throw, size)
-    wave = next(steps)
-    while True:
-        try:
-            wave = steps.send(make(wave))
-        except StopIteration as end:
-            found: Found = end.value
-            return found
+def drive(throw: Scenario, size: Size, make: Callable[[str, Cases], Rows]) -> Found:
+    """Run the study, the throws of each wave made by ``make``."""
+    aims, unaimed = aiming(throw, size)
+    throws = counting(throw, size, aims, make("aims", aims))
+    return read(throw, size, throws, make("throws", throws), unaimed)
 
 
 def make_case(case: Case, seed: int) -> list[Landed]:
@@ -140,21 +129,22 @@ def make_case(case: Case, seed: int) -> list[Landed]:
 
 def read_rows(store: Store, design: Throws) -> list[list[Landed]]:
     """Return the rows of a complete store, case by case."""
-    made = store.connection.execute(f"SELECT {', '.join(COLUMNS)} FROM points ORDER BY number")
-    rows = [Landed(**dict(zip(COLUMNS, row, strict=True))) for row in made]
+    columns = ("number", "status", "message", "reason", "seconds", *LANDING)
+    made = store.connection.execute(f"SELECT {', '.join(columns)} FROM points ORDER BY number")
+    rows = [Landed(**dict(zip(columns, row, strict=True))) for row in made]
     return [rows[end - case.throws : end] for case, end in zip(design.cases, design.ends, strict=True)]
 
 
 def _own(out: Path) -> None:
     """Make the folder, or refuse one that holds anything but this study."""
+    kind = "landing"
     try:
         if out.exists() and not out.is_dir():
             raise SweepError(f"{out} is a file; --out names a folder")
-        if out.exists():
-            check_own(out, KIND)
         out.mkdir(parents=True, exist_ok=True)
+        check_own(out, kind)
         if not (out / MARKER).exists():
-            write_whole(out / MARKER, marker_text(KIND).encode())
+            write_whole(out / MARKER, marker_text(kind).encode())
     except OutputError as error:
         raise SweepError(str(error)) from None
     except OSError as error:

@@ -38,10 +38,6 @@ REFERENCE: Final = "ode_reference"
 """The program that lands event by event; every other name is an engine's."""
 
 
-KEPT: Final = 1024
-"""Touches that a process keeps."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Landed:
     """What became of a throw. A number that is not known is None, and ``reason`` says why.
@@ -92,39 +88,29 @@ def make_landing(point: Point) -> Landed:
     settings = point.settings
     began = time.perf_counter()
 
-    def lost(status: str, reason: str) -> Landed:
-        return Landed(number=point.number, status=status, reason=reason, seconds=time.perf_counter() - began)
+    def ended(status: str, reason: str, **read: Any) -> Landed:
+        return Landed(number=point.number, status=status, reason=reason, seconds=time.perf_counter() - began, **read)
 
     try:
         scenario = point.scenario()
         table = Table(height=settings["height"], restitution=settings["restitution"], friction=settings["friction"])
     except ScenarioError as error:
-        return lost("impossible", str(error))
+        return ended("impossible", str(error))
     try:
         touch = flown(scenario, table.height)
     except ValueError as error:
-        return lost("missed", str(error))
+        return ended("missed", str(error))
     except Exception as error:
-        return lost("failed", f"{type(error).__name__}: {error}")
+        return ended("failed", f"{type(error).__name__}: {error}")
     try:
         outcome = landed(touch, table, settings["program"], settings["law"])
     except Exception as error:
-        return lost("failed", f"{type(error).__name__}: {error}")
-    return Landed(
-        number=point.number,
-        outcome=outcome.outcome,
-        **touch_readings(touch),
-        certified=outcome.certified,
-        margin=outcome.margin,
-        slid=outcome.slid,
-        bounces=outcome.bounces,
-        status="ok" if outcome.decided else "undecided",
-        reason=outcome.reason,
-        seconds=time.perf_counter() - began,
-    )
+        return ended("failed", f"{type(error).__name__}: {error}")
+    read = {name: getattr(outcome, name) for name in ("outcome", "certified", "margin", "slid", "bounces")}
+    return ended("ok" if outcome.decided else "undecided", outcome.reason, **touch_readings(touch), **read)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=1024)
 def flown(scenario: Scenario, height: float) -> Touch:
     """Return the touch of a throw; laws and tables meet the same throwers, whose flights they share."""
     import ode_reference

@@ -18,8 +18,7 @@ from typing import Any, Final, Literal
 
 from flipproof.chapters.differences.chapter import BY_ENGINE, EQ8_FREE, PROGRAM_EQ8, TOTAL, Differences
 from flipproof.chapters.differences.study import Difference
-from flipproof.chapters.finite_step.chapter import StepCosts
-from flipproof.chapters.finite_step.study import EVERYTHING, HELD, LOCATED
+from flipproof.chapters.finite_step.chapter import EVERYTHING, HELD, LOCATED, StepCosts
 from flipproof.chapters.solvers import FREE
 from flipproof.chapters.waterfall.study import NAMES, STEP, Bar, Waterfall
 from flipproof.frame.gather import Gathered

@@ -2,30 +2,102 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from itertools import combinations
 from typing import Final
 
 import numpy as np
 
-from flipproof.chapters.agreement.study import Agreement, study_agreement
 from flipproof.chapters.differences.chapter import MODEL_FLOOR
 from flipproof.chapters.reference.chapter import witnessed
 from flipproof.chapters.solvers import FREE, LOCATED
-from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Flights, Missing, Run, Study
-from flipproof.frame.flights import attempt
+from flipproof.frame.chapter import Ask, Chapter, Claims, Flights, Missing, Run, Study, attempt, observed
 from flipproof.frame.twins import twins, usual_rest_speed
+from slicemodel import Trajectory
 from slicemodel.trajectory import FloatArray
 
 SOLVE_IVP: Final = "solve_ivp"
 """Name of the witness: ``scipy.integrate.solve_ivp`` over all 2N + 1 equations (``ode_reference.witness``)."""
 
-COARSER: Final = {"rtol": 1e-9, "atol": 1e-12}
-"""Tolerances of a second run of the witness, at the usual rest speed: by how much that differs is its own band."""
 
-SOLVERS: Final = {FREE: ("pymunk", LOCATED, "mujoco"), "eq8": ("pymunk rotating",)}
-"""Equation -> the engine runs that solve it, beside the equation itself and the witness, on the same throw."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pair:
+    """Two solvers of one equation: max |omega_second - omega_first| / |omega_0| before the horizon [1].
+
+    ``bands`` is the largest sum of the two printed bands [1], ``share`` that of the sampled times within the sum.
+    """
+
+    first: str
+    second: str
+    largest: float
+    bands: float
+    share: float
+
+    @property
+    def agree(self) -> bool:
+        """Whether nearly all times, 95 %, lie within the bands; NaN agrees with nobody."""
+        return self.share >= 0.95
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Agreement:
+    """All pairs of several solvers up to a time [s]; ``words`` say which one stands alone, if one does."""
+
+    names: tuple[str, ...]
+    pairs: tuple[Pair, ...]
+    until: float
+    words: str
+
+    def pair(self, a: str, b: str) -> Pair:
+        """Return the pair of two different solvers, in either order."""
+        return next(pair for pair in self.pairs if {pair.first, pair.second} == {a, b})
+
+
+def study_agreement(
+    runs: Mapping[str, Trajectory], bands: Mapping[str, FloatArray | float], until: float = math.inf
+) -> Agreement:
+    """Compare every solver with every other, on the times of the first run.
+
+    Parameters
+    ----------
+    runs : mapping name -> Trajectory - of one throw, at the same output times; at least two
+    bands : mapping name -> float or array, shape (P,) - how far each omega(t) may be off by its own account [omega_0]
+    until : float - the horizon [s]: later times are not compared
+
+    Raises
+    ------
+    ValueError
+        If fewer than two runs are given, or their throws or output times differ.
+    """
+    names = tuple(runs)
+    if len(names) < 2:
+        raise ValueError(f"runs = {list(names)}: an agreement takes at least two")
+    first = runs[names[0]]
+    for name in names[1:]:
+        if runs[name].scenario != first.scenario or not np.array_equal(runs[name].t, first.t):
+            raise ValueError(f"{name} and {names[0]} are not runs of one throw at the same times")
+    seen = first.t <= until
+    pairs = []
+    for a, b in combinations(names, 2):
+        gap = np.abs(runs[b].omega - runs[a].omega)[seen] / abs(first.scenario.omega0)
+        allowed = np.broadcast_to(np.asarray(bands[a]) + np.asarray(bands[b]), first.t.shape)[seen]
+        # Written as "inside", because NaN fails every comparison: what is not a number is not within a band.
+        share = float(np.mean(gap <= allowed))
+        pairs.append(Pair(first=a, second=b, largest=float(gap.max()), bands=float(allowed.max()), share=share))
+    return Agreement(names=names, pairs=tuple(pairs), until=float(first.t[seen][-1]), words=_words(names, pairs))
+
+
+def _words(names: tuple[str, ...], pairs: list[Pair]) -> str:
+    apart = [{pair.first, pair.second} for pair in pairs if not pair.agree]
+    if not apart:
+        return "all agree within their bands"
+    alone = [name for name in names if all(name in two for two in apart)]
+    if len(alone) == 1:
+        return f"all but {alone[0]} agree within their bands"
+    named = "; ".join(" and ".join(sorted(two)) for two in apart)
+    return f"outside their bands: {named}; no single one of them explains it"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,12 +109,16 @@ class Agreed:
 
 
 def study(ask: Ask) -> Study[Agreed]:
-    """Compare, for free flight and for Eq. 8, the solvers that reached the end and know their band."""
+    """Compare, for free flight and for Eq. 8, the solvers that reached the end and know their band.
+
+    Beside the equation itself and its witness these are engines. The witness's own band is by how much it differs from
+    itself at coarser tolerances and the usual rest speed.
+    """
     runs: dict[str, dict[str, Run]] = {}
     coarser: dict[str, Run] = {}
-    for equation, engines in SOLVERS.items():
+    for equation, engines in ((FREE, ("pymunk", LOCATED, "mujoco")), ("eq8", ("pymunk rotating",))):
         settings = witnessed(ask.throw, equation)
-        coarse = {**settings, **COARSER, "rest_speed": usual_rest_speed(equation)}
+        coarse = {**settings, "rtol": 1e-9, "atol": 1e-12, "rest_speed": usual_rest_speed(equation)}
         runs[equation] = {
             equation: ask.solvers[equation],
             SOLVE_IVP: Run(equation, ask.throw, settings, f"{equation}, {SOLVE_IVP}"),
@@ -81,32 +157,18 @@ def band_over_time(run: Run, others_of: Iterable[Run], flights: Flights) -> Floa
 
 
 def claims(found: Agreed) -> Claims:
-    """Yield the largest difference of a pair for each equation."""
+    """Yield for each equation the largest difference of a pair, and which solver differs from all others."""
     for equation, agreement in found.agreements.items():
-        yield claim_agreement(equation, agreement)
-
-
-def claim_agreement(equation: str, agreement: Agreement) -> Finding:
-    """Several solvers of one equation: the largest difference of a pair, and which solver differs from all others."""
-    widest = max(agreement.pairs, key=lambda pair: pair.largest)
-    return Finding(
-        id="agreement" if equation == FREE else f"agreement-{equation}",
-        title=f"{', '.join(agreement.names)}: {agreement.words}",
-        value=widest.largest,
-        unit="of ω₀",
-        kind="observation",
-        band=widest.bands,
-        note="; ".join(
-            f"{p.first} and {p.second} {p.largest:.1e}, {100 * p.share:.0f} % within" for p in agreement.pairs
+        widest = max(agreement.pairs, key=lambda pair: pair.largest)
+        pairs = [f"{p.first} and {p.second} {p.largest:.1e}, {100 * p.share:.0f} % within" for p in agreement.pairs]
+        yield observed(
+            "agreement" if equation == FREE else f"agreement-{equation}",
+            f"{', '.join(agreement.names)}: {agreement.words}",
+            widest.largest,
+            "of ω₀",
+            f"{'; '.join(pairs)}; up to {1e3 * agreement.until:.0f} ms",
+            band=widest.bands,
         )
-        + f"; up to {1e3 * agreement.until:.0f} ms",
-    )
 
 
-CHAPTER: Final = Chapter(
-    name="agreement",
-    title="One equation by several solvers",
-    study=study,
-    claims=claims,
-    template=Path(__file__).with_name("part.html.j2"),
-)
+CHAPTER: Final = Chapter(name="agreement", title="One equation by several solvers", study=study, claims=claims)

@@ -4,24 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
-from flipproof.chapters.alignment.figure import figure_gantt
-from flipproof.chapters.alignment.found import Alignment, Keyed, Rests, end_name
+from flipproof.chapters.alignment.found import SHIFT_BAND, Alignment, Table, end_name
 from flipproof.chapters.alignment.study import study_alignment
 from flipproof.chapters.alignment.tube import Tube, study_tube
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Outcome, Study, attempt, judged
+from flipproof.figures.style import new_figure, styled
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Outcome, Study, attempt, observed
 from flipproof.output.columns import rows_csv
+from slicemodel.trajectory import BASE, CAP
 
 PAIRS: Final = (("eq8", "midpoint"), ("eq8", "free-flight"))
 """Pairs whose impact sequences are aligned: two ways to the same equation, and two equations."""
 
-TUBE_TIME: Final = 2e-3
-TUBE_SHARE: Final = 0.01
-"""Half-widths of the tube in which two trajectories are compared: seconds, and share of omega_0."""
+LANES = 0.2, -0.2
+END_COLOURS = {BASE: "#0072B2", CAP: "#E69F00"}
+IMPACTS = {
+    "agrees": ("#444444", 3.5),
+    "shifted": ("#009E73", 5.0),
+    "missing": ("#D1001C", 6.5),
+    "extra": ("#A030C0", 6.5),
+    "after a fork": ("#BBBBBB", 3.5),
+}
+"""Colour and size of every kind of impact."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,40 +49,31 @@ class Events:
 
 
 def study(ask: Ask) -> Study[Events]:
-    """Align the impacts of the pairs."""
+    """Align the impacts of the pairs, and hold their omega in tubes of 2 ms and a hundredth of omega_0."""
     flights = yield [ask.solvers[name] for pair in PAIRS for name in pair]
-    dy = TUBE_SHARE * abs(ask.throw.omega0)
+    dy = 0.01 * abs(ask.throw.omega0)
 
     def both(pair: tuple[str, str]) -> Any:
         return (flights[ask.solvers[name]].flight for name in pair)
 
     return Events(
         {pair: attempt(lambda pair: study_alignment(*both(pair)), pair) for pair in PAIRS},
-        {pair: attempt(lambda pair: study_tube(*both(pair), dt=TUBE_TIME, dy=dy), pair) for pair in PAIRS},
+        {pair: attempt(lambda pair: study_tube(*both(pair), dt=2e-3, dy=dy), pair) for pair in PAIRS},
     )
 
 
 def claims(found: Events) -> Claims:
-    """Yield the share of the time that each second curve spends in the tube around the first."""
+    """Yield the share of the time that each second curve spends in the tube around the first: early is no failure."""
     for (first, second), tube in found.tubes.items():
-        title = f"tube of {first} and {second}"
-        yield judged(claim_tube, first, second, tube, id=f"tube-{first}-{second}", title=title, kind="observation")
+        if tube.found is None:
+            yield Absent(f"tube-{first}-{second}", f"tube of {first} and {second}", tube.reason, "observation")
+        else:
+            title = f"{second} in the tube around {first}: share of the time"
+            yield observed(f"tube-{first}-{second}", title, tube.found.share, "", tube.found.words)
     for (first, second), each in found.alignments.items():
         if each.found is None:
             title = f"alignment of {first} and {second}"
             yield Absent(f"alignment-{first}-{second}", title, each.reason, "observation")
-
-
-def claim_tube(first: str, second: str, tube: Tube) -> Finding:
-    """The share of the time that one curve spends in the tolerance tube around another: early is no failure."""
-    return Finding(
-        id=f"tube-{first}-{second}",
-        title=f"{second} in the tube around {first}: share of the time",
-        value=tube.share,
-        unit="",
-        kind="observation",
-        note=tube.words,
-    )
 
 
 def figures(found: Events) -> Iterator[Exhibit]:
@@ -80,61 +82,119 @@ def figures(found: Events) -> Iterator[Exhibit]:
         yield Exhibit(
             name=f"gantt-{first}-{second}",
             title=f"Contacts and impacts: {first} and {second}",
-            caption=(
-                "One row per slice. Bars are contacts, triangles are impacts; the upper lane of a row is the first "
-                "solver, the lower the second. Where the two lanes of a row look alike, both solvers have the same "
-                "contacts and impacts of that slice. At a fork the slice strikes one end in the first flight and the "
-                "other end in the second."
-            ),
+            caption="One row per slice. Bars are contacts, triangles are impacts; the upper lane of a row is the first "
+            "solver, the lower the second. Where the two lanes of a row look alike, both solvers have the same "
+            "contacts and impacts of that slice. At a fork the slice strikes one end in the first flight and the "
+            "other end in the second.",
             alt=f"Contacts and impacts of {first} above those of {second}, one row per slice. "
             f"{alignment.words}.".replace("ω₀", "omega_0"),
             maker=figure_gantt,
             data=(alignment,),
-            table=table(alignment),
+            table=rows_csv(
+                ("run", "what", "slice [1]", "end", "impact number of its slice there [1]", "from [s]", "to [s]"),
+                _rows(alignment),
+            ),
         )
 
 
-def table(alignment: Alignment) -> str:
-    """Return every contact and impact of the two runs, with what became of each impact."""
-    return rows_csv(
-        ("run", "what", "slice [1]", "end", "impact number of its slice there [1]", "from [s]", "to [s]"),
-        (*_contacts(alignment), *_impacts(alignment)),
-    )
-
-
-def _contacts(alignment: Alignment) -> Iterator[tuple[Any, ...]]:
-    for name, rests in zip((alignment.first, alignment.second), alignment.rests, strict=True):
-        yield from _rests(name, rests)
-
-
-def _rests(name: str, rests: Rests) -> Iterator[tuple[Any, ...]]:
-    for i, end, start, stop in zip(rests.slice, rests.end, rests.start, rests.stop, strict=True):
-        yield name, "contact", i, end_name(int(end)), None, start, stop
-
-
-def _impacts(alignment: Alignment) -> Iterator[tuple[Any, ...]]:
-    """Yield impacts; of a matched one the time in the first and in the second run."""
-    first, second, matched = alignment.first, alignment.second, alignment.matched
+def _rows(alignment: Alignment) -> Iterator[tuple[Any, ...]]:
+    """Yield every contact and impact of the two runs; of a matched impact the time in the first and in the second."""
+    first, second = both = alignment.first, alignment.second
+    for name, rests in zip(both, alignment.rests, strict=True):
+        for i, end, start, stop in rests:
+            yield name, "contact", i, end_name(end), None, start, stop
     kinds = np.where(alignment.shifted, "impact in both, shifted", "impact in both")
-    for k, kind in enumerate(kinds):
-        ends = (matched.slice[k], end_name(int(matched.end[k])), matched.k[k])
-        yield f"{first}; {second}", str(kind), *ends, matched.time[k], matched.time[k] + alignment.shift[k]
-    yield from _lone(first, f"impact missing in {second}", alignment.missing)
-    yield from _lone(second, f"impact missing in {first}", alignment.extra)
-    for name, after in zip((first, second), alignment.after_fork, strict=True):
-        yield from _lone(name, "impact after a fork", after)
+    for hit, kind, shift in zip(alignment.matched, kinds, alignment.shift, strict=True):
+        yield f"{first}; {second}", str(kind), hit.slice, end_name(hit.end), hit.k, hit.time, hit.time + shift
+    for name, what, impacts in (
+        (first, f"impact missing in {second}", alignment.missing),
+        (second, f"impact missing in {first}", alignment.extra),
+        *((name, "impact after a fork", after) for name, after in zip(both, alignment.after_fork, strict=True)),
+    ):
+        for hit in impacts:
+            yield name, what, hit.slice, end_name(hit.end), hit.k, hit.time, hit.time
 
 
-def _lone(name: str, what: str, impacts: Keyed) -> Iterator[tuple[Any, ...]]:
-    for time, i, end, k in zip(impacts.time, impacts.slice, impacts.end, impacts.k, strict=True):
-        yield name, what, i, end_name(int(end)), k, time, time
+def even_rows(n_slices: int) -> list[int]:
+    """Return at most 16 slices, evenly chosen, the first and the last among them."""
+    return [int(i) for i in np.unique(np.linspace(0, n_slices - 1, min(16, n_slices)).round())]
+
+
+@styled
+def figure_gantt(alignment: Alignment) -> Figure:
+    """Contacts and impacts of two runs, one row per slice: the first run above, the second paler below."""
+    rows = {i: row for row, i in enumerate(even_rows(alignment.n_slices))}
+    figure, axes = new_figure(size=(8.0, 1.9 + 0.36 * len(rows)))
+    axes.grid(visible=False)
+    for row in range(1, len(rows), 2):
+        axes.axhspan(row - 0.5, row + 0.5, color="#f4f4f4", linewidth=0)
+    for rests, lane, opacity in zip(alignment.rests, LANES, (0.9, 0.4), strict=True):
+        for i, end, start, stop in rests:
+            if i in rows and start <= alignment.until:
+                bar: dict[str, Any] = {"height": 0.3, "color": END_COLOURS[end], "alpha": opacity, "linewidth": 0}
+                axes.barh(rows[i] + lane, min(stop, alignment.until) - start, left=start, **bar)
+    _draw_impacts(axes, alignment, rows)
+    for fork in alignment.forks:
+        if fork.first.slice in rows:
+            axes.plot(fork.time, rows[fork.first.slice], "*", color="black", markersize=9, zorder=5)
+    axes.set_yticks(range(len(rows)), [str(i) for i in rows])
+    axes.set_ylim(-0.6, len(rows) - 0.4)
+    axes.set_xlim(-0.01 * alignment.until, 1.01 * alignment.until)
+    axes.set(xlabel="time t [s]", ylabel="slice number [1], 0 starts on the base")
+    title = f"in each row: {alignment.first} above, {alignment.second} below; "
+    title += f"{len(alignment.swapped)} impacts in another order"
+    axes.set_title(title, fontsize=10, loc="left")
+    figure.legend(handles=_gantt_handles(alignment), loc="outside lower center", ncols=4)
+    return figure
+
+
+def _draw_impacts(axes: Axes, alignment: Alignment, rows: dict[int, int]) -> None:
+    """Mark every impact in its lane, and join the two of a shifted pair."""
+    matched, moved = alignment.matched, alignment.shifted
+    later = matched.copy()
+    later.time += alignment.shift
+    for here, there in zip(matched[moved], later[moved], strict=True):
+        if here.slice in rows:
+            heights = [rows[here.slice] + lane for lane in LANES]
+            axes.plot((here.time, there.time), heights, color=IMPACTS["shifted"][0], linewidth=0.6, alpha=0.7)
+    for chosen, kind in ((~moved, "agrees"), (moved, "shifted")):
+        _mark(axes, matched[chosen], rows, LANES[0], kind)
+        _mark(axes, later[chosen], rows, LANES[1], kind)
+    for after, lane in zip(alignment.after_fork, LANES, strict=True):
+        _mark(axes, after, rows, lane, "after a fork")
+    _mark(axes, alignment.missing, rows, LANES[0], "missing")
+    _mark(axes, alignment.extra, rows, LANES[1], "extra")
+
+
+def _mark(axes: Axes, impacts: Table, rows: dict[int, int], lane: float, kind: str) -> None:
+    colour, size = IMPACTS[kind]
+    above = 3 if kind == "agrees" else 4
+    for end, marker in ((BASE, "v"), (CAP, "^")):
+        shown = impacts[(impacts.end == end) & np.isin(impacts.slice, list(rows))]
+        heights = [rows[i] + lane for i in shown.slice]
+        edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.3}
+        axes.plot(shown.time, heights, marker, color=colour, markersize=size, zorder=above, **edge)
+
+
+def _gantt_handles(alignment: Alignment) -> list[Patch | Line2D]:
+    labels = (
+        f"agrees within {SHIFT_BAND * 1e3:g} ms ({int((~alignment.shifted).sum())})",
+        f"shifted further ({int(alignment.shifted.sum())})",
+        f"missing in {alignment.second} ({len(alignment.missing)})",
+        f"extra in {alignment.second} ({len(alignment.extra)})",
+        "after a fork ({} + {})".format(*map(len, alignment.after_fork)),
+    )
+    colours = [colour for colour, _ in IMPACTS.values()]
+    return [
+        Patch(color=END_COLOURS[BASE], label="in contact with the base"),
+        Patch(color=END_COLOURS[CAP], label="in contact with the cap"),
+        Line2D([], [], linestyle="", marker="v", color="#444444", label="impact on the base"),
+        Line2D([], [], linestyle="", marker="^", color="#444444", label="impact on the cap"),
+        *(Line2D([], [], linestyle="", marker="o", color=c, label=x) for c, x in zip(colours, labels, strict=True)),
+        Line2D([], [], linestyle="", marker="*", markersize=9, color="black", label=f"fork ({len(alignment.forks)})"),
+    ]
 
 
 CHAPTER: Final = Chapter(
-    name="alignment",
-    title="Contacts and impacts side by side",
-    study=study,
-    claims=claims,
-    figures=figures,
-    template=Path(__file__).with_name("part.html.j2"),
+    name="alignment", title="Contacts and impacts side by side", study=study, claims=claims, figures=figures
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,145 +11,85 @@ from numpy.typing import NDArray
 from slicemodel import Impacts
 from slicemodel.trajectory import BASE, FloatArray
 
-IndexArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
-
 SHIFT_BAND = 1e-3
 """Impacts further apart in time than this are shifted [s]."""
 
 LEAST_SPEED = 1e-2
 """Slower impacts are the tail of a slice that comes to rest [m/s]."""
 
-SPEED_MARGIN = 2.0
-"""An impact slower than the least speed by less than this factor may still be the partner of one that is not."""
-
-REST_TOLERANCE = 1e-4
-"""Distance from an end, as a fraction of the length, within which a slice is in contact."""
+Table = Any
+"""A NumPy record array: rows with named columns, such as ``impacts.time``."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Keyed:
-    """Impacts with their keys in order of time; arrays of shape (K,).
+class Fork(NamedTuple):
+    """The impacts, rows of a table, at which the two histories of a slice name different ends."""
 
-    ``slice`` counts from 0, ``end`` is +1 for the base and -1 for the cap, ``k`` counts from 1.
-    """
-
-    time: FloatArray
-    slice: IndexArray
-    end: IndexArray
-    k: IndexArray
-
-    def __len__(self) -> int:
-        return len(self.time)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Fork:
-    """The impact at which the two histories of a slice name different ends, each with its own time [s]."""
-
-    slice: int
-    k: int
-    first_time: float
-    first_end: int
-    second_time: float
-    second_end: int
+    first: Any
+    second: Any
 
     @property
     def time(self) -> float:
         """The earlier of the two impacts [s]: the first sign of the fork."""
-        return min(self.first_time, self.second_time)
+        return float(min(self.first.time, self.second.time))
 
     @property
     def words(self) -> str:
         """The fork in words."""
-        return (
-            f"slice {self.slice}: {end_name(self.first_end)} at {self.first_time * 1e3:.1f} ms "
-            f"against {end_name(self.second_end)} at {self.second_time * 1e3:.1f} ms"
-        )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Rests:
-    """Contiguous times at which a slice is in contact with an end; arrays of shape (K,), times in [s]."""
-
-    slice: IndexArray
-    end: IndexArray
-    start: FloatArray
-    stop: FloatArray
+        one, other = (f"{end_name(hit.end)} at {hit.time * 1e3:.1f} ms" for hit in self)
+        return f"slice {self.first.slice}: {one} against {other}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Alignment:
     """Two impact sequences, aligned up to the end of the shorter run.
 
+    Tables of impacts are in order of time and have the columns time [s], slice (from 0), end (+1 base, -1 cap) and k,
+    the number of the impact of that slice on that end, from 1.
+
     Parameters
     ----------
-    first, second : str
-        Labels of the runs.
+    first, second : str - labels of the runs
     n_slices : int
-    until : float
-        Common end of the two runs [s].
-    shift_band : float [s], least_speed : float [m/s]
-    matched : Keyed
-        Impacts of the first that the second has too, with times and keys as in the first.
-    shift : (len(matched),)
-        Time in the second minus time in the first [s].
-    missing, extra : Keyed
-        Impacts that only the first has; that only the second has.
-    swapped : (S, 2)
-        Pairs of indices into ``matched``: neighbours in the first whose order the second reverses by more than the
-        band.
-    forks : tuple of Fork
-        In order of time; at most one per slice.
-    after_fork : (Keyed, Keyed)
-        Impacts of the first and of the second at and after a fork of their slice, not aligned.
-    tail : (int, int)
-        Impacts of each run that are too slow to be aligned.
-    undecided : int
-        Impacts without a partner in the last ``shift_band`` before ``until``, where a partner may just be cut off.
-    rests : (Rests, Rests)
-        Contacts of each run; empty for a run without slice paths.
+    until : float - common end of the two runs [s]
+    matched : Table - impacts of the first that the second has too, with times and keys as in the first
+    shift : (len(matched),) - time in the second minus time in the first [s]
+    missing, extra : Table - impacts that only the first has; that only the second has
+    swapped : (S, 2) - indices into ``matched`` of neighbours whose order the second reverses by more than the band
+    forks : tuple of Fork - in order of time; at most one per slice
+    after_fork : (Table, Table) - impacts of each run at and after a fork of their slice, not aligned
+    tail : (int, int) - impacts of each run that are too slow to be aligned
+    undecided : int - impacts without a partner so near to ``until`` that a partner may just be cut off
+    rests : (Table, Table) - contacts of each run: slice, end, start, stop [s]; empty for a run without slice paths
     """
 
     first: str
     second: str
     n_slices: int
     until: float
-    shift_band: float
-    least_speed: float
-    matched: Keyed
+    matched: Table
     shift: FloatArray
-    missing: Keyed
-    extra: Keyed
-    swapped: IndexArray
+    missing: Table
+    extra: Table
+    swapped: NDArray[np.int64]
     forks: tuple[Fork, ...]
-    after_fork: tuple[Keyed, Keyed]
+    after_fork: tuple[Table, Table]
     tail: tuple[int, int]
     undecided: int
-    rests: tuple[Rests, Rests]
+    rests: tuple[Table, Table]
 
     @property
-    def shifted(self) -> BoolArray:
+    def shifted(self) -> NDArray[np.bool_]:
         """Which matched impacts are further apart than the band; shape (len(matched),)."""
-        return np.asarray(np.abs(self.shift) > self.shift_band)
-
-    @property
-    def share(self) -> float:
-        """Impacts matched within the band as a share of all that either run has, without tails; NaN if none."""
-        several = sum(map(len, (self.matched, self.missing, self.extra)))
-        # One impact of the first and one of the second after a fork count as one that does not match.
-        several += max(map(len, self.after_fork))
-        return float((~self.shifted).sum()) / several if several else float("nan")
+        return np.asarray(np.abs(self.shift) > SHIFT_BAND)
 
     @property
     def words(self) -> str:
         """What agrees, what does not and what was not compared, in one sentence with the numbers."""
-        shifted = int(self.shifted.sum())
         words = f"{len(self.matched)} impacts are in both flights"
         if len(self.matched):
             size = np.abs(self.shift) * 1e3
             words += (
-                f", {len(self.matched) - shifted} of them within {self.shift_band * 1e3:g} ms of each other (median "
+                f", {int((~self.shifted).sum())} of them within {SHIFT_BAND * 1e3:g} ms of each other (median "
                 f"{np.median(size):.3g} ms, largest {size.max():.3g} ms), {len(self.swapped)} in another order"
             )
         words += f"; {len(self.missing)} are in the first flight alone, {len(self.extra)} in the second alone; "
@@ -160,7 +101,7 @@ class Alignment:
             )
         else:
             words += f"none of {self.n_slices} slices strikes different ends in the two flights"
-        words += f"; {self.tail[0]} and {self.tail[1]} impacts slower than {self.least_speed:g} m/s are not compared"
+        words += f"; {self.tail[0]} and {self.tail[1]} impacts slower than {LEAST_SPEED:g} m/s are not compared"
         return words + (f"; {self.undecided} come too near the end of the flight to tell" if self.undecided else "")
 
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 from flipproof.chapters.solvers import WITNESSES
-from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Study
+from flipproof.frame.chapter import Ask, Chapter, Claims, Study, observed
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,11 +24,9 @@ def study(ask: Ask) -> Study[Certificates]:
     """Read the certificates of the engines' runs."""
     runs = {name: ask.solvers[name] for name in WITNESSES if name in ask.solvers}
     flights = yield runs.values()
-    diagnostics = {
-        name: run.diagnostics for name, each in runs.items() if (run := flights.trajectory(each)) is not None
-    }
+    flown = {name: run for name, each in runs.items() if (run := flights.trajectory(each)) is not None}
     return Certificates(
-        {name: each["certificate"] for name, each in diagnostics.items() if "certificate" in each},
+        {name: run.diagnostics["certificate"] for name, run in flown.items() if "certificate" in run.diagnostics},
         tuple(name for name, run in runs.items() if "tolerance" not in run.settings),
         ask.size,
         ask.scenario.omega0,
@@ -37,37 +34,20 @@ def study(ask: Ask) -> Study[Certificates]:
 
 
 def claims(found: Certificates) -> Claims:
-    """Yield the band of every certificate."""
+    """Yield what every engine says of its own run: how far omega(t) may be off at the settings it was certified for."""
     for name, certificate in found.certificates.items():
-        yield claim_certificate(name, certificate)
+        settings, order = certificate["settings"], certificate["order"]
+        words = [f"Δt = {settings['step']:.3g} s" if settings.get("step") else "no step was completed"]
+        if settings.get("iterations") is not None:
+            words.append(f"{settings['iterations']} iterations")
+        hits = {"grid": "hits on the step's grid", "located": "hits located by us"}.get(settings.get("hits"))
+        if hits is not None:
+            words.append(hits)
+        words.append(f"order {order:.2f}" if order is not None else f"no order: {certificate['order_reason']}")
+        if certificate["reason"]:
+            words.append(certificate["reason"])
+        id_, title = f"certificate-{name.replace(' ', '-')}", f"{name}: {certificate['status']}, band of ω(t)"
+        yield observed(id_, title, certificate["band"], "of ω₀", "; ".join(words))
 
 
-def claim_certificate(name: str, certificate: Mapping[str, Any]) -> Finding:
-    """What an engine says of its own run: how far omega(t) may be off at the settings it was certified for."""
-    settings, order = certificate["settings"], certificate["order"]
-    words = [f"Δt = {settings['step']:.3g} s" if settings.get("step") else "no step was completed"]
-    if settings.get("iterations") is not None:
-        words.append(f"{settings['iterations']} iterations")
-    hits = {"grid": "hits on the step's grid", "located": "hits located by us"}.get(settings.get("hits"))
-    if hits is not None:
-        words.append(hits)
-    words.append(f"order {order:.2f}" if order is not None else f"no order: {certificate['order_reason']}")
-    if certificate["reason"]:
-        words.append(certificate["reason"])
-    return Finding(
-        id=f"certificate-{name.replace(' ', '-')}",
-        title=f"{name}: {certificate['status']}, band of ω(t)",
-        value=certificate["band"],
-        unit="of ω₀",
-        kind="observation",
-        note="; ".join(words),
-    )
-
-
-CHAPTER: Final = Chapter(
-    name="certificates",
-    title="Certificates",
-    study=study,
-    claims=claims,
-    template=Path(__file__).with_name("part.html.j2"),
-)
+CHAPTER: Final = Chapter(name="certificates", title="Certificates", study=study, claims=claims)

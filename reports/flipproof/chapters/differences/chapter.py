@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any, Final
 
-from flipproof.chapters.differences.figure import LEAST, MOST, draw
-from flipproof.chapters.differences.study import PARTING_BAND, Difference, study_difference
+import numpy as np
+from matplotlib.figure import Figure
+
+from flipproof.chapters.differences.study import PARTING_BAND, Difference, percent, study_difference
 from flipproof.chapters.predictability.study import PartingGrowth, study_parting_growth
 from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, WITNESSES
 from flipproof.chapters.waterfall.study import NAMES
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Flights, Run, Study, Touch, attempt
+from flipproof.figures.style import new_figure, styled
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Flights, Run, Study, Touch, attempt, observed
 from flipproof.frame.solvers import find
 from flipproof.frame.throws import finer
 from flipproof.frame.twins import BAND_WORDS, twins
@@ -37,8 +40,8 @@ PAIRS: Final = (
 )
 """Name, first, second: down the ladder one assumption at a time, then the engine, then several together."""
 
-REFINED: Final = (*SCHEMES, *LADDER)
-"""Solvers that fly the throw again at ``FINER`` times the slices; a full report adds the engine, its slowest run."""
+LEAST, MOST = 1e-6, 2.0
+"""Ends of the axis of the figure, as shares of omega_0."""
 
 MODEL_FLOOR: Final = 1e-9
 """Least band of a model, fraction of omega_0: the digits that independent methods share; none finer is claimed."""
@@ -60,7 +63,11 @@ class Differences:
 
 
 def study(ask: Ask) -> Study[Differences]:
-    """Compare the pairs; a size that is asked for cheap solvers only does without bands and finer cuts."""
+    """Compare the pairs; a size that is asked for cheap solvers only does without bands and finer cuts.
+
+    Schemes and equations fly the throw again at ``FINER`` times the slices; a full report adds the engine, its slowest
+    run.
+    """
     runs = dict(ask.solvers)
     if ask.size == "check":
         runs = {name: run for name, run in runs.items() if find(run.solver).package != "engine_check"}
@@ -69,10 +76,14 @@ def study(ask: Ask) -> Study[Differences]:
         more: dict[str, Run] = {}
     else:
         more = {ENGINE: finer(runs[ENGINE])} if ask.size == "full" else {}
-        more |= {name: fine(runs[name]) for name in REFINED}
+        more |= {name: fine(runs[name]) for name in (*SCHEMES, *LADDER)}
         flights = yield [*more.values(), *runs.values(), *(twin for model in LADDER for twin in twins(runs[model]))]
         bands = run_bands(runs, flights)
     flown = {name: run for name, each in runs.items() if (run := flights.trajectory(each)) is not None}
+
+    def refined(*names: str) -> tuple[Trajectory, Trajectory] | None:
+        one, other = (flights.trajectory(more[name]) if name in more else None for name in names)
+        return (one, other) if one is not None and other is not None and one.ok and other.ok else None
 
     def compared(name: str, first: str, second: str) -> Difference:
         return study_difference(
@@ -81,23 +92,21 @@ def study(ask: Ask) -> Study[Differences]:
             flights[runs[second]].flight,
             impacts_of=flown.get(LIMITS.get(first, first)),
             band=bands[first] + bands[second] if first in bands and second in bands else None,
-            finer=_refined(first, second, more, flights),
+            finer=refined(first, second),
         )
 
-    tried = {pair: attempt(lambda pair: compared(*pair), pair) for pair in PAIRS if set(pair[1:]) <= set(runs)}
+    tried = {pair: attempt(compared, *pair) for pair in PAIRS if set(pair[1:]) <= set(runs)}
     pairs = tuple(outcome.found for outcome in tried.values() if outcome.found is not None)
     growths = []
     for difference in pairs:
         if difference.parting_time is not None:
             located = flown.get(LIMITS.get(difference.first, difference.first))
             growths.append(study_parting_growth(difference, None if located is None else located.impacts))
-    return Differences(
-        pairs,
-        tuple(growths),
-        ask.throw.n_slices,
-        _ended(flown.get(FREE)),
-        {pair: outcome.reason for pair, outcome in tried.items() if outcome.reason},
-    )
+    free, ended = flown.get(FREE), ""
+    if free is not None and not free.ok:
+        ended = f"up to t = {1e3 * free.t[-1]:.0f} ms, where {free.method} {free.status}"
+    missing = {pair: outcome.reason for pair, outcome in tried.items() if outcome.reason}
+    return Differences(pairs, tuple(growths), ask.throw.n_slices, ended, missing)
 
 
 def fine(run: Run) -> Run:
@@ -127,41 +136,19 @@ def run_bands(runs: Mapping[str, Run], flights: Flights) -> dict[str, float]:
     return bands
 
 
-def _refined(
-    first: str, second: str, more: Mapping[str, Run], flights: Flights
-) -> tuple[Trajectory, Trajectory] | None:
-    """Return the runs of two solvers at more slices; None if either was not made so or is not whole."""
-    one, other = (flights.trajectory(more[name]) if name in more else None for name in (first, second))
-    return (one, other) if one is not None and other is not None and one.ok and other.ok else None
-
-
-def _ended(free: Trajectory | None) -> str:
-    if free is None or free.ok:
-        return ""
-    return f"up to t = {1e3 * free.t[-1]:.0f} ms, where {free.method} {free.status}"
-
-
 def claims(found: Differences) -> Claims:
-    """Yield the largest difference of every pair."""
-    for difference in found.pairs:
-        yield claim_difference(difference)
+    """Yield the largest difference of every pair: an observation with a band and a moment, and no share."""
+    for d in found.pairs:
+        more = "" if d.finer is None else f"; {d.finer[1]:.3g} at N = {d.finer[0]}"
+        note = f"largest difference of this pair, at t = {d.largest_time * 1e3:.1f} ms, N = {d.slices}{more}"
+        id_, title = _id(d.first, d.second), f"{d.name}: {d.first} against {d.second}"
+        yield observed(id_, title, d.largest, "of ω₀", f"{note}; {d.moment}", band=d.band)
     for (name, first, second), reason in found.missing.items():
-        yield Absent(f"difference-{first}-{second}".replace(" ", "-"), name, reason, "observation")
+        yield Absent(_id(first, second), name, reason, "observation")
 
 
-def claim_difference(difference: Difference) -> Finding:
-    """The largest difference of one pair of solvers: an observation with a band and a moment, and no share."""
-    more = "" if difference.finer is None else f"; {difference.finer[1]:.3g} at N = {difference.finer[0]}"
-    return Finding(
-        id=f"difference-{difference.first}-{difference.second}".replace(" ", "-"),
-        title=f"{difference.name}: {difference.first} against {difference.second}",
-        value=difference.largest,
-        unit="of ω₀",
-        kind="observation",
-        band=difference.band,
-        note=f"largest difference of this pair, at t = {difference.largest_time * 1e3:.1f} ms, N = {difference.slices}"
-        f"{more}; {difference.moment}",
-    )
+def _id(first: str, second: str) -> str:
+    return f"difference-{first}-{second}".replace(" ", "-")
 
 
 def figures(found: Differences) -> Iterator[Exhibit]:
@@ -191,20 +178,46 @@ def figures(found: Differences) -> Iterator[Exhibit]:
     )
 
 
+@styled
+def draw(differences: Sequence[Difference]) -> Figure:
+    """Draw a panel a pair on one logarithmic scale, with the parting band and when it is first passed."""
+    columns, line, limit = 3, "#0072B2", "#B00020"
+    rows = -(-len(differences) // columns)
+    size = (8.0, 0.5 + 1.75 * rows)
+    figure, grid = new_figure(rows, columns, size=size, sharex=True, sharey=True, squeeze=False)
+    for axes, difference in zip(grid.flat, differences, strict=False):
+        axes.plot(difference.t, np.maximum(np.abs(difference.omega), LEAST / 10), color=line, linewidth=1.2)
+        axes.axhline(PARTING_BAND, color=limit, linewidth=1.0, linestyle=":")
+        if difference.parting_time is not None:
+            axes.plot(difference.parting_time, PARTING_BAND, "o", color=limit, markeredgecolor="white", markersize=7)
+        words = f"{textwrap.fill(difference.name, 32)}\nat most {percent(difference.largest)}"
+        axes.set_title(words, fontsize=9, loc="left")
+        axes.margins(x=0.02)
+    for axes in grid.flat[len(differences) :]:
+        axes.remove()
+    grid[0, 0].set(yscale="log", ylim=(LEAST, MOST))
+    for axes in grid[:, 0]:
+        axes.set_ylabel("|difference| [1]")
+    for column in range(columns):
+        lowest = grid[(len(differences) - 1 - column) // columns, column]
+        lowest.set_xlabel("time t [s]")
+        lowest.tick_params(labelbottom=True)
+    return figure
+
+
 def summary(found: Differences) -> dict[str, Any]:
     """Return the numbers of every pair."""
-    return {"differences": [_mapping(difference) for difference in found.pairs]}
-
-
-def _mapping(difference: Difference) -> dict[str, Any]:
-    names = ("name", "first", "second", "largest", "largest_time", "final", "parting_time", "band")
-    impact = difference.parting_impact
-    slices, largest = difference.finer or (None, None)
-    return {name: getattr(difference, name) for name in names} | {
-        "slices": difference.slices,
-        "finer": None if slices is None else {"slices": slices, "largest": largest},
-        "parting_band": PARTING_BAND,
-        "parting_impact": None if impact is None else asdict(impact),
+    names = ("name", "first", "second", "largest", "largest_time", "final", "parting_time", "band", "slices")
+    return {
+        "differences": [
+            {name: getattr(d, name) for name in names}
+            | {
+                "finer": None if d.finer is None else dict(zip(("slices", "largest"), d.finer, strict=True)),
+                "parting_band": PARTING_BAND,
+                "parting_impact": None if d.parting_impact is None else asdict(d.parting_impact),
+            }
+            for d in found.pairs
+        ]
     }
 
 
@@ -214,7 +227,6 @@ CHAPTER: Final = Chapter(
     study=study,
     claims=claims,
     figures=figures,
-    template=Path(__file__).with_name("part.html.j2"),
     work={"check": None, "quick": None, "full": None},
     summary=summary,
 )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flipproof.frame.findings import Finding
+from flipproof.frame.findings import Finding, regression
 from flipproof.frame.solvers import Missing
 from slicemodel import Impact, Trajectory
 from slicemodel.trajectory import FloatArray
@@ -32,29 +32,17 @@ class Difference:
 
     Parameters
     ----------
-    name : str
-        The assumption that separates the two.
-    first, second : str
-        Labels of the runs.
+    name : str - the assumption that separates the two
+    first, second : str - labels of the runs
     t : (P,) [s]
-    omega : (P,)
-        (omega_second - omega_first) / omega_0, signed.
-    theta : (P,) [rad], r_cm : (P,)
-        Signed differences; r_cm as a fraction of the bottle's length.
-    largest : float
-        max |omega| over time, at ``largest_time``.
-    final : float
-        omega at the last common time.
-    parting_time : float or None
-        First time |omega| exceeds PARTING_BAND, interpolated [s]; None if it never does.
-    parting_impact : Impact or None
-        Last impact at or before the parting, in the run given for it.
-    band : float or None
-        Numerical uncertainty of ``largest``: the sum of the two runs' own.
-    slices : int
-        Slices of both runs.
-    finer : (int, float) or None
-        ``largest`` of the same two solvers at another number of slices, and that number; None if not computed.
+    omega : (P,) - (omega_second - omega_first) / omega_0, signed
+    largest : float - max |omega| over time, at ``largest_time``
+    final : float - omega at the last common time
+    parting_time : float or None - first time |omega| exceeds PARTING_BAND, interpolated [s]; None if it never does
+    parting_impact : Impact or None - last impact at or before the parting, in the run given for it
+    band : float or None - numerical uncertainty of ``largest``: the sum of the two runs' own
+    slices : int - of both runs
+    finer : (int, float) or None - another number of slices, and ``largest`` of the same two solvers at it
     """
 
     name: str
@@ -62,16 +50,14 @@ class Difference:
     second: str
     t: FloatArray
     omega: FloatArray
-    theta: FloatArray
-    r_cm: FloatArray
     largest: float
     largest_time: float
     final: float
     parting_time: float | None
     parting_impact: Impact | None
-    band: float | None = None
+    band: float | None
     slices: int
-    finer: tuple[int, float] | None = None
+    finer: tuple[int, float] | None
 
     @property
     def moment(self) -> str:
@@ -100,11 +86,8 @@ def study_difference(
     linearly if its times differ. ``impacts_of`` is the run whose impacts the parting is set against; ``finer`` are the
     same two solvers at more slices.
     """
-    end = min(first.t[-1], second.t[-1])
-    t = first.t[first.t <= end]
-    points = len(t)
-    omega0 = first.scenario.omega0
-    omega = (_at(t, second.t, second.omega) - first.omega[:points]) / omega0
+    t = first.t[first.t <= min(first.t[-1], second.t[-1])]
+    omega = (np.interp(t, second.t, second.omega) - first.omega[: len(t)]) / first.scenario.omega0
     size = np.abs(omega)
     k = int(size.argmax())
     parting = first_crossing(t, size, PARTING_BAND)
@@ -114,8 +97,6 @@ def study_difference(
         second=second.label,
         t=t,
         omega=omega,
-        theta=_at(t, second.t, second.theta) - first.theta[:points],
-        r_cm=(_at(t, second.t, second.r_cm) - first.r_cm[:points]) / first.scenario.bottle.length,
         largest=float(size[k]),
         largest_time=float(t[k]),
         final=float(omega[-1]),
@@ -125,12 +106,6 @@ def study_difference(
         slices=first.scenario.n_slices,
         finer=None if finer is None else (finer[0].scenario.n_slices, study_difference(name, *finer).largest),
     )
-
-
-def _at(t: FloatArray, times: FloatArray, values: FloatArray) -> FloatArray:
-    if len(times) >= len(t) and np.array_equal(times[: len(t)], t):
-        return values[: len(t)]
-    return np.asarray(np.interp(t, times, values))
 
 
 def first_crossing(t: FloatArray, size: FloatArray, band: float) -> float | None:
@@ -169,8 +144,7 @@ def claim_change(
     for run in (first, second):
         if not run.ok:
             raise Missing(f"{run.method}: {run.message or run.status}")
-    value = largest_change(first, second)
-    return Finding(id=id_, title=title, value=value, unit="of ω₀", kind="regression", admissible=(0.0, band), note=note)
+    return regression(id_, title, largest_change(first, second), "of ω₀", (0.0, band), note)
 
 
 def largest_change(first: Trajectory, second: Trajectory) -> float:

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Finding, Made, Outcome, Run, Study, attempt, judged
+from flipproof.frame.findings import regression
 from ode_reference.models import LADDER
 from slicemodel import Trajectory
-
-SLICES: Final = 20
-
-RESIDUAL: Final = 1e-9
-"""What an energy ledger may miss, as a fraction of the initial energy."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,23 +27,19 @@ class Energy:
 
 def study(ask: Ask) -> Study[Energy]:
     """Keep the ledger of every model, on both throws."""
-    throws = (ask.reference.with_slices(SLICES), ask.throw.with_slices(SLICES))
-    checks, throws_runs = ({m: Run(m, throw, {"energy": True}, f"ledger, {m}") for m in LADDER} for throw in throws)
-    flights = yield [*checks.values(), *throws_runs.values()]
+    throws = (ask.reference.with_slices(20), ask.throw.with_slices(20))
+    checks, runs = ({m: Run(m, throw, {"energy": True}, f"ledger, {m}") for m in LADDER} for throw in throws)
+    flights = yield [*checks.values(), *runs.values()]
     return Energy(
         {model: flights[run] for model, run in checks.items()},
-        {
-            model: attempt(lambda run: flights[run].flight.diagnostics["energy"], run)
-            for model, run in throws_runs.items()
-        },
+        {m: attempt(lambda run: flights[run].flight.diagnostics["energy"], run) for m, run in runs.items()},
     )
 
 
 def claims(found: Energy) -> Claims:
     """Yield that every ledger closes on the paper's own throw."""
     for model, made in found.checks.items():
-        title = f"{model}: the energy ledger closes"
-        yield judged(claim_energy, made, id=f"energy-{model}", title=title)
+        yield judged(claim_energy, made, id=f"energy-{model}", title=f"{model}: the energy ledger closes")
     for model, each in found.ledgers.items():
         if each.found is None:
             yield Absent(f"ledger-{model}", f"ledger of {model}", each.reason, "observation")
@@ -57,21 +48,9 @@ def claims(found: Energy) -> Claims:
 def claim_energy(run: Trajectory) -> Finding:
     """The works of all forces and the losses in impacts add up to the change of energy."""
     ledger = run.diagnostics["energy"]
-    return Finding(
-        id=f"energy-{run.method}",
-        title=f"{run.method}: the energy ledger closes",
-        value=abs(float(ledger["residual"]) / float(ledger["initial"])),
-        unit="of the initial energy",
-        kind="regression",
-        admissible=(0.0, RESIDUAL),
-    )
+    missed = abs(float(ledger["residual"]) / float(ledger["initial"]))
+    title = f"{run.method}: the energy ledger closes"
+    return regression(f"energy-{run.method}", title, missed, "of the initial energy", (0.0, 1e-9))
 
 
-CHAPTER: Final = Chapter(
-    name="energy",
-    title="Where the energy goes",
-    study=study,
-    claims=claims,
-    kind="regression",
-    template=Path(__file__).with_name("part.html.j2"),
-)
+CHAPTER: Final = Chapter(name="energy", title="Where the energy goes", study=study, claims=claims, kind="regression")

@@ -1,49 +1,74 @@
-"""Errata: what the paper prints against what follows from its own earlier equations."""
+"""Errata: what the paper prints against what follows from its own earlier equations.
+
+Every item is computed from the printed formula, the printed program, or a run; the interval is the one that the number
+would lie in if the print were right.
+"""
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Final
 
+from flipproof.chapters.errata import equations, programs
 from flipproof.chapters.errata.erratum import ROUND_OFF, Erratum
-from flipproof.chapters.errata.study import study_errata
-from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Finding, Study
+from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Study, observed
+from slicemodel import Scenario
+
+AUDIT: Final[Mapping[str, Callable[[Scenario], Erratum]]] = {
+    "eq4b-epsilon": equations.erratum_eq4b,
+    "eq8-gravity": equations.erratum_gravity,
+    "eq8-origin": equations.erratum_origin,
+    "eq8-drag": equations.erratum_drag_reference,
+    "eq9a-roots": equations.erratum_roots,
+    "eq9d-cosh-sign": equations.erratum_cosh_sign,
+    "eq9d-sinh-sign": equations.erratum_sinh_sign,
+    "contact-sign": lambda _: programs.erratum_contact_sign(),
+    **{f"eq11e-{fill:g}": partial(equations.erratum_eq11e, fill=fill) for fill in (0.1, 0.25, 0.5, 0.75, 1.0)},
+    "python-cost": lambda _: programs.erratum_cost("python"),
+    "matlab-cost": lambda _: programs.erratum_cost("matlab"),
+    "matlab-comment": lambda _: programs.erratum_matlab_comment(),
+    "matlab-damping": programs.erratum_matlab_damping,
+    "matlab-reset": lambda _: programs.erratum_matlab_reset(),
+    "python-sinh-sign": equations.erratum_python_sign,
+    "python-defaults": lambda _: programs.erratum_defaults(),
+    "alpha-unit": lambda _: equations.erratum_alpha_unit(),
+}
+"""Stable name -> item, in the order of the paper."""
 
 
-def study(ask: Ask) -> Study[tuple[Erratum, ...]]:
+def study(ask: Ask) -> Study[Mapping[str, Erratum]]:
     """Have a worker audit the paper on the throw."""
     audit = Call(study_errata, (ask.throw,), "errata")
     flights = yield [audit]
-    errata: tuple[Erratum, ...] = flights.answer(audit)
+    errata: Mapping[str, Erratum] = flights.answer(audit)
     return errata
 
 
-def claims(found: tuple[Erratum, ...]) -> Claims:
-    """Yield every erratum."""
-    for erratum in found:
-        yield claim_erratum(erratum)
+def study_errata(throw: Scenario) -> dict[str, Erratum]:
+    """Return the audit; an item that cannot be computed has the value NaN and says why."""
+    return {id_: audited(item, throw) for id_, item in AUDIT.items()}
 
 
-def claim_erratum(erratum: Erratum) -> Finding:
-    """What the paper prints against what follows from its own earlier equations."""
-    known = math.isfinite(erratum.value)
-    return Finding(
-        id=f"erratum-{erratum.id}",
-        title=f"{erratum.place}: {erratum.verdict}",
-        value=erratum.value if known else None,
-        unit=erratum.unit,
-        kind="observation",
-        band=abs(erratum.value) * (ROUND_OFF[1] - 1.0) if known else None,
-        note=f"prints {erratum.prints}; follows {erratum.follows}" + (f"; {erratum.note}" if erratum.note else ""),
-    )
+def audited(item: Callable[[Scenario], Erratum], throw: Scenario) -> Erratum:
+    """Return an item of the audit, or why it cannot be computed."""
+    try:
+        return item(throw)
+    except (ValueError, ArithmeticError, RuntimeError) as error:
+        return Erratum(note=f"{type(error).__name__}: {error}")
+
+
+def claims(found: Mapping[str, Erratum]) -> Claims:
+    """Yield what the paper prints against what follows from its own earlier equations."""
+    for id_, erratum in found.items():
+        value = erratum.value if math.isfinite(erratum.value) else None
+        band = None if value is None else abs(value) * (ROUND_OFF[1] - 1.0)
+        note = f"prints {erratum.prints}; follows {erratum.follows}" + (f"; {erratum.note}" if erratum.note else "")
+        title = f"{erratum.place}: {erratum.verdict}"
+        yield observed(f"erratum-{id_}", title, value, erratum.unit, note, band=band)
 
 
 CHAPTER: Final = Chapter(
-    name="errata",
-    title="Errata",
-    study=study,
-    claims=claims,
-    template=Path(__file__).with_name("part.html.j2"),
-    work={"check": None, "quick": None, "full": None},
+    name="errata", title="Errata", study=study, claims=claims, work={"check": None, "quick": None, "full": None}
 )

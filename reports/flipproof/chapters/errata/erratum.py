@@ -6,18 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import Final, Literal
 
-MUCH_LESS = 0.1
-"""What "gamma << omega" is taken to mean: at most a tenth."""
-
 ROUND_OFF = (1.0 - 1e-6, 1.0 + 1e-6)
 """A quotient that should be 1, with room for a finite difference."""
 
 SQUARE: Final = (1.8, 2.2)
 """Exponents that count as a square."""
-
-FILLS = (0.1, 0.25, 0.5, 0.75, 1.0)
-MANY_SLICES = 20_000
-WATER_DENSITY = 1000.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,7 +19,6 @@ class Erratum:
 
     Parameters
     ----------
-    id : str - stable name
     place : str - equation, section or file of the paper
     prints, follows : str - what stands there; what its own earlier equations demand
     value : float, unit : str - the number that separates the two; NaN if it could not be computed
@@ -34,13 +26,12 @@ class Erratum:
     note : str - further numbers
     """
 
-    id: str
-    place: str
-    prints: str
-    follows: str
-    value: float
-    unit: str
-    admissible: tuple[float, float]
+    place: str = ""
+    prints: str = ""
+    follows: str = ""
+    value: float = math.nan
+    unit: str = ""
+    admissible: tuple[float, float] = (0.0, 0.0)
     note: str = ""
 
     @property

@@ -21,7 +21,6 @@ def erratum_matlab_damping(throw: Scenario) -> Erratum:
 
     constants = SCHEMES["published-matlab"].constants(throw if throw.drag else replace(throw, drag=0.01))
     return Erratum(
-        id="matlab-damping",
         place="Supplement, FindNewlocation.m",
         prints="alpha/2/M_W/N in the position update",
         follows="γ = αN / 2M_w, as in its other three places",
@@ -32,21 +31,15 @@ def erratum_matlab_damping(throw: Scenario) -> Erratum:
     )
 
 
-def matlab_default(n_slices: int = 500) -> Scenario:
-    """Return the throw that the MATLAB supplement itself makes."""
-    return replace(Scenario(), water_mass=0.5, duration=1.0, gravity=9.8).with_slices(n_slices)
-
-
 def erratum_matlab_reset() -> Erratum:
     """Show that the MATLAB program flips the velocity of a slice that is outside and leaves it there."""
-    throw = matlab_default()
+    throw = replace(Scenario(), water_mass=0.5, duration=1.0, gravity=9.8).with_slices(500)  # that of the supplement
     run = solve("published-matlab", throw)
     length = throw.bottle.length
     outside = np.maximum(-run.r, run.r - length).max(axis=1) / length
     first = float(run.t[int((outside > 0).argmax())]) if (outside > 0).any() else throw.duration
     deep = run.t[outside > 0.05]
     return Erratum(
-        id="matlab-reset",
         place="Supplement, CheckBoundaryConditions.m",
         prints="r_new = r: no position is reset",
         follows="[C.S.]: r(t_n) = r(t_n−1), so that 0 ≤ r ≤ L throughout",
@@ -58,9 +51,6 @@ def erratum_matlab_reset() -> Erratum:
     )
 
 
-MATLAB_LINE: Final = "rho =1000; density of water"
-"""A line of Main.m exactly as printed; its comment lacks the percent sign."""
-
 MATLAB_FUNCTIONS: Final = (
     "FindCenterOfMass", "InertiaMomentumWater", "InertiaMomentumBottle", "InstantaneousAngularFrequency", "FindTheta",
     "FindNewlocation", "CheckBoundaryConditions",
@@ -68,17 +58,15 @@ MATLAB_FUNCTIONS: Final = (
 """Functions that the MATLAB supplement defines."""
 
 
-def stray_commands(line: str) -> list[str]:
-    """Return the statements of a line of MATLAB that assign nothing and call no function of the supplement."""
+def erratum_matlab_comment(line: str = "rho =1000; density of water") -> Erratum:
+    """Show that Main.m as printed stops at a comment without its percent sign; ``line`` is exactly as printed.
+
+    A statement is stray if it assigns nothing and calls no function of the supplement.
+    """
     statements = (part.strip() for part in line.split("%")[0].split(";"))
-    return [part for part in statements if part and "=" not in part and part.partition("(")[0] not in MATLAB_FUNCTIONS]
-
-
-def erratum_matlab_comment(line: str = MATLAB_LINE) -> Erratum:
-    """Show that Main.m as printed stops at a comment without its percent sign."""
-    stray = stray_commands(line)
+    named = (part for part in statements if part and "=" not in part)
+    stray = [part for part in named if part.partition("(")[0] not in MATLAB_FUNCTIONS]
     return Erratum(
-        id="matlab-comment",
         place="Supplement, Main.m",
         prints=line,
         follows="a comment starts with %, as on the lines around it",
@@ -91,13 +79,11 @@ def erratum_matlab_comment(line: str = MATLAB_LINE) -> Erratum:
 
 def erratum_contact_sign(beta: float = -0.5) -> Erratum:
     """[C.S.] as typeset multiplies the velocity by minus beta: with beta = -0.5 a slice goes on into the wall."""
-    before = 1.0
     return Erratum(
-        id="contact-sign",
         place="[C.S.], section 5",
         prints="r' = −β r' with −1 ≤ β ≤ 0",
         follows="its own words, “bounces back”, and both programs: r' = β r'",
-        value=-beta * before,
+        value=-beta,
         unit="of the velocity before",
         admissible=(-1.0, 0.0),
         note=f"β = {beta:g}",
@@ -108,9 +94,9 @@ def erratum_defaults() -> Erratum:
     """Show that the Python program as supplied does not make the paper's throw."""
     supplied = replace(Scenario(), water_mass=0.1, n_slices=100, drag=0.01, restitution=0.3, duration=0.6)
     paper = replace(supplied, restitution=0.5, duration=0.5)
-    levels = [_plateau_of("published-python", throw) for throw in (supplied, paper)]
+    runs = [solve("published-python", throw, store="summary") for throw in (supplied, paper)]
+    levels = [plateau(run.t, run.omega, run.scenario.omega0) for run in runs]
     return Erratum(
-        id="python-defaults",
         place="Supplement, main.py",
         prints="beta = −0.3, t_max = 0.6, water_mass = 0.1",
         follows="section 5: β = −0.5, T = 0.5 s, M_w from 0.05 to 1 kg",
@@ -121,13 +107,8 @@ def erratum_defaults() -> Erratum:
     )
 
 
-def _plateau_of(solver: str, throw: Scenario) -> float:
-    run = solve(solver, throw, store="summary")
-    return plateau(run.t, run.omega, throw.omega0)
-
-
 class _Counted(np.ndarray):
-    """An array that counts the elements of every operation made with it, and of every copy asked for by ``kept``."""
+    """An array that counts the elements of every operation made with it."""
 
     elements = 0
 
@@ -147,8 +128,7 @@ def count_operations(n: int, steps: int, *, copies_history: bool) -> int:
     on the values, so no slice needs to hit an end.
     """
     _Counted.elements = 0
-    r = (np.linspace(0.1, 0.2, n)).view(_Counted)
-    v = (np.zeros(n)).view(_Counted)
+    r, v = np.linspace(0.1, 0.2, n).view(_Counted), np.zeros(n).view(_Counted)
     omega, gamma, dt = 20.0, 5.0, 1e-9
     for step in range(1, steps):
         r_cm = 0.05 * 0.14 + 0.95 * np.add.reduce(r) / n
@@ -169,25 +149,20 @@ def count_operations(n: int, steps: int, *, copies_history: bool) -> int:
 @cache
 def exponents_of_cost(*, copies_history: bool) -> tuple[float, float]:
     """Return the exponents of N and of P in the elements touched, between 250 and 1000 of each."""
-    base, most = 250, 1000
-    low, wide, long = (
-        count_operations(n, p, copies_history=copies_history) for n, p in ((base, base), (most, base), (base, most))
-    )
-    return math.log(wide / low) / math.log(most / base), math.log(long / low) / math.log(most / base)
+    sizes = ((250, 250), (1000, 250), (250, 1000))
+    low, wide, long = (count_operations(n, p, copies_history=copies_history) for n, p in sizes)
+    return math.log(wide / low) / math.log(4.0), math.log(long / low) / math.log(4.0)
 
 
 def erratum_cost(program: Literal["python", "matlab"]) -> Erratum:
     """Operations of a published program against N and P: the claim is N^2."""
     of_n, of_p = exponents_of_cost(copies_history=program == "matlab")
-    why = {
-        "python": "main.py: a step touches each of N slices a fixed number of times",
-        "matlab": "Main.m: linear in N too; what grows as a square is P, since every step copies all steps before",
-    }
     return Erratum(
-        id=f"{program}-cost",
         place="Section 5, Supp. Fig. 1",
         prints="“computing time t_c roughly increases as N²”",
-        follows=why[program],
+        follows="main.py: a step touches each of N slices a fixed number of times"
+        if program == "python"
+        else "Main.m: linear in N too; what grows as a square is P, since every step copies all steps before",
         value=of_n,
         unit="exponent of N",
         admissible=SQUARE,

@@ -3,23 +3,37 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Final
 
-from flipproof.chapters.exact_cases.study import SharedDigits, study_digits
-from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Finding, Outcome, Study, attempt, judged
+import numpy as np
 
-ERROR: Final = 1e-9
-"""Error of the reference against exact solutions, relative to omega_0 and to the length."""
+from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Finding, Outcome, Study, attempt, judged, regression
 
-Found = Mapping[str, Outcome[tuple[SharedDigits, ...]]]
+Found = Mapping[str, Outcome[Mapping[str, float]]]
+"""Model -> error by case."""
 
 
 def study(ask: Ask) -> Study[Found]:
     """Have workers hold each model of ``ask.work`` against the exact cases."""
-    calls = {model: Call(study_digits, (model,), f"exact cases of {model}") for model in ask.work}
+    calls = {model: Call(errors_of, (model,), f"exact cases of {model}") for model in ask.work}
     flights = yield list(calls.values())
     return {model: attempt(flights.answer, call) for model, call in calls.items()}
+
+
+def errors_of(model: str) -> dict[str, float]:
+    """Return the largest error of omega (of omega_0) and of positions (of the length), case by case."""
+    import ode_reference
+    from ode_reference.closed_forms import CASES
+
+    errors = {}
+    for make_case in CASES:
+        case = make_case(model)
+        run = ode_reference.solve(case.scenario, model, times=case.t, rest_speed=case.rest_speed)
+        omega = np.abs(run.omega - case.omega).max() / abs(case.scenario.omega0)
+        position = np.abs(run.r - case.r).max() / case.scenario.bottle.length
+        errors[case.name] = float(max(omega, position))
+    return errors
 
 
 def claims(found: Found) -> Claims:
@@ -28,17 +42,17 @@ def claims(found: Found) -> Claims:
         yield judged(claim_exact_cases, model, each, id=f"exact-cases-{model}", title=f"exact cases of {model}")
 
 
-def claim_exact_cases(model: str, cases: Sequence[SharedDigits]) -> Finding:
-    """The reference reproduces every case that has an exact solution."""
-    worst = max(cases, key=lambda case: math.inf if math.isnan(case.error) else case.error)
-    return Finding(
-        id=f"exact-cases-{model}",
-        title=f"{model}: largest error against exact solutions",
-        value=worst.error,
-        unit="relative",
-        kind="regression",
-        admissible=(0.0, ERROR),
-        note="digits shared: " + ", ".join(f"{case.case} {case.digits:.0f}" for case in cases),
+def claim_exact_cases(model: str, errors: Mapping[str, float]) -> Finding:
+    """The reference reproduces every case that has an exact solution, to a billionth of omega_0 and of the length."""
+    worst = max(errors.values(), key=lambda error: math.inf if math.isnan(error) else error)
+    digits = {case: 16.0 if error == 0.0 else min(16.0, -math.log10(error)) for case, error in errors.items()}
+    return regression(
+        f"exact-cases-{model}",
+        f"{model}: largest error against exact solutions",
+        worst,
+        "relative",
+        (0.0, 1e-9),
+        "digits shared: " + ", ".join(f"{case} {shared:.0f}" for case, shared in digits.items()),
     )
 
 

@@ -1,18 +1,78 @@
-"""What a step of finite length costs, taken apart."""
+"""What a step of finite length costs, taken apart: coefficients held over the step, a lag, rebounds that wait.
+
+Before the first impact nothing waits, so that there a scheme without lag shows what holding the coefficients costs and
+nothing else. Each number is max |omega - omega of the scheme's own equation| / omega_0 at one number of steps. Across
+impacts the parts do not add up: they may cancel.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from flipproof.chapters.finite_step.study import WAYS, StepCost, Way, study_finite_step, way_run
-from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Run, Study, attempt
+import numpy as np
+
+from flipproof.chapters.solvers import LIMITS
+from flipproof.frame.chapter import Ask, Chapter, Claims, Run, Study, attempt, observed
 from flipproof.frame.throws import FINER, finer
+from slicemodel import Trajectory
 
-MODEL_BAND: Final = 1e-9
-"""Fraction of omega_0 by which an equation without recoil may be off on the throws of a report."""
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Way:
+    """One way to take a step: scheme, its settings, and in words what is finite about it."""
+
+    name: str
+    scheme: str
+    settings: Mapping[str, Any]
+    words: str
+
+    @property
+    def model(self) -> str:
+        """The equation that the scheme converges to."""
+        return LIMITS[self.scheme]
+
+
+EVERYTHING: Final = "everything"
+HELD: Final = "held"
+LOCATED: Final = "held-located"
+
+WAYS: Final = (
+    Way(
+        EVERYTHING,
+        "published-python",
+        {},
+        "the published program: coefficients held, J and r_CM a step behind, rebounds wait for the grid",
+    ),
+    Way(
+        HELD,
+        "published-python",
+        {"lagged": False},
+        "the published program without its lag: coefficients held, rebounds wait for the grid",
+    ),
+    Way("exact", "exact-step", {}, "exact step: coefficients held, rebounds wait for the grid"),
+    Way(
+        LOCATED, "exact-step", {"rebound": "in-step"}, "exact step: coefficients held, rebounds located inside the step"
+    ),
+    Way("waiting", "midpoint", {"rebound": "grid"}, "midpoint: coefficients at mid-step, rebounds wait for the grid"),
+    Way("neither", "midpoint", {}, "midpoint: coefficients at mid-step, rebounds located inside the step"),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StepCost:
+    """What one way costs: the largest error of omega before the first impact and over the flight [omega_0].
+
+    ``start`` is NaN if no slice ever strikes an end.
+    """
+
+    way: Way
+    steps: int
+    start: float
+    first_impact: float | None
+    flight: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,48 +84,49 @@ class StepCosts:
     slices: int
     finer_slices: int
 
-    @property
-    def rows(self) -> list[tuple[StepCost, StepCost | None]]:
-        """Each cost beside the same at more slices."""
-        return list(zip(self.costs, self.more or (None,) * len(self.costs), strict=True))
-
 
 def study(ask: Ask) -> Study[StepCosts]:
     """Hold every way to take a step against its equation, at the report's slices and at more."""
-    pairs = {way: (way_run(way, ask.throw, ask.steps), Run(way.model, ask.throw, {}, way.model)) for way in WAYS}
+    pairs = {}
+    for way in WAYS:
+        settings = {"steps": ask.steps, "store": "summary", **way.settings}
+        run = Run(way.scheme, ask.throw, settings, f"finite step, {way.name}")
+        pairs[way] = run, Run(way.model, ask.throw, {}, way.model)
     more = {way: (finer(run), finer(truth)) for way, (run, truth) in pairs.items()}
     flights = yield [run for both in (*pairs.values(), *more.values()) for run in both]
 
-    def cost(of: dict[Way, tuple[Run, Run]]) -> tuple[StepCost, ...]:
-        return study_finite_step({way: (flights[run].whole, flights[truth].whole) for way, (run, truth) in of.items()})
+    def costs(of: dict[Way, tuple[Run, Run]]) -> tuple[StepCost, ...]:
+        return tuple(cost_of(way, flights[run].whole, flights[truth].whole) for way, (run, truth) in of.items())
 
-    return StepCosts(cost(pairs), attempt(cost, more).found or (), ask.throw.n_slices, FINER * ask.throw.n_slices)
+    return StepCosts(costs(pairs), attempt(costs, more).found or (), ask.throw.n_slices, FINER * ask.throw.n_slices)
+
+
+def cost_of(way: Way, run: Trajectory, reference: Trajectory) -> StepCost:
+    """Hold a run against its equation."""
+    error = np.abs(run.omega - np.interp(run.t, reference.t, reference.omega)) / abs(run.scenario.omega0)
+    impacts = reference.impacts
+    first = float(impacts.time[0]) if impacts is not None and len(impacts) else None
+    before = error[run.t < first] if first is not None else np.array([])
+    start = float(before.max()) if len(before) else math.nan
+    return StepCost(way=way, steps=len(run.t), start=start, first_impact=first, flight=float(error.max()))
 
 
 def claims(found: StepCosts) -> Claims:
-    """Yield what every way costs."""
+    """Yield what every way costs, against the equation that it converges to.
+
+    Its band is what an equation without recoil may be off by on the throws of a report.
+    """
     for cost in found.costs:
-        yield claim_finite_step(cost)
-
-
-def claim_finite_step(cost: StepCost) -> Finding:
-    """What one way to take a step of finite length costs, against the equation that it converges to."""
-    before = "no slice strikes an end" if math.isnan(cost.start) else f"{cost.start:.2g} of ω₀ before the first impact"
-    return Finding(
-        id=f"finite-step-{cost.way.name}",
-        title=f"{cost.way.words}: largest difference in ω from {cost.way.model}",
-        value=cost.flight,
-        unit="of ω₀",
-        kind="observation",
-        band=MODEL_BAND,
-        note=f"{cost.steps} steps; {before}",
-    )
+        before = "no slice strikes an end"
+        if not math.isnan(cost.start):
+            before = f"{cost.start:.2g} of ω₀ before the first impact"
+        title, note = (
+            f"{cost.way.words}: largest difference in ω from {cost.way.model}",
+            f"{cost.steps} steps; {before}",
+        )
+        yield observed(f"finite-step-{cost.way.name}", title, cost.flight, "of ω₀", note, band=1e-9)
 
 
 CHAPTER: Final = Chapter(
-    name="finite-step",
-    title="What a step of finite length costs, taken apart",
-    study=study,
-    claims=claims,
-    template=Path(__file__).with_name("part.html.j2"),
+    name="finite-step", title="What a step of finite length costs, taken apart", study=study, claims=claims
 )

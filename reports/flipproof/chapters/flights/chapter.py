@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from engine_check.witness import witness_of
-from flipproof.chapters.flights import figures as pictures
 from flipproof.chapters.solvers import FLIGHTS, LIMITS, OTHERS, SCHEMES
+from flipproof.figures.style import new_figure, shared_legend, shown_name, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Exhibit, Made, Study, Touch
 from flipproof.frame.solvers import find
 from flipproof.output.columns import curves_csv, json_ready
@@ -21,6 +20,13 @@ from flipproof.output.tables import trajectory_csv
 from flipproof.page.motion import motion_data
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import plateau
+from slicemodel.trajectory import FloatArray
+
+AXES = {
+    "omega": "angular velocity ω / ω₀ [1]",
+    "theta": "angle θ [degrees]",
+    "centre-of-mass": "centre of mass r_CM / L [1], cap = 0",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,15 +65,9 @@ def study(ask: Ask) -> Study[Flown]:
 
 def solver_row(name: str, made: Made) -> dict[str, Any]:
     """Return what a report says of one solver."""
-    solver = find(made.run.solver)
-    row: dict[str, Any] = {
-        "name": name,
-        "package": solver.package,
-        "equation": solver.equation,
-        "reason": solver.reason,
-        "seconds": made.seconds,
-    }
-    run = made.trajectory
+    solver, run = find(made.run.solver), made.trajectory
+    row: dict[str, Any] = {"name": name, "package": solver.package, "equation": solver.equation}
+    row |= {"reason": solver.reason, "seconds": made.seconds}
     if run is None:
         return row | {"status": "failed", "message": made.reason}
     if solver.package == "engine_check":
@@ -90,36 +90,45 @@ def figures(found: Flown) -> Iterator[Exhibit]:
     if not flights:
         return
     length = found.throw.bottle.length
-    over_time = partial(_over_time, flights)
-    yield over_time(
-        "omega", "Angular velocity", pictures.figure_omega, "omega/omega_0", "[1]",
+    yield _over_time(
+        flights,
+        "omega",
+        "Angular velocity",
         caption="The published program and its limit Δt → 0, and the exact step and Eq. 8, are each a scheme and the "
         "equation that it solves: they differ by what a finite time step does. pymunk throws the bottle of free flight "
         "by its own mechanics. Any other two curves solve different equations. All have "
         f"N = {flights[0].scenario.n_slices} slices.",
-        values={run.label: run.omega / run.scenario.omega0 for run in flights},
-        alt="Line plot of omega over omega_0 against time, 1 at release. Values at the end: {ends}. {apart}",
-        digits=".3f", apart=".2g", unit=" of omega_0", label="angular velocity ω / ω₀ [1]",
-    )  # fmt: skip
-    yield over_time(
-        "theta", "Angle", pictures.figure_theta, "theta", "[degrees]",
+        alt="Line plot of omega over omega_0 against time, 1 at release. Values at the end: {}.",
+        column="omega/omega_0 {} [1]",
+        unit=" of omega_0",
+        label="angular velocity ω / ω₀ [1]",
+    )
+    yield _over_time(
+        flights,
+        "theta",
+        "Angle",
         caption="The angle is the integral of the angular velocity above, so that a lasting difference in ω adds up. "
         "At 0° and at multiples of 360° the bottle stands upright.",
-        values={run.label: np.degrees(run.theta) for run in flights},
-        alt="Line plot of the angle theta in degrees against time. Values at the end: {ends} degrees. {apart}",
-        digits=".0f", apart=".1f", unit=" degrees", label="angle θ [°]",
-    )  # fmt: skip
-    yield over_time(
-        "centre-of-mass", "Centre of mass", pictures.figure_centre_of_mass, "r_CM/L", "[1]",
+        alt="Line plot of the angle theta in degrees against time. Values at the end: {} degrees.",
+        column="theta {} [degrees]",
+        unit=" degrees",
+        label="angle θ [°]",
+    )
+    yield _over_time(
+        flights,
+        "centre-of-mass",
+        "Centre of mass",
         caption="Distance from the cap. The nearer to the cap the centre of mass is on landing, the easier the bottle "
         "topples; in ice it stays where it is.",
-        values={run.label: run.r_cm / length for run in flights},
         alt="Line plot of the centre of mass from the cap, as a fraction of the length, "
-        f"{flights[0].r_cm[0] / length:.3f} at release. At the end: {{ends}}. {{apart}}",
-        digits=".3f", apart=".2g", unit=" of the length", label="centre of mass from the cap, r_CM / L [1]",
-    )  # fmt: skip
-    chosen = pictures.chosen_slices(flights[0])
+        f"{flights[0].r_cm[0] / length:.3f} at release. At the end: {{}}.",
+        column="r_CM/L {} [1]",
+        unit=" of the length",
+        label="centre of mass from the cap, r_CM / L [1]",
+    )
+    chosen = chosen_slices(flights[0])
     whole = [run for run in flights if len(run.r)]
+    ends_of = {i: {run.label: float(run.r[-1, i] / length) for run in whole} for i, _ in chosen}
     yield Exhibit(
         name="slices",
         title="Chosen slices",
@@ -127,11 +136,10 @@ def figures(found: Flown) -> Iterator[Exhibit]:
         "water; the one in between starts nearest the centre of mass, where the push outwards is weakest.",
         alt="Line plots of position against time, cap (0) at the top and base (1) at the bottom, every solver. "
         + " ".join(
-            f"Slice {i}, which {words}, is at the end at "
-            f"{_listed({run.label: float(run.r[-1, i] / length) for run in whole}, '.2f')} of the length."
+            f"Slice {i}, which {words}, is at the end at {_listed(ends_of[i], '.2f')} of the length."
             for i, words in chosen
         ),
-        maker=pictures.figure_slices,
+        maker=figure_slices,
         data=(whole,),
         table=curves_csv(
             {f"r/L of slice {i} {run.label} [1]": (run.t, run.r[:, i] / length) for i, _ in chosen for run in whole}
@@ -140,21 +148,21 @@ def figures(found: Flown) -> Iterator[Exhibit]:
 
 
 def _over_time(
-    flights: Sequence[Trajectory], name: str, title: str, maker: Any, symbol: str, column_unit: str, *, caption: str,
-    values: Mapping[str, Any], alt: str, digits: str, apart: str, unit: str, label: str,
-) -> Exhibit:  # fmt: skip
-    """Return the figure of one quantity; ``values`` is that of each flight by its label."""
-    ends = {name: float(curve[-1]) for name, curve in values.items()}
-    curves = {run.label: (run.t, values[run.label]) for run in flights}
+    flights: Sequence[Trajectory], name: str, title: str, *, caption: str, alt: str, column: str, unit: str, label: str
+) -> Exhibit:
+    """Return the figure of one quantity; ``unit`` is that of its differences, in words."""
+    curves = {run.label: (run.t, values_of(run, name)) for run in flights}
+    ends = {label: float(values[-1]) for label, (_, values) in curves.items()}
+    angle = name == "theta"
     return Exhibit(
         name=name,
         title=title,
         caption=caption,
-        alt=alt.format(ends=_listed(ends, digits), apart=_apart(ends, unit, apart)),
-        maker=maker,
-        data=(list(flights),),
-        table=curves_csv({f"{symbol} {name} {column_unit}": curve for name, curve in curves.items()}),
-        touch=Touch(label=label, curves=curves, digits=1 if unit == " degrees" else 3),
+        alt=f"{alt.format(_listed(ends, '.0f' if angle else '.3f'))} {_apart(ends, unit, '.1f' if angle else '.2g')}",
+        maker=figure_over_time,
+        data=(list(flights), name),
+        table=curves_csv({column.format(run): curve for run, curve in curves.items()}),
+        touch=Touch(label=label, curves=curves, digits=1 if angle else 3),
     )
 
 
@@ -169,21 +177,56 @@ def _apart(ends: Mapping[str, float], unit: str, digits: str) -> str:
         return ""
     low, high = min(finite, key=lambda name: finite[name]), max(finite, key=lambda name: finite[name])
     words = f"They end up to {finite[high] - finite[low]:{digits}}{unit} apart ({low} to {high})"
-    pairs = [(s, LIMITS[s]) for s in SCHEMES if s in finite and LIMITS[s] in finite]
-    if pairs:
-        words += ", a scheme and its own equation up to " + (
-            f"{max(abs(finite[s] - finite[m]) for s, m in pairs):{digits}}{unit}"
-        )
-    return words + "."
+    pairs = [abs(finite[s] - finite[LIMITS[s]]) for s in SCHEMES if s in finite and LIMITS[s] in finite]
+    return words + (f", a scheme and its own equation up to {max(pairs):{digits}}{unit}." if pairs else ".")
 
 
-def tables(found: Flown) -> dict[str, str]:
-    """Return the trajectory of every solver as CSV."""
-    return {
-        f"trajectories/{name}/data.csv": trajectory_csv(made.trajectory)
-        for name, made in found.made.items()
-        if made.trajectory is not None
-    }
+def values_of(run: Trajectory, quantity: str) -> FloatArray:
+    """Return a quantity of ``AXES`` over time, in the unit of its axis."""
+    if quantity == "omega":
+        return run.omega / run.scenario.omega0
+    return np.degrees(run.theta) if quantity == "theta" else run.r_cm / run.scenario.bottle.length
+
+
+@styled
+def figure_over_time(trajectories: Iterable[Trajectory], quantity: str) -> Figure:
+    """One quantity of ``AXES`` over time."""
+    figure, axes = new_figure()
+    for k, run in enumerate(trajectories):
+        axes.plot(run.t, values_of(run, quantity), label=shown_name(run), **solver_style(run.label, k))
+    axes.set(xlabel="time t [s]", ylabel=AXES[quantity])
+    axes.margins(x=0.01)
+    shared_legend(figure, axes)
+    if quantity == "omega":
+        axes.set_ylim(bottom=0.0)
+    return figure
+
+
+def chosen_slices(trajectory: Trajectory) -> list[tuple[int, str]]:
+    """Return the slices worth drawing: first, nearest the centre of mass at release, last; fewer if they coincide."""
+    nearest = int(np.abs(trajectory.r[0] - trajectory.r_cm[0]).argmin())
+    words = {0: "starts on the base", trajectory.scenario.n_slices - 1: "starts on top of the water"}
+    words.setdefault(nearest, "starts nearest the centre of mass")
+    return sorted(words.items())
+
+
+@styled
+def figure_slices(trajectories: Sequence[Trajectory]) -> Figure:
+    """Paths of a few slices, one panel each."""
+    chosen = chosen_slices(trajectories[0])
+    size = (8.0, 1.2 + 2.0 * len(chosen))
+    figure, grid = new_figure(len(chosen), size=size, sharex=True, sharey=True, squeeze=False)
+    panels = grid[:, 0]
+    for axes, (i, words) in zip(panels, chosen, strict=True):
+        for k, run in enumerate(trajectories):
+            length = run.scenario.bottle.length
+            axes.plot(run.t, run.r[:, i] / length, label=shown_name(run), **solver_style(run.label, k))
+        axes.set_title(f"slice {i}: {words}", fontsize=10, loc="left")
+        axes.set(ylabel="r / L [1]", ylim=(1.03, -0.03))
+        axes.margins(x=0.01)
+    panels[-1].set_xlabel("time t [s]")
+    shared_legend(figure, panels[0])
+    return figure
 
 
 CHAPTER: Final = Chapter(
@@ -191,7 +234,10 @@ CHAPTER: Final = Chapter(
     title="The flights",
     study=study,
     figures=figures,
-    template=Path(__file__).with_name("part.html.j2"),
     summary=lambda found: {"solvers": found.rows},
-    tables=tables,
+    tables=lambda found: {
+        f"trajectories/{name}/data.csv": trajectory_csv(made.trajectory)
+        for name, made in found.made.items()
+        if made.trajectory is not None
+    },
 )

@@ -9,8 +9,7 @@ ladder. A fair share is the mean over all orders of mending the assumptions (``f
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields, replace
-from itertools import product
+from dataclasses import dataclass
 from typing import Any
 
 from flipproof.chapters.waterfall.study import equation_run
@@ -29,14 +28,9 @@ FREE = MODELS["free-flight"].switches
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Split:
-    """How a guest's plateau becomes that of free flight.
+    """How a guest's plateau ``start`` becomes that of its equation, ``placed``, and that of free flight, ``end``.
 
-    Parameters
-    ----------
-    equation : str - that the guest solves
-    start, placed, end : float - plateau of the guest, of its equation, of free flight
-    bars : mapping switch -> float - its fair share
-    ranges : mapping switch -> (float, float) - least and largest change by it in a single order
+    ``bars`` maps each switch to its fair share, ``ranges`` to the least and the largest change by it in a single order.
     """
 
     equation: str
@@ -75,15 +69,19 @@ def switches_made(traits: Traits | None, certificate: Certificate | None, neares
     return None if nearest is None else switches_of(nearest)
 
 
-def sets_to_free(start: Switches) -> tuple[Switches, ...]:
-    """Return every set of assumptions on the way from ``start`` to free flight, in any order."""
-    off = [field.name for field in fields(Switches) if not getattr(start, field.name)]
-    return tuple(replace(start, **dict(zip(off, on, strict=True))) for on in product((False, True), repeat=len(off)))
-
-
 def plan_splits(starts: Iterable[Switches], throw: Scenario) -> list[Run]:
     """Return the runs that the splits need; those of the waterfall of the same throw are among them."""
-    return list(dict.fromkeys(equation_run(throw, each) for start in starts for each in sets_to_free(start)))
+    asked: dict[Run, None] = {}
+
+    def ask(switches: Switches) -> float:
+        asked[equation_run(throw, switches)] = None
+        return 0.0
+
+    for start in starts:
+        ask(start)
+        ask(FREE)
+        changes_of(start, FREE, ask)
+    return list(asked)
 
 
 def split(run: Trajectory, start: Switches, flights: Flights) -> Split:
@@ -91,10 +89,8 @@ def split(run: Trajectory, start: Switches, flights: Flights) -> Split:
 
     Raises
     ------
-    Missing
-        If a run is not whole.
-    ArithmeticError
-        If rest and bars miss the whole difference by more than round-off.
+    Missing - if a run is not whole
+    ArithmeticError - if rest and bars miss the whole difference by more than round-off
     """
 
     def read(trajectory: Trajectory) -> float:

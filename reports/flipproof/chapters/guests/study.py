@@ -23,7 +23,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from flipproof.chapters.agreement.study import Agreement, study_agreement
+from flipproof.chapters.agreement.chapter import Agreement, study_agreement
 from flipproof.chapters.differences.chapter import run_bands
 from flipproof.chapters.differences.study import Difference, study_difference
 from flipproof.chapters.guests.split import Split, plan_splits, split, switches_made
@@ -48,10 +48,6 @@ LEVELS: Final = (-4, -2, 0, 2)
 
 SPARSE: Final = 27
 """Every so many output times are asked for at ``LEVELS``: a solver makes at least one step from each to the next."""
-
-
-LONGEST: Final = 60
-"""Letters of the name by which files and anchors call a guest; one with more is called by its number."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,11 +105,6 @@ class Guest:
         return self.visit.flight
 
     @property
-    def nearest(self) -> Difference | None:
-        """The difference to the nearest rung."""
-        return min(self.differences.values(), key=lambda d: d.largest, default=None)
-
-    @property
     def rise(self) -> float | None:
         """Largest rise of the energy between two output times, fraction of E(0)."""
         return None if self.energy is None else float(max(0.0, np.max(np.diff(self.energy), initial=0.0)))
@@ -157,18 +148,13 @@ class Guests:
     @property
     def facts(self) -> dict[str, str]:
         """Which code each guest was, for the provenance."""
-        return {
-            guest.label: ", ".join(
-                part
-                for part in (
-                    guest.visit.spec,
-                    guest.visit.traits.distribution if guest.visit.traits is not None else "",
-                    f"files {guest.visit.content:.12}" if guest.visit.content else "",
-                )
-                if part
-            )
-            for guest in self.guests
-        }
+        facts = {}
+        for guest in self.guests:
+            visit = guest.visit
+            distribution = visit.traits.distribution if visit.traits is not None else ""
+            files = f"files {visit.content:.12}" if visit.content else ""
+            facts[guest.label] = ", ".join(part for part in (visit.spec, distribution, files) if part)
+        return facts
 
 
 def study(ask: Ask) -> Study[Guests]:
@@ -210,14 +196,9 @@ def received(calls: Mapping[str, Call], flights: Flights) -> tuple[Visit, ...]:
 
 
 def visit(spec: str, throw: Scenario, times: FloatArray, timeout: float | None = None) -> Visit:
-    """Certify a solver, let it make the throw at each of its efforts, and in ice.
+    """Certify a solver, let it make the throw at each of its efforts, and in ice, at output times of shape (P,) [s].
 
-    Parameters
-    ----------
-    spec : str
-    throw : Scenario
-    times : array, shape (P,) - output times [s]
-    timeout : float, optional - seconds one run may take, instead of what the solver says
+    ``timeout`` is how many seconds one run may take, instead of what the solver says.
     """
     problems: dict[str, str] = {}
 
@@ -236,14 +217,16 @@ def visit(spec: str, throw: Scenario, times: FloatArray, timeout: float | None =
         traits = tried("solver", lambda: runner.traits)
         if traits is None:
             return Visit(spec=spec, content=content, problems=problems)
-        curve = spec.startswith(CSV)
-        if curve:
+        certificate = ice = None
+        if spec.startswith(CSV):
             problems["certificate"] = "a curve in a file cannot be asked"
-        certificate = None if curve else tried("certificate", lambda: certify(runner))
+        else:
+            certificate = tried("certificate", lambda: certify(runner))
         flight = tried("flight", lambda: _flight(runner, throw, times, LEVELS[-1]).run)
         levels = LEVELS if traits.refined_by is not None else ()
         efforts = [tried(f"flight at level {k}", partial(_flight, runner, throw, times[::SPARSE], k)) for k in levels]
-        ice = None if curve else tried("ice", lambda: _flight(runner, replace(throw, frozen=True), times, 0).run)
+        if not spec.startswith(CSV):
+            ice = tried("ice", lambda: _flight(runner, replace(throw, frozen=True), times, 0).run)
     return Visit(
         spec=spec,
         content=content,
@@ -275,7 +258,6 @@ def study_guests(
 
     Parameters
     ----------
-    visits : sequence of Visit
     ladder : mapping rung -> Trajectory - of the same throw
     bands : mapping name -> float - how far omega may be off, fraction of omega_0; 0 for one that is missing
     others : mapping name -> Trajectory - schemes and engines on the same throw, for who agrees with whom
@@ -285,19 +267,17 @@ def study_guests(
     for k, (one, name) in enumerate(zip(visits, taken, strict=True)):
         label = name if taken.count(name) == 1 and name not in {**ladder, **others} else f"{name} ({one.spec})"
         slug = re.sub(r"[^a-z0-9]+", "-", label.lower()).strip("-")
-        if not 0 < len(slug) <= LONGEST:
+        if not 0 < len(slug) <= 60:
             slug = f"solver-{k + 1}"
         while any(guest.slug == slug for guest in guests):
             slug += f"-{k + 1}"
         guests.append(_guest(one, label, slug, ladder, bands))
+    runs, known = dict(ladder), {name: bands.get(name, 0.0) for name in ladder}
     first = next(iter(ladder.values()), None)
-    same = {name: run for name, run in others.items() if first is not None and _same_times(run, first)}
-    runs = {**ladder, **same}
-    known = {name: bands.get(name, 0.0) for name in runs}
-    for guest in guests:
-        if guest.run is not None and first is not None and _same_times(guest.run, first):
-            runs[guest.label] = guest.run
-            known[guest.label] = guest.band or 0.0
+    flown = {guest.label: (guest.run, guest.band) for guest in guests}
+    for name, (run, band) in ({name: (run, bands.get(name)) for name, run in others.items()} | flown).items():
+        if run is not None and first is not None and _same_times(run, first):
+            runs[name], known[name] = run, band or 0.0
     agreement = study_agreement(runs, known) if guests and len(runs) > 1 else None
     return Guests(guests=tuple(guests), ladder=dict(ladder), agreement=agreement)
 

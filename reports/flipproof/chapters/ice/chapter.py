@@ -9,35 +9,29 @@ from typing import Final
 import numpy as np
 from matplotlib.figure import Figure
 
+from flipproof.chapters.solvers import ENGINE
 from flipproof.figures.style import ICE_FLOOR, STYLES, new_figure, shared_legend, styled
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged, regression
 from flipproof.output.columns import curves_csv
 from slicemodel import Scenario, Trajectory
 from slicemodel.trajectory import FloatArray
 
-SOLVERS: Final = ("published-python", "exact-step", "published-limit", "eq8", "free-flight")
-ENGINE: Final = "pymunk"
-
 ADMISSIBLE: Final = {"slicemodel": 1e-12, "ode_reference": 1e-12, "engine_check": 1e-6}
 """max |omega/omega_0 - 1| by package: round-off where omega is computed from J, else the engine's own drift."""
 
-WELDED_SLICES: Final = 20
-"""Slices of the ice that joints hold; its drift hardly depends on them."""
 
-COARSEST: Final = 4e-4
-"""Longest step of the welded runs [s]."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Drift:
-    """|omega / omega_0 - 1| of one frozen run over time, its maximum, and the step that made it (None: it has none)."""
+    """|omega / omega_0 - 1| of one frozen run over time."""
 
     label: str
-    package: str
-    step: float | None
     t: FloatArray
     drift: FloatArray
-    largest: float
+
+    @property
+    def largest(self) -> float:
+        """The largest drift."""
+        return float(self.drift.max())
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,26 +41,25 @@ class Ice:
     rigid: Mapping[str, Made]
     welded: Mapping[str, Made]
 
-    @property
-    def drifts(self) -> list[Drift]:
-        """The drift of every run that was made."""
-        runs = {**self.rigid, **self.welded}
-        return [measure(label, made.flight) for label, made in runs.items() if made.trajectory is not None]
-
 
 def study(ask: Ask) -> Study[Ice]:
     """Throw bottles of ice: every solver, and unless ``ask.work`` is false the engine with masses held by joints."""
     ice = replace(ask.throw, frozen=True)
-    rigid = {name: Run(name, ice, label=f"ice, {name}") for name in SOLVERS}
+    solvers = ("published-python", "exact-step", "published-limit", "eq8", "free-flight")
+    rigid = {name: Run(name, ice, label=f"ice, {name}") for name in solvers}
     rigid[f"{ENGINE} rigid"] = Run(ENGINE, ice, {"ice": "rigid"}, f"ice, {ENGINE} rigid")
-    welded = _welded(replace(ask.reference.with_slices(WELDED_SLICES), frozen=True)) if ask.work else {}
+    # The drift of welded ice hardly depends on its slices.
+    welded = _welded(replace(ask.reference.with_slices(20), frozen=True)) if ask.work else {}
     flights = yield [*rigid.values(), *welded.values()]
     return Ice(*({label: flights[run] for label, run in runs.items()} for runs in (rigid, welded)))
 
 
 def _welded(ice: Scenario) -> dict[str, Run]:
-    """Return runs at output times by which the engine's step, a whole part of each interval, really halves."""
-    times = np.linspace(0.0, ice.duration, 1 + int(np.ceil(ice.duration / COARSEST)))
+    """Return runs at output times by which the engine's step, a whole part of each interval, really halves.
+
+    The longest step is 0.4 ms.
+    """
+    times = np.linspace(0.0, ice.duration, 1 + int(np.ceil(ice.duration / 4e-4)))
     runs = {}
     for dt in float(times[1]) / np.array([1, 2, 4]):
         label = f"{ENGINE} welded, Δt = {dt:.2g} s"
@@ -76,56 +69,44 @@ def _welded(ice: Scenario) -> dict[str, Run]:
 
 def measure(label: str, run: Trajectory) -> Drift:
     """Return the drift of one frozen run."""
-    drift = np.abs(run.omega / run.scenario.omega0 - 1.0)
-    step = run.settings.get("step")
-    return Drift(label=label, package=run.solver, step=step, t=run.t, drift=drift, largest=float(drift.max()))
+    return Drift(label, run.t, np.abs(run.omega / run.scenario.omega0 - 1.0))
 
 
 def claims(found: Ice) -> Claims:
     """Yield that every solver keeps omega, and that welded masses drift at the engine's printed order."""
     for label, made in found.rigid.items():
         id_, title = f"ice-{label.replace(' ', '-')}", f"ice: {label} keeps ω constant"
-        yield judged(lambda label, flight: claim_ice(measure(label, flight)), label, made, id=id_, title=title)
+        yield judged(claim_ice, id_, title, made, id=id_, title=title)
     if found.welded:
-        yield judged(
-            lambda *flights: claim_welded_order(flights), *found.welded.values(), id="ice-welded-order",
-            title="drift of welded ice",
-        )  # fmt: skip
+        title = "drift of welded ice"
+        yield judged(claim_welded_order, *found.welded.values(), id="ice-welded-order", title=title)
 
 
-def claim_ice(drift: Drift) -> Finding:
+def claim_ice(id_: str, title: str, run: Trajectory) -> Finding:
     """With frozen water omega stays what it was."""
-    return Finding(
-        id=f"ice-{drift.label.replace(' ', '-')}",
-        title=f"ice: {drift.label} keeps ω constant",
-        value=drift.largest,
-        unit="of ω₀",
-        kind="regression",
-        admissible=(0.0, ADMISSIBLE[drift.package]),
-    )
+    return regression(id_, title, measure("", run).largest, "of ω₀", (0.0, ADMISSIBLE[run.solver]))
 
 
-def claim_welded_order(runs: Sequence[Trajectory]) -> Finding:
+def claim_welded_order(*runs: Trajectory) -> Finding:
     """Ice made of masses welded on by joints drifts, and the drift falls with dt at the engine's printed order."""
-    drifts = [measure("", run) for run in runs]
     printed = runs[0].diagnostics["weld_order"]
-    dt = [np.nan if drift.step is None else drift.step for drift in drifts]
-    sizes = np.array([drift.largest for drift in drifts])
+    dt = [run.settings.get("step", np.nan) for run in runs]
+    sizes = np.array([measure("", run).largest for run in runs])
     order = float(np.polyfit(np.log(dt), np.log(sizes), 1)[0]) if np.all(sizes > 0) else float("nan")
-    return Finding(
-        id="ice-welded-order",
-        title="ice: drift of the welded engine falls with Δt at its printed order",
-        value=order,
-        unit="",
-        kind="regression",
-        admissible=(printed - 0.3, printed + 0.3),
-        note="drift " + ", ".join(f"{size:.2g} at Δt = {step:.2g} s" for step, size in zip(dt, sizes, strict=True)),
+    return regression(
+        "ice-welded-order",
+        "ice: drift of the welded engine falls with Δt at its printed order",
+        order,
+        "",
+        (printed - 0.3, printed + 0.3),
+        "drift " + ", ".join(f"{size:.2g} at Δt = {step:.2g} s" for step, size in zip(dt, sizes, strict=True)),
     )
 
 
 def figures(found: Ice) -> Iterator[Exhibit]:
     """Yield the drifts over time."""
-    drifts = found.drifts
+    runs = {**found.rigid, **found.welded}
+    drifts = [measure(label, made.flight) for label, made in runs.items() if made.trajectory is not None]
     if not drifts:
         return
     words = ", ".join(f"{ice.label} {ice.largest:.2g}" for ice in drifts)
@@ -151,15 +132,12 @@ def draw(drifts: Sequence[Drift]) -> Figure:
     for ice in drifts:
         floor = ICE_FLOOR * 3.0**exact
         exact += ice.largest == 0.0
-        words = "none" if ice.largest == 0.0 else f"{ice.largest:.1e}"
+        words = f"{ice.label}: {'none' if ice.largest == 0.0 else f'{ice.largest:.1e}'}"
         known = STYLES.get(ENGINE if ice.label == f"{ENGINE} rigid" else ice.label)
-        axes.semilogy(
-            ice.t, np.maximum(ice.drift, floor), color=known["color"] if known else next(others), linewidth=1.5,
-            label=f"{ice.label}: {words}",
-        )  # fmt: skip
+        colour = known["color"] if known else next(others)
+        axes.semilogy(ice.t, np.maximum(ice.drift, floor), color=colour, linewidth=1.5, label=words)
     axes.set_ylim(ICE_FLOOR / 3, 1e-2)
-    axes.set_xlabel("time t [s]")
-    axes.set_ylabel(f"|ω / ω₀ − 1| [1], zero drawn below {1000 * ICE_FLOOR:.0e}")
+    axes.set(xlabel="time t [s]", ylabel=f"|ω / ω₀ − 1| [1], zero drawn below {1000 * ICE_FLOOR:.0e}")
     axes.margins(x=0.01)
     shared_legend(figure, axes, columns=2)
     return figure

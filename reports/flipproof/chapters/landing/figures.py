@@ -2,17 +2,44 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
-from typing import Any
+from typing import Any, Final
 
-from flipproof.chapters.landing import drawings
-from flipproof.chapters.landing.study import Found
-from flipproof.chapters.landing.tables import energies_csv, map_csv, share_line, shares_csv, static_csv
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from flipproof.chapters.landing.study import AXIS_KINDS, KINDS, OPTIMAL, WATER_AND_ICE, Cell, Found, Kind
+from flipproof.chapters.landing.tables import (
+    energies_csv,
+    map_csv,
+    share_line,
+    shares_csv,
+    static_csv,
+    witnesses_csv,
+)
+from flipproof.figures.style import new_figure, shared_legend, styled
 from flipproof.frame.exhibit import Exhibit
+from flipproof.landing.aim import FAMILIES
+
+LOOKS: Final[Mapping[Kind, dict[str, Any]]] = {
+    "together": {"color": "#0072B2", "marker": "o", "linestyle": "-"},
+    "in-turn": {"color": "#56B4E9", "marker": "^", "linestyle": "--"},
+    "compliant": {"color": "#CC79A7", "marker": "v", "linestyle": ":"},
+    "ice": {"color": "#444444", "marker": "s", "linestyle": "-"},
+    "ice, compliant": {"color": "#999999", "marker": "D", "linestyle": ":"},
+}
+
+SHADES: Final = {
+    "upright": "#0072B2", "lying": "#E8E2D4", "cap": "#E69F00", "undecided": "#CC79A7", "missed": "#FFFFFF"
+}  # fmt: skip
+"""Colour of every outcome on the map; water and ice alike."""
 
 
 def witnesses() -> Mapping[str, Any]:
@@ -24,117 +51,80 @@ def witnesses() -> Mapping[str, Any]:
 def figures(found: Found) -> list[Exhibit]:
     """Return every figure of the subject."""
     size = found.size
-    shares = " ".join(share_line(found, family).replace("\n ", " ") + "." for family in size.families)
-    upright = {kind: int((outcomes.outcome == "upright").sum()) for kind, outcomes in found.maps.items()}
-    cells = len(found.fillings) * len(found.omegas)
-    stored = witnesses()
     soft = f" (soft contacts {size.engine_throws})" if size.engine_throws else ""
     missed = "In family A ice that does not reach the table from above counts as not upright. "
-    assumed = found.assumed.capitalize() + "."
+
+    def exhibit(name: str, title: str, caption: str, alt: str, maker: Callable[..., Figure], table: str) -> Exhibit:
+        caption = f"{caption} {found.assumed.capitalize()}."
+        return Exhibit(name=name, title=title, caption=caption, alt=alt, maker=maker, data=(found,), table=table)
+
     return [
-        Exhibit(
-            name="landing-shares",
-            title="Does it stand? Water and ice over the filling",
-            caption=(
-                f"Share of throws that end upright, {size.throws} throws a point{soft}, with Wilson's 95 % interval. "
-                "The laws of the impact are models of one landing and are not averaged. The shaded fillings are those "
-                f"that the paper calls optimal. {missed if 'A' in size.families else ''}{assumed}"
-            ),
-            alt=shares,
-            maker=drawings.figure_shares,
-            data=(found,),
-            table=shares_csv(found),
+        exhibit(
+            "landing-shares",
+            "Does it stand? Water and ice over the filling",
+            f"Share of throws that end upright, {size.throws} throws a point{soft}, with Wilson's 95 % interval. "
+            "The laws of the impact are models of one landing and are not averaged. The shaded fillings are those "
+            f"that the paper calls optimal. {missed if 'A' in size.families else ''}".rstrip(),
+            " ".join(share_line(found, family).replace("\n ", " ") + "." for family in size.families),
+            figure_shares,
+            shares_csv(found),
         ),
-        Exhibit(
-            name="landing-map",
-            title="Outcome over filling and ω₀",
-            caption=(
-                "One throw a cell, without scatter, onto a table where the bottle would touch standing after the "
-                "flight's duration. On the lines the bottle touches at 360 and at 720 degrees. Bottle and water strike "
-                f"the table together. {assumed}"
+        exhibit(
+            "landing-map",
+            "Outcome over filling and ω₀",
+            "One throw a cell, without scatter, onto a table where the bottle would touch standing after the "
+            "flight's duration. On the lines the bottle touches at 360 and at 720 degrees. Bottle and water strike "
+            "the table together.",
+            ", ".join(
+                f"{kind}: {int((each.outcome == 'upright').sum())} of {each.outcome.size} cells upright"
+                for kind, each in found.maps.items()
             ),
-            alt=", ".join(f"{kind}: {count} of {cells} cells upright" for kind, count in upright.items()),
-            maker=drawings.figure_map,
-            data=(found,),
-            table=map_csv(found),
+            figure_map,
+            map_csv(found),
         ),
-        Exhibit(
-            name="landing-axes",
-            title="What the share depends on",
-            caption=(
-                f"Share of throws that end upright at filling {size.axis_filling:g}, along each assumption, with the "
-                f"others as they are; {size.axis_throws} throws a point, the same for all points. "
-                f"{assumed}"
+        exhibit(
+            "landing-axes",
+            "What the share depends on",
+            f"Share of throws that end upright at filling {size.axis_filling:g}, along each assumption, with the "
+            f"others as they are; {size.axis_throws} throws a point, the same for all points.",
+            "; ".join(
+                f"P(upright) of water along {axis}: "
+                + ", ".join(f"{value:g}: {cell.share.value:.2f}" for value, cell in found.along(axis, "together"))
+                for axis in ("restitution", "friction", "scatter")
             ),
-            alt=_axes_words(found),
-            maker=drawings.figure_axes,
-            data=(found,),
-            table=shares_csv(found),
+            figure_axes,
+            shares_csv(found),
         ),
-        Exhibit(
-            name="landing-static",
-            title="Where the static criterion is right and wrong",
-            caption=(
-                "The toppling angle of Eq. 13a, with the water where it is at the touch, says whether a bottle put "
-                "down at rest would come upright. Each bar is the share that does end upright, of all throws that the "
-                f"angle calls upright and of all others, at all fillings. {assumed}"
+        exhibit(
+            "landing-static",
+            "Where the static criterion is right and wrong",
+            "The toppling angle of Eq. 13a, with the water where it is at the touch, says whether a bottle put "
+            "down at rest would come upright. Each bar is the share that does end upright, of all throws that the "
+            "angle calls upright and of all others, at all fillings.",
+            "; ".join(
+                f"family {family}, {kind}: {counts[True, True]} of {counts[True, True] + counts[True, False]} called "
+                f"upright stand, {counts[False, True]} of {counts[False, True] + counts[False, False]} others"
+                for (family, kind), counts in found.static.items()
             ),
-            alt=_static_words(found),
-            maker=drawings.figure_static,
-            data=(found,),
-            table=static_csv(found),
+            figure_static,
+            static_csv(found),
         ),
-        Exhibit(
-            name="landing-energy",
-            title="Energy against the saddle",
-            caption=(
-                f"The same throwers with water and with ice, filling {size.axis_filling:g}. Below 1 the energy does "
-                f"not suffice to get from the base over a rim, and the outcome is final. {assumed}"
-            ),
-            alt=_energy_words(found),
-            maker=drawings.figure_energy,
-            data=(found,),
-            table=energies_csv(found),
+        exhibit(
+            "landing-energy",
+            "Energy against the saddle",
+            f"The same throwers with water and with ice, filling {size.axis_filling:g}. Below 1 the energy does "
+            "not suffice to get from the base over a rim, and the outcome is final.",
+            _energy_words(found),
+            figure_energy,
+            energies_csv(found),
         ),
-        Exhibit(
-            name="landing-witnesses",
-            title="Programs that share no formula, from the same touches",
-            caption=(
-                f"Two programs land the same {stored['touches']} touches, {stored['n_slices']} slices at filling "
-                f"{stored['cases'][0]['filling']:g}. Each matrix counts the touches by their outcome in the program "
-                "that stands beside it (rows) and in the one below it (columns); in red the two differ. "
-                f"The counts are stored with this program; this command made them: {stored['command']}"
-            ),
-            alt=_witness_words(stored),
-            maker=drawings.figure_witnesses,
-            data=(stored["cases"],),
-            table=_witness_csv(stored),
-        ),
+        _witness_figure(witnesses()),
     ]
-
-
-def _axes_words(found: Found) -> str:
-    words = []
-    for axis in ("restitution", "friction", "scatter"):
-        values = ", ".join(f"{value:g}: {cell.share.value:.2f}" for value, cell in found.along(axis, "together"))
-        words.append(f"P(upright) of water along {axis}: {values}")
-    return "; ".join(words)
-
-
-def _static_words(found: Found) -> str:
-    words = []
-    for (family, kind), counts in found.static.items():
-        said, others = (counts[called, True] + counts[called, False] for called in (True, False))
-        words.append(
-            f"family {family}, {kind}: {counts[True, True]} of {said} called upright stand, "
-            f"{counts[False, True]} of {others} others"
-        )
-    return "; ".join(words)
 
 
 def _energy_words(found: Found) -> str:
     words = []
-    for kind in ("together", "ice"):
+    for kind in WATER_AND_ICE:
         runs = [run for run in found.energies if run.kind == kind]
         if runs:
             start = sum(float(run.energy[0]) for run in runs) / len(runs)
@@ -143,22 +133,158 @@ def _energy_words(found: Found) -> str:
     return "; ".join(words)
 
 
-def _witness_words(stored: Mapping[str, Any]) -> str:
+def _witness_figure(stored: Mapping[str, Any]) -> Exhibit:
     words = []
     for case in stored["cases"]:
         kind = "ice" if case["law"] is None else f"water, {case['slices']}, {case['law']}"
         for matrix in case["matrices"]:
             one, other = matrix["programs"]
             words.append(f"{kind}, {one} and {other}: {matrix['differ']} of {matrix['decided by both']} differ")
-    return "; ".join(words)
+    return Exhibit(
+        name="landing-witnesses",
+        title="Programs that share no formula, from the same touches",
+        caption=f"Two programs land the same {stored['touches']} touches, {stored['n_slices']} slices at filling "
+        f"{stored['cases'][0]['filling']:g}. Each matrix counts the touches by their outcome in the program "
+        "that stands beside it (rows) and in the one below it (columns); in red the two differ. "
+        f"The counts are stored with this program; this command made them: {stored['command']}",
+        alt="; ".join(words),
+        maker=figure_witnesses,
+        data=(stored["cases"],),
+        table=witnesses_csv(stored),
+    )
 
 
-def _witness_csv(stored: Mapping[str, Any]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("slices", "law", "first", "second", "outcome of first", "outcome of second", "touches"))
-    for case in stored["cases"]:
-        for matrix in case["matrices"]:
-            for pair, count in matrix["outcomes"].items():
-                writer.writerow((case["slices"], case["law"], *matrix["programs"], *pair.split("/"), count))
-    return text.getvalue()
+@styled
+def figure_shares(found: Found) -> Figure:
+    """P(upright) over the filling with 95 % intervals, a panel a family."""
+    figure, panels = new_figure(1, len(found.size.families), size=(8.6, 4.4), squeeze=False, sharey=True)
+    for axes, family in zip(panels[0], found.size.families, strict=True):
+        for kind in LOOKS:
+            _curve(axes, kind, found.curve(family, kind))
+        axes.axvspan(*OPTIMAL, color="#0072B2", alpha=0.06, linewidth=0)
+        axes.set_xlabel("fill fraction M_w / M_max [1]")
+        axes.set_title(f"{family}: {FAMILIES[family]}", fontsize=10, loc="left")
+        axes.set_ylim(0.0, 1.0)
+    panels[0, 0].set_ylabel("P(upright) [1]")
+    shared_legend(figure, panels[0, -1], columns=5)
+    return figure
+
+
+@styled
+def figure_axes(found: Found) -> Figure:
+    """P(upright) along what is assumed: restitution and friction of the table, scatter of the thrower."""
+    names = {"restitution": "e_table [1]", "friction": "friction of the table [1]", "scatter": "scatter, times assumed"}
+    figure, panels = new_figure(1, 3, size=(8.6, 3.8), sharey=True)
+    for axes, (axis, label) in zip(panels, names.items(), strict=True):
+        for kind in AXIS_KINDS:
+            _curve(axes, kind, found.along(axis, kind))
+        axes.set(xlabel=label, ylim=(0.0, 1.0))
+    panels[0].set_ylabel("P(upright) [1]")
+    title = f"filling {found.size.axis_filling:g}, family {found.size.families[-1]}"
+    panels[0].set_title(title, fontsize=10, loc="left")
+    shared_legend(figure, panels[0])
+    return figure
+
+
+def _curve(axes: Axes, kind: Kind, curve: Sequence[tuple[float, Cell]]) -> None:
+    if not curve:
+        return
+    x = [value for value, _ in curve]
+    low, high = np.array([cell.share.interval for _, cell in curve]).T
+    axes.plot(x, [cell.share.value for _, cell in curve], label=KINDS[kind].words, markersize=4.5, **LOOKS[kind])
+    axes.fill_between(x, low, high, color=LOOKS[kind]["color"], alpha=0.13, linewidth=0)
+
+
+@styled
+def figure_map(found: Found) -> Figure:
+    """Outcome of one throw without scatter over filling and omega_0; lines where the bottle touches upright."""
+    figure, panels = new_figure(1, max(len(found.maps), 1), size=(8.6, 4.6), squeeze=False, sharey=True)
+    names, colours = list(SHADES), ListedColormap(list(SHADES.values()))
+    grid = found.size.map_axes
+    for axes, (kind, outcomes) in zip(panels[0], found.maps.items(), strict=False):
+        codes = np.vectorize(lambda name: names.index(name) if name in names else len(names) - 1)(outcomes.outcome)
+        ends = {"vmin": -0.5, "vmax": len(names) - 0.5}
+        axes.pcolormesh(*grid, codes, cmap=colours, **ends, shading="nearest", rasterized=True)
+        turns = outcomes.theta / math.tau
+        for level, style in ((1.0, "-"), (2.0, "--")):
+            if np.isfinite(turns).any() and np.nanmin(turns) < level < np.nanmax(turns):
+                axes.contour(*grid, turns, levels=[level], colors="black", linestyles=style, linewidths=1.3)
+        axes.set_title(KINDS[kind].words, fontsize=10, loc="left")
+        axes.set_xlabel("fill fraction M_w / M_max [1]")
+        axes.grid(visible=False)
+    panels[0, 0].set_ylabel("ω₀ [rad/s]")
+    shown = {str(name) for outcomes in found.maps.values() for name in outcomes.outcome.ravel()}
+    patches = [Patch(facecolor=SHADES[name], edgecolor="#bbbbbb", label=name) for name in names if name in shown]
+    once = Line2D([], [], color="black", linestyle="-", label="touches at 360 degrees")
+    twice = Line2D([], [], color="black", linestyle="--", label="at 720 degrees")
+    figure.legend(handles=[*patches, once, twice], loc="outside lower center", ncols=5)
+    return figure
+
+
+@styled
+def figure_static(found: Found) -> Figure:
+    """Of the throws that the static criterion calls upright, and of those it does not, the share that stands."""
+    names = [name for name, counts in found.static.items() if sum(counts.values())]
+    figure, axes = new_figure(size=(8.6, 3.9))
+    width = 0.38
+    sides = ((True, "#0072B2", "tilt below the toppling angle at touch"), (False, "#D55E00", "tilt above it"))
+    for side, (said, colour, label) in enumerate(sides):
+        for k, name in enumerate(names):
+            counts = found.static[name]
+            total = counts[said, True] + counts[said, False]
+            height = counts[said, True] / total if total else 0.0
+            bar = axes.bar(k + (side - 0.5) * width, height, width, color=colour, label=label if k == 0 else None)
+            axes.bar_label(bar, [f"{counts[said, True]} of {total}"], fontsize=7.5, padding=2)
+    axes.set_xticks(range(len(names)), [f"{KINDS[kind].words}\nfamily {family}" for family, kind in names], fontsize=8)
+    axes.set(ylim=(0.0, 1.1), ylabel="share that stands [1]")
+    shared_legend(figure, axes, columns=2)
+    return figure
+
+
+@styled
+def figure_energy(found: Found) -> Figure:
+    """Energy of a few landings over the saddle: below 1 the outcome is final."""
+    figure, panels = new_figure(1, 2, size=(8.6, 4.0), sharey=True)
+    fallen = "#B08D57"
+    for axes, kind in zip(panels, WATER_AND_ICE, strict=True):
+        for run in found.energies:
+            if run.kind == kind:
+                colour = SHADES["upright"] if run.outcome == "upright" else fallen
+                axes.plot(run.t, np.minimum(run.energy, 8.0), color=colour, linewidth=1.1, alpha=0.85)
+        axes.axhline(1.0, color="black", linewidth=1.2)
+        axes.set_title(KINDS[kind].words, fontsize=10, loc="left")
+        axes.set(xlabel="time from the touch [s]", ylim=(0.4, 4.0))
+        axes.margins(x=0.0)
+    panels[0].set_ylabel("energy over the table / saddle E_s [1]")
+    handles = [Line2D([], [], color=SHADES["upright"], label="ends upright")]
+    handles += [Line2D([], [], color=fallen, label="ends lying or on the cap")]
+    handles += [Line2D([], [], color="black", label="saddle: below it the outcome is final")]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    return figure
+
+
+@styled
+def figure_witnesses(cases: Sequence[Mapping[str, Any]]) -> Figure:
+    """Outcomes of two programs from one touch, a matrix for each pair and law."""
+    matrices = [(case, matrix) for case in cases for matrix in case["matrices"]]
+    columns = 4
+    rows = -(-len(matrices) // columns)
+    figure, panels = new_figure(rows, columns, size=(8.6, 2.3 * rows), squeeze=False)
+    names = ("upright", "lying", "cap", "undecided")
+    for axes in panels.ravel()[len(matrices) :]:
+        axes.set_axis_off()
+    for axes, (case, matrix) in zip(panels.ravel(), matrices, strict=False):
+        counts = np.array([[matrix["outcomes"].get(f"{one}/{other}", 0) for other in names] for one in names])
+        axes.imshow(np.sqrt(counts), cmap="Blues", vmin=0.0, vmax=1.6 * math.sqrt(matrix["touches"]))
+        for (row, column), count in np.ndenumerate(counts):
+            if count:
+                colour = "#B00020" if row != column else "black"
+                axes.text(column, row, str(count), ha="center", va="center", fontsize=8, color=colour)
+        axes.set_xticks(range(4), names, fontsize=8, rotation=90)
+        axes.set_yticks(range(4), names, fontsize=8)
+        axes.grid(visible=False)
+        kind = "ice" if case["law"] is None else f"water, {case['law']}\nslices {case['slices']}"
+        axes.set_title(kind, fontsize=8)
+        axes.set_ylabel(matrix["programs"][0], fontsize=8)
+        axes.set_xlabel(matrix["programs"][1], fontsize=8)
+    return figure

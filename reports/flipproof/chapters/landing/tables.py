@@ -5,30 +5,20 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
-from flipproof.chapters.landing.study import KINDS, Cell, Found, Kind
-
-NAMES: dict[Kind, str] = {
-    "together": "water, together",
-    "in-turn": "water, in turn",
-    "compliant": "water, compliant",
-    "ice": "ice",
-    "ice, compliant": "ice, compliant",
-}
-"""What is landed, as figures and tables name it."""
-
-FAMILIES = {"A": "A: ω₀ as thrown", "B": "B: time of flight as thrown"}
-"""Family of throws -> what all its bottles share."""
+from flipproof.chapters.landing.study import KINDS, Found
+from flipproof.landing.aim import FAMILIES
 
 
 def shares_csv(found: Found) -> str:
     """Return one row for each share: what was thrown, the share with its 95 % interval, and means at the touch."""
     rows = [
         [
-            key.axis, key.value, key.family, key.filling, NAMES[key.kind], cell.share.upright, cell.share.undecided,
-            cell.missed, cell.share.throws, cell.share.value, *cell.share.interval, cell.aim.throw.omega0,
-            cell.aim.height, cell.aim.time, cell.omega, cell.speed, cell.energy, cell.bounces,
+            key.axis, key.value, key.family, key.filling, KINDS[key.kind].words, cell.share.upright,
+            cell.share.undecided, cell.missed, cell.share.throws, cell.share.value, *cell.share.interval,
+            cell.aim.throw.omega0, cell.aim.height, cell.aim.time, cell.omega, cell.speed, cell.energy, cell.bounces,
         ]
         for key, cell in found.cells.items()
     ]  # fmt: skip
@@ -42,11 +32,12 @@ def shares_csv(found: Found) -> str:
 
 def map_csv(found: Found) -> str:
     """Return one row for each cell of the map."""
+    fillings, omegas = found.size.map_axes
     rows = [
-        [fill, omega0, NAMES[kind], outcomes.outcome[j, i], math.degrees(outcomes.theta[j, i])]
+        [fill, omega0, KINDS[kind].words, outcomes.outcome[j, i], math.degrees(outcomes.theta[j, i])]
         for kind, outcomes in found.maps.items()
-        for j, omega0 in enumerate(found.omegas.tolist())
-        for i, fill in enumerate(found.fillings.tolist())
+        for j, omega0 in enumerate(omegas.tolist())
+        for i, fill in enumerate(fillings.tolist())
     ]
     return _csv(("fill_fraction [1]", "omega0 [rad/s]", "landed", "outcome", "theta at touch [degrees]"), rows)
 
@@ -54,7 +45,7 @@ def map_csv(found: Found) -> str:
 def static_csv(found: Found) -> str:
     """Return how often the static criterion and the outcome agree."""
     rows = [
-        [family, NAMES[kind], "yes" if said else "no", "yes" if true else "no", count]
+        [family, KINDS[kind].words, "yes" if said else "no", "yes" if true else "no", count]
         for (family, kind), counts in found.static.items()
         for (said, true), count in counts.items()
     ]
@@ -64,47 +55,26 @@ def static_csv(found: Found) -> str:
 def energies_csv(found: Found) -> str:
     """Return the energies that are drawn."""
     rows = [
-        [NAMES[run.kind], k, run.outcome, t, e]
+        [KINDS[run.kind].words, k, run.outcome, t, e]
         for k, run in enumerate(found.energies)
         for t, e in zip(run.t.tolist(), run.energy.tolist(), strict=True)
     ]
     return _csv(("landed", "throw", "outcome", "t [s]", "energy [E_s]"), rows)
 
 
-def share_text(cell: Cell | None) -> str:
-    """Return a share with its interval."""
-    if cell is None:
-        return "-"
-    low, high = cell.share.interval
-    return f"{cell.share.value:.3f} [{low:.3f}, {high:.3f}]"
-
-
-def share_line(found: Found, family: str) -> str:
-    """Return the shares of one family as lines."""
-    lines = [f"P(upright), family {family}, 95 % intervals:"]
-    for kind in KINDS:
-        curve = found.curve(family, kind)
-        if curve:
-            lines.append(f"  {NAMES[kind]}: " + ", ".join(f"{fill:g}: {share_text(cell)}" for fill, cell in curve))
-    return "\n".join(lines)
-
-
-def _shares_of(found: Found, family: str) -> tuple[str, list[float], list[tuple[str, list[dict[str, str]]]]]:
-    """Return a family in words, its fillings, and the shares of every law of the impact there with their intervals."""
-    curves = {NAMES[kind]: dict(found.curve(family, kind)) for kind in KINDS}
-    fills = sorted({fill for curve in curves.values() for fill in curve})
-    rows = [(name, [_cell_words(curve.get(fill)) for fill in fills]) for name, curve in curves.items() if curve]
-    return f"family {FAMILIES[family]}", fills, rows
-
-
-def _cell_words(cell: Cell | None) -> dict[str, str]:
-    if cell is None:
-        return {"value": "–", "interval": ""}
-    low, high = cell.share.interval
-    return {"value": f"{cell.share.value:.2f}", "interval": f"{low:.2f} to {high:.2f}"}
+def witnesses_csv(stored: Mapping[str, Any]) -> str:
+    """Return how many touches end in which pair of outcomes, for every pair of programs."""
+    rows = [
+        [case["slices"], case["law"], *matrix["programs"], *pair.split("/"), count]
+        for case in stored["cases"]
+        for matrix in case["matrices"]
+        for pair, count in matrix["outcomes"].items()
+    ]
+    return _csv(("slices", "law", "first", "second", "outcome of first", "outcome of second", "touches"), rows)
 
 
 def _csv(names: Iterable[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return rows as CSV, every digit of a number; one that is none is an empty cell."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(names)
@@ -113,9 +83,35 @@ def _csv(names: Iterable[str], rows: Iterable[Sequence[object]]) -> str:
     return text.getvalue()
 
 
+def share_line(found: Found, family: str) -> str:
+    """Return the shares of one family as lines."""
+    lines = [f"P(upright), family {family}, 95 % intervals:"]
+    for kind, landing in KINDS.items():
+        words = []
+        for fill, cell in found.curve(family, kind):
+            low, high = cell.share.interval
+            words.append(f"{fill:g}: {cell.share.value:.3f} [{low:.3f}, {high:.3f}]")
+        if words:
+            lines.append(f"  {landing.words}: " + ", ".join(words))
+    return "\n".join(lines)
+
+
 def page(found: Found) -> dict[str, object]:
-    """Return what the chapter's template takes."""
-    return {
-        "shares": [_shares_of(found, family) for family in found.size.families],
-        "unaimed": sorted(set(found.unaimed.values())),
-    }
+    """Return what the chapter's template takes: a table a family, and why some throws were not made.
+
+    A table is the family in words, its fillings, and a row for every law of the impact with share and interval there.
+    """
+    shares = []
+    for family in found.size.families:
+        curves = {landing.words: dict(found.curve(family, kind)) for kind, landing in KINDS.items()}
+        fills = sorted({fill for curve in curves.values() for fill in curve})
+        rows = []
+        for name, curve in curves.items():
+            cells = [{"value": "–", "interval": ""} for _ in fills]
+            for k, fill in enumerate(fills):
+                if fill in curve:
+                    low, high = curve[fill].share.interval
+                    cells[k] = {"value": f"{curve[fill].share.value:.2f}", "interval": f"{low:.2f} to {high:.2f}"}
+            rows += [(name, cells)] if curve else []
+        shares.append((f"family {family}: {FAMILIES[family]}", fills, rows))
+    return {"shares": shares, "unaimed": sorted(set(found.unaimed.values()))}
