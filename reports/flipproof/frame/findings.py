@@ -41,11 +41,17 @@ class Finding:
     id: str
     title: str
     value: float | None
-    unit: str
-    kind: Kind
+    unit: str = ""
+    kind: Kind = "observation"
     admissible: tuple[float, float] = (-math.inf, math.inf)
     band: float | None = None
     note: str = ""
+
+    def __post_init__(self) -> None:
+        if self.kind == "observation" and any(map(math.isfinite, self.admissible)):
+            raise ValueError(
+                f"{self.id}: an observation cannot fail; admissible = {self.admissible} is for regressions"
+            )
 
     @property
     def verdict(self) -> Verdict:
