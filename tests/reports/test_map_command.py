@@ -166,7 +166,7 @@ def test_table_and_contours_say_what_the_map_holds(tmp_path):
     assert [(contour["of"], contour["level"]) for contour in facts["contours"]] == [
         (of, level) for of in ("error of published-python", "change by overlap") for level in (0.01, 0.1)
     ]
-    shown = {"error of published-python": study.error("published-python"), "change by overlap": abs(study.overlap)}
+    shown = {"error of published-python": study.error, "change by overlap": abs(study.overlap)}
     for contour in facts["contours"]:
         error = shown[contour["of"]]
         assert contour["cells above"] == (error >= contour["level"]).sum()
