@@ -14,6 +14,7 @@ from flipproof.chapters.waterfall.study import (
     NAMES,
     OBSERVABLES,
     canonical,
+    observe,
     plan_finer,
     plan_waterfall,
     study_waterfall,
@@ -112,10 +113,11 @@ def test_the_margin_is_that_of_direct_runs():
     runs = {run: make(run).flight for run in (*plan_waterfall(throw, 200), *plan_finer(throw, 200))}
     found = study_waterfall(waterfall.program_run(throw, 200), runs)
     column, few, many = (ode_reference.solve(throw.with_slices(n), m) for n, m in ((2, "column"), (2, FREE), (4, FREE)))
+    column, few, many = map(observe, (column, few, many))
     for part in found:
-        difference = part.observable.of(column) - part.observable.of(few)
-        assert part.overlap == pytest.approx(difference, abs=1e-12)
-        assert part.finer_overlap == pytest.approx(part.observable.of(column) - part.observable.of(many), abs=1e-12)
+        name = part.observable.name
+        assert part.overlap == pytest.approx(column[name] - few[name], abs=1e-12)
+        assert part.finer_overlap == pytest.approx(column[name] - many[name], abs=1e-12)
 
 
 @pytest.mark.parametrize("kind", ["twin in release", "twin in rest speed"])
