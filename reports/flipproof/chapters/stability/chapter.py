@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -12,7 +11,6 @@ import numpy as np
 from flipproof.chapters.stability.figure import figure_stability
 from flipproof.chapters.stability.study import (
     DEFAULT_ITERATIONS,
-    ENGINE,
     FULL,
     GOOD,
     QUICK,
@@ -21,7 +19,7 @@ from flipproof.chapters.stability.study import (
     plan_stability,
     study_stability,
 )
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged
 from flipproof.output.columns import rows_csv
 from slicemodel import Trajectory
 
@@ -36,18 +34,15 @@ class Stability:
 
 def study(ask: Ask) -> Study[Stability]:
     """Fly every cell of the layout ``ask.work``."""
-    default = Run(ENGINE, ask.throw, {"iterations": DEFAULT_ITERATIONS}, f"{ENGINE}, {DEFAULT_ITERATIONS} iterations")
+    default = Run("pymunk", ask.throw, {"iterations": DEFAULT_ITERATIONS}, f"pymunk, {DEFAULT_ITERATIONS} iterations")
     flights = yield [*plan_stability(ask.reference, ask.work), default]
     return Stability(study_stability(ask.reference, ask.work, flights), flights[default])
 
 
 def claims(found: Stability) -> Claims:
     """Yield the rule of iterations, what happens at the default, and how many runs are whole and wrong."""
-    if found.default.trajectory is not None:
-        yield claim_explosion_is_reported(found.default.trajectory)
-    else:
-        title = f"{ENGINE} with its default {DEFAULT_ITERATIONS} iterations"
-        yield Absent("engine-default-iterations", title, found.default.reason, "observation")
+    id_, title = "engine-default-iterations", f"pymunk with its default {DEFAULT_ITERATIONS} iterations"
+    yield judged(claim_explosion_is_reported, found.default, id=id_, title=title, kind="observation")
     yield claim_rule_of_iterations(found.panels)
     yield claim_default_iterations_explode(found.panels)
     yield claim_whole_and_wrong(found.panels)
@@ -55,8 +50,7 @@ def claims(found: Stability) -> Claims:
 
 def claim_rule_of_iterations(panels: Sequence[StabilityPanel]) -> Finding:
     """With the iterations that the rule asks for, and a step up to twice the default, pymunk follows free flight."""
-    errors = np.concatenate([panel.by_the_rule for panel in panels]) if panels else np.array([])
-    band = float(np.max([panel.band for panel in panels])) if panels else math.nan
+    errors = np.concatenate([panel.by_the_rule for panel in panels])
     return Finding(
         id="engine-rule-of-iterations",
         title=f"pymunk with enough iterations and Δt ≤ {RULE_DT:g} s: largest error of ω(t) against free flight",
@@ -65,20 +59,19 @@ def claim_rule_of_iterations(panels: Sequence[StabilityPanel]) -> Finding:
         unit="of ω₀",
         kind="regression",
         admissible=(0.0, GOOD),
-        band=band,
+        band=float(np.max([panel.band for panel in panels])),
         note=f"{len(errors)} runs; " + "; ".join(panel.words for panel in panels),
     )
 
 
 def claim_default_iterations_explode(panels: Sequence[StabilityPanel]) -> Finding:
     """No run with pymunk's own number of iterations reaches the end of the flight, whatever its step."""
-    grades = np.concatenate([panel.at_default for panel in panels]) if panels else np.array([])
+    grades = np.concatenate([panel.at_default for panel in panels])
     stopped = int((grades == "explodes").sum())
     return Finding(
         id="engine-default-explodes",
         title=f"pymunk with its default {DEFAULT_ITERATIONS} iterations: runs that do not explode",
         value=float(len(grades) - stopped) if len(grades) else None,
-        unit="",
         kind="regression",
         admissible=(0.0, 0.0),
         note=f"of {len(grades)}, at every step of the chart; each is reported as diverged with its reason",
@@ -88,13 +81,12 @@ def claim_default_iterations_explode(panels: Sequence[StabilityPanel]) -> Findin
 def claim_whole_and_wrong(panels: Sequence[StabilityPanel]) -> Finding:
     """How many runs break no invariant and are wrong all the same: only a reference tells."""
     counts = {grade: sum(panel.counts[grade] for panel in panels) for grade in ("wrong", "good", "excellent")}
-    errors = np.concatenate([panel.error[panel.grade == "wrong"] for panel in panels]) if panels else np.array([])
+    errors = np.concatenate([panel.error[panel.grade == "wrong"] for panel in panels])
     return Finding(
         id="engine-whole-and-wrong",
         title=f"pymunk: runs that break no invariant and are wrong by more than {GOOD:.0%} of ω₀",
         value=float(counts["wrong"]),
         unit=f"of {sum(counts.values())}",
-        kind="observation",
         note=f"by up to {100 * errors.max():.2g} % of ω₀; only a reference tells"
         if len(errors)
         else "none on this chart",
@@ -109,15 +101,13 @@ def claim_explosion_is_reported(trajectory: Trajectory) -> Finding:
         title=f"{trajectory.method} with its default 10 iterations: last output time before an invariant breaks",
         value=float(trajectory.t[-1]) if diverged else None,
         unit="s",
-        kind="observation",
         note=trajectory.message or "the run did not diverge",
     )
 
 
 def figures(found: Stability) -> Iterator[Exhibit]:
     """Yield the chart."""
-    if found.panels:
-        yield draw_stability(found.panels)
+    yield draw_stability(found.panels)
 
 
 def draw_stability(panels: Sequence[StabilityPanel]) -> Exhibit:
@@ -143,12 +133,12 @@ def draw_stability(panels: Sequence[StabilityPanel]) -> Exhibit:
         alt="Charts of step against solver iterations. " + ". ".join(panel.words for panel in panels) + ".",
         maker=figure_stability,
         data=(panels,),
-        table=table_stability(panels),
+        table=_cells_csv(panels),
     )
 
 
-def table_stability(panels: Sequence[StabilityPanel]) -> str:
-    """Every cell of the chart."""
+def _cells_csv(panels: Sequence[StabilityPanel]) -> str:
+    """Return every cell of the chart."""
     return rows_csv(
         ("mass ratio M_w/M_b [1]", "slices [1]", "iterations [1]", "iterations by the rule [1]", "dt [s]", "grade",
          "largest error of omega [of omega_0]", "error of the plateau [of omega_0]", "stopped after [s]", "reason"),

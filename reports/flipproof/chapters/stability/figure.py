@@ -12,21 +12,18 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
-from flipproof.chapters.stability.study import DEFAULT_ITERATIONS, GRADES, StabilityPanel
+from flipproof.chapters.stability.study import DEFAULT_ITERATIONS, StabilityPanel
 from flipproof.figures.style import new_figure, styled
 
-COLOURS = dict(zip(GRADES, ("#7CCBA8", "#CDEBDC", "#F7DC87", "#C6B5E3", "#EDA184", "#F0F0F0"), strict=True))
-SIGNS = dict(zip(GRADES, ("++", "+", "≠", "↓", "×", "–"), strict=True))
-"""One colour and one sign per grade: the chart can be read without colours."""
-
-GRADE_WORDS = {
-    "excellent": "++ error ≤ 0.1 % of ω₀",
-    "good": "+ error ≤ 1 %",
-    "wrong": "≠ whole, but error > 1 %",
-    "sinks in": "↓ stopped: slices sink in (shorten Δt)",
-    "explodes": "× stopped: joints open (iterate more)",
-    "not run": "– not run",
+LOOKS = {
+    "excellent": ("#7CCBA8", "++", "++ error ≤ 0.1 % of ω₀"),
+    "good": ("#CDEBDC", "+", "+ error ≤ 1 %"),
+    "wrong": ("#F7DC87", "≠", "≠ whole, but error > 1 %"),
+    "sinks in": ("#C6B5E3", "↓", "↓ stopped: slices sink in (shorten Δt)"),
+    "explodes": ("#EDA184", "×", "× stopped: joints open (iterate more)"),
+    "not run": ("#F0F0F0", "–", "– not run"),
 }
+"""One colour, one sign and the words of the legend per grade: the chart can be read without colours."""
 
 
 @styled
@@ -44,9 +41,10 @@ def figure_stability(panels: Sequence[StabilityPanel]) -> Figure:
         at.set_ylabel("iterations per step [1]")
     for at in axes[-1, :]:
         at.set_xlabel("step Δt [ms], finer to the right")
-    present = [grade for grade in GRADES if any(panel.counts[grade] for panel in panels)]
     handles: list[Artist] = [
-        Patch(facecolor=COLOURS[grade], edgecolor="#888888", label=GRADE_WORDS[grade]) for grade in present
+        Patch(facecolor=colour, edgecolor="#888888", label=words)
+        for grade, (colour, _, words) in LOOKS.items()
+        if any(panel.counts[grade] for panel in panels)
     ]
     handles.append(Line2D([], [], color="black", linewidth=2.0, label="rule: enough iterations above it"))
     handles.append(Line2D([], [], color="black", linewidth=1.2, linestyle="--", label="pymunk's default iterations"))
@@ -57,7 +55,7 @@ def figure_stability(panels: Sequence[StabilityPanel]) -> Figure:
 def _draw_panel(axes: Axes, panel: StabilityPanel) -> None:
     for (row, column), grade in np.ndenumerate(panel.grade):
         corner = (column - 0.5, row - 0.5)
-        axes.add_patch(Rectangle(corner, 1, 1, facecolor=COLOURS[grade], edgecolor="white", linewidth=1.0))
+        axes.add_patch(Rectangle(corner, 1, 1, facecolor=LOOKS[grade][0], edgecolor="white", linewidth=1.0))
         axes.text(column, row, _cell_text(panel, row, column), ha="center", va="center", fontsize=7.5)
     axes.set_xlim(-0.5, len(panel.dt) - 0.5)
     axes.set_ylim(-0.5, len(panel.iterations) - 0.5)
@@ -78,7 +76,8 @@ def _draw_panel(axes: Axes, panel: StabilityPanel) -> None:
 
 
 def _cell_text(panel: StabilityPanel, row: int, column: int) -> str:
-    grade, sign = panel.grade[row, column], SIGNS[panel.grade[row, column]]
+    grade = panel.grade[row, column]
+    sign = LOOKS[grade][1]
     if grade == "not run":
         return sign
     if grade in ("explodes", "sinks in"):
