@@ -102,20 +102,14 @@ def test_the_plan_changes_angle_and_spin_by_each_size_both_ways():
     assert all(run.settings == {"rtol": 1e-9} for level in plan for run in level)
 
 
-@pytest.mark.parametrize("options", [{"members": 0}, {"members": 5}, {"sizes": (0.0,)}])
-def test_an_impossible_plan_is_refused(options):
-    with pytest.raises(ValueError, match=r"outside|positive"):
-        plan_predictability(THROW, "eq8", **options)
-
-
 def test_a_smooth_flight_has_a_horizon_for_each_size_and_for_round_off():
     study = study_predictability(flight(), members(lambda size: size * np.exp(40 * T)))
     expected = [math.log(1e-3 / size) / 40 for size in SIZES]
     assert study.sizes == pytest.approx(SIZES, rel=1e-6, abs=0.0)
     assert study.horizons == pytest.approx(expected, abs=1e-3)
     assert study.horizon == pytest.approx(expected[-1], abs=1e-3)
-    assert study.largest_amplification == pytest.approx(math.exp(20), rel=1e-4, abs=0.0)
-    assert [growth.rate for growth in study.growths] == pytest.approx([40] * 4, rel=1e-3, abs=0.0)
+    assert study.amplification == pytest.approx(math.exp(20), rel=1e-4, abs=0.0)
+    assert study.growth.rate == pytest.approx(40, rel=1e-3, abs=0.0)
     assert study.round_off_horizon is None
     assert study.rough_from is None
     steep = study_predictability(flight(), members(lambda size: size * np.exp(60 * T)))
@@ -133,20 +127,20 @@ def test_a_flight_without_growth_is_predictable_to_the_end():
 def test_a_jump_that_does_not_care_for_the_size_is_said_so():
     study = study_predictability(flight(), members(lambda size: np.where(T < 0.2, size, 3e-4)))
     assert study.rough_from == pytest.approx(0.2, abs=1e-3)
-    assert study.largest_amplification == pytest.approx([3e5, 3e4, 3e3, 3e2], rel=1e-3, abs=0.0)
+    assert study.amplification == pytest.approx([3e5, 3e4, 3e3, 3e2], rel=1e-3, abs=0.0)
     assert "cannot be extrapolated" in study.words
 
 
 def test_a_member_that_ends_early_is_a_horizon_and_not_a_cut():
     levels = members(lambda size: size)
     short = T[:401]
-    levels[2][1] = replace(flight(1e-7, t=short, status="diverged"), scenario=levels[2][1].scenario)
+    levels[0][1] = replace(flight(1e-9, t=short, status="diverged"), scenario=levels[0][1].scenario)
     study = study_predictability(flight(), levels)
     assert len(study.t) == len(T)
-    assert study.horizons[2] == pytest.approx(short[-1])
-    assert study.horizons[3] is None
-    assert np.isinf(study.spread[2, -1])
-    assert np.isfinite(study.growths[2].rate)
+    assert study.horizons[0] == pytest.approx(short[-1])
+    assert study.horizons[1:] == (None,) * 3
+    assert np.isinf(study.spread[0, -1])
+    assert np.isfinite(study.growth.rate)
 
 
 def test_a_base_that_ends_early_says_so():
@@ -161,8 +155,8 @@ def test_eq8_is_smooth_and_ice_amplifies_nothing():
         levels = [[make(run).trajectory for run in level] for level in plan_predictability(throw, solver, (1e-7, 1e-6))]
         study = study_predictability(solve(solver, throw), levels)
         assert study.spread[:, 0] == pytest.approx(study.sizes, rel=1e-6, abs=0.0)
-        assert study.largest_amplification.min() > 0.999
-        assert study.largest_amplification.max() < most
+        assert study.amplification.min() > 0.999
+        assert study.amplification.max() < most
         assert study.horizon is None
 
 
