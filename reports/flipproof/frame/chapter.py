@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
 from flipproof.frame.exhibit import Exhibit, Touch
-from flipproof.frame.findings import Finding, Kind
+from flipproof.frame.findings import Finding, Kind, observed, regression
 from flipproof.frame.flights import Call, Flights, Outcome, attempt
 from flipproof.frame.solvers import Made, Missing, Run
 from flipproof.frame.throws import REFERENCE
@@ -24,7 +24,7 @@ from slicemodel import Scenario
 
 __all__ = [
     "Absent", "Ask", "Call", "Chapter", "Claims", "Exhibit", "Finding", "Flights", "Kind", "Made", "Missing", "Outcome",
-    "Part", "Run", "Size", "Study", "Touch", "attempt", "judged",
+    "Part", "Run", "Size", "Study", "Touch", "attempt", "judged", "observed", "regression",
 ]  # fmt: skip
 """All that a chapter is written with."""
 

@@ -41,17 +41,11 @@ class Finding:
     id: str
     title: str
     value: float | None
-    unit: str = ""
-    kind: Kind = "observation"
+    unit: str
+    kind: Kind
     admissible: tuple[float, float] = (-math.inf, math.inf)
     band: float | None = None
     note: str = ""
-
-    def __post_init__(self) -> None:
-        if self.kind == "observation" and any(map(math.isfinite, self.admissible)):
-            raise ValueError(
-                f"{self.id}: an observation cannot fail; admissible = {self.admissible} is for regressions"
-            )
 
     @property
     def verdict(self) -> Verdict:
@@ -103,3 +97,17 @@ class Finding:
         mapping["threshold"] = self.threshold_text
         mapping["verdict"] = self.verdict
         return mapping
+
+
+def observed(
+    id: str, title: str, value: float | None, unit: str = "", note: str = "", *, band: float | None = None
+) -> Finding:
+    """Return an observation; its value is None if it could not be made, and ``note`` says why."""
+    return Finding(id=id, title=title, value=value, unit=unit, kind="observation", band=band, note=note)
+
+
+def regression(
+    id: str, title: str, value: float | None, unit: str, admissible: tuple[float, float], note: str = ""
+) -> Finding:
+    """Return a claim that fails unless its value lies in the closed interval ``admissible``."""
+    return Finding(id=id, title=title, value=value, unit=unit, kind="regression", admissible=admissible, note=note)

@@ -12,7 +12,7 @@ import numpy as np
 from flipproof.chapters.model_form.richardson import Richardson, richardson
 from flipproof.chapters.model_form.study import ModelForm, study_omega
 from flipproof.chapters.step_size.study import plan_step_size
-from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Finding, Outcome, Run, Study, attempt, judged
+from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Finding, Outcome, Run, Study, attempt, judged, observed
 from slicemodel import Trajectory
 
 FORMS: Final = (
@@ -71,7 +71,7 @@ def claims(found: Forms) -> Claims:
 def claim_limit(scheme: str, limit: Richardson) -> Finding:
     """Where omega(T) / omega_0 of a scheme goes as its step goes to zero, with its grid-convergence index."""
     how = f"observed order {limit.order:.2f}; band: grid-convergence index; " if limit.ok else ""
-    return Finding(
+    return observed(
         id=f"limit-{scheme}",
         title=f"{scheme}: ω(T)/ω₀ extrapolated to Δt = 0 (Richardson)",
         value=limit.value if limit.ok else None,
@@ -82,7 +82,7 @@ def claim_limit(scheme: str, limit: Richardson) -> Finding:
 
 def claim_model_form(id_: str, title: str, form: ModelForm) -> Finding:
     """What stays of a scheme's error as its step goes to zero decides between step size and another equation."""
-    return Finding(id=id_, title=f"{title}: {form.verdict}", value=form.floor, unit="of ω₀", note=form.reason)
+    return observed(id=id_, title=f"{title}: {form.verdict}", value=form.floor, unit="of ω₀", note=form.reason)
 
 
 CHAPTER: Final = Chapter(

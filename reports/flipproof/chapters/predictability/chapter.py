@@ -8,7 +8,7 @@ from typing import Final
 
 from flipproof.chapters.predictability.figure import figure_predictability
 from flipproof.chapters.predictability.study import Predictability, plan_predictability, study_predictability
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Outcome, Study, attempt, judged
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Outcome, Study, attempt, judged, observed
 from flipproof.output.columns import curves_csv
 
 Found = Mapping[str, Outcome[Predictability]]
@@ -36,7 +36,7 @@ def claims(found: Found) -> Claims:
 
 def claim_predictability(solver: str, study: Predictability) -> Finding:
     """How much a tiny change of the release is amplified, and up to when a curve means anything."""
-    return Finding(
+    return observed(
         id=f"predictability-{solver}",
         title=f"{solver}: largest amplification of a change of {study.sizes[0]:.0e} of the release",
         value=float(study.amplification[0]),

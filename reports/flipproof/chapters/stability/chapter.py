@@ -19,7 +19,19 @@ from flipproof.chapters.stability.study import (
     plan_stability,
     study_stability,
 )
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged
+from flipproof.frame.chapter import (
+    Ask,
+    Chapter,
+    Claims,
+    Exhibit,
+    Finding,
+    Made,
+    Run,
+    Study,
+    judged,
+    observed,
+    regression,
+)
 from flipproof.output.columns import rows_csv
 from slicemodel import Trajectory
 
@@ -68,11 +80,11 @@ def claim_default_iterations_explode(panels: Sequence[StabilityPanel]) -> Findin
     """No run with pymunk's own number of iterations reaches the end of the flight, whatever its step."""
     grades = np.concatenate([panel.at_default for panel in panels])
     stopped = int((grades == "explodes").sum())
-    return Finding(
+    return regression(
         id="engine-default-explodes",
         title=f"pymunk with its default {DEFAULT_ITERATIONS} iterations: runs that do not explode",
         value=float(len(grades) - stopped) if len(grades) else None,
-        kind="regression",
+        unit="",
         admissible=(0.0, 0.0),
         note=f"of {len(grades)}, at every step of the chart; each is reported as diverged with its reason",
     )
@@ -82,7 +94,7 @@ def claim_whole_and_wrong(panels: Sequence[StabilityPanel]) -> Finding:
     """How many runs break no invariant and are wrong all the same: only a reference tells."""
     counts = {grade: sum(panel.counts[grade] for panel in panels) for grade in ("wrong", "good", "excellent")}
     errors = np.concatenate([panel.error[panel.grade == "wrong"] for panel in panels])
-    return Finding(
+    return observed(
         id="engine-whole-and-wrong",
         title=f"pymunk: runs that break no invariant and are wrong by more than {GOOD:.0%} of ω₀",
         value=float(counts["wrong"]),
@@ -96,7 +108,7 @@ def claim_whole_and_wrong(panels: Sequence[StabilityPanel]) -> Finding:
 def claim_explosion_is_reported(trajectory: Trajectory) -> Finding:
     """At the engine's default of 10 iterations the run explodes, and is reported as diverged instead of shown."""
     diverged = trajectory.status == "diverged"
-    return Finding(
+    return observed(
         id="engine-default-iterations",
         title=f"{trajectory.method} with its default 10 iterations: last output time before an invariant breaks",
         value=float(trajectory.t[-1]) if diverged else None,

@@ -26,6 +26,7 @@ from flipproof.frame.chapter import (
     Study,
     attempt,
     judged,
+    observed,
 )
 from flipproof.output.columns import rows_csv
 
@@ -112,11 +113,12 @@ def claim_order(study: StepSize, where: str, *, kind: Kind = "regression") -> Fi
     title = f"{study.scheme} converges to {study.model} at order 1, {where}"
     if study.exact:
         note = "there is no step error to be seen: all errors are at round-off"
-        return Finding(id=id_, title=title, value=float(study.error.max()), unit="of ω₀", note=note)
+        return observed(id_, title, float(study.error.max()), "of ω₀", note)
     return Finding(
         id=id_,
         title=title,
         value=study.order if study.refined or kind == "observation" else math.nan,
+        unit="",
         kind=kind,
         admissible=(0.9, 1.1) if kind == "regression" else (-math.inf, math.inf),
         band=study.order_error,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from flipproof.chapters.vectors.published import Vector, deviations, load_all
-from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Made, Run, Study, judged
+from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Made, Run, Study, judged, regression
 
 TOLERANCE: Final = {"published-python": 1e-10, "published-matlab": 1e-8}
 """Relative; the two sides differ by the order of additions and, for MATLAB, by amplified round-off."""
@@ -47,12 +47,11 @@ def claims(found: tuple[Repeated, ...]) -> Claims:
 def claim_vectors(name: str, scheme: str, off: Mapping[str, float]) -> Finding:
     """The scheme reproduces what the published program prints; ``off`` is the largest deviation of each column."""
     worst = max(off, key=lambda column: math.inf if math.isnan(off[column]) else off[column])
-    return Finding(
+    return regression(
         id=f"vectors-{name}",
         title=f"{scheme} reproduces the published run {name}",
         value=float(off[worst]),
         unit="relative",
-        kind="regression",
         admissible=(0.0, TOLERANCE[scheme]),
         note=f"largest in column {worst}, over {len(off)} columns",
     )

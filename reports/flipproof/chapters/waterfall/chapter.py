@@ -8,7 +8,7 @@ from typing import Final
 
 from flipproof.chapters.waterfall.figure import figure_waterfall
 from flipproof.chapters.waterfall.study import Waterfall, plan_finer, plan_waterfall, program_run, study_waterfall
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, observed
 from flipproof.frame.throws import FINER
 from flipproof.output.columns import rows_csv
 
@@ -31,7 +31,7 @@ def claims(found: tuple[Waterfall, ...]) -> Claims:
 def claim_waterfall(waterfall: Waterfall) -> Finding:
     """From the published program to free flight, split over the assumptions; the bars sum to the whole."""
     largest = waterfall.largest
-    return Finding(
+    return observed(
         id=f"waterfall-{waterfall.observable.name}",
         title=f"{waterfall.observable.words}: free flight minus published program",
         value=waterfall.total,
@@ -48,7 +48,7 @@ def claim_waterfall(waterfall: Waterfall) -> Finding:
 def claim_overlap(waterfall: Waterfall) -> Finding:
     """From free flight, whose slices overlap, to the column, which cannot: the margin of the waterfall."""
     finer = waterfall.finer_overlap
-    return Finding(
+    return observed(
         id="waterfall-overlap",
         title=f"{waterfall.observable.words}: column minus free flight, what forbidding overlap changes",
         value=waterfall.overlap,

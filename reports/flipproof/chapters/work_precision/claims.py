@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from flipproof.chapters.work_precision.study import Cost, Curve, WorkPrecision
-from flipproof.frame.findings import Finding
+from flipproof.frame.findings import Finding, observed
 from slicemodel.scenario import shortened
 
 
@@ -41,9 +41,9 @@ def _pair(study: WorkPrecision, first: Curve, second: Curve) -> Finding:
         if steps_a is not None and steps_b is not None:
             break
     else:
-        return Finding(id=id_, title=title, value=None, note="no error that both keep")
+        return observed(id=id_, title=title, value=None, note="no error that both keep")
     if steps_a.bound and steps_b.bound:
-        return Finding(id=id_, title=title, value=None, note=f"the first levels of both keep {error:.1e} of ω₀")
+        return observed(id=id_, title=title, value=None, note=f"the first levels of both keep {error:.1e} of ω₀")
 
     def against(cost: Cost, unit: str, scale: float = 1.0) -> str:
         prices = (study.price(curve, error, cost) for curve in (first, second))
@@ -51,7 +51,7 @@ def _pair(study: WorkPrecision, first: Curve, second: Curve) -> Finding:
 
     limit = {(False, True): "at least, ", (True, False): "at most, "}.get((steps_a.bound, steps_b.bound), "")
     count_a, count_b = (f"{'at most ' if steps.bound else ''}{steps.value:.0f}" for steps in (steps_a, steps_b))
-    return Finding(
+    return observed(
         id=id_,
         title=limit + title,
         value=steps_a.value / steps_b.value,
@@ -63,7 +63,7 @@ def _pair(study: WorkPrecision, first: Curve, second: Curve) -> Finding:
 def _order_of_midpoint(study: WorkPrecision) -> Iterator[Finding]:
     curve = study.named("midpoint")
     if curve is not None:
-        yield Finding(
+        yield observed(
             id=f"work-order-midpoint-{study.case.name}",
             title=f"observed order in cost of midpoint, {study.case.title}",
             value=None if math.isnan(curve.slope) else curve.slope,
@@ -88,7 +88,7 @@ def _cheapest(study: WorkPrecision, equation: str, error: float) -> Iterator[Fin
     work = ranked("work")
     keepers = {name for _, name, _ in work}
     others = [curve.contender.name for curve in study.of(equation) if curve.contender.name not in keepers]
-    yield Finding(
+    yield observed(
         id=f"work-cheapest-{equation}-{error:.0e}",
         title=f"{equation} to {error:.0e} of ω₀: updates of the second cheapest over the cheapest",
         value=work[1][0] / work[0][0] if len(work) > 1 else None,
@@ -101,7 +101,7 @@ def _floors(study: WorkPrecision) -> Finding:
     floors = {name: reference.floor for name, reference in study.references.items() if math.isfinite(reference.floor)}
     highest = max(floors, key=lambda name: floors[name])
     at = [curve.contender.name for curve in study.of(highest) if any(point.at_floor for point in curve.points)]
-    return Finding(
+    return observed(
         id="work-floor",
         title="highest floor of a reference, below which no contender is ranked",
         value=floors[highest],
@@ -114,7 +114,7 @@ def _floors(study: WorkPrecision) -> Finding:
 def _failures(study: WorkPrecision) -> Iterator[Finding]:
     failed = {key: curve.failed for key, curve in study.curves.items() if curve.failed}
     if failed:
-        yield Finding(
+        yield observed(
             id="work-failed",
             title=f"levels that failed, of {sum(len(curve.points) for curve in study.curves.values())}",
             value=float(sum(map(len, failed.values()))),
@@ -137,7 +137,7 @@ def _price_of_impacts(studies: Mapping[str, WorkPrecision]) -> Iterator[Finding]
             rates.append(None if found is None else found.value / study.case.scenario.duration)
         smooth, through = rates
         if smooth is not None and through is not None:
-            yield Finding(
+            yield observed(
                 id=f"work-impacts-{equation}",
                 title=f"{equation}: updates of DOP853 per second of flight, through impacts over before the first",
                 value=through / smooth,
