@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -17,17 +17,19 @@ from flipproof.frame.chapter import Ask, Chapter, Exhibit, Run, Study, attempt
 from flipproof.frame.throws import FINER
 from flipproof.output.columns import curves_csv
 from slicemodel import Trajectory
-from slicemodel.trajectory import FloatArray
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class SliceCount:
     """One scheme at several numbers of slices, and its distance from the finest cut, max |d omega| / omega_0."""
 
-    scheme: str
-    counts: tuple[int, ...]
-    trajectories: tuple[Trajectory, ...]
-    distance: FloatArray
+    trajectories: list[Trajectory]
+    distance: list[float]
+
+    @property
+    def counts(self) -> list[int]:
+        """Numbers of slices, rising."""
+        return [run.scenario.n_slices for run in self.trajectories]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +44,7 @@ class Slices:
 def study(ask: Ask) -> Study[Slices]:
     """Throw the bottle in as many slices as ``ask.work`` lists, in increasing order."""
     runs = {
-        scheme: [
-            Run(scheme, ask.throw.with_slices(n), {"store": "summary"}, f"{scheme}, {n} slices")
-            for n in sorted(ask.work)
-        ]
+        scheme: [Run(scheme, ask.throw.with_slices(n), {"store": "summary"}, f"{scheme}, {n} slices") for n in ask.work]
         for scheme in SCHEMES
     }
     flights = yield [run for cuts in runs.values() for run in cuts]
@@ -57,19 +56,12 @@ def study(ask: Ask) -> Study[Slices]:
     return Slices(schemes, ask.throw.n_slices, FINER * ask.throw.n_slices)
 
 
-def compare(runs: Sequence[Trajectory]) -> SliceCount:
+def compare(runs: list[Trajectory]) -> SliceCount:
     """Compare every cut with the finest, which is the last."""
     finest = runs[-1]
     points = min(len(run.t) for run in runs)
-    distance = np.array(
-        [np.abs(run.omega[:points] - finest.omega[:points]).max() / abs(finest.scenario.omega0) for run in runs]
-    )
-    return SliceCount(
-        scheme=finest.method,
-        counts=tuple(run.scenario.n_slices for run in runs),
-        trajectories=tuple(runs),
-        distance=distance,
-    )
+    apart = [np.abs(run.omega[:points] - finest.omega[:points]).max() / abs(finest.scenario.omega0) for run in runs]
+    return SliceCount(runs, apart)
 
 
 def figures(found: Slices) -> Iterator[Exhibit]:
@@ -88,7 +80,7 @@ def figures(found: Slices) -> Iterator[Exhibit]:
         alt="Line plots of omega over omega_0 for several numbers of slices. Largest distance from the finest cut, of "
         f"omega_0: {words}.",
         maker=draw,
-        data=(dict(found.schemes),),
+        data=(found.schemes,),
         table=curves_csv(
             {
                 f"omega/omega_0 {scheme} N = {n} [1]": (run.t, run.omega / run.scenario.omega0)
