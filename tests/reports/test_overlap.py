@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from made_up import trajectory_of
 
-from flipproof.chapters.overlap.chapter import claim_column, draw_overlap
-from flipproof.chapters.overlap.figure import figure_overlap
+from flipproof.chapters.overlap.chapter import claim_column, figure_overlap, figures
 from flipproof.chapters.overlap.study import CHECK, COARSER, COLUMN, EXCLUDE, PASS, plan_overlap, study_overlap
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import Made, make
@@ -57,7 +56,7 @@ def test_levels_bands_cost_and_distance_from_ice_are_read_off():
     claim = claim_column(study)
     assert claim.value == pytest.approx(-0.598)
     assert "no share; free flight at N = 4" in claim.note
-    assert "at most −0.598, at filling 100 %" in draw_overlap(study).caption
+    assert "at most −0.598, at filling 100 %" in next(figures((study, None))).caption
     assert study.missing_from_ice(EXCLUDE) == pytest.approx(0.004)
     assert study.missing_from_ice(PASS) == pytest.approx(0.6)
     assert study.restitution == 0.5

@@ -7,12 +7,13 @@ import pytest
 from made_up import trajectory_of
 
 from flipproof.chapters.stability.chapter import (
+    LOOKS,
     claim_default_iterations_explode,
     claim_rule_of_iterations,
     claim_whole_and_wrong,
-    draw_stability,
+    figure_stability,
+    figures,
 )
-from flipproof.chapters.stability.figure import LOOKS, figure_stability
 from flipproof.chapters.stability.study import (
     FULL,
     GRADES,
@@ -149,7 +150,7 @@ def test_the_figure_signs_every_cell_and_draws_rule_and_default():
     assert "[1]" in axes.get_ylabel()
     assert list(LOOKS) == list(GRADES)
     assert all(len(set(looks)) == len(GRADES) for looks in zip(*LOOKS.values(), strict=True))
-    exhibit = draw_stability([panel])
+    (exhibit,) = figures(((panel,), None))
     assert "2 explode" not in exhibit.caption
     assert "1 not run" in exhibit.alt
     assert "Not run (1)" in exhibit.caption

@@ -18,12 +18,13 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.chapters.solvers import LIMITS, SCHEMES
+from flipproof.chapters.solvers import FREE, LIMITS, SCHEMES
 from flipproof.chapters.waterfall.study import NAMES, canonical, fair_share
 from flipproof.frame.solvers import Made, Run, make
 from flipproof.frame.twins import band, twins
 from ode_reference.models import LADDER as MODELS
 from ode_reference.models import MODELS as EQUATIONS
+from ode_reference.solver import COLUMN
 from ode_reference.switches import Switches
 from slicemodel import Scenario
 from slicemodel.observables import plateau
@@ -34,8 +35,6 @@ Axis = Literal["gamma", "step", "restitution"]
 
 LADDER: Final = ("published-python", *MODELS)
 """From what was published to what is right; each differs from the next by one mistake."""
-
-FREE: Final = LADDER[-1]
 
 RUNGS: Final = (
     "step size",
@@ -57,11 +56,11 @@ SETS: Final = {
 }
 """Every set of assumptions mended -> the model that flies it, a rung of the ladder where there is one."""
 
-COLUMN: Final = "column"
-"""Water that cannot overlap. It has no switches of the ladder: what it changes is no fair share."""
-
 EXTRA: Final = ("exact-step", COLUMN)
-"""Beside the ladder: a scheme held against its own equation, and the column against free flight."""
+"""Beside the ladder: a scheme held against its own equation, and the column, water that cannot overlap.
+
+The column has no switches of the ladder: what it changes is no fair share.
+"""
 
 SOLVERS: Final = tuple(dict.fromkeys((*LADDER, *EXTRA, *SETS.values())))
 """What flies every cell: two schemes, 40 models and the column."""

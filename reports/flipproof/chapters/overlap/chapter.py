@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from flipproof.chapters.maps.study import vary
-from flipproof.chapters.overlap.figure import figure_overlap
-from flipproof.chapters.overlap.study import COLUMN, EXCLUDE, PASS, Overlap, plan_overlap, study_overlap
+from flipproof.chapters.overlap.study import CHECK, EXCLUDE, ICE, PASS, Overlap, plan_overlap, study_overlap
+from flipproof.figures.style import STYLES, new_figure, shared_legend, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Run, Study, observed, regression
 from flipproof.output.columns import columns_csv
+from ode_reference.solver import COLUMN
 from slicemodel import Trajectory
 
 
@@ -27,15 +28,11 @@ class Amount(NamedTuple):
     dt: float = 1e-4
 
 
-@dataclass(frozen=True, slots=True)
-class Overlaps:
-    """The curves over the fill fraction of the report's throw, and the paper's own bottle filled to the brim."""
-
-    overlap: Overlap
-    full_bottle: Trajectory | None
+Found = tuple[Overlap, Trajectory | None]
+"""The curves over the fill fraction of the report's throw, and the paper's own bottle filled to the brim."""
 
 
-def study(ask: Ask) -> Study[Overlaps]:
+def study(ask: Ask) -> Study[Found]:
     """Let slices overlap, and not."""
     full = vary(ask.reference.with_slices(5), fill=1.0)
     # In a full bottle nothing can move, and resting contacts creep at first order: hence the fine step.
@@ -44,14 +41,15 @@ def study(ask: Ask) -> Study[Overlaps]:
     runs = plan_overlap(ask.throw, *ask.work)
     flights = yield [*(run for curve in runs.values() for run in curve), brim]
     run = flights.trajectory(brim)
-    return Overlaps(study_overlap(ask.work.fills, runs, flights), run if run is not None and run.ok else None)
+    return study_overlap(ask.work.fills, runs, flights), run if run is not None and run.ok else None
 
 
-def claims(found: Overlaps) -> Claims:
+def claims(found: Found) -> Claims:
     """Yield that a full bottle is ice, and by how much it is not when slices overlap."""
-    yield claim_full_bottle(found.full_bottle)
-    yield claim_overlap(found.overlap)
-    yield claim_column(found.overlap)
+    overlap, full_bottle = found
+    yield claim_full_bottle(full_bottle)
+    yield claim_overlap(overlap)
+    yield claim_column(overlap)
 
 
 def claim_full_bottle(run: Trajectory | None) -> Finding:
@@ -93,25 +91,26 @@ def claim_column(study: Overlap) -> Finding:
     )
 
 
-def figures(found: Overlaps) -> Iterator[Exhibit]:
-    """Yield the plateau over the fill fraction."""
-    yield draw_overlap(found.overlap)
-
-
-def draw_overlap(study: Overlap) -> Exhibit:
-    """Return the plateau over the fill fraction, with slices that overlap and with slices that do not."""
+def figures(found: Found) -> Iterator[Exhibit]:
+    """Yield the plateau over the fill fraction, with slices that overlap and with slices that do not."""
+    study, _ = found
     rows = "; ".join(
         f"filling {fill:.0%}: " + ", ".join(f"{name} {level[k]:.3f}" for name, level in study.level.items())
         for k, fill in enumerate(study.fills)
     )
-    return Exhibit(
+    cost = study.cost_to_column
+    most = ""
+    if np.isfinite(cost).any():
+        k = int(np.nanargmax(np.abs(cost)))
+        most = f"; at most {cost[k]:+.3f}, at filling {100 * study.fills[k]:.0f} %".replace("-", "−")
+    yield Exhibit(
         name="overlap",
         title="How far ω falls because slices may overlap",
         caption="In the paper slices pass through each other, and a full bottle, which ought to behave like ice, slows "
         "down. In the same engine, slices that are rods and exclude each other keep the angular velocity of a full "
         "bottle. The two curves differ by what overlap does. Water as one stretching column cannot overlap either, and "
         "has no parameter to choose; free flight minus the column is what overlap changes between two exact equations. "
-        f"That is a difference of two models, free flight at N = {study.slices}, and no share{_costs(study)}. In the "
+        f"That is a difference of two models, free flight at N = {study.slices}, and no share{most}. In the "
         "paper's experiment the fall is largest at fillings of 0.25 to 0.5, and a filling of 0.1 turns like ice. Bars: "
         "twice what halving the step changes.",
         alt=f"Line plot of the plateau of omega over omega_0 against the fill fraction; ice is 1. {rows}.",
@@ -119,15 +118,6 @@ def draw_overlap(study: Overlap) -> Exhibit:
         data=(study,),
         table=_plateaus_csv(study),
     )
-
-
-def _costs(study: Overlap) -> str:
-    """Return free flight minus the column where it is largest, in words."""
-    cost = np.abs(study.cost_to_column)
-    if not np.isfinite(cost).any():
-        return ""
-    k = int(np.nanargmax(cost))
-    return f"; at most {study.cost_to_column[k]:+.3f}, at filling {100 * study.fills[k]:.0f} %".replace("-", "−")
 
 
 def _plateaus_csv(study: Overlap) -> str:
@@ -141,6 +131,52 @@ def _plateaus_csv(study: Overlap) -> str:
             columns[f"missing because: {name}"] = study.reason[name]
     columns["free flight minus column [1]"] = study.cost_to_column
     return columns_csv(columns)
+
+
+LOOKS = {
+    PASS: STYLES["pymunk"] | {"marker": "o"},
+    CHECK: STYLES["free-flight"] | {"marker": "x"},
+    EXCLUDE: {"color": "#0072B2", "linestyle": "-", "linewidth": 2.2, "marker": "s"},
+    COLUMN: {"color": "#CC79A7", "linestyle": "-.", "linewidth": 1.8, "marker": "d"},
+}
+
+
+@styled
+def figure_overlap(study: Overlap) -> Figure:
+    """Plateau over fill fraction; what overlap costs is the distance between the two engine curves, ice is the top."""
+    figure, axes = new_figure(size=(8.0, 4.6))
+    axes.axhline(ICE, color="#444444", linestyle=":", linewidth=1.4)
+    axes.annotate(
+        "ice: nothing moves (expected of a full bottle)", (0.5, ICE), xytext=(0, 5), textcoords="offset points",
+        ha="center", fontsize=9, color="#444444",
+    )  # fmt: skip
+    for name, look in LOOKS.items():
+        axes.plot(study.fills, study.level[name], label=name, markersize=6, **look)
+    exclude = study.level[EXCLUDE]
+    axes.errorbar(study.fills, exclude, yerr=study.band, fmt="none", ecolor="#222222", capsize=3)
+    axes.fill_between(
+        study.fills, study.level[PASS], exclude, color="#0072B2", alpha=0.12, linewidth=0,
+        label="what overlap takes away",
+    )  # fmt: skip
+    # Each run that failed is marked at the foot of its fill fraction, so that a gap in a curve is not taken for data.
+    for k, (name, look) in enumerate(LOOKS.items()):
+        for fill, reason in zip(study.fills, study.reason[name], strict=True):
+            if reason:
+                axes.annotate(
+                    f"× {reason.partition(':')[0]}", (fill, 0.0), xytext=(0, 3 + 10 * k), textcoords="offset points",
+                    ha="center", fontsize=7.5, color=look["color"],
+                )  # fmt: skip
+    axes.set_xlim(0.0, 1.05)
+    axes.set_ylim(0.0, 1.12)
+    axes.set_xlabel("fill fraction M_w / M_max [1]")
+    axes.set_ylabel("mean of ω/ω₀ over the second half [1]")
+    axes.set_title(
+        f"{study.slices} slices, restitution {study.restitution:g} at the ends and between slices",
+        fontsize=10,
+        loc="left",
+    )
+    shared_legend(figure, axes, columns=2)
+    return figure
 
 
 CHAPTER: Final = Chapter(

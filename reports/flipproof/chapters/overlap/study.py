@@ -15,6 +15,7 @@ import numpy as np
 
 from flipproof.chapters.maps.study import vary
 from flipproof.frame.solvers import Made, Run
+from ode_reference.solver import COLUMN
 from slicemodel import Scenario
 from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray
@@ -24,8 +25,6 @@ ICE: Final = 1.0
 
 PASS, EXCLUDE, CHECK = "pymunk, slices overlap", "pymunk, slices exclude each other", "free-flight, slices overlap"
 COARSER: Final = f"{EXCLUDE}, coarser"
-COLUMN: Final = "column"
-"""Water as one stretching column: it cannot overlap, and nothing about it is chosen (``ode_reference.column``)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +37,8 @@ class Overlap:
     slices : int
     restitution : float - at the ends and between slices
     level : name -> array
-        Mean of omega / omega_0 over the second half, for PASS, EXCLUDE, CHECK and COLUMN; NaN where the run failed.
+        Mean of omega / omega_0 over the second half, for PASS, EXCLUDE, CHECK and COLUMN, which is water as one
+        stretching column (``ode_reference.column``); NaN where the run failed.
     reason : name -> F strings - "" or why the run cannot be used
     band : array - twice what halving the step changed for EXCLUDE
     """
@@ -73,7 +73,7 @@ def plan_overlap(throw: Scenario, fills: Sequence[float], slices: int, dt: float
         COARSER: ("pymunk", {"slices": "exclude", "dt": dt}),
         PASS: ("pymunk", {"dt": dt}),
         CHECK: ("free-flight", {}),
-        COLUMN: ("column", {}),
+        COLUMN: (COLUMN, {}),
     }
     return {
         name: [

@@ -61,7 +61,7 @@ def load_all() -> tuple[Vector, ...]:
         )
         for entry in json.loads((folder() / "python_vectors.json").read_text(encoding="utf-8"))
     ]
-    # MATLAB counts slices from 1. The default run overflows; it is compared up to 0.2 s, before its slices are thrown out to infinity.
+    # MATLAB counts slices from 1. Its default run is compared up to 0.2 s: its slices are thrown out to infinity later.
     default, no_drag = Scenario(n_slices=500, drag=0.01, duration=1.0), Scenario(n_slices=100, drag=0.0, duration=0.3)
     runs += [
         ("published-matlab", "matlab_default.csv", default, 249, 0.2),

@@ -25,13 +25,12 @@ from typing import Final, NamedTuple, TypeVar
 from flipproof.frame.solvers import Run
 from flipproof.frame.throws import finer
 from flipproof.frame.twins import band, twins
+from ode_reference.solver import COLUMN
 from ode_reference.switches import Switches
 from slicemodel import Scenario, Trajectory, observables
 from slicemodel.trajectory import FloatArray
 
 PROGRAM: Final = "published-python"
-COLUMN: Final = "column"
-
 NAMES: Final = MappingProxyType(
     {
         "signs": "signs of Eq. 9d: no damping",
