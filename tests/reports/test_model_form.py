@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from flipproof.chapters.model_form.richardson import richardson
-from flipproof.chapters.model_form.study import ModelForm, study_model_form, study_omega
-from flipproof.chapters.step_size.study import before_first_impact, plan_step_size
+from flipproof.chapters.model_form.study import ModelForm, study_model_form
+from flipproof.chapters.step_size.study import before_first_impact, errors_of, plan_step_size
 from flipproof.frame.solvers import make, solve
 from slicemodel import Bottle, Scenario
 
@@ -148,7 +148,7 @@ def flights(scheme, throw=THROW, multiple=27, base=COMMON):
     ],
 )
 def test_every_scheme_solves_its_own_equation_and_no_other(references, scheme, model, verdict):
-    study = study_omega(references[model], flights(scheme))
+    study = study_model_form(*errors_of(references[model], flights(scheme)))
     assert study.verdict == verdict, study.reason
     if verdict == "model form":
         assert study.floor > 0.01
@@ -156,7 +156,7 @@ def test_every_scheme_solves_its_own_equation_and_no_other(references, scheme, m
 
 def test_a_wrong_moment_of_inertia_is_model_form(references):
     slim = replace(THROW, bottle=Bottle(radius=1e-4))
-    study = study_omega(references["eq8"], flights("exact-step", slim))
+    study = study_model_form(*errors_of(references["eq8"], flights("exact-step", slim)))
     assert study.verdict == "model form"
 
 
@@ -164,12 +164,12 @@ def test_half_a_step_too_late_costs_an_order():
     start = before_first_impact(THROW, solve("eq8", THROW))
     reference = solve("eq8", start, times=np.linspace(0.0, start.duration, 10))
     runs = flights("midpoint", start, multiple=1, base=9)
-    assert passes(study_omega(reference, runs, expected_order=2.0, band=1e-12))
+    assert passes(study_model_form(*errors_of(reference, runs), expected_order=2.0, band=1e-12))
     late = [
         [replace(run, omega=np.interp(run.t + run.settings["dt"] / 2, run.t, run.omega)) for run in level]
         for level in runs
     ]
-    study = study_omega(reference, late, expected_order=2.0, band=1e-12)
+    study = study_model_form(*errors_of(reference, late), expected_order=2.0, band=1e-12)
     assert study.verdict == "failure"
     assert "order too low" in study.reason
 
@@ -177,4 +177,4 @@ def test_half_a_step_too_late_costs_an_order():
 def test_a_run_that_ends_early_fails(references):
     runs = flights("exact-step")
     runs[2][0] = replace(runs[2][0], status="overflow")
-    assert study_omega(references["eq8"], runs).verdict == "failure"
+    assert study_model_form(*errors_of(references["eq8"], runs)).verdict == "failure"

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from flipproof.chapters.differences.figure import LEAST, MOST, draw
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, study_difference
-from flipproof.chapters.predictability.study import PartingGrowth, study_parting_growth
+from flipproof.chapters.predictability.study import parting_words
 from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, WITNESSES
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Flights, Run, Study, Touch, attempt
@@ -52,7 +52,7 @@ class Differences:
     """
 
     pairs: tuple[Difference, ...]
-    growths: tuple[PartingGrowth, ...]
+    growths: tuple[str, ...]
     slices: int
     ended: str
     missing: Mapping[tuple[str, str, str], str]
@@ -90,7 +90,7 @@ def study(ask: Ask) -> Study[Differences]:
     for difference in pairs:
         if difference.parting_time is not None:
             located = flown.get(LIMITS.get(difference.first, difference.first))
-            growths.append(study_parting_growth(difference, None if located is None else located.impacts))
+            growths.append(parting_words(difference, None if located is None else located.impacts))
     return Differences(
         pairs,
         tuple(growths),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -28,21 +27,18 @@ from flipproof.output.columns import rows_csv
 
 AXES: Final[Mapping[Axis, str]] = {"gamma": "damping", "step": "step size", "restitution": "restitution"}
 
+SLICES: Final = 50
+
 CHUNK: Final = 200
 """Runs of a map that a worker makes at a time; it returns their readings alone."""
 
 
-@dataclass(frozen=True, slots=True)
-class Maps:
-    """The map of every axis, at a number of slices."""
-
-    maps: Mapping[Axis, Outcome[ValidityMap]]
-    slices: int
+Maps = Mapping[Axis, Outcome[ValidityMap]]
 
 
 def study(ask: Ask) -> Study[Maps]:
     """Fly every set of assumptions on ``ask.work`` by ``ask.work`` cells of each map, many runs to a call."""
-    cut = ask.throw.with_slices(50)
+    cut = ask.throw.with_slices(SLICES)
     ends = {axis: map_axes(axis, ask.work, ask.work) for axis in AXES}
     calls = {}
     for axis in AXES:
@@ -59,19 +55,19 @@ def study(ask: Ask) -> Study[Maps]:
         readings = {run: reading for chunk, found in answers for run, reading in zip(chunk, found, strict=False)}
         return study_readings(cut, axis, *ends[axis], readings, steps=ask.steps)
 
-    return Maps({axis: attempt(mapped, axis) for axis in AXES}, cut.n_slices)
+    return {axis: attempt(mapped, axis) for axis in AXES}
 
 
 def claims(found: Maps) -> Claims:
     """Yield which map could not be made."""
-    for axis, each in found.maps.items():
+    for axis, each in found.items():
         if each.found is None:
             yield Absent(f"map-{axis}", f"map over {axis}", each.reason, "observation")
 
 
 def figures(found: Maps) -> Iterator[Exhibit]:
     """Yield every map."""
-    for each in found.maps.values():
+    for each in found.values():
         if each.found is not None:
             yield _exhibit(each.found)
 
@@ -164,4 +160,5 @@ CHAPTER: Final = Chapter(
     figures=figures,
     template=Path(__file__).with_name("part.html.j2"),
     work={"full": 20},
+    page=lambda _: {"slices": SLICES},
 )

@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 
 from flipproof.chapters.model_form.richardson import Richardson, richardson
-from flipproof.chapters.model_form.study import ModelForm, study_omega
-from flipproof.chapters.step_size.study import plan_step_size
+from flipproof.chapters.model_form.study import ModelForm, study_model_form
+from flipproof.chapters.step_size.study import errors_of, plan_step_size
 from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Finding, Outcome, Run, Study, attempt, judged, observed
 from slicemodel import Trajectory
 
@@ -33,7 +33,7 @@ class Forms:
 
 
 def study(ask: Ask) -> Study[Forms]:
-    """Halve the step of the schemes of FORMS; fit the pairs that ``ask.work`` lists, in workers."""
+    """Halve the step of the schemes of FORMS; fit omega of the pairs that ``ask.work`` lists, in workers."""
     levels = {scheme: plan_step_size(ask.throw, scheme, 37, 54, 6) for scheme in dict(FORMS)}
     truths = {pair: Run(pair[1], ask.throw, {}, pair[1]) for pair in ask.work}
     flights = yield [*truths.values(), *(run for grids in levels.values() for level in grids for run in level)]
@@ -43,7 +43,7 @@ def study(ask: Ask) -> Study[Forms]:
 
     def fit(scheme: str, model: str) -> Call:
         truth = flights[truths[scheme, model]].flight
-        return Call(study_omega, (truth, grids(scheme)), f"{scheme} against {model}")
+        return Call(study_model_form, errors_of(truth, grids(scheme)), f"{scheme} against {model}")
 
     def limit(scheme: str) -> Richardson:
         # The mean over the grids of a level: a single one carries the luck of its impact phases.

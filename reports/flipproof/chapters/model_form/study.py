@@ -11,7 +11,7 @@ error says nothing about an F that lies at its bound.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -20,8 +20,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq, least_squares
 from scipy.stats import f as f_distribution
 
-from flipproof.chapters.step_size.study import ROUND_OFF, errors_of
-from slicemodel import Trajectory
+from flipproof.chapters.step_size.study import ROUND_OFF
 from slicemodel.trajectory import FloatArray
 
 Verdict = Literal["step size", "model form", "undecided", "failure"]
@@ -55,21 +54,6 @@ class ModelForm:
     floor_interval: Interval = (math.nan, math.nan)
     verdict: Verdict
     reason: str
-
-
-def study_omega(
-    reference: Trajectory, runs: Sequence[Sequence[Trajectory]], *, expected_order: float = 1.0, band: float = 1e-7
-) -> ModelForm:
-    """Decide for omega of a scheme against an equation.
-
-    Parameters
-    ----------
-    reference : Trajectory - on uniform times
-    runs : levels of members, as ``plan_step_size`` plans them - grids that share times with the reference
-
-    The error is the largest over the shared times, as a fraction of omega_0. The others are as in ``study_model_form``.
-    """
-    return study_model_form(*errors_of(reference, runs), expected_order=expected_order, band=band)
 
 
 def study_model_form(dt: ArrayLike, error: ArrayLike, *, expected_order: float = 1.0, band: float = 1e-7) -> ModelForm:

@@ -18,7 +18,7 @@ import numpy as np
 from flipproof.chapters.alignment.found import LEAST_SPEED, count_key, ordinal
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, first_crossing, percent
 from flipproof.frame.solvers import Run
-from slicemodel import Impact, Impacts, Scenario, Trajectory
+from slicemodel import Impacts, Scenario, Trajectory
 from slicemodel.trajectory import FloatArray
 
 SIZES = (1e-9, 1e-8, 1e-7, 1e-6)
@@ -88,59 +88,27 @@ def fit_growth(t: FloatArray, size: FloatArray, start: float = -math.inf, stop: 
     return Growth(rate, scatter / math.sqrt(float(((x - x.mean()) ** 2).sum())))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PartingGrowth:
-    """How a difference grows before and after it first leaves its band, and the impact it follows.
-
-    ``time`` is None if the two never part; ``k`` says which of its slice's impacts on its end ``impact`` is, from 1.
-    """
-
-    first: str
-    second: str
-    time: float | None
-    before: Growth
-    after: Growth
-    impact: Impact | None
-    k: int | None
-
-    @property
-    def words(self) -> str:
-        """The parting in words."""
-        if self.time is None:
-            return f"{self.first} and {self.second} never differ by more than {percent(PARTING_BAND)} of ω₀"
-        words = (
-            f"{self.first} and {self.second} differ by more than {percent(PARTING_BAND)} of ω₀ from "
-            f"{self.time * 1e3:.1f} ms on"
-        )
-        if self.impact is not None and self.k is not None:
-            words += (
-                f", {(self.time - self.impact.time) * 1e3:.1f} ms after the {ordinal(self.k)} impact of slice "
-                f"{self.impact.slice} on the {self.impact.end}"
-            )
-        return f"{words}; the difference {self.before.words} before and {self.after.words} after"
-
-
-def study_parting_growth(difference: Difference, impacts: Impacts | None = None) -> PartingGrowth:
-    """Fit the growth of a difference over ``GROWTH_WINDOW`` seconds before and after the parting.
+def parting_words(difference: Difference, impacts: Impacts | None = None) -> str:
+    """Return when two flights part, the impact that this follows, and how their difference grows before and after.
 
     ``impacts`` is the record of the run whose impacts the parting is set against; those slower than ``LEAST_SPEED`` are
-    passed over, because near rest there is always one.
+    passed over, because near rest there is always one. Growth is fitted over ``GROWTH_WINDOW`` seconds.
     """
-    time, impact, k = difference.parting_time, None, None
-    moment = math.nan if time is None else time
+    pair, band, time = f"{difference.first} and {difference.second}", percent(PARTING_BAND), difference.parting_time
+    if time is None:
+        return f"{pair} never differ by more than {band} of ω₀"
+    words = f"{pair} differ by more than {band} of ω₀ from {time * 1e3:.1f} ms on"
     if impacts is not None:
-        fast = np.flatnonzero((impacts.time <= moment) & (impacts.speed_before >= LEAST_SPEED))
+        fast = np.flatnonzero((impacts.time <= time) & (impacts.speed_before >= LEAST_SPEED))
         if len(fast):
             impact, k = impacts[int(fast[-1])], count_key(impacts, int(fast[-1]), LEAST_SPEED)
-    return PartingGrowth(
-        first=difference.first,
-        second=difference.second,
-        time=time,
-        before=fit_growth(difference.t, difference.omega, moment - GROWTH_WINDOW, moment),
-        after=fit_growth(difference.t, difference.omega, moment, moment + GROWTH_WINDOW),
-        impact=impact,
-        k=k,
-    )
+            words += (
+                f", {(time - impact.time) * 1e3:.1f} ms after the {ordinal(k)} impact of slice {impact.slice} on the "
+                f"{impact.end}"
+            )
+    before = fit_growth(difference.t, difference.omega, time - GROWTH_WINDOW, time)
+    after = fit_growth(difference.t, difference.omega, time, time + GROWTH_WINDOW)
+    return f"{words}; the difference {before.words} before and {after.words} after"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,23 +118,18 @@ class Predictability:
     Parameters
     ----------
     solver : str
-    sizes : (S,)
-        Sizes of the changes, rising.
+    sizes : (S,) - of the changes, rising
     t : (P,) [s]
-    spread : (S, P)
-        max |omega_member - omega| / |omega_0| over the members; infinite where a member has ended.
-    horizons : tuple of S times or None
-        First time the spread exceeds ``HORIZON_BAND`` [s]; None: never, predictable to the end.
+    spread : (S, P) - max |omega_member - omega| / |omega_0| over the members; infinite where a member has ended
+    horizons : S times or None - when the spread first exceeds ``HORIZON_BAND`` [s]; None: predictable to the end
     round_off_horizon : float or None
         The same for a change of the size of round-off, amplified as the smallest change is. It means something only
         while the flight is smooth.
-    growth : Growth
-        Of the spread after the smallest change, up to its horizon.
+    growth : Growth - of the spread after the smallest change, up to its horizon
     rough_from : float or None
         First time at which amplifications of two sizes differ by more than a factor of 10 [s]: the flight is not smooth
         there, or the solver's own error exceeds the smallest change.
-    ended : float or None
-        Where the run ends, if that is before the end of the throw [s].
+    ended : float or None - where the run ends, if that is before the end of the throw [s]
     """
 
     solver: str
@@ -243,10 +206,8 @@ def study_predictability(base: Trajectory, members: Sequence[Sequence[Trajectory
 
     Parameters
     ----------
-    base : Trajectory
-        The unchanged flight.
-    members : sizes of members
-        Trajectories of the runs of ``plan_predictability``, in its order.
+    base : Trajectory - the unchanged flight
+    members : sizes of members - flights of the runs of ``plan_predictability``, in its order
     """
     throw = base.scenario
 

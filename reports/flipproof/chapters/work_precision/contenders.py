@@ -136,10 +136,7 @@ QUICK: Final = replace(
     scheme_members=(4, 6),
     engine_levels=4,
     engine_members=(4,),
-    methods={
-        "DOP853": Asked(rtol=(1e-3, 1e-5, 1e-7)),
-        "LSODA": Asked(rtol=(1e-3, 1e-5, 1e-7), equations=("eq8",)),
-    },
+    methods={"DOP853": Asked(rtol=(1e-3, 1e-5, 1e-7)), "LSODA": Asked(rtol=(1e-3, 1e-5, 1e-7), equations=("eq8",))},
 )
 
 

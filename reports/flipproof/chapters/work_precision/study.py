@@ -180,18 +180,21 @@ def _rival_run(case: Case, rival: Contender, settings: Mapping[str, Any], words:
 def _plan_reference(case: Case, equation: str, rivals: Iterable[Contender]) -> list[Run]:
     """Return the reference of an equation and its witnesses."""
     scenario, solver = case.scenario, equation
-    asked: list[dict[str, Any]]
     if equation in (*MODELS, AT_REST):
         if equation == AT_REST:
             scenario, solver = replace(scenario, frozen=True), "eq8"
-        rest_speed, omega0 = usual_rest_speed(solver), abs(scenario.omega0)
+        usual, omega0 = usual_rest_speed(solver), abs(scenario.omega0)
+
+        def tight(method: str, rtol: float, rest_speed: float, radians: float) -> dict[str, Any]:
+            longest = min(radians, scenario.duration * omega0) / omega0
+            tolerances = {"rtol": rtol, "atol": 1e-3 * rtol, "rest_speed": rest_speed, "max_step": longest}
+            return {"method": method, **tolerances, "times": case.times}
+
         asked = [
-            {"method": method, "rtol": rtol, "atol": 1e-3 * rtol, "rest_speed": rest_speed / cut,
-             "max_step": min(radians, scenario.duration * omega0) / omega0, "times": case.times}
-            for method, rtol, cut, radians in (
-                ("DOP853", 1e-12, 10, 0.02), ("LSODA", 1e-10, 1, 0.02), ("DOP853", 1e-11, 1, 0.04),
-            )
-        ]  # fmt: skip
+            tight("DOP853", 1e-12, usual / 10, 0.02),
+            tight("LSODA", 1e-10, usual, 0.02),
+            tight("DOP853", 1e-11, usual, 0.04),
+        ]
     else:
         # The scheme's own limit: the scheme on a grid eight times finer than its last level, and on half of that.
         rival = next(rival for rival in rivals if rival.equation == equation)
