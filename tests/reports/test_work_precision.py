@@ -179,6 +179,7 @@ def studied(monkeypatch, errors, floor=1e-9, spoiled=None):
         family="scheme",
         solver="exact-step",
         equation="eq8",
+        fixed={},
         levels=tuple(({"steps": COMMON * 2**k + 1},) for k in range(len(errors))),
     )
     monkeypatch.setattr(work_precision, "contenders", lambda *_: (rival,))

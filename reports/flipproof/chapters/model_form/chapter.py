@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -24,15 +23,11 @@ FORMS: Final = (
 """Scheme and equation: is what is left as the step goes to zero the step's, or another equation?"""
 
 
-@dataclass(frozen=True, slots=True)
-class Forms:
-    """The fit of every pair of scheme and equation, and where each scheme goes as its step goes to zero."""
-
-    forms: Mapping[tuple[str, str], Outcome[ModelForm]]
-    limits: Mapping[str, Outcome[Richardson]]
+Found = tuple[Mapping[tuple[str, str], Outcome[ModelForm]], Mapping[str, Outcome[Richardson]]]
+"""The fit of every pair of scheme and equation, and where each scheme goes as its step goes to zero."""
 
 
-def study(ask: Ask) -> Study[Forms]:
+def study(ask: Ask) -> Study[Found]:
     """Halve the step of the schemes of FORMS; fit omega of the pairs that ``ask.work`` lists, in workers."""
     levels = {scheme: plan_step_size(ask.throw, scheme, 37, 54, 6) for scheme in dict(FORMS)}
     truths = {pair: Run(pair[1], ask.throw, {}, pair[1]) for pair in ask.work}
@@ -53,17 +48,16 @@ def study(ask: Ask) -> Study[Forms]:
 
     calls = {pair: attempt(fit, *pair) for pair in truths}
     flights = yield [call.found for call in calls.values() if call.found is not None]
-    return Forms(
-        {pair: attempt(lambda call: flights.answer(call.value), call) for pair, call in calls.items()},
-        {scheme: attempt(limit, scheme) for scheme in levels},
-    )
+    forms = {pair: attempt(lambda call: flights.answer(call.value), call) for pair, call in calls.items()}
+    return forms, {scheme: attempt(limit, scheme) for scheme in levels}
 
 
-def claims(found: Forms) -> Claims:
+def claims(found: Found) -> Claims:
     """Yield where every scheme goes, and what stays of its error against an equation."""
-    for scheme, limit in found.limits.items():
+    forms, limits = found
+    for scheme, limit in limits.items():
         yield judged(claim_limit, scheme, limit, id=f"limit-{scheme}", title=f"limit of {scheme}", kind="observation")
-    for (scheme, model), form in found.forms.items():
+    for (scheme, model), form in forms.items():
         id_, title = f"model-form-{scheme}-{model}", f"{scheme} against {model}"
         yield judged(claim_model_form, id_, title, form, id=id_, title=title, kind="observation")
 
@@ -92,5 +86,5 @@ CHAPTER: Final = Chapter(
     claims=claims,
     template=Path(__file__).with_name("part.html.j2"),
     work={"quick": FORMS[:2], "full": FORMS},
-    page=lambda found: {"fits": [(pair, each.found) for pair, each in found.forms.items() if each.found is not None]},
+    page=lambda found: {"fits": [(pair, each.found) for pair, each in found[0].items() if each.found is not None]},
 )

@@ -14,7 +14,6 @@ from matplotlib.figure import Figure
 from flipproof.chapters.solvers import SCHEMES
 from flipproof.figures.style import new_figure, shared_legend, styled
 from flipproof.frame.chapter import Ask, Chapter, Exhibit, Run, Study, attempt
-from flipproof.frame.throws import FINER
 from flipproof.output.columns import curves_csv
 from slicemodel import Trajectory
 
@@ -32,16 +31,11 @@ class SliceCount:
         return [run.scenario.n_slices for run in self.trajectories]
 
 
-@dataclass(frozen=True, slots=True)
-class Slices:
-    """The study of every scheme all of whose cuts were made; slices of the report's own throw, and of its finer one."""
-
-    schemes: Mapping[str, SliceCount]
-    slices: int
-    finer: int
+Found = Mapping[str, SliceCount]
+"""The study of every scheme all of whose cuts were made."""
 
 
-def study(ask: Ask) -> Study[Slices]:
+def study(ask: Ask) -> Study[Found]:
     """Throw the bottle in as many slices as ``ask.work`` lists, in increasing order."""
     runs = {
         scheme: [Run(scheme, ask.throw.with_slices(n), {"store": "summary"}, f"{scheme}, {n} slices") for n in ask.work]
@@ -52,8 +46,7 @@ def study(ask: Ask) -> Study[Slices]:
         scheme: attempt(lambda cuts: compare([flights[run].flight for run in cuts]), cuts)
         for scheme, cuts in runs.items()
     }
-    schemes = {scheme: each.found for scheme, each in counted.items() if each.found is not None}
-    return Slices(schemes, ask.throw.n_slices, FINER * ask.throw.n_slices)
+    return {scheme: each.found for scheme, each in counted.items() if each.found is not None}
 
 
 def compare(runs: list[Trajectory]) -> SliceCount:
@@ -64,13 +57,13 @@ def compare(runs: list[Trajectory]) -> SliceCount:
     return SliceCount(runs, apart)
 
 
-def figures(found: Slices) -> Iterator[Exhibit]:
+def figures(found: Found) -> Iterator[Exhibit]:
     """Yield omega(t) at every number of slices."""
-    if not found.schemes:
+    if not found:
         return
     words = "; ".join(
         f"{scheme}: " + ", ".join(f"N = {n} {d:.2g}" for n, d in zip(s.counts, s.distance, strict=True))
-        for scheme, s in found.schemes.items()
+        for scheme, s in found.items()
     )
     yield Exhibit(
         name="slice-count",
@@ -80,11 +73,11 @@ def figures(found: Slices) -> Iterator[Exhibit]:
         alt="Line plots of omega over omega_0 for several numbers of slices. Largest distance from the finest cut, of "
         f"omega_0: {words}.",
         maker=draw,
-        data=(found.schemes,),
+        data=(found,),
         table=curves_csv(
             {
                 f"omega/omega_0 {scheme} N = {n} [1]": (run.t, run.omega / run.scenario.omega0)
-                for scheme, s in found.schemes.items()
+                for scheme, s in found.items()
                 for n, run in zip(s.counts, s.trajectories, strict=True)
             }
         ),

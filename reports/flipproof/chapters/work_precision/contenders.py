@@ -19,8 +19,8 @@ engine has several members: their impacts fall at other phases of the step, and 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -158,7 +158,7 @@ class Contender:
     family: Literal["scheme", "method", "engine"]
     solver: str
     equation: str
-    fixed: Mapping[str, Any] = field(default_factory=dict)
+    fixed: Mapping[str, Any]
     levels: tuple[tuple[Mapping[str, Any], ...], ...]
 
     @property
@@ -202,9 +202,11 @@ def left_out(effort: Effort) -> dict[str, str]:
     return reasons | {f"throw «{name}»": f"the size «{effort.name}» takes one throw" for name in unthrown}
 
 
-def _doubled(members: tuple[int, ...], levels: int) -> list[list[int]]:
-    """Return the numbers of steps of every level."""
-    return [[COMMON * member * 2**level for member in members] for level in range(levels)]
+def _levels(
+    members: tuple[int, ...], count: int, setting: Callable[[int], dict[str, Any]]
+) -> tuple[tuple[dict[str, Any], ...], ...]:
+    """Return the setting of every member of every level, from its number of steps, which doubles with each level."""
+    return tuple(tuple(setting(COMMON * member * 2**level) for member in members) for level in range(count))
 
 
 def _schemes(effort: Effort) -> Iterator[Contender]:
@@ -216,10 +218,7 @@ def _schemes(effort: Effort) -> Iterator[Contender]:
             equation=EQUATION_OF_SCHEME.get(name, OWN_LIMIT + name),
             fixed={"store": "summary", "rebound": "in-step" if scheme.form.in_step else "grid"},
             # Points of the grid: one more than steps.
-            levels=tuple(
-                tuple({"steps": steps + 1} for steps in grids)
-                for grids in _doubled(effort.scheme_members, effort.scheme_levels)
-            ),
+            levels=_levels(effort.scheme_members, effort.scheme_levels, lambda steps: {"steps": steps + 1}),
         )
 
 
@@ -227,6 +226,7 @@ def _engines(case: Case, effort: Effort) -> Iterator[Contender]:
     from engine_check.pymunk_rotating import ITERATIONS
     from engine_check.pymunk_settings import enough_iterations
 
+    duration = case.scenario.duration
     for engine in ENGINES.values():
         for frame in engine.frames:
             if frame not in EQUATION_OF_FRAME:
@@ -240,10 +240,7 @@ def _engines(case: Case, effort: Effort) -> Iterator[Contender]:
                 equation=EQUATION_OF_FRAME[frame],
                 fixed={"frame": frame, "times": case.times}
                 | ({"iterations": iterations} if engine.name == "pymunk" else {}),
-                levels=tuple(
-                    tuple({"dt": case.scenario.duration / steps} for steps in grids)
-                    for grids in _doubled(effort.engine_members, effort.engine_levels)
-                ),
+                levels=_levels(effort.engine_members, effort.engine_levels, lambda steps: {"dt": duration / steps}),
             )
 
 
