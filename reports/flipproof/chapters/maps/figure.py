@@ -65,16 +65,10 @@ def figure_map(study: ValidityMap) -> Figure:
         handles += _contours(axes, study, error, name, colour)
     if logarithmic:
         axes.set_yscale("log")
-    axes.set_xlim(x[0], x[-1])
-    axes.set_ylim(y[0], y[-1])
+    axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel="fill fraction M_w / M_max [1]", ylabel=LABELS[study.axis])
     axes.grid(visible=False)
-    axes.set_xlabel("fill fraction M_w / M_max [1]")
-    axes.set_ylabel(LABELS[study.axis])
-    axes.set_title(
-        f"Plateau of ω / ω₀ at N = {study.slices}: {shaded} (shade), largest fair share (outline)",
-        fontsize=10,
-        loc="left",
-    )
+    title = f"Plateau of ω / ω₀ at N = {study.slices}: {shaded} (shade), largest fair share (outline)"
+    axes.set_title(title, fontsize=10, loc="left")
     reasons = _reasons(study)
     if reasons:
         handles.append(Patch(label=f"not computed: {reasons}", **hatched))

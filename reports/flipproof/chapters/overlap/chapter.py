@@ -166,15 +166,10 @@ def figure_overlap(study: Overlap) -> Figure:
                     f"× {reason.partition(':')[0]}", (fill, 0.0), xytext=(0, 3 + 10 * k), textcoords="offset points",
                     ha="center", fontsize=7.5, color=look["color"],
                 )  # fmt: skip
-    axes.set_xlim(0.0, 1.05)
-    axes.set_ylim(0.0, 1.12)
-    axes.set_xlabel("fill fraction M_w / M_max [1]")
-    axes.set_ylabel("mean of ω/ω₀ over the second half [1]")
-    axes.set_title(
-        f"{study.slices} slices, restitution {study.restitution:g} at the ends and between slices",
-        fontsize=10,
-        loc="left",
-    )
+    axes.set(xlim=(0.0, 1.05), ylim=(0.0, 1.12))
+    axes.set(xlabel="fill fraction M_w / M_max [1]", ylabel="mean of ω/ω₀ over the second half [1]")
+    title = f"{study.slices} slices, restitution {study.restitution:g} at the ends and between slices"
+    axes.set_title(title, fontsize=10, loc="left")
     shared_legend(figure, axes, columns=2)
     return figure
 

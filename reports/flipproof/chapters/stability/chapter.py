@@ -95,14 +95,13 @@ def claim_whole_and_wrong(panels: Sequence[StabilityPanel]) -> Finding:
     """How many runs break no invariant and are wrong all the same: only a reference tells."""
     counts = {grade: sum(panel.counts[grade] for panel in panels) for grade in ("wrong", "good", "excellent")}
     errors = np.concatenate([panel.error[panel.grade == "wrong"] for panel in panels])
+    note = f"by up to {100 * errors.max():.2g} % of ω₀; only a reference tells" if len(errors) else "none on this chart"
     return observed(
         id="engine-whole-and-wrong",
         title=f"pymunk: runs that break no invariant and are wrong by more than {GOOD:.0%} of ω₀",
         value=float(counts["wrong"]),
         unit=f"of {sum(counts.values())}",
-        note=f"by up to {100 * errors.max():.2g} % of ω₀; only a reference tells"
-        if len(errors)
-        else "none on this chart",
+        note=note,
     )
 
 
@@ -203,8 +202,7 @@ def _draw_panel(axes: Axes, panel: StabilityPanel) -> None:
         corner = (column - 0.5, row - 0.5)
         axes.add_patch(Rectangle(corner, 1, 1, facecolor=LOOKS[grade][0], edgecolor="white", linewidth=1.0))
         axes.text(column, row, _cell_text(panel, row, column), ha="center", va="center", fontsize=7.5)
-    axes.set_xlim(-0.5, len(panel.dt) - 0.5)
-    axes.set_ylim(-0.5, len(panel.iterations) - 0.5)
+    axes.set(xlim=(-0.5, len(panel.dt) - 0.5), ylim=(-0.5, len(panel.iterations) - 0.5))
     axes.set_xticks(range(len(panel.dt)), [f"{1e3 * dt:g}" for dt in panel.dt])
     axes.set_yticks(range(len(panel.iterations)), [str(n) for n in panel.iterations])
     axes.grid(visible=False)
