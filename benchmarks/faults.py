@@ -75,7 +75,7 @@ FAULTS = (
      "test_waterfall.py"),
     ("reports/flipproof/chapters/alignment/tube.py", "(inside[:-1] ^ inside[1:]) / 2", "(inside[:-1] ^ inside[1:])",
      "test_tube.py"),
-    ("reports/flipproof/chapters/model_form/richardson.py", "gci=float(1.25 * abs(gap))", "gci=float(3.0 * abs(gap))",
+    ("reports/flipproof/chapters/model_form/study.py", "gci=float(1.25 * abs(gap))", "gci=float(3.0 * abs(gap))",
      "test_model_form.py"),
     ("reports/flipproof/chapters/stability/study.py", "if not error <= GOOD:", "if error > GOOD:", "test_stability.py"),
     ("reports/flipproof/film/tracker/smoothing.py", "np.sqrt(1 - own[usable])", "(1 - own[usable])",

@@ -6,8 +6,18 @@ import numpy as np
 import pytest
 from made_up import trajectory_of
 
-from flipproof.chapters.overlap.chapter import claim_column, figure_overlap, figures
-from flipproof.chapters.overlap.study import CHECK, COARSER, COLUMN, EXCLUDE, PASS, plan_overlap, study_overlap
+from flipproof.chapters.overlap.chapter import (
+    CHECK,
+    COARSER,
+    COLUMN,
+    EXCLUDE,
+    PASS,
+    claim_column,
+    figure_overlap,
+    figures,
+    plan_overlap,
+    study_overlap,
+)
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import Made, make
 from slicemodel import Scenario

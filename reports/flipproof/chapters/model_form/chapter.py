@@ -8,8 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from flipproof.chapters.model_form.richardson import Richardson, richardson
-from flipproof.chapters.model_form.study import ModelForm, study_model_form
+from flipproof.chapters.model_form.study import ModelForm, Richardson, richardson, study_model_form
 from flipproof.chapters.step_size.study import errors_of, plan_step_size
 from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Finding, Outcome, Run, Study, attempt, judged, observed
 from slicemodel import Trajectory
