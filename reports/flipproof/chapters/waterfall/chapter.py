@@ -7,7 +7,14 @@ from pathlib import Path
 from typing import Final
 
 from flipproof.chapters.waterfall.figure import figure_waterfall
-from flipproof.chapters.waterfall.study import Waterfall, plan_finer, plan_waterfall, program_run, study_waterfall
+from flipproof.chapters.waterfall.study import (
+    Waterfall,
+    observe,
+    plan_finer,
+    plan_waterfall,
+    program_run,
+    split_all,
+)
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, observed
 from flipproof.frame.throws import FINER
 from flipproof.output.columns import rows_csv
@@ -18,7 +25,7 @@ def study(ask: Ask) -> Study[tuple[Waterfall, ...]]:
     cut = ask.throw.with_slices(min(ask.work, ask.throw.n_slices))
     runs = [*plan_waterfall(cut, ask.steps), *plan_finer(cut, ask.steps)]
     flights = yield runs
-    return study_waterfall(program_run(cut, ask.steps), {run: flights[run].flight for run in runs})
+    return split_all(program_run(cut, ask.steps), {run: observe(flights[run].whole) for run in runs})
 
 
 def claims(found: tuple[Waterfall, ...]) -> Claims:

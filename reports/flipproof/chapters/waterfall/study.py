@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import chain, combinations
 from types import MappingProxyType
 from typing import Final, NamedTuple, TypeVar
 
@@ -168,8 +168,7 @@ def column_run(throw: Scenario) -> Run:
 def plan_waterfall(throw: Scenario, steps: int) -> list[Run]:
     """Return the program's run, every equation with its twins, and the column's (122 runs)."""
     equations = _plan_equations(throw)
-    followers = [twin for run in equations for twin in twins(run)]
-    return [program_run(throw, steps), *equations, *followers, column_run(throw)]
+    return [program_run(throw, steps), *equations, *chain.from_iterable(map(twins, equations)), column_run(throw)]
 
 
 def _plan_equations(throw: Scenario) -> list[Run]:
@@ -183,27 +182,13 @@ def plan_finer(throw: Scenario, steps: int) -> list[Run]:
     return [finer(run) for run in (program_run(throw, steps), *_plan_equations(throw))]
 
 
-def study_waterfall(program: Run, flights: Mapping[Run, Trajectory]) -> tuple[Waterfall, ...]:
+def split_all(program: Run, observed: Mapping[Run, Mapping[str, float]]) -> tuple[Waterfall, ...]:
     """Split every observable.
 
     Parameters
     ----------
     program : Run - the published program's
-    flights : mapping from run to trajectory - of ``plan_waterfall``, and all of ``plan_finer`` or none
-
-    Raises
-    ------
-    ArithmeticError
-        If a run is not whole, or a split does not sum to the whole difference within round-off.
-    """
-    for run, flight in flights.items():
-        if not flight.ok:
-            raise ArithmeticError(f"{run.name}: {flight.status}: {flight.message}")
-    return split_all(program, {run: observe(flight) for run, flight in flights.items()})
-
-
-def split_all(program: Run, observed: Mapping[Run, Mapping[str, float]]) -> tuple[Waterfall, ...]:
-    """Split every observable; ``observed`` maps the runs of ``plan_waterfall`` to their values by name.
+    observed : run -> value by observable - of ``plan_waterfall``, and of all of ``plan_finer`` or none
 
     Raises
     ------
