@@ -69,5 +69,5 @@ def parts() -> tuple[Part, ...]:
 
 def chapters_named(*names: str) -> tuple[Part, ...]:
     """Return a part with these chapters alone, for a command that needs no more."""
-    chapters = [chapter for part in parts() for chapter in part.chapters if chapter.name in names]
-    return (Part("", "", "", tuple(sorted(chapters, key=lambda chapter: names.index(chapter.name)))),)
+    by_name = {chapter.name: chapter for part in parts() for chapter in part.chapters}
+    return (Part("", "", "", tuple(by_name[name] for name in names)),)

@@ -69,23 +69,27 @@ def study(ask: Ask) -> Study[Orders]:
     # Throw, first multiple of the 37 intervals that all grids share (a divisor of the 999 of the default output times),
     # levels, and the names of both parts.
     asked = [(ask.reference, 108, 4, *CHECKED)] + ([(ask.throw, 27, ask.work, START, WHOLE)] if ask.work else [])
-    whole, starts = {}, {}
-    for throw, multiple, levels, _, part in asked:
-        for scheme in SCHEMES:
-            truth = Run(LIMITS[scheme], throw, {}, LIMITS[scheme])
-            grids = Grids(truth, plan_step_size(throw, scheme, 37, multiple, levels))
-            whole[part, scheme] = Outcome(grids)
-    flights = yield [run for each in whole.values() for run in each.value.runs]
-    for _, _, levels, start, part in asked:
-        for scheme in SCHEMES:
-            starts[start, scheme] = attempt(_start, whole[part, scheme].value.truth, flights, scheme, levels)
+    whole = {
+        (part, scheme): Grids(
+            Run(LIMITS[scheme], throw, {}, LIMITS[scheme]), plan_step_size(throw, scheme, 37, multiple, levels)
+        )
+        for throw, multiple, levels, _, part in asked
+        for scheme in SCHEMES
+    }
+    flights = yield [run for grids in whole.values() for run in grids.runs]
+    starts = {
+        (start, scheme): attempt(_start, whole[part, scheme].truth, flights, scheme, levels)
+        for _, _, levels, start, part in asked
+        for scheme in SCHEMES
+    }
     flights = yield [run for each in starts.values() if each.found is not None for run in each.found.runs]
 
-    def measured(each: Outcome[Grids]) -> StepSize:
-        truth, levels = each.value
-        return study_step_size(flights[truth].flight, [[flights[run].flight for run in level] for level in levels])
+    def measured(grids: Grids) -> StepSize:
+        levels = [[flights[run].flight for run in level] for level in grids.levels]
+        return study_step_size(flights[grids.truth].flight, levels)
 
-    return {part: attempt(measured, each) for part, each in (whole | starts).items()}
+    found = {part: attempt(measured, grids) for part, grids in whole.items()}
+    return found | {part: attempt(lambda each: measured(each.value), each) for part, each in starts.items()}
 
 
 def _start(truth: Run, flights: Flights, scheme: str, levels: int) -> Grids:
