@@ -44,10 +44,9 @@ def figure_map(study: ValidityMap) -> Figure:
     x, y = _edges(study.fills, logarithmic=False), _edges(study.values, logarithmic=logarithmic)
     shown = errors(study)
     shaded, error = shown[0]
-    shade = axes.pcolormesh(
-        x, y, np.ma.masked_invalid(np.clip(error, *RANGE)), norm=LogNorm(*RANGE), rasterized=True,
-        cmap=ListedColormap(colormaps["Greys"](np.linspace(0.0, 0.6, 256))),  # light enough for black lines on top
-    )  # fmt: skip
+    greys = ListedColormap(colormaps["Greys"](np.linspace(0.0, 0.6, 256)))  # light enough for black lines on top
+    clipped = np.ma.masked_invalid(np.clip(error, *RANGE))
+    shade = axes.pcolormesh(x, y, clipped, cmap=greys, norm=LogNorm(*RANGE), rasterized=True)
     bar = figure.colorbar(shade, ax=axes, label=f"{shaded} [of ω₀]", extend="min", ticks=[1e-3, 1e-2, 1e-1, 1.0])
     bar.ax.set_yticklabels(["0.1%", "1%", "10%", "100%"])
     handles: list[Artist] = []

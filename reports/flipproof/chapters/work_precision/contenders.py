@@ -68,8 +68,14 @@ class Case:
 THROW: Final = Scenario().with_slices(12)
 OTHER: Final = Scenario(
     bottle=Bottle(length=0.22, radius=0.033, mass=0.024, capacity=0.75),
-    water_mass=0.3, n_slices=30, drag=0.06, restitution=0.35, omega0=16.0, theta0=1.1, duration=0.45,
-).with_slices(12)  # fmt: skip
+    water_mass=0.3,
+    n_slices=30,
+    drag=0.06,
+    restitution=0.35,
+    omega0=16.0,
+    theta0=1.1,
+    duration=0.45,
+).with_slices(12)
 
 CASES: Final[Mapping[str, Case]] = {
     name: Case(name=name, title=title, scenario=scenario)
