@@ -19,10 +19,9 @@ from pathlib import Path
 
 from flipproof.build import ask_of, gather_report
 from flipproof.chapters import chapters_named
-from flipproof.chapters.work_precision.chapter import figures
+from flipproof.chapters.work_precision.chapter import figures, summarise_work_precision, tabulate_work_precision
 from flipproof.chapters.work_precision.claims import claim_work_precision
 from flipproof.chapters.work_precision.contenders import COMPLETE, FULL, QUICK
-from flipproof.chapters.work_precision.tables import summarise_work_precision, tabulate_work_precision
 from slicemodel import Scenario
 
 RESULTS = Path(__file__).resolve().parent / "results"

@@ -12,7 +12,11 @@ import slicemodel
 from engine_check.solver import ENGINES
 from flipproof.build import ask_of
 from flipproof.chapters import chapters_named
-from flipproof.chapters.work_precision.chapter import figures
+from flipproof.chapters.work_precision.chapter import (
+    figures,
+    summarise_work_precision,
+    tabulate_work_precision,
+)
 from flipproof.chapters.work_precision.claims import claim_work_precision
 from flipproof.chapters.work_precision.contenders import (
     AT_REST,
@@ -36,10 +40,6 @@ from flipproof.chapters.work_precision.study import (
     plan_work_precision,
     study_work_precision,
     work_of,
-)
-from flipproof.chapters.work_precision.tables import (
-    summarise_work_precision,
-    tabulate_work_precision,
 )
 from flipproof.frame.gather import gather
 from flipproof.frame.pool import Here

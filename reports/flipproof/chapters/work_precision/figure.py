@@ -172,7 +172,6 @@ def _write(axes: Axes, labels: Sequence[tuple[tuple[float, float], str, str]], l
 
 
 def _explain(axes: Axes) -> None:
-    """Explain the signs in a panel of its own."""
     axes.axis("off")
     handles: list[Artist] = [
         Line2D([], [], color="#333333", linestyle=line, marker=MARKERS[family][0], markersize=4.5, label=label)

@@ -263,7 +263,6 @@ def _why_failed(made: Made) -> str:
 
 
 def _steps(trajectory: Trajectory) -> float:
-    """Return the steps that a run made."""
     if trajectory.solver == "slicemodel":
         return float(trajectory.settings["steps"] - 1)
     return float(trajectory.diagnostics["steps"])
