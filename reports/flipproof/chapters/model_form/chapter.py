@@ -28,7 +28,7 @@ Found = tuple[Mapping[tuple[str, str], Outcome[ModelForm]], Mapping[str, Outcome
 
 def study(ask: Ask) -> Study[Found]:
     """Halve the step of the schemes of FORMS; fit omega of the pairs that ``ask.work`` lists, in workers."""
-    levels = {scheme: plan_step_size(ask.throw, scheme, 37, 54, 6) for scheme in dict(FORMS)}
+    levels = {scheme: plan_step_size(ask.throw, scheme, base=37, multiple=54, count=6) for scheme in dict(FORMS)}
     truths = {pair: Run(pair[1], ask.throw, {}, pair[1]) for pair in ask.work}
     flights = yield [*truths.values(), *(run for grids in levels.values() for level in grids for run in level)]
 

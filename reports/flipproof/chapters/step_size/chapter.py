@@ -99,7 +99,7 @@ def _start(truth: Run, flights: Flights, scheme: str, levels: int) -> Grids:
         raise Missing(f"{truth.solver} strikes no end")
     times = np.linspace(0.0, start.duration, 10)
     before = Run(truth.solver, start, {"times": times}, f"{truth.solver} before the first impact")
-    return Grids(before, plan_step_size(start, scheme, 9, 14, levels))
+    return Grids(before, plan_step_size(start, scheme, base=9, multiple=14, count=levels))
 
 
 def claims(found: Orders) -> Claims:
