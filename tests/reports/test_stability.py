@@ -56,6 +56,8 @@ def test_the_plan_has_different_runs_explicit_settings_and_references_with_twins
     assert sum(run.solver == "free-flight" for run in runs) == 3 * len(FULL.panels)
     costs = [run.scenario.n_slices * run.settings["iterations"] / run.settings["dt"] for run in engine]
     assert costs == sorted(costs, reverse=True)
+    cells = [slices * n / dt for _, slices in FULL.panels for n in FULL.iterations for dt in FULL.dt]
+    assert len(engine) == sum(cost * FULL.duration <= FULL.budget for cost in cells) < len(cells)
     assert 10 in FULL.iterations
     assert 10 in QUICK.iterations
 

@@ -280,6 +280,7 @@ def test_a_run_off_the_common_times_is_refused(monkeypatch):
     [
         (2e-2, Price(80.0, bound=True)),  # the first level keeps it already
         (1e-3, Price(160.0, bound=False)),
+        (4e-4, Price(640.0 * 2.0 ** (math.log(0.8) / math.log(0.02)), bound=False)),  # just finer than the level at 640
         (math.sqrt(5e-4 * 1e-5), Price(math.sqrt(640.0 * 1280.0), bound=False)),  # past the lucky level at 320
         (1e-6, None),  # never reached
         (math.nan, None),
