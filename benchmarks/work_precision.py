@@ -19,10 +19,9 @@ from pathlib import Path
 
 from flipproof.build import ask_of, gather_report
 from flipproof.chapters import chapters_named
+from flipproof.chapters.work_precision.chapter import figures, summarise_work_precision, tabulate_work_precision
 from flipproof.chapters.work_precision.claims import claim_work_precision
 from flipproof.chapters.work_precision.contenders import COMPLETE, FULL, QUICK
-from flipproof.chapters.work_precision.exhibits import draw_work_precision
-from flipproof.chapters.work_precision.tables import summarise_work_precision, tabulate_work_precision
 from slicemodel import Scenario
 
 RESULTS = Path(__file__).resolve().parent / "results"
@@ -50,7 +49,11 @@ def main() -> int:
     for finding in findings:
         print(f"{finding.title}: {finding.value_text} {finding.band_text}\n    {finding.note}")
     for table in tabulate_work_precision(studies):
-        print(f"\n{table.as_text()}")
+        widths = [max(map(len, column)) for column in zip(table.columns, *table.rows, strict=True)]
+        print(f"\n{table.title}")
+        for row in (table.columns, *table.rows):
+            print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+        print(table.note)
     print(f"\n{seconds:.1f} s")
     arguments.out.mkdir(parents=True, exist_ok=True)
     facts = {
@@ -62,7 +65,7 @@ def main() -> int:
         "throws": summarise_work_precision(studies),
     }
     (arguments.out / "work_precision.json").write_text(json.dumps(facts, indent=1, allow_nan=False), encoding="utf-8")
-    for exhibit in draw_work_precision(studies):
+    for exhibit in figures(studies):
         (arguments.out / f"{exhibit.name.replace('-', '_')}.png").write_bytes(exhibit.drawing.png)
     return 0
 

@@ -13,7 +13,6 @@ import pytest
 from flipproof.build import ask_of
 from flipproof.chapters import parts
 from flipproof.chapters.horizon.study import Reach
-from flipproof.chapters.overlap import chapter as overlap
 from flipproof.chapters.overlap.chapter import Amount
 from flipproof.chapters.stability.study import Layout
 from flipproof.check.diff import Change, change_of, compare_summaries, read_summary, scenario_changes, within
@@ -38,7 +37,7 @@ WORK = {
     "model-form": (),
     "stability": Layout(panels=((18.0, 10),), dt=(2e-3, 2e-4), iterations=(10, 90), duration=0.1, budget=2e6),
     "horizon": Reach(solvers=("pymunk",), sizes=(1e-9,), seeds=(1,), slices=3),
-    "overlap": Amount(fills=(1.0,), slices=3, dt=4e-4),
+    "overlap": Amount(fills=(1.0,), slices=3, dt=4e-4, brim_dt=1e-4),
 }
 """As small as a report can be that makes all kinds of claims."""
 
@@ -46,7 +45,6 @@ WORK = {
 def summary_of_a_run(make=solvers.make):
     """Return the summary of a small report; ``make`` makes its runs."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(overlap, "FULL_DT", 1e-4)
         patch.setattr(pool, "make", make)
         reference = dataclasses.replace(Scenario().with_slices(5), duration=0.3)
         ask = dataclasses.replace(ask_of(THROW, "quick", certified=()), reference=reference)

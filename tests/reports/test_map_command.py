@@ -16,7 +16,7 @@ from made_up import command as run
 from made_up import study_map
 
 from flipproof.chapters.maps.study import CURVE, LADDER, RUNGS
-from flipproof.chapters.waterfall.study import OBSERVABLES, study_waterfall
+from flipproof.chapters.waterfall.study import OBSERVABLES, observe, split_all
 from flipproof.frame.pool import Here
 from flipproof.frame.solvers import make
 from flipproof.sweep.design import design_of
@@ -166,7 +166,7 @@ def test_table_and_contours_say_what_the_map_holds(tmp_path):
     assert [(contour["of"], contour["level"]) for contour in facts["contours"]] == [
         (of, level) for of in ("error of published-python", "change by overlap") for level in (0.01, 0.1)
     ]
-    shown = {"error of published-python": study.error("published-python"), "change by overlap": abs(study.overlap)}
+    shown = {"error of published-python": study.error, "change by overlap": abs(study.overlap)}
     for contour in facts["contours"]:
         error = shown[contour["of"]]
         assert contour["cells above"] == (error >= contour["level"]).sum()
@@ -222,8 +222,7 @@ def test_a_waterfall_from_rows_is_that_of_direct_runs_to_the_last_bit(split):
     _, runs, design, out = split
     with Store(out, design, code_identity()) as store:
         rows = read_runs(store, runs)
-    made = {r: make(r).trajectory for r in runs}
-    direct = study_waterfall(runs[0], made)
+    direct = split_all(runs[0], {r: observe(make(r).whole) for r in runs})
     assert [part.observable.name for part in direct] == [observable.name for observable in OBSERVABLES]
     assert split_rows(rows) == direct
     assert len(waterfall_csv(direct).splitlines()) == 1 + len(direct) * (3 + len(direct[0].bars))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import slicemodel
-from flipproof.chapters.waterfall.study import NAMES, STEP, column_run, plan_waterfall, program_run, study_waterfall
+from flipproof.chapters.waterfall.study import NAMES, STEP, column_run, observe, plan_waterfall, split_all
 from flipproof.frame.solvers import make
 from flipproof.frame.twins import twins
 from ode_reference import combinations, contact, motion, witness
@@ -139,7 +139,7 @@ def bars():
         runs |= dict.fromkeys([planned] if planned is program else [planned, *twins(planned)], trajectory)
     column = column_run(THROW)
     runs[column] = make(column).trajectory
-    plateau = study_waterfall(program_run(THROW, STEPS), runs)[0]
+    plateau = split_all(program, {run: observe(flight) for run, flight in runs.items()})[0]
     assert plateau.observable.name == "plateau"
     return {bar.name: bar.forward for bar in plateau.bars}
 

@@ -16,7 +16,13 @@ from flipproof.chapters.ice.chapter import measure
 from flipproof.chapters.reference.chapter import claim_reference_converged, claim_second_method
 from flipproof.chapters.slices.chapter import compare
 from flipproof.chapters.step_size.chapter import claim_order
-from flipproof.chapters.step_size.study import PHASES, levels, observed_order, study_step_size
+from flipproof.chapters.step_size.study import (
+    PHASES,
+    before_first_impact,
+    observed_order,
+    plan_step_size,
+    study_step_size,
+)
 from flipproof.frame.findings import Finding
 from flipproof.frame.flights import Flights
 from flipproof.frame.solvers import Made, Missing, Run
@@ -75,7 +81,9 @@ def test_first_crossing_at_the_first_point_and_never():
 
 
 def test_levels_double_and_spread():
-    grids = levels(10, 10, 3)
+    grids = [
+        [run.settings["steps"] - 1 for run in level] for level in plan_step_size(SCENARIO, "exact-step", 10, 10, 3)
+    ]
     assert [grid[0] for grid in grids] == [100, 200, 400]
     assert all(len(set(grid)) == PHASES for grid in grids)
     assert all(steps % 10 == 0 for grid in grids for steps in grid)
@@ -137,6 +145,13 @@ def test_no_step_error_is_no_failure():
     assert finding.kind == "observation"
     assert not finding.failed
     assert "round-off" in finding.note
+
+
+def test_nothing_strikes_before_the_first_impact():
+    impacts = Impacts(time=[0.2, 0.3], slice=[0, 0], end=[1, -1], speed_before=[1] * 2, speed_after=[1] * 2)
+    assert before_first_impact(SCENARIO, curve([20, 20], impacts=impacts)).duration == pytest.approx(0.18)
+    none = Impacts(time=[], slice=[], end=[], speed_before=[], speed_after=[])
+    assert before_first_impact(SCENARIO, curve([20, 20], impacts=none)) is None
 
 
 def test_runs_that_share_too_few_times_are_refused():

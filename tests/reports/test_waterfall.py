@@ -7,19 +7,22 @@ import pytest
 from made_up import trajectory_of
 
 import ode_reference
+from flipproof.build import ask_of
 from flipproof.chapters.waterfall import study as waterfall
-from flipproof.chapters.waterfall.chapter import claim_overlap
+from flipproof.chapters.waterfall.chapter import claim_overlap, study
 from flipproof.chapters.waterfall.figure import figure_waterfall
 from flipproof.chapters.waterfall.study import (
     NAMES,
     OBSERVABLES,
     canonical,
+    observe,
     plan_finer,
     plan_waterfall,
-    study_waterfall,
+    split_all,
 )
 from flipproof.frame import twins
-from flipproof.frame.solvers import make
+from flipproof.frame.flights import Flights
+from flipproof.frame.solvers import Made, Missing, make
 from ode_reference.switches import Switches
 from slicemodel import Scenario, Trajectory
 
@@ -39,11 +42,11 @@ def split(value_of, *, program=0.0, moved=0.0, kind="twin in release"):
     runs = {}
     for run in plan_waterfall(THROW, 1000):
         if run.solver in (waterfall.PROGRAM, waterfall.COLUMN):
-            runs[run] = made_up(program if run.solver == waterfall.PROGRAM else 5.0)
+            runs[run] = observe(made_up(program if run.solver == waterfall.PROGRAM else 5.0))
             continue
         value = value_of(Switches.from_name(run.solver))
-        runs[run] = made_up(value + (moved if run.label.endswith(kind) else 0.0))
-    return study_waterfall(PROGRAM_RUN, runs)
+        runs[run] = observe(made_up(value + (moved if run.label.endswith(kind) else 0.0)))
+    return split_all(PROGRAM_RUN, runs)
 
 
 def plateau_bars(result):
@@ -109,13 +112,14 @@ def test_overlap_stands_in_the_margin_and_takes_no_part_in_the_split():
 
 def test_the_margin_is_that_of_direct_runs():
     throw = Scenario(n_slices=2, duration=0.2)
-    runs = {run: make(run).flight for run in (*plan_waterfall(throw, 200), *plan_finer(throw, 200))}
-    found = study_waterfall(waterfall.program_run(throw, 200), runs)
+    runs = {run: observe(make(run).whole) for run in (*plan_waterfall(throw, 200), *plan_finer(throw, 200))}
+    found = split_all(waterfall.program_run(throw, 200), runs)
     column, few, many = (ode_reference.solve(throw.with_slices(n), m) for n, m in ((2, "column"), (2, FREE), (4, FREE)))
+    column, few, many = map(observe, (column, few, many))
     for part in found:
-        difference = part.observable.of(column) - part.observable.of(few)
-        assert part.overlap == pytest.approx(difference, abs=1e-12)
-        assert part.finer_overlap == pytest.approx(part.observable.of(column) - part.observable.of(many), abs=1e-12)
+        name = part.observable.name
+        assert part.overlap == pytest.approx(column[name] - few[name], abs=1e-12)
+        assert part.finer_overlap == pytest.approx(column[name] - many[name], abs=1e-12)
 
 
 @pytest.mark.parametrize("kind", ["twin in release", "twin in rest speed"])
@@ -127,12 +131,12 @@ def test_bands_come_from_the_twins(kind):
 
 
 def test_a_run_that_is_not_whole_is_named():
-    runs = {run: made_up(1.0) for run in plan_waterfall(THROW, 1000)}
-    run = next(run for run in runs if run != PROGRAM_RUN)
-    runs[run] = dataclasses.replace(runs[run], status="stalled", message="time hardly passes")
-    with pytest.raises(ArithmeticError, match="stalled: time hardly passes") as refusal:
-        study_waterfall(PROGRAM_RUN, runs)
-    assert run.name in str(refusal.value)
+    asked = study(dataclasses.replace(ask_of(THROW, "quick"), work=1))
+    made = {run: Made(run, made_up(1.0), 0.0) for run in next(asked)}
+    run = next(run for run in made if run != PROGRAM_RUN)
+    stalled = dataclasses.replace(made_up(1.0), status="stalled", message="time hardly passes")
+    with pytest.raises(Missing, match=f"{run.name}: stalled: time hardly passes"):
+        asked.send(Flights(made | {run: Made(run, stalled, 0.0)}))
 
 
 def test_canonical_sets_make_the_same_equation():

@@ -12,6 +12,11 @@ import slicemodel
 from engine_check.solver import ENGINES
 from flipproof.build import ask_of
 from flipproof.chapters import chapters_named
+from flipproof.chapters.work_precision.chapter import (
+    figures,
+    summarise_work_precision,
+    tabulate_work_precision,
+)
 from flipproof.chapters.work_precision.claims import claim_work_precision
 from flipproof.chapters.work_precision.contenders import (
     AT_REST,
@@ -29,18 +34,12 @@ from flipproof.chapters.work_precision.contenders import (
     contenders,
     left_out,
 )
-from flipproof.chapters.work_precision.exhibits import draw_work_precision
 from flipproof.chapters.work_precision.figure import figure_work_precision
 from flipproof.chapters.work_precision.study import (
     Price,
     plan_work_precision,
-    price,
     study_work_precision,
     work_of,
-)
-from flipproof.chapters.work_precision.tables import (
-    summarise_work_precision,
-    tabulate_work_precision,
 )
 from flipproof.frame.gather import gather
 from flipproof.frame.pool import Here
@@ -183,6 +182,7 @@ def studied(monkeypatch, errors, floor=1e-9, spoiled=None):
         family="scheme",
         solver="exact-step",
         equation="eq8",
+        fixed={},
         levels=tuple(({"steps": COMMON * 2**k + 1},) for k in range(len(errors))),
     )
     monkeypatch.setattr(work_precision, "contenders", lambda *_: (rival,))
@@ -256,7 +256,7 @@ def test_a_failed_run_stays_with_its_reason(monkeypatch, outcome, words):
     results = next(tabulate_work_precision([study]))
     assert any(words in cell for row in results.rows for cell in row)
     assert f"{words[:20]}" in json.dumps(summarise_work_precision([study]), allow_nan=False)
-    assert price(found, 8e-3, study.references["eq8"]) == Price(found.points[2].work, bound=True)
+    assert study.price(found, 8e-3) == Price(found.points[2].work, bound=True)
     crosses = [line for line in figure_work_precision(study).axes[0].lines if line.get_marker() == "x"]
     assert len(crosses) == (outcome["trajectory"] is not None)  # a run that never began has no cost to stand at
 
@@ -267,7 +267,7 @@ def test_without_a_reference_nobody_has_an_error(monkeypatch):
     )
     assert math.isnan(study.references["eq8"].floor)
     assert all("no reference: ValueError: no" in point.reason for point in found.points)
-    assert price(found, 1e-2, study.references["eq8"]) is None
+    assert study.price(found, 1e-2) is None
     figure_work_precision(study)
 
 
@@ -283,6 +283,7 @@ def test_a_run_off_the_common_times_is_refused(monkeypatch):
     [
         (2e-2, Price(80.0, bound=True)),  # the first level keeps it already
         (1e-3, Price(160.0, bound=False)),
+        (4e-4, Price(640.0 * 2.0 ** (math.log(0.8) / math.log(0.02)), bound=False)),  # just finer than the level at 640
         (math.sqrt(5e-4 * 1e-5), Price(math.sqrt(640.0 * 1280.0), bound=False)),  # past the lucky level at 320
         (1e-6, None),  # never reached
         (math.nan, None),
@@ -290,7 +291,7 @@ def test_a_run_off_the_common_times_is_refused(monkeypatch):
 )
 def test_the_price_of_an_error(monkeypatch, error, expected):
     study, found = studied(monkeypatch, [1e-2, 1e-3, 1e-8, 5e-4, 1e-5], floor=1e-9)
-    level = price(found, error, study.references["eq8"])
+    level = study.price(found, error)
     assert (level is None) == (expected is None)
     if expected is not None:
         assert (level.value, level.bound) == (pytest.approx(expected.value), expected.bound)
@@ -300,14 +301,13 @@ def test_nobody_is_priced_at_the_floor(monkeypatch):
     study, found = studied(monkeypatch, [1e-2, 1e-5, 1e-10], floor=1e-9)
     floor = study.references["eq8"].floor
     assert found.points[-1].at_floor
-    assert price(found, floor, study.references["eq8"]) is None
-    assert price(found, 1.01 * floor, study.references["eq8"]).value <= found.points[-1].work
+    assert study.price(found, floor) is None
+    assert study.price(found, 1.01 * floor).value <= found.points[-1].work
 
 
 def test_a_price_in_seconds_steps_and_work(monkeypatch):
     study, found = studied(monkeypatch, [1e-2, 1e-4])
-    reference = study.references["eq8"]
-    middle = [price(found, 1e-3, reference, cost).value for cost in ("work", "steps", "seconds")]
+    middle = [study.price(found, 1e-3, cost).value for cost in ("work", "steps", "seconds")]
     assert middle == pytest.approx([80 * math.sqrt(2), 40 * math.sqrt(2), 0.1 * math.sqrt(2)])
 
 
@@ -451,7 +451,7 @@ def test_figures_name_every_contender_and_carry_units(quick):
 
 
 def test_exhibits_and_tables_of_the_quick_report(quick):
-    exhibits = list(draw_work_precision(quick))
+    exhibits = list(figures(quick))
     assert [exhibit.name for exhibit in exhibits] == ["work-precision-impacts"]
     for exhibit in exhibits:
         assert exhibit.drawing.svg.startswith("<?xml")
@@ -461,7 +461,6 @@ def test_exhibits_and_tables_of_the_quick_report(quick):
     for table in tables.values():
         assert all(len(row) == len(table.columns) for row in table.rows)
         assert "nan" not in " ".join(" ".join(row) for row in table.rows)
-        assert table.as_text().startswith(table.title)
     held = {row[0]: row[4] for row in tables["work-settings-impacts"].rows}
     assert "iterations" in held["pymunk"]
     assert "rest_flight" in held["mujoco"]
@@ -484,7 +483,7 @@ def test_findings_are_observations_with_numbers(quick):
 
 def test_claims_of_nothing_are_none():
     assert list(claim_work_precision([])) == []
-    assert list(draw_work_precision([])) == []
+    assert list(figures([])) == []
 
 
 def test_what_impacts_cost_needs_both_throws(quick, smooth):

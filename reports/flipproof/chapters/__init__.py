@@ -71,5 +71,5 @@ def _chapter(name: str) -> Chapter[Any]:
 
 def chapters_named(*names: str) -> tuple[Part, ...]:
     """Return a part with these chapters alone, for a command that needs no more."""
-    chapters = [chapter for part in parts() for chapter in part.chapters if chapter.name in names]
-    return (Part("", "", "", tuple(sorted(chapters, key=lambda chapter: names.index(chapter.name)))),)
+    by_name = {chapter.name: chapter for part in parts() for chapter in part.chapters}
+    return (Part("", "", "", tuple(by_name[name] for name in names)),)

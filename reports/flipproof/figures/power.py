@@ -10,8 +10,6 @@ from flipproof.figures.style import new_figure, styled
 from flipproof.foreign.certify import CHECKS
 from flipproof.foreign.power import Caught
 
-SEEN = "#0072B2"
-
 
 @styled
 def figure_power(found: Sequence[Caught]) -> Figure:
@@ -19,7 +17,7 @@ def figure_power(found: Sequence[Caught]) -> Figure:
     figure, axes = new_figure(size=(8.0, 1.6 + 0.22 * len(found)))
     checks = list(CHECKS)
     for row, caught in enumerate(found):
-        axes.plot([checks.index(name) for name in caught.checks], [row] * len(caught.checks), "s", color=SEEN)
+        axes.plot([checks.index(name) for name in caught.checks], [row] * len(caught.checks), "s", color="#0072B2")
     axes.set_yticks(range(len(found)), [caught.mistake for caught in found], fontsize=8)
     axes.set_xticks(range(len(checks)), checks, rotation=60, ha="right", fontsize=8)
     axes.set_xlim(-0.5, len(checks) - 0.5)

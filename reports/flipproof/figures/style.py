@@ -22,8 +22,6 @@ from matplotlib.ticker import FuncFormatter, LogFormatterMathtext
 from flipproof.frame.spoken import spoken
 from slicemodel import Trajectory
 
-WIDE = (8.0, 3.9)
-
 # One hue per family, so that a scheme and the equation it converges to are seen as a pair (Okabe-Ito colours,
 # told apart by most colour-blind readers; line style and marker carry the same information).
 STYLES: dict[str, dict[str, Any]] = {
@@ -129,7 +127,7 @@ def solver_style(label: str, k: int = 0) -> dict[str, Any]:
 
 
 def new_figure(
-    rows: int = 1, columns: int = 1, *, size: tuple[float, float] = WIDE, **options: Any
+    rows: int = 1, columns: int = 1, *, size: tuple[float, float] = (8.0, 3.9), **options: Any
 ) -> tuple[Figure, Any]:
     """Return a figure and its axes, laid out so that nothing overlaps."""
     figure = Figure(figsize=size, layout="constrained")

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, percent, study_difference
-from flipproof.chapters.predictability.study import PartingGrowth, study_parting_growth
+from flipproof.chapters.predictability.study import parting_words
 from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, WITNESSES
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.figures.style import new_figure, styled
@@ -55,7 +55,7 @@ class Differences:
     """
 
     pairs: tuple[Difference, ...]
-    growths: tuple[PartingGrowth, ...]
+    growths: tuple[str, ...]
     slices: int
     ended: str
     missing: Mapping[tuple[str, str, str], str]
@@ -101,7 +101,7 @@ def study(ask: Ask) -> Study[Differences]:
     for difference in pairs:
         if difference.parting_time is not None:
             located = flown.get(LIMITS.get(difference.first, difference.first))
-            growths.append(study_parting_growth(difference, None if located is None else located.impacts))
+            growths.append(parting_words(difference, None if located is None else located.impacts))
     free, ended = flown.get(FREE), ""
     if free is not None and not free.ok:
         ended = f"up to t = {1e3 * free.t[-1]:.0f} ms, where {free.method} {free.status}"

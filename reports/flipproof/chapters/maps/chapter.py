@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -11,70 +10,64 @@ import numpy as np
 
 from flipproof.chapters.maps.figure import CONTOURS, errors, figure_map
 from flipproof.chapters.maps.study import (
-    CHUNK,
     EXTRA,
     LABELS,
     LADDER,
     RUNGS,
     Axis,
-    Reading,
     ValidityMap,
     make_readings,
     map_axes,
     plan_map,
     study_readings,
 )
-from flipproof.frame.chapter import Absent, Ask, Call, Chapter, Claims, Exhibit, Outcome, Run, Study, attempt
+from flipproof.frame.chapter import Absent, Ask, Call, Chapter, Claims, Exhibit, Outcome, Study, attempt
 from flipproof.frame.twins import BAND_WORDS
 from flipproof.output.columns import rows_csv
 
 AXES: Final[Mapping[Axis, str]] = {"gamma": "damping", "step": "step size", "restitution": "restitution"}
+
 SLICES: Final = 50
-CELLS: Final = 20
+
+CHUNK: Final = 200
+"""Runs of a map that a worker makes at a time; it returns their readings alone."""
 
 
-@dataclass(frozen=True, slots=True)
-class Maps:
-    """The map of every axis, at a number of slices."""
-
-    maps: Mapping[Axis, Outcome[ValidityMap]]
-    slices: int
+Maps = Mapping[Axis, Outcome[ValidityMap]]
 
 
 def study(ask: Ask) -> Study[Maps]:
     """Fly every set of assumptions on ``ask.work`` by ``ask.work`` cells of each map, many runs to a call."""
     cut = ask.throw.with_slices(SLICES)
     ends = {axis: map_axes(axis, ask.work, ask.work) for axis in AXES}
-    runs = {axis: plan_map(cut, axis, *ends[axis], steps=ask.steps, banded=True) for axis in AXES}
-    calls = {
-        axis: [Call(make_readings, (some[k : k + CHUNK],), f"map over {axis}") for k in range(0, len(some), CHUNK)]
-        for axis, some in runs.items()
-    }
+    calls = {}
+    for axis in AXES:
+        runs = plan_map(cut, axis, *ends[axis], steps=ask.steps, banded=True)
+        chunks = [runs[k : k + CHUNK] for k in range(0, len(runs), CHUNK)]
+        calls[axis] = [Call(make_readings, (chunk,), f"map over {axis}") for chunk in chunks]
     # After the runs of the first wave, the longest of which would else wait behind tens of thousands of short ones.
     yield ()
     flights = yield [call for some in calls.values() for call in some]
 
     def mapped(axis: Axis) -> ValidityMap:
-        readings: dict[Run, Reading] = {}
-        for k, call in enumerate(calls[axis]):
-            # Cells of a chunk whose worker died stay "not run".
-            answer = attempt(flights.answer, call)
-            readings |= zip(runs[axis][k * CHUNK : (k + 1) * CHUNK], answer.found or (), strict=False)
+        # Cells of a chunk whose worker died stay "not run".
+        answers = [(call.arguments[0], attempt(flights.answer, call).found or ()) for call in calls[axis]]
+        readings = {run: reading for chunk, found in answers for run, reading in zip(chunk, found, strict=False)}
         return study_readings(cut, axis, *ends[axis], readings, steps=ask.steps)
 
-    return Maps({axis: attempt(lambda axis: mapped(axis), axis) for axis in AXES}, cut.n_slices)
+    return {axis: attempt(mapped, axis) for axis in AXES}
 
 
 def claims(found: Maps) -> Claims:
     """Yield which map could not be made."""
-    for axis, each in found.maps.items():
+    for axis, each in found.items():
         if each.found is None:
             yield Absent(f"map-{axis}", f"map over {axis}", each.reason, "observation")
 
 
 def figures(found: Maps) -> Iterator[Exhibit]:
     """Yield every map."""
-    for each in found.maps.values():
+    for each in found.values():
         if each.found is not None:
             yield _exhibit(each.found)
 
@@ -105,7 +98,7 @@ def _exhibit(study: ValidityMap) -> Exhibit:
         f"largest {which}: {counts or 'none could be computed'}. {_within(study)}",
         maker=figure_map,
         data=(study,),
-        table=table(study),
+        table=_cells_csv(study),
     )
 
 
@@ -137,25 +130,24 @@ def _within(study: ValidityMap) -> str:
     for words, error in errors(study):
         finite = error[np.isfinite(error)]
         cells = ", ".join(f"below {level:.0%} in {int((finite < level).sum())}" for level, _ in CONTOURS)
-        parts.append(
-            f"The {words} is {cells} of {finite.size} cells" + (f", at most {finite.max():.2g}" if finite.size else "")
-        )
+        most = f", at most {finite.max():.2g}" if finite.size else ""
+        parts.append(f"The {words} is {cells} of {finite.size} cells{most}")
     return "; ".join(parts) + "."
 
 
-def table(study: ValidityMap) -> str:
+def _cells_csv(study: ValidityMap) -> str:
     """Return every cell: the plateau of each solver, and the assumption with the largest fair share."""
     solvers = (*LADDER, *EXTRA)
-    dominant = study.dominant
+    label = LABELS[study.axis]
+    for sign, word in (("γ", "gamma"), ("ω", "omega"), ("₀", "_0"), ("Δ", "d")):
+        label = label.replace(sign, word)
     return rows_csv(
-        ("fill fraction [1]", LABELS[study.axis].translate({ord("γ"): "gamma", ord("ω"): "omega", ord("₀"): "_0",
-                                                            ord("Δ"): "d"}),
-         "largest fair share",
+        ("fill fraction [1]", label, "largest fair share",
          *(f"plateau of omega/omega_0 {name} [1]" for name in solvers), "not computed because"),
         (
             (study.fills[column], study.values[row], RUNGS[k] if k >= 0 else None,
              *(study.level[name][row, column] for name in solvers), study.reason[row, column])
-            for (row, column), k in np.ndenumerate(dominant)
+            for (row, column), k in np.ndenumerate(study.dominant)
         ),
     )  # fmt: skip
 
@@ -167,5 +159,6 @@ CHAPTER: Final = Chapter(
     claims=claims,
     figures=figures,
     template=Path(__file__).with_name("part.html.j2"),
-    work={"full": CELLS},
+    work={"full": 20},
+    page=lambda _: {"slices": SLICES},
 )

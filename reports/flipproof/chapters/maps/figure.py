@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib import colormaps
@@ -16,7 +16,7 @@ from matplotlib.patches import Patch, PathPatch, Rectangle
 from matplotlib.path import Path
 from numpy.typing import NDArray
 
-from flipproof.chapters.maps.study import LABELS, RUNGS, Measure, ValidityMap
+from flipproof.chapters.maps.study import LABELS, LADDER, RUNGS, ValidityMap
 from flipproof.chapters.solvers import SCHEMES
 from flipproof.figures.style import new_figure, styled
 from slicemodel.scenario import shortened
@@ -25,27 +25,15 @@ from slicemodel.trajectory import FloatArray
 COLOURS = ("#606060", "#D95F02", "#C2A500", "#7B3FB5", "#1F78B4", "#128A63", "#C2247F")
 """One per rung, dark enough for an outline on every shade; their order follows RUNGS."""
 
-SHADES = ListedColormap(colormaps["Greys"](np.linspace(0.0, 0.6, 256)))
-"""Light enough for black lines on top."""
-
 RANGE = (1e-3, 1.0)
 """Errors of the lightest and of the darkest shade, as fractions of omega_0."""
 
 CONTOURS: tuple[tuple[float, Literal["--", "-"]], ...] = ((0.01, "--"), (0.1, "-"))
 """Error of the approximation as a fraction of omega_0, and the line that shows it."""
 
-LINES = ("#000000", "#D00000")
-HATCH = "////"
-
-INSET = 0.12
-"""Distance of an outline from its cell's border, as a fraction of the cell."""
-
-WIDE = 80
-"""Characters of the reasons that a legend has room for."""
-
 
 @styled
-def figure_map(study: ValidityMap, approximation: str = "published-python", measure: Measure = "plateau") -> Figure:
+def figure_map(study: ValidityMap) -> Figure:
     """Size of an approximation's error as shade, the largest fair share as outline, failed cells hatched with reasons.
 
     Along "step" shade and contours are those of the schemes against their own equations, since only schemes have a
@@ -54,55 +42,44 @@ def figure_map(study: ValidityMap, approximation: str = "published-python", meas
     figure, axes = new_figure(size=(8.0, 6.0))
     logarithmic = study.axis != "restitution"
     x, y = _edges(study.fills, logarithmic=False), _edges(study.values, logarithmic=logarithmic)
-    shown = errors(study, approximation, measure)
+    shown = errors(study)
     shaded, error = shown[0]
-    shade = axes.pcolormesh(
-        x, y, np.ma.masked_invalid(np.clip(error, *RANGE)), cmap=SHADES, norm=LogNorm(*RANGE), rasterized=True
-    )
+    greys = ListedColormap(colormaps["Greys"](np.linspace(0.0, 0.6, 256)))  # light enough for black lines on top
+    clipped = np.ma.masked_invalid(np.clip(error, *RANGE))
+    shade = axes.pcolormesh(x, y, clipped, cmap=greys, norm=LogNorm(*RANGE), rasterized=True)
     bar = figure.colorbar(shade, ax=axes, label=f"{shaded} [of ω₀]", extend="min", ticks=[1e-3, 1e-2, 1e-1, 1.0])
     bar.ax.set_yticklabels(["0.1%", "1%", "10%", "100%"])
-    for k, colour in enumerate(COLOURS):
+    handles: list[Artist] = []
+    for k, (colour, name) in enumerate(zip(COLOURS, RUNGS, strict=True)):
         outline = _outline(study.dominant == k, x, y, logarithmic=logarithmic)
         if outline:
             border = Path.make_compound_path(*map(Path, outline))
             axes.add_patch(PathPatch(border, fill=False, edgecolor=colour, linewidth=2.2, capstyle="projecting"))
+        handles.append(Patch(facecolor="none", edgecolor=colour, linewidth=2.2, label=name))
+    hatched: dict[str, Any] = {"facecolor": "none", "edgecolor": "#555555", "hatch": "////"}
     for row, column in zip(*np.nonzero(study.dominant < 0), strict=True):
-        corner = (x[column], y[row])
         size = (x[column + 1] - x[column], y[row + 1] - y[row])
-        axes.add_patch(Rectangle(corner, *size, facecolor="none", edgecolor="#555555", hatch=HATCH, linewidth=0))
-    handles: list[Artist] = [
-        Patch(facecolor="none", edgecolor=colour, linewidth=2.2, label=name)
-        for colour, name in zip(COLOURS, RUNGS, strict=True)
-    ]
-    for (name, error), colour in zip(shown, LINES, strict=False):
+        axes.add_patch(Rectangle((x[column], y[row]), *size, linewidth=0, **hatched))
+    for (name, error), colour in zip(shown, ("#000000", "#D00000"), strict=True):
         handles += _contours(axes, study, error, name, colour)
     if logarithmic:
         axes.set_yscale("log")
-    axes.set_xlim(x[0], x[-1])
-    axes.set_ylim(y[0], y[-1])
+    axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel="fill fraction M_w / M_max [1]", ylabel=LABELS[study.axis])
     axes.grid(visible=False)
-    axes.set_xlabel("fill fraction M_w / M_max [1]")
-    axes.set_ylabel(LABELS[study.axis])
-    axes.set_title(
-        f"Plateau of ω / ω₀ at N = {study.slices}: {shaded} (shade), largest fair share (outline)",
-        fontsize=10,
-        loc="left",
-    )
+    title = f"Plateau of ω / ω₀ at N = {study.slices}: {shaded} (shade), largest fair share (outline)"
+    axes.set_title(title, fontsize=10, loc="left")
     reasons = _reasons(study)
     if reasons:
-        handles.append(Patch(facecolor="none", edgecolor="#555555", hatch=HATCH, label=f"not computed: {reasons}"))
+        handles.append(Patch(label=f"not computed: {reasons}", **hatched))
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 
 
-def errors(
-    study: ValidityMap, approximation: str = "published-python", measure: Measure = "plateau"
-) -> Sequence[tuple[str, FloatArray]]:
+def errors(study: ValidityMap) -> Sequence[tuple[str, FloatArray]]:
     """Return what the contours show, with its name."""
     if study.axis == "step":
         return [(f"step error of {scheme}", study.step_error[scheme]) for scheme in SCHEMES]
-    overlap = np.abs(study.overlap)
-    return [(f"error of {approximation}", study.error(approximation, measure)), ("change by overlap", overlap)]
+    return [(f"error of {LADDER[0]}", study.error), ("change by overlap", np.abs(study.overlap))]
 
 
 def _contours(axes: Axes, study: ValidityMap, error: FloatArray, words: str, colour: str) -> list[Line2D]:
@@ -147,17 +124,16 @@ def _edges(centres: FloatArray, *, logarithmic: bool) -> FloatArray:
     return np.exp(inner) if logarithmic else np.asarray(inner)
 
 
-def _outline(
-    inside: NDArray[np.bool_], x: FloatArray, y: FloatArray, *, logarithmic: bool
-) -> list[list[tuple[float, float]]]:
+def _outline(inside: NDArray[np.bool_], x: FloatArray, y: FloatArray, *, logarithmic: bool) -> list[FloatArray]:
     """Return the border of the cells ``inside`` as segments, moved inwards so that neighbours' borders stay apart."""
+    inset = 0.12  # of a cell
     at = np.log(y) if logarithmic else y
     around = np.pad(inside, 1)
     segments = []
     for row, column in zip(*np.nonzero(inside), strict=True):
         below, above = not around[row, column + 1], not around[row + 2, column + 1]
         before, behind = not around[row + 1, column], not around[row + 1, column + 2]
-        dx, dy = INSET * (x[column + 1] - x[column]), INSET * (at[row + 1] - at[row])
+        dx, dy = inset * (x[column + 1] - x[column]), inset * (at[row + 1] - at[row])
         left, right = x[column] + before * dx, x[column + 1] - behind * dx
         low, high = at[row] + below * dy, at[row + 1] - above * dy
         sides = (
@@ -166,9 +142,10 @@ def _outline(
             (below, ((left, low), (right, low))),
             (above, ((left, high), (right, high))),
         )
-        segments += [
-            [(float(a), float(np.exp(b) if logarithmic else b)) for a, b in side] for there, side in sides if there
-        ]
+        segments += [np.array(side) for there, side in sides if there]
+    if logarithmic:
+        for side in segments:
+            side[:, 1] = np.exp(side[:, 1])
     return segments
 
 
@@ -176,4 +153,4 @@ def _reasons(study: ValidityMap) -> str:
     """Return every reason once, with the number of cells it holds for."""
     found, counts = np.unique(study.reason[study.reason != ""], return_counts=True)
     words = [f"{reason} ({count})" for reason, count in zip(found, counts, strict=True)]
-    return shortened(", ".join(words[:3]), WIDE) + (f" and {len(words) - 3} more" if len(words) > 3 else "")
+    return shortened(", ".join(words[:3]), 80) + (f" and {len(words) - 3} more" if len(words) > 3 else "")

@@ -10,19 +10,21 @@ combination of assumptions is flown in every cell.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.chapters.solvers import SCHEMES
+from flipproof.chapters.solvers import FREE, LIMITS, SCHEMES
 from flipproof.chapters.waterfall.study import NAMES, canonical, fair_share
 from flipproof.frame.solvers import Made, Run, make
 from flipproof.frame.twins import band, twins
 from ode_reference.models import LADDER as MODELS
 from ode_reference.models import MODELS as EQUATIONS
+from ode_reference.solver import COLUMN
 from ode_reference.switches import Switches
 from slicemodel import Scenario
 from slicemodel.observables import plateau
@@ -30,7 +32,6 @@ from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
 
 Axis = Literal["gamma", "step", "restitution"]
-Measure = Literal["plateau", "largest"]
 
 LADDER: Final = ("published-python", *MODELS)
 """From what was published to what is right; each differs from the next by one mistake."""
@@ -55,11 +56,11 @@ SETS: Final = {
 }
 """Every set of assumptions mended -> the model that flies it, a rung of the ladder where there is one."""
 
-COLUMN: Final = "column"
-"""Water that cannot overlap. It has no switches of the ladder: what it changes is no fair share."""
-
 EXTRA: Final = ("exact-step", COLUMN)
-"""Beside the ladder: a scheme held against its own equation, and the column against free flight."""
+"""Beside the ladder: a scheme held against its own equation, and the column, water that cannot overlap.
+
+The column has no switches of the ladder: what it changes is no fair share.
+"""
 
 SOLVERS: Final = tuple(dict.fromkeys((*LADDER, *EXTRA, *SETS.values())))
 """What flies every cell: two schemes, 40 models and the column."""
@@ -70,33 +71,11 @@ LABELS: Final[Mapping[Axis, str]] = {
     "restitution": "restitution e [1]",
 }
 
-POINTS = 201
+POINTS: Final = 201
 """Output times of a model."""
 
-CURVE = 101
+CURVE: Final = 101
 """Equal times at which two runs are compared."""
-
-FILLS: Final = (0.05, 1.0)
-
-RANGES: Final[Mapping[Axis, tuple[float, float]]] = {
-    "gamma": (0.02, 1.0),
-    "step": (0.002, 0.2),
-    "restitution": (0.0, 1.0),
-}
-"""Ends of a map's axes; "gamma" and "step" are spaced in equal ratios."""
-
-CHUNK: Final = 200
-"""Runs of a map that a worker makes at a time; it returns their readings alone."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
-    """One throw of a map: row, column, scenario, and points of the grid for the schemes."""
-
-    row: int
-    column: int
-    scenario: Scenario
-    steps: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,12 +99,12 @@ class ValidityMap:
     slices : int
     level : name -> array - plateau of every entry of LADDER and EXTRA; NaN where it could not be computed
     largest : name -> array - max |d omega| / omega_0 against free flight; of a scheme, against its own equation too
+    step_error : scheme -> array - error against the scheme's own equation, by plateau
+    reason : array of str - "" or why the cell, or a part of it, could not be computed
     shares : array, shape (rungs, rows, columns)
         Fair share of every rung in the plateau, signed; they add up from the published program to free flight.
     band : array or None
         By how much twins move the plateau of free flight, the most sensitive equation; None if they were not flown.
-    step_error : scheme -> array - error against the scheme's own equation, by plateau
-    reason : array of str - "" or why the cell, or a part of it, could not be computed
     """
 
     axis: Axis
@@ -139,16 +118,15 @@ class ValidityMap:
     shares: FloatArray
     band: FloatArray | None = None
 
-    def error(self, name: str, measure: Measure = "plateau") -> FloatArray:
-        """Return the error of an approximation against free flight as a fraction of omega_0."""
-        if measure == "largest":
-            return self.largest[name]
-        return np.abs(self.level[name] - self.level[LADDER[-1]])
+    @property
+    def error(self) -> FloatArray:
+        """Error of the published program against free flight in the plateau, fraction of omega_0."""
+        return np.abs(self.level[LADDER[0]] - self.level[FREE])
 
     @property
     def overlap(self) -> FloatArray:
         """What overlap changes: plateau of free flight, whose slices overlap, minus that of the column."""
-        return self.level[LADDER[-1]] - self.level[COLUMN]
+        return self.level[FREE] - self.level[COLUMN]
 
     @property
     def dominant(self) -> NDArray[np.int64]:
@@ -173,26 +151,31 @@ def vary(throw: Scenario, *, fill: float, damping: float | None = None, restitut
 
 
 def map_axes(axis: Axis, columns: int, rows: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return fill fractions and values of a map of that many cells over the whole of its axes."""
+    """Return fill fractions and values of a map of that many cells; "gamma" and "step" are spaced in equal ratios."""
+    ends = {"gamma": (0.02, 1.0), "step": (0.002, 0.2), "restitution": (0.0, 1.0)}[axis]
     spaced: Callable[..., Any] = np.linspace if axis == "restitution" else np.geomspace
-    return tuple(np.linspace(*FILLS, columns).tolist()), tuple(spaced(*RANGES[axis], rows).tolist())
+    return tuple(np.linspace(0.05, 1.0, columns).tolist()), tuple(spaced(*ends, rows).tolist())
 
 
-def cells(throw: Scenario, axis: Axis, fills: Sequence[float], values: Sequence[float], steps: int) -> list[Cell]:
-    """Return the throws of a map, row by row; ``steps`` is the grid where the map does not say another."""
-    found = []
-    for row, value in enumerate(values):
-        for column, fill in enumerate(fills):
-            scenario = vary(
-                throw,
-                fill=fill,
-                damping=value if axis == "gamma" else None,
-                restitution=value if axis == "restitution" else None,
-            )
-            turn = abs(throw.omega0) * throw.duration
-            points = max(2, round(turn / value) + 1) if axis == "step" else steps
-            found.append(Cell(row=row, column=column, scenario=scenario, steps=points))
-    return found
+def cells(
+    throw: Scenario, axis: Axis, fills: Sequence[float], values: Sequence[float], steps: int, points: int | None
+) -> Iterator[tuple[tuple[int, int], dict[str, Run]]]:
+    """Yield row and column of every cell of a map, row by row, and the run that it has of every solver.
+
+    A model does not know a step, nor the column the restitution: along that axis their runs of a fill fraction are one.
+    """
+    usual = {} if points is None else {"times": np.linspace(0.0, throw.duration, points)}
+    for (row, value), (column, fill) in product(enumerate(values), enumerate(fills)):
+        damping, restitution = (value if axis == name else None for name in ("gamma", "restitution"))
+        scenario = vary(throw, fill=fill, damping=damping, restitution=restitution)
+        turn = abs(throw.omega0) * throw.duration
+        scheme = {"steps": max(2, round(turn / value) + 1) if axis == "step" else steps, "store": "summary"}
+        runs = {}
+        for name in SOLVERS:
+            thrown = replace(scenario, restitution=0.0) if name == COLUMN and axis == "restitution" else scenario
+            label = f"map {axis}, row {row}, column {column}, {name}"
+            runs[name] = Run(name, thrown, scheme if name in SCHEMES else usual, label)
+        yield (row, column), runs
 
 
 def plan_map(
@@ -205,34 +188,16 @@ def plan_map(
     points: int | None = POINTS,
     banded: bool = False,
 ) -> list[Run]:
-    """Return the runs of one map.
+    """Return the runs of one map, equal ones once.
 
-    A model does not know a step: along "step" it runs once per fill fraction, and so does the column along
-    "restitution", which it does not know. ``points`` are its output times; None:
-    its own. ``banded`` gives free flight its twins.
+    ``steps`` is the grid of a scheme where the map does not say another, ``points`` are the output times of a model;
+    None: its own. ``banded`` gives free flight its twins.
     """
-    usual = _usual(throw, points)
-    runs = []
-    for cell in cells(throw, axis, fills, values, steps):
-        for name in SOLVERS:
-            if cell.row > 0 and (name == COLUMN if axis == "restitution" else axis == "step" and name not in SCHEMES):
-                continue
-            run = _run(axis, cell, name, usual)
-            runs += [run, *(twins(run) if banded and name == LADDER[-1] else ())]
-    return runs
-
-
-def _usual(throw: Scenario, points: int | None) -> dict[str, Any]:
-    return {} if points is None else {"times": np.linspace(0.0, throw.duration, points)}
-
-
-def _run(axis: Axis, cell: Cell, name: str, usual: Mapping[str, Any]) -> Run:
-    """Return the run that a cell has of a solver; ``usual`` are the settings of a model."""
-    settings = {"steps": cell.steps, "store": "summary"} if name in SCHEMES else usual
-    scenario = cell.scenario
-    if name == COLUMN and axis == "restitution":
-        scenario = replace(scenario, restitution=RANGES[axis][0])
-    return Run(name, scenario, settings, f"map {axis}, row {cell.row}, column {cell.column}, {name}")
+    runs: dict[Run, None] = {}
+    for _, by_name in cells(throw, axis, fills, values, steps, points):
+        for name, run in by_name.items():
+            runs |= dict.fromkeys((run, *(twins(run) if banded and name == FREE else ())))
+    return list(runs)
 
 
 def make_readings(runs: Sequence[Run]) -> list[Reading]:
@@ -252,24 +217,20 @@ def study_readings(
 ) -> ValidityMap:
     """Make the map of what was read off the runs of ``plan_map``, planned with the same arguments."""
     shape = (len(values), len(fills))
-    level = {name: np.full(shape, np.nan) for name in SOLVERS}
-    largest = {name: np.full(shape, np.nan) for name in SOLVERS}
-    step_error = {name: np.full(shape, np.nan) for name in SCHEMES}
+    level, largest = ({name: np.full(shape, np.nan) for name in SOLVERS} for _ in range(2))
     reason = np.full(shape, "", dtype="<U80")
-    planned = cells(throw, axis, fills, values, steps)
-    usual = _usual(throw, points)
-    for cell in planned:
-        at = (cell.row, cell.column)
-        found = {name: readings.get(_run(axis, cell, name, usual), Reading(problem="not run")) for name in SOLVERS}
-        problems = [f"{name}: {reading.problem}" for name, reading in found.items() if reading.problem]
-        truth = found[LADDER[-1]].omega
+    free: dict[tuple[int, int], Run] = {}
+    for at, runs in cells(throw, axis, fills, values, steps, points):
+        free[at] = runs[FREE]
+        found = {name: readings.get(run, Reading(problem="not run")) for name, run in runs.items()}
+        truth = found[FREE].omega
         for name, reading in found.items():
             level[name][at] = reading.level
             if truth is not None and reading.omega is not None:
                 largest[name][at] = np.abs(reading.omega - truth).max() / abs(throw.omega0)
-        for scheme, model in (("published-python", "published-limit"), ("exact-step", "eq8")):
-            step_error[scheme][at] = abs(level[scheme][at] - level[model][at])
+        problems = (f"{name}: {reading.problem}" for name, reading in found.items() if reading.problem)
         reason[at] = shortened("; ".join(problems), 80)
+    of_sets = {switches: level[name] for switches, name in SETS.items()}
     return ValidityMap(
         axis=axis,
         fills=np.asarray(fills, dtype=np.float64),
@@ -277,28 +238,21 @@ def study_readings(
         slices=throw.n_slices,
         level={name: level[name] for name in (*LADDER, *EXTRA)},
         largest={name: largest[name] for name in (*LADDER, *EXTRA)},
-        step_error=step_error,
+        step_error={scheme: np.abs(level[scheme] - level[LIMITS[scheme]]) for scheme in SCHEMES},
         reason=reason,
-        shares=_shares(level),
-        band=_band({(c.row, c.column): _run(axis, c, LADDER[-1], usual) for c in planned}, readings),
+        shares=np.array([level[LADDER[1]] - level[LADDER[0]], *(fair_share(name, of_sets) for name in NAMES)]),
+        band=_band(free, readings, shape),
     )
 
 
-def _band(free: Mapping[tuple[int, int], Run], readings: Mapping[Run, Reading]) -> FloatArray | None:
+def _band(
+    free: Mapping[tuple[int, int], Run], readings: Mapping[Run, Reading], shape: tuple[int, int]
+) -> FloatArray | None:
     """Return the band of free flight in every cell; None if its twins were not flown."""
     if not all(twin in readings for run in free.values() for twin in twins(run)):
         return None
     levels = {run: reading.level for run, reading in readings.items()}
-    found = np.full((1 + max(row for row, _ in free), 1 + max(column for _, column in free)), np.nan)
-    for at, run in free.items():
-        found[at] = band(run, levels)
-    return found
-
-
-def _shares(level: Mapping[str, FloatArray]) -> FloatArray:
-    """Return the fair share of every rung, the step size first; together they lead from program to free flight."""
-    of_sets = {switches: level[name] for switches, name in SETS.items()}
-    return np.array([level[LADDER[1]] - level[LADDER[0]], *(fair_share(name, of_sets) for name in NAMES)])
+    return np.array([band(run, levels) for run in free.values()]).reshape(shape)
 
 
 def read_flight(made: Made) -> Reading:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from flipproof.chapters.model_form.richardson import Richardson, richardson
-from flipproof.chapters.model_form.study import ModelForm, study_signals
-from flipproof.chapters.step_size.study import plan_step_size
-from flipproof.frame.chapter import Absent, Ask, Call, Chapter, Claims, Finding, Outcome, Run, Study, attempt, judged
+from flipproof.chapters.model_form.study import ModelForm, Richardson, richardson, study_model_form
+from flipproof.chapters.step_size.study import errors_of, plan_step_size
+from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Finding, Outcome, Run, Study, attempt, judged, observed
 from slicemodel import Trajectory
 
 FORMS: Final = (
@@ -23,30 +21,14 @@ FORMS: Final = (
 )
 """Scheme and equation: is what is left as the step goes to zero the step's, or another equation?"""
 
-LEVELS: Final = 6
-MULTIPLE: Final = 54
-COMMON: Final = 37
+
+Found = tuple[Mapping[tuple[str, str], Outcome[ModelForm]], Mapping[str, Outcome[Richardson]]]
+"""The fit of every pair of scheme and equation, and where each scheme goes as its step goes to zero."""
 
 
-@dataclass(frozen=True, slots=True)
-class Forms:
-    """The fit of every pair of scheme and equation, and where each scheme goes as its step goes to zero."""
-
-    forms: Mapping[tuple[str, str], Outcome[Mapping[str, ModelForm]]]
-    limits: Mapping[str, Outcome[Richardson]]
-
-    @property
-    def omega(self) -> list[tuple[tuple[str, str], ModelForm]]:
-        """The fits of omega that could be made."""
-        return [(pair, each.found["omega"]) for pair, each in self.forms.items() if each.found is not None]
-
-
-def study(ask: Ask) -> Study[Forms]:
-    """Halve the step of the schemes of FORMS; fit the pairs that ``ask.work`` lists, in workers."""
-    levels = {
-        scheme: plan_step_size(ask.throw, scheme, COMMON, MULTIPLE, LEVELS)
-        for scheme in dict.fromkeys(scheme for scheme, _ in FORMS)
-    }
+def study(ask: Ask) -> Study[Found]:
+    """Halve the step of the schemes of FORMS; fit omega of the pairs that ``ask.work`` lists, in workers."""
+    levels = {scheme: plan_step_size(ask.throw, scheme, base=37, multiple=54, count=6) for scheme in dict(FORMS)}
     truths = {pair: Run(pair[1], ask.throw, {}, pair[1]) for pair in ask.work}
     flights = yield [*truths.values(), *(run for grids in levels.values() for level in grids for run in level)]
 
@@ -55,58 +37,45 @@ def study(ask: Ask) -> Study[Forms]:
 
     def fit(scheme: str, model: str) -> Call:
         truth = flights[truths[scheme, model]].flight
-        return Call(study_signals, (truth, grids(scheme)), f"{scheme} against {model}")
+        return Call(study_model_form, errors_of(truth, grids(scheme)), f"{scheme} against {model}")
+
+    def limit(scheme: str) -> Richardson:
+        # The mean over the grids of a level: a single one carries the luck of its impact phases.
+        steps = [float(np.mean([run.settings["dt"] for run in level])) for level in grids(scheme)]
+        ends = [float(np.mean([run.omega[-1] for run in level])) / ask.throw.omega0 for level in grids(scheme)]
+        return richardson(steps, ends)
 
     calls = {pair: attempt(fit, *pair) for pair in truths}
     flights = yield [call.found for call in calls.values() if call.found is not None]
-    return Forms(
-        {pair: attempt(lambda call: flights.answer(call.value), call) for pair, call in calls.items()},
-        {scheme: attempt(lambda scheme: _limit(grids(scheme), ask.throw.omega0), scheme) for scheme in levels},
-    )
+    forms = {pair: attempt(lambda call: flights.answer(call.value), call) for pair, call in calls.items()}
+    return forms, {scheme: attempt(limit, scheme) for scheme in levels}
 
 
-def _limit(levels: list[list[Trajectory]], omega0: float) -> Richardson:
-    # The mean over the grids of a level: a single one carries the luck of its impact phases.
-    steps = [float(np.mean([run.settings["dt"] for run in level])) for level in levels]
-    return richardson(steps, [float(np.mean([run.omega[-1] for run in level])) / omega0 for level in levels])
-
-
-def claims(found: Forms) -> Claims:
+def claims(found: Found) -> Claims:
     """Yield where every scheme goes, and what stays of its error against an equation."""
-    for scheme, limit in found.limits.items():
+    forms, limits = found
+    for scheme, limit in limits.items():
         yield judged(claim_limit, scheme, limit, id=f"limit-{scheme}", title=f"limit of {scheme}", kind="observation")
-    for (scheme, model), form in found.forms.items():
-        if form.found is not None:
-            yield claim_model_form(scheme, model, form.found["omega"])
-        else:
-            yield Absent(f"model-form-{scheme}-{model}", f"{scheme} against {model}", form.reason, "observation")
+    for (scheme, model), form in forms.items():
+        id_, title = f"model-form-{scheme}-{model}", f"{scheme} against {model}"
+        yield judged(claim_model_form, id_, title, form, id=id_, title=title, kind="observation")
 
 
 def claim_limit(scheme: str, limit: Richardson) -> Finding:
     """Where omega(T) / omega_0 of a scheme goes as its step goes to zero, with its grid-convergence index."""
-    return Finding(
+    how = f"observed order {limit.order:.2f}; band: grid-convergence index; " if limit.ok else ""
+    return observed(
         id=f"limit-{scheme}",
         title=f"{scheme}: ω(T)/ω₀ extrapolated to Δt = 0 (Richardson)",
         value=limit.value if limit.ok else None,
-        unit="",
-        kind="observation",
         band=limit.gci if limit.ok else None,
-        note=f"observed order {limit.order:.2f}; band: grid-convergence index; {limit.reason}"
-        if limit.ok
-        else limit.reason,
+        note=how + limit.reason,
     )
 
 
-def claim_model_form(scheme: str, model: str, form: ModelForm) -> Finding:
+def claim_model_form(id_: str, title: str, form: ModelForm) -> Finding:
     """What stays of a scheme's error as its step goes to zero decides between step size and another equation."""
-    return Finding(
-        id=f"model-form-{scheme}-{model}",
-        title=f"{scheme} against {model}: {form.verdict}",
-        value=form.floor,
-        unit="of ω₀",
-        kind="observation",
-        note=form.reason,
-    )
+    return observed(id=id_, title=f"{title}: {form.verdict}", value=form.floor, unit="of ω₀", note=form.reason)
 
 
 CHAPTER: Final = Chapter(
@@ -116,4 +85,5 @@ CHAPTER: Final = Chapter(
     claims=claims,
     template=Path(__file__).with_name("part.html.j2"),
     work={"quick": FORMS[:2], "full": FORMS},
+    page=lambda found: {"fits": [(pair, each.found) for pair, each in found[0].items() if each.found is not None]},
 )

@@ -13,46 +13,27 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq, least_squares
 from scipy.stats import f as f_distribution
 
-from flipproof.chapters.step_size.study import LEAST_COMMON
-from slicemodel import Trajectory
+from flipproof.chapters.step_size.study import ROUND_OFF
 from slicemodel.trajectory import FloatArray
 
 Verdict = Literal["step size", "model form", "undecided", "failure"]
 Interval = tuple[float, float]
 
-CONFIDENCE = 0.95
-"""Probability that a stated interval holds the parameter, if the scatter is independent and log-normal."""
-
-ORDERS: Interval = (0.2, 8.0)
-"""Orders that the fit may find; below, C dt^p can no longer be told from F."""
-
-ORDER_TOLERANCE = 0.25
+ORDER_TOLERANCE: Final = 0.25
 """An observed order further than this from the expected one is a failure, be it too low or too high."""
 
-PHASE_FACTOR = 2.0
+PHASE_FACTOR: Final = 2.0
 """Impact phases alone change the error of a single run by up to this factor, up or down."""
 
-ROUND_OFF = 1e-13
-"""Errors below this fraction carry no order."""
-
-CURVATURE = 0.25
-"""An F below this share of the finest error may be the curve that higher orders bend into C dt^p: refine to tell."""
-
-LEAST_SCATTER = 1e-6
-"""Scatter of log(error) that even perfect data are given: the fit itself is no better."""
-
-LEAST_LEVELS = 4
+LEAST_LEVELS: Final = 4
 """Step sizes that a fit of three parameters needs at the least."""
-
-BAND = 1e-7
-"""Numerical uncertainty of the reference as a fraction of the signal's scale."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,42 +42,21 @@ class ModelForm:
 
     Parameters
     ----------
-    dt, error : arrays of one shape, (levels,) or (levels, members) - step [s] and error, as given
-    coefficient, order, floor : float
-        C [error / s^p], p and F of error = C dt^p + F; NaN if there is no fit.
-    order_interval, floor_interval : (low, high)
-        95 % profile intervals; NaN if there is no fit.
-    scatter : float - standard deviation of the residuals of log(error), level by level
-    expected_order, band : float - what the order was held against, and what F was
+    order, floor : float - p and F of error = C dt^p + F; NaN if there is no fit
+    order_interval, floor_interval : (low, high) - 95 % profile intervals, if the scatter is independent and log-normal
     verdict : {"step size", "model form", "undecided", "failure"}
     reason : str - the verdict in words
     """
 
-    dt: FloatArray
-    error: FloatArray
-    coefficient: float
-    order: float
-    floor: float
-    order_interval: Interval
-    floor_interval: Interval
-    scatter: float
-    expected_order: float
-    band: float
+    order: float = math.nan
+    floor: float = math.nan
+    order_interval: Interval = (math.nan, math.nan)
+    floor_interval: Interval = (math.nan, math.nan)
     verdict: Verdict
     reason: str
 
-    def curve(self, dt: ArrayLike) -> FloatArray:
-        """Return C dt^p + F."""
-        return np.asarray(self.coefficient * np.asarray(dt, dtype=np.float64) ** self.order + self.floor)
 
-
-def study_model_form(
-    dt: ArrayLike,
-    error: ArrayLike,
-    *,
-    expected_order: float = 1.0,
-    band: float = BAND,
-) -> ModelForm:
+def study_model_form(dt: ArrayLike, error: ArrayLike, *, expected_order: float = 1.0, band: float = 1e-7) -> ModelForm:
     """Decide whether an error is a matter of step size or of model form.
 
     Parameters
@@ -116,89 +76,55 @@ def study_model_form(
         F may be zero or such a small part, and the order is the expected one; "undecided" if the data do not reach far
         enough; "failure" if the error is not finite, oscillates, or falls at another order.
     """
-    steps, errors = np.asarray(dt, dtype=np.float64), np.asarray(error, dtype=np.float64)
-    if steps.shape != errors.shape or steps.ndim not in (1, 2):
-        raise ValueError(f"dt has shape {steps.shape}, error {errors.shape}: one shape (levels[, members]) is needed")
-    if not (np.all(np.isfinite(steps)) and np.all(steps > 0)):
-        raise ValueError("dt holds steps that are not positive and finite")
-    levels = _by_level(steps, errors)
-    refusal = _refusal(levels)
-    fit = None if refusal else _Fit.of(levels.dt, levels.error)
-    if fit is None:
-        nan = (math.nan, math.nan)
-        verdict, reason = refusal or ("failure", "no fit of C Δt^p + F was found")
-        parameters, intervals, scatter = (math.nan,) * 3, (nan, nan), math.nan
-    else:
-        parameters = (math.exp(fit.best[0]), float(fit.best[1]), float(fit.best[2]))
-        intervals = (fit.interval(1), fit.interval(2))
-        scatter = fit.scatter
-        verdict, reason = _verdict(fit, intervals, levels, expected_order, band)
+    members = np.asarray(dt).reshape(len(np.asarray(dt)), -1)
+    steps = np.exp(np.log(members).mean(axis=1))
+    order = np.argsort(-steps)
+    errors = np.sqrt((np.asarray(error).reshape(members.shape)[order] ** 2).mean(axis=1))
+    steps = steps[order]
+    refusal = _refusal(steps, errors, members.shape[1])
+    if refusal is not None:
+        return ModelForm(verdict=refusal[0], reason=refusal[1])
+    fit = _Fit(steps, errors)
+    intervals = fit.interval(1), fit.interval(2)
+    verdict, reason = _verdict(fit, *intervals, float(errors[-1]), expected_order, band)
     return ModelForm(
-        dt=steps,
-        error=errors,
-        coefficient=parameters[0],
-        order=parameters[1],
-        floor=parameters[2],
+        order=float(fit.best[1]),
+        floor=float(fit.best[2]),
         order_interval=intervals[0],
         floor_interval=intervals[1],
-        scatter=scatter,
-        expected_order=expected_order,
-        band=band,
         verdict=verdict,
         reason=reason,
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Levels:
-    """Step and root-mean-square error of every level, the coarsest first, and the members of a level."""
-
-    dt: FloatArray
-    error: FloatArray
-    members: int
-
-
-def _by_level(dt: FloatArray, error: FloatArray) -> _Levels:
-    steps = dt[:, np.newaxis] if dt.ndim == 1 else dt
-    errors = error[:, np.newaxis] if error.ndim == 1 else error
-    mean = np.exp(np.log(steps).mean(axis=1))
-    order = np.argsort(-mean)
-    return _Levels(mean[order], np.sqrt((errors[order] ** 2).mean(axis=1)), steps.shape[1])
-
-
-def _refusal(levels: _Levels) -> tuple[Verdict, str] | None:
-    """Return why these errors have no fit, or None."""
-    if not np.all(np.isfinite(levels.error)):
-        where = levels.dt[~np.isfinite(levels.error)][0]
-        return "failure", f"the error at Δt = {where:.2g} s is not finite"
-    if len(np.unique(levels.dt)) < LEAST_LEVELS:
-        return "undecided", f"{len(np.unique(levels.dt))} step sizes; {LEAST_LEVELS} are needed for C, p and F"
-    if levels.error.min() < ROUND_OFF:
-        return "undecided", f"errors reach round-off ({levels.error.min():.1g}), where an order means nothing"
+def _refusal(dt: FloatArray, error: FloatArray, members: int) -> tuple[Verdict, str] | None:
+    """Return why these errors, the coarsest level's first, have no fit, or None."""
+    if not np.all(np.isfinite(error)):
+        return "failure", f"the error at Δt = {dt[~np.isfinite(error)][0]:.2g} s is not finite"
+    if len(np.unique(dt)) < LEAST_LEVELS:
+        return "undecided", f"{len(np.unique(dt))} step sizes; {LEAST_LEVELS} are needed for C, p and F"
+    if error.min() < ROUND_OFF:
+        return "undecided", f"errors reach round-off ({error.min():.1g}), where an order means nothing"
     # What impact phases may do to the quotient of two levels, less the more members are averaged.
-    allowed = PHASE_FACTOR ** (2.0 / math.sqrt(levels.members))
-    rise = levels.error[1:] / np.minimum.accumulate(levels.error)[:-1]
+    allowed = PHASE_FACTOR ** (2.0 / math.sqrt(members))
+    rise = error[1:] / np.minimum.accumulate(error)[:-1]
     k = int(rise.argmax())
     if rise[k] > allowed:
         return (
             "failure",
-            f"oscillation: at Δt = {levels.dt[k + 1]:.2g} s the error is {rise[k]:.1f} times that of a coarser step",
+            f"oscillation: at Δt = {dt[k + 1]:.2g} s the error is {rise[k]:.1f} times that of a coarser step",
         )
     return None
 
 
 def _verdict(
-    fit: _Fit,
-    intervals: tuple[Interval, Interval],
-    levels: _Levels,
-    expected: float,
-    band: float,
+    fit: _Fit, order: Interval, floor: Interval, finest: float, expected: float, band: float
 ) -> tuple[Verdict, str]:
-    (order_low, order_high), (floor_low, floor_high) = intervals
-    finest = float(levels.error[-1])
+    (order_low, order_high), (floor_low, floor_high) = order, floor
     if fit.scatter > math.log(PHASE_FACTOR):
         return "failure", f"errors scatter {math.exp(fit.scatter):.1f}-fold about C Δt^p + F: they do not follow it"
-    if floor_low > band and floor_high > CURVATURE * finest:
+    # A smaller F may be the curve that higher orders bend into C dt^p: refine to tell.
+    if floor_low > band and floor_high > 0.25 * finest:
         low, high = f"{floor_low:.2g}", f"{floor_high:.2g}"
         left = low if low == high else f"{low} to {high}"
         return "model form", f"an error of {left} remains as Δt goes to zero (band {band:.1g})"
@@ -208,94 +134,75 @@ def _verdict(
         return "failure", f"order too low: {order_low:.2f} to {order_high:.2f}, not {expected:g}"
     if floor_high > finest:
         return "undecided", f"F may be as large as {floor_high:.2g}, the finest error is {finest:.2g}: refine further"
-    order = float(fit.best[1])
-    if abs(order - expected) > ORDER_TOLERANCE:
-        return (
-            "undecided",
-            f"order {order:.2f} ({order_low:.2f} to {order_high:.2f}) instead of {expected:g}: add levels",
-        )
-    return "step size", f"order {order:.2f}; F at zero, at most {floor_high:.2g} where the finest error is {finest:.2g}"
+    p = fit.best[1]
+    if abs(p - expected) > ORDER_TOLERANCE:
+        return "undecided", f"order {p:.2f} ({order_low:.2f} to {order_high:.2f}) instead of {expected:g}: add levels"
+    return "step size", f"order {p:.2f}; F at zero, at most {floor_high:.2g} where the finest error is {finest:.2g}"
 
 
-@dataclass(frozen=True, slots=True)
 class _Fit:
-    """Least squares of log(C dt^p + F) - log(error) in (log C, p, F)."""
+    """Least squares of log(C dt^p + F) - log(error) in (log C, p, F), and the scatter of what is left."""
 
-    log_dt: FloatArray
-    log_error: FloatArray
-    best: FloatArray
-    cost: float
-
-    @classmethod
-    def of(cls, dt: FloatArray, error: FloatArray) -> _Fit:
-        """Return the best of fits from several starts: F nothing, a little, nearly all of the finest error."""
-        log_dt, log_error = np.log(dt), np.log(error)
-        smallest = float(error.min())
-        trial = cls(log_dt, log_error, np.zeros(3), math.inf)
-        starts = [np.array([0.0, p, share * smallest]) for p in (0.5, 1.0, 2.0) for share in (0.0, 0.3, 0.95)]
+    def __init__(self, dt: FloatArray, error: FloatArray) -> None:
+        self.log_dt, self.log_error = np.log(dt), np.log(error)
+        self.smallest, largest = (math.exp(float(end)) for end in (self.log_error.min(), self.log_error.max()))
+        # Of an order below 0.2, C dt^p can no longer be told from F.
+        self.low, self.high = np.array([-690.0, 0.2, 0.0]), np.array([690.0, 8.0, 2.0 * largest])
+        # Starts: F nothing, a little, nearly all of the finest error.
+        starts = [np.array([0.0, p, share * error.min()]) for p in (0.5, 1.0, 2.0) for share in (0.0, 0.3, 0.95)]
         for start in starts:
-            start[0] = float(np.mean(log_error - start[1] * log_dt))
-        best, cost = min((trial.minimum(start, None) for start in starts), key=lambda found: found[1])
-        return cls(log_dt, log_error, best, cost)
+            start[0] = float(np.mean(self.log_error - start[1] * self.log_dt))
+        self.best, self.cost = min((self._minimum(start, None) for start in starts), key=lambda found: found[1])
+        self.freedom = len(dt) - 3
+        self.scatter = math.sqrt(self.cost / self.freedom)
 
-    @property
-    def freedom(self) -> int:
-        return len(self.log_dt) - 3
-
-    @property
-    def scatter(self) -> float:
-        return math.sqrt(self.cost / self.freedom)
-
-    def minimum(self, start: FloatArray, fixed: int | None) -> tuple[FloatArray, float]:
+    def _minimum(self, start: FloatArray, fixed: int | None) -> tuple[FloatArray, float]:
         """Return the best parameters from ``start`` and their cost, with parameter ``fixed`` held."""
-        largest = math.exp(float(self.log_error.max()))
-        low = np.array([-690.0, ORDERS[0], 0.0])
-        high = np.array([690.0, ORDERS[1], 2.0 * largest])
         moving = np.array([j for j in range(3) if j != fixed])
         # F is measured in its own size: near zero the finest error is the scale on which it matters.
-        scale = np.array([1.0, 1.0, math.exp(float(self.log_error.min()))])
+        scale = np.array([1.0, 1.0, self.smallest])
+
+        def whole(part: FloatArray) -> FloatArray:
+            parameters = start.copy()
+            parameters[moving] = part * scale[moving]
+            return parameters
 
         def residuals(part: FloatArray) -> FloatArray:
-            whole = start.copy()
-            whole[moving] = part * scale[moving]
+            log_c, p, floor = whole(part)
             with np.errstate(over="ignore"):
-                return np.asarray(np.log(np.exp(whole[0] + whole[1] * self.log_dt) + whole[2]) - self.log_error)
+                return np.asarray(np.log(np.exp(log_c + p * self.log_dt) + floor) - self.log_error)
 
         def slopes(part: FloatArray) -> FloatArray:
-            whole = start.copy()
-            whole[moving] = part * scale[moving]
+            log_c, p, floor = whole(part)
             with np.errstate(over="ignore", divide="ignore"):
-                step_error = np.exp(whole[0] + whole[1] * self.log_dt)
-                share = 1.0 / (1.0 + whole[2] / step_error)
-                columns = np.array([share, share * self.log_dt, scale[2] / (step_error + whole[2])])
+                step_error = np.exp(log_c + p * self.log_dt)
+                share = 1.0 / (1.0 + floor / step_error)
+                columns = np.array([share, share * self.log_dt, scale[2] / (step_error + floor)])
             return np.asarray(columns[moving].T)
 
-        bounds = (low[moving] / scale[moving], high[moving] / scale[moving])
-        inside = np.clip(start[moving] / scale[moving], bounds[0], bounds[1])
+        bounds = (self.low[moving] / scale[moving], self.high[moving] / scale[moving])
+        inside = np.clip(start[moving] / scale[moving], *bounds)
         found = least_squares(residuals, inside, slopes, bounds=bounds, x_scale="jac", max_nfev=400)
-        whole = start.copy()
-        whole[moving] = found.x * scale[moving]
-        return whole, float(2.0 * found.cost)
+        return whole(found.x), float(2.0 * found.cost)
 
     def interval(self, j: int) -> Interval:
-        """Return the values of parameter ``j`` that the data do not refuse, with the others fitted anew for each."""
-        margin = float(f_distribution.ppf(CONFIDENCE, 1, self.freedom)) * max(self.scatter, LEAST_SCATTER) ** 2
-        bounds = ((-690.0, 690.0), ORDERS, (0.0, 2.0 * math.exp(float(self.log_error.max()))))[j]
+        """Return the values of p (1) or F (2) that the data do not refuse, with the others fitted anew for each."""
+        # Even perfect data are given a scatter of 1e-6: the fit itself is no better.
+        margin = float(f_distribution.ppf(0.95, 1, self.freedom)) * max(self.scatter, 1e-6) ** 2
 
         def excess(value: float) -> float:
             costs = []
             for start in (self.best.copy(), np.array([self.best[0], self.best[1], 0.0])):
                 start[j] = value
                 # Follow the ridge: with another p or F, C must change too, or the search starts far off.
-                if j != 0:
-                    step_error = np.maximum(np.exp(self.log_error) - start[2], 1e-3 * np.exp(self.log_error))
-                    start[0] = float(np.mean(np.log(step_error) - start[1] * self.log_dt))
-                costs.append(self.minimum(start, j)[1])
+                step_error = np.maximum(np.exp(self.log_error) - start[2], 1e-3 * np.exp(self.log_error))
+                start[0] = float(np.mean(np.log(step_error) - start[1] * self.log_dt))
+                costs.append(self._minimum(start, j)[1])
             return min(costs) - self.cost - margin
 
         centre = float(self.best[j])
-        width = max(abs(centre) * 1e-3, 1e-3) if j < 2 else max(centre, math.exp(float(self.log_error.min()))) * 1e-2
-        return _edge(excess, centre, -width, bounds[0]), _edge(excess, centre, width, bounds[1])
+        width = max(abs(centre) * 1e-3, 1e-3) if j == 1 else max(centre, self.smallest) * 1e-2
+        return _edge(excess, centre, -width, self.low[j]), _edge(excess, centre, width, self.high[j])
 
 
 def _edge(excess: Callable[[float], float], centre: float, width: float, bound: float) -> float:
@@ -314,42 +221,63 @@ def _edge(excess: Callable[[float], float], centre: float, width: float, bound: 
         inside, width = outside, 3.0 * width
 
 
-def study_signals(
-    reference: Trajectory, runs: Sequence[Sequence[Trajectory]], *, expected_order: float = 1.0, band: float = BAND
-) -> dict[str, ModelForm]:
-    """Decide for omega, theta and r_CM of a scheme against an equation.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Richardson:
+    """The limit of a value as the step goes to zero, from the three finest grids alone.
 
     Parameters
     ----------
-    reference : Trajectory - on uniform times
-    runs : levels of members, as ``plan_step_size`` plans them - grids that share times with the reference
-
-    Returns
-    -------
-    dict
-        Signal -> decision; errors are the largest over the shared times, of omega as a fraction of omega_0, of theta
-        in rad, of r_CM as a fraction of L.
+    order : float - observed; NaN if it could not be found
+    value : float - f_1 + (f_1 - f_2) / (r^p - 1), extrapolated to dt = 0
+    gci : float - grid-convergence index of the finest grid, an uncertainty in the unit of the value
+    ok : bool
+    reason : str - why not, or how it was found
     """
-    scales = {"omega": abs(reference.scenario.omega0), "theta": 1.0, "r_cm": reference.scenario.bottle.length}
-    dt = np.array([[run.settings["dt"] for run in level] for level in runs])
-    return {
-        signal: study_model_form(
-            dt,
-            np.array([[_largest(reference, run, signal) / scale for run in level] for level in runs]),
-            expected_order=expected_order,
-            band=band,
+
+    order: float = math.nan
+    value: float = math.nan
+    gci: float = math.nan
+    ok: bool = False
+    reason: str
+
+
+def richardson(dt: Sequence[float], values: Sequence[float]) -> Richardson:
+    """Extrapolate a value of first order to dt = 0 and give its grid-convergence index (ASME V&V 20).
+
+        gci = 1.25 |f_2 - f_1| / (r^p - 1),   r = dt_2 / dt_1
+
+    p comes from the three finest grids, (f_3 - f_2) / (f_2 - f_1) = (dt_3^p - dt_2^p) / (dt_2^p - dt_1^p). Fails if a
+    value is not finite, if the values oscillate or part, or if p is more than 0.5 off 1.
+    """
+    if not np.all(np.isfinite(values)):
+        return Richardson(reason="a value is not finite")
+    finest = np.argsort(dt)[:3]
+    h, f = np.asarray(dt)[finest], np.asarray(values)[finest]
+    p = _order_of_three(h, f)
+    if math.isnan(p):
+        turns_back = (f[2] - f[1]) * (f[1] - f[0]) < 0
+        return Richardson(
+            reason="oscillation: the value turns back" if turns_back else "the values do not approach a limit"
         )
-        for signal, scale in scales.items()
-    }
+    gap = (f[0] - f[1]) / ((h[1] / h[0]) ** p - 1.0)
+    ok = abs(p - 1.0) <= 0.5
+    return Richardson(
+        order=p,
+        value=float(f[0] + gap),
+        gci=float(1.25 * abs(gap)),
+        ok=ok,
+        reason="three finest grids" if ok else f"order too {'high' if p > 1.0 else 'low'}: {p:.2f}, not 1",
+    )
 
 
-def _largest(reference: Trajectory, run: Trajectory, signal: str) -> float:
-    """Return the largest difference of a signal at the times that both grids hold; NaN if a run is not complete."""
-    if not (reference.ok and run.ok):
+def _order_of_three(h: FloatArray, f: FloatArray) -> float:
+    """Return the order that three values show, or NaN."""
+    fine, coarse = f[1] - f[0], f[2] - f[1]
+    if fine == 0.0 or coarse * fine <= 0.0:
         return math.nan
-    fine, coarse = len(run.t) - 1, len(reference.t) - 1
-    common = math.gcd(fine, coarse)
-    if common < LEAST_COMMON:
-        raise ValueError(f"{fine} steps and {coarse} reference intervals share only {common} intervals")
-    difference = getattr(run, signal)[:: fine // common] - getattr(reference, signal)[:: coarse // common]
-    return float(np.abs(difference).max())
+
+    def excess(p: float) -> float:
+        return float((h[2] ** p - h[1] ** p) / (h[1] ** p - h[0] ** p) - coarse / fine)
+
+    low, high = 1e-3, 20.0
+    return math.nan if excess(low) * excess(high) > 0.0 else float(brentq(excess, low, high))

@@ -1,96 +1,173 @@
-"""How far omega falls because slices may overlap."""
+"""What overlapping slices cost: the plateau over the fill fraction, with slices that share their place and without.
+
+The paper expects a full bottle to behave like ice, since nothing in it can move, and finds that its own does not: its
+slices may share their place. The same engine with the same slices, once letting them pass and once not, leaves that one
+assumption between two curves; the reference (which lets them pass) says how far the engine is to be trusted.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from flipproof.chapters.maps.study import vary
-from flipproof.chapters.overlap.figure import figure_overlap
-from flipproof.chapters.overlap.study import (
-    COLUMN,
-    DT,
-    EXCLUDE,
-    FILLS,
-    PASS,
-    SLICES,
-    Overlap,
-    plan_overlap,
-    study_overlap,
-)
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Run, Study
+from flipproof.figures.style import STYLES, new_figure, shared_legend, styled
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, observed, regression
 from flipproof.output.columns import columns_csv
-from slicemodel import Trajectory
+from ode_reference.solver import COLUMN
+from slicemodel import Scenario, Trajectory
+from slicemodel.observables import plateau
+from slicemodel.trajectory import FloatArray
 
-FULL_SLICES: Final = 5
-FULL_DT: Final = 1e-5
-"""A full bottle in which nothing can move: resting contacts creep at first order, hence the fine step."""
+ICE: Final = 1.0
+"""omega / omega_0 of a bottle in which nothing moves."""
 
-FULL_BOTTLE: Final = 1e-3
-"""What a full bottle in which nothing can move may lose of its angular velocity, fraction of omega_0."""
-
-
-class Amount(NamedTuple):
-    """Fill fractions, slices, and the coarser step of the engine [s]."""
-
-    fills: tuple[float, ...] = FILLS
-    slices: int = SLICES
-    dt: float = DT
+PASS, EXCLUDE, CHECK = "pymunk, slices overlap", "pymunk, slices exclude each other", "free-flight, slices overlap"
+COARSER: Final = f"{EXCLUDE}, coarser"
 
 
-@dataclass(frozen=True, slots=True)
-class Overlaps:
-    """The curves over the fill fraction of the report's throw, and the paper's own bottle filled to the brim."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Overlap:
+    """The plateau of every solver over the fill fraction. Arrays have shape (F,).
 
-    overlap: Overlap
-    full_bottle: Trajectory | None
+    Parameters
+    ----------
+    fills : array - fill fractions M_w / M_max
+    slices : int
+    restitution : float - at the ends and between slices
+    level : name -> array
+        Mean of omega / omega_0 over the second half, for PASS, EXCLUDE, CHECK and COLUMN, which is water as one
+        stretching column (``ode_reference.column``); NaN where the run failed.
+    reason : name -> F strings - "" or why the run cannot be used
+    band : array - twice what halving the step changed for EXCLUDE
+    """
+
+    fills: FloatArray
+    slices: int
+    restitution: float
+    level: Mapping[str, FloatArray]
+    reason: Mapping[str, Sequence[str]]
+    band: FloatArray
+
+    @property
+    def cost_to_column(self) -> FloatArray:
+        """What overlap changes between exact equations: slices that overlap in free flight minus the column."""
+        return self.level[CHECK] - self.level[COLUMN]
+
+    def missing_from_ice(self, name: str) -> float:
+        """Return by how much a curve misses ice where the bottle is full; NaN if it was not run there."""
+        full = np.flatnonzero(np.isclose(self.fills, 1.0))
+        return float(ICE - self.level[name][full[0]]) if full.size else float("nan")
 
 
-def study(ask: Ask) -> Study[Overlaps]:
-    """Let slices overlap, and not."""
-    fills, slices, dt = ask.work
-    full = vary(ask.reference.with_slices(FULL_SLICES), fill=1.0)
-    settings = {"slices": "exclude", "dt": FULL_DT, "times": np.linspace(0.0, full.duration, 101)}
-    brim = Run("pymunk", full, settings, "full bottle, slices exclude each other")
-    flights = yield [*plan_overlap(ask.throw, fills, slices=slices, dt=dt), brim]
-    run = flights.trajectory(brim)
-    return Overlaps(
-        study_overlap(ask.throw, flights, fills, slices=slices, dt=dt), run if run is not None and run.ok else None
+def plan_overlap(throw: Scenario, fills: Sequence[float], slices: int, dt: float) -> dict[str, list[Run]]:
+    """Return the runs of every curve, one for each fill fraction; gamma of the throw is unchanged.
+
+    ``dt`` is the coarser step of the engine [s]; slices that exclude each other are thrown at half of it, too.
+    """
+    cut = throw.with_slices(slices)
+    times = np.linspace(0.0, throw.duration, 201)
+    kinds: dict[str, tuple[str, dict[str, Any]]] = {
+        EXCLUDE: ("pymunk", {"slices": "exclude", "dt": dt / 2}),
+        COARSER: ("pymunk", {"slices": "exclude", "dt": dt}),
+        PASS: ("pymunk", {"dt": dt}),
+        CHECK: ("free-flight", {}),
+        COLUMN: (COLUMN, {}),
+    }
+    return {
+        name: [
+            Run(solver, vary(cut, fill=fill), settings | {"times": times}, f"overlap, {name}, fill {fill:g}")
+            for fill in fills
+        ]
+        for name, (solver, settings) in kinds.items()
+    }
+
+
+def study_overlap(fills: Sequence[float], runs: Mapping[str, Sequence[Run]], made: Mapping[Run, Made]) -> Overlap:
+    """Read the runs that ``plan_overlap`` planned over these fill fractions."""
+    read = {name: [_plateau(made[run]) for run in curve] for name, curve in runs.items()}
+    level = {name: np.array([found for found, _ in curve]) for name, curve in read.items()}
+    throw = runs[PASS][0].scenario
+    names = (PASS, EXCLUDE, CHECK, COLUMN)
+    return Overlap(
+        fills=np.asarray(fills),
+        slices=throw.n_slices,
+        restitution=throw.restitution,
+        level={name: level[name] for name in names},
+        reason={name: [reason for _, reason in read[name]] for name in names},
+        band=2.0 * np.abs(level[EXCLUDE] - level[COARSER]),
     )
 
 
-def claims(found: Overlaps) -> Claims:
+def _plateau(made: Made) -> tuple[float, str]:
+    """Return the plateau of a run, or NaN and why it cannot be used."""
+    flight = made.trajectory
+    if flight is None:
+        return np.nan, made.reason
+    if not flight.ok:
+        return np.nan, f"{flight.status}: {flight.message}"
+    return plateau(flight.t, flight.omega, flight.scenario.omega0), ""
+
+
+class Amount(NamedTuple):
+    """Fill fractions, slices, the coarser step of the engine, and its step in the bottle filled to the brim [s].
+
+    In a full bottle nothing can move, and resting contacts creep at first order: hence that fine step. With 5, 10 and
+    20 slices that exclude each other the half-full bottle keeps 0.227, 0.227, 0.228 of omega_0.
+    """
+
+    fills: tuple[float, ...] = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+    slices: int = 10
+    dt: float = 1e-4
+    brim_dt: float = 1e-5
+
+
+Found = tuple[Overlap, Trajectory | None]
+"""The curves over the fill fraction of the report's throw, and the paper's own bottle filled to the brim."""
+
+
+def study(ask: Ask) -> Study[Found]:
+    """Let slices overlap, and not."""
+    full = vary(ask.reference.with_slices(5), fill=1.0)
+    settings = {"slices": "exclude", "dt": ask.work.brim_dt, "times": np.linspace(0.0, full.duration, 101)}
+    brim = Run("pymunk", full, settings, "full bottle, slices exclude each other")
+    runs = plan_overlap(ask.throw, *ask.work[:3])
+    flights = yield [*(run for curve in runs.values() for run in curve), brim]
+    run = flights.trajectory(brim)
+    return study_overlap(ask.work.fills, runs, flights), run if run is not None and run.ok else None
+
+
+def claims(found: Found) -> Claims:
     """Yield that a full bottle is ice, and by how much it is not when slices overlap."""
-    yield claim_full_bottle(found.full_bottle)
-    yield claim_overlap(found.overlap)
-    yield claim_column(found.overlap)
+    overlap, full_bottle = found
+    yield claim_full_bottle(full_bottle)
+    yield claim_overlap(overlap)
+    yield claim_column(overlap)
 
 
 def claim_full_bottle(run: Trajectory | None) -> Finding:
     """A full bottle whose slices exclude each other keeps its angular velocity: it is ice."""
     drift = None if run is None else float(np.abs(run.omega / run.scenario.omega0 - 1.0).max())
-    return Finding(
+    return regression(
         id="engine-full-bottle",
         title="full bottle, slices exclude each other: largest |ω/ω₀ − 1|",
         value=drift,
         unit="",
-        kind="regression",
-        admissible=(0.0, FULL_BOTTLE),
+        admissible=(0.0, 1e-3),
         note="" if run is None else f"N = {run.scenario.n_slices}, Δt = {run.settings['step']:.1g} s; falls with Δt",
     )
 
 
 def claim_overlap(study: Overlap) -> Finding:
     """What a full bottle loses because its slices may share their place."""
-    return Finding(
+    return observed(
         id="overlap-full-bottle",
         title="full bottle: how far the plateau of ω/ω₀ lies below ice when slices overlap",
         value=study.missing_from_ice(PASS),
-        unit="",
-        kind="observation",
         note=f"{study.missing_from_ice(EXCLUDE):.2g} when they exclude each other, "
         f"{study.missing_from_ice(COLUMN):.2g} for a column; N = {study.slices}; the paper expects a full bottle to "
         "behave like ice",
@@ -102,65 +179,96 @@ def claim_column(study: Overlap) -> Finding:
     cost = study.cost_to_column
     known = np.flatnonzero(np.isfinite(cost)).tolist()
     each = ", ".join(f"{cost[k]:+.3f} at {study.fills[k]:.0%}" for k in known)
-    return Finding(
+    return observed(
         id="overlap-column",
         title="plateau of ω/ω₀ of free flight, whose slices overlap, minus that of a column: the largest over fillings",
         value=float(max((cost[k] for k in known), key=abs)) if known else None,
-        unit="",
-        kind="observation",
         note=f"a difference of two models, no share; free flight at N = {study.slices}, the column has no slices; "
         + (each or "not computed at any filling"),
     )
 
 
-def figures(found: Overlaps) -> Iterator[Exhibit]:
-    """Yield the plateau over the fill fraction."""
-    yield draw_overlap(found.overlap)
-
-
-def draw_overlap(study: Overlap) -> Exhibit:
-    """Return the plateau over the fill fraction, with slices that overlap and with slices that do not."""
+def figures(found: Found) -> Iterator[Exhibit]:
+    """Yield the plateau over the fill fraction, with slices that overlap and with slices that do not."""
+    study, _ = found
     rows = "; ".join(
-        f"filling {fill:.0%}: " + ", ".join(f"{name} {curve.level[k]:.3f}" for name, curve in study.curves.items())
+        f"filling {fill:.0%}: " + ", ".join(f"{name} {level[k]:.3f}" for name, level in study.level.items())
         for k, fill in enumerate(study.fills)
     )
-    return Exhibit(
+    cost = study.cost_to_column
+    most = ""
+    if np.isfinite(cost).any():
+        k = int(np.nanargmax(np.abs(cost)))
+        most = f"; at most {cost[k]:+.3f}, at filling {100 * study.fills[k]:.0f} %".replace("-", "−")
+    yield Exhibit(
         name="overlap",
         title="How far ω falls because slices may overlap",
         caption="In the paper slices pass through each other, and a full bottle, which ought to behave like ice, slows "
         "down. In the same engine, slices that are rods and exclude each other keep the angular velocity of a full "
         "bottle. The two curves differ by what overlap does. Water as one stretching column cannot overlap either, and "
         "has no parameter to choose; free flight minus the column is what overlap changes between two exact equations. "
-        f"That is a difference of two models, free flight at N = {study.slices}, and no share{_costs(study)}. In the "
+        f"That is a difference of two models, free flight at N = {study.slices}, and no share{most}. In the "
         "paper's experiment the fall is largest at fillings of 0.25 to 0.5, and a filling of 0.1 turns like ice. Bars: "
         "twice what halving the step changes.",
         alt=f"Line plot of the plateau of omega over omega_0 against the fill fraction; ice is 1. {rows}.",
         maker=figure_overlap,
         data=(study,),
-        table=table_overlap(study),
+        table=_plateaus_csv(study),
     )
 
 
-def _costs(study: Overlap) -> str:
-    """Return free flight minus the column where it is largest, in words."""
-    cost = np.abs(study.cost_to_column)
-    if not np.isfinite(cost).any():
-        return ""
-    k = int(np.nanargmax(cost))
-    return f"; at most {study.cost_to_column[k]:+.3f}, at filling {100 * study.fills[k]:.0f} %".replace("-", "−")
-
-
-def table_overlap(study: Overlap) -> str:
-    """Plateau of every curve, its band, and why a run is missing."""
+def _plateaus_csv(study: Overlap) -> str:
+    """Return the plateau of every curve, the band, and why a run is missing."""
     columns: dict[str, Any] = {"fill fraction [1]": study.fills}
-    for name, curve in study.curves.items():
-        columns[f"plateau of omega/omega_0 {name} [1]"] = curve.level
-        if np.isfinite(curve.band).any():
-            columns[f"band {name} [1]"] = curve.band
-        if any(curve.reason):
-            columns[f"missing because: {name}"] = curve.reason
+    for name, level in study.level.items():
+        columns[f"plateau of omega/omega_0 {name} [1]"] = level
+        if name == EXCLUDE and np.isfinite(study.band).any():
+            columns[f"band {name} [1]"] = study.band
+        if any(study.reason[name]):
+            columns[f"missing because: {name}"] = study.reason[name]
     columns["free flight minus column [1]"] = study.cost_to_column
     return columns_csv(columns)
+
+
+LOOKS = {
+    PASS: STYLES["pymunk"] | {"marker": "o"},
+    CHECK: STYLES["free-flight"] | {"marker": "x"},
+    EXCLUDE: {"color": "#0072B2", "linestyle": "-", "linewidth": 2.2, "marker": "s"},
+    COLUMN: {"color": "#CC79A7", "linestyle": "-.", "linewidth": 1.8, "marker": "d"},
+}
+
+
+@styled
+def figure_overlap(study: Overlap) -> Figure:
+    """Plateau over fill fraction; what overlap costs is the distance between the two engine curves, ice is the top."""
+    figure, axes = new_figure(size=(8.0, 4.6))
+    axes.axhline(ICE, color="#444444", linestyle=":", linewidth=1.4)
+    axes.annotate(
+        "ice: nothing moves (expected of a full bottle)", (0.5, ICE), xytext=(0, 5), textcoords="offset points",
+        ha="center", fontsize=9, color="#444444",
+    )  # fmt: skip
+    for name, look in LOOKS.items():
+        axes.plot(study.fills, study.level[name], label=name, markersize=6, **look)
+    exclude = study.level[EXCLUDE]
+    axes.errorbar(study.fills, exclude, yerr=study.band, fmt="none", ecolor="#222222", capsize=3)
+    axes.fill_between(
+        study.fills, study.level[PASS], exclude, color="#0072B2", alpha=0.12, linewidth=0,
+        label="what overlap takes away",
+    )  # fmt: skip
+    # Each run that failed is marked at the foot of its fill fraction, so that a gap in a curve is not taken for data.
+    for k, (name, look) in enumerate(LOOKS.items()):
+        for fill, reason in zip(study.fills, study.reason[name], strict=True):
+            if reason:
+                axes.annotate(
+                    f"× {reason.partition(':')[0]}", (fill, 0.0), xytext=(0, 3 + 10 * k), textcoords="offset points",
+                    ha="center", fontsize=7.5, color=look["color"],
+                )  # fmt: skip
+    axes.set(xlim=(0.0, 1.05), ylim=(0.0, 1.12))
+    axes.set(xlabel="fill fraction M_w / M_max [1]", ylabel="mean of ω/ω₀ over the second half [1]")
+    title = f"{study.slices} slices, restitution {study.restitution:g} at the ends and between slices"
+    axes.set_title(title, fontsize=10, loc="left")
+    shared_legend(figure, axes, columns=2)
+    return figure
 
 
 CHAPTER: Final = Chapter(

@@ -8,32 +8,23 @@ from typing import Final
 
 from flipproof.chapters.predictability.figure import figure_predictability
 from flipproof.chapters.predictability.study import Predictability, plan_predictability, study_predictability
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Outcome, Study, attempt, judged
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Outcome, Study, attempt, judged, observed
 from flipproof.output.columns import curves_csv
-
-SOLVERS: Final = ("eq8", "free-flight")
 
 Found = Mapping[str, Outcome[Predictability]]
 
 
 def study(ask: Ask) -> Study[Found]:
     """Change the release of each solver's flight by the sizes that ``ask.work`` lists."""
-    levels = {name: plan_predictability(ask.throw, name, sizes=ask.work) for name in SOLVERS}
-    flights = yield [
-        run
-        for name, changed in levels.items()
-        for run in (ask.solvers[name], *(run for level in changed for run in level))
-    ]
-    return {
-        name: attempt(
-            lambda name, changed: study_predictability(
-                flights[ask.solvers[name]].flight, [[flights[run].flight for run in level] for level in changed]
-            ),
-            name,
-            changed,
-        )
-        for name, changed in levels.items()
-    }
+    levels = {name: plan_predictability(ask.throw, name, sizes=ask.work) for name in ("eq8", "free-flight")}
+    changed = [run for plans in levels.values() for level in plans for run in level]
+    flights = yield [*(ask.solvers[name] for name in levels), *changed]
+
+    def measured(name: str) -> Predictability:
+        members = [[flights[run].flight for run in level] for level in levels[name]]
+        return study_predictability(flights[ask.solvers[name]].flight, members)
+
+    return {name: attempt(measured, name) for name in levels}
 
 
 def claims(found: Found) -> Claims:
@@ -45,12 +36,10 @@ def claims(found: Found) -> Claims:
 
 def claim_predictability(solver: str, study: Predictability) -> Finding:
     """How much a tiny change of the release is amplified, and up to when a curve means anything."""
-    return Finding(
+    return observed(
         id=f"predictability-{solver}",
         title=f"{solver}: largest amplification of a change of {study.sizes[0]:.0e} of the release",
-        value=float(study.largest_amplification[0]),
-        unit="",
-        kind="observation",
+        value=float(study.amplification[0]),
         note=study.words,
     )
 

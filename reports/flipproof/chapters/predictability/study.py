@@ -18,7 +18,7 @@ import numpy as np
 from flipproof.chapters.alignment.found import LEAST_SPEED, count_key, ordinal
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, first_crossing, percent
 from flipproof.frame.solvers import Run
-from slicemodel import Impact, Impacts, Scenario, Trajectory
+from slicemodel import Impacts, Scenario, Trajectory
 from slicemodel.trajectory import FloatArray
 
 SIZES = (1e-9, 1e-8, 1e-7, 1e-6)
@@ -30,37 +30,24 @@ DIRECTIONS = ((1, 1), (-1, -1), (1, -1), (-1, 1))
 HORIZON_BAND = 1e-3
 """A flight is predictable while the difference in omega stays below this fraction of omega_0."""
 
-ROUND_OFF = float(np.finfo(np.float64).eps)
-JUMP_FACTOR = 10.0
-"""The flight is not smooth where the amplifications of two sizes differ by this factor."""
-
-SATURATED = 0.1
-"""Beyond this fraction of omega_0 a difference has no room to grow, and its amplification means nothing."""
-
 GROWTH_WINDOW = 0.05
 """Growth before and after a parting is fitted over this time [s]."""
 
-FIT_WINDOWS = 12
-LEAST_FIT_WINDOWS = 4
-CLEAR = 3.0
-"""Standard errors that a rate must differ from zero by; with so few windows, noise does so in 5 of 100 cases."""
 
-FLOOR = 1e-14
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Growth:
     """Exponential growth rate of a difference [1/s] with its standard error; NaN if it cannot be fitted."""
 
-    rate: float
-    error: float
-    start: float
-    stop: float
+    rate: float = math.nan
+    error: float = math.nan
 
     @property
     def clear(self) -> bool:
-        """True if the rate differs from zero by more than CLEAR standard errors."""
-        return abs(self.rate) > CLEAR * self.error
+        """True if the rate differs from zero by more than three standard errors.
+
+        With as few windows as are fitted, noise does so in 5 of 100 cases.
+        """
+        return abs(self.rate) > 3.0 * self.error
 
     @property
     def words(self) -> str:
@@ -76,22 +63,21 @@ def fit_growth(t: FloatArray, size: FloatArray, start: float = -math.inf, stop: 
     """Fit |difference| = A exp(rate t) over [start, stop], robustly.
 
     A difference changes sign and jumps, so single points and squares of residuals tell little. The interval is divided
-    into FIT_WINDOWS windows with the median of log |difference| in each, and the rate is the median of the slopes
-    between all pairs of them (Theil and Sen). Its standard error is that of a straight line whose scatter is the
-    median absolute residual, scaled to a normal distribution. Points below round-off or not finite are left out.
+    into twelve windows with the median of log |difference| in each, and the rate is the median of the slopes between
+    all pairs of them (Theil and Sen). Its standard error is that of a straight line whose scatter is the median
+    absolute residual, scaled to a normal distribution. Points below round-off or not finite are left out.
     """
+    windows, least = 12, 4
     size = np.abs(size)
-    usable = (t >= start) & (t <= stop) & np.isfinite(size) & (size > FLOOR)
+    usable = (t >= start) & (t <= stop) & np.isfinite(size) & (size > 1e-14)
     times, logs = t[usable], np.log(size[usable])
-    span = (float(times[0]), float(times[-1])) if len(times) else (math.nan, math.nan)
-    none = Growth(rate=math.nan, error=math.nan, start=span[0], stop=span[1])
-    if len(times) < LEAST_FIT_WINDOWS:
-        return none
-    edges = np.linspace(*span, FIT_WINDOWS + 1)
-    window = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, FIT_WINDOWS - 1)
+    if len(times) < least:
+        return Growth()
+    edges = np.linspace(times[0], times[-1], windows + 1)
+    window = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, windows - 1)
     filled = np.unique(window)
-    if len(filled) < LEAST_FIT_WINDOWS:
-        return none
+    if len(filled) < least:
+        return Growth()
     x = np.array([times[window == w].mean() for w in filled])
     y = np.array([np.median(logs[window == w]) for w in filled])
     i, j = np.triu_indices(len(x), 1)
@@ -99,70 +85,30 @@ def fit_growth(t: FloatArray, size: FloatArray, start: float = -math.inf, stop: 
     residual = y - rate * x
     scatter = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
     scatter *= math.sqrt(len(x) / (len(x) - 2))
-    error = scatter / math.sqrt(float(((x - x.mean()) ** 2).sum()))
-    return Growth(rate=rate, error=error, start=span[0], stop=span[1])
+    return Growth(rate, scatter / math.sqrt(float(((x - x.mean()) ** 2).sum())))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PartingGrowth:
-    """How a difference grows before and after it first leaves its band, and the impact it follows.
-
-    ``time`` is None if the two never part; ``k`` says which of its slice's impacts on its end ``impact`` is, from 1.
-    """
-
-    first: str
-    second: str
-    time: float | None
-    before: Growth
-    after: Growth
-    impact: Impact | None
-    k: int | None
-
-    @property
-    def words(self) -> str:
-        """The parting in words."""
-        if self.time is None:
-            return f"{self.first} and {self.second} never differ by more than {percent(PARTING_BAND)} of ω₀"
-        words = (
-            f"{self.first} and {self.second} differ by more than {percent(PARTING_BAND)} of ω₀ from "
-            f"{self.time * 1e3:.1f} ms on"
-        )
-        if self.impact is not None and self.k is not None:
-            words += (
-                f", {(self.time - self.impact.time) * 1e3:.1f} ms after the {ordinal(self.k)} impact of slice "
-                f"{self.impact.slice} on the {self.impact.end}"
-            )
-        return f"{words}; the difference {self.before.words} before and {self.after.words} after"
-
-
-def study_parting_growth(difference: Difference, impacts: Impacts | None = None) -> PartingGrowth:
-    """Fit the growth of a difference over ``GROWTH_WINDOW`` seconds before and after the parting.
+def parting_words(difference: Difference, impacts: Impacts | None = None) -> str:
+    """Return when two flights part, the impact that this follows, and how their difference grows before and after.
 
     ``impacts`` is the record of the run whose impacts the parting is set against; those slower than ``LEAST_SPEED`` are
-    passed over, because near rest there is always one.
+    passed over, because near rest there is always one. Growth is fitted over ``GROWTH_WINDOW`` seconds.
     """
-    time = difference.parting_time
-    moment = math.nan if time is None else time
-    impact, k = _followed(time, impacts)
-    return PartingGrowth(
-        first=difference.first,
-        second=difference.second,
-        time=time,
-        before=fit_growth(difference.t, difference.omega, moment - GROWTH_WINDOW, moment),
-        after=fit_growth(difference.t, difference.omega, moment, moment + GROWTH_WINDOW),
-        impact=impact,
-        k=k,
-    )
-
-
-def _followed(time: float | None, impacts: Impacts | None) -> tuple[Impact | None, int | None]:
-    """Return the last impact at or before ``time`` that is fast enough, and its k."""
-    if time is None or impacts is None:
-        return None, None
-    fast = np.flatnonzero((impacts.time <= time) & (impacts.speed_before >= LEAST_SPEED))
-    if not len(fast):
-        return None, None
-    return impacts[int(fast[-1])], count_key(impacts, int(fast[-1]), LEAST_SPEED)
+    pair, band, time = f"{difference.first} and {difference.second}", percent(PARTING_BAND), difference.parting_time
+    if time is None:
+        return f"{pair} never differ by more than {band} of ω₀"
+    words = f"{pair} differ by more than {band} of ω₀ from {time * 1e3:.1f} ms on"
+    if impacts is not None:
+        fast = np.flatnonzero((impacts.time <= time) & (impacts.speed_before >= LEAST_SPEED))
+        if len(fast):
+            impact, k = impacts[int(fast[-1])], count_key(impacts, int(fast[-1]), LEAST_SPEED)
+            words += (
+                f", {(time - impact.time) * 1e3:.1f} ms after the {ordinal(k)} impact of slice {impact.slice} on the "
+                f"{impact.end}"
+            )
+    before = fit_growth(difference.t, difference.omega, time - GROWTH_WINDOW, time)
+    after = fit_growth(difference.t, difference.omega, time, time + GROWTH_WINDOW)
+    return f"{words}; the difference {before.words} before and {after.words} after"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,47 +118,34 @@ class Predictability:
     Parameters
     ----------
     solver : str
-    sizes : (S,)
-        Sizes of the changes, rising.
+    sizes : (S,) - of the changes, rising
     t : (P,) [s]
-    spread : (S, P)
-        max |omega_member - omega| / |omega_0| over the members; infinite where a member has ended.
-    band : float
-        What the spread may not exceed, as a fraction of omega_0.
-    horizons : tuple of S times or None
-        First time the spread exceeds the band [s]; None: never, predictable to the end.
+    spread : (S, P) - max |omega_member - omega| / |omega_0| over the members; infinite where a member has ended
+    horizons : S times or None - when the spread first exceeds ``HORIZON_BAND`` [s]; None: predictable to the end
     round_off_horizon : float or None
         The same for a change of the size of round-off, amplified as the smallest change is. It means something only
         while the flight is smooth.
-    growths : tuple of S Growth
-        Of the spread, up to the horizon.
+    growth : Growth - of the spread after the smallest change, up to its horizon
     rough_from : float or None
-        First time at which amplifications differ by more than JUMP_FACTOR between sizes [s]: the flight is not smooth
+        First time at which amplifications of two sizes differ by more than a factor of 10 [s]: the flight is not smooth
         there, or the solver's own error exceeds the smallest change.
-    ended : float or None
-        Where the run ends, if that is before the end of the throw [s].
+    ended : float or None - where the run ends, if that is before the end of the throw [s]
     """
 
     solver: str
     sizes: FloatArray
     t: FloatArray
     spread: FloatArray
-    band: float
     horizons: tuple[float | None, ...]
     round_off_horizon: float | None
-    growths: tuple[Growth, ...]
+    growth: Growth
     rough_from: float | None
     ended: float | None
 
     @property
     def amplification(self) -> FloatArray:
-        """Spread over size of the change, shape (S, P); 1 at the start."""
-        return self.spread / self.sizes[:, np.newaxis]
-
-    @property
-    def largest_amplification(self) -> FloatArray:
-        """Largest amplification over the flight for every size, shape (S,)."""
-        return np.asarray(self.amplification.max(axis=1))
+        """Largest spread over size of the change for every size, shape (S,); 1 if it is never amplified."""
+        return np.asarray((self.spread / self.sizes[:, np.newaxis]).max(axis=1))
 
     @property
     def horizon(self) -> float | None:
@@ -222,20 +155,17 @@ class Predictability:
     @property
     def words(self) -> str:
         """Amplification of every size, horizon, growth and smoothness in words."""
-        factors = zip(self.sizes, self.largest_amplification, strict=True)
         each = " and ".join(
-            f"a change of the release by {size:.0e} at most {factor:.3g} times" for size, factor in factors
+            f"a change of the release by {size:.0e} at most {factor:.3g} times"
+            for size, factor in zip(self.sizes, self.amplification, strict=True)
         )
         words = f"{self.solver}: the flight amplifies {each}"
         if self.horizon is None:
-            words += f"; none of these moves ω by {self.band:g} of ω₀, so that the flight is predictable to its end"
+            words += f"; none of these moves ω by {HORIZON_BAND:g} of ω₀, so that the flight is predictable to its end"
         for size, time in zip(self.sizes, self.horizons, strict=True):
-            words += (
-                ""
-                if time is None
-                else f"; a change by {size:.0e} moves ω by {self.band:g} of ω₀ at {time * 1e3:.1f} ms"
-            )
-        words += f"; the effect of a change by {self.sizes[0]:.0e} {self.growths[0].words}"
+            if time is not None:
+                words += f"; a change by {size:.0e} moves ω by {HORIZON_BAND:g} of ω₀ at {time * 1e3:.1f} ms"
+        words += f"; the effect of a change by {self.sizes[0]:.0e} {self.growth.words}"
         if self.rough_from is not None:
             words += (
                 f" and reaches {self.spread[0].max():.1e} of ω₀; from {self.rough_from * 1e3:.1f} ms on the factor "
@@ -253,17 +183,10 @@ def plan_predictability(
     members: int = 2,
     settings: Mapping[str, Any] | None = None,
 ) -> list[list[Run]]:
-    """Return the changed runs, one list per size; the unchanged run is the solver's own with the same settings.
+    """Return the changed runs, one list of one to four ``members`` per size, the smallest first.
 
-    Raises
-    ------
-    ValueError
-        If ``members`` is not in [1, 4], or a size is not positive.
+    The unchanged run is the solver's own with the same settings.
     """
-    if not 1 <= members <= len(DIRECTIONS):
-        raise ValueError(f"members = {members} is outside [1, {len(DIRECTIONS)}]")
-    if not all(size > 0 for size in sizes):
-        raise ValueError(f"sizes = {tuple(sizes)} must be positive")
     return [
         [
             Run(
@@ -283,38 +206,35 @@ def study_predictability(base: Trajectory, members: Sequence[Sequence[Trajectory
 
     Parameters
     ----------
-    base : Trajectory
-        The unchanged flight.
-    members : sizes of members
-        Trajectories of the runs of ``plan_predictability``, in its order.
+    base : Trajectory - the unchanged flight
+    members : sizes of members - flights of the runs of ``plan_predictability``, in its order
     """
-    sizes = np.array([max(_size(base.scenario, run.scenario) for run in level) for level in members])
-    spread = np.array([np.max([_apart(base, run) for run in level], axis=0) for level in members])
+    throw = base.scenario
+
+    def size(changed: Scenario) -> float:
+        return max(abs(changed.theta0 - throw.theta0), abs(changed.omega0 / throw.omega0 - 1))
+
+    def apart(run: Trajectory) -> FloatArray:
+        """Return |difference in omega| / |omega_0| at the times of ``base``, infinite after the end of ``run``."""
+        distance = np.abs(np.interp(base.t, run.t, run.omega) - base.omega) / abs(throw.omega0)
+        return np.where(base.t <= run.t[-1], distance, np.inf)
+
+    sizes = np.array([max(size(run.scenario) for run in level) for level in members])
+    spread = np.array([np.max([apart(run) for run in level], axis=0) for level in members])
     horizons = tuple(first_crossing(base.t, row, HORIZON_BAND) for row in spread)
-    stops = [math.inf if time is None else time for time in horizons]
-    # A spread beyond saturation says nothing about smoothness: a larger change has merely less room.
-    amplification = np.where(spread <= SATURATED, spread / sizes[:, np.newaxis], np.nan)
+    # A spread beyond a tenth of omega_0 says nothing about smoothness: a larger change has merely less room.
+    amplification = np.where(spread <= 0.1, spread / sizes[:, np.newaxis], np.nan)
     with np.errstate(invalid="ignore"):
         ratio = np.fmax.reduce(amplification, axis=0) / np.fmin.reduce(amplification, axis=0)
+    round_off = float(np.finfo(np.float64).eps)
     return Predictability(
         solver=base.label,
         sizes=sizes,
         t=base.t,
         spread=spread,
-        band=HORIZON_BAND,
         horizons=horizons,
-        round_off_horizon=first_crossing(base.t, spread[0] / sizes[0] * ROUND_OFF, HORIZON_BAND),
-        growths=tuple(fit_growth(base.t, row, stop=stop) for row, stop in zip(spread, stops, strict=True)),
-        rough_from=first_crossing(base.t, np.nan_to_num(ratio, nan=1.0), JUMP_FACTOR),
+        round_off_horizon=first_crossing(base.t, spread[0] / sizes[0] * round_off, HORIZON_BAND),
+        growth=fit_growth(base.t, spread[0], stop=math.inf if horizons[0] is None else horizons[0]),
+        rough_from=first_crossing(base.t, np.nan_to_num(ratio, nan=1.0), 10.0),
         ended=None if base.status in ("ok", "escaped") else float(base.t[-1]),
     )
-
-
-def _size(base: Scenario, changed: Scenario) -> float:
-    return max(abs(changed.theta0 - base.theta0), abs(changed.omega0 / base.omega0 - 1))
-
-
-def _apart(base: Trajectory, run: Trajectory) -> FloatArray:
-    """Return |difference in omega| / |omega_0| at the times of ``base``, infinite after the end of ``run``."""
-    apart = np.abs(np.interp(base.t, run.t, run.omega) - base.omega) / abs(base.scenario.omega0)
-    return np.where(base.t <= run.t[-1], apart, np.inf)

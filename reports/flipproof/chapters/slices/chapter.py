@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -14,38 +14,31 @@ from matplotlib.figure import Figure
 from flipproof.chapters.solvers import SCHEMES
 from flipproof.figures.style import new_figure, shared_legend, styled
 from flipproof.frame.chapter import Ask, Chapter, Exhibit, Run, Study, attempt
-from flipproof.frame.throws import FINER
 from flipproof.output.columns import curves_csv
 from slicemodel import Trajectory
-from slicemodel.trajectory import FloatArray
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SliceCount:
-    """One scheme at several numbers of slices, and its distance from the finest cut, max |d omega| / omega_0."""
-
-    scheme: str
-    counts: tuple[int, ...]
-    trajectories: tuple[Trajectory, ...]
-    distance: FloatArray
 
 
 @dataclass(frozen=True, slots=True)
-class Slices:
-    """The study of every scheme all of whose cuts were made; slices of the report's own throw, and of its finer one."""
+class SliceCount:
+    """One scheme at several numbers of slices, and its distance from the finest cut, max |d omega| / omega_0."""
 
-    schemes: Mapping[str, SliceCount]
-    slices: int
-    finer: int
+    trajectories: list[Trajectory]
+    distance: list[float]
+
+    @property
+    def counts(self) -> list[int]:
+        """Numbers of slices, rising."""
+        return [run.scenario.n_slices for run in self.trajectories]
 
 
-def study(ask: Ask) -> Study[Slices]:
+Found = Mapping[str, SliceCount]
+"""The study of every scheme all of whose cuts were made."""
+
+
+def study(ask: Ask) -> Study[Found]:
     """Throw the bottle in as many slices as ``ask.work`` lists, in increasing order."""
     runs = {
-        scheme: [
-            Run(scheme, ask.throw.with_slices(n), {"store": "summary"}, f"{scheme}, {n} slices")
-            for n in sorted(ask.work)
-        ]
+        scheme: [Run(scheme, ask.throw.with_slices(n), {"store": "summary"}, f"{scheme}, {n} slices") for n in ask.work]
         for scheme in SCHEMES
     }
     flights = yield [run for cuts in runs.values() for run in cuts]
@@ -53,32 +46,24 @@ def study(ask: Ask) -> Study[Slices]:
         scheme: attempt(lambda cuts: compare([flights[run].flight for run in cuts]), cuts)
         for scheme, cuts in runs.items()
     }
-    schemes = {scheme: each.found for scheme, each in counted.items() if each.found is not None}
-    return Slices(schemes, ask.throw.n_slices, FINER * ask.throw.n_slices)
+    return {scheme: each.found for scheme, each in counted.items() if each.found is not None}
 
 
-def compare(runs: Sequence[Trajectory]) -> SliceCount:
+def compare(runs: list[Trajectory]) -> SliceCount:
     """Compare every cut with the finest, which is the last."""
     finest = runs[-1]
     points = min(len(run.t) for run in runs)
-    distance = np.array(
-        [np.abs(run.omega[:points] - finest.omega[:points]).max() / abs(finest.scenario.omega0) for run in runs]
-    )
-    return SliceCount(
-        scheme=finest.method,
-        counts=tuple(run.scenario.n_slices for run in runs),
-        trajectories=tuple(runs),
-        distance=distance,
-    )
+    apart = [np.abs(run.omega[:points] - finest.omega[:points]).max() / abs(finest.scenario.omega0) for run in runs]
+    return SliceCount(runs, apart)
 
 
-def figures(found: Slices) -> Iterator[Exhibit]:
+def figures(found: Found) -> Iterator[Exhibit]:
     """Yield omega(t) at every number of slices."""
-    if not found.schemes:
+    if not found:
         return
     words = "; ".join(
         f"{scheme}: " + ", ".join(f"N = {n} {d:.2g}" for n, d in zip(s.counts, s.distance, strict=True))
-        for scheme, s in found.schemes.items()
+        for scheme, s in found.items()
     )
     yield Exhibit(
         name="slice-count",
@@ -88,11 +73,11 @@ def figures(found: Slices) -> Iterator[Exhibit]:
         alt="Line plots of omega over omega_0 for several numbers of slices. Largest distance from the finest cut, of "
         f"omega_0: {words}.",
         maker=draw,
-        data=(dict(found.schemes),),
+        data=(found,),
         table=curves_csv(
             {
                 f"omega/omega_0 {scheme} N = {n} [1]": (run.t, run.omega / run.scenario.omega0)
-                for scheme, s in found.schemes.items()
+                for scheme, s in found.items()
                 for n, run in zip(s.counts, s.trajectories, strict=True)
             }
         ),

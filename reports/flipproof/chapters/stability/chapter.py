@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
 
-from flipproof.chapters.stability.figure import figure_stability
 from flipproof.chapters.stability.study import (
     DEFAULT_ITERATIONS,
-    ENGINE,
     FULL,
     GOOD,
     QUICK,
@@ -21,42 +23,47 @@ from flipproof.chapters.stability.study import (
     plan_stability,
     study_stability,
 )
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study
+from flipproof.figures.style import new_figure, styled
+from flipproof.frame.chapter import (
+    Ask,
+    Chapter,
+    Claims,
+    Exhibit,
+    Finding,
+    Made,
+    Run,
+    Study,
+    judged,
+    observed,
+    regression,
+)
 from flipproof.output.columns import rows_csv
 from slicemodel import Trajectory
 
-
-@dataclass(frozen=True, slots=True)
-class Stability:
-    """The charts, and the report's throw at the engine's own number of iterations."""
-
-    panels: tuple[StabilityPanel, ...]
-    default: Made
+Found = tuple[tuple[StabilityPanel, ...], Made]
+"""The charts, and the report's throw at the engine's own number of iterations."""
 
 
-def study(ask: Ask) -> Study[Stability]:
+def study(ask: Ask) -> Study[Found]:
     """Fly every cell of the layout ``ask.work``."""
-    default = Run(ENGINE, ask.throw, {"iterations": DEFAULT_ITERATIONS}, f"{ENGINE}, {DEFAULT_ITERATIONS} iterations")
+    default = Run("pymunk", ask.throw, {"iterations": DEFAULT_ITERATIONS}, f"pymunk, {DEFAULT_ITERATIONS} iterations")
     flights = yield [*plan_stability(ask.reference, ask.work), default]
-    return Stability(study_stability(ask.reference, ask.work, flights), flights[default])
+    return study_stability(ask.reference, ask.work, flights), flights[default]
 
 
-def claims(found: Stability) -> Claims:
+def claims(found: Found) -> Claims:
     """Yield the rule of iterations, what happens at the default, and how many runs are whole and wrong."""
-    if found.default.trajectory is not None:
-        yield claim_explosion_is_reported(found.default.trajectory)
-    else:
-        title = f"{ENGINE} with its default {DEFAULT_ITERATIONS} iterations"
-        yield Absent("engine-default-iterations", title, found.default.reason, "observation")
-    yield claim_rule_of_iterations(found.panels)
-    yield claim_default_iterations_explode(found.panels)
-    yield claim_whole_and_wrong(found.panels)
+    panels, default = found
+    id_, title = "engine-default-iterations", f"pymunk with its default {DEFAULT_ITERATIONS} iterations"
+    yield judged(claim_explosion_is_reported, default, id=id_, title=title, kind="observation")
+    yield claim_rule_of_iterations(panels)
+    yield claim_default_iterations_explode(panels)
+    yield claim_whole_and_wrong(panels)
 
 
 def claim_rule_of_iterations(panels: Sequence[StabilityPanel]) -> Finding:
     """With the iterations that the rule asks for, and a step up to twice the default, pymunk follows free flight."""
-    errors = np.concatenate([panel.by_the_rule for panel in panels]) if panels else np.array([])
-    band = float(np.max([panel.band for panel in panels])) if panels else math.nan
+    errors = np.concatenate([panel.by_the_rule for panel in panels])
     return Finding(
         id="engine-rule-of-iterations",
         title=f"pymunk with enough iterations and Δt ≤ {RULE_DT:g} s: largest error of ω(t) against free flight",
@@ -65,21 +72,20 @@ def claim_rule_of_iterations(panels: Sequence[StabilityPanel]) -> Finding:
         unit="of ω₀",
         kind="regression",
         admissible=(0.0, GOOD),
-        band=band,
+        band=float(np.max([panel.band for panel in panels])),
         note=f"{len(errors)} runs; " + "; ".join(panel.words for panel in panels),
     )
 
 
 def claim_default_iterations_explode(panels: Sequence[StabilityPanel]) -> Finding:
     """No run with pymunk's own number of iterations reaches the end of the flight, whatever its step."""
-    grades = np.concatenate([panel.at_default for panel in panels]) if panels else np.array([])
+    grades = np.concatenate([panel.at_default for panel in panels])
     stopped = int((grades == "explodes").sum())
-    return Finding(
+    return regression(
         id="engine-default-explodes",
         title=f"pymunk with its default {DEFAULT_ITERATIONS} iterations: runs that do not explode",
         value=float(len(grades) - stopped) if len(grades) else None,
         unit="",
-        kind="regression",
         admissible=(0.0, 0.0),
         note=f"of {len(grades)}, at every step of the chart; each is reported as diverged with its reason",
     )
@@ -88,40 +94,32 @@ def claim_default_iterations_explode(panels: Sequence[StabilityPanel]) -> Findin
 def claim_whole_and_wrong(panels: Sequence[StabilityPanel]) -> Finding:
     """How many runs break no invariant and are wrong all the same: only a reference tells."""
     counts = {grade: sum(panel.counts[grade] for panel in panels) for grade in ("wrong", "good", "excellent")}
-    errors = np.concatenate([panel.error[panel.grade == "wrong"] for panel in panels]) if panels else np.array([])
-    return Finding(
+    errors = np.concatenate([panel.error[panel.grade == "wrong"] for panel in panels])
+    note = f"by up to {100 * errors.max():.2g} % of ω₀; only a reference tells" if len(errors) else "none on this chart"
+    return observed(
         id="engine-whole-and-wrong",
         title=f"pymunk: runs that break no invariant and are wrong by more than {GOOD:.0%} of ω₀",
         value=float(counts["wrong"]),
         unit=f"of {sum(counts.values())}",
-        kind="observation",
-        note=f"by up to {100 * errors.max():.2g} % of ω₀; only a reference tells"
-        if len(errors)
-        else "none on this chart",
+        note=note,
     )
 
 
 def claim_explosion_is_reported(trajectory: Trajectory) -> Finding:
     """At the engine's default of 10 iterations the run explodes, and is reported as diverged instead of shown."""
     diverged = trajectory.status == "diverged"
-    return Finding(
+    return observed(
         id="engine-default-iterations",
         title=f"{trajectory.method} with its default 10 iterations: last output time before an invariant breaks",
         value=float(trajectory.t[-1]) if diverged else None,
         unit="s",
-        kind="observation",
         note=trajectory.message or "the run did not diverge",
     )
 
 
-def figures(found: Stability) -> Iterator[Exhibit]:
-    """Yield the chart."""
-    if found.panels:
-        yield draw_stability(found.panels)
-
-
-def draw_stability(panels: Sequence[StabilityPanel]) -> Exhibit:
-    """Return the stability chart."""
+def figures(found: Found) -> Iterator[Exhibit]:
+    """Yield the stability chart."""
+    panels, _ = found
     counts = {grade: sum(panel.counts[grade] for panel in panels) for grade in panels[0].counts}
     default = np.concatenate([panel.at_default for panel in panels])
     missing = sorted({reason for panel in panels for reason in panel.reason[panel.grade == "not run"]})
@@ -136,19 +134,19 @@ def draw_stability(panels: Sequence[StabilityPanel]) -> Exhibit:
     )
     if missing:
         caption += f" Not run ({counts['not run']}): {'; '.join(missing)}."
-    return Exhibit(
+    yield Exhibit(
         name="stability",
         title="Where pymunk is stable, and where it is right",
         caption=caption,
         alt="Charts of step against solver iterations. " + ". ".join(panel.words for panel in panels) + ".",
         maker=figure_stability,
         data=(panels,),
-        table=table_stability(panels),
+        table=_cells_csv(panels),
     )
 
 
-def table_stability(panels: Sequence[StabilityPanel]) -> str:
-    """Every cell of the chart."""
+def _cells_csv(panels: Sequence[StabilityPanel]) -> str:
+    """Return every cell of the chart."""
     return rows_csv(
         ("mass ratio M_w/M_b [1]", "slices [1]", "iterations [1]", "iterations by the rule [1]", "dt [s]", "grade",
          "largest error of omega [of omega_0]", "error of the plateau [of omega_0]", "stopped after [s]", "reason"),
@@ -160,6 +158,77 @@ def table_stability(panels: Sequence[StabilityPanel]) -> str:
             for (row, column), grade in np.ndenumerate(panel.grade)
         ),
     )  # fmt: skip
+
+
+LOOKS = {
+    "excellent": ("#7CCBA8", "++", "++ error ≤ 0.1 % of ω₀"),
+    "good": ("#CDEBDC", "+", "+ error ≤ 1 %"),
+    "wrong": ("#F7DC87", "≠", "≠ whole, but error > 1 %"),
+    "sinks in": ("#C6B5E3", "↓", "↓ stopped: slices sink in (shorten Δt)"),
+    "explodes": ("#EDA184", "×", "× stopped: joints open (iterate more)"),
+    "not run": ("#F0F0F0", "–", "– not run"),
+}
+"""One colour, one sign and the words of the legend per grade: the chart can be read without colours."""
+
+
+@styled
+def figure_stability(panels: Sequence[StabilityPanel]) -> Figure:
+    """Grades over step and iterations, one panel per bottle: colour, sign and number in every cell."""
+    columns = min(2, len(panels))
+    rows = math.ceil(len(panels) / columns)
+    height = 1.2 + rows * (1.0 + 0.4 * len(panels[0].iterations))
+    figure, axes = new_figure(rows, columns, size=(8.0, height), squeeze=False)
+    for at, panel in zip(axes.flat, panels, strict=False):
+        _draw_panel(at, panel)
+    for at in axes.flat[len(panels) :]:
+        at.set_visible(False)
+    for at in axes[:, 0]:
+        at.set_ylabel("iterations per step [1]")
+    for at in axes[-1, :]:
+        at.set_xlabel("step Δt [ms], finer to the right")
+    handles: list[Artist] = [
+        Patch(facecolor=colour, edgecolor="#888888", label=words)
+        for grade, (colour, _, words) in LOOKS.items()
+        if any(panel.counts[grade] for panel in panels)
+    ]
+    handles.append(Line2D([], [], color="black", linewidth=2.0, label="rule: enough iterations above it"))
+    handles.append(Line2D([], [], color="black", linewidth=1.2, linestyle="--", label="pymunk's default iterations"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    return figure
+
+
+def _draw_panel(axes: Axes, panel: StabilityPanel) -> None:
+    for (row, column), grade in np.ndenumerate(panel.grade):
+        corner = (column - 0.5, row - 0.5)
+        axes.add_patch(Rectangle(corner, 1, 1, facecolor=LOOKS[grade][0], edgecolor="white", linewidth=1.0))
+        axes.text(column, row, _cell_text(panel, row, column), ha="center", va="center", fontsize=7.5)
+    axes.set(xlim=(-0.5, len(panel.dt) - 0.5), ylim=(-0.5, len(panel.iterations) - 0.5))
+    axes.set_xticks(range(len(panel.dt)), [f"{1e3 * dt:g}" for dt in panel.dt])
+    axes.set_yticks(range(len(panel.iterations)), [str(n) for n in panel.iterations])
+    axes.grid(visible=False)
+    for row in np.flatnonzero(panel.iterations == DEFAULT_ITERATIONS):
+        axes.add_patch(
+            Rectangle((-0.47, row - 0.47), len(panel.dt) - 0.06, 0.94, fill=False, linestyle="--", linewidth=1.2)
+        )
+    # Rows are numbers of iterations, not a scale: the rule lies below the first row that follows it.
+    axes.axhline(int((panel.iterations < panel.enough).sum()) - 0.5, color="black", linewidth=2.5)
+    known = "" if math.isnan(panel.band) else f", reference ± {100 * panel.band:.1g} %"
+    axes.set_title(
+        f"M_w / M_b = {panel.mass_ratio:g}, N = {panel.slices}\nrule: {panel.enough} iterations{known}",
+        fontsize=9.5, loc="left",
+    )  # fmt: skip
+
+
+def _cell_text(panel: StabilityPanel, row: int, column: int) -> str:
+    grade = panel.grade[row, column]
+    sign = LOOKS[grade][1]
+    if grade == "not run":
+        return sign
+    if grade in ("explodes", "sinks in"):
+        held = panel.held_until[row, column]
+        # Not even the first output after release, one longest step later.
+        return f"{sign}\n{1e3 * held:.0f} ms" if held > 0.0 else f"{sign}\n< {1e3 * panel.dt.max():g} ms"
+    return f"{sign}\n{100 * panel.error[row, column]:.2g} %"
 
 
 CHAPTER: Final = Chapter(

@@ -8,7 +8,7 @@ reference shows it. Every cell of the chart is a run, or says why there is none;
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -23,14 +23,10 @@ from slicemodel.observables import plateau
 from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
 
-ENGINE: Final = "pymunk"
-REFERENCE: Final = "free-flight"
-
 DEFAULT_ITERATIONS: Final = 10
 """What pymunk iterates unless told otherwise."""
 
-EXCELLENT: Final = 1e-3
-GOOD: Final = 1e-2
+EXCELLENT, GOOD = 1e-3, 1e-2
 """Largest |omega - omega of the reference| up to which a cell is called so, as a fraction of omega_0."""
 
 RULE_DT: Final = 2e-4
@@ -148,39 +144,28 @@ def panel_throw(throw: Scenario, mass_ratio: float, slices: int, duration: float
 
 def plan_stability(throw: Scenario, layout: Layout) -> list[Run]:
     """Return the runs of a chart: each panel's reference with its twins, and the cells in budget, slowest first."""
-    runs, cells = [], []
-    for mass_ratio, slices in layout.panels:
-        scenario = panel_throw(throw, mass_ratio, slices, layout.duration)
-        reference = _reference(scenario, layout)
+    runs: list[Run] = []
+    cells: list[tuple[float, Run]] = []
+    for panel in layout.panels:
+        reference, planned = _plan_panel(throw, layout, *panel)
         runs += [reference, *twins(reference)]
-        for dt, iterations in _grid(layout):
-            cost = _cost(layout, slices, dt, iterations)
-            if cost <= layout.budget:
-                cells.append((cost, _cell(scenario, layout, dt, iterations)))
+        cells += [(cost, run) for cost, run in planned.values() if cost <= layout.budget]
     return runs + [run for _, run in sorted(cells, key=lambda pair: -pair[0])]
 
 
-def _grid(layout: Layout) -> Iterator[tuple[float, int]]:
-    for iterations in layout.iterations:
-        for dt in layout.dt:
-            yield dt, iterations
-
-
-def _cost(layout: Layout, slices: int, dt: float, iterations: int) -> float:
-    return slices * iterations * layout.duration / dt
-
-
-def _reference(scenario: Scenario, layout: Layout) -> Run:
-    return Run(REFERENCE, scenario, {"times": layout.times}, f"{_label(scenario)}, {REFERENCE}")
-
-
-def _cell(scenario: Scenario, layout: Layout, dt: float, iterations: int) -> Run:
-    settings = {"dt": dt, "iterations": iterations, "times": layout.times}
-    return Run(ENGINE, scenario, settings, f"{_label(scenario)}, dt {dt:g} s, {iterations} iterations")
-
-
-def _label(scenario: Scenario) -> str:
-    return f"stability, mass ratio {scenario.water_mass / scenario.bottle.mass:g}, {scenario.n_slices} slices"
+def _plan_panel(
+    throw: Scenario, layout: Layout, mass_ratio: float, slices: int
+) -> tuple[Run, dict[tuple[int, int], tuple[float, Run]]]:
+    """Return the reference of a panel, and cost and run of every cell by its row and column."""
+    scenario = panel_throw(throw, mass_ratio, slices, layout.duration)
+    label = f"stability, mass ratio {scenario.water_mass / scenario.bottle.mass:g}, {slices} slices"
+    cells = {}
+    for row, iterations in enumerate(layout.iterations):
+        for column, dt in enumerate(layout.dt):
+            settings = {"dt": dt, "iterations": iterations, "times": layout.times}
+            run = Run("pymunk", scenario, settings, f"{label}, dt {dt:g} s, {iterations} iterations")
+            cells[row, column] = slices * iterations * layout.duration / dt, run
+    return Run("free-flight", scenario, {"times": layout.times}, f"{label}, free-flight"), cells
 
 
 def study_stability(throw: Scenario, layout: Layout, made: Mapping[Run, Made]) -> tuple[StabilityPanel, ...]:
@@ -194,24 +179,20 @@ def _panel(throw: Scenario, layout: Layout, mass_ratio: float, slices: int, made
     shape = (len(layout.iterations), len(layout.dt))
     error, level, held = (np.full(shape, np.nan) for _ in range(3))
     grade, reason = np.full(shape, "not run", dtype="<U12"), np.full(shape, "", dtype="<U160")
-    scenario = panel_throw(throw, mass_ratio, slices, layout.duration)
-    reference = _reference(scenario, layout)
-    truth = _whole(made.get(reference))
-    others = [run for twin in twins(reference) if (run := _whole(made.get(twin))) is not None]
-    for k, (dt, iterations) in enumerate(_grid(layout)):
-        at = np.unravel_index(k, shape)
-        cost = _cost(layout, slices, dt, iterations)
-        outcome = made.get(_cell(scenario, layout, dt, iterations))
-        flight = None if outcome is None else outcome.trajectory
+    reference, cells = _plan_panel(throw, layout, mass_ratio, slices)
+    truth, *others = (_whole(made[run]) for run in (reference, *twins(reference)))
+    apart = [math.nan if truth is None or other is None else _apart(other, truth) for other in others]
+    for at, (cost, run) in cells.items():
+        flight = made[run].trajectory if cost <= layout.budget else None
         if cost > layout.budget:
             reason[at] = f"{cost:.1e} slices × iterations × steps, more than {layout.budget:.1e}"
-        elif outcome is None or flight is None:
-            reason[at] = "not made" if outcome is None else shortened(outcome.reason, 160)
+        elif flight is None:
+            reason[at] = shortened(made[run].reason, 160)
         elif not flight.ok:
             grade[at] = "sinks in" if flight.reason == "penetration" else "explodes"
             reason[at], held[at] = shortened(flight.message, 160), flight.t[-1]
         elif truth is None:
-            reason[at] = f"{REFERENCE} has no result to hold it against"
+            reason[at] = "free-flight has no result to hold it against"
         else:
             error[at] = _apart(flight, truth)
             level[at] = abs(_plateau(flight) - _plateau(truth))
@@ -227,16 +208,14 @@ def _panel(throw: Scenario, layout: Layout, mass_ratio: float, slices: int, made
         plateau_error=level,
         held_until=held,
         reason=reason,
-        enough=enough_iterations(scenario),
-        band=math.nan if truth is None or len(others) < 2 else max(_apart(run, truth) for run in others),
+        enough=enough_iterations(reference.scenario),
+        band=float(np.max(apart)),
     )
 
 
-def _whole(outcome: Made | None) -> Trajectory | None:
+def _whole(made: Made) -> Trajectory | None:
     """Return the trajectory of a run that reached the end."""
-    return (
-        outcome.trajectory if outcome is not None and outcome.trajectory is not None and outcome.trajectory.ok else None
-    )
+    return made.trajectory if made.trajectory is not None and made.trajectory.ok else None
 
 
 def grade_of(error: float) -> str:

@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from flipproof.chapters.solvers import LIMITS, SCHEMES
-from flipproof.chapters.step_size.figure import figure_step_size
-from flipproof.chapters.step_size.study import PHASES, StepSize, before_first_impact, plan_step_size, study_step_size
+from flipproof.chapters.step_size.study import (
+    PHASES,
+    ROUND_OFF,
+    StepSize,
+    before_first_impact,
+    plan_step_size,
+    study_step_size,
+)
+from flipproof.figures.style import MARKERS, STYLES, new_figure, shared_legend, solver_style, styled
 from flipproof.frame.chapter import (
     Ask,
     Chapter,
@@ -27,20 +35,18 @@ from flipproof.frame.chapter import (
     Study,
     attempt,
     judged,
+    observed,
 )
 from flipproof.output.columns import rows_csv
-from slicemodel import Scenario
 
-COMMON: Final = 37
-"""Intervals that all grids of a flight share; a divisor of the 999 intervals of the default output times."""
+CHECKED: Final = ("before the first impact", "across impacts")
+"""The two parts of the paper's own throw on which the order is a regression."""
 
-COMMON_START: Final = 9
-"""The same, before the first impact."""
+START, WHOLE = "before the first impact of this throw", "across the impacts of this throw"
+"""The same parts of the report's throw, on which it is an observation."""
 
-FIRST_ORDER: Final = (0.9, 1.1)
-"""Admissible observed order of a scheme of first order, before the first impact and across impacts."""
-
-CHECK_LEVELS: Final = 4
+Orders = Mapping[tuple[str, str], Outcome[StepSize]]
+"""Part and scheme -> its study."""
 
 
 class Grids(NamedTuple):
@@ -54,95 +60,64 @@ class Grids(NamedTuple):
         """Every run."""
         return [self.truth, *(run for level in self.levels for run in level)]
 
-    def measured(self, flights: Flights) -> StepSize:
-        """Return the observed order; raises Missing if a run was not made."""
-        return study_step_size(
-            flights[self.truth].flight, [[flights[run].flight for run in level] for level in self.levels]
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class Orders:
-    """Scheme -> its study: over whole flights and before the first impact, of the throw and of the paper's own."""
-
-    flights: Mapping[str, Outcome[StepSize]]
-    starts: Mapping[str, Outcome[StepSize]]
-    check_flights: Mapping[str, Outcome[StepSize]]
-    check_starts: Mapping[str, Outcome[StepSize]]
-
-    @property
-    def measured(self) -> list[StepSize]:
-        """The studies over whole flights of the throw that could be made."""
-        return [each.found for each in self.flights.values() if each.found is not None]
-
 
 def study(ask: Ask) -> Study[Orders]:
     """Halve the step over whole flights; then, once the first impact is known, before it as well.
 
     ``ask.work`` is the number of steps on the report's throw; 0: only the paper's own throw is studied.
     """
-    throws = {"check": ask.reference, **({"throw": ask.throw} if ask.work else {})}
-    levels = {"check": CHECK_LEVELS, "throw": ask.work}
-    multiple = {"check": 108, "throw": 27}
+    # Throw, first multiple of the 37 intervals that all grids share (a divisor of the 999 of the default output times),
+    # levels, and the names of both parts.
+    asked = [(ask.reference, 108, 4, *CHECKED)] + ([(ask.throw, 27, ask.work, START, WHOLE)] if ask.work else [])
     whole = {
-        (where, scheme): Grids(
-            Run(LIMITS[scheme], throw, {}, LIMITS[scheme]),
-            plan_step_size(throw, scheme, COMMON, multiple[where], levels[where]),
+        (part, scheme): Grids(
+            Run(LIMITS[scheme], throw, {}, LIMITS[scheme]), plan_step_size(throw, scheme, 37, multiple, levels)
         )
-        for where, throw in throws.items()
+        for throw, multiple, levels, _, part in asked
         for scheme in SCHEMES
     }
     flights = yield [run for grids in whole.values() for run in grids.runs]
     starts = {
-        (where, scheme): attempt(lambda grids, n, s: _start(grids, flights, s, n), grids, levels[where], scheme)
-        for (where, scheme), grids in whole.items()
+        (start, scheme): attempt(_start, whole[part, scheme].truth, flights, scheme, levels)
+        for _, _, levels, start, part in asked
+        for scheme in SCHEMES
     }
-    flights = yield [run for grids in starts.values() if grids.found is not None for run in grids.found.runs]
+    flights = yield [run for each in starts.values() if each.found is not None for run in each.found.runs]
 
-    def over(what: Mapping[tuple[str, str], Grids | Outcome[Grids]], where: str) -> dict[str, Outcome[StepSize]]:
-        return {
-            scheme: attempt(
-                lambda grids: (grids.value if isinstance(grids, Outcome) else grids).measured(flights), grids
-            )
-            for (place, scheme), grids in what.items()
-            if place == where
-        }
+    def measured(grids: Grids) -> StepSize:
+        levels = [[flights[run].flight for run in level] for level in grids.levels]
+        return study_step_size(flights[grids.truth].flight, levels)
 
-    return Orders(over(whole, "throw"), over(starts, "throw"), over(whole, "check"), over(starts, "check"))
+    found = {part: attempt(measured, grids) for part, grids in whole.items()}
+    return found | {part: attempt(lambda each: measured(each.value), each) for part, each in starts.items()}
 
 
-def _start(grids: Grids, flights: Flights, scheme: str, count: int) -> Grids:
+def _start(truth: Run, flights: Flights, scheme: str, levels: int) -> Grids:
     """Return the grids on the part of the flight before any impact."""
-    model = grids.truth.solver
-    start: Scenario | None = before_first_impact(grids.truth.scenario, flights[grids.truth].flight)
+    start = before_first_impact(truth.scenario, flights[truth].flight)
     if start is None:
-        raise Missing(f"{model} strikes no end")
-    times = np.linspace(0.0, start.duration, COMMON_START + 1)
-    truth = Run(model, start, {"times": times}, f"{model} before the first impact")
-    return Grids(truth, plan_step_size(start, scheme, COMMON_START, 14, count))
+        raise Missing(f"{truth.solver} strikes no end")
+    times = np.linspace(0.0, start.duration, 10)
+    before = Run(truth.solver, start, {"times": times}, f"{truth.solver} before the first impact")
+    return Grids(before, plan_step_size(start, scheme, base=9, multiple=14, count=levels))
 
 
 def claims(found: Orders) -> Claims:
     """Yield the order of every scheme: a regression on the paper's own throw, an observation on the report's."""
     for scheme in SCHEMES:
-        for studies, where in (
-            (found.check_starts, "before the first impact"),
-            (found.check_flights, "across impacts"),
-        ):
-            yield judged(
-                claim_order,
-                studies[scheme],
-                where,
-                id=f"order-{scheme}-{where.replace(' ', '-')}",
-                title=f"{scheme} converges to {LIMITS[scheme]}, {where}",
-            )
-        for studies, where in (
-            (found.starts, "before the first impact of this throw"),
-            (found.flights, "across the impacts of this throw"),
-        ):
-            measured = studies[scheme].found if scheme in studies else None
-            if measured is not None:
-                yield claim_order(measured, where, kind="observation")
+        for where in CHECKED:
+            id_ = f"order-{scheme}-{where.replace(' ', '-')}"
+            title = f"{scheme} converges to {LIMITS[scheme]}, {where}"
+            yield judged(claim_order, found[where, scheme], where, id=id_, title=title)
+        for where in (START, WHOLE):
+            for measured in _measured(found, where):
+                if measured.scheme == scheme:
+                    yield claim_order(measured, where, kind="observation")
+
+
+def _measured(found: Orders, where: str) -> list[StepSize]:
+    """Return the studies of a part that could be made."""
+    return [each.found for (part, _), each in found.items() if part == where and each.found is not None]
 
 
 def claim_order(study: StepSize, where: str, *, kind: Kind = "regression") -> Finding:
@@ -151,14 +126,14 @@ def claim_order(study: StepSize, where: str, *, kind: Kind = "regression") -> Fi
     title = f"{study.scheme} converges to {study.model} at order 1, {where}"
     if study.exact:
         note = "there is no step error to be seen: all errors are at round-off"
-        return Finding(id=id_, title=title, value=float(study.error.max()), unit="of ω₀", kind="observation", note=note)
+        return observed(id_, title, float(study.error.max()), "of ω₀", note)
     return Finding(
         id=id_,
         title=title,
         value=study.order if study.refined or kind == "observation" else math.nan,
         unit="",
         kind=kind,
-        admissible=FIRST_ORDER if kind == "regression" else (-math.inf, math.inf),
+        admissible=(0.9, 1.1) if kind == "regression" else (-math.inf, math.inf),
         band=study.order_error,
         note=f"error {study.mean_error[0]:.2g} → {study.mean_error[-1]:.2g} of ω₀ "
         f"from Δt = {study.mean_dt[0]:.2g} s to {study.mean_dt[-1]:.2g} s"
@@ -168,7 +143,7 @@ def claim_order(study: StepSize, where: str, *, kind: Kind = "regression") -> Fi
 
 def figures(found: Orders) -> Iterator[Exhibit]:
     """Yield error against step size, over the whole flight and before the first impact."""
-    studies, starts = found.measured, [each.found for each in found.starts.values() if each.found is not None]
+    studies, starts = _measured(found, WHOLE), _measured(found, START)
     if not studies:
         return
     words = f"Over the whole flight: {'; '.join(map(_converges, studies))}."
@@ -183,7 +158,7 @@ def figures(found: Orders) -> Iterator[Exhibit]:
         alt=f"Two log-log plots of error against step. {words}",
         maker=figure_step_size,
         data=(studies, starts),
-        table=table(studies, starts),
+        table=_errors_csv(studies, starts),
     )
 
 
@@ -197,7 +172,7 @@ def _converges(study: StepSize) -> str:
     )
 
 
-def table(flights: Sequence[StepSize], starts: Sequence[StepSize]) -> str:
+def _errors_csv(flights: Sequence[StepSize], starts: Sequence[StepSize]) -> str:
     """Return the error at every step size, with the range of its grids and the order that was fitted."""
     return rows_csv(
         ("part of the flight", "scheme", "held against", "mean dt [s]", "mean error [of omega_0]",
@@ -211,6 +186,37 @@ def table(flights: Sequence[StepSize], starts: Sequence[StepSize]) -> str:
     )  # fmt: skip
 
 
+@styled
+def figure_step_size(flights: Sequence[StepSize], starts: Sequence[StepSize]) -> Figure:
+    """Error against step size: over the whole flight (left) and before the first impact (right)."""
+    figure, panels = new_figure(1, 2, size=(8.0, 4.4))
+    for axes, studies, title in ((panels[0], flights, "whole flight"), (panels[1], starts, "before the first impact")):
+        for k, study in enumerate(studies):
+            style = solver_style(study.scheme, k)
+            spread = study.error.min(axis=1), study.error.max(axis=1)
+            low, high = np.maximum(spread, ROUND_OFF)
+            axes.fill_between(study.mean_dt, low, high, color=style["color"], alpha=0.25, linewidth=0)
+            axes.loglog(
+                study.mean_dt, np.maximum(study.mean_error, ROUND_OFF), marker=MARKERS[k], color=style["color"],
+                linewidth=1.4, label=f"{study.scheme} → {study.model}",
+            )  # fmt: skip
+            axes.text(
+                0.03, 0.96 - 0.07 * k, f"{study.scheme}: order {study.order:.2f}", transform=axes.transAxes,
+                va="top", fontsize=9, color=STYLES.get(study.model, style)["color"],
+            )  # fmt: skip
+        if studies:
+            dt = studies[0].mean_dt
+            top = max(ROUND_OFF, *(study.mean_error[0] for study in studies)) * 2.0
+            axes.loglog(dt, top * dt / dt[0], color="#444444", linestyle=":", linewidth=1.0, label="slope 1")
+        axes.set_title(title, fontsize=10, loc="left")
+        axes.set_xlabel("step Δt [s]")
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.yaxis.set_minor_formatter(NullFormatter())
+    panels[0].set_ylabel("max |ω − ω of its equation| / ω₀ [1]")
+    shared_legend(figure, panels[0] if flights else panels[1], columns=3)
+    return figure
+
+
 CHAPTER: Final = Chapter(
     name="step-size",
     title="Error against step size",
@@ -220,4 +226,5 @@ CHAPTER: Final = Chapter(
     figures=figures,
     template=Path(__file__).with_name("part.html.j2"),
     work={"check": 0, "quick": 6, "full": 7},
+    page=lambda found: {"studies": _measured(found, WHOLE)},
 )

@@ -24,9 +24,6 @@ PHASES = 8
 ROUND_OFF = 1e-13
 """Errors below this fraction of omega_0 are not the step's."""
 
-BEFORE = 0.9
-"""Share of the time up to the first impact that is flown where none shall happen."""
-
 LEAST_COMMON = 8
 """Common times, less one, that a run and its reference must share at the least."""
 
@@ -64,65 +61,65 @@ class StepSize:
         return np.asarray(np.sqrt((self.error**2).mean(axis=1)))
 
 
-def levels(base: int, multiple: int, count: int) -> list[list[int]]:
-    """Return the numbers of steps of every level: multiples of ``base`` from ``multiple`` on, doubled at each level."""
-    return [[base * (multiple + phase) * 2**level for phase in range(PHASES)] for level in range(count)]
-
-
 def plan_step_size(scenario: Scenario, scheme: str, base: int, multiple: int, count: int) -> list[list[Run]]:
-    """Return the runs of every level; all their grids share ``base + 1`` times."""
+    """Return the runs of every level: PHASES multiples of ``base`` steps from ``multiple`` on, doubled at each level.
+
+    All their grids share ``base + 1`` times.
+    """
     return [
         [
             Run(scheme, scenario, {"steps": steps + 1, "store": "summary"}, f"{scheme}, {steps} steps")
-            for steps in members
+            for steps in (base * (multiple + phase) * 2**level for phase in range(PHASES))
         ]
-        for members in levels(base, multiple, count)
+        for level in range(count)
     ]
 
 
 def study_step_size(reference: Trajectory, runs: Sequence[Sequence[Trajectory]]) -> StepSize:
-    """Measure the observed order of a scheme.
-
-    Parameters
-    ----------
-    reference : Trajectory
-        The scheme's limit equation, on uniform times that each run shares at least LEAST_COMMON intervals with.
-    runs : levels of phases
-        Trajectories of one scheme as planned by ``plan_step_size``.
-
-    Raises
-    ------
-    ValueError
-        If a run and the reference share too few times.
-    """
-    omega0 = reference.scenario.omega0
-    error = np.array([[_error(reference, run, omega0) for run in level] for level in runs])
-    dt = np.array([[run.settings["dt"] for run in level] for level in runs])
-    scheme = runs[0][0].method
+    """Measure the observed order of a scheme against its limit equation; arguments and errors as of ``errors_of``."""
+    dt, error = errors_of(reference, runs)
     order, order_error = observed_order(dt, error)
     # Refinement is proven only if every level is better than the one before it.
     mean = np.sqrt((error**2).mean(axis=1))
-    refined = bool(np.all(np.isfinite(mean)) and np.all(np.diff(mean) < 0))
     return StepSize(
-        scheme=scheme,
+        scheme=runs[0][0].method,
         model=reference.method,
         dt=dt,
         error=error,
         order=order,
         order_error=order_error,
-        refined=refined,
+        refined=bool(np.all(np.isfinite(mean)) and np.all(np.diff(mean) < 0)),
     )
 
 
-def _error(reference: Trajectory, run: Trajectory, omega0: float) -> float:
+def errors_of(reference: Trajectory, runs: Sequence[Sequence[Trajectory]]) -> tuple[FloatArray, FloatArray]:
+    """Return step [s] and max |omega - omega_reference| / omega_0 of every run, shape (levels, members).
+
+    The error is NaN where a run is not complete.
+
+    Parameters
+    ----------
+    reference : Trajectory - on uniform times
+    runs : levels of members - as ``plan_step_size`` plans them
+
+    Raises
+    ------
+    ValueError
+        If a run shares fewer than LEAST_COMMON intervals with the reference.
+    """
+    dt = np.array([[run.settings["dt"] for run in level] for level in runs])
+    return dt, np.array([[_error(reference, run) for run in level] for level in runs])
+
+
+def _error(reference: Trajectory, run: Trajectory) -> float:
     if not (run.ok and reference.ok):
-        return float("nan")
+        return math.nan
     fine, coarse = len(run.t) - 1, len(reference.t) - 1
     common = math.gcd(fine, coarse)
     if common < LEAST_COMMON:
         raise ValueError(f"{fine} steps and {coarse} reference intervals share only {common} intervals")
     difference = run.omega[:: fine // common] - reference.omega[:: coarse // common]
-    return float(np.abs(difference).max() / abs(omega0))
+    return float(np.abs(difference).max() / abs(reference.scenario.omega0))
 
 
 def observed_order(dt: FloatArray, error: FloatArray) -> tuple[float, float]:
@@ -131,7 +128,7 @@ def observed_order(dt: FloatArray, error: FloatArray) -> tuple[float, float]:
     NaN for both if an error is not finite, or if errors reach ROUND_OFF, where an order means nothing.
     """
     if not np.all(np.isfinite(error)) or error.min() < ROUND_OFF or len(dt) < 3:
-        return float("nan"), float("nan")
+        return math.nan, math.nan
     x = np.log(dt).mean(axis=1)
     y = 0.5 * np.log((error**2).mean(axis=1))
     x = x - x.mean()
@@ -142,11 +139,11 @@ def observed_order(dt: FloatArray, error: FloatArray) -> tuple[float, float]:
 
 
 def before_first_impact(scenario: Scenario, reference: Trajectory) -> Scenario | None:
-    """Return the throw cut off before any slice first strikes an end, or None if none ever does.
+    """Return the throw cut off at 0.9 of the time of the first impact, or None if no slice ever strikes an end.
 
     A slice that rests on an end from the start does not strike it.
     """
     assert reference.impacts is not None
     if len(reference.impacts) == 0:
         return None
-    return replace(scenario, duration=BEFORE * float(reference.impacts.time[0]))
+    return replace(scenario, duration=0.9 * float(reference.impacts.time[0]))

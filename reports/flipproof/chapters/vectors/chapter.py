@@ -3,57 +3,41 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Final
 
 from flipproof.chapters.vectors.published import Vector, deviations, load_all
-from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Made, Run, Study, judged
+from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Made, Run, Study, judged, regression
+from slicemodel import Trajectory
 
 TOLERANCE: Final = {"published-python": 1e-10, "published-matlab": 1e-8}
 """Relative; the two sides differ by the order of additions and, for MATLAB, by amplified round-off."""
 
 
-@dataclass(frozen=True, slots=True)
-class Repeated:
-    """One published run, and what became of ours."""
-
-    vector: Vector
-    made: Made
-
-
-def study(ask: Ask) -> Study[tuple[Repeated, ...]]:
+def study(ask: Ask) -> Study[list[tuple[Vector, Made]]]:
     """Repeat every published run; these are throws of the paper, whatever the report's own is."""
     del ask
-    runs = {
-        vector.name: (vector, Run(vector.scheme, vector.scenario, {"steps": vector.steps}, f"vector {vector.name}"))
-        for vector in load_all()
-    }
-    flights = yield [run for _, run in runs.values()]
-    return tuple(Repeated(vector, flights[run]) for vector, run in runs.values())
+    vectors = load_all()
+    runs = [Run(each.scheme, each.scenario, {"steps": each.steps}, f"vector {each.name}") for each in vectors]
+    flights = yield runs
+    return [(vector, flights[run]) for vector, run in zip(vectors, runs, strict=True)]
 
 
-def claims(found: tuple[Repeated, ...]) -> Claims:
+def claims(found: list[tuple[Vector, Made]]) -> Claims:
     """Yield the largest deviation of each run from what was printed."""
-    for one in found:
-        yield judged(
-            lambda one: claim_vectors(one.vector.name, one.vector.scheme, deviations(one.vector, one.made.flight)),
-            one,
-            id=f"vectors-{one.vector.name}",
-            title=f"published run {one.vector.name}",
-        )
+    for vector, made in found:
+        yield judged(claim_vectors, vector, made, id=f"vectors-{vector.name}", title=f"published run {vector.name}")
 
 
-def claim_vectors(name: str, scheme: str, off: Mapping[str, float]) -> Finding:
-    """The scheme reproduces what the published program prints; ``off`` is the largest deviation of each column."""
+def claim_vectors(vector: Vector, flight: Trajectory) -> Finding:
+    """The scheme reproduces what the published program prints, in the column with the largest deviation, too."""
+    off = deviations(vector, flight)
     worst = max(off, key=lambda column: math.inf if math.isnan(off[column]) else off[column])
-    return Finding(
-        id=f"vectors-{name}",
-        title=f"{scheme} reproduces the published run {name}",
+    return regression(
+        id=f"vectors-{vector.name}",
+        title=f"{vector.scheme} reproduces the published run {vector.name}",
         value=float(off[worst]),
         unit="relative",
-        kind="regression",
-        admissible=(0.0, TOLERANCE[scheme]),
+        admissible=(0.0, TOLERANCE[vector.scheme]),
         note=f"largest in column {worst}, over {len(off)} columns",
     )
 

@@ -30,13 +30,6 @@ class Vector:
         return len(self.columns["t"])
 
 
-MATLAB_RUNS = (
-    # The default run overflows; it is compared up to 0.2 s, before its slices are thrown out to infinity.
-    ("matlab_default", {"n_slices": 500, "drag": 0.01, "duration": 1.0}, 0.2),
-    ("matlab_no_drag", {"n_slices": 100, "drag": 0.0, "duration": 0.3}, 0.3),
-)
-
-
 def folder() -> Path:
     """Return where the vectors are: inside the installed package, or beside it in a checkout."""
     here = Path(__file__).resolve().parent
@@ -50,10 +43,11 @@ def folder() -> Path:
 
 def load_all() -> tuple[Vector, ...]:
     """Return every published vector, the Python program's first."""
-    vectors = [
-        Vector(
-            name=entry["file"].removesuffix(".csv"),
-            scenario=Scenario(
+    runs = [
+        (
+            "published-python",
+            entry["file"],
+            Scenario(
                 water_mass=entry["water_mass"],
                 n_slices=entry["n_slices"],
                 drag=entry["alpha"],
@@ -62,26 +56,28 @@ def load_all() -> tuple[Vector, ...]:
                 theta0=entry["theta_0"],
                 duration=entry["t_max"],
             ),
-            scheme="published-python",
-            middle_slice=entry["n_slices"] // 2,
-            until=entry["t_max"],
-            columns=_columns(entry["file"]),
+            entry["n_slices"] // 2,
+            entry["t_max"],
         )
         for entry in json.loads((folder() / "python_vectors.json").read_text(encoding="utf-8"))
     ]
-    for name, changes, until in MATLAB_RUNS:
-        scenario = Scenario(**changes)  # type: ignore[arg-type]
-        vectors.append(
-            Vector(
-                name=name,
-                scenario=scenario,
-                scheme="published-matlab",
-                middle_slice=scenario.n_slices // 2 - 1,
-                until=until,
-                columns=_columns(f"{name}.csv"),
-            )
+    # MATLAB counts slices from 1. Its default run is compared up to 0.2 s: its slices are thrown out to infinity later.
+    default, no_drag = Scenario(n_slices=500, drag=0.01, duration=1.0), Scenario(n_slices=100, drag=0.0, duration=0.3)
+    runs += [
+        ("published-matlab", "matlab_default.csv", default, 249, 0.2),
+        ("published-matlab", "matlab_no_drag.csv", no_drag, 49, 0.3),
+    ]
+    return tuple(
+        Vector(
+            name=file.removesuffix(".csv"),
+            scenario=scenario,
+            scheme=scheme,
+            middle_slice=middle,
+            until=until,
+            columns=_columns(file),
         )
-    return tuple(vectors)
+        for scheme, file, scenario, middle, until in runs
+    )
 
 
 def _columns(file: str) -> MappingProxyType[str, FloatArray]:
@@ -112,17 +108,12 @@ def deviations(vector: Vector, trajectory: Trajectory) -> dict[str, float]:
         "r_min": trajectory.r.min(axis=1),
         "r_max": trajectory.r.max(axis=1),
     }
-    return {
-        name: relative_deviation(ours[name][:points], values[:points])
-        for name, values in vector.columns.items()
-        if name in ours
-    }
+    compared = (name for name in vector.columns if name in ours)
+    return {name: relative_deviation(ours[name][:points], vector.columns[name][:points]) for name in compared}
 
 
 def relative_deviation(values: FloatArray, expected: FloatArray) -> float:
     """Return max |values - expected| / |expected|, 0 where both are 0; NaN anywhere gives NaN."""
-    difference = np.abs(values - expected)
-    scale = np.abs(expected)
     with np.errstate(divide="ignore", invalid="ignore"):
-        relative = np.where((difference == 0.0) & (scale == 0.0), 0.0, difference / scale)
-    return float(relative.max())
+        relative = np.abs(values - expected) / np.abs(expected)
+    return float(np.where((values == 0.0) & (expected == 0.0), 0.0, relative).max())

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 from flipproof.chapters.waterfall.figure import figure_waterfall
-from flipproof.chapters.waterfall.study import Waterfall, plan_finer, plan_waterfall, program_run, study_waterfall
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study
+from flipproof.chapters.waterfall.study import (
+    Waterfall,
+    observe,
+    plan_finer,
+    plan_waterfall,
+    program_run,
+    split_all,
+)
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, observed
 from flipproof.frame.throws import FINER
 from flipproof.output.columns import rows_csv
-from slicemodel import Trajectory
 
 
 def study(ask: Ask) -> Study[tuple[Waterfall, ...]]:
@@ -20,7 +25,7 @@ def study(ask: Ask) -> Study[tuple[Waterfall, ...]]:
     cut = ask.throw.with_slices(min(ask.work, ask.throw.n_slices))
     runs = [*plan_waterfall(cut, ask.steps), *plan_finer(cut, ask.steps)]
     flights = yield runs
-    return study_waterfall(program_run(cut, ask.steps), {run: flights[run].flight for run in runs})
+    return split_all(program_run(cut, ask.steps), {run: observe(flights[run].whole) for run in runs})
 
 
 def claims(found: tuple[Waterfall, ...]) -> Claims:
@@ -33,12 +38,11 @@ def claims(found: tuple[Waterfall, ...]) -> Claims:
 def claim_waterfall(waterfall: Waterfall) -> Finding:
     """From the published program to free flight, split over the assumptions; the bars sum to the whole."""
     largest = waterfall.largest
-    return Finding(
+    return observed(
         id=f"waterfall-{waterfall.observable.name}",
         title=f"{waterfall.observable.words}: free flight minus published program",
         value=waterfall.total,
         unit="" if waterfall.observable.unit == "1" else waterfall.observable.unit,
-        kind="observation",
         band=waterfall.end_band,
         note=f"largest fair share (mean over all orders): {largest.name}, {largest.average:+.3g} ± "
         f"{largest.average_band:.1g}, from {largest.low:+.3g} to {largest.high:+.3g} in single orders, at "
@@ -51,12 +55,10 @@ def claim_waterfall(waterfall: Waterfall) -> Finding:
 def claim_overlap(waterfall: Waterfall) -> Finding:
     """From free flight, whose slices overlap, to the column, which cannot: the margin of the waterfall."""
     finer = waterfall.finer_overlap
-    return Finding(
+    return observed(
         id="waterfall-overlap",
         title=f"{waterfall.observable.words}: column minus free flight, what forbidding overlap changes",
         value=waterfall.overlap,
-        unit="",
-        kind="observation",
         band=waterfall.end_band,
         note=f"a difference of two models, no share; free flight at N = {waterfall.slices}, the column has no slices"
         + (f"; {finer:+.3g} at N = {FINER * waterfall.slices}" if finer is not None else ""),
@@ -82,21 +84,12 @@ def figures(found: tuple[Waterfall, ...]) -> Iterator[Exhibit]:
         f"{waterfall.end:.3f}. Means over all orders: {bars}. The largest is {waterfall.largest.name}. "
         f"From there to water as one column, which cannot overlap: {waterfall.overlap:+.3f}.",
         maker=figure_waterfall,
-        data=(_without_reader(waterfall),),
-        table=table(waterfall),
+        data=(waterfall,),
+        table=_bars_csv(waterfall),
     )
 
 
-def _without_reader(waterfall: Waterfall) -> Waterfall:
-    """Return the same numbers for a worker process: what reads them off a run is a lambda and cannot be sent there."""
-    return replace(waterfall, observable=replace(waterfall.observable, of=_already_read))
-
-
-def _already_read(run: Trajectory) -> float:
-    raise TypeError(f"the numbers of {run.label} were read before they were sent to be drawn")
-
-
-def table(waterfall: Waterfall) -> str:
+def _bars_csv(waterfall: Waterfall) -> str:
     """Return every bar in three orders, between the two ends."""
     unit = waterfall.observable.unit
     return rows_csv(

@@ -16,22 +16,21 @@ minus free flight is a difference of two models.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass, fields, replace
-from itertools import combinations
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import chain, combinations
 from types import MappingProxyType
-from typing import Final, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
 from flipproof.frame.solvers import Run
 from flipproof.frame.throws import finer
 from flipproof.frame.twins import band, twins
+from ode_reference.solver import COLUMN
 from ode_reference.switches import Switches
 from slicemodel import Scenario, Trajectory, observables
 from slicemodel.trajectory import FloatArray
 
 PROGRAM: Final = "published-python"
-COLUMN: Final = "column"
-
 NAMES: Final = MappingProxyType(
     {
         "signs": "signs of Eq. 9d: no damping",
@@ -49,42 +48,34 @@ Value = TypeVar("Value", float, FloatArray)
 STEP: Final = "finite step of the program"
 
 
-@dataclass(frozen=True, slots=True)
-class Observable:
-    """One number read off a trajectory."""
+class Observable(NamedTuple):
+    """One number that ``observe`` reads off a trajectory."""
 
     name: str
     symbol: str
     words: str
     unit: str
-    of: Callable[[Trajectory], float]
 
 
 OBSERVABLES: Final = (
-    Observable(
-        "plateau",
-        "plateau",
-        "mean of ω/ω₀ over the second half",
-        "1",
-        lambda run: observables.plateau(run.t, run.omega, run.scenario.omega0),
-    ),
-    Observable("omega", "ω(T)/ω₀", "ω on landing / ω₀", "1", lambda run: float(run.omega[-1] / run.scenario.omega0)),
-    Observable("theta", "θ(T)", "θ on landing", "rad", lambda run: float(run.theta[-1])),
-    Observable(
-        "toppling",
-        "θ_c(T)",
-        "toppling angle on landing",
-        "rad",
-        lambda run: float(observables.toppling_angle(run.scenario, run.r_cm[-1])),
-    ),
-    Observable(
-        "v_cm",
-        "v_CM(T)",
-        "velocity of C_M in the bottle on landing",
-        "m/s",
-        lambda run: float(observables.centre_of_mass_velocity(run.scenario, run.v[-1])),
-    ),
+    Observable("plateau", "plateau", "mean of ω/ω₀ over the second half", "1"),
+    Observable("omega", "ω(T)/ω₀", "ω on landing / ω₀", "1"),
+    Observable("theta", "θ(T)", "θ on landing", "rad"),
+    Observable("toppling", "θ_c(T)", "toppling angle on landing", "rad"),
+    Observable("v_cm", "v_CM(T)", "velocity of C_M in the bottle on landing", "m/s"),
 )
+
+
+def observe(run: Trajectory) -> dict[str, float]:
+    """Return every observable by its name."""
+    throw = run.scenario
+    return {
+        "plateau": observables.plateau(run.t, run.omega, throw.omega0),
+        "omega": float(run.omega[-1] / throw.omega0),
+        "theta": float(run.theta[-1]),
+        "toppling": float(observables.toppling_angle(throw, run.r_cm[-1])),
+        "v_cm": float(observables.centre_of_mass_velocity(throw, run.v[-1])),
+    }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,8 +168,7 @@ def column_run(throw: Scenario) -> Run:
 def plan_waterfall(throw: Scenario, steps: int) -> list[Run]:
     """Return the program's run, every equation with its twins, and the column's (122 runs)."""
     equations = _plan_equations(throw)
-    followers = [twin for run in equations for twin in twins(run)]
-    return [program_run(throw, steps), *equations, *followers, column_run(throw)]
+    return [program_run(throw, steps), *equations, *chain.from_iterable(map(twins, equations)), column_run(throw)]
 
 
 def _plan_equations(throw: Scenario) -> list[Run]:
@@ -192,27 +182,13 @@ def plan_finer(throw: Scenario, steps: int) -> list[Run]:
     return [finer(run) for run in (program_run(throw, steps), *_plan_equations(throw))]
 
 
-def study_waterfall(program: Run, flights: Mapping[Run, Trajectory]) -> tuple[Waterfall, ...]:
+def split_all(program: Run, observed: Mapping[Run, Mapping[str, float]]) -> tuple[Waterfall, ...]:
     """Split every observable.
 
     Parameters
     ----------
     program : Run - the published program's
-    flights : mapping from run to trajectory - of ``plan_waterfall``, and all of ``plan_finer`` or none
-
-    Raises
-    ------
-    ArithmeticError
-        If a run is not whole, or a split does not sum to the whole difference within round-off.
-    """
-    for run, flight in flights.items():
-        if not flight.ok:
-            raise ArithmeticError(f"{run.name}: {flight.status}: {flight.message}")
-    return split_all(program, {run: {o.name: o.of(flight) for o in OBSERVABLES} for run, flight in flights.items()})
-
-
-def split_all(program: Run, observed: Mapping[Run, Mapping[str, float]]) -> tuple[Waterfall, ...]:
-    """Split every observable; ``observed`` maps the runs of ``plan_waterfall`` to their values by name.
+    observed : run -> value by observable - of ``plan_waterfall``, and of all of ``plan_finer`` or none
 
     Raises
     ------
@@ -223,17 +199,12 @@ def split_all(program: Run, observed: Mapping[Run, Mapping[str, float]]) -> tupl
 
 
 def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) -> Waterfall:
-    values: dict[Switches, float] = {}
-    bands: dict[Switches, float] = {}
-    more: dict[Switches, float] = {}
-    for switches in Switches.every():
-        run = equation_run(program.scenario, switches)
-        values[switches] = observed[run]
-        bands[switches] = band(run, observed)
-        if finer(run) in observed:
-            more[switches] = observed[finer(run)]
+    runs = {switches: equation_run(program.scenario, switches) for switches in Switches.every()}
+    values = {switches: observed[run] for switches, run in runs.items()}
+    bands = {switches: band(run, observed) for switches, run in runs.items()}
+    more = {switches: observed[finer(run)] for switches, run in runs.items() if finer(run) in observed}
     start = observed[program]
-    none, everything = Switches(), Switches(*[True] * len(NAMES))
+    none, everything = Switches(), _with(NAMES)
     step = values[none] - start
     bars = [
         Bar(
@@ -248,11 +219,11 @@ def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) 
             finer=more[none] - observed[finer(program)] if more else None,
         )
     ]
-    order = [field.name for field in fields(Switches)]
-    for name in order:
-        before = order[: order.index(name)]
-        after = order[order.index(name) + 1 :]
-        changes = [_change(name, chosen, values) for chosen, _ in sets_before(name, NAMES)]
+    order = list(NAMES)
+    for k, name in enumerate(order):
+        before, after = order[:k], order[k + 1 :]
+        sets = list(sets_before(name, NAMES))
+        changes = [_change(name, chosen, values) for chosen, _ in sets]
         bars.append(
             Bar(
                 name=NAMES[name],
@@ -263,8 +234,7 @@ def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) 
                 high=max(changes),
                 forward_band=bands[_with(before)] + bands[_with([*before, name])],
                 average_band=sum(
-                    weight * (bands[_with(chosen)] + bands[_with([*chosen, name])])
-                    for chosen, weight in sets_before(name, NAMES)
+                    weight * (bands[_with(chosen)] + bands[_with([*chosen, name])]) for chosen, weight in sets
                 ),
                 finer=fair_share(name, more) if more else None,
             )
@@ -288,11 +258,11 @@ def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) 
     )
 
 
-def _with(names: list[str] | tuple[str, ...]) -> Switches:
+def _with(names: Iterable[str]) -> Switches:
     return Switches(**dict.fromkeys(names, True))
 
 
-def _change(name: str, others: list[str] | tuple[str, ...], values: Mapping[Switches, Value]) -> Value:
+def _change(name: str, others: Iterable[str], values: Mapping[Switches, Value]) -> Value:
     """Return what switching ``name`` on changes when ``others`` are on."""
     return values[_with([*others, name])] - values[_with(others)]
 

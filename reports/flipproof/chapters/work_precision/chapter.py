@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, Literal, NamedTuple
 
-from flipproof.chapters.work_precision import contenders
 from flipproof.chapters.work_precision.claims import claim_work_precision
-from flipproof.chapters.work_precision.contenders import CASES
-from flipproof.chapters.work_precision.exhibits import draw_work_precision
-from flipproof.chapters.work_precision.study import WorkPrecision, plan_work_precision, study_work_precision
-from flipproof.chapters.work_precision.tables import summarise_work_precision, tabulate_work_precision
-from flipproof.frame.chapter import Ask, Call, Chapter, Made, Run, Study
+from flipproof.chapters.work_precision.contenders import CASES, COMMON, FULL
+from flipproof.chapters.work_precision.figure import figure_work_precision
+from flipproof.chapters.work_precision.study import (
+    Cost,
+    Curve,
+    WorkPrecision,
+    plan_work_precision,
+    study_work_precision,
+    words_of,
+)
+from flipproof.frame.chapter import Ask, Call, Chapter, Exhibit, Study
 from flipproof.frame.timing import batches, make_timed
+from flipproof.output.columns import rows_csv
 
 
 def study(ask: Ask) -> Study[tuple[WorkPrecision, ...]]:
@@ -24,8 +32,207 @@ def study(ask: Ask) -> Study[tuple[WorkPrecision, ...]]:
     # After the other runs, so that the compiled loop is there and its compiling is not counted.
     yield ()
     flights = yield calls
-    made: Mapping[Run, Made] = {each.run: each for call in calls for each in flights.answer(call)}
+    made = {each.run: each for call in calls for each in flights.answer(call)}
     return tuple(study_work_precision(case, ask.work, made) for case in cases)
+
+
+def figures(studies: Sequence[WorkPrecision]) -> Iterator[Exhibit]:
+    """Yield a figure for each throw over updates; if there are several, one of them over processor time as well."""
+    for study in studies:
+        yield _exhibit(study, "work")
+    if len(studies) > 1:
+        # Through impacts: there methods differ by what an event costs them.
+        yield _exhibit(next(study for study in studies if study.case.name == "impacts"), "seconds")
+
+
+def _exhibit(study: WorkPrecision, cost: Literal["work", "seconds"]) -> Exhibit:
+    timed = cost == "seconds"
+
+    def reached(curve: Curve) -> str:
+        """Return error and cost of a contender's first and last level, or why there is none."""
+        if not curve.whole:
+            return f"{curve.contender.key}: {curve.failed[0].reason.partition(':')[0]}"
+        levels = (curve.whole[0], curve.whole[-1])
+        words = (f"{level.error:.1e} for {level.cost(cost):.1e}{' s' if timed else ''}" for level in levels)
+        return f"{curve.contender.key}: {' to '.join(words)}"
+
+    levels = "; ".join(map(reached, study.curves.values()))
+    floors = ", ".join(f"{r.equation} {r.floor:.1e}" for r in study.references.values() if math.isfinite(r.floor))
+    return Exhibit(
+        name=f"work-precision-{study.case.name}{'-time' if timed else ''}",
+        title=f"What a digit costs: {study.case.title}{', in processor time' if timed else ''}",
+        caption="Farther left is cheaper, farther down is better; p is the order in cost. Each panel holds one "
+        "equation and those who solve it, so that what lies between equations does not enter. In the grey nothing is "
+        "claimed: there the reference itself is uncertain. A cross at the top edge is a run that failed; the table "
+        "says why. "
+        + (
+            "Schemes and engines run in compiled code, methods in Python: this is the price of a program."
+            if timed
+            else "An update of one slice is counted the same on every machine, but is not the same work to everyone."
+        ),
+        alt=f"Log-log plots of error, of omega_0, against {'processor time' if timed else 'updates of one slice'}. "
+        f"From the first level to the last: {levels}. Floors: {floors}.",
+        maker=figure_work_precision,
+        data=(study, cost),
+        table=_levels_csv(study),
+    )
+
+
+def _levels_csv(study: WorkPrecision) -> str:
+    """Return every level of every contender, with its price and its error."""
+    return rows_csv(
+        ("contender", "equation", "level", "updates of one slice [1]", "steps [1]", "processor time [s]",
+         "error of omega [of omega_0]", "least error [of omega_0]", "largest error [of omega_0]",
+         "error of the plateau [of omega_0]", "floor of the reference [of omega_0]", "at the floor",
+         "failed because"),
+        (
+            (curve.contender.name, curve.contender.equation, point.settings, point.work, point.steps, point.seconds,
+             point.error, point.lowest, point.highest, point.plateau,
+             study.references[curve.contender.equation].floor, point.at_floor, point.reason)
+            for curve in study.curves.values()
+            for point in curve.points
+        ),
+    )  # fmt: skip
+
+
+class Table(NamedTuple):
+    """A table of words: ``rows`` have as many cells as there are ``columns``."""
+
+    name: str
+    title: str
+    columns: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+    note: str = ""
+
+
+def tabulate_work_precision(studies: Sequence[WorkPrecision]) -> Iterator[Table]:
+    """Yield results and settings of every throw, then who is absent and why."""
+    absent: dict[str, str] = {}
+    for study in studies:
+        yield _results(study)
+        yield _settings(study)
+        yield _references(study)
+        absent |= study.absent
+    if studies:
+        yield Table("work-absent", "Not competing", ("what", "why"), list(absent.items()))
+
+
+def _results(study: WorkPrecision) -> Table:
+    errors = (1e-2, 1e-3, 1e-4, 1e-6)
+
+    def price(curve: Curve, error: float, cost: Cost) -> str:
+        found = study.price(curve, error, cost)
+        return "–" if found is None else f"{found.limit}{found.value:.2g}"
+
+    rows = []
+    for curve in study.curves.values():
+        whole, failed = curve.whole, curve.failed
+        first_last = f"{whole[0].error:.1e} to {whole[-1].error:.1e}" if whole else "–"
+        order = f"{curve.slope:.2f} ± {curve.slope_error:.2f}"
+        rows.append(
+            (
+                curve.contender.name,
+                curve.contender.equation,
+                first_last + (" (floor)" if any(point.at_floor for point in whole) else ""),
+                f"{whole[-1].plateau:.1e}" if whole else "–",
+                order if math.isfinite(curve.slope) else f"– ({curve.slope_reason})",
+                *(price(curve, error, "work") for error in errors),
+                price(curve, 1e-3, "seconds"),
+                f"{len(failed)} of {len(curve.points)}: {failed[0].settings}: {failed[0].reason}" if failed else "",
+            )
+        )
+    return Table(
+        f"work-results-{study.case.name}",
+        f"What an error costs: {study.case.title}",
+        (
+            "contender", "equation", "error, first to last level", "of the plateau, last", "order in cost",
+            *(f"updates for {error:.0e}" for error in errors), "seconds for 1e-03", "failed",
+        ),
+        rows,
+        "Errors in fractions of omega_0; floor: not told apart from the reference. ≤: the coarsest level that was "
+        "usable keeps it already. Processor time is that of the machine that made this report.",
+    )  # fmt: skip
+
+
+def _settings(study: WorkPrecision) -> Table:
+    counted = {
+        "scheme": "steps × slices (× 2 where it predicts)",
+        "method": "right-hand sides × slices",
+        "engine": "steps × slices × iterations, or × 4 for RK4",
+    }
+    rows = []
+    for curve in study.curves.values():
+        rival, levels = curve.contender, curve.contender.levels
+        name, first = next(iter(levels[0][0].items()))
+        rows.append(
+            (
+                rival.name,
+                rival.equation,
+                f"{name} {first:.3g} to {levels[-1][-1][name]:.3g}",
+                f"{len(levels)}" + (f" of {len(levels[0])} grids" if len(levels[0]) > 1 else ""),
+                words_of(curve.held),
+                counted[rival.family],
+            )
+        )
+    return Table(
+        f"work-settings-{study.case.name}",
+        f"Settings: {study.case.title}",
+        ("contender", "equation", "refined", "levels", "held", "an update is"),
+        rows,
+        f"{study.case.scenario.n_slices} slices; errors at {COMMON + 1} times that all grids share. A method's "
+        "absolute tolerance is a thousandth of its relative one.",
+    )
+
+
+def _references(study: WorkPrecision) -> Table:
+    rows = []
+    for reference in study.references.values():
+        floors = (
+            f"{floor:.1e}" if math.isfinite(floor) else "–" for floor in (reference.floor, reference.plateau_floor)
+        )
+        rows.append(
+            (reference.equation, *floors, reference.words + (f" ({reference.reason})" if reference.reason else ""))
+        )
+    return Table(
+        f"work-references-{study.case.name}",
+        f"References: {study.case.title}",
+        ("equation", "floor of ω", "floor of the plateau", "reference; its witnesses"),
+        rows,
+        "The floor is the largest difference between the reference and a witness, and never less than 1e-13.",
+    )
+
+
+def summarise_work_precision(studies: Sequence[WorkPrecision]) -> dict[str, Any]:
+    """Return every number of the diagrams as JSON-ready data; what is not finite becomes null."""
+    return {
+        study.case.name: {
+            "title": study.case.title,
+            "scenario": study.case.scenario.to_mapping(),
+            "references": {name: _plain(asdict(reference)) for name, reference in study.references.items()},
+            "contenders": {
+                key: {
+                    "name": curve.contender.name,
+                    "family": curve.contender.family,
+                    "equation": curve.contender.equation,
+                    "held": _plain(curve.held),
+                    **_plain({name: getattr(curve, name) for name in ("slope", "slope_error", "slope_reason")}),
+                    "points": [_plain(asdict(point)) for point in curve.points],
+                }
+                for key, curve in study.curves.items()
+            },
+            "absent": dict(study.absent),
+        }
+        for study in studies
+    }
+
+
+def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
+    def plain(value: Any) -> Any:
+        if isinstance(value, float):
+            return value if math.isfinite(value) else None
+        return value if isinstance(value, (bool, int, str)) else str(value)
+
+    return {name: plain(value) for name, value in values.items()}
 
 
 CHAPTER: Final = Chapter(
@@ -33,9 +240,9 @@ CHAPTER: Final = Chapter(
     title="What a digit costs",
     study=study,
     claims=claim_work_precision,
-    figures=draw_work_precision,
+    figures=figures,
     template=Path(__file__).with_name("part.html.j2"),
-    work={"full": contenders.FULL},
+    work={"full": FULL},
     summary=lambda found: {"work_precision": summarise_work_precision(found)},
     page=lambda found: {"tables": list(tabulate_work_precision(found))},
 )

@@ -19,21 +19,19 @@ engine has several members: their impacts fall at other phases of the step, and 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 import numpy as np
 
 from engine_check.solver import ENGINES
 from flipproof.chapters.solvers import LIMITS
+from flipproof.frame.twins import usual_rest_speed
 from ode_reference.models import MODELS
-from ode_reference.solver import REST_SPEED, REST_SPEED_WITH_RECOIL
 from slicemodel import Bottle, Scenario
 from slicemodel.schemes import SCHEMES
 from slicemodel.trajectory import FloatArray
-
-Family = Literal["scheme", "method", "engine"]
 
 METHODS: Final = ("DOP853", "LSODA", "Radau")
 """The methods of ``ode_reference`` that compete."""
@@ -50,16 +48,6 @@ OWN_LIMIT: Final = "limit of "
 EQUATION_OF_SCHEME: Final[Mapping[str, str]] = {**LIMITS, "paper-typeset": AT_REST}
 EQUATION_OF_FRAME: Final[Mapping[str, str]] = {"free": "free-flight", "rotating": "eq8"}
 
-ATOL_SHARE: Final = 1e-3
-"""Absolute tolerance of a method over its relative one: the numbers are of the order of 0.1 to 10."""
-
-RADAU_TURN: Final = 0.02
-"""Longest step of Radau in radians of the bottle at release. Its dense output has order 3: with steps as long as its
-tolerance allows, rests and releases chatter (627 402 right-hand sides at rtol 1e-4, where 10 071 suffice at 1e-8)."""
-
-FINEST_OWN: Final = 8
-"""How much finer than its last level the run is that stands for a scheme's own limit."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
@@ -75,33 +63,26 @@ class Case:
         return np.linspace(0.0, self.scenario.duration, COMMON + 1)
 
 
-SLICES: Final = 12
-"""With 20, ten times the rest speed moves free flight by 1.4e-3 omega_0 after 1251 impacts, and nothing finer than that
-could be told apart; with 12 by 1e-5."""
+# With 20 slices, ten times the rest speed moves free flight by 1.4e-3 omega_0 after 1251 impacts, and nothing finer
+# than that could be told apart; with 12 by 1e-5.
+THROW: Final = Scenario().with_slices(12)
+OTHER: Final = Scenario(
+    bottle=Bottle(length=0.22, radius=0.033, mass=0.024, capacity=0.75),
+    water_mass=0.3,
+    n_slices=30,
+    drag=0.06,
+    restitution=0.35,
+    omega0=16.0,
+    theta0=1.1,
+    duration=0.45,
+).with_slices(12)
 
 CASES: Final[Mapping[str, Case]] = {
-    case.name: case
-    for case in (
-        Case(
-            name="smooth",
-            title="the paper's throw up to shortly before the first impact",
-            scenario=replace(Scenario().with_slices(SLICES), duration=0.03),
-        ),
-        Case(name="impacts", title="the paper's throw, with all its impacts", scenario=Scenario().with_slices(SLICES)),
-        Case(
-            name="other-bottle",
-            title="a smaller bottle, e = 0.35, less drag, slower spin",
-            scenario=Scenario(
-                bottle=Bottle(length=0.22, radius=0.033, mass=0.024, capacity=0.75),
-                water_mass=0.3,
-                n_slices=30,
-                drag=0.06,
-                restitution=0.35,
-                omega0=16.0,
-                theta0=1.1,
-                duration=0.45,
-            ).with_slices(SLICES),
-        ),
+    name: Case(name=name, title=title, scenario=scenario)
+    for name, title, scenario in (
+        ("smooth", "the paper's throw up to shortly before the first impact", replace(THROW, duration=0.03)),
+        ("impacts", "the paper's throw, with all its impacts", THROW),
+        ("other-bottle", "a smaller bottle, e = 0.35, less drag, slower spin", OTHER),
     )
 }
 
@@ -127,11 +108,6 @@ class Effort:
     methods: Mapping[str, Asked]
 
 
-WITNESSED: Final = ("eq8", "free-flight")
-"""The equations on which a full report asks the implicit methods, without recoil and with it."""
-
-DECADES: Final = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
-
 COMPLETE: Final = Effort(
     name="complete",
     cases=tuple(CASES),
@@ -139,7 +115,7 @@ COMPLETE: Final = Effort(
     scheme_members=(4, 5, 6, 7),
     engine_levels=7,
     engine_members=(4, 5, 6, 7),
-    methods={name: Asked(rtol=DECADES) for name in METHODS},
+    methods=dict.fromkeys(METHODS, Asked(rtol=(1e-3, 1e-5, 1e-7, 1e-9, 1e-11))),
 )
 """By command only; a few minutes."""
 
@@ -152,8 +128,9 @@ FULL: Final = replace(
     engine_members=(4, 6),
     methods={
         "DOP853": Asked(rtol=(1e-3, 1e-6, 1e-9, 1e-11)),
-        "LSODA": Asked(rtol=(1e-3, 1e-6, 1e-9, 1e-11), equations=WITNESSED),
-        "Radau": Asked(rtol=(1e-5, 1e-8), equations=WITNESSED),
+        # The implicit methods on an equation without recoil and on one with it.
+        "LSODA": Asked(rtol=(1e-3, 1e-6, 1e-9, 1e-11), equations=("eq8", "free-flight")),
+        "Radau": Asked(rtol=(1e-5, 1e-8), equations=("eq8", "free-flight")),
     },
 )
 
@@ -165,11 +142,7 @@ QUICK: Final = replace(
     scheme_members=(4, 6),
     engine_levels=4,
     engine_members=(4,),
-    methods={
-        name: Asked(rtol=(1e-3, 1e-5, 1e-7), equations=("eq8",) if name == "LSODA" else ())
-        for name in METHODS
-        if name != "Radau"
-    },
+    methods={"DOP853": Asked(rtol=(1e-3, 1e-5, 1e-7)), "LSODA": Asked(rtol=(1e-3, 1e-5, 1e-7), equations=("eq8",))},
 )
 
 
@@ -188,10 +161,10 @@ class Contender:
     """
 
     name: str
-    family: Family
+    family: Literal["scheme", "method", "engine"]
     solver: str
     equation: str
-    fixed: Mapping[str, Any] = field(default_factory=dict)
+    fixed: Mapping[str, Any]
     levels: tuple[tuple[Mapping[str, Any], ...], ...]
 
     @property
@@ -199,18 +172,12 @@ class Contender:
         """Unique among the contenders of a throw: a method competes once for each equation."""
         return f"{self.name} on {self.equation}"
 
-    @property
-    def refined(self) -> str:
-        """The setting that is refined, with its first and last value."""
-        name, first = next(iter(self.levels[0][0].items()))
-        return f"{name} {first:.3g} to {self.levels[-1][-1][name]:.3g}"
-
 
 def contenders(case: Case, effort: Effort) -> tuple[Contender, ...]:
     """Return all who compete on a throw: schemes, engines, then methods for each equation that one of these solves."""
     rivals = (*_schemes(effort), *_engines(case, effort))
-    solved = [model for model in MODELS if any(rival.equation == model for rival in rivals)]
-    return (*rivals, *_methods(case, effort, solved))
+    solved = {rival.equation for rival in rivals}
+    return (*rivals, *_methods(case, effort, [model for model in MODELS if model in solved]))
 
 
 def left_out(effort: Effort) -> dict[str, str]:
@@ -237,76 +204,61 @@ def left_out(effort: Effort) -> dict[str, str]:
                 reasons[f"{engine.name}, slices = {contact}"] = (
                     "slices that meet are another equation, to which no scheme and no method here converges"
                 )
-    for name in CASES:
-        if name not in effort.cases:
-            reasons[f"throw «{name}»"] = f"the size «{effort.name}» takes one throw"
-    return reasons
+    unthrown = (name for name in CASES if name not in effort.cases)
+    return reasons | {f"throw «{name}»": f"the size «{effort.name}» takes one throw" for name in unthrown}
 
 
-def equation_of_scheme(name: str) -> str:
-    """Return the equation a scheme converges to; one that no model states is its own limit."""
-    return EQUATION_OF_SCHEME.get(name, OWN_LIMIT + name)
-
-
-def _doubled(members: tuple[int, ...], levels: int) -> Iterator[tuple[int, ...]]:
-    for level in range(levels):
-        yield tuple(COMMON * member * 2**level for member in members)
+def _levels(
+    members: tuple[int, ...], count: int, setting: Callable[[int], dict[str, Any]]
+) -> tuple[tuple[dict[str, Any], ...], ...]:
+    """Return the setting of every member of every level, from its number of steps, which doubles with each level."""
+    return tuple(tuple(setting(COMMON * member * 2**level) for member in members) for level in range(count))
 
 
 def _schemes(effort: Effort) -> Iterator[Contender]:
-    for name in SCHEMES:
+    for name, scheme in SCHEMES.items():
         yield Contender(
             name=name,
             family="scheme",
             solver=name,
-            equation=equation_of_scheme(name),
-            fixed={"store": "summary", "rebound": "in-step" if SCHEMES[name].form.in_step else "grid"},
+            equation=EQUATION_OF_SCHEME.get(name, OWN_LIMIT + name),
+            fixed={"store": "summary", "rebound": "in-step" if scheme.form.in_step else "grid"},
             # Points of the grid: one more than steps.
-            levels=tuple(
-                tuple({"steps": steps + 1} for steps in grids)
-                for grids in _doubled(effort.scheme_members, effort.scheme_levels)
-            ),
+            levels=_levels(effort.scheme_members, effort.scheme_levels, lambda steps: {"steps": steps + 1}),
         )
 
 
 def _engines(case: Case, effort: Effort) -> Iterator[Contender]:
+    from engine_check.pymunk_rotating import ITERATIONS
+    from engine_check.pymunk_settings import enough_iterations
+
+    duration = case.scenario.duration
     for engine in ENGINES.values():
         for frame in engine.frames:
             if frame not in EQUATION_OF_FRAME:
                 continue
+            # Iterations by rule, where the engine's world iterates; they depend on the throw, not on dt.
+            iterations = ITERATIONS if frame == "rotating" else enough_iterations(case.scenario)
             yield Contender(
                 name=engine.name if frame == "free" else f"{engine.name} {frame}",
                 family="engine",
                 solver=engine.name,
                 equation=EQUATION_OF_FRAME[frame],
-                fixed={"frame": frame, "times": case.times, **_iterations(case, engine.name, frame)},
-                levels=tuple(
-                    tuple({"dt": case.scenario.duration / steps} for steps in grids)
-                    for grids in _doubled(effort.engine_members, effort.engine_levels)
-                ),
+                fixed={"frame": frame, "times": case.times}
+                | ({"iterations": iterations} if engine.name == "pymunk" else {}),
+                levels=_levels(effort.engine_members, effort.engine_levels, lambda steps: {"dt": duration / steps}),
             )
 
 
-def _iterations(case: Case, engine: str, frame: str) -> dict[str, int]:
-    """Return the iterations by rule, where the engine's world iterates; they depend on the throw, not on dt."""
-    if engine != "pymunk":
-        return {}
-    if frame == "rotating":
-        from engine_check.pymunk_rotating import ITERATIONS
-
-        return {"iterations": ITERATIONS}
-    from engine_check.pymunk_settings import enough_iterations
-
-    return {"iterations": enough_iterations(case.scenario)}
-
-
 def _methods(case: Case, effort: Effort, solved: list[str]) -> Iterator[Contender]:
-    turn = RADAU_TURN / abs(case.scenario.omega0)
+    longest = case.scenario.duration
+    # Radau's dense output has order 3: with steps as long as its tolerance allows, rests and releases chatter (627 402
+    # right-hand sides at rtol 1e-4, where 10 071 suffice at 1e-8). 0.02 rad of the bottle at release are short enough.
+    shorter = min(0.02 / abs(case.scenario.omega0), longest)
     for model in solved:
         for method, asked in effort.methods.items():
             if asked.equations and model not in asked.equations:
                 continue
-            longest = min(turn, case.scenario.duration) if method == "Radau" else case.scenario.duration
             yield Contender(
                 name=method,
                 family="method",
@@ -314,15 +266,11 @@ def _methods(case: Case, effort: Effort, solved: list[str]) -> Iterator[Contende
                 equation=model,
                 fixed={
                     "method": method,
-                    "max_step": longest,
-                    "rest_speed": rest_speed(model),
+                    "max_step": shorter if method == "Radau" else longest,
+                    "rest_speed": usual_rest_speed(model),
                     "impact_law": "simultaneous",
                     "times": case.times,
                 },
-                levels=tuple(({"rtol": rtol, "atol": ATOL_SHARE * rtol},) for rtol in asked.rtol),
+                # The numbers are of the order of 0.1 to 10.
+                levels=tuple(({"rtol": rtol, "atol": 1e-3 * rtol},) for rtol in asked.rtol),
             )
-
-
-def rest_speed(model: str) -> float:
-    """Return the rest speed that the reference takes unless told otherwise [m/s]."""
-    return REST_SPEED_WITH_RECOIL if MODELS[model].switches.recoil else REST_SPEED

@@ -13,17 +13,11 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
+from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
 
 from flipproof.chapters.work_precision.study import Cost, Curve, WorkPrecision
 from flipproof.figures.style import OTHERS, STYLES, new_figure, styled
 from ode_reference.models import MODELS
-
-LABELS: Final[Mapping[Cost, str]] = {
-    "work": "updates of one slice [1]",
-    "steps": "steps of the solver [1]",
-    "seconds": "processor time, least of several runs [s]",
-}
 
 COLOURS: Final = {"DOP853": "#000000", "LSODA": "#0050A0", "Radau": "#6A5ACD", "mujoco": "#D55E00"}
 """Of those whom ``STYLES`` does not know."""
@@ -31,50 +25,47 @@ COLOURS: Final = {"DOP853": "#000000", "LSODA": "#0050A0", "Radau": "#6A5ACD", "
 LINES: Final[Mapping[str, Literal["-", "--", ":"]]] = {"scheme": "-", "method": "--", "engine": ":"}
 MARKERS: Final = {"scheme": "os", "method": "^v<>", "engine": "DPX"}
 FLOOR_COLOUR: Final = "#c8c8c8"
-LOWEST: Final = 1e-14
 ROOM: Final = 0.54
 """Share of a panel's width that is left for the labels."""
 
-DARKER: Final = 0.55
-"""Share of a curve's colour in its label, so that small letters stand out from white and from the floor."""
-
 LINE_HEIGHT: Final = 0.075
 """Least distance of two labels, as a share of the panel's height."""
+
+Limits = tuple[tuple[float, float], tuple[float, float]]
+"""Ends of the axes of cost and of error."""
 
 
 @styled
 def figure_work_precision(study: WorkPrecision, cost: Cost = "work") -> Figure:
     """Draw one panel per equation on common axes, and a last one that explains the signs."""
-    equations = list(study.references)
-    rows = math.ceil((len(equations) + 1) / 2)
+    rows = math.ceil((len(study.references) + 1) / 2)
     figure, panels = new_figure(rows, 2, size=(8.0, 0.4 + 2.55 * rows), sharex=True, sharey=True, squeeze=False)
-    *used, legend = list(panels.flat)[: len(equations) + 1]
-    for spare in list(panels.flat)[len(equations) + 1 :]:
+    *used, legend = list(panels.flat)[: len(study.references) + 1]
+    for spare in list(panels.flat)[len(study.references) + 1 :]:
         spare.set_visible(False)
     limits = _limits(study, cost)
-    for axes, equation in zip(used, equations, strict=True):
+    for axes, equation in zip(used, study.references, strict=True):
         _panel(axes, study, equation, cost, limits)
     for axes in panels[:, 0]:
         axes.set_ylabel("max |Δω| / ω₀ [1]")
     for axes in used[-2:]:
-        axes.set_xlabel(LABELS[cost])
+        axes.set_xlabel("updates of one slice [1]" if cost == "work" else "processor time, least of several runs [s]")
         axes.xaxis.set_tick_params(labelbottom=True)
     _explain(legend)
     return figure
 
 
-def _limits(study: WorkPrecision, cost: Cost) -> tuple[tuple[float, float], tuple[float, float]]:
+def _limits(study: WorkPrecision, cost: Cost) -> Limits:
     costs = [point.cost(cost) for curve in study.curves.values() for point in curve.points]
     finite = [value for value in costs if math.isfinite(value) and value > 0.0]
     low, high = (min(finite), max(finite)) if finite else (1.0, 10.0)
     floors = [reference.floor for reference in study.references.values() if math.isfinite(reference.floor)]
     low, high = low / 1.6, 1.6 * high
-    return (low, high * (high / low) ** (ROOM / (1.0 - ROOM))), (max(LOWEST, min([1e-10, *floors]) / 10), 2.0)
+    return (low, high * (high / low) ** (ROOM / (1.0 - ROOM))), (max(1e-14, min([1e-10, *floors]) / 10), 2.0)
 
 
-def _plain(value: float, at: int | None) -> str:
+def _plain(value: float, _: float) -> str:
     """Return a power of ten as plain text: typeset, the ticks of eight panels cost half a second."""
-    del at
     return f"1e{round(math.log10(value))}"
 
 
@@ -84,38 +75,29 @@ def _beside(costs: tuple[float, float]) -> float:
     return math.exp(ROOM * math.log(low) + (1.0 - ROOM) * math.log(high))
 
 
-def _panel(
-    axes: Axes, study: WorkPrecision, equation: str, cost: Cost, limits: tuple[tuple[float, float], tuple[float, float]]
-) -> None:
-    reference = study.references[equation]
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.set_xlim(*limits[0])
-    axes.set_ylim(*limits[1])
+def _panel(axes: Axes, study: WorkPrecision, equation: str, cost: Cost, limits: Limits) -> None:
+    floor = study.references[equation].floor
+    axes.set(xscale="log", yscale="log", xlim=limits[0], ylim=limits[1])
     # No ticks under the labels.
     decades = np.arange(math.ceil(math.log10(limits[0][0])), math.floor(math.log10(_beside(limits[0]))) + 1)
     axes.xaxis.set_major_locator(FixedLocator((10.0**decades).tolist()))
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.xaxis.set_major_formatter(FuncFormatter(_plain))
-    axes.yaxis.set_major_formatter(FuncFormatter(_plain))
     axes.yaxis.set_major_locator(LogLocator(100.0, numticks=12))
-    axes.yaxis.set_minor_locator(NullLocator())
-    floor = reference.floor
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_minor_locator(NullLocator())
+        axis.set_major_formatter(_plain)
     words = f"equation {equation}" if equation in MODELS else equation
     if math.isfinite(floor):
         axes.axhspan(limits[1][0], floor, color=FLOOR_COLOUR, linewidth=0, zorder=0)
-        words += f", floor {floor:.0e}"
-    else:
-        words += ", no reference"
-    axes.set_title(words, fontsize=9.5, loc="left")
+    axes.set_title(
+        words + (f", floor {floor:.0e}" if math.isfinite(floor) else ", no reference"), fontsize=9.5, loc="left"
+    )
     labels = []
     counts = dict.fromkeys(LINES, 0)
     for curve in study.of(equation):
         family = curve.contender.family
         style = _style(curve, counts[family])
         counts[family] += 1
-        _curve(axes, curve, floor, cost, style)
-        at = _end(curve, floor, cost)
+        at = _curve(axes, curve, floor, cost, style)
         if at is not None:
             labels.append((at, _label(curve), style["color"]))
     _write(axes, labels, limits)
@@ -125,61 +107,49 @@ def _style(curve: Curve, k: int) -> dict[str, Any]:
     """Return colour, line and marker: the line tells the family, the marker who within it."""
     contender = curve.contender
     known = STYLES.get(contender.name) or STYLES.get(contender.solver if contender.family == "engine" else "")
-    usual = COLOURS.get(contender.name, OTHERS[k % len(OTHERS)])
     markers = MARKERS[contender.family]
     return {
-        "color": known["color"] if known else usual,
+        "color": known["color"] if known else COLOURS.get(contender.name, OTHERS[k % len(OTHERS)]),
         "linestyle": LINES[contender.family],
         "marker": markers[k % len(markers)],
     }
 
 
-def _curve(axes: Axes, curve: Curve, floor: float, cost: Cost, style: Mapping[str, Any]) -> None:
+def _curve(axes: Axes, curve: Curve, floor: float, cost: Cost, style: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Draw a curve; return where it ends: its last level, or the top edge above its dearest failure."""
+    colour = style["color"]
     whole = [point for point in curve.whole if math.isfinite(point.cost(cost))]
     x = np.array([point.cost(cost) for point in whole])
-    y = np.array([max(point.error, floor) for point in whole])
-    axes.plot(x, y, color=style["color"], linestyle=style["linestyle"], linewidth=1.3)
-    axes.vlines(
-        x, [max(point.lowest, floor) for point in whole], [max(point.highest, floor) for point in whole],
-        color=style["color"], linewidth=0.8, alpha=0.6,
-    )  # fmt: skip
+    low, y, high = (
+        np.array([max(getattr(point, name), floor) for point in whole]) for name in ("lowest", "error", "highest")
+    )
+    axes.plot(x, y, color=colour, linestyle=style["linestyle"], linewidth=1.3)
+    axes.vlines(x, low, high, color=colour, linewidth=0.8, alpha=0.6)
     hollow = np.array([point.at_floor for point in whole], dtype=bool)
-    for chosen, face in ((~hollow, style["color"]), (hollow, "white")):
+    for chosen, face in ((~hollow, colour), (hollow, "white")):
         axes.plot(
             x[chosen], y[chosen], linestyle="none", marker=style["marker"], markersize=4.5, markerfacecolor=face,
-            markeredgecolor=style["color"],
+            markeredgecolor=colour,
         )  # fmt: skip
     failed = [point.cost(cost) for point in curve.failed if math.isfinite(point.cost(cost))]
-    if not failed:
-        return
-    axes.plot(
-        failed, np.ones(len(failed)), "x", color=style["color"], markersize=6, markeredgewidth=1.5,
-        transform=axes.get_xaxis_transform(), clip_on=False, zorder=5,
-    )  # fmt: skip
-
-
-def _end(curve: Curve, floor: float, cost: Cost) -> tuple[float, float] | None:
-    """Return where the curve ends: its last level, or the top edge above its dearest failure."""
-    whole = [point for point in curve.whole if math.isfinite(point.cost(cost))]
+    if failed:
+        axes.plot(
+            failed, np.ones(len(failed)), "x", color=colour, markersize=6, markeredgewidth=1.5,
+            transform=axes.get_xaxis_transform(), clip_on=False, zorder=5,
+        )  # fmt: skip
     if whole:
-        return max(point.cost(cost) for point in whole), max(whole[-1].error, floor)
-    failed = [point.cost(cost) for point in curve.failed if math.isfinite(point.cost(cost))]
+        return float(x.max()), float(y[-1])
     return (max(failed), 1.0) if failed else None
 
 
 def _label(curve: Curve) -> str:
     if not curve.whole:
         return f"{curve.contender.name}: {curve.failed[0].reason.partition(':')[0]}"
-    if math.isnan(curve.slope):
-        return curve.contender.name
-    return f"{curve.contender.name}  p {curve.slope:.2f} ± {curve.slope_error:.2f}"
+    slope = "" if math.isnan(curve.slope) else f"  p {curve.slope:.2f} ± {curve.slope_error:.2f}"
+    return curve.contender.name + slope
 
 
-def _write(
-    axes: Axes,
-    labels: Sequence[tuple[tuple[float, float], str, str]],
-    limits: tuple[tuple[float, float], tuple[float, float]],
-) -> None:
+def _write(axes: Axes, labels: Sequence[tuple[tuple[float, float], str, str]], limits: Limits) -> None:
     """Write the labels beside the dearest point of all, in the order of the curves' ends and clear of each other."""
     low, high = limits[1]
     span = math.log(high / low)
@@ -191,33 +161,27 @@ def _write(
     for k in reversed(range(len(heights))):
         least = 0.05 if k == len(heights) - 1 else heights[k + 1] + LINE_HEIGHT
         heights[k] = max(heights[k], least)
-    for ((x, y), words, colour), height in zip(placed, heights, strict=True):
+    for (at, words, colour), height in zip(placed, heights, strict=True):
         beside = math.exp(math.log(low) + height * span)
         note = axes.annotate(
-            words, (x, y), xytext=(_beside(limits[0]), beside), textcoords="data", ha="left", va="center", fontsize=8.0,
-            color=_dark(colour),
+            words, at, xytext=(_beside(limits[0]), beside), textcoords="data", ha="left", va="center", fontsize=8.0,
+            color=tuple(0.55 * part for part in to_rgb(colour)),  # darker: small letters on white and on the floor
             arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.5, "alpha": 0.6, "shrinkB": 4},
         )  # fmt: skip
         note.set_in_layout(False)
 
 
-def _dark(colour: str) -> tuple[float, ...]:
-    """Return the colour with less light."""
-    return tuple(DARKER * part for part in to_rgb(colour))
-
-
 def _explain(axes: Axes) -> None:
-    """Explain the signs in a panel of its own."""
     axes.axis("off")
-    dark = "#333333"
     handles: list[Artist] = [
-        Line2D([], [], color=dark, linestyle=LINES["scheme"], marker="o", markersize=4.5, label="scheme, by its steps"),
-        Line2D(
-            [], [], color=dark, linestyle=LINES["method"], marker="^", markersize=4.5, label="method, by its tolerance"
-        ),
-        Line2D([], [], color=dark, linestyle=LINES["engine"], marker="D", markersize=4.5, label="engine, by its dt"),
-        Line2D([], [], color=dark, linestyle="none", marker="o", markerfacecolor="white", label="at the floor"),
-        Line2D([], [], color=dark, linestyle="none", marker="x", markeredgewidth=1.5, label="failed (top edge)"),
+        Line2D([], [], color="#333333", linestyle=line, marker=MARKERS[family][0], markersize=4.5, label=label)
+        for (family, line), label in zip(
+            LINES.items(), ("scheme, by its steps", "method, by its tolerance", "engine, by its dt"), strict=True
+        )
+    ]
+    handles += [
+        Line2D([], [], color="#333333", linestyle="none", marker="o", markerfacecolor="white", label="at the floor"),
+        Line2D([], [], color="#333333", linestyle="none", marker="x", markeredgewidth=1.5, label="failed (top edge)"),
         Patch(facecolor=FLOOR_COLOUR, label="below the reference's own error"),
         Line2D([], [], linestyle="none", label="p: error halves p times as work doubles"),
     ]

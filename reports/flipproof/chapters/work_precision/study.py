@@ -20,52 +20,40 @@ Cost is counted twice: in updates of one slice (``contenders``), which any machi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
 from flipproof.chapters.step_size.study import ROUND_OFF, observed_order
-from flipproof.chapters.work_precision.contenders import (
-    AT_REST,
-    FINEST_OWN,
-    Case,
-    Contender,
-    Effort,
-    contenders,
-    left_out,
-    rest_speed,
-)
+from flipproof.chapters.work_precision.contenders import AT_REST, Case, Contender, Effort, contenders, left_out
 from flipproof.frame.solvers import Made, Run
 from flipproof.frame.timing import at_times
+from flipproof.frame.twins import usual_rest_speed
 from ode_reference.models import MODELS
-from slicemodel import Scenario, Trajectory
+from slicemodel import Trajectory
 from slicemodel.observables import plateau
 from slicemodel.schemes import SCHEMES
 from slicemodel.trajectory import FloatArray
 
-Cost = Literal["work", "steps", "seconds"]
-
-STAGES: Final[Mapping[str, int]] = {"RK4": 4}
-"""Forces per step of the integrators that engines name."""
-
-FOLLOWING: Final = ("dt", "step", "step_least", "points", "times")
-"""Settings that follow from what is refined, or are the same for all."""
-
-ABOVE_FLOOR: Final = 3.0
-"""A slope is read off errors that are at least this many floors: below, the reference's own error bends it."""
+Cost = Literal["work", "seconds", "steps"]
+"""Updates of one slice, seconds of the processor, the solver's own steps."""
 
 SATURATED: Final = 0.2
 """Errors above this fraction of omega_0 say that the run is wrong, not how wrong: no slope is read off them."""
 
-LEAST_SPAN: Final = 1.5
-"""Cost must grow by this factor at least for an error to have a slope in it."""
 
-ROLES: Final = ("reference", "witness 1", "witness 2")
+class Price(NamedTuple):
+    """What it costs to keep an error; ``bound`` says that it may be less, because no coarser level was usable."""
 
-LAWLESS: Final = 0.25
-"""Standard error of a slope above which errors follow no law, in units of the slope or of 1, whichever is more."""
+    value: float
+    bound: bool
+
+    @property
+    def limit(self) -> str:
+        """A sign before the value that is a bound."""
+        return "≤ " if self.bound else ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,8 +65,8 @@ class Reference:
     """
 
     equation: str
-    floor: float
-    plateau_floor: float
+    floor: float = math.nan
+    plateau_floor: float = math.nan
     words: str
     reason: str = ""
 
@@ -87,24 +75,23 @@ class Reference:
 class Point:
     """One level of a contender: geometric means of cost, root-mean-square errors with the range of its members.
 
-    ``work`` is in updates of one slice, ``steps`` in the solver's own, ``seconds`` of the processor; NaN if the run
-    never began. Errors are NaN if a member failed, for ``reason``.
+    Costs are NaN if the run never began. Errors are NaN if a member failed, for ``reason``.
     """
 
     settings: str
     work: float
     steps: float
     seconds: float
-    error: float
-    lowest: float
-    highest: float
-    plateau: float
-    at_floor: bool
+    error: float = math.nan
+    lowest: float = math.nan
+    highest: float = math.nan
+    plateau: float = math.nan
+    at_floor: bool = False
     reason: str = ""
 
     def cost(self, kind: Cost) -> float:
         """Return the cost of that kind."""
-        return {"work": self.work, "steps": self.steps, "seconds": self.seconds}[kind]
+        return float(getattr(self, kind))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,23 +132,44 @@ class WorkPrecision:
         """Return the curves of one equation."""
         return tuple(curve for curve in self.curves.values() if curve.contender.equation == equation)
 
+    def named(self, name: str) -> Curve | None:
+        """Return the first curve of a contender, or None if it does not compete."""
+        return next((curve for curve in self.curves.values() if curve.contender.name == name), None)
 
-# ---------------------------------------------------------------------- runs
+    def price(self, curve: Curve, error: float, cost: Cost = "work") -> Price | None:
+        """Return the cost from which on a contender keeps ``error``, interpolated between two levels.
+
+        From which on: a level that is better than a finer one was lucky. None if no level keeps it, or if the error is
+        below the floor, where nobody can tell.
+        """
+        floor, points = self.references[curve.contender.equation].floor, curve.points
+        first = len(points)
+        while first > 0 and max(points[first - 1].error, floor) <= error:
+            first -= 1
+        if first == len(points) or not error > floor:
+            return None
+        fine = points[first]
+        if first == 0 or not math.isfinite(points[first - 1].error):
+            return Price(fine.cost(cost), bound=True)
+        coarse = points[first - 1]
+        y0, y1 = math.log(coarse.error), math.log(max(fine.error, floor))
+        share = (math.log(error) - y0) / (y1 - y0)
+        x0, x1 = math.log(coarse.cost(cost)), math.log(fine.cost(cost))
+        return Price(math.exp(x0 + share * (x1 - x0)), bound=False)
 
 
 def plan_work_precision(case: Case, effort: Effort) -> list[Run]:
     """Return every run of one throw: references, witnesses, contenders."""
     rivals = contenders(case, effort)
-    runs = [
-        run
-        for equation in dict.fromkeys(rival.equation for rival in rivals)
-        for run in _plan_reference(case, equation, rivals)
-    ]
+    runs = [run for equation in _equations(rivals) for run in _plan_reference(case, equation, rivals)]
     for rival in rivals:
         for level, members in enumerate(rival.levels):
-            for member, settings in enumerate(members):
-                runs.append(_rival_run(case, rival, settings, f"{level}, {member}"))
+            runs += [_rival_run(case, rival, settings, f"{level}, {member}") for member, settings in enumerate(members)]
     return runs
+
+
+def _equations(rivals: Iterable[Contender]) -> list[str]:
+    return list(dict.fromkeys(rival.equation for rival in rivals))
 
 
 def _rival_run(case: Case, rival: Contender, settings: Mapping[str, Any], words: str = "") -> Run:
@@ -171,35 +179,31 @@ def _rival_run(case: Case, rival: Contender, settings: Mapping[str, Any], words:
 
 def _plan_reference(case: Case, equation: str, rivals: Iterable[Contender]) -> list[Run]:
     """Return the reference of an equation and its witnesses."""
-    if equation not in (*MODELS, AT_REST):  # the scheme's own limit
-        rival = next(rival for rival in rivals if rival.equation == equation)
-        finest = FINEST_OWN * (rival.levels[-1][0]["steps"] - 1)
-        grids = [{**rival.fixed, "steps": finest // coarser + 1} for coarser in (1, 2)]
-        return [
-            Run(rival.solver, case.scenario, settings, f"work, {case.name}, {role}, {equation}")
-            for role, settings in zip(ROLES, grids, strict=False)
+    scenario, solver = case.scenario, equation
+    if equation in (*MODELS, AT_REST):
+        if equation == AT_REST:
+            scenario, solver = replace(scenario, frozen=True), "eq8"
+        usual, omega0 = usual_rest_speed(solver), abs(scenario.omega0)
+
+        def witness(method: str, rtol: float, radians: float) -> dict[str, Any]:
+            longest = min(radians, scenario.duration * omega0) / omega0
+            tolerances = {"rtol": rtol, "atol": 1e-3 * rtol, "rest_speed": usual, "max_step": longest}
+            return {"method": method, **tolerances, "times": case.times}
+
+        asked = [
+            {"method": "taylor", "rest_speed": usual / 10, "times": case.times},
+            witness("LSODA", 1e-10, 0.02),
+            witness("DOP853", 1e-11, 0.04),
         ]
-    scenario, model = case.scenario, equation
-    if equation == AT_REST:
-        scenario, model = replace(scenario, frozen=True), "eq8"
+    else:
+        # The scheme's own limit: the scheme on a grid eight times finer than its last level, and on half of that.
+        rival = next(rival for rival in rivals if rival.equation == equation)
+        solver, finest = rival.solver, 8 * (rival.levels[-1][0]["steps"] - 1)
+        asked = [{**rival.fixed, "steps": finest // coarser + 1} for coarser in (1, 2)]
     return [
-        Run(model, scenario, {**settings, "times": case.times}, f"work, {case.name}, {role}, {equation}")
-        for role, settings in zip(ROLES, _flow_and_witnesses(scenario, model), strict=True)
+        Run(solver, scenario, settings, f"work, {case.name}, {f'witness {k}' if k else 'reference'}, {equation}")
+        for k, settings in enumerate(asked)
     ]
-
-
-def _flow_and_witnesses(scenario: Scenario, model: str) -> list[dict[str, Any]]:
-    usual, turn = rest_speed(model), scenario.duration * abs(scenario.omega0)
-
-    def witness(method: str, rtol: float, radians: float) -> dict[str, Any]:
-        longest = min(radians, turn) / abs(scenario.omega0)
-        return {"method": method, "rtol": rtol, "atol": 1e-3 * rtol, "rest_speed": usual, "max_step": longest}
-
-    flow = {"method": "taylor", "rest_speed": usual / 10}
-    return [flow, witness("LSODA", 1e-10, 0.02), witness("DOP853", 1e-11, 0.04)]
-
-
-# ---------------------------------------------------------------------- what is read off them
 
 
 def study_work_precision(case: Case, effort: Effort, made: Mapping[Run, Made]) -> WorkPrecision:
@@ -213,7 +217,7 @@ def study_work_precision(case: Case, effort: Effort, made: Mapping[Run, Made]) -
     rivals = contenders(case, effort)
     truths = {
         equation: _reference(case, equation, [made[run] for run in _plan_reference(case, equation, rivals)])
-        for equation in dict.fromkeys(rival.equation for rival in rivals)
+        for equation in _equations(rivals)
     }
     curves = {}
     for rival in rivals:
@@ -223,29 +227,24 @@ def study_work_precision(case: Case, effort: Effort, made: Mapping[Run, Made]) -
             _point(case, members, level, reference, truth) for members, level in zip(runs, rival.levels, strict=True)
         )
         curves[rival.key] = _curve(rival, points, _held(rival, runs), reference)
-    return WorkPrecision(
-        case=case,
-        references={equation: reference for equation, (reference, _) in truths.items()},
-        curves=curves,
-        absent=left_out(effort),
-    )
+    references = {equation: reference for equation, (reference, _) in truths.items()}
+    return WorkPrecision(case=case, references=references, curves=curves, absent=left_out(effort))
 
 
 def _reference(case: Case, equation: str, runs: Sequence[Made]) -> tuple[Reference, FloatArray | None]:
     """Return an equation's reference and its omega at the common times; None if there is none."""
     words = "; ".join(words_of(run.run.settings) for run in runs)
-    problem = next((reason for run in runs if (reason := why_failed(run))), "")
+    problem = next(filter(None, map(_why_failed, runs)), "")
     if problem:
-        missing = Reference(equation=equation, floor=math.nan, plateau_floor=math.nan, words=words, reason=problem)
-        return missing, None
-    truth, *witnesses = [_omega(run.trajectory, case) for run in runs if run.trajectory is not None]
+        return Reference(equation=equation, words=words, reason=problem), None
+    truth, *witnesses = [_omega(run, case) for run in runs]
     errors = [_errors(case, witness, truth) for witness in witnesses]
     floor, plateau_floor = (max(ROUND_OFF, *column) for column in zip(*errors, strict=True))
     return Reference(equation=equation, floor=floor, plateau_floor=plateau_floor, words=words), truth
 
 
-def _omega(trajectory: Trajectory, case: Case) -> FloatArray:
-    return np.asarray(trajectory.omega[at_times(trajectory.t, case.times)])
+def _omega(made: Made, case: Case) -> FloatArray:
+    return np.asarray(made.flight.omega[at_times(made.flight.t, case.times)])
 
 
 def _errors(case: Case, omega: FloatArray, truth: FloatArray) -> tuple[float, float]:
@@ -255,7 +254,7 @@ def _errors(case: Case, omega: FloatArray, truth: FloatArray) -> tuple[float, fl
     return largest, abs(plateau(case.times, omega, omega0) - plateau(case.times, truth, omega0))
 
 
-def why_failed(made: Made) -> str:
+def _why_failed(made: Made) -> str:
     """Return why a run cannot be used, or nothing."""
     if made.trajectory is None:
         return made.reason or "it returned nothing"
@@ -263,8 +262,7 @@ def why_failed(made: Made) -> str:
     return "" if run.ok else f"{run.status}: {run.message.removeprefix(f'{run.status} ')}"
 
 
-def steps_of(trajectory: Trajectory) -> float:
-    """Return the steps that a run made."""
+def _steps(trajectory: Trajectory) -> float:
     if trajectory.solver == "slicemodel":
         return float(trajectory.settings["steps"] - 1)
     return float(trajectory.diagnostics["steps"])
@@ -278,8 +276,8 @@ def work_of(trajectory: Trajectory) -> float:
     if trajectory.solver == "slicemodel":
         per_step = 2 if SCHEMES[trajectory.method].form.midpoint else 1
     else:
-        per_step = settings.get("iterations") or STAGES.get(settings.get("integrator", ""), 1)
-    return steps_of(trajectory) * slices * per_step
+        per_step = settings.get("iterations") or (4 if settings.get("integrator") == "RK4" else 1)
+    return _steps(trajectory) * slices * per_step
 
 
 def _point(
@@ -289,30 +287,21 @@ def _point(
     reference: Reference,
     truth: FloatArray | None,
 ) -> Point:
-    def mean(count: Callable[[Trajectory], float]) -> float:
-        return _geometric([math.nan if made.trajectory is None else count(made.trajectory) for made in members])
-
-    words = words_of(level[0]) + (f" to {words_of(level[-1])}" if len(level) > 1 else "")
-    seconds = _geometric([made.seconds for made in members])
-    common: dict[str, Any] = {"settings": words, "work": mean(work_of), "steps": mean(steps_of), "seconds": seconds}
-    reason = next((why for made in members if (why := why_failed(made))), "")
-    if not reason and truth is None:
-        reason = f"no reference: {reference.reason}"
+    flights = [made.trajectory for made in members]
+    costs: dict[str, Any] = {
+        "settings": words_of(level[0]) + (f" to {words_of(level[-1])}" if len(level) > 1 else ""),
+        "work": _geometric([math.nan if flight is None else work_of(flight) for flight in flights]),
+        "steps": _geometric([math.nan if flight is None else _steps(flight) for flight in flights]),
+        "seconds": _geometric([made.seconds for made in members]),
+    }
+    reason = next(filter(None, map(_why_failed, members)), "")
     if reason or truth is None:
-        return Point(
-            **common,
-            error=math.nan,
-            lowest=math.nan,
-            highest=math.nan,
-            plateau=math.nan,
-            at_floor=False,
-            reason=reason,
-        )
-    errors = [_errors(case, _omega(made.trajectory, case), truth) for made in members if made.trajectory is not None]
+        return Point(**costs, reason=reason or f"no reference: {reference.reason}")
+    errors = [_errors(case, _omega(made, case), truth) for made in members]
     largest, flat = (np.array(column) for column in zip(*errors, strict=True))
     error = float(np.sqrt(np.mean(largest**2)))
     return Point(
-        **common,
+        **costs,
         error=error,
         lowest=float(largest.min()),
         highest=float(largest.max()),
@@ -339,59 +328,24 @@ def words_of(settings: Mapping[str, Any]) -> str:
 def _held(rival: Contender, runs: Sequence[Sequence[Made]]) -> dict[str, Any]:
     """Return what the first run that began reports of its settings, without what is refined or follows from it."""
     reported = next((m.trajectory.settings for level in runs for m in level if m.trajectory is not None), rival.fixed)
-    refined = {*rival.levels[0][0], *FOLLOWING}
+    refined = {*rival.levels[0][0], "dt", "step", "step_least", "points", "times"}
     return {name: value for name, value in reported.items() if name not in refined and value is not None}
 
 
 def _curve(rival: Contender, points: tuple[Point, ...], held: Mapping[str, Any], reference: Reference) -> Curve:
+    # Below three floors the reference's own error bends a slope.
     used = [
-        point
-        for point in points
-        if math.isfinite(point.error) and ABOVE_FLOOR * reference.floor <= point.error <= SATURATED
+        point for point in points if math.isfinite(point.error) and 3.0 * reference.floor <= point.error <= SATURATED
     ]
-    reason = ""
+    slope, slope_error, reason = math.nan, math.nan, ""
     if len(used) < 3:
         reason = f"{len(used)} level{'s' * (len(used) != 1)} between the floor and {SATURATED:g} omega_0; 3 are needed"
-    elif max(point.work for point in used) < LEAST_SPAN * min(point.work for point in used):
+    elif max(point.work for point in used) < 1.5 * min(point.work for point in used):
         reason = "refinement hardly changes the cost: events set it"
-    slope, slope_error = math.nan, math.nan
-    if not reason:
+    else:
         step = np.array([[1.0 / point.work] for point in used])
         slope, slope_error = observed_order(step, np.array([[point.error] for point in used]))
-        if slope_error > LAWLESS * max(1.0, abs(slope)):
+        if slope_error > 0.25 * max(1.0, abs(slope)):
             reason = f"errors fall by no law of cost: {slope:.1f} ± {slope_error:.1f}"
             slope = slope_error = math.nan
     return Curve(contender=rival, points=points, held=held, slope=slope, slope_error=slope_error, slope_reason=reason)
-
-
-@dataclass(frozen=True, slots=True)
-class Price:
-    """What it costs to keep an error; ``bound`` says that it may be less, because no coarser level was usable."""
-
-    value: float
-    bound: bool
-
-
-def price(curve: Curve, error: float, reference: Reference, cost: Cost = "work") -> Price | None:
-    """Return the cost from which on a contender keeps ``error``, interpolated between two levels.
-
-    From which on: a level that is better than a finer one was lucky. None if no level keeps it, or if the error is
-    below the floor, where nobody can tell.
-    """
-    if not error > reference.floor:
-        return None
-    points = curve.points
-    keeps = [max(point.error, reference.floor) <= error for point in points]
-    first = len(points)
-    while first > 0 and keeps[first - 1]:
-        first -= 1
-    if first == len(points):
-        return None
-    fine = points[first]
-    if first == 0 or not math.isfinite(points[first - 1].error):
-        return Price(fine.cost(cost), bound=True)
-    coarse = points[first - 1]
-    y0, y1 = math.log(coarse.error), math.log(max(fine.error, reference.floor))
-    share = (math.log(error) - y0) / (y1 - y0)
-    x0, x1 = math.log(coarse.cost(cost)), math.log(fine.cost(cost))
-    return Price(math.exp(x0 + share * (x1 - x0)), bound=False)
