@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import functools
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,7 +14,9 @@ from flipproof.cli.arguments import (
     add_no_cache,
     check_guests,
     check_writable,
+    store_of,
     write_json,
+    write_junit,
 )
 
 TOLERANCE_HELP: Final = (
@@ -53,10 +56,7 @@ def add_checks(commands: Any) -> None:
 
 def command_diff(options: argparse.Namespace) -> int:
     """Print what differs; return 1 if anything does."""
-    if options.html:
-        check_writable("--html", options.html)
-    if options.json:
-        check_writable("--json", options.json)
+    check_writable(options, "html", "json")
     from flipproof.check.diff import TOLERANCE, compare_summaries, read_summary
 
     old, new = read_summary(options.old), read_summary(options.new)
@@ -85,29 +85,18 @@ def command_check(options: argparse.Namespace) -> int:
     groups = options.only or tuple(group for group in known() if options.baseline or group != "thresholds")
     if "thresholds" in groups and options.baseline is None:
         raise ValueError("--only thresholds: needs --baseline, the summary.json of a report of this throw")
-    if options.junit:
-        check_writable("--junit", options.junit)
-    if options.json:
-        check_writable("--json", options.json)
+    check_writable(options, "junit", "json")
     from flipproof.check.diff import TOLERANCE
     from flipproof.check.throw import check
-    from flipproof.frame.store import RunStore, default_place
 
     allowed = TOLERANCE if options.tolerance is None else options.tolerance
-
-    def say(line: str) -> None:
-        print(line, flush=True)
-
-    with RunStore(None if options.no_cache else default_place()) as store:
+    say = functools.partial(print, flush=True)
+    with store_of(options) as store:
         found = check(
             scenario, groups, baseline=options.baseline, tolerance=allowed, say=say, store=store,
             guests=options.guests, timeout=options.timeout,
         )  # fmt: skip
-    if options.junit:
-        from flipproof.output.folder import write_text
-        from flipproof.output.junit import junit_text
-
-        write_text(options.junit, junit_text(found.findings, "flipproof check", found.seconds))
+    write_junit(options.junit, found.findings, "flipproof check", found.seconds)
     write_json(options.json, {"findings": [one.to_mapping() for one in found.findings], "conclusion": found.conclusion})
     say(found.conclusion)
     return 1 if found.failed else 0

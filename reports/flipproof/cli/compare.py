@@ -15,6 +15,7 @@ from flipproof.cli.arguments import (
     count,
     read_scenario,
     write_json,
+    write_junit,
 )
 from flipproof.cli.check import tolerance
 
@@ -39,12 +40,9 @@ def add_compare(commands: Any) -> None:
 
 def command_compare(options: argparse.Namespace) -> int:
     """Compare two solvers or files and print the differences; return 1 if they exceed the tolerance."""
-    if options.junit:
-        if options.tolerance is None:
-            raise ValueError(f"--junit {options.junit} needs --tolerance: without it no comparison can fail")
-        check_writable("--junit", options.junit)
-    if options.json:
-        check_writable("--json", options.json)
+    if options.junit and options.tolerance is None:
+        raise ValueError(f"--junit {options.junit} needs --tolerance: without it no comparison can fail")
+    check_writable(options, "junit", "json")
     from flipproof.check.comparison import claims, compare, table
     from flipproof.frame.solvers import find, solve
     from flipproof.output.tables import Curve, read_curve
@@ -69,11 +67,7 @@ def command_compare(options: argparse.Namespace) -> int:
     write_json(options.json, {**found.to_mapping(), "findings": [finding.to_mapping() for finding in held]})
     if options.tolerance is None:
         return 0
-    if options.junit:
-        from flipproof.output.folder import write_text
-        from flipproof.output.junit import junit_text
-
-        write_text(options.junit, junit_text(held, "flipproof compare"))
+    write_junit(options.junit, held, "flipproof compare")
     first = held[0]
     word = "FAIL" if first.failed else "PASS"
     print(f"{word}  {first.title}: {first.value:.6g} {first.unit}, tolerance {options.tolerance:g} ({first.note})")

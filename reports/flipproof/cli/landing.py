@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, number, read_scenario
+from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, number, progress_bar, read_scenario
 from flipproof.cli.sweeps import add_store, fill
 
 SLICES: Final = 20
@@ -93,8 +93,6 @@ def command_land(options: argparse.Namespace) -> int:
 
 
 def _film(options: argparse.Namespace, rows: Any, table: Any) -> None:
-    from tqdm import tqdm
-
     from flipproof.animate import MOST_FPS, MOST_FRAMES, FilmError, write_pictures
     from flipproof.landing.film import draw_landing, film_times, shown
     from flipproof.landing.work import REFERENCE
@@ -111,12 +109,7 @@ def _film(options: argparse.Namespace, rows: Any, table: Any) -> None:
     times = film_times(bottles, options.slow, options.fps)
     if len(times) > MOST_FRAMES:
         raise FilmError(f"--slow {options.slow:g} makes {len(times)} frames (admissible: at most {MOST_FRAMES})")
-    hide = True if options.quiet else None
-    with tqdm(total=len(times), desc="drawing", unit="frame", disable=hide, leave=False) as bar:
-
-        def step(drawn: int, _frames: int) -> None:
-            bar.update(drawn - bar.n)
-
+    with progress_bar("drawing", "frame", quiet=options.quiet) as step:
         write_pictures(draw_landing(bottles, times, options.slow), len(times), options.fps, options.film, step)
     print(f"{options.film}: {len(times)} frames, {len(bottles)} bottles ({options.slow:g} times slower)")
 

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
-import os
 import shlex
-import signal
 import subprocess
 import tempfile
 from pathlib import Path
@@ -15,15 +12,12 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.foreign.answers import PER_SLICE, Answer, AnswerError, answer_of
-from flipproof.foreign.contract import TIMEOUT, Ask, Traits
-from flipproof.foreign.isolated import PATIENCE
-from flipproof.foreign.specs import COMMAND, CSV, ForeignError
+from flipproof.foreign.contract import Ask, Traits
+from flipproof.foreign.isolated import PATIENCE, end_group, last_line
+from flipproof.foreign.specs import COMMAND, CSV, ForeignError, Runner
 
 FIELDS: Final = ("scenario", "times", "start", "effort", "out")
 """What a command line may hold in braces: paths of files, and the effort as a number."""
-
-MOST_BYTES: Final = 1 << 30
-"""Size of an answer's file at the most."""
 
 
 def read_answer(path: Path, n_slices: int) -> dict[str, Any]:
@@ -34,9 +28,10 @@ def read_answer(path: Path, n_slices: int) -> dict[str, Any]:
     AnswerError
         Naming file, line and column.
     """
+    most = 1 << 30
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise AnswerError(f"{path} is larger than {MOST_BYTES} bytes")
+        if path.stat().st_size > most:
+            raise AnswerError(f"{path} is larger than {most} bytes")
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = csv.reader(file)
             header = [name.strip() for name in next(rows, [])]
@@ -72,7 +67,7 @@ def write_ask(ask: Ask, folder: Path) -> dict[str, str]:
     }
 
 
-class File:
+class File(Runner):
     """A curve in a CSV file. It answers at its own times, for whatever throw it is taken to be of."""
 
     def __init__(self, spec: str) -> None:
@@ -88,11 +83,8 @@ class File:
         except AnswerError as error:
             raise ForeignError(str(error)) from None
 
-    def close(self) -> None:
-        """Nothing runs."""
 
-
-class Command:
+class Command(Runner):
     """A program: flipproof writes scenario, times and start as files, calls it, and reads the CSV that it wrote."""
 
     def __init__(self, spec: str, timeout: float | None = None) -> None:
@@ -103,7 +95,7 @@ class Command:
         if not self.words or not any("{out}" in word for word in self.words):
             raise ValueError(f"solver {spec!r}: a command must hold {{out}}, the CSV file that it is to write")
         effort = any("{effort" in word for word in self.words)
-        self.timeout = timeout or TIMEOUT
+        self.timeout = timeout or 60.0
         self._late = 0
         name = next((Path(w).name for w in self.words[1:] if not w.startswith(("-", "{"))), Path(self.words[0]).name)
         self.traits = Traits(name=name, refined_by="dt" if effort else None, timeout=self.timeout)
@@ -142,16 +134,8 @@ class Command:
                 raise ForeignError(f"no answer within {self.timeout:g} s; the program was ended") from None
             finally:
                 if process.poll() is None:
-                    if os.name == "posix":
-                        with contextlib.suppress(ProcessLookupError, PermissionError):
-                            os.killpg(process.pid, signal.SIGKILL)
-                    process.kill()
-                    process.wait()
+                    end_group(process)
             if status:
-                said.seek(max(0, said.seek(0, os.SEEK_END) - 4096))
-                lines = [line for line in said.read().decode(errors="replace").splitlines() if line.strip()]
-                last = f": {' '.join(lines[-1].split())}" if lines else ""
-                raise ForeignError(f"{words[0]} ended with status {status}{last}")
-
-    def close(self) -> None:
-        """Nothing runs between asks."""
+                said.seek(max(0, said.seek(0, 2) - 4096))
+                last = last_line(said.read())
+                raise ForeignError(f"{words[0]} ended with status {status}{f': {last}' if last else ''}")

@@ -6,7 +6,6 @@ import math
 
 from flipproof.foreign.certify import EXPECTED, FAILED, IDLE, Certificate
 from flipproof.frame.findings import Finding
-from flipproof.output.junit import junit_text
 
 
 def findings_of(certificate: Certificate, id_: str = "certify-", title: str = "") -> tuple[Finding, ...]:
@@ -29,8 +28,3 @@ def findings_of(certificate: Certificate, id_: str = "certify-", title: str = ""
             )
         )
     return tuple(found)
-
-
-def junit_of(certificate: Certificate) -> str:
-    """Return the certificate as JUnit XML."""
-    return junit_text(findings_of(certificate), f"flipproof certify {certificate.traits.name}")
