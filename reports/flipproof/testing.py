@@ -16,8 +16,6 @@ import functools
 from collections.abc import Callable, Iterable
 from typing import Any
 
-import numpy as np
-
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, certify
 from flipproof.foreign.specs import Runner, opened
 
@@ -75,22 +73,3 @@ def assert_ice_constant(spec: str) -> None:
     finally:
         runner.close()
     assert result.verdict != FAILED, result.line
-
-
-def assert_same_curve(t: Any, omega: Any, spec: str, scenario: Any, tolerance: float) -> None:
-    """Assert that omega(t) is that of a solver of flipproof within ``tolerance``, a fraction of omega_0.
-
-    Raises
-    ------
-    AssertionError
-    """
-    from flipproof.foreign.contract import Ask
-
-    runner = opened(spec)
-    try:
-        answer = runner(Ask.of(scenario, np.array(t, dtype=np.float64)))
-    finally:
-        runner.close()
-    off = np.abs(np.asarray(omega, dtype=np.float64) - answer.omega) / abs(scenario.omega0)
-    k = int(np.argmax(off))
-    assert off[k] <= tolerance, f"omega(t = {answer.t[k]:.4g} s) is {off[k]:.3g} of omega_0 from {spec}"

@@ -65,13 +65,12 @@ def chosen_solvers(text: str | None, usual: tuple[str, ...]) -> list[str]:
     """
     if text is None:
         return list(usual)
-    from flipproof.animate import MOST_BOTTLES
     from flipproof.frame.solvers import find
 
     names = [find(name.strip()).name for name in text.split(",")]
     for name in names:
         if names.count(name) > 1:
             raise ValueError(f"--solvers {text}: {name} is there twice")
-    if len(names) > MOST_BOTTLES:
-        raise ValueError(f"--solvers {text}: {len(names)} bottles do not fit (admissible: at most {MOST_BOTTLES})")
+    if len(names) > 6:
+        raise ValueError(f"--solvers {text}: {len(names)} bottles do not fit (admissible: at most 6)")
     return names

@@ -146,7 +146,7 @@ def write_junit(
         from flipproof.output.folder import write_text
         from flipproof.output.junit import junit_text
 
-        write_text(path, junit_text(findings, suite, seconds or {}))
+        write_text(path, junit_text(findings, suite, seconds))
 
 
 @contextmanager

@@ -299,12 +299,10 @@ def command_report(options: argparse.Namespace) -> int:
         with store_of(options) as store, workers(options.jobs) as pool, progress_bar("runs", "run") as progress:
             contents = parts() if measurement is None else (part_measured(measurement), *parts())
             work = {"guests": (tuple(options.guests), options.timeout)} if options.guests else {}
-            gathered = gather_report(
-                ask, progress, options.jobs, Stages(say), store, pool, contents=contents, work=work
-            )
+            gathered = gather_report(ask, progress, Stages(say), store, pool, contents=contents, work=work)
             guests = gathered.found("guests")
             facts = provenance(command_line()) | store.facts() | ({} if guests is None else guests.facts)
-            report = build(gathered, facts, pool=store.remembering(pool), png=options.png)
+            report = build(gathered, facts, store.remembering(pool), png=options.png)
         write(report, folder)
         if options.pdf:
             print_page(folder / "index.html", folder / "report.pdf")

@@ -19,9 +19,6 @@ LOCK: Final = "lock"
 NEW: Final = "new"
 OLD: Final = "old"
 
-TRIES: Final = 1000
-"""How often a folder that others remove as they end is made again, before it counts as one that cannot be made."""
-
 
 def check_replaceable(target: Path, kind: str) -> None:
     """Refuse a target that is a file, or a folder with anything in it but what flipproof wrote there as this ``kind``.
@@ -90,9 +87,12 @@ def _plainly(place: Path) -> Iterator[None]:
 
 @contextmanager
 def _held(beside: Path, target: Path) -> Iterator[None]:
-    """Make the unfinished folder and hold its lock; remove both at the end."""
+    """Make the unfinished folder and hold its lock; remove both at the end.
+
+    A folder that others remove as they end is made again up to a thousand times.
+    """
     with ExitStack() as held:
-        for left in reversed(range(TRIES)):
+        for left in reversed(range(1000)):
             beside.parent.mkdir(parents=True, exist_ok=True)
             try:
                 beside.mkdir(exist_ok=True)
@@ -127,12 +127,6 @@ def _clear(beside: Path, target: Path) -> None:
         shutil.rmtree(place, ignore_errors=True)
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
-
-
 def write_text(path: Path, text: str) -> None:
     """Write one file so that a reader sees the old or the new content, never half of it.
 
@@ -145,20 +139,22 @@ def write_text(path: Path, text: str) -> None:
     """
     path = path.resolve()
     with _plainly(path):
-        if path.exists() and not path.is_file() and not path.is_dir():
+        if path.is_dir():
+            raise OutputError(f"{path} is a folder; name a file")
+        if path.exists() and not path.is_file():
             path.write_text(text, encoding="utf-8")
         else:
             _replace(path, text)
 
 
 def _replace(path: Path, text: str) -> None:
-    if path.is_dir():
-        raise OutputError(f"{path} is a folder; name a file")
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     try:
         with os.fdopen(handle, "w", encoding="utf-8") as file:
             file.write(text)
-        Path(name).chmod(0o666 & ~_umask())
+        mask = os.umask(0)
+        os.umask(mask)
+        Path(name).chmod(0o666 & ~mask)
         os.replace(name, path)
     except BaseException:
         Path(name).unlink(missing_ok=True)

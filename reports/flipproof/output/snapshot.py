@@ -27,7 +27,6 @@ from flipproof.page.lead import answered, asides, percent_at
 PLACE: Final = Path(__file__).resolve().parents[2] / "snapshot"
 
 KEPT: Final = ("flipproof", "version", "scenario", "slices", "size", "lead", "headlines", "findings", "differences")
-
 PICTURES: Final = ("omega", "waterfall", "differences")
 
 README: Final = PLACE.parents[1] / "README.md"

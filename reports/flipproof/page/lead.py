@@ -43,7 +43,7 @@ def lead_words(headlines: Sequence[Headline]) -> str:
 def answers(headlines: Sequence[Headline]) -> Iterator[tuple[str, list[str]]]:
     """Yield the questions of the front page, each answered by yes or no and its sentences; none if all agree."""
     found = {headline.id: headline for headline in headlines}
-    if _nothing_compared(headlines) or _all_agree(headlines) is not None:
+    if (largest := _largest(headlines)) is None or largest < NOTHING:
         return
     held = [found[id_].value for id_ in ("held", "held-through") if id_ in found]
     step = [found["step"].value] if "step" in found else []
@@ -112,29 +112,21 @@ def _verdict(values: Sequence[float]) -> str:
     return f"Yes, within {within}." if max(values) <= PARTING_BAND else f"No, not within {within}."
 
 
-def _compared(headlines: Sequence[Headline]) -> list[float]:
-    return [h.value for h in headlines if h.measure == "largest" and h.id in ("whole", "pair", "program-eq8")]
-
-
-def _nothing_compared(headlines: Sequence[Headline]) -> bool:
-    return not _compared(headlines)
-
-
-def _all_agree(headlines: Sequence[Headline]) -> float | None:
-    """Return the largest difference if it is nothing, else None."""
-    largest = max(_compared(headlines))
-    return largest if largest < NOTHING else None
+def _largest(headlines: Sequence[Headline]) -> float | None:
+    """Return the largest difference of those that tell whether all solvers agree; None if none was computed."""
+    told = [h.value for h in headlines if h.measure == "largest" and h.id in ("whole", "pair", "program-eq8")]
+    return max(told, default=None)
 
 
 def sentences(headlines: Sequence[Headline]) -> Iterator[str]:
     """Yield the verdict sentence by sentence; each can be read alone."""
     found = {headline.id: headline for headline in headlines}
-    if _nothing_compared(headlines):
+    largest = _largest(headlines)
+    if largest is None:
         yield "No two solvers could be compared on this throw; the reasons stand below."
         return
-    agree = _all_agree(headlines)
-    if agree is not None:
-        yield f"On this throw all solvers agree to {percent(agree)} of ω₀."
+    if largest < NOTHING:
+        yield f"On this throw all solvers agree to {percent(largest)} of ω₀."
         return
     yield from _equations(found)
     yield from _shares(found)
@@ -184,7 +176,8 @@ def _shares(found: Mapping[str, Headline]) -> Iterator[str]:
             f"In single orders these six changes move that mean by {signed(low)} to {signed(high)} of ω₀ "
             f"(N = {shares[0].slices}). For ω, θ and v_CM on landing the shares are others; the report has a table."
         )
-    if len(shares) > 1 and tied(shares[0], shares[1]):
+    moves = [abs(h.finer - h.value) for h in shares[:2] if h.finer is not None]
+    if len(shares) > 1 and moves and abs(abs(shares[0].value) - abs(shares[1].value)) <= max(moves):
         yield (
             f"Which of “{shares[0].what}” and “{shares[1].what}” has the larger share is not settled: the number of "
             "slices moves at least one of them by more than they differ."
@@ -237,17 +230,17 @@ def _engine(engine: Headline) -> Iterator[str]:
     yield "Agreement with pymunk tests the solution of free flight, not whether slices describe water."
 
 
-def tied(first: Headline, second: Headline) -> bool:
-    """Return whether two shares differ by less than either moves with the number of slices."""
-    moved = [abs(h.finer - h.value) for h in (first, second) if h.finer is not None]
-    return bool(moved) and abs(abs(first.value) - abs(second.value)) <= max(moved)
-
-
 def amount(headline: Headline) -> str:
-    """Return a number with what belongs to it, as in "13 % of ω₀ (N = 50; 0.35 % of ω₀ less at N = 100)"."""
+    """Return a number with N, and how far it moves with N: of a share, where it moves to.
+
+    As in "13 % of ω₀ (N = 50; 0.35 % of ω₀ less at N = 100)".
+    """
     share = headline.measure in ("share", "order")
-    text = signed if share else percent
-    return f"{text(headline.value)} of ω₀ ({at_slices(headline)})"
+    words = f"N = {headline.slices}"
+    if headline.finer is not None and headline.finer_slices is not None:
+        to = f"{signed(headline.finer)} at N = {headline.finer_slices}"
+        words += f"; {to if share else moved(headline.value, headline.finer, headline.finer_slices)}"
+    return f"{(signed if share else percent)(headline.value)} of ω₀ ({words})"
 
 
 def percent_at(headline: Headline, slices: int) -> str:
@@ -256,18 +249,6 @@ def percent_at(headline: Headline, slices: int) -> str:
     return "–" if value is None else percent(value)
 
 
-def at_slices(headline: Headline) -> str:
-    """Return the number of slices, and how far the number moves with it: of a share, where it moves to."""
-    words = f"N = {headline.slices}"
-    if headline.finer is None or headline.finer_slices is None:
-        return words
-    if headline.measure in ("share", "order"):
-        return f"{words}; {signed(headline.finer)} at N = {headline.finer_slices}"
-    return f"{words}; {moved(headline.value, headline.finer, headline.finer_slices)}"
-
-
-def signed(share: float | None) -> str:
-    """Return a fraction with its sign, two digits; a dash if there is none."""
-    if share is None:
-        return "–"
+def signed(share: float) -> str:
+    """Return a fraction with its sign, two digits."""
     return f"{'+' if share >= 0 else '−'}{percent(abs(share))}"

@@ -3,7 +3,6 @@
 ::
 
     headlines/eq8-free/value                                  keys, and entries of a list by their id or name
-    headlines/program-eq8/value : headlines/whole/value       a ratio
     count findings verdict pass                               entries of a list whose field has, or lists, a value;
                                                               vectors-* is any text that begins so
     length paper/experiment                                   entries of a list
@@ -62,9 +61,6 @@ class Summary:
         if kind == "count":
             entries, field, wanted = self.at(words[0]) or (), words[1], words[2]
             return sum(_has(Summary(entry).at(field), wanted) for entry in entries)
-        if " : " in source:
-            above, below = (self.evaluate(part) for part in source.split(" : "))
-            return None if above is None or not below else above / below
         found = self.at(source)
         return float(found) if isinstance(found, (int, float)) else None
 
