@@ -27,10 +27,6 @@ from slicemodel.trajectory import FloatArray
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-FORMATS: Final = (".gif", ".mp4")
-MOST_FPS: Final = 50
-"""Frames per second at the most: a GIF counts in hundredths of a second, and viewers slow down what is faster."""
-
 MOST_FRAMES: Final = 3000
 """Frames of a film at the most; a GIF holds them all in memory."""
 
@@ -47,18 +43,20 @@ class FilmError(ValueError):
     """The film cannot be made as asked; the message says why and what to do."""
 
 
+def check_pace(slow: float, fps: int) -> None:
+    """Refuse by a FilmError a film slower or faster than can be shown; a GIF counts in hundredths of a second."""
+    if not (np.isfinite(slow) and slow > 0):
+        raise FilmError(f"--slow {slow:g} is outside (0, inf): 1 is real time, 9.6 the paper's slow motion")
+    if not 1 <= fps <= 50:
+        raise FilmError(f"--fps {fps} is outside [1, 50] frames per second")
+
+
 def plan_film(throw: Scenario, slow: float, fps: int) -> FloatArray:
     """Return the times of flight that the frames show, from release to landing, shape (F,) [s].
 
-    Raises
-    ------
-    FilmError
-        If a number is out of range, or the film would be too long.
+    A number out of range or a film that would be too long raises a FilmError.
     """
-    if not (np.isfinite(slow) and slow > 0):
-        raise FilmError(f"--slow {slow:g} is outside (0, inf): 1 is real time, 9.6 the paper's slow motion")
-    if not 1 <= fps <= MOST_FPS:
-        raise FilmError(f"--fps {fps} is outside [1, {MOST_FPS}] frames per second")
+    check_pace(slow, fps)
     frames = throw.duration * slow * fps + 1
     if frames > MOST_FRAMES:
         raise FilmError(f"--slow {slow:g} at --fps {fps} makes {frames:.4g} frames (admissible: at most {MOST_FRAMES})")
@@ -78,8 +76,8 @@ def check_target(path: Path) -> None:
     FilmError
         If its name has another ending, its folder is not there, it is a folder, or ffmpeg is needed and missing.
     """
-    if path.suffix.lower() not in FORMATS:
-        raise FilmError(f"--out {path}: the name ends in {path.suffix or 'nothing'} (admissible: {', '.join(FORMATS)})")
+    if path.suffix.lower() not in (".gif", ".mp4"):
+        raise FilmError(f"--out {path}: the name ends in {path.suffix or 'nothing'} (admissible: .gif, .mp4)")
     if path.is_dir():
         raise FilmError(f"--out {path} is a folder; name a file")
     if not path.parent.is_dir():

@@ -14,9 +14,8 @@ from flipproof.chapters.solvers import CERTIFIED, solver_runs
 from flipproof.frame.chapter import Ask, Part, Size
 from flipproof.frame.exhibit import Exhibit, drawn
 from flipproof.frame.findings import Finding
-from flipproof.frame.gather import Gathered, gather, tell
+from flipproof.frame.gather import Gathered, Stages, gather, tell
 from flipproof.frame.pool import Here, Progress, compile_kernels, workers
-from flipproof.frame.stages import Stages
 from flipproof.frame.store import RunStore
 from flipproof.output.junit import junit_text
 from flipproof.output.summary import SCHEMA_NAME, schema_text, summarise, summary_text

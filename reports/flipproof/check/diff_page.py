@@ -50,7 +50,7 @@ def diff_page(old: Path, new: Path, before: Mapping[str, Any], after: Mapping[st
         found=found,
         groups=[(heading, changes) for heading, changes in rows if changes],
         figure=draw(figure_report_pair(curves[0], curves[1], apart)).svg if apart else "",
-        largest=[(name, *_largest(t, size)) for name, (t, size) in apart.items() if len(t)],
+        largest=[(name, size[k := int(np.abs(size).argmax())], t[k]) for name, (t, size) in apart.items() if len(t)],
         missing=missing,
         alone=sorted(set(curves[0]) ^ set(curves[1])) if len(curves) == 2 else [],
     )  # fmt: skip
@@ -78,9 +78,3 @@ def read_curves(path: Path) -> Curves:
             if there.any():
                 found[name.removeprefix("omega/omega_0 ").partition(" [")[0]] = times[there], values[there]
     return found
-
-
-def _largest(t: Any, size: Any) -> tuple[float, float]:
-    """Return the largest difference and its time."""
-    k = int(np.abs(size).argmax())
-    return float(size[k]), float(t[k])

@@ -93,14 +93,11 @@ def command_land(options: argparse.Namespace) -> int:
 
 
 def _film(options: argparse.Namespace, rows: Any, table: Any) -> None:
-    from flipproof.animate import MOST_FPS, MOST_FRAMES, FilmError, write_pictures
+    from flipproof.animate import MOST_FRAMES, FilmError, check_pace, write_pictures
     from flipproof.landing.film import draw_landing, film_times, shown
     from flipproof.landing.work import REFERENCE
 
-    if not options.slow > 0:
-        raise FilmError(f"--slow {options.slow:g} is outside (0, inf): 1 is real time, 9.6 the paper's slow motion")
-    if options.fps > MOST_FPS:
-        raise FilmError(f"--fps {options.fps} is outside [1, {MOST_FPS}] frames per second")
+    check_pace(options.slow, options.fps)
     chosen = [row for row in rows if row.program == REFERENCE] or list(rows)
     bottles = [
         shown(row.name if row.law is None else f"{row.name}, {row.law}", row.touch, table, row.law, row.outcome)
@@ -133,15 +130,11 @@ def command_upright(options: argparse.Namespace) -> int:
         raise ValueError("scenario.frozen = true: the study throws water and ice beside it; leave it out")
     size = Size(
         families=families,
-        throws=options.throws,
         axis_throws=options.throws,
         aim_throws=max(1, options.throws // 5),
-        slices=options.slices,
         map_cells=options.map,
         engine_throws=options.engine,
-        restitution=options.restitution,
-        friction=options.friction,
-        seed=options.seed,
+        **{name: getattr(options, name) for name in ("throws", "slices", "restitution", "friction", "seed")},
     )
     if options.fillings:
         middle = min(options.fillings, key=lambda filling: abs(filling - size.axis_filling))

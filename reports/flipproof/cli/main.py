@@ -38,8 +38,7 @@ from flipproof.cli.arguments import (
     refuse_overwriting,
     store_of,
 )
-from flipproof.cli.check import add_checks
-from flipproof.cli.compare import add_compare
+from flipproof.cli.check import add_checks, add_compare
 from flipproof.cli.completion import add_completion
 from flipproof.cli.console import readable, speak_plainly
 from flipproof.cli.fit import add_fit
@@ -201,10 +200,12 @@ def _complain(words: str, status: int) -> int:
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the whole command line."""
+    from flipproof.output.provenance import version_of
+
     top = OneLineParser(
         prog="flipproof", description=MANUAL, epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    top.add_argument("--version", action="version", version=f"flipproof {_version()}")
+    top.add_argument("--version", action="version", version=f"flipproof {version_of('flipproof')}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
     report = add_command(commands, "report", "Run everything and write a validation report.", command_report)
@@ -255,15 +256,6 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
-def _version() -> str:
-    from importlib import metadata
-
-    try:
-        return metadata.version("flipproof")
-    except metadata.PackageNotFoundError:
-        return "checkout"
-
-
 def command_report(options: argparse.Namespace) -> int:
     """Write a report; return 1 if a regression claim failed."""
     scenario = read_scenario(options.scenario)
@@ -283,8 +275,8 @@ def command_report(options: argparse.Namespace) -> int:
     from flipproof.build import ask_of, build, gather_report, write
     from flipproof.chapters import parts
     from flipproof.film.measured import part_measured
+    from flipproof.frame.gather import Stages
     from flipproof.frame.pool import workers
-    from flipproof.frame.stages import Stages
     from flipproof.output.provenance import provenance
 
     began = time.perf_counter()

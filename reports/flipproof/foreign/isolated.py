@@ -120,9 +120,10 @@ class Isolated(Runner):
             raise ForeignError(f"{self.spec}: {error}") from None
 
     def _drain(self, stream: Any) -> None:
+        kept = 4096  # bytes of what a solver prints, from the end
         with contextlib.suppress(OSError, ValueError):
             while part := stream.read1(65536):
-                self._printed = (self._printed + part)[-4096:]
+                self._printed = (self._printed + part)[-kept:]
 
     def _exchange(
         self, header: dict[str, Any], arrays: dict[str, Any], limit: float, most: int

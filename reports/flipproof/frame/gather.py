@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,8 +15,29 @@ from flipproof.frame.findings import Finding
 from flipproof.frame.flights import Call, Flights, Outcome, attempt
 from flipproof.frame.pool import Progress, make_all
 from flipproof.frame.solvers import Run
-from flipproof.frame.stages import Stages
 from flipproof.frame.store import RunStore
+
+
+class Stages:
+    """A stopwatch whose laps have names; ``seconds`` holds them in the order in which they were first begun.
+
+    ``begins`` is called with the name of each lap when it begins.
+    """
+
+    def __init__(self, begins: Callable[[str], None] = lambda _: None) -> None:
+        self.seconds: dict[str, float] = {}
+        self._begins = begins
+
+    @contextmanager
+    def lap(self, name: str) -> Iterator[None]:
+        """Add the wall time of a block to the lap of this name."""
+        self._begins(name)
+        self.seconds.setdefault(name, 0.0)
+        began = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] += time.perf_counter() - began
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 from flipproof.chapters.differences.study import PARTING_BAND, moved, percent
 from flipproof.chapters.waterfall.study import NAMES
@@ -45,31 +44,25 @@ def answers(headlines: Sequence[Headline]) -> Iterator[tuple[str, list[str]]]:
     found = {headline.id: headline for headline in headlines}
     if (largest := _largest(headlines)) is None or largest < NOTHING:
         return
-    held = [found[id_].value for id_ in ("held", "held-through") if id_ in found]
-    step = [found["step"].value] if "step" in found else []
-    free = [found["eq8-free"].value] if "eq8-free" in found else []
+
+    def verdict(*ids: str) -> str:
+        return _verdict([found[id_] for id_ in ids if id_ in found])
+
     steps = found["step"].note if "step" in found else "the steps"
-    yield f"Is it justified to hold omega constant over a step? {_verdict(held)}", list(_held(found))
-    yield f"Are {steps} enough? {_verdict(step)}", list(_step(found))
-    yield f"Is Eq. 8 free flight? {_verdict(free)}", list(_equations(found))
+    yield f"Is it justified to hold omega constant over a step? {verdict('held', 'held-through')}", list(_held(found))
+    yield f"Are {steps} enough? {verdict('step')}", list(_step(found))
+    yield f"Is Eq. 8 free flight? {verdict('eq8-free')}", list(_equations(found))
     if "share" in found:
         yield "Which change matters most for the mean omega of the second half?", list(_shares(found))
     if "engine" in found:
-        yield f"Does a physics engine agree? {_verdict([found['engine'].value])}", list(_engine(found["engine"]))
+        yield f"Does a physics engine agree? {verdict('engine')}", list(_engine(found["engine"]))
 
 
-@dataclass(frozen=True, slots=True)
-class Answered:
-    """One line of the table of answers: a question, yes or no, and a number with what it is the difference of."""
+def answered(headlines: Sequence[Headline]) -> Iterator[tuple[str, str, str, Headline]]:
+    """Yield the lines of the table of answers: a question, yes or no, and a number after what it is the difference of.
 
-    question: str
-    verdict: str
-    words: str
-    headline: Headline
-
-
-def answered(headlines: Sequence[Headline]) -> Iterator[Answered]:
-    """Yield the lines of the table of answers; question and verdict stand in the first line of several."""
+    Question and verdict stand in the first line of several.
+    """
     found = {headline.id: headline for headline in headlines}
     steps = found["step"].note if "step" in found else "the steps"
     asked = {
@@ -91,9 +84,9 @@ def answered(headlines: Sequence[Headline]) -> Iterator[Answered]:
     }
     for question, pairs in asked.items():
         there = [(words, found[id_]) for id_, words in pairs.items() if id_ in found]
-        verdict = _verdict([headline.value for _, headline in there])
+        verdict = _verdict([headline for _, headline in there])
         for k, (words, headline) in enumerate(there):
-            yield Answered(question if k == 0 else "", verdict if k == 0 else "", words, headline)
+            yield "" if k else question, "" if k else verdict, words, headline
 
 
 def asides(headlines: Sequence[Headline]) -> Iterator[str]:
@@ -105,11 +98,12 @@ def asides(headlines: Sequence[Headline]) -> Iterator[str]:
         yield " ".join(list(_engine(found["engine"]))[1:])
 
 
-def _verdict(values: Sequence[float]) -> str:
+def _verdict(headlines: Sequence[Headline]) -> str:
     within = percent(PARTING_BAND)
-    if not values:
+    if not headlines:
         return "Not known."
-    return f"Yes, within {within}." if max(values) <= PARTING_BAND else f"No, not within {within}."
+    agree = max(headline.value for headline in headlines) <= PARTING_BAND
+    return f"Yes, within {within}." if agree else f"No, not within {within}."
 
 
 def _largest(headlines: Sequence[Headline]) -> float | None:
