@@ -14,36 +14,23 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable
+from contextlib import closing
 from typing import Any
 
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, certify
 from flipproof.foreign.specs import Runner, opened
 
 
-class Check:
-    """One check of one solver, to be called in a test."""
+def _check(name: str, runner: Callable[[], Runner]) -> None:
+    """Make one check of one solver, in a test."""
+    import pytest
 
-    def __init__(self, spec: str, name: str, runner: Callable[[], Runner]) -> None:
-        self.spec, self.name, self.runner = spec, name, runner
-
-    def __call__(self) -> None:
-        """Make the check.
-
-        Raises
-        ------
-        AssertionError
-        """
-        import pytest
-
-        (result,) = certify(self.runner(), [self.name]).results
-        if result.verdict == IDLE:
-            pytest.skip(result.reason)
-        if result.verdict == EXPECTED:
-            pytest.xfail(result.reason)
-        assert result.verdict != FAILED, result.line
-
-    def __repr__(self) -> str:
-        return f"{self.spec} {self.name}"
+    (result,) = certify(runner(), [name]).results
+    if result.verdict == IDLE:
+        pytest.skip(result.reason)
+    if result.verdict == EXPECTED:
+        pytest.xfail(result.reason)
+    assert result.verdict != FAILED, result.line
 
 
 def parametrize_with_checks(spec: str, checks: Iterable[str] = tuple(CHECKS)) -> Any:
@@ -57,19 +44,12 @@ def parametrize_with_checks(spec: str, checks: Iterable[str] = tuple(CHECKS)) ->
     import pytest
 
     runner = functools.cache(lambda: opened(spec))
-    return pytest.mark.parametrize("check", [Check(spec, name, runner) for name in checks], ids=tuple(checks))
+    made = {name: functools.partial(_check, name, runner) for name in checks}
+    return pytest.mark.parametrize("check", made.values(), ids=made.keys())
 
 
 def assert_ice_constant(spec: str) -> None:
-    """Assert that a solver keeps omega constant when the water is frozen.
-
-    Raises
-    ------
-    AssertionError
-    """
-    runner = opened(spec)
-    try:
+    """Assert that a solver keeps omega constant when the water is frozen."""
+    with closing(opened(spec)) as runner:
         (result,) = certify(runner, ["ice"]).results
-    finally:
-        runner.close()
     assert result.verdict != FAILED, result.line

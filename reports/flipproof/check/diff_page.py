@@ -14,7 +14,6 @@ from flipproof.check.diff import HEADINGS, Comparison
 from flipproof.figures.report_pair import differences, figure_report_pair
 from flipproof.figures.style import draw
 from flipproof.output.columns import Curves
-from flipproof.page.inline import data_uri, shape
 from flipproof.page.templating import environment
 
 
@@ -42,9 +41,7 @@ def diff_page(old: Path, new: Path, before: Mapping[str, Any], after: Mapping[st
         (heading, [(titles[change.id], change.id, change.words) for change in found.changes if change.kind == kind])
         for kind, heading in HEADINGS.items()
     ]
-    templates = environment()
-    templates.filters |= {"data_uri": data_uri, "shape": shape}
-    return templates.get_template("diff.html.j2").render(
+    return environment().get_template("diff.html.j2").render(
         old=str(old),
         new=str(new),
         found=found,

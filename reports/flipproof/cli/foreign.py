@@ -157,17 +157,10 @@ def command_kit(options: argparse.Namespace) -> int:
     from flipproof.foreign.contract import Traits
     from flipproof.foreign.kit import Kit
 
-    traits = Traits(
-        name=options.name,
-        equation=options.equation,
-        refined_by=options.refined_by,
-        precision=options.precision,
-        order=options.order,
-    )
-    kit = Kit.made(options.out, traits)
-    print(
-        f"{len(kit.asks)} asks in {options.out / 'asks'}: write answer.csv beside each scenario.toml (columns t, theta,"
-    )
+    traits = {name: getattr(options, name) for name in ("name", "equation", "refined_by", "precision", "order")}
+    kit = Kit.made(options.out, Traits(**traits))
+    asks = f"{len(kit.asks)} asks in {options.out / 'asks'}"
+    print(f"{asks}: write answer.csv beside each scenario.toml (columns t, theta,")
     print(f"omega; r_0 to r_(N-1) if you have them), then run: flipproof grade {options.out}")
     return 0
 

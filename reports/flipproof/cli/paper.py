@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from flipproof.cli.arguments import add_command, add_no_cache, command_line, count, progress_bar, store_of
-
-DEFAULT_OUT: Final = Path("reports/latest.paper" if Path("reports/flipproof").is_dir() else "flipproof-paper")
 
 
 def add_paper(commands: Any) -> None:
@@ -17,7 +15,8 @@ def add_paper(commands: Any) -> None:
     paper.add_argument(
         "--figure", action="append", default=[], metavar="NAME", help="one figure, such as 7b; may be given again (all)"
     )
-    paper.add_argument("--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="folder to write (%(default)s)")
+    usual = Path("reports/latest.paper" if Path("reports/flipproof").is_dir() else "flipproof-paper")
+    paper.add_argument("--out", type=Path, default=usual, metavar="DIR", help="folder to write (%(default)s)")
     paper.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
     add_no_cache(paper)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cache
 
 from flipproof.chapters.waterfall.study import NAMES, canonical, sets_before
 from flipproof.foreign.checking import ask_of, times_of
@@ -95,13 +96,10 @@ def changes_of(start: Switches, end: Switches, of: Callable[[Switches], float]) 
     of : callable (switches) -> float - the number by the equation of a set of switches; asked for once each
     """
     differing = [f.name for f in fields(Switches) if getattr(start, f.name) != getattr(end, f.name)]
-    known: dict[Switches, float] = {}
+    once = cache(of)
 
     def value(turned: tuple[str, ...]) -> float:
-        switches = canonical(replace(start, **{name: getattr(end, name) for name in turned}))
-        if switches not in known:
-            known[switches] = of(switches)
-        return known[switches]
+        return once(canonical(replace(start, **{name: getattr(end, name) for name in turned})))
 
     return {
         name: [(weight, value((*chosen, name)) - value(chosen)) for chosen, weight in sets_before(name, differing)]

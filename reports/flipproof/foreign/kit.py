@@ -17,11 +17,11 @@ from typing import Final
 
 import numpy as np
 
-from flipproof.foreign.answers import Answer, AnswerError, answer_of
+from flipproof.foreign.answers import Answer
 from flipproof.foreign.certify import CHECKS, Certificate, certify
 from flipproof.foreign.contract import Ask, Traits
-from flipproof.foreign.files import read_answer, write_ask
-from flipproof.foreign.specs import ForeignError, Runner, WaitingError
+from flipproof.foreign.files import answer_in, write_ask
+from flipproof.foreign.specs import Runner, WaitingError
 
 INDEX: Final = "kit.json"
 
@@ -81,10 +81,7 @@ class Kit(Runner):
         if not path.is_file():
             self.waiting += 1
             raise WaitingError(f"{path.relative_to(self.folder)} is not there yet")
-        try:
-            return answer_of(ask, read_answer(path, ask.scenario.n_slices))
-        except AnswerError as error:
-            raise ForeignError(str(error).replace(str(self.folder), "").lstrip("/")) from None
+        return answer_in(path, ask, str(path.relative_to(self.folder)))
 
     def _place(self, ask: Ask) -> Path:
         """Return the folder of an ask, which equal asks share."""

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import shlex
 import sys
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -136,6 +137,14 @@ def locate(spec: str) -> EntryPoint | tuple[str, str]:
     elif not all(part.isidentifier() for part in place.split(".")):
         raise ValueError(f"solver {spec!r}: {place!r} is neither a module nor a .py file; write {how}")
     return place, name
+
+
+def words_of(spec: str) -> list[str]:
+    """Return the words of a command; raises ValueError if a quotation is not closed."""
+    try:
+        return shlex.split(spec.removeprefix(COMMAND))
+    except ValueError as error:
+        raise ValueError(f"solver {spec!r}: {error}") from None
 
 
 def load(spec: str) -> object:

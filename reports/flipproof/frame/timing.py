@@ -47,17 +47,17 @@ def at_times(t: FloatArray, times: FloatArray) -> NDArray[np.int64]:
     return at
 
 
-def batches(runs: list[tuple[Run, FloatArray]], batch: int = 12) -> Iterator[list[tuple[Run, FloatArray]]]:
+def batches(runs: list[tuple[Run, FloatArray]]) -> Iterator[list[tuple[Run, FloatArray]]]:
     """Yield jobs, the slice model's first: one for all of it, so that its loop is compiled in one worker only."""
-    compiled = [job for job in runs if find(job[0].solver).package == "slicemodel"]
-    if compiled:
-        yield compiled
+    compiled: list[tuple[Run, FloatArray]] = []
     groups: dict[tuple[Any, ...], list[tuple[Run, FloatArray]]] = {}
     for run, times in runs:
-        if find(run.solver).package != "slicemodel":
-            groups.setdefault(_kind(run), []).append((run, times))
+        scheme = find(run.solver).package == "slicemodel"
+        (compiled if scheme else groups.setdefault(_kind(run), [])).append((run, times))
+    if compiled:
+        yield compiled
     for group in groups.values():
-        yield from (group[k : k + batch] for k in range(0, len(group), batch))
+        yield from (group[k : k + 12] for k in range(0, len(group), 12))
 
 
 def _kind(run: Run) -> tuple[Any, ...]:

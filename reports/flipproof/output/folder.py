@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
 from flipproof.output.ownership import MARKER, OutputError, check_own, files_of, marker_text, sole_writer
+from flipproof.sweep.files import whole_file
 
 UNFINISHED: Final = ".flipproof-unfinished"
 """Ends the name of the folder, beside the one that is written, that holds the new one and the old one for a moment."""
@@ -143,19 +143,6 @@ def write_text(path: Path, text: str) -> None:
             raise OutputError(f"{path} is a folder; name a file")
         if path.exists() and not path.is_file():
             path.write_text(text, encoding="utf-8")
-        else:
-            _replace(path, text)
-
-
-def _replace(path: Path, text: str) -> None:
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        mask = os.umask(0)
-        os.umask(mask)
-        Path(name).chmod(0o666 & ~mask)
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+            return
+        with whole_file(path) as part:
+            part.write_text(text, encoding="utf-8")

@@ -16,7 +16,6 @@ from flipproof.frame.solvers import find
 from flipproof.page.equations import equation, mathematics, numbers, typeset
 from flipproof.page.glossary import EQUATIONS, TERMS, anchor, symbols
 from flipproof.page.headlines import headlines
-from flipproof.page.inline import data_uri, shape
 from flipproof.page.lead import answer, answers, lead_words
 from flipproof.page.parts import STORY, behind, sections, shared
 from flipproof.page.story.facts import story
@@ -112,11 +111,9 @@ def page_environment() -> Environment:
     """Return the environment of the page's templates, with the filters that they and the chapters' parts use."""
     templates = environment()
     templates.filters |= {
-        "typeset": typeset, "unbroken": unbroken, "amount": amount, "percent": percent, "data_uri": data_uri,
-        "shape": shape, "touch_data": touch_data, "short": short,
-        "restitution_error": restitution_error, "term_anchor": anchor, "equation": equation, "shared": shared,
-        "symbols": symbols,
-        "mathematics": mathematics, "numbers": numbers,
+        "typeset": typeset, "unbroken": unbroken, "amount": amount, "percent": percent, "touch_data": touch_data,
+        "short": short, "restitution_error": restitution_error, "term_anchor": anchor, "equation": equation,
+        "shared": shared, "symbols": symbols, "mathematics": mathematics, "numbers": numbers,
     }  # fmt: skip
     templates.globals["assets"] = read_assets()
     return templates
