@@ -174,12 +174,8 @@ def groups() -> dict[str, tuple[str, ...]]:
     """Return ``CHECKS``, and before the last a group for every other chapter that has the size "check"."""
     known = {name for names in CHECKS.values() for name in names}
     quick = [chapter.name for part in parts() for chapter in part.chapters if "check" in chapter.work]
-    *first, last = CHECKS
-    return (
-        {group: CHECKS[group] for group in first}
-        | {name: (name,) for name in quick if name not in known}
-        | {last: CHECKS[last]}
-    )
+    *first, last = CHECKS.items()
+    return dict([*first, *((name, (name,)) for name in quick if name not in known), last])
 
 
 def findings_of(group: str, throw: Scenario, store: RunStore | None = None, work: Any = None) -> Iterator[Finding]:

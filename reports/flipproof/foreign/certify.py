@@ -9,12 +9,11 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any, Final
 
-import numpy as np
-
 from flipproof.foreign import checks_basic, checks_equation, checks_impacts, checks_order
 from flipproof.foreign.checking import Check, Found, NotApplicableError, drive
 from flipproof.foreign.contract import Traits
 from flipproof.foreign.specs import ForeignError, Runner, WaitingError
+from flipproof.output.columns import json_ready
 from flipproof.output.provenance import version_of
 
 PASSED: Final = "passed"
@@ -108,20 +107,9 @@ class Certificate:
                 | {name: getattr(r.found, name) for name in ("expected", "came", "where", "advice") if r.found}
                 for r in self.results
             ],
-            "facts": _plain(facts),
+            "facts": json_ready(facts),
             "conclusion": self.conclusion,
         }
-
-
-def _plain(value: Any) -> Any:
-    """Return ``value`` as JSON can hold it."""
-    if isinstance(value, Mapping):
-        return {str(name): _plain(one) for name, one in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(one) for one in value]
-    if isinstance(value, (float, np.floating)):
-        return float(value) if np.isfinite(value) else None
-    return value.item() if isinstance(value, np.generic) else value
 
 
 def certify(

@@ -8,13 +8,13 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from importlib import metadata
 
-from flipproof.frame.processes import cores
-
 PACKAGES = ("flipproof", "numpy", "scipy", "numba", "pymunk", "mujoco-core", "matplotlib", "jinja2")
 
 
 def provenance(command: str) -> dict[str, str]:
     """Return name and value of everything that a reader needs to repeat the report."""
+    from flipproof.frame.processes import cores  # every command asks this module for a version at its start
+
     return {
         "command": command,
         "made": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
