@@ -12,7 +12,7 @@ from flipproof.foreign.contract import Ask, traits_of
 from flipproof.foreign.mistakes import MISTAKES
 from flipproof.foreign.specs import ForeignError, Runner
 from flipproof.foreign.subject import Subject
-from flipproof.frame.findings import Finding
+from flipproof.frame.findings import Finding, regression
 from flipproof.output.columns import rows_csv
 
 CLEAN: Final = "none"
@@ -57,25 +57,13 @@ def claim_power(found: Sequence[Caught]) -> tuple[Finding, ...]:
     planted = [caught for caught in found if caught.mistake != CLEAN]
     missed = [caught.mistake for caught in planted if not caught.checks]
     accused = [name for caught in found if caught.mistake == CLEAN for name in caught.checks]
+    count = float(len(planted))
+    note = f"not seen: {', '.join(missed)}" if missed else ""
+    seen, title = count - len(missed), "planted mistakes that at least one check sees"
+    clean = "checks that accuse the solver without a mistake"
     return (
-        Finding(
-            id="power-caught",
-            title="planted mistakes that at least one check sees",
-            value=float(len(planted) - len(missed)),
-            unit=f"of {len(planted)}",
-            kind="regression",
-            admissible=(float(len(planted)), float(len(planted))),
-            note=f"not seen: {', '.join(missed)}" if missed else "",
-        ),
-        Finding(
-            id="power-clean",
-            title="checks that accuse the solver without a mistake",
-            value=float(len(accused)),
-            unit="",
-            kind="regression",
-            admissible=(0.0, 0.0),
-            note=", ".join(accused),
-        ),
+        regression("power-caught", title, seen, f"of {len(planted)}", (count, count), note),
+        regression("power-clean", clean, float(len(accused)), "", (0.0, 0.0), ", ".join(accused)),
     )
 
 

@@ -86,3 +86,17 @@ class Finding:
         mapping["threshold"] = self.threshold_text
         mapping["verdict"] = self.verdict
         return mapping
+
+
+def observed(
+    id: str, title: str, value: float | None, unit: str = "", note: str = "", *, band: float | None = None
+) -> Finding:
+    """Return an observation; its value is None if it could not be made, and ``note`` says why."""
+    return Finding(id=id, title=title, value=value, unit=unit, kind="observation", band=band, note=note)
+
+
+def regression(
+    id: str, title: str, value: float | None, unit: str, admissible: tuple[float, float], note: str = ""
+) -> Finding:
+    """Return a claim that fails unless its value lies in the closed interval ``admissible``."""
+    return Finding(id=id, title=title, value=value, unit=unit, kind="regression", admissible=admissible, note=note)

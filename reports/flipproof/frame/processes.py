@@ -105,7 +105,8 @@ class Processes(Executor):
                     worker = worker or self._start()
                     fine, answer = worker.ask(call)
                 except (EOFError, OSError) as error:
-                    code = self._end(worker)
+                    code = worker.end() if worker else None
+                    self._forget(worker)
                     worker = None
                     words = f"exit code {code}" if code is not None else str(error)
                     if tried == self._tries or self._ended:
@@ -115,9 +116,14 @@ class Processes(Executor):
                     future.set_exception(error)
                     break
                 else:
-                    (future.set_result if fine else future.set_exception)(answer)
+                    if fine:
+                        future.set_result(answer)
+                    else:
+                        future.set_exception(answer)
                     break
-        self._end(worker)
+        if worker:
+            worker.end()
+            self._forget(worker)
 
     def _start(self) -> _Worker:
         with self._lock:
@@ -127,15 +133,10 @@ class Processes(Executor):
             self._alive.add(worker.process)
             return worker
 
-    def _end(self, worker: _Worker | None) -> int | None:
-        """Wait for the end of a worker that no more calls reach; return its exit code."""
-        if worker is None:
-            return None
-        worker.pipe.close()
-        worker.process.join()
+    def _forget(self, worker: _Worker | None) -> None:
         with self._lock:
-            self._alive.discard(worker.process)
-        return worker.process.exitcode
+            if worker:
+                self._alive.discard(worker.process)
 
 
 class _Worker:
@@ -153,6 +154,11 @@ class _Worker:
         self.pipe.send(call)
         fine, answer = self.pipe.recv()
         return fine, answer
+
+    def end(self) -> int | None:
+        self.pipe.close()
+        self.process.join()
+        return self.process.exitcode
 
 
 def _answer_calls(pipe: Connection) -> None:
