@@ -11,10 +11,9 @@ import pytest
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.frame.gather import tell
 from flipproof.page.glossary import TERMS, anchor, linked
+from flipproof.page.live import sliders
 from flipproof.page.parts import STORY
-from flipproof.page.story.facts import CHANGES, EXPERIMENTS, story
-from flipproof.page.story.live import sliders
-from flipproof.page.story.numbers import Summary
+from flipproof.page.story import CHANGES, EXPERIMENTS, Summary, story
 from slicemodel import Scenario
 
 SOLVERS = ("published-python", "eq8", "free-flight")

@@ -90,7 +90,8 @@ def check_restitution(traits: Traits) -> Making:
         came += f" where it is farthest off, at {min(speeds):.2g} to {max(speeds):.2g} m/s"
         where = f"{len(curve)} first impacts"
     elif (threshold := (yield from _threshold(traits, curve))) is not None:
-        low, high = facts["threshold"] = list(threshold)
+        low, high = threshold
+        facts["threshold"] = [low, high]
         expected += " at every speed"
         came = f"none below {(low + high) / 2:.3g} +- {(high - low) / 2:.1g} m/s, a velocity threshold"
         where = f"{wrong[0].end}, {wrong[0].speed:.3g} m/s: e = {wrong[0].restitution:.3f}"

@@ -120,20 +120,16 @@ def cap_and_base(scenario: Scenario, flight: Flight) -> tuple[FloatArray, FloatA
     return centre - flight.r_cm[:, np.newaxis] * along, centre + to_base * along
 
 
-def motion_data(
-    throw: Scenario, made: Mapping[str, Made], solvers: Sequence[str] = FLOWN, *, frames: int = FRAMES
-) -> dict[str, Any] | None:
+def motion_data(throw: Scenario, made: Mapping[str, Made]) -> dict[str, Any] | None:
     """Return what the player needs, ready for JSON; None if no solver flew.
 
     Parameters
     ----------
     throw : Scenario - the throw of all runs, cut as they were
-    made : mapping from name to outcome - a solver that failed is shown with its reason
-    solvers : names, in the order of the bottles
-    frames : int - frames of a whole flight
+    made : mapping from name to outcome - of those in ``FLOWN``; a solver that failed is shown with its reason
     """
-    times = frame_times(throw, frames)
-    there = {name: made[name] for name in solvers if name in made}
+    times = frame_times(throw, FRAMES)
+    there = {name: made[name] for name in FLOWN if name in made}
     shown = {name: flight_of(each.trajectory, times) for name, each in there.items() if each.trajectory is not None}
     if not shown:
         return None
@@ -141,7 +137,7 @@ def motion_data(
     first, *_ = shown.values()
     return {
         "duration": throw.duration,
-        "frames": frames,
+        "frames": FRAMES,
         "length": bottle.length,
         "radius": bottle.radius,
         "slice_height": throw.slice_height,
