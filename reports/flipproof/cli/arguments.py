@@ -110,18 +110,14 @@ def refuse_overwriting(options: argparse.Namespace) -> None:
     """Refuse by a ValueError a command that would write over a file that it reads."""
     given = vars(options)
     written = ("out", "json", "junit", "html", "export", "film")
-    read = [each for name, value in given.items() if name not in written for each in _each(value)]
+    values = [value if isinstance(value, list) else [value] for name, value in given.items() if name not in written]
+    texts = [str(each) for value in values for each in value if isinstance(each, str | Path)]
     # A spec such as mine.py:solve or csv:file.csv names a file, too.
-    read = [part for each in read for part in (each, *each.split(":")) if os.path.isfile(part)]
+    read = [part for text in texts for part in (text, *text.split(":")) if os.path.isfile(part)]
     for name in written:
         path = given.get(name)
         if isinstance(path, Path) and path.is_file() and any(path.samefile(part) for part in read):
             raise ValueError(f"--{name} {path} is a file that this command reads; name another")
-
-
-def _each(value: object) -> list[str]:
-    """Return the texts and paths of an option as texts."""
-    return [str(each) for each in (value if isinstance(value, list) else [value]) if isinstance(each, str | Path)]
 
 
 def add_json(command: argparse.ArgumentParser, what: str) -> None:
