@@ -15,7 +15,7 @@ from flipproof.cli.arguments import (
     add_json,
     add_no_cache,
     check_guests,
-    check_writable,
+    check_outputs,
     count,
     read_scenario,
     store_of,
@@ -60,7 +60,7 @@ def add_checks(commands: Any) -> None:
 
 def command_diff(options: argparse.Namespace) -> int:
     """Print what differs; return 1 if anything does."""
-    check_writable(options, "html", "json")
+    check_outputs(options, "html", "json")
     from flipproof.check.diff import TOLERANCE, compare_summaries, read_summary
 
     old, new = read_summary(options.old), read_summary(options.new)
@@ -89,7 +89,7 @@ def command_check(options: argparse.Namespace) -> int:
     groups = options.only or tuple(group for group in known() if options.baseline or group != "thresholds")
     if "thresholds" in groups and options.baseline is None:
         raise ValueError("--only thresholds: needs --baseline, the summary.json of a report of this throw")
-    check_writable(options, "junit", "json")
+    check_outputs(options, "junit", "json")
     from flipproof.check.diff import TOLERANCE
     from flipproof.check.throw import check
 
@@ -149,7 +149,7 @@ def command_compare(options: argparse.Namespace) -> int:
     """Compare two solvers or files and print the differences; return 1 if they exceed the tolerance."""
     if options.junit and options.tolerance is None:
         raise ValueError(f"--junit {options.junit} needs --tolerance: without it no comparison can fail")
-    check_writable(options, "junit", "json")
+    check_outputs(options, "junit", "json")
     from flipproof.check.comparison import claims, compare, table
     from flipproof.frame.solvers import find, solve
     from flipproof.output.tables import Curve, read_curve

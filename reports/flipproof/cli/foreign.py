@@ -15,7 +15,7 @@ from flipproof.cli.arguments import (
     SCENARIO_HELP,
     add_command,
     add_json,
-    check_writable,
+    check_outputs,
     count,
     read_scenario,
     write_json,
@@ -117,7 +117,7 @@ def command_certify(options: argparse.Namespace) -> int:
 
     if options.equation is not None:
         check_equation(options.equation)
-    check_writable(options, "json", "junit")
+    check_outputs(options, "json", "junit")
     with closing(opened(options.spec, options.timeout)) as runner, patience(20.0):
         found = certify(runner, equation=options.equation, say=lambda result: print(result.line, flush=True))
     write_json(options.json, found.to_mapping())

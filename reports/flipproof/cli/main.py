@@ -30,7 +30,7 @@ from flipproof.cli.arguments import (
     add_guests,
     add_no_cache,
     check_guests,
-    check_writable,
+    check_outputs,
     command_line,
     count,
     progress_bar,
@@ -334,7 +334,7 @@ def command_simulate(options: argparse.Namespace) -> int:
         if solver.package != "slicemodel":
             raise ValueError(f"--steps {options.steps}: {solver.name} is not a scheme and chooses its own steps")
         settings["steps"] = options.steps
-    check_writable(options, "out")
+    check_outputs(options, "out")
     trajectory = solve(solver.name, scenario, **settings)
     table = trajectory_csv(trajectory)
     if options.out:
