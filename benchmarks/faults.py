@@ -84,10 +84,10 @@ FAULTS = (
     ("reports/flipproof/page/motion.py", "- 0.5 * scenario.gravity", "- scenario.gravity", "test_motion.py"),
     ("reports/flipproof/sweep/run.py", "(points[:middle], points[middle:])", "(points[:middle], points[middle + 1 :])",
      "test_sweep_run.py"),
-    ("reports/flipproof/check/diff.py", "return sum(abs(band) for band in known",
-     "return max(abs(band) for band in known", "test_diff.py"),
-    ("reports/flipproof/foreign/checks_order.py", "holds=abs(order - traits.order) <= WIDTH",
-     "holds=order - traits.order <= WIDTH", "foreign/test_certify.py"),
+    ("reports/flipproof/check/diff.py", "return sum(abs(band) for band in",
+     "return max(abs(band) for band in", "test_diff.py"),
+    ("reports/flipproof/foreign/checks_order.py", "holds=abs(order - declared) <= WIDTH",
+     "holds=order - declared <= WIDTH", "foreign/test_certify.py"),
     ("reports/flipproof/frame/keys.py", '"settings": dict(run.settings)}', '"settings": {}}', "test_run_store.py"),
 )  # fmt: skip
 

@@ -22,6 +22,7 @@ from flipproof.chapters import chapters_named
 from flipproof.chapters.work_precision.chapter import figures, summarise_work_precision, tabulate_work_precision
 from flipproof.chapters.work_precision.claims import claim_work_precision
 from flipproof.chapters.work_precision.contenders import COMPLETE, FULL, QUICK
+from flipproof.frame.pool import workers
 from slicemodel import Scenario
 
 RESULTS = Path(__file__).resolve().parent / "results"
@@ -37,12 +38,13 @@ def main() -> int:
     arguments = parser.parse_args()
     began = time.perf_counter()
     chapter = "work-precision"
-    gathered = gather_report(
-        ask_of(Scenario(), "full"),
-        jobs=arguments.jobs,
-        contents=chapters_named(chapter),
-        work={chapter: SIZES[arguments.size]},
-    )
+    with workers(arguments.jobs) as pool:
+        gathered = gather_report(
+            ask_of(Scenario(), "full"),
+            pool=pool,
+            contents=chapters_named(chapter),
+            work={chapter: SIZES[arguments.size]},
+        )
     studies = gathered.outcomes[chapter].value
     seconds = time.perf_counter() - began
     findings = list(claim_work_precision(studies))

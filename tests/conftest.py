@@ -62,4 +62,4 @@ def gathered() -> Gathered:
 @pytest.fixture(scope="session")
 def report(gathered) -> Report:
     """Built once per process, of the same evidence."""
-    return build(gathered, provenance("flipproof report"), jobs=1, png=True)
+    return build(gathered, provenance("flipproof report"), png=True)

@@ -15,6 +15,7 @@ from flipproof.frame.gather import Gathered, gather, tell
 from flipproof.frame.pool import Here, make_each
 from flipproof.frame.solvers import Made, Run
 from flipproof.output.provenance import provenance
+from flipproof.output.summary import summarise
 from flipproof.page.render import render
 from slicemodel import Scenario, Trajectory
 
@@ -72,7 +73,8 @@ def page_of(gathered: Gathered, picture: Drawing) -> str:
         name: replace(each, figures=tuple(replace(figure, drawn=picture) for figure in each.figures))
         for name, each in tell(gathered).items()
     }
-    return render(gathered, told, provenance("flipproof report"))
+    made_by = provenance("flipproof report")
+    return render(gathered, told, made_by, summarise(gathered, told, made_by))
 
 
 def study_map(throw, axis, fills, values, made, **how):

@@ -11,6 +11,7 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -26,23 +27,11 @@ from slicemodel.trajectory import FloatArray
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-FORMATS: Final = (".gif", ".mp4")
-MOST_FPS: Final = 50
-"""Frames per second at the most: a GIF counts in hundredths of a second, and viewers slow down what is faster."""
-
 MOST_FRAMES: Final = 3000
 """Frames of a film at the most; a GIF holds them all in memory."""
 
-MOST_BOTTLES: Final = 6
 HOLD: Final = 1.0
 """Seconds that the last frame stays."""
-
-COLOURS: Final = 128
-"""Colours of a GIF."""
-
-NEARLY: Final = 20
-"""Colours of a GIF whose channels differ from the background's by less than this are the background. Pillow looks a
-colour up by the corner of its box of 8 levels, and nothing else may be nearer to that than the background is."""
 
 ENCODER: Final = "ffmpeg"
 
@@ -54,18 +43,20 @@ class FilmError(ValueError):
     """The film cannot be made as asked; the message says why and what to do."""
 
 
+def check_pace(slow: float, fps: int) -> None:
+    """Refuse by a FilmError a film slower or faster than can be shown; a GIF counts in hundredths of a second."""
+    if not (np.isfinite(slow) and slow > 0):
+        raise FilmError(f"--slow {slow:g} is outside (0, inf): 1 is real time, 9.6 the paper's slow motion")
+    if not 1 <= fps <= 50:
+        raise FilmError(f"--fps {fps} is outside [1, 50] frames per second")
+
+
 def plan_film(throw: Scenario, slow: float, fps: int) -> FloatArray:
     """Return the times of flight that the frames show, from release to landing, shape (F,) [s].
 
-    Raises
-    ------
-    FilmError
-        If a number is out of range, or the film would be too long.
+    A number out of range or a film that would be too long raises a FilmError.
     """
-    if not (np.isfinite(slow) and slow > 0):
-        raise FilmError(f"--slow {slow:g} is outside (0, inf): 1 is real time, 9.6 the paper's slow motion")
-    if not 1 <= fps <= MOST_FPS:
-        raise FilmError(f"--fps {fps} is outside [1, {MOST_FPS}] frames per second")
+    check_pace(slow, fps)
     frames = throw.duration * slow * fps + 1
     if frames > MOST_FRAMES:
         raise FilmError(f"--slow {slow:g} at --fps {fps} makes {frames:.4g} frames (admissible: at most {MOST_FRAMES})")
@@ -85,8 +76,8 @@ def check_target(path: Path) -> None:
     FilmError
         If its name has another ending, its folder is not there, it is a folder, or ffmpeg is needed and missing.
     """
-    if path.suffix.lower() not in FORMATS:
-        raise FilmError(f"--out {path}: the name ends in {path.suffix or 'nothing'} (admissible: {', '.join(FORMATS)})")
+    if path.suffix.lower() not in (".gif", ".mp4"):
+        raise FilmError(f"--out {path}: the name ends in {path.suffix or 'nothing'} (admissible: .gif, .mp4)")
     if path.is_dir():
         raise FilmError(f"--out {path} is a folder; name a file")
     if not path.parent.is_dir():
@@ -110,19 +101,18 @@ def write_film(film: Film, path: Path, step: Step) -> None:
 
 def write_pictures(pictures: Iterator[Picture], count: int, fps: int, path: Path, step: Step) -> None:
     """Write ``count`` pictures as a film; errors as of ``write_film``."""
+
+    def counted() -> Iterator[Picture]:
+        for k, picture in enumerate(pictures, start=1):
+            yield picture
+            step(k, count)
+
     check_target(path)
-    frames = _counted(pictures, count, step)
     with whole_file(path) as part:
         if path.suffix.lower() == ".gif":
-            _write_gif(frames, frame_durations(count, fps), part)
+            _write_gif(counted(), frame_durations(count, fps), part)
         else:
-            _write_mp4(frames, fps, part)
-
-
-def _counted(pictures: Iterator[Picture], count: int, step: Step) -> Iterator[Picture]:
-    for k, picture in enumerate(pictures, start=1):
-        yield picture
-        step(k, count)
+            _write_mp4(counted(), fps, part)
 
 
 def frame_durations(count: int, fps: int) -> list[int]:
@@ -150,14 +140,18 @@ def _write_gif(frames: Iterator[Picture], stays: list[int], path: Path) -> None:
 
 
 def _palette(picture: Image) -> Image:
-    """Return an image with a palette fit for ``picture``, with the background's colour exactly among its own."""
+    """Return an image with a palette of 128 colours fit for ``picture``, the background's exactly among them.
+
+    Colours whose channels differ from the background's by less than 20 are the background. Pillow looks a colour up by
+    the corner of its box of 8 levels, and nothing else may be nearer to that than the background is.
+    """
     from PIL import Image
 
-    fit = picture.quantize(colors=COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    fit = picture.quantize(colors=128, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
     colours = np.array(fit.getpalette()).reshape(-1, 3)
     wanted = np.array(picture.getpixel((0, 0)))
     # The median of a box of nearly white colours is not white, and the page around the film would show it.
-    colours[np.abs(colours - wanted).max(axis=1) < NEARLY] = wanted
+    colours[np.abs(colours - wanted).max(axis=1) < 20] = wanted
     made = Image.new("P", (1, 1))
     made.putpalette(colours.ravel().tolist())
     return made
@@ -173,13 +167,10 @@ def _write_mp4(frames: Iterator[Picture], fps: int, path: Path) -> None:
     ]  # fmt: skip
     with tempfile.TemporaryFile() as said, _running(command, said) as process:
         assert process.stdin is not None
-        try:
-            process.stdin.write(first.tobytes())
-            for frame in frames:
+        with suppress(BrokenPipeError):  # what it said tells why
+            for frame in chain([first], frames):
                 process.stdin.write(frame.tobytes())
             process.stdin.close()
-        except BrokenPipeError:
-            pass  # what it said tells why
         if process.wait() != 0:
             said.seek(0)
             # The end tells why it failed.

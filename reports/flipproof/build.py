@@ -14,9 +14,8 @@ from flipproof.chapters.solvers import CERTIFIED, solver_runs
 from flipproof.frame.chapter import Ask, Part, Size
 from flipproof.frame.exhibit import Exhibit, drawn
 from flipproof.frame.findings import Finding
-from flipproof.frame.gather import Gathered, gather, tell
-from flipproof.frame.pool import Progress, compile_kernels, workers
-from flipproof.frame.stages import Stages
+from flipproof.frame.gather import Gathered, Stages, gather, tell
+from flipproof.frame.pool import Here, Progress, compile_kernels, workers
 from flipproof.frame.store import RunStore
 from flipproof.output.junit import junit_text
 from flipproof.output.summary import SCHEMA_NAME, schema_text, summarise, summary_text
@@ -25,9 +24,6 @@ from slicemodel import Scenario
 
 SLICES: Final = 50
 """Slices at which solvers are compared, unless told otherwise."""
-
-STEPS: Final = 1000
-"""Points of a scheme's grid."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,14 +58,13 @@ def ask_of(scenario: Scenario, size: Size, slices: int | None = None, certified:
     certified : witnesses that are certified; None: those of the size
     """
     throw = scenario.with_slices(slices or min(SLICES, scenario.n_slices))
-    solvers = solver_runs(throw, STEPS, CERTIFIED[size] if certified is None else certified)
-    return Ask(scenario=scenario, throw=throw, size=size, steps=STEPS, solvers=solvers)
+    ask = Ask(scenario=scenario, throw=throw, size=size)
+    return replace(ask, solvers=solver_runs(throw, ask.steps, CERTIFIED[size] if certified is None else certified))
 
 
 def gather_report(
     ask: Ask,
     progress: Progress = lambda *_: None,
-    jobs: int | None = None,
     stages: Stages | None = None,
     store: RunStore | None = None,
     pool: Executor | None = None,
@@ -77,23 +72,17 @@ def gather_report(
     contents: tuple[Part, ...] | None = None,
     work: Mapping[str, Any] | None = None,
 ) -> Gathered:
-    """Make every run of a report and study them, in a ``pool`` or by worker processes (``jobs``; None: one per core).
+    """Make every run of a report and study them, in a ``pool`` or by a worker process per core.
 
     Slow runs and calls are looked for in the ``store`` and kept there.
     """
-    contents = parts() if contents is None else contents
-    with workers(jobs) if pool is None else nullcontext(pool) as made_by:
+    with workers(None) if pool is None else nullcontext(pool) as made_by:
         compile_kernels(made_by)
-        return gather(contents, ask, made_by, progress, work=work, stages=stages, store=store)
+        return gather(contents or parts(), ask, made_by, progress, work=work, stages=stages, store=store)
 
 
 def build(
-    gathered: Gathered,
-    provenance: Mapping[str, str],
-    jobs: int | None = None,
-    *,
-    pool: Executor | None = None,
-    png: bool = False,
+    gathered: Gathered, provenance: Mapping[str, str], pool: Executor | None = None, *, png: bool = False
 ) -> Report:
     """Evaluate every claim, draw every figure and write the page, all in memory.
 
@@ -101,17 +90,13 @@ def build(
     ----------
     gathered : Gathered
     provenance : mapping
-    jobs : int or None
-        Worker processes that draw; None: one per core, 1: this process.
-    pool : Executor or None
-        Workers that are there already and draw instead.
-    png : bool
-        Whether figures are made as PNG, too.
+    pool : Executor or None - workers that draw; None: this process
+    png : bool - whether figures are made as PNG, too
     """
     told = tell(gathered)
     with gathered.stages.lap("figures"):
         figures = [figure for each in told.values() for figure in each.figures]
-        exhibits = drawn(figures, jobs, pool=pool, png=png)
+        exhibits = drawn(figures, pool or Here(), png=png)
     by_name = {exhibit.name: exhibit for exhibit in exhibits}
     told = {
         name: replace(each, figures=tuple(by_name[figure.name] for figure in each.figures))
@@ -135,7 +120,7 @@ def build(
 
 def write(report: Report, folder: Path) -> None:
     """Write a finished report into an empty folder."""
-    files: dict[str, str | bytes] = {
+    files: dict[str, str | bytes | None] = {
         "index.html": report.html,
         "summary.json": summary_text(report.summary),
         SCHEMA_NAME: schema_text(),
@@ -143,12 +128,10 @@ def write(report: Report, folder: Path) -> None:
         **report.tables,
     }
     for exhibit in report.exhibits:
-        files[f"figures/{exhibit.name}.svg"] = exhibit.drawing.svg
-        if exhibit.drawing.png:
-            files[f"figures/{exhibit.name}.png"] = exhibit.drawing.png
-        if exhibit.table is not None:
-            files[f"figures/{exhibit.name}.csv"] = exhibit.table
+        made = {"svg": exhibit.drawing.svg, "png": exhibit.drawing.png or None, "csv": exhibit.table}
+        files |= {f"figures/{exhibit.name}.{kind}": content for kind, content in made.items()}
     for path, content in files.items():
-        place = folder / path
-        place.parent.mkdir(parents=True, exist_ok=True)
-        place.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
+        if content is not None:
+            place = folder / path
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))

@@ -14,38 +14,23 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable
+from contextlib import closing
 from typing import Any
-
-import numpy as np
 
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, certify
 from flipproof.foreign.specs import Runner, opened
 
 
-class Check:
-    """One check of one solver, to be called in a test."""
+def _check(name: str, runner: Callable[[], Runner]) -> None:
+    """Make one check of one solver, in a test."""
+    import pytest
 
-    def __init__(self, spec: str, name: str, runner: Callable[[], Runner]) -> None:
-        self.spec, self.name, self.runner = spec, name, runner
-
-    def __call__(self) -> None:
-        """Make the check.
-
-        Raises
-        ------
-        AssertionError
-        """
-        import pytest
-
-        (result,) = certify(self.runner(), [self.name]).results
-        if result.verdict == IDLE:
-            pytest.skip(result.reason)
-        if result.verdict == EXPECTED:
-            pytest.xfail(result.reason)
-        assert result.verdict != FAILED, result.line
-
-    def __repr__(self) -> str:
-        return f"{self.spec} {self.name}"
+    (result,) = certify(runner(), [name]).results
+    if result.verdict == IDLE:
+        pytest.skip(result.reason)
+    if result.verdict == EXPECTED:
+        pytest.xfail(result.reason)
+    assert result.verdict != FAILED, result.line
 
 
 def parametrize_with_checks(spec: str, checks: Iterable[str] = tuple(CHECKS)) -> Any:
@@ -59,38 +44,12 @@ def parametrize_with_checks(spec: str, checks: Iterable[str] = tuple(CHECKS)) ->
     import pytest
 
     runner = functools.cache(lambda: opened(spec))
-    return pytest.mark.parametrize("check", [Check(spec, name, runner) for name in checks], ids=tuple(checks))
+    made = {name: functools.partial(_check, name, runner) for name in checks}
+    return pytest.mark.parametrize("check", made.values(), ids=made.keys())
 
 
 def assert_ice_constant(spec: str) -> None:
-    """Assert that a solver keeps omega constant when the water is frozen.
-
-    Raises
-    ------
-    AssertionError
-    """
-    runner = opened(spec)
-    try:
+    """Assert that a solver keeps omega constant when the water is frozen."""
+    with closing(opened(spec)) as runner:
         (result,) = certify(runner, ["ice"]).results
-    finally:
-        runner.close()
     assert result.verdict != FAILED, result.line
-
-
-def assert_same_curve(t: Any, omega: Any, spec: str, scenario: Any, tolerance: float) -> None:
-    """Assert that omega(t) is that of a solver of flipproof within ``tolerance``, a fraction of omega_0.
-
-    Raises
-    ------
-    AssertionError
-    """
-    from flipproof.foreign.contract import Ask
-
-    runner = opened(spec)
-    try:
-        answer = runner(Ask.of(scenario, np.array(t, dtype=np.float64)))
-    finally:
-        runner.close()
-    off = np.abs(np.asarray(omega, dtype=np.float64) - answer.omega) / abs(scenario.omega0)
-    k = int(np.argmax(off))
-    assert off[k] <= tolerance, f"omega(t = {answer.t[k]:.4g} s) is {off[k]:.3g} of omega_0 from {spec}"

@@ -5,7 +5,7 @@ import itertools
 import pytest
 
 from flipproof.chapters import CONTENTS
-from flipproof.page.sections import BEHIND, STORY
+from flipproof.page.parts import BEHIND, STORY
 
 LARGEST = 5e6
 """Bytes of the whole page, the validity maps of a full report included."""

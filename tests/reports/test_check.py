@@ -37,7 +37,7 @@ def thresholds():
 
 @pytest.fixture
 def computed(monkeypatch, thresholds):
-    def known(group, throw, store):
+    def known(group, throw, store, _work):
         return iter(thresholds) if group == "thresholds" else findings_of(group, throw, store)
 
     monkeypatch.setattr(check_module, "findings_of", known)

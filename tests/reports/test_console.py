@@ -73,7 +73,7 @@ def test_an_error_of_flipproofs_own_has_its_own_status(monkeypatch, capsys):
     def broken(_):
         raise ZeroDivisionError("float division by zero")
 
-    monkeypatch.setattr(cli, "command_models", broken)
+    monkeypatch.setattr("flipproof.cli.foreign.command_models", broken)
     assert cli.main(["models"]) == 3
     assert capsys.readouterr().err == (
         "flipproof: error: ZeroDivisionError: float division by zero (an error in flipproof itself; "

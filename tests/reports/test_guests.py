@@ -96,7 +96,7 @@ def test_energy_falls_in_free_flight_and_is_that_of_turning_in_ice():
 
 
 def test_every_figure_is_drawn_with_its_numbers(studied):
-    exhibits = drawn(tuple(draw_guests(studied)), 1)
+    exhibits = drawn(tuple(draw_guests(studied)), Here())
     assert [exhibit.name for exhibit in exhibits] == [
         "guests-omega", "guests-differences", "guests-convergence", "guests-ice-energy",
     ]  # fmt: skip

@@ -6,6 +6,7 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
@@ -15,7 +16,7 @@ from flipproof.chapters.finite_step.chapter import EVERYTHING, HELD, LOCATED, WA
 from flipproof.chapters.waterfall.study import STEP
 from flipproof.frame.throws import FINER
 from flipproof.output.snapshot import BEGIN, END, PLACE, README, front_page, write_front_page
-from flipproof.page.headlines import MEASURES, Headline, headlines
+from flipproof.page.headlines import Headline, Measure, headlines
 from flipproof.page.lead import amount, answer, lead_words, sentences, signed
 
 PAIRS = {"whole": TOTAL, "program-eq8": PROGRAM_EQ8, "eq8-free": EQ8_FREE, "engine": BY_ENGINE}
@@ -109,7 +110,8 @@ def numbers_allowed(headline):
     text = signed if headline.measure in ("share", "order") else percent
     moved = [] if headline.finer is None else [text(headline.finer), percent(abs(headline.finer - headline.value))]
     band = [] if headline.band is None else [percent(headline.band)]
-    return {text(headline.value), *moved, *band, signed(headline.low), signed(headline.high), signed(headline.value)}
+    ends = [signed(end) for end in (headline.low, headline.high) if end is not None]
+    return {text(headline.value), *moved, *band, *ends, signed(headline.value)}
 
 
 def test_every_percentage_of_lead_and_front_page_is_a_headline(kept, report):
@@ -162,7 +164,7 @@ def test_headlines_come_back_from_json():
     for headline in (made_up(), made_up(value=math.inf, finer=0.1, finer_slices=100, low=-0.1, high=0.2, time=0.3)):
         mapping = json.loads(json.dumps({**headline.to_mapping(), "value": str(headline.value)}))
         assert Headline.from_mapping(mapping) == headline
-    assert set(MEASURES) == {"largest", "start", "landing", "share", "order"}
+    assert set(get_args(Measure)) == {"largest", "start", "landing", "share", "order"}
 
 
 # ---------------------------------------------------------------------- sentences

@@ -59,7 +59,7 @@ def test_a_report_that_is_given_a_measurement_has_a_section_of_it(held, monkeypa
 
     monkeypatch.setattr("flipproof.film.measured.hold", known)
     ask, contents = ask_of(THROW, "quick"), (part_measured(measurement),)
-    report = build(gather_report(ask, pool=Here(), contents=contents), provenance("flipproof report"), jobs=1)
+    report = build(gather_report(ask, pool=Here(), contents=contents), provenance("flipproof report"))
     assert '<section id="measured" class="fold">' in report.html
     assert '<figure id="figure-measured">' in report.html
     assert "Your measurement is nearest to free flight" in report.html

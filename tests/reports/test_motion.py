@@ -83,7 +83,7 @@ def test_a_standing_bottle_has_its_base_below_its_cap():
 
 def test_the_page_holds_every_flight_to_the_steps_it_states():
     run = flown(points=FRAMES)
-    packed = motion_data(THROW, made_of(run), ("eq8",))["flights"][0]
+    packed = motion_data(THROW, made_of(run))["flights"][0]
     assert packed["reached"] == FRAMES
     assert unpacked(packed["theta"], "<f4") == pytest.approx(run.theta, rel=1e-6, abs=0.0)
     assert unpacked(packed["omega"], "<f4") == pytest.approx(run.omega, rel=1e-6, abs=0.0)
@@ -95,7 +95,7 @@ def test_the_page_holds_every_flight_to_the_steps_it_states():
 
 def test_impacts_keep_their_time_slice_end_and_speed():
     impacts = Impacts([0.1, 0.1, 0.25], [0, 300, 70_000], [1, -1, 1], [0.5, 0.6, 0.7], [0.2, 0.3, 0.4])
-    found = motion_data(THROW, made_of(flown(impacts=impacts)), ("eq8",))["flights"][0]["impacts"]
+    found = motion_data(THROW, made_of(flown(impacts=impacts)))["flights"][0]["impacts"]
     assert unpacked(found["time"], "<f4") == pytest.approx([0.1, 0.1, 0.25], rel=1e-6, abs=0.0)
     assert unpacked(found["slice"], "<u4").tolist() == [0, 300, 70_000]
     assert unpacked(found["end"], "<i2").tolist() == [1, -1, 1]
@@ -105,17 +105,17 @@ def test_impacts_keep_their_time_slice_end_and_speed():
 def test_a_solver_that_failed_is_shown_with_its_reason_and_without_any_there_is_no_player():
     made = made_of(flown())
     made["pymunk"] = Made(Run("pymunk", THROW, label="pymunk"), None, 0.1, "RuntimeError: no engine")
-    data = motion_data(THROW, made, ("published-python", "eq8", "pymunk"))
+    data = motion_data(THROW, made)
     assert [flight["name"] for flight in data["flights"]] == ["eq8"]
     assert data["failed"] == [{"name": "pymunk", "reason": "RuntimeError: no engine"}]
     assert "no engine" in rendered(data)
-    assert motion_data(THROW, {"pymunk": made["pymunk"]}, ("pymunk",)) is None
+    assert motion_data(THROW, {"pymunk": made["pymunk"]}) is None
     assert rendered(None).strip() == ""
 
 
 def test_a_flight_that_ended_early_stops_there_and_leaves_dashes():
     run = flown(end=0.2, status="diverged")
-    data = motion_data(THROW, made_of(run, flown("pymunk")), ("eq8", "pymunk"))
+    data = motion_data(THROW, made_of(run, flown("pymunk")))
     assert data["flights"][0]["reached"] == pytest.approx(FRAMES / 2, abs=1)
     assert data["flights"][0]["status"] == "diverged"
     assert [row["values"][0] is None for row in data["table"]] == [row["t"] > 0.2 + 1e-9 for row in data["table"]]
@@ -126,7 +126,7 @@ def test_a_flight_that_ended_early_stops_there_and_leaves_dashes():
 def test_a_slice_far_outside_is_drawn_at_the_farthest_place():
     run = flown()
     lost = replace(run, r=run.r * 1e6, status="escaped")
-    r = unpacked(motion_data(THROW, made_of(lost), ("eq8",))["flights"][0]["r"], "<i2")
+    r = unpacked(motion_data(THROW, made_of(lost))["flights"][0]["r"], "<i2")
     assert r.max() * POSITION_STEP == pytest.approx(3.0)
 
 
@@ -149,7 +149,7 @@ def test_four_bottles_of_fifty_slices_stay_below_the_pages_share():
 def test_a_run_without_slices_still_has_a_bottle():
     run = flown()
     bare = replace(run, r=np.zeros((0, 5)), v=np.zeros((0, 5)))
-    data = motion_data(THROW, made_of(bare), ("eq8",))
+    data = motion_data(THROW, made_of(bare))
     assert data["flights"][0]["drawn"] == []
     assert rendered(data)
 
@@ -157,7 +157,7 @@ def test_a_run_without_slices_still_has_a_bottle():
 def test_the_template_is_whole_holds_the_data_and_escapes_what_runs_say(read_page):
     made = made_of(flown())
     made["pymunk"] = Made(Run("pymunk", THROW, label="pymunk"), None, 0.1, "</script><b>&")
-    data = motion_data(THROW, made, ("eq8", "pymunk"))
+    data = motion_data(THROW, made)
     text = rendered(data)
     read_page(text)
     block = re.search(r'<script type="application/json" id="motion-data">(.*?)</script>', text, re.DOTALL)
@@ -167,7 +167,7 @@ def test_the_template_is_whole_holds_the_data_and_escapes_what_runs_say(read_pag
 
 def test_every_control_that_the_script_looks_for_is_in_the_template():
     script = (ASSETS / "motion.js").read_text(encoding="utf-8")
-    text = rendered(motion_data(THROW, made_of(flown()), ("eq8",)))
+    text = rendered(motion_data(THROW, made_of(flown())))
     wanted = set(re.findall(r'find\("([a-z-]+)"\)', script))
     assert {"play", "scrub", "time", "view", "rate", "next-impact"} <= wanted
     there = set(re.findall(r'data-testid="motion-([a-z0-9-]+)"', text))
@@ -193,7 +193,7 @@ def test_nothing_in_the_assets_asks_the_network():
 
 def test_another_bottle_is_drawn_with_its_own_size():
     small = Scenario(bottle=Bottle(length=0.2, radius=0.03), water_mass=0.2).with_slices(4)
-    data = motion_data(small, made_of(flown(scenario=small)), ("eq8",))
+    data = motion_data(small, made_of(flown(scenario=small)))
     assert (data["length"], data["radius"]) == (0.2, 0.03)
     assert data["slice_height"] == pytest.approx(0.2 * 0.2 / 4)
     assert data["release"] == pytest.approx([0.2, 0.0], abs=1e-12)

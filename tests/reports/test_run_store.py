@@ -314,7 +314,7 @@ def test_a_file_that_can_only_be_read_is_read(place):
 
 def test_the_place_is_in_the_users_cache(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert default_place() == tmp_path / "flipproof" / store.FILE
+    assert default_place() == tmp_path / "flipproof" / "runs-1.sqlite"
     for given in ("", "relative/folder"):  # the standard says: an empty or relative one counts as not set
         monkeypatch.setenv("XDG_CACHE_HOME", given)
         assert Path.home() in default_place().parents

@@ -9,9 +9,9 @@ import pytest
 from flipproof.figures.style import draw, new_figure
 from flipproof.frame.solvers import catalogue
 from flipproof.frame.spoken import SPOKEN, spoken
-from flipproof.page.captions import shared
 from flipproof.page.equations import equation, mathematics, numbers
 from flipproof.page.glossary import linked
+from flipproof.page.parts import shared
 from ode_reference.models import MODELS
 
 

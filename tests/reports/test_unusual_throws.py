@@ -47,7 +47,7 @@ def test_unusual_throws_have_a_report_too(name, read_page):
     contents = tuple(replace(p, chapters=tuple(c for c in p.chapters if c.name not in WITHOUT)) for p in parts())
     # In this process: to start workers for it, twice, takes a third of the time of all of it.
     gathered = gather_report(ask, work=SMALL, pool=Here(), contents=contents)
-    report = build(gathered, provenance("flipproof report"), jobs=1)
+    report = build(gathered, provenance("flipproof report"))
     assert [(f.id, f.value, f.note) for f in report.failed] == []
     json.dumps(report.summary, allow_nan=False)
     read_page(report.html)

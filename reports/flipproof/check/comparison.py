@@ -13,9 +13,6 @@ from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray
 
 SYMBOLS = {"omega": "omega", "theta": "theta", "r_cm": "r_CM"}
-SAME = 1e-12
-"""Relative difference of two times that printing and reading them explains."""
-
 UNITS = {"omega": "rad/s", "theta": "rad", "r_cm": "m"}
 
 
@@ -43,6 +40,12 @@ class Apart:
         """Absolute difference over the scale, shape (P,)."""
         return np.abs(self.second - self.first) / abs(self.scale)
 
+    @property
+    def largest(self) -> tuple[float, float]:
+        """Largest difference over the scale, and its time [s]."""
+        k = int(self.size.argmax())
+        return float(self.size[k]), float(self.t[k])
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
@@ -55,7 +58,6 @@ class Comparison:
 
     def to_mapping(self) -> dict[str, object]:
         """Return labels, notes and, for each quantity, the largest difference, its time and what it is divided by."""
-        rows = [(one, int(one.size.argmax())) for one in self.apart]
         return {
             "first": self.first,
             "second": self.second,
@@ -64,12 +66,11 @@ class Comparison:
                 {
                     "quantity": one.quantity,
                     "unit": "omega_0" if one.quantity == "omega" else UNITS[one.quantity],
-                    "largest": float(one.size[k]),
-                    "time": float(one.t[k]),
+                    **dict(zip(("largest", "time"), one.largest, strict=True)),
                     "times": len(one.t),
                     "interpolated": one.interpolated,
                 }
-                for one, k in rows
+                for one in self.apart
             ],
         }
 
@@ -112,14 +113,12 @@ def _apart(quantity: str, first: Curve, second: Curve) -> Apart:
     if kept.sum() < 2:
         raise ValueError(f"{first.label} has {kept.sum()} times within those of {second.label}; at least 2 are needed")
     t, values, after = t[kept], values[kept], ends[kept]
-    near = SAME * max(abs(times[0]), abs(times[-1]))
+    near = 1e-12 * max(abs(times[0]), abs(times[-1]))  # printing and reading a time explains so much
     before, behind = np.searchsorted(times, t - near, "left"), np.searchsorted(times, t + near, "right") - 1
     own = before <= behind
     found = np.where(after, others[behind], others[np.minimum(before, len(times) - 1)])
     found[~own] = np.interp(t[~own], times, others)
-    return Apart(
-        quantity=quantity, t=t, first=values, second=found, scale=scale, interpolated=int((~own).sum())
-    )  # fmt: skip
+    return Apart(quantity=quantity, t=t, first=values, second=found, scale=scale, interpolated=int((~own).sum()))
 
 
 def table(found: Comparison) -> str:
@@ -137,11 +136,9 @@ def table(found: Comparison) -> str:
             a, b = (plateau(one.t, values, one.scale) for values in (one.first, one.second))
             row("omega/omega_0, mean of second half", (a, b))
     for one in found.apart:
-        k = int(one.size.argmax())
-        size = (
-            f"{one.size[k]:.3%} of omega_0" if one.quantity == "omega" else f"{one.size[k]:.3g} {UNITS[one.quantity]}"
-        )
-        lines.append(f"largest |difference in {SYMBOLS[one.quantity]}|: {size} at t = {one.t[k]:.5g} s")
+        largest, time = one.largest
+        size = f"{largest:.3%} of omega_0" if one.quantity == "omega" else f"{largest:.3g} {UNITS[one.quantity]}"
+        lines.append(f"largest |difference in {SYMBOLS[one.quantity]}|: {size} at t = {time:.5g} s")
         if one.quantity == "omega":
             parting = first_crossing(one.t, one.size, PARTING_BAND)
             words = "never" if parting is None else f"{parting:.5g} s"
@@ -162,19 +159,15 @@ def _times(found: Comparison) -> str:
 
 def claims(found: Comparison, tolerance: float) -> tuple[Finding, ...]:
     """Return the largest differences as findings; the first quantity is held to the tolerance, others are observed."""
-    made = []
-    for one in found.apart:
-        k = int(one.size.argmax())
-        held = one is found.apart[0]
-        made.append(
-            Finding(
-                id=f"compare-{one.quantity.replace('_', '-')}",
-                title=f"largest difference in {SYMBOLS[one.quantity]} between {found.first} and {found.second}",
-                value=float(one.size[k]),
-                unit="of omega_0" if one.quantity == "omega" else UNITS[one.quantity],
-                kind="regression" if held else "observation",
-                admissible=(0.0, tolerance) if held else (-np.inf, np.inf),
-                note=f"at t = {one.t[k]:.6g} s",
-            )
+    return tuple(
+        Finding(
+            id=f"compare-{one.quantity.replace('_', '-')}",
+            title=f"largest difference in {SYMBOLS[one.quantity]} between {found.first} and {found.second}",
+            value=one.largest[0],
+            unit="of omega_0" if one.quantity == "omega" else UNITS[one.quantity],
+            kind="observation" if k else "regression",
+            admissible=(-np.inf, np.inf) if k else (0.0, tolerance),
+            note=f"at t = {one.largest[1]:.6g} s",
         )
-    return tuple(made)
+        for k, one in enumerate(found.apart)
+    )

@@ -20,9 +20,6 @@ from typing import Any, Final, Literal
 
 from slicemodel.scenario import UnsuitableFileError, read_text
 
-MOST_BYTES: Final = 2**28
-"""Bytes of a summary at the most."""
-
 ROUND_OFF: Final = 1e-9
 """Relative change of a number that nobody claims to be a change."""
 
@@ -32,11 +29,6 @@ LEAST: Final = 1e-12
 TOLERANCE: Final = 1e-6
 """What a finding may move beyond its bands, in its own unit: round-off of another machine, by way of a flight's impacts
 and of finite differences."""
-
-READABLE: Final = (1, 2)
-"""Versions of the summary's format that can be compared."""
-
-NEEDED: Final = ("id", "title", "value", "unit", "kind", "band", "verdict", "admissible")
 
 Kind = Literal["verdict", "moved", "words", "gone", "new", "bandless"]
 
@@ -67,11 +59,9 @@ class Comparison:
     ----------
     premises : tuple of str
         In what the two were made differently and cannot be expected to agree: throw, slices, size of the report.
-    circumstances : tuple of str
-        In what else they differ: versions and machine.
+    circumstances : tuple of str - in what else they differ: versions and machine
     changes : tuple of Change
-    compared : int
-        Findings that both have.
+    compared : int - findings that both have
     """
 
     premises: tuple[str, ...]
@@ -113,9 +103,6 @@ class Comparison:
         return "\n".join([*lines, self.conclusion])
 
 
-# ---------------------------------------------------------------------- reading
-
-
 def read_summary(path: Path) -> dict[str, Any]:
     """Return the summary of a report: of a folder, or of its ``summary.json`` itself.
 
@@ -126,7 +113,7 @@ def read_summary(path: Path) -> dict[str, Any]:
     """
     file = path / "summary.json" if path.is_dir() else path
     try:
-        summary = json.loads(read_text(file, MOST_BYTES).removeprefix("\ufeff"))
+        summary = json.loads(read_text(file, 2**28).removeprefix("\ufeff"))
     except UnsuitableFileError as error:
         raise ValueError(f"{file}: {error}") from None
     except OSError as error:
@@ -143,15 +130,16 @@ def _problem(summary: Any) -> str:
     """Return what keeps a summary from being compared, or nothing."""
     if not isinstance(summary, dict) or "findings" not in summary:
         return "is not the summary of a report: it has no findings"
-    if summary.get("version") not in READABLE:
-        return f"version = {summary.get('version')!r} of the format, must be one of {', '.join(map(str, READABLE))}"
+    if summary.get("version") not in (1, 2):
+        return f"version = {summary.get('version')!r} of the format, must be one of 1, 2"
     if not isinstance(summary.get("scenario"), dict):
         return "has no scenario"
     findings = summary["findings"]
     if not isinstance(findings, list) or not all(isinstance(finding, dict) for finding in findings):
         return "its findings are not a list of objects"
     for k, finding in enumerate(findings):
-        missing = [name for name in NEEDED if name not in finding]
+        needed = ("id", "title", "value", "unit", "kind", "band", "verdict", "admissible")
+        missing = [name for name in needed if name not in finding]
         if missing:
             return f"finding {finding.get('id', k)!r} has no {', '.join(missing)}"
         if not isinstance(finding["id"], str):
@@ -178,9 +166,6 @@ def _readable(value: Any) -> bool:
 def number(value: Any) -> float | None:
     """Return a number of a summary, which may be one of the words "nan", "inf", "-inf"; None stays None."""
     return None if value is None else float(value)
-
-
-# ---------------------------------------------------------------------- comparing
 
 
 def compare_summaries(old: Mapping[str, Any], new: Mapping[str, Any], tolerance: float = TOLERANCE) -> Comparison:
@@ -210,23 +195,22 @@ def change_of(old: Mapping[str, Any], new: Mapping[str, Any], tolerance: float =
         return Change(kind="moved", id=name, words=f"{_value(old)} → {_value(new)}")
     first, second = number(old["value"]), number(new["value"])
     moved = first is not None and second is not None and not within(first, second, bands(old, new) + tolerance)
-    if moved and (_has_band(old, new) or not (math.isfinite(first or 0.0) and math.isfinite(second or 0.0))):
+    if moved and (_bands(old, new) or not (math.isfinite(first or 0.0) and math.isfinite(second or 0.0))):
         return Change(kind="moved", id=name, words=_moved(old, new))
     if old["title"] != new["title"]:
         return Change(kind="words", id=name, words=f"“{old['title']}” → “{new['title']}”")
     return Change(kind="bandless", id=name, words=_moved(old, new)) if moved else None
 
 
-def _has_band(*findings: Mapping[str, Any]) -> bool:
-    """Return whether one of the findings states a band."""
+def _bands(*findings: Mapping[str, Any]) -> list[float]:
+    """Return the bands that findings state, without those that are not finite."""
     known = [number(finding["band"]) for finding in findings]
-    return any(band is not None and math.isfinite(band) for band in known)
+    return [band for band in known if band is not None and math.isfinite(band)]
 
 
 def bands(*findings: Mapping[str, Any]) -> float:
     """Return the sum of the bands; one that is missing or not finite adds nothing."""
-    known = [number(finding["band"]) for finding in findings]
-    return sum(abs(band) for band in known if band is not None and math.isfinite(band))
+    return sum(abs(band) for band in _bands(*findings))
 
 
 def within(old: float, new: float, allowed: float) -> bool:
@@ -239,7 +223,7 @@ def within(old: float, new: float, allowed: float) -> bool:
 def _moved(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     by = float(new["value"]) - float(old["value"])
     words = f"{_value(old)} → {_value(new)}, moved by {by:+.2g}"
-    return words + (f", bands allow {bands(old, new):.1g}" if _has_band(old, new) else ", no band")
+    return words + (f", bands allow {bands(old, new):.1g}" if _bands(old, new) else ", no band")
 
 
 def _value(finding: Mapping[str, Any]) -> str:
@@ -260,11 +244,11 @@ def _premises(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
 
 def scenario_changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     """Return which fields of a throw differ, as "water_mass = 0.5 → 0.3"."""
-    flat = [_flat(scenario) for scenario in (old, new)]
+    before, after = _flat(old), _flat(new)
     return [
-        f"{name} = {flat[0].get(name, 'absent')} → {flat[1].get(name, 'absent')}"
-        for name in dict.fromkeys((*flat[0], *flat[1]))
-        if flat[0].get(name) != flat[1].get(name)
+        f"{name} = {before.get(name, 'absent')} → {after.get(name, 'absent')}"
+        for name in dict.fromkeys((*before, *after))
+        if before.get(name) != after.get(name)
     ]
 
 
@@ -278,17 +262,14 @@ def _flat(scenario: Mapping[str, Any]) -> dict[str, Any]:
     return flat
 
 
-APART: Final = ("command", "made", "from the store")
-"""Of the provenance, what differs between any two reports."""
-
-
 def _circumstances(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
+    """Yield in what two reports differ, but for what differs between any two."""
     if old["version"] != new["version"]:
         yield f"version of the format: {old['version']} → {new['version']}"
     before, after = ({"flipproof": s.get("flipproof"), **_mapping(s.get("provenance"))} for s in (old, new))
     for name in dict.fromkeys((*before, *after)):
         one, other = before.get(name), after.get(name)
-        if name not in APART and one is not None and other is not None and one != other:
+        if name not in ("command", "made", "from the store") and None not in (one, other) and one != other:
             yield f"{name}: {one} → {other}"
 
 

@@ -6,21 +6,15 @@ import csv
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
-from flipproof.check.diff import HEADINGS, Change, Comparison
+from flipproof.check.diff import HEADINGS, Comparison
 from flipproof.figures.report_pair import differences, figure_report_pair
 from flipproof.figures.style import draw
 from flipproof.output.columns import Curves
-from flipproof.page.inline import data_uri, shape
 from flipproof.page.templating import environment
-
-CURVES: Final = "figures/omega.csv"
-"""Where a report keeps omega / omega_0 over time, by solver."""
-
-NAME: Final = "omega/omega_0 "
 
 
 def diff_page(old: Path, new: Path, before: Mapping[str, Any], after: Mapping[str, Any], found: Comparison) -> str:
@@ -33,7 +27,7 @@ def diff_page(old: Path, new: Path, before: Mapping[str, Any], after: Mapping[st
     """
     curves, missing = [], []
     for which, place in (("old", old), ("new", new)):
-        file = (place if place.is_dir() else place.parent) / CURVES
+        file = (place if place.is_dir() else place.parent) / "figures" / "omega.csv"
         try:
             curves.append(read_curves(file))
         except (OSError, ValueError) as error:
@@ -42,19 +36,18 @@ def diff_page(old: Path, new: Path, before: Mapping[str, Any], after: Mapping[st
     apart = {} if missing else differences(curves[0], curves[1])
     if not missing and not apart:
         missing.append("The two reports have no curve of the same solver.")
+    titles = {finding["id"]: finding["title"] for finding in (*before["findings"], *after["findings"])}
     rows = [
-        (heading, [_row(change, before, after) for change in found.changes if change.kind == kind])
+        (heading, [(titles[change.id], change.id, change.words) for change in found.changes if change.kind == kind])
         for kind, heading in HEADINGS.items()
     ]
-    templates = environment()
-    templates.filters |= {"data_uri": data_uri, "shape": shape}
-    return templates.get_template("diff.html.j2").render(
+    return environment().get_template("diff.html.j2").render(
         old=str(old),
         new=str(new),
         found=found,
         groups=[(heading, changes) for heading, changes in rows if changes],
         figure=draw(figure_report_pair(curves[0], curves[1], apart)).svg if apart else "",
-        largest=[(name, *_largest(t, size)) for name, (t, size) in apart.items() if len(t)],
+        largest=[(name, size[k := int(np.abs(size).argmax())], t[k]) for name, (t, size) in apart.items() if len(t)],
         missing=missing,
         alone=sorted(set(curves[0]) ^ set(curves[1])) if len(curves) == 2 else [],
     )  # fmt: skip
@@ -63,10 +56,7 @@ def diff_page(old: Path, new: Path, before: Mapping[str, Any], after: Mapping[st
 def read_curves(path: Path) -> Curves:
     """Return the curves of a report's table by solver; a column of values follows the column of its times.
 
-    Raises
-    ------
-    OSError, ValueError
-        If the table cannot be read; the message says what is wrong.
+    Raises OSError or ValueError if the table cannot be read.
     """
     with path.open(encoding="utf-8", newline="") as file:
         header, *lines = list(csv.reader(file)) or [[]]
@@ -80,20 +70,8 @@ def read_curves(path: Path) -> Curves:
     for name, values in zip(header, columns, strict=False):
         if name.startswith("t "):
             times = values
-        elif name.startswith(NAME):
+        elif name.startswith("omega/omega_0 "):
             there = ~(np.isnan(times) | np.isnan(values))
             if there.any():
-                found[name.removeprefix(NAME).partition(" [")[0]] = times[there], values[there]
+                found[name.removeprefix("omega/omega_0 ").partition(" [")[0]] = times[there], values[there]
     return found
-
-
-def _row(change: Change, before: Mapping[str, Any], after: Mapping[str, Any]) -> tuple[str, str, str]:
-    """Return what a finding is about, its id, and from what to what it changed."""
-    titles = {finding["id"]: finding["title"] for finding in (*before["findings"], *after["findings"])}
-    return titles[change.id], change.id, change.words
-
-
-def _largest(t: Any, size: Any) -> tuple[float, float]:
-    """Return the largest difference and its time."""
-    k = int(np.abs(size).argmax())
-    return float(size[k]), float(t[k])

@@ -30,9 +30,6 @@ from flipproof.frame.pool import Here
 from flipproof.frame.store import RunStore
 from slicemodel import Scenario
 
-SLICES: Final = 50
-"""Slices at most, where no baseline says how many."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Checked:
@@ -77,21 +74,15 @@ def check(
     Parameters
     ----------
     scenario : Scenario
-    groups : sequence of str
-        Of "ice", "vectors", "convergence", "reference", "thresholds"; the last needs a baseline.
-    baseline : Path or None
-        A report's folder or ``summary.json``, of the same throw.
-    tolerance : float
-        What a finding may move beyond its bands, in its own unit.
-    say : callable (line)
-        Called with a line for each claim, as soon as it is known.
-    store : RunStore or None
-        Slow runs are looked for and kept there.
+    groups : sequence of str - of ``groups()``; "thresholds" needs a baseline
+    baseline : Path or None - a report's folder or ``summary.json``, of the same throw
+    tolerance : float - what a finding may move beyond its bands, in its own unit
+    say : callable (line) - called with a line for each claim, as soon as it is known
+    store : RunStore or None - slow runs are looked for and kept there
     guests : sequence of str
         Specs of foreign solvers: their certificates are among the claims, and what a report of them found in the
         baseline is found again.
-    timeout : float or None
-        Seconds one of their runs may take; None: as each declares.
+    timeout : float or None - seconds one of their runs may take; None: as each declares
 
     Raises
     ------
@@ -104,38 +95,29 @@ def check(
         changes = scenario_changes(summary["scenario"], scenario.to_mapping())
         if changes:
             raise ValueError(f"{baseline}: is of another throw: {'; '.join(changes)} (baseline → scenario)")
-    slices = min(SLICES, scenario.n_slices) if summary is None else summary.get("slices")
+    slices = min(50, scenario.n_slices) if summary is None else summary.get("slices")
     if not isinstance(slices, int) or isinstance(slices, bool) or slices < 1:
         raise ValueError(f"{baseline}: slices = {slices!r} must be a whole number of at least 1")
     throw = scenario.with_slices(slices)
     found: list[Finding] = []
     seconds: dict[str, float] = {}
+    asked: list[tuple[str, Any]] = [(group, None) for group in groups]
+    asked += [("guests", (tuple(guests), timeout))] if guests else []
     began = time.perf_counter()
-    for group in groups:
-        for finding in findings_of(group, throw, store):
+    for group, work in asked:
+        for finding in findings_of(group, throw, store, work):
             began, seconds[finding.id] = time.perf_counter(), time.perf_counter() - began
             was = known.get(finding.id)
-            if was is None and group == "thresholds":
+            moves = group == "thresholds" or (work is not None and finding.kind != "regression")
+            if moves and (was is None or (work is not None and was["value"] is None)):
                 continue
             held, needs = finding, _interval(finding.admissible)
             if was is not None:
-                held, needs = _held_to(finding, was, tolerance, moves=group == "thresholds")
+                held, needs = _held_to(finding, was, tolerance, moves=moves)
             found.append(held)
             say(line(held, needs))
-    for finding in findings_of("guests", throw, store, (tuple(guests), timeout)) if guests else ():
-        was = known.get(finding.id)
-        moves = finding.kind != "regression"
-        if moves and (was is None or was["value"] is None):
-            continue
-        held, needs = (
-            (finding, _interval(finding.admissible)) if was is None else _held_to(finding, was, tolerance, moves=moves)
-        )
-        found.append(held)
-        say(line(held, needs))
-    if "thresholds" in groups:
-        left_out = tuple(name for name in known if name not in {finding.id for finding in found})
-    else:
-        left_out = ()
+    recomputed = {finding.id for finding in found}
+    left_out = tuple(name for name in known if name not in recomputed) if "thresholds" in groups else ()
     return Checked(findings=tuple(found), left_out=left_out, seconds=seconds)
 
 
@@ -178,9 +160,6 @@ def _held_to(finding: Finding, was: Mapping[str, Any], tolerance: float, *, move
     return replace(finding, kind="regression", admissible=(low, high)), " and ".join(needs) or "any number"
 
 
-# ---------------------------------------------------------------------- the groups
-
-
 CHECKS: Final[Mapping[str, tuple[str, ...]]] = {
     "ice": ("ice",),
     "vectors": ("vectors",),
@@ -195,20 +174,14 @@ def groups() -> dict[str, tuple[str, ...]]:
     """Return ``CHECKS``, and before the last a group for every other chapter that has the size "check"."""
     known = {name for names in CHECKS.values() for name in names}
     quick = [chapter.name for part in parts() for chapter in part.chapters if "check" in chapter.work]
-    *first, last = CHECKS
-    return (
-        {group: CHECKS[group] for group in first}
-        | {name: (name,) for name in quick if name not in known}
-        | {last: CHECKS[last]}
-    )
+    *first, last = CHECKS.items()
+    return dict([*first, *((name, (name,)) for name in quick if name not in known), last])
 
 
 def findings_of(group: str, throw: Scenario, store: RunStore | None = None, work: Any = None) -> Iterator[Finding]:
     """Yield the findings of a group's chapters, or of a chapter given its ``work``; runs are made in this process."""
+    chapters = groups()[group] if work is None else (group,)
     ask = ask_of(throw, "check", throw.n_slices)
-    if work is None:
-        told = tell(gather(chapters_named(*groups()[group]), ask, Here(), store=store))
-    else:
-        told = tell(gather(chapters_named(group), ask, Here(), work={group: work}, store=store))
-    for each in told.values():
+    amounts = None if work is None else {group: work}
+    for each in tell(gather(chapters_named(*chapters), ask, Here(), work=amounts, store=store)).values():
         yield from each.findings

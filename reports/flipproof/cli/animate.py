@@ -6,10 +6,9 @@ import argparse
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, read_scenario
+from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, progress_bar, read_scenario
 
 SLICES: Final = 50
-DEFAULT_OUT: Final = Path("flips.gif")
 
 
 def add_animate(commands: Any) -> None:
@@ -18,7 +17,7 @@ def add_animate(commands: Any) -> None:
     animate.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     animate.add_argument("--solvers", metavar="A,B,C", help="see 'flipproof models' (default: those of the report)")
     animate.add_argument(
-        "--out", type=Path, default=DEFAULT_OUT, metavar="FILE", help="file.gif or file.mp4 (%(default)s)"
+        "--out", type=Path, default=Path("flips.gif"), metavar="FILE", help="file.gif or file.mp4 (%(default)s)"
     )
     animate.add_argument(
         "--slow", type=float, default=9.6, metavar="X", help="times slower than the flight (%(default)s)"
@@ -43,9 +42,8 @@ def command_animate(options: argparse.Namespace) -> int:
 
     from flipproof.frame.solvers import solve
 
-    hide = True if options.quiet else None
     runs = []
-    for name in tqdm(names, desc="throwing", unit="bottle", disable=hide, leave=False):
+    for name in tqdm(names, desc="throwing", unit="bottle", disable=True if options.quiet else None, leave=False):
         run = solve(name, throw)
         if len(run.t) < 2:
             raise ValueError(f"--solvers {name}: nothing to show on this throw: {run.status}: {run.message}")
@@ -53,11 +51,7 @@ def command_animate(options: argparse.Namespace) -> int:
             raise ValueError(f"--solvers {name}: gives neither r nor r_cm; a picture needs one of them")
         runs.append(run)
     film = film_of(runs, times, fps=options.fps, slow=options.slow)
-    with tqdm(total=len(times), desc="drawing", unit="frame", disable=hide, leave=False) as bar:
-
-        def step(drawn: int, _frames: int) -> None:
-            bar.update(drawn - bar.n)
-
+    with progress_bar("drawing", "frame", quiet=options.quiet) as step:
         write_film(film, options.out, step)
     seconds = throw.duration * options.slow
     print(f"{options.out}: {len(times)} frames, {len(runs)} bottles, {seconds:.1f} s ({options.slow:g} times slower)")
@@ -67,20 +61,16 @@ def command_animate(options: argparse.Namespace) -> int:
 def chosen_solvers(text: str | None, usual: tuple[str, ...]) -> list[str]:
     """Return the solvers that ``--solvers`` names, or the usual ones.
 
-    Raises
-    ------
-    ValueError
-        If one is unknown or named twice, or if they are too many to stand side by side.
+    One that is unknown or named twice, or too many to stand side by side, raise a ValueError.
     """
     if text is None:
         return list(usual)
-    from flipproof.animate import MOST_BOTTLES
     from flipproof.frame.solvers import find
 
     names = [find(name.strip()).name for name in text.split(",")]
     for name in names:
         if names.count(name) > 1:
             raise ValueError(f"--solvers {text}: {name} is there twice")
-    if len(names) > MOST_BOTTLES:
-        raise ValueError(f"--solvers {text}: {len(names)} bottles do not fit (admissible: at most {MOST_BOTTLES})")
+    if len(names) > 6:
+        raise ValueError(f"--solvers {text}: {len(names)} bottles do not fit (admissible: at most 6)")
     return names

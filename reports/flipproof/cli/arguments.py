@@ -6,11 +6,18 @@ import argparse
 import json
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+import shlex
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final, NoReturn
+from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from flipproof.cli.console import readable
+
+if TYPE_CHECKING:
+    from flipproof.frame.findings import Finding
+    from flipproof.frame.store import RunStore
 
 SCENARIO_HELP: Final = "scenario file (TOML with tables [scenario] and [bottle]); default: the paper's own throw"
 
@@ -41,6 +48,13 @@ def add_no_cache(command: argparse.ArgumentParser) -> None:
     )
 
 
+def store_of(options: argparse.Namespace) -> RunStore:
+    """Return the store of runs that a command with ``--no-cache`` uses."""
+    from flipproof.frame.store import RunStore, default_place
+
+    return RunStore(None if options.no_cache else default_place())
+
+
 def add_guests(command: argparse.ArgumentParser, what: str) -> None:
     """Add ``--with SPEC``, which may be repeated, and ``--timeout``."""
     command.add_argument(
@@ -55,12 +69,7 @@ def add_guests(command: argparse.ArgumentParser, what: str) -> None:
 
 
 def check_guests(specs: Sequence[str]) -> None:
-    """Refuse, before the work begins, a spec that names nothing or is there twice; no foreign code runs.
-
-    Raises
-    ------
-    ValueError
-    """
+    """Refuse by a ValueError, before the work begins, a spec that names nothing or is there twice; nothing runs."""
     from flipproof.frame.solvers import find
 
     for spec in specs:
@@ -87,45 +96,33 @@ def number(text: str) -> float:
     return value
 
 
-def check_writable(option: str, path: Path) -> None:
-    """Refuse, before the work begins, a file that could not be written after it.
+def check_outputs(options: argparse.Namespace, *names: str) -> None:
+    """Refuse by a ValueError, before the work begins, files of options that could not be written after it."""
+    for name in names:
+        if path := getattr(options, name):
+            check_writable(f"--{name}", path)
 
-    Raises
-    ------
-    ValueError
-        If the path is a folder, or its folder does not exist.
-    """
+
+def check_writable(option: str, path: Path) -> None:
+    """Refuse by a ValueError, before the work begins, a file that could not be written after it."""
     if path.is_dir():
         raise ValueError(f"{option} {path} is a folder; name a file")
     if not path.parent.is_dir():
         raise ValueError(f"{option} {path}: the folder {path.parent} does not exist")
 
 
-WRITTEN: Final = ("out", "json", "junit", "html", "export", "film")
-"""Options that name what a command writes."""
-
-
 def refuse_overwriting(options: argparse.Namespace) -> None:
-    """Refuse a command that would write over a file that it reads.
-
-    Raises
-    ------
-    ValueError
-        Naming the option and the file.
-    """
+    """Refuse by a ValueError a command that would write over a file that it reads."""
     given = vars(options)
-    read = [each for name, value in given.items() if name not in WRITTEN for each in _each(value)]
+    written = ("out", "json", "junit", "html", "export", "film")
+    values = [value if isinstance(value, list) else [value] for name, value in given.items() if name not in written]
+    texts = [str(each) for value in values for each in value if isinstance(each, str | Path)]
     # A spec such as mine.py:solve or csv:file.csv names a file, too.
-    read = [part for each in read for part in (each, *each.split(":")) if os.path.isfile(part)]
-    for name in WRITTEN:
+    read = [part for text in texts for part in (text, *text.split(":")) if os.path.isfile(part)]
+    for name in written:
         path = given.get(name)
         if isinstance(path, Path) and path.is_file() and any(path.samefile(part) for part in read):
             raise ValueError(f"--{name} {path} is a file that this command reads; name another")
-
-
-def _each(value: object) -> list[str]:
-    """Return the texts and paths of an option as texts."""
-    return [str(each) for each in (value if isinstance(value, list) else [value]) if isinstance(each, str | Path)]
 
 
 def add_json(command: argparse.ArgumentParser, what: str) -> None:
@@ -140,6 +137,37 @@ def write_json(path: Path | None, mapping: Mapping[str, Any]) -> None:
         from flipproof.output.folder import write_text
 
         write_text(path, json.dumps(json_ready(mapping), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def write_junit(
+    path: Path | None, findings: Sequence[Finding], suite: str, seconds: Mapping[str, float] | None = None
+) -> None:
+    """Write findings as JUnit XML into the file that ``--junit`` names, if any."""
+    if path is not None:
+        from flipproof.output.folder import write_text
+        from flipproof.output.junit import junit_text
+
+        write_text(path, junit_text(findings, suite, seconds))
+
+
+@contextmanager
+def progress_bar(what: str, unit: str, *, quiet: bool = False) -> Iterator[Callable[..., None]]:
+    """Give what is to be called with the number made, the number planned and a name; a terminal shows a bar."""
+    from tqdm import tqdm
+
+    with tqdm(desc=what, unit=unit, disable=True if quiet else None, leave=False) as bar:
+
+        def progress(made: int, planned: int, label: str = "") -> None:
+            bar.total = planned
+            bar.set_postfix_str(label, refresh=False)
+            bar.update(made - bar.n)
+
+        yield progress
+
+
+def command_line() -> str:
+    """Return the command as it was given, for the provenance."""
+    return shlex.join(["flipproof", *sys.argv[1:]])
 
 
 def read_scenario(path: str | None, slices: int | None = None) -> Any:

@@ -1,19 +1,26 @@
-"""The commands of ``flipproof`` for other people's pipelines: diff compares two reports, check holds a throw to one."""
+"""The commands of ``flipproof`` for pipelines: compare two curves, diff two reports, check a throw against one."""
 
 from __future__ import annotations
 
 import argparse
+import functools
+import math
 from pathlib import Path
 from typing import Any, Final
 
 from flipproof.cli.arguments import (
+    SCENARIO_HELP,
     add_command,
     add_guests,
     add_json,
     add_no_cache,
     check_guests,
-    check_writable,
+    check_outputs,
+    count,
+    read_scenario,
+    store_of,
     write_json,
+    write_junit,
 )
 
 TOLERANCE_HELP: Final = (
@@ -53,10 +60,7 @@ def add_checks(commands: Any) -> None:
 
 def command_diff(options: argparse.Namespace) -> int:
     """Print what differs; return 1 if anything does."""
-    if options.html:
-        check_writable("--html", options.html)
-    if options.json:
-        check_writable("--json", options.json)
+    check_outputs(options, "html", "json")
     from flipproof.check.diff import TOLERANCE, compare_summaries, read_summary
 
     old, new = read_summary(options.old), read_summary(options.new)
@@ -85,29 +89,18 @@ def command_check(options: argparse.Namespace) -> int:
     groups = options.only or tuple(group for group in known() if options.baseline or group != "thresholds")
     if "thresholds" in groups and options.baseline is None:
         raise ValueError("--only thresholds: needs --baseline, the summary.json of a report of this throw")
-    if options.junit:
-        check_writable("--junit", options.junit)
-    if options.json:
-        check_writable("--json", options.json)
+    check_outputs(options, "junit", "json")
     from flipproof.check.diff import TOLERANCE
     from flipproof.check.throw import check
-    from flipproof.frame.store import RunStore, default_place
 
     allowed = TOLERANCE if options.tolerance is None else options.tolerance
-
-    def say(line: str) -> None:
-        print(line, flush=True)
-
-    with RunStore(None if options.no_cache else default_place()) as store:
+    say = functools.partial(print, flush=True)
+    with store_of(options) as store:
         found = check(
             scenario, groups, baseline=options.baseline, tolerance=allowed, say=say, store=store,
             guests=options.guests, timeout=options.timeout,
         )  # fmt: skip
-    if options.junit:
-        from flipproof.output.folder import write_text
-        from flipproof.output.junit import junit_text
-
-        write_text(options.junit, junit_text(found.findings, "flipproof check", found.seconds))
+    write_junit(options.junit, found.findings, "flipproof check", found.seconds)
     write_json(options.json, {"findings": [one.to_mapping() for one in found.findings], "conclusion": found.conclusion})
     say(found.conclusion)
     return 1 if found.failed else 0
@@ -132,3 +125,57 @@ def tolerance(text: str) -> float:
     if not 0.0 <= value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text!r} is not a finite number of at least 0")
     return value
+
+
+def add_compare(commands: Any) -> None:
+    """Add the command."""
+    compare = add_command(commands, "compare", "Compare two solvers, or two CSV files, in numbers.", command_compare)
+    compare.add_argument(
+        "first", metavar="A", help="a solver's name or spec, or a CSV file with a column t and at least one of omega, "
+        "theta and r_cm; empty cells are left out, and of a track.csv the flight is taken",
+    )  # fmt: skip
+    compare.add_argument("second", metavar="B", help="the same; differences are B minus A")
+    compare.add_argument("--scenario", metavar="SCENARIO.toml", help=SCENARIO_HELP)
+    compare.add_argument("--slices", type=count, metavar="N", help="slices for both solvers (default 50)")
+    compare.add_argument(
+        "--tolerance", type=tolerance, metavar="X", help="end with status 1 if the largest difference in omega exceeds "
+        "X omega_0; without omega in both, in theta X rad; without theta, in r_cm X m",
+    )  # fmt: skip
+    add_json(compare, "both curves' differences")
+    compare.add_argument("--junit", type=Path, metavar="FILE", help="write that verdict as JUnit XML, too")
+
+
+def command_compare(options: argparse.Namespace) -> int:
+    """Compare two solvers or files and print the differences; return 1 if they exceed the tolerance."""
+    if options.junit and options.tolerance is None:
+        raise ValueError(f"--junit {options.junit} needs --tolerance: without it no comparison can fail")
+    check_outputs(options, "junit", "json")
+    from flipproof.check.comparison import claims, compare, table
+    from flipproof.frame.solvers import find, solve
+    from flipproof.output.tables import Curve, read_curve
+
+    scenario = read_scenario(options.scenario, options.slices)
+    if options.slices is None:
+        scenario = scenario.with_slices(min(50, scenario.n_slices))
+
+    def load(name: str) -> Curve:
+        path = Path(name)
+        if path.is_file() or ((path.suffix or "/" in name) and ":" not in name):
+            return read_curve(path)
+        run = solve(find(name).name, scenario)
+        if len(run.t) < 2:
+            raise ValueError(f"{name} has nothing to compare on this throw: {run.status}: {run.message}")
+        return Curve.of(run)
+
+    found = compare(load(options.first), load(options.second))
+    print(table(found))
+    allowed = math.inf if options.tolerance is None else options.tolerance
+    held = claims(found, allowed)
+    write_json(options.json, {**found.to_mapping(), "findings": [finding.to_mapping() for finding in held]})
+    if options.tolerance is None:
+        return 0
+    write_junit(options.junit, held, "flipproof compare")
+    first = held[0]
+    word = "FAIL" if first.failed else "PASS"
+    print(f"{word}  {first.title}: {first.value:.6g} {first.unit}, tolerance {options.tolerance:g} ({first.note})")
+    return 1 if first.failed else 0

@@ -13,13 +13,11 @@ from typing import Any, Final
 from flipproof.cli.arguments import add_command
 from slicemodel.scenario import shortened
 
-SHELLS: Final = ("bash", "zsh", "fish")
-
 SOLVERS: Final = frozenset({"solver", "solvers", "model", "guests", "spec", "first", "second"})
 """Arguments that name solvers."""
 
 HEAD: Final = """\
-# Completion for flipproof. Now: eval "$(flipproof completion {shell})"; for good: put that line into {file}.
+# Completion for flipproof. Now: eval "$(flipproof completion {shell})"; for good: put that line into ~/.{shell}rc.
 {prefix}_flipproof() {{
     local word=${{COMP_WORDS[COMP_CWORD]}} before=${{COMP_WORDS[COMP_CWORD-1]}} command=${{COMP_WORDS[1]}} words=""
     COMPREPLY=()
@@ -43,8 +41,6 @@ autoload -U +X bashcompinit && bashcompinit
 """
 """What zsh needs to take a script for bash."""
 
-FILES: Final = {"bash": "~/.bashrc", "zsh": "~/.zshrc"}
-
 FISH: Final = """\
 # Completion for flipproof. Now: flipproof completion fish | source; for good: put that line into
 # ~/.config/fish/config.fish.
@@ -60,9 +56,6 @@ complete -c flipproof -n __flipproof_first -f
 """
 """Which word is typed, asked by every line for fish; what was defined before is taken back."""
 
-SAID: Final = 70
-"""Letters of a description that fish shows beside a word."""
-
 
 def add_completion(commands: Any) -> None:
     """Add the command."""
@@ -71,7 +64,7 @@ def add_completion(commands: Any) -> None:
     )
     command.add_argument(
         "shell",
-        choices=SHELLS,
+        choices=("bash", "zsh", "fish"),
         help='whose; then: eval "$(flipproof completion bash)", or in fish: flipproof completion fish | source',
     )
 
@@ -90,10 +83,8 @@ def script(shell: str, top: argparse.ArgumentParser, solvers: list[str]) -> str:
     commands = _commands(top)
     if shell == "fish":
         return FISH + "".join(f"complete -c flipproof {line}\n" for line in _fish(top, solvers))
-    prefix = ZSH if shell == "zsh" else ""
-    head = HEAD.format(
-        shell=shell, file=FILES[shell], prefix=prefix, commands=shlex.quote(" ".join([*commands, *_options(top)]))
-    )
+    first = shlex.quote(" ".join([*commands, *_options(top)]))
+    head = HEAD.format(shell=shell, prefix=ZSH if shell == "zsh" else "", commands=first)
     lines = [line for name, command in commands.items() for line in _values(name, command, solvers)]
     lines += ["    esac", '    case "$command $word" in']
     lines += [
@@ -127,7 +118,7 @@ def _fish(top: argparse.ArgumentParser, solvers: list[str]) -> Iterator[str]:
             said = command._get_formatter()._expand_help(action) if action.help else ""
             for option in action.option_strings:
                 kind = "-l" if option.startswith("--") else "-s"
-                yield f"{here} {kind} {option.lstrip('-')}{takes} -d {_for_fish(shortened(said, SAID))}"
+                yield f"{here} {kind} {option.lstrip('-')}{takes} -d {_for_fish(shortened(said, 70))}"
 
 
 def _for_fish(text: str) -> str:

@@ -21,16 +21,10 @@ ASCII: Final = {
 }  # fmt: skip
 """How a character is written where it cannot be shown."""
 
-HANDLER: Final = "flipproof"
-
-MOST_WORD: Final = 300
-MOST_LINE: Final = 2000
-"""Characters of a word, such as a path, and of a line in an error message."""
-
 
 def readable(words: str) -> str:
     """Return an error message as one line of readable length: a word or a line without end loses its middle."""
-    return _cut(" ".join(_cut(word, MOST_WORD) for word in words.split()), MOST_LINE)
+    return _cut(" ".join(_cut(word, 300) for word in words.split()), 2000)
 
 
 def _cut(text: str, most: int) -> str:
@@ -58,11 +52,11 @@ def speak_plainly() -> None:
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
-    codecs.register_error(HANDLER, _in_ascii)
+    codecs.register_error("flipproof", _in_ascii)
     for stream in (sys.stdout, sys.stderr):
         reconfigure: Any = getattr(stream, "reconfigure", None)
         if reconfigure is not None:
-            reconfigure(errors=HANDLER)
+            reconfigure(errors="flipproof")
 
 
 def _in_ascii(error: UnicodeError) -> tuple[str, int]:

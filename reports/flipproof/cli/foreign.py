@@ -1,10 +1,11 @@
-"""The commands of ``flipproof`` for anybody's solver: certify, place, explain, kit, grade, power."""
+"""The commands of ``flipproof`` about solvers, its own and anybody's: models, certify, place, explain, kit, power."""
 
 from __future__ import annotations
 
 import argparse
 import json
 import sys
+import textwrap
 from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
@@ -14,10 +15,11 @@ from flipproof.cli.arguments import (
     SCENARIO_HELP,
     add_command,
     add_json,
-    check_writable,
+    check_outputs,
     count,
     read_scenario,
     write_json,
+    write_junit,
 )
 from flipproof.cli.console import patience
 
@@ -66,29 +68,37 @@ def add_foreign(commands: Any) -> None:
     power.add_argument("--out", type=Path, metavar="DIR", help="also write power.csv, .svg, .png and junit.xml there")
 
 
-def print_offered() -> None:
-    """List the solvers that installed packages offer; none of them is imported."""
-    from flipproof.foreign.specs import offered
-
-    points = offered()
-    if points:
-        print("\nsolvers that installed packages offer, imported when they are named\n")
-    for name, point in sorted(points.items()):
-        owner = f"{point.dist.name} {point.dist.version}" if point.dist else "an unnamed package"
-        print(f"  {name}\n      {point.value}, from {owner}")
+def add_models(commands: Any) -> None:
+    """Add the command that lists solvers."""
+    models = add_command(commands, "models", "List every scheme, model and engine.", command_models)
+    models.add_argument("--json", action="store_true", help="print JSON")
 
 
-def print_offered_json() -> None:
-    """Print every solver, flipproof's own and those that installed packages offer, as JSON."""
+def command_models(options: argparse.Namespace) -> int:
+    """List every solver with its equation and the reason it is there, and what packages offer; none is imported."""
     from flipproof.foreign.specs import offered
     from flipproof.frame.solvers import catalogue
 
-    points = {
-        name: {"object": point.value, "distribution": point.dist.name if point.dist else None}
-        for name, point in sorted(offered().items())
-    }
-    own = {solver.name: asdict(solver) for solver in catalogue().values()}
-    print(json.dumps({"solvers": own, "offered": points}, indent=1, ensure_ascii=False))
+    own, points = catalogue(), sorted(offered().items())
+    if options.json:
+        solvers = {name: asdict(solver) for name, solver in own.items()}
+        others = {n: {"object": p.value, "distribution": p.dist.name if p.dist else None} for n, p in points}
+        print(json.dumps({"solvers": solvers, "offered": others}, indent=1, ensure_ascii=False))
+        return 0
+    package = ""
+    for solver in own.values():
+        if solver.package != package:
+            package = solver.package
+            print(f"\n{package}.solve(scenario, {solver.keyword}=...)\n")
+        print(f"  {solver.name}")
+        for text in (solver.equation, solver.reason):
+            print(textwrap.fill(text, width=100, initial_indent="      ", subsequent_indent="      "))
+    if points:
+        print("\nsolvers that installed packages offer, imported when they are named\n")
+    for name, point in points:
+        owner = f"{point.dist.name} {point.dist.version}" if point.dist else "an unnamed package"
+        print(f"  {name}\n      {point.value}, from {owner}")
+    return 0
 
 
 def _add_spec(command: argparse.ArgumentParser) -> None:
@@ -103,20 +113,15 @@ def command_certify(options: argparse.Namespace) -> int:
     from flipproof.foreign.certify import certify
     from flipproof.foreign.contract import check_equation
     from flipproof.foreign.specs import opened
+    from flipproof.foreign.verdicts import findings_of
 
     if options.equation is not None:
         check_equation(options.equation)
-    for name in ("json", "junit"):
-        if getattr(options, name) is not None:
-            check_writable(f"--{name}", getattr(options, name))
+    check_outputs(options, "json", "junit")
     with closing(opened(options.spec, options.timeout)) as runner, patience(20.0):
         found = certify(runner, equation=options.equation, say=lambda result: print(result.line, flush=True))
     write_json(options.json, found.to_mapping())
-    if options.junit is not None:
-        from flipproof.foreign.verdicts import junit_of
-        from flipproof.output.folder import write_text
-
-        write_text(options.junit, junit_of(found))
+    write_junit(options.junit, findings_of(found), f"flipproof certify {found.traits.name}")
     print(found.conclusion)
     return 1 if found.failed else 0
 
@@ -152,17 +157,10 @@ def command_kit(options: argparse.Namespace) -> int:
     from flipproof.foreign.contract import Traits
     from flipproof.foreign.kit import Kit
 
-    traits = Traits(
-        name=options.name,
-        equation=options.equation,
-        refined_by=options.refined_by,
-        precision=options.precision,
-        order=options.order,
-    )
-    kit = Kit.made(options.out, traits)
-    print(
-        f"{len(kit.asks)} asks in {options.out / 'asks'}: write answer.csv beside each scenario.toml (columns t, theta,"
-    )
+    traits = {name: getattr(options, name) for name in ("name", "equation", "refined_by", "precision", "order")}
+    kit = Kit.made(options.out, Traits(**traits))
+    asks = f"{len(kit.asks)} asks in {options.out / 'asks'}"
+    print(f"{asks}: write answer.csv beside each scenario.toml (columns t, theta,")
     print(f"omega; r_0 to r_(N-1) if you have them), then run: flipproof grade {options.out}")
     return 0
 
@@ -183,17 +181,17 @@ def command_grade(options: argparse.Namespace) -> int:
 
 def command_power(options: argparse.Namespace) -> int:
     """Print a line a mistake; return 1 if one is caught by no check, or the clean solver by any."""
-    from flipproof.foreign.power import claim_power, detect_all, matrix_csv
+    from flipproof.foreign.mistakes import MISTAKES
+    from flipproof.foreign.power import CLEAN, claim_power, detect, matrix_csv
     from flipproof.frame.pool import workers
     from flipproof.output.folder import write_text
-    from flipproof.output.junit import junit_text
 
-    def say(caught: Any) -> None:
-        seen = ", ".join(caught.checks) or "no check"
-        print(f"{caught.mistake:22} {caught.words} Seen by: {seen}", flush=True)
-
+    found = []
     with workers(options.jobs) as pool:
-        found = detect_all(pool, say)
+        for caught in pool.map(detect, [CLEAN, *MISTAKES]):
+            seen = ", ".join(caught.checks) or "no check"
+            print(f"{caught.mistake:22} {caught.words} Seen by: {seen}", flush=True)
+            found.append(caught)
     if options.out is not None:
         from flipproof.figures.power import figure_power
         from flipproof.figures.style import draw
@@ -207,7 +205,6 @@ def command_power(options: argparse.Namespace) -> int:
     for claim in claims:
         verdict = "FAIL" if claim.failed else "PASS"
         print(f"{verdict}  {claim.title}: {claim.value:g} {claim.unit} {claim.note}".rstrip())
-    if options.out is not None:
-        write_text(options.out / "junit.xml", junit_text(claims, "flipproof power"))
+    write_junit(options.out and options.out / "junit.xml", claims, "flipproof power")
     sys.stdout.flush()
     return 1 if any(claim.failed for claim in claims) else 0

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, number, read_scenario
+from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, number, progress_bar, read_scenario
 from flipproof.cli.sweeps import add_store, fill
 
 SLICES: Final = 20
@@ -93,16 +93,11 @@ def command_land(options: argparse.Namespace) -> int:
 
 
 def _film(options: argparse.Namespace, rows: Any, table: Any) -> None:
-    from tqdm import tqdm
-
-    from flipproof.animate import MOST_FPS, MOST_FRAMES, FilmError, write_pictures
+    from flipproof.animate import MOST_FRAMES, FilmError, check_pace, write_pictures
     from flipproof.landing.film import draw_landing, film_times, shown
     from flipproof.landing.work import REFERENCE
 
-    if not options.slow > 0:
-        raise FilmError(f"--slow {options.slow:g} is outside (0, inf): 1 is real time, 9.6 the paper's slow motion")
-    if options.fps > MOST_FPS:
-        raise FilmError(f"--fps {options.fps} is outside [1, {MOST_FPS}] frames per second")
+    check_pace(options.slow, options.fps)
     chosen = [row for row in rows if row.program == REFERENCE] or list(rows)
     bottles = [
         shown(row.name if row.law is None else f"{row.name}, {row.law}", row.touch, table, row.law, row.outcome)
@@ -111,12 +106,7 @@ def _film(options: argparse.Namespace, rows: Any, table: Any) -> None:
     times = film_times(bottles, options.slow, options.fps)
     if len(times) > MOST_FRAMES:
         raise FilmError(f"--slow {options.slow:g} makes {len(times)} frames (admissible: at most {MOST_FRAMES})")
-    hide = True if options.quiet else None
-    with tqdm(total=len(times), desc="drawing", unit="frame", disable=hide, leave=False) as bar:
-
-        def step(drawn: int, _frames: int) -> None:
-            bar.update(drawn - bar.n)
-
+    with progress_bar("drawing", "frame", quiet=options.quiet) as step:
         write_pictures(draw_landing(bottles, times, options.slow), len(times), options.fps, options.film, step)
     print(f"{options.film}: {len(times)} frames, {len(bottles)} bottles ({options.slow:g} times slower)")
 
@@ -140,15 +130,11 @@ def command_upright(options: argparse.Namespace) -> int:
         raise ValueError("scenario.frozen = true: the study throws water and ice beside it; leave it out")
     size = Size(
         families=families,
-        throws=options.throws,
         axis_throws=options.throws,
         aim_throws=max(1, options.throws // 5),
-        slices=options.slices,
         map_cells=options.map,
         engine_throws=options.engine,
-        restitution=options.restitution,
-        friction=options.friction,
-        seed=options.seed,
+        **{name: getattr(options, name) for name in ("throws", "slices", "restitution", "friction", "seed")},
     )
     if options.fillings:
         middle = min(options.fillings, key=lambda filling: abs(filling - size.axis_filling))

@@ -13,7 +13,6 @@ if __name__ == "__main__":
 import _thread
 import argparse
 import os
-import shlex
 import signal
 import threading
 import time
@@ -31,16 +30,19 @@ from flipproof.cli.arguments import (
     add_guests,
     add_no_cache,
     check_guests,
+    check_outputs,
+    command_line,
     count,
+    progress_bar,
     read_scenario,
     refuse_overwriting,
+    store_of,
 )
-from flipproof.cli.check import add_checks
-from flipproof.cli.compare import add_compare
+from flipproof.cli.check import add_checks, add_compare
 from flipproof.cli.completion import add_completion
 from flipproof.cli.console import readable, speak_plainly
 from flipproof.cli.fit import add_fit
-from flipproof.cli.foreign import add_foreign, print_offered, print_offered_json
+from flipproof.cli.foreign import add_foreign, add_models
 from flipproof.cli.landing import add_landing
 from flipproof.cli.paper import add_paper
 from flipproof.cli.start import INTERRUPTED, INTERRUPTED_WORDS, SIGNALS
@@ -48,8 +50,7 @@ from flipproof.cli.sweeps import add_sweeps
 from flipproof.cli.tracker import add_tracker
 
 BAD_INPUT: Final = 2
-INTERNAL: Final = 3
-"""Exit statuses of a mistake in what was given, and of one in flipproof."""
+"""Exit status of a mistake in what was given; 3 is that of one in flipproof."""
 
 DEFAULT_OUT = Path("reports/latest" if Path("reports/flipproof").is_dir() else "flipproof-report")
 """Where a report goes without --out: into the checkout if the command runs in one, else beside what the user has."""
@@ -129,7 +130,7 @@ def _status(arguments: Sequence[str] | None) -> int:
         return _complain(
             f"{type(error).__name__}: {readable(str(error))} (an error in flipproof itself; "
             "set FLIPPROOF_TRACEBACK=1 to see where)",
-            INTERNAL,
+            3,
         )
 
 
@@ -199,10 +200,12 @@ def _complain(words: str, status: int) -> int:
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the whole command line."""
+    from flipproof.output.provenance import version_of
+
     top = OneLineParser(
         prog="flipproof", description=MANUAL, epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    top.add_argument("--version", action="version", version=f"flipproof {_version()}")
+    top.add_argument("--version", action="version", version=f"flipproof {version_of('flipproof')}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
     report = add_command(commands, "report", "Run everything and write a validation report.", command_report)
@@ -249,18 +252,8 @@ def parser() -> argparse.ArgumentParser:
     add_landing(commands)
     add_foreign(commands)
     add_completion(commands)
-    models = add_command(commands, "models", "List every scheme, model and engine.", command_models)
-    models.add_argument("--json", action="store_true", help="print JSON")
+    add_models(commands)
     return top
-
-
-def _version() -> str:
-    from importlib import metadata
-
-    try:
-        return metadata.version("flipproof")
-    except metadata.PackageNotFoundError:
-        return "checkout"
 
 
 def command_report(options: argparse.Namespace) -> int:
@@ -279,14 +272,11 @@ def command_report(options: argparse.Namespace) -> int:
     if options.pdf:
         require_browser()
 
-    from tqdm import tqdm
-
     from flipproof.build import ask_of, build, gather_report, write
     from flipproof.chapters import parts
     from flipproof.film.measured import part_measured
+    from flipproof.frame.gather import Stages
     from flipproof.frame.pool import workers
-    from flipproof.frame.stages import Stages
-    from flipproof.frame.store import RunStore, default_place
     from flipproof.output.provenance import provenance
 
     began = time.perf_counter()
@@ -297,27 +287,14 @@ def command_report(options: argparse.Namespace) -> int:
             print(f"flipproof: {time.perf_counter() - began:.0f} s: {stage}", file=sys.stderr, flush=True)
 
     ask = ask_of(scenario, "quick" if options.quick else "full", options.slices)
-    command = shlex.join(["flipproof", *sys.argv[1:]])
     with replaced_folder(options.out, "report") as folder:
-        with (
-            RunStore(None if options.no_cache else default_place()) as store,
-            workers(options.jobs) as pool,
-            tqdm(desc="runs", unit="run", disable=None, leave=False) as bar,
-        ):
-
-            def progress(made: int, planned: int, label: str) -> None:
-                bar.total = planned
-                bar.set_postfix_str(label, refresh=False)
-                bar.update(made - bar.n)
-
+        with store_of(options) as store, workers(options.jobs) as pool, progress_bar("runs", "run") as progress:
             contents = parts() if measurement is None else (part_measured(measurement), *parts())
             work = {"guests": (tuple(options.guests), options.timeout)} if options.guests else {}
-            gathered = gather_report(
-                ask, progress, options.jobs, Stages(say), store, pool, contents=contents, work=work
-            )
+            gathered = gather_report(ask, progress, Stages(say), store, pool, contents=contents, work=work)
             guests = gathered.found("guests")
-            facts = provenance(command) | store.facts() | ({} if guests is None else guests.facts)
-            report = build(gathered, facts, pool=store.remembering(pool), png=options.png)
+            facts = provenance(command_line()) | store.facts() | ({} if guests is None else guests.facts)
+            report = build(gathered, facts, store.remembering(pool), png=options.png)
         write(report, folder)
         if options.pdf:
             print_page(folder / "index.html", folder / "report.pdf")
@@ -357,10 +334,7 @@ def command_simulate(options: argparse.Namespace) -> int:
         if solver.package != "slicemodel":
             raise ValueError(f"--steps {options.steps}: {solver.name} is not a scheme and chooses its own steps")
         settings["steps"] = options.steps
-    if options.out and options.out.is_dir():
-        raise ValueError(f"--out {options.out} is a folder; name a file")
-    if options.out and not options.out.parent.is_dir():
-        raise ValueError(f"--out {options.out}: the folder {options.out.parent} does not exist")
+    check_outputs(options, "out")
     trajectory = solve(solver.name, scenario, **settings)
     table = trajectory_csv(trajectory)
     if options.out:
@@ -369,27 +343,6 @@ def command_simulate(options: argparse.Namespace) -> int:
         sys.stdout.write(table)
     if not trajectory.ok:
         print(f"flipproof: {solver.name}: {trajectory.status}: {trajectory.message}", file=sys.stderr)
-    return 0
-
-
-def command_models(options: argparse.Namespace) -> int:
-    """List every solver with its equation and the reason it is there."""
-    import textwrap
-
-    from flipproof.frame.solvers import catalogue
-
-    if options.json:
-        print_offered_json()
-        return 0
-    package = ""
-    for solver in catalogue().values():
-        if solver.package != package:
-            package = solver.package
-            print(f"\n{package}.solve(scenario, {solver.keyword}=...)\n")
-        print(f"  {solver.name}")
-        for text in (solver.equation, solver.reason):
-            print(textwrap.fill(text, width=100, initial_indent="      ", subsequent_indent="      "))
-    print_offered()
     return 0
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -17,9 +16,7 @@ from slicemodel.trajectory import IMPACT_FIELDS, FloatArray, Impacts, Trajectory
 REQUIRED: Final = ("t", "theta", "omega")
 PER_TIME: Final = ("r_cm", "inertia")
 PER_SLICE: Final = ("r", "v")
-
-KINDS: Final = MappingProxyType({"c": "complex numbers", "U": "text", "S": "text", "O": "objects", "b": "truth values"})
-"""What an array holds that is no real number, by numpy's letter of its kind."""
+IMPACT: Final = tuple(name for name, _ in IMPACT_FIELDS)
 
 
 class AnswerError(ValueError):
@@ -61,14 +58,12 @@ def answer_of(ask: Ask, given: object, *, own_times: bool = False) -> Answer:
     Raises
     ------
     AnswerError
+        Naming the field, what came and what is needed.
     """
     if isinstance(given, Trajectory) and not given.ok:
         raise AnswerError(f"status = {given.status!r}: {given.message}")
-    fields: dict[str, Any] = {}
-    for name in (*REQUIRED, *PER_TIME, *PER_SLICE, "impacts"):
-        value = given.get(name) if isinstance(given, Mapping) else getattr(given, name, None)
-        if value is not None:
-            fields[name] = value
+    names = (*REQUIRED, *PER_TIME, *PER_SLICE, "impacts")
+    fields = {name: value for name in names if (value := _field(given, name)) is not None}
     missing = [name for name in REQUIRED if name not in fields]
     if missing:
         kind = "" if isinstance(given, Mapping) else f" (a {type(given).__name__} came)"
@@ -93,14 +88,13 @@ def answer_of(ask: Ask, given: object, *, own_times: bool = False) -> Answer:
     return Answer(**arrays, impacts=impacts)
 
 
-def numbers_of(name: str, value: object, shape: tuple[int, ...]) -> FloatArray:
-    """Return ``value`` as finite float64 numbers of ``shape``.
+def _field(given: object, name: str) -> Any:
+    """Return what a mapping has under a name, or an object as an attribute; None if nothing."""
+    return given.get(name) if isinstance(given, Mapping) else getattr(given, name, None)
 
-    Raises
-    ------
-    AnswerError
-        Naming the field, what came and what is needed.
-    """
+
+def numbers_of(name: str, value: object, shape: tuple[int, ...]) -> FloatArray:
+    """Return ``value`` as finite float64 numbers of ``shape``; an AnswerError names the field and what is needed."""
     if len(shape) == 1:
         _length(name, value, shape[0])
     try:
@@ -110,7 +104,8 @@ def numbers_of(name: str, value: object, shape: tuple[int, ...]) -> FloatArray:
     if array.shape != shape:
         raise AnswerError(f"{name} has shape {array.shape}, not {shape}")
     if array.dtype.kind not in "fiu":
-        kind = KINDS.get(array.dtype.kind, str(array.dtype))
+        words = {"c": "complex numbers", "U": "text", "S": "text", "O": "objects", "b": "truth values"}
+        kind = words.get(array.dtype.kind, str(array.dtype))
         raise AnswerError(f"{name} holds {kind}; real numbers are needed")
     array = np.ascontiguousarray(array, dtype=np.float64)
     if not np.isfinite(array).all():
@@ -136,18 +131,16 @@ def _length(name: str, value: object, needed: int | None = None) -> int:
 
 def _impacts_of(given: object, n_slices: int) -> Impacts:
     """Return impacts given as ``Impacts``, as a mapping of arrays, or as rows of its five fields."""
-    names = [name for name, _ in IMPACT_FIELDS]
     if not isinstance(given, (Impacts, Mapping)):
         try:
-            rows = [tuple(row[name] for name in names) if isinstance(row, Mapping) else tuple(row) for row in given]  # type: ignore[attr-defined]
-            given = dict(zip(names, zip(*rows, strict=True) if rows else [()] * len(names), strict=True))
+            rows = [tuple(row[name] for name in IMPACT) if isinstance(row, Mapping) else tuple(row) for row in given]  # type: ignore[attr-defined]
+            given = dict(zip(IMPACT, zip(*rows, strict=True) if rows else [()] * len(IMPACT), strict=True))
         except (TypeError, ValueError, KeyError) as error:
-            raise AnswerError(f"impacts are no rows of {', '.join(names)} ({type(error).__name__}: {error})") from None
-    columns = {name: given[name] if isinstance(given, Mapping) and name in given else getattr(given, name, None)
-               for name in names}  # fmt: skip
+            raise AnswerError(f"impacts are no rows of {', '.join(IMPACT)} ({type(error).__name__}: {error})") from None
+    columns = {name: _field(given, name) for name in IMPACT}
     absent = [name for name, column in columns.items() if column is None]
     if absent:
-        raise AnswerError(f"impacts: {' and '.join(absent)} missing; {', '.join(names)} are needed")
+        raise AnswerError(f"impacts: {' and '.join(absent)} missing; {', '.join(IMPACT)} are needed")
     count = _length("impacts.time", columns["time"])
     arrays = {name: numbers_of(f"impacts.{name}", column, (count,)) for name, column in columns.items()}
     if not np.isin(arrays["end"], (-1.0, 1.0)).all():
@@ -176,14 +169,11 @@ def trajectory_of(ask: Ask, answer: Answer, traits: Traits) -> Trajectory:
         scenario=ask.scenario,
         solver="foreign",
         method=traits.name,
-        t=answer.t,
-        theta=answer.theta,
-        omega=answer.omega,
+        **{name: getattr(answer, name) for name in (*REQUIRED, "impacts")},
         r=r,
         v=v,
         r_cm=r_cm,
         inertia=inertia,
-        impacts=answer.impacts,
         settings={"spec": traits.name, "effort": ask.effort, **ask.options},
         diagnostics={"not_given": [name for name in PER_TIME if getattr(answer, name) is None]},
     )

@@ -5,15 +5,16 @@ from __future__ import annotations
 import platform
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from types import MappingProxyType
 from typing import Any, Final
-
-import numpy as np
 
 from flipproof.foreign import checks_basic, checks_equation, checks_impacts, checks_order
 from flipproof.foreign.checking import Check, Found, NotApplicableError, drive
 from flipproof.foreign.contract import Traits
 from flipproof.foreign.specs import ForeignError, Runner, WaitingError
+from flipproof.output.columns import json_ready
+from flipproof.output.provenance import version_of
 
 PASSED: Final = "passed"
 FAILED: Final = "failed"
@@ -97,39 +98,18 @@ class Certificate:
         facts: dict[str, Any] = {}
         for result in self.results:
             facts |= dict(result.found.facts) if result.found else {}
-        traits = asdict(self.traits)
         return {
             "passport": 1,
-            "solver": traits,
+            "solver": asdict(self.traits),
             "versions": dict(self.versions),
             "checks": [
-                {
-                    "check": r.check,
-                    "verdict": r.verdict,
-                    "title": r.title,
-                    "reason": r.reason,
-                    **(
-                        {}
-                        if r.found is None
-                        else {name: getattr(r.found, name) for name in ("expected", "came", "where", "advice")}
-                    ),
-                }
+                {name: getattr(r, name) for name in ("check", "verdict", "title", "reason")}
+                | {name: getattr(r.found, name) for name in ("expected", "came", "where", "advice") if r.found}
                 for r in self.results
             ],
-            "facts": _plain(facts),
+            "facts": json_ready(facts),
             "conclusion": self.conclusion,
         }
-
-
-def _plain(value: Any) -> Any:
-    """Return ``value`` as JSON can hold it."""
-    if isinstance(value, Mapping):
-        return {str(name): _plain(one) for name, one in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(one) for one in value]
-    if isinstance(value, (float, np.floating)):
-        return float(value) if np.isfinite(value) else None
-    return value.item() if isinstance(value, np.generic) else value
 
 
 def certify(
@@ -158,32 +138,24 @@ def certify(
     for name in checks:
         results.append(_result(name, traits, runner))
         say(results[-1])
-    return Certificate(traits=traits, results=tuple(results), versions=versions())
+    versions = {name: version_of(name) for name in ("flipproof", "numpy", "scipy", "numba")}
+    return Certificate(
+        traits=traits, results=tuple(results), versions={"python": platform.python_version(), **versions}
+    )
 
 
 def _result(name: str, traits: Traits, runner: Runner) -> Result:
     check = CHECKS[name]
-    title = (check.__doc__ or "").partition("\n")[0]
+    result = partial(Result, check=name, title=(check.__doc__ or "").partition("\n")[0])
     known = traits.expected_failures.get(name)
     try:
         found = drive(check(traits), runner)
     except (NotApplicableError, WaitingError) as why:
-        return Result(check=name, verdict=IDLE, title=title, reason=str(why))
+        return result(verdict=IDLE, reason=str(why))
     except ForeignError as error:
-        verdict = FAILED if known is None else EXPECTED
-        return Result(
-            check=name, verdict=verdict, title=title, reason=str(error) + (f"; known: {known}" if known else "")
-        )
+        words = f"{error}; known: {known}" if known else str(error)
+        return result(verdict=FAILED if known is None else EXPECTED, reason=words)
     if found.holds:
         unexpected = f"declared as a failure ({known}), but holds" if known else ""
-        return Result(check=name, verdict=PASSED, title=title, found=found, reason=unexpected)
-    return Result(check=name, verdict=EXPECTED if known else FAILED, title=title, found=found, reason=known or "")
-
-
-def versions() -> dict[str, str]:
-    """Return the versions of what judged: flipproof, Python, numpy, scipy, numba."""
-    from importlib.metadata import version
-
-    return {"python": platform.python_version()} | {
-        name: version(name) for name in ("flipproof", "numpy", "scipy", "numba")
-    }
+        return result(verdict=PASSED, found=found, reason=unexpected)
+    return result(verdict=EXPECTED if known else FAILED, found=found, reason=known or "")

@@ -24,9 +24,6 @@ THROW: Final = replace(Scenario(), duration=0.3).with_slices(4)
 SMOOTH: Final = replace(THROW, duration=0.05)
 """The same up to before any equation of the ladder has its first impact."""
 
-POINTS: Final = 61
-"""Times of an ask; a step of the published program is a divisor of their distance."""
-
 
 class NotApplicableError(Exception):
     """A check cannot be made of this solver; the message says what is missing."""
@@ -53,12 +50,12 @@ Making = Generator[Sequence[Ask], Sequence[Answer], Found]
 Check = Callable[[Traits], Making]
 
 
-def times_of(scenario: Scenario, points: int = POINTS) -> FloatArray:
-    """Return uniform times over the flight [s]."""
+def times_of(scenario: Scenario, points: int = 61) -> FloatArray:
+    """Return uniform times over the flight [s]; a step of the published program divides the distance of 61 of them."""
     return np.linspace(0.0, scenario.duration, points)
 
 
-def ask_of(traits: Traits, scenario: Scenario, level: float = 0, points: int = POINTS) -> Ask:
+def ask_of(traits: Traits, scenario: Scenario, level: float = 0, points: int = 61) -> Ask:
     """Return the ask for a throw at a level of refinement; level 0 is a thousandth of the flight, or rtol 1e-6."""
     return Ask.of(scenario, times_of(scenario, points), effort_of(traits, scenario, level))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -12,28 +12,10 @@ from flipproof.foreign.answers import Answer
 from flipproof.foreign.checking import Found, Making, NotApplicableError, ask_of
 from flipproof.foreign.contract import Ask, Traits
 from slicemodel import Scenario
-from slicemodel.trajectory import FloatArray
-
-SPINS: Final = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
-"""Angular velocities at release [rad/s]; the speeds of the first impacts grow with them, from 0.05 to 4 m/s."""
-
-SAMPLES: Final = 2401
-TURNS: Final = 5.0
-"""omega_0 T of a throw: long enough for the last slice to reach the cap in every equation."""
-
-NEAR: Final = 6
-"""Samples on either side of an impact from which its speeds are read; the two next to it are left out."""
-
-SLOWED: Final = 0.6
-"""A slice that keeps less than this of its speed from one sample to the next has struck."""
-
-ADMISSIBLE: Final = 0.02
-"""How far a measured restitution may be from the one asked for."""
-
-HALVINGS: Final = 5
-"""How often the interval of a threshold is halved."""
 
 ASKED: Final = 0.5
+ADMISSIBLE: Final = 0.02
+"""The restitution asked for, and how far a measured one may be from it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,30 +30,35 @@ class Rebound:
 
 
 def throw_of(spin: float) -> Scenario:
-    """Return the throw whose first impacts are measured: no drag, no gravity, so that all equations of motion agree."""
-    return replace(Scenario(), n_slices=4, drag=0.0, gravity=0.0, restitution=ASKED, omega0=spin, duration=TURNS / spin)
+    """Return the throw whose first impacts are measured: no drag, no gravity, so that all equations of motion agree.
+
+    With omega_0 T = 5 the last slice reaches the cap in every one of them.
+    """
+    return replace(Scenario(), n_slices=4, drag=0.0, gravity=0.0, restitution=ASKED, omega0=spin, duration=5.0 / spin)
 
 
 def measure(answer: Answer, scenario: Scenario, end: str) -> Rebound | None:
     """Return the first impact of one slice on ``end``, with or without a rebound; None if it reaches no end.
 
-    The last slice strikes the cap first, the second one the base. Speeds are the slopes of two parabolas, through the
-    samples before and after the turn, where the parabolas meet.
+    The last slice strikes the cap first, the second one the base. A slice has struck that keeps less than 0.6 of its
+    speed from one sample to the next. Speeds are the slopes of two parabolas where they meet, each through ``near``
+    samples before and after the turn; the two next to it are left out.
     """
     assert answer.r is not None
+    near, slowed = 6, 0.6
     side, index = (-1.0, scenario.n_slices - 1) if end == "cap" else (1.0, 1)
     x = side * answer.r[:, index]
     wall = side * (scenario.r_min if end == "cap" else scenario.r_max)
     step = float(answer.t[1] - answer.t[0])
     v = np.diff(x)
-    fast_enough = v[:-1] > SLOWED * np.maximum.accumulate(v)[:-1]
-    slowed = fast_enough & (v[1:] < SLOWED * v[:-1]) & (wall - x[1:-1] < 0.1 * scenario.bottle.length)
-    turns = np.flatnonzero(slowed) + 1
-    if not turns.size or turns[0] < NEAR + 2 or turns[0] + NEAR + 2 >= len(x):
+    fast_enough = v[:-1] > slowed * np.maximum.accumulate(v)[:-1]
+    struck = fast_enough & (v[1:] < slowed * v[:-1]) & (wall - x[1:-1] < 0.1 * scenario.bottle.length)
+    turns = np.flatnonzero(struck) + 1
+    if not turns.size or turns[0] < near + 2 or turns[0] + near + 2 >= len(x):
         return None
     k = int(turns[0])
-    before = _parabola(x[k - NEAR - 1 : k - 1], -NEAR - 1)
-    after = _parabola(x[k + 2 : k + 2 + NEAR], 2)
+    before = np.polyfit(np.arange(-near - 1, -1), x[k - near - 1 : k - 1], 2)
+    after = np.polyfit(np.arange(2, 2 + near), x[k + 2 : k + 2 + near], 2)
     crossing = np.roots(np.polysub(before, after))
     crossing = crossing[np.abs(crossing.imag) < 1e-9].real
     s = float(crossing[np.argmin(np.abs(crossing))]) if crossing.size else 0.0
@@ -80,66 +67,43 @@ def measure(answer: Answer, scenario: Scenario, end: str) -> Rebound | None:
     return Rebound(end, scenario.omega0, fast, -slow / fast, float(answer.t[k]))
 
 
-def _parabola(x: FloatArray, first: int) -> FloatArray:
-    found: FloatArray = np.polyfit(np.arange(first, first + len(x)), x, 2)
-    return found
-
-
 def check_restitution(traits: Traits) -> Making:
     """A slice leaves an end with e times the speed at which it struck, at both ends and at every speed."""
-    answers = yield [_ask(traits, spin) for spin in SPINS]
+    spins = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # with them first impacts come at 0.05 to 4 m/s
+    answers = yield [_ask(traits, spin) for spin in spins]
     if answers[0].r is None:
         raise NotApplicableError("no r is given")
     curve = [
         found
         for end in ("base", "cap")
-        for spin, answer in zip(SPINS, answers, strict=True)
+        for spin, answer in zip(spins, answers, strict=True)
         if (found := measure(answer, throw_of(spin), end)) is not None
     ]
     if not curve:
         raise NotApplicableError("no slice reaches an end")
-    facts = {"restitution": [(r.end, r.speed, r.restitution) for r in curve], "asked": ASKED}
+    facts: dict[str, Any] = {"restitution": [(r.end, r.speed, r.restitution) for r in curve], "asked": ASKED}
     wrong = [r for r in curve if not abs(r.restitution - ASKED) <= ADMISSIBLE]
+    worst = max(wrong or curve, key=lambda r: abs(r.restitution - ASKED))
+    expected, came, advice = f"e = {ASKED} within {ADMISSIBLE}", f"e = {worst.restitution:.4f}", ""
     if not wrong:
-        largest = max(curve, key=lambda r: abs(r.restitution - ASKED))
-        return Found(
-            holds=True,
-            expected=f"e = {ASKED} within {ADMISSIBLE}",
-            came=f"e = {largest.restitution:.4f} where it is farthest off, at {_range(curve)}",
-            where=f"{len(curve)} first impacts",
-            facts=facts,
-        )
-    threshold = yield from _threshold(traits, curve)
-    if threshold is not None:
+        speeds = [r.speed for r in curve]
+        came += f" where it is farthest off, at {min(speeds):.2g} to {max(speeds):.2g} m/s"
+        where = f"{len(curve)} first impacts"
+    elif (threshold := (yield from _threshold(traits, curve))) is not None:
         low, high = threshold
         facts["threshold"] = [low, high]
-        said = f"none below {(low + high) / 2:.3g} +- {(high - low) / 2:.1g} m/s, a velocity threshold"
-        return Found(
-            holds=False,
-            expected=f"e = {ASKED} within {ADMISSIBLE} at every speed",
-            came=said,
-            where=f"{wrong[0].end}, {wrong[0].speed:.3g} m/s: e = {wrong[0].restitution:.3f}",
-            advice="scale lengths up so that impacts are faster than the threshold, or lower it in the engine",
-            facts=facts,
-        )
-    worst = max(wrong, key=lambda r: abs(r.restitution - ASKED))
-    return Found(
-        holds=False,
-        expected=f"e = {ASKED} within {ADMISSIBLE}",
-        came=f"e = {worst.restitution:.4f}",
-        where=f"{worst.end}, struck at {worst.speed:.3g} m/s, t = {worst.time:.4g} s",
-        advice="the speed after an impact, relative to the bottle, is e times the speed before it",
-        facts=facts,
-    )
+        expected += " at every speed"
+        came = f"none below {(low + high) / 2:.3g} +- {(high - low) / 2:.1g} m/s, a velocity threshold"
+        where = f"{wrong[0].end}, {wrong[0].speed:.3g} m/s: e = {wrong[0].restitution:.3f}"
+        advice = "scale lengths up so that impacts are faster than the threshold, or lower it in the engine"
+    else:
+        where = f"{worst.end}, struck at {worst.speed:.3g} m/s, t = {worst.time:.4g} s"
+        advice = "the speed after an impact, relative to the bottle, is e times the speed before it"
+    return Found(holds=not wrong, expected=expected, came=came, where=where, advice=advice, facts=facts)
 
 
 def _ask(traits: Traits, spin: float) -> Ask:
-    return ask_of(traits, throw_of(spin), 2, SAMPLES)
-
-
-def _range(curve: Sequence[Rebound]) -> str:
-    speeds = [r.speed for r in curve]
-    return f"{min(speeds):.2g} to {max(speeds):.2g} m/s"
+    return ask_of(traits, throw_of(spin), 2, 2401)
 
 
 def _threshold(
@@ -153,7 +117,7 @@ def _threshold(
         if not dead or not live or dead[-1].speed > live[0].speed or len(dead) + len(live) < len(here):
             continue
         low, high = dead[-1], live[0]
-        for _ in range(HALVINGS):
+        for _ in range(5):
             spin = float(np.sqrt(low.spin * high.spin))
             (answer,) = yield [_ask(traits, spin)]
             found = measure(answer, throw_of(spin), end)

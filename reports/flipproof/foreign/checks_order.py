@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -17,56 +16,41 @@ LEVELS: Final = (0, 1, 2, 3)
 WIDTH: Final = 0.3
 """How far an observed order before impacts may be from the declared one."""
 
-ACROSS: Final = (0.5, 0.5)
-"""Across impacts: how far an order may be below the smaller of the declared one and 1, and above the declared one."""
-
-DEEPEST: Final = {"dt": 8, "steps": 8, "rtol": 6}
-"""Level of refinement at which the search for a floor ends; level 8 is 250 000 steps."""
-
-SIXTEENTH: Final = math.log2(17 / 16)
-"""Level by which a step is shorter by a sixteenth: a change as large as by steps a quarter as long is noise."""
-
 STILL: Final = 0.7
 """Share of the change before from which on a change counts as no smaller."""
 
 NOISE: Final = 0.5
 """Share of a change that steps shorter by another sixteenth make where noise limits; with an error of order 1, 0.02."""
 
-ADMISSIBLE: Final = MappingProxyType({"float64": 2e-8, "float32": 1e-4})
-"""Floor above which something limits a solver that its declared arithmetic does not explain, fraction of omega_0."""
-
-PRINTED: Final = 0.1
-"""Distance to the next float32 up to which a number is one, printed with nine digits or more [spacing of float32]."""
-
-DISTINCT: Final = 20
-"""Different numbers that a field has at the least where they tell its arithmetic."""
-
 ROUNDOFF: Final = 1e-11
 """Changes below which orders drown in round-off, fraction of omega_0."""
 
 
-def _refinable(traits: Traits) -> None:
+def _order_of(traits: Traits) -> float:
+    """Return the declared order of a solver that is refined by its step."""
     if traits.refined_by is None:
         raise NotApplicableError("refined_by is not declared")
+    if traits.order is None or traits.refined_by == "rtol":
+        raise NotApplicableError("no order is declared" if traits.order is None else "rtol has no order")
+    return traits.order
 
 
 def check_order_before(traits: Traits) -> Making:
     """Before the first impact the error falls with the step at the declared order."""
-    _refinable(traits)
-    if traits.order is None or traits.refined_by == "rtol":
-        raise NotApplicableError("no order is declared" if traits.order is None else "rtol has no order")
+    declared = _order_of(traits)
     # Few and long steps: at short ones an order of 4 and more drowns in round-off. Low orders show at short ones only.
-    coarsest = -8 if traits.order > 2 else -4
+    coarsest = -8 if declared > 2 else -4
     answers = yield [ask_of(traits, SMOOTH, coarsest + level, points=3) for level in LEVELS]
     changes = [shift(a, b, SMOOTH.omega0) for a, b in pairwise(answers)]
-    order = _order(changes)
-    if math.isnan(order):
+    clear = [change for change in changes if change > ROUNDOFF]
+    if len(clear) < 2:
         raise NotApplicableError(f"changes under refinement are round-off, {changes[0]:.2g} of omega_0")
+    order = math.log2(clear[-2] / clear[-1])
     return Found(
-        holds=abs(order - traits.order) <= WIDTH,
-        expected=f"order {traits.order:g} +- {WIDTH}",
+        holds=abs(order - declared) <= WIDTH,
+        expected=f"order {declared:g} +- {WIDTH}",
         came=f"{order:.2f}",
-        where=f"0.05 s before any impact, steps of {'13' if traits.order > 2 else '0.8'} ms and its halves",
+        where=f"0.05 s before any impact, steps of {'13' if declared > 2 else '0.8'} ms and its halves",
         advice="a coefficient of the step, or the instant at which omega, r_CM or J are taken, costs the order",
         facts={"order_before_impacts": order},
     )
@@ -74,9 +58,7 @@ def check_order_before(traits: Traits) -> Making:
 
 def check_order_across(traits: Traits) -> Making:
     """Across impacts the error falls with the step: at the declared order, or at least at order one half."""
-    _refinable(traits)
-    if traits.order is None or traits.refined_by == "rtol":
-        raise NotApplicableError("no order is declared" if traits.order is None else "rtol has no order")
+    declared = _order_of(traits)
     # Several throws and steps a level: where rebounds wait for the grid, a single one carries the luck of its phase.
     throws = [THROW.with_slices(THROW.n_slices + more) for more in (0, 1, 2)]
     levels = [level - 4 + part for level in LEVELS for part in (0.0, 0.19)]
@@ -89,7 +71,7 @@ def check_order_across(traits: Traits) -> Making:
     if errors[-1] < ROUNDOFF:
         raise NotApplicableError(f"changes under refinement are round-off, {errors[0]:.2g} of omega_0")
     order = -float(np.polyfit(LEVELS, np.log2(np.maximum(errors, 1e-300)), 1)[0])
-    low, high = min(traits.order, 1.0) - ACROSS[0], traits.order + ACROSS[1]
+    low, high = min(declared, 1.0) - 0.5, declared + 0.5
     return Found(
         holds=low <= order <= high,
         expected=f"order {low:g} to {high:g}",
@@ -101,19 +83,11 @@ def check_order_across(traits: Traits) -> Making:
     )
 
 
-def _order(changes: list[float]) -> float:
-    """Return the observed order from changes between halved steps, the finest that stand clear of round-off."""
-    clear = [change for change in changes if change > ROUNDOFF]
-    if len(clear) < 2:
-        return math.nan
-    return math.log2(clear[-2] / clear[-1])
-
-
 def check_floor(traits: Traits) -> Making:
     """Refined until changes stop shrinking, a solver in float64 goes below 2e-8 of omega_0 or is still shrinking."""
-    _refinable(traits)
-    stride = 1 if traits.refined_by == "rtol" else 2
-    deepest = DEEPEST[str(traits.refined_by)]
+    if traits.refined_by is None:
+        raise NotApplicableError("refined_by is not declared")
+    stride, deepest = (1, 6) if traits.refined_by == "rtol" else (2, 8)  # level 8 is 250 000 steps
     coarse, fine = yield [ask_of(traits, SMOOTH, level) for level in (0, stride)]
     changes = [shift(coarse, fine, SMOOTH.omega0)]
     noises: list[float] = []
@@ -121,8 +95,9 @@ def check_floor(traits: Traits) -> Making:
     for level in range(2 * stride, deepest + 1, stride):
         if stopped:
             break
-        # With another tolerance a solver takes other steps altogether: there, a change next to none says nothing.
-        near = [level + SIXTEENTH] if level < deepest and traits.refined_by != "rtol" else []
+        # By steps shorter by a sixteenth a change as large as by steps a quarter as long is noise. With another
+        # tolerance a solver takes other steps altogether: there, a change next to none says nothing.
+        near = [level + math.log2(17 / 16)] if level < deepest and traits.refined_by != "rtol" else []
         coarse = fine
         fine, *beside = yield [ask_of(traits, SMOOTH, each) for each in (level, *near)]
         changes.append(shift(coarse, fine, SMOOTH.omega0))
@@ -131,14 +106,14 @@ def check_floor(traits: Traits) -> Making:
         noisy = any(noise > NOISE * changes[-1] for noise in here)
         stopped = changes[-1] <= 16 * traits.epsilon or changes[-1] > STILL * changes[-2] or noisy
     floor = min(changes)
-    limited = stopped and floor > ADMISSIBLE["float64"]
+    admissible = {"float64": 2e-8, "float32": 1e-4}  # a higher floor is not explained by that arithmetic
+    limited = stopped and floor > admissible["float64"]
     singles = _singles(fine) if limited else []
     if singles:
         said = f": the numbers of {', '.join(singles)} are those of float32"
     else:
         said = ": something else than refinement limits it" if limited and traits.precision == "float64" else ""
-    count = len(changes)
-    meant = ADMISSIBLE[traits.precision]
+    count, meant = len(changes), admissible[traits.precision]
     return Found(
         holds=floor <= meant or not stopped,
         expected=f"changes fall below {meant:.0e} of omega_0, or still fall",
@@ -160,14 +135,17 @@ def check_floor(traits: Traits) -> Making:
 
 
 def _singles(answer: Answer) -> list[str]:
-    """Return the names of the fields whose numbers are those of float32."""
+    """Return the names of the fields whose numbers, 20 different ones at the least, are those of float32.
+
+    A number that was printed with nine digits or more is within a tenth of their spacing.
+    """
     found = []
     for name in ("theta", "omega", "r", "v"):
         values = getattr(answer, name)
-        if values is None or len(np.unique(values)) < DISTINCT:
+        if values is None or len(np.unique(values)) < 20:
             continue
         with np.errstate(over="ignore", invalid="ignore"):
             nearest = values.astype(np.float32)
-            if np.all(np.abs(values - nearest) <= PRINTED * np.spacing(np.abs(nearest))):
+            if np.all(np.abs(values - nearest) <= 0.1 * np.spacing(np.abs(nearest))):
                 found.append(name)
     return found

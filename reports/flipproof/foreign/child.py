@@ -6,23 +6,16 @@ The solver sees an empty standard input; what it prints goes to standard error, 
 from __future__ import annotations
 
 import os
-import sys
 import threading
 import time
-from typing import Any, Final
+from typing import Any
 
-from flipproof.foreign.answers import AnswerError, answer_of
+from flipproof.foreign.answers import IMPACT, AnswerError, answer_of
 from flipproof.foreign.contract import Ask, solve_of, traits_of
 from flipproof.foreign.specs import distribution_of, load
 from flipproof.foreign.wire import BrokenFrameError, receive, send
 from slicemodel import Scenario
 from slicemodel.scenario import shortened
-from slicemodel.trajectory import IMPACT_FIELDS
-
-MEMORY: Final = 8 * 2**30
-"""Bytes of address space that the process may take, where the system can limit it."""
-
-MOST_ASK: Final = 1 << 30
 
 
 def main() -> None:
@@ -47,20 +40,12 @@ def main() -> None:
         return
     while True:
         try:
-            header, arrays = receive(inbox, MOST_ASK)
+            header, arrays = receive(inbox, 1 << 30)
         except BrokenFrameError:
             return
-        _answer(outbox, solve, _ask(header, arrays))
-
-
-def _ask(header: dict[str, Any], arrays: dict[str, Any]) -> Ask:
-    return Ask(
-        scenario=Scenario.from_mapping(header["scenario"]),
-        times=arrays["times"],
-        start=arrays["start"],
-        effort=header["effort"],
-        options=header["options"],
-    )
+        scenario = Scenario.from_mapping(header["scenario"])
+        ask = Ask(scenario=scenario, effort=header["effort"], options=header["options"], **arrays)
+        _answer(outbox, solve, ask)
 
 
 def _answer(outbox: Any, solve: Any, ask: Ask) -> None:
@@ -69,7 +54,7 @@ def _answer(outbox: Any, solve: Any, ask: Ask) -> None:
         answer = answer_of(ask, solve(ask))
         fields = {name: getattr(answer, name) for name in answer.given if name != "impacts"}
         if answer.impacts is not None:
-            fields |= {f"impacts.{name}": getattr(answer.impacts, name) for name, _ in IMPACT_FIELDS}
+            fields |= {f"impacts.{name}": getattr(answer.impacts, name) for name in IMPACT}
         send(outbox, {}, fields)
     except BaseException as error:
         send(outbox, {"reason": _reason(error)}, {})
@@ -85,11 +70,12 @@ def _reason(error: BaseException) -> str:
 
 
 def _limit_memory() -> None:
+    """Take at most 8 GiB of address space, where the system can limit it, and leave no core behind."""
     try:
         import resource
     except ImportError:  # not on this system
         return
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
+    resource.setrlimit(resource.RLIMIT_AS, (8 * 2**30, resource.getrlimit(resource.RLIMIT_AS)[1]))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
@@ -98,9 +84,3 @@ def _watch(parent: int) -> None:
     while os.getppid() == parent:
         time.sleep(0.5)
     os._exit(1)
-
-
-if __name__ == "__main__":
-    main()
-    sys.stdout.flush()
-    os._exit(0)  # threads that the solver left behind keep nothing alive

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import ast
 import hashlib
-import shlex
 from collections.abc import Iterator
 from importlib.machinery import PathFinder
 from importlib.metadata import EntryPoint
 from importlib.util import find_spec
 from pathlib import Path
 
-from flipproof.foreign.specs import COMMAND, CSV, is_foreign, locate
+from flipproof.foreign.specs import COMMAND, CSV, is_foreign, locate, words_of
 from flipproof.frame.sources import files_in
 
 
@@ -45,11 +44,7 @@ def _files(spec: str) -> Iterator[tuple[str, Path]]:
         yield "", Path(spec.removeprefix(CSV))
         return
     if spec.startswith(COMMAND):
-        try:
-            words = shlex.split(spec.removeprefix(COMMAND))
-        except ValueError as error:
-            raise ValueError(f"solver {spec!r}: {error}") from None
-        for k, word in enumerate(words):
+        for k, word in enumerate(words_of(spec)):
             file = Path(word.rpartition("=")[2])
             if file.is_file():
                 yield str(k), file

@@ -25,9 +25,6 @@ PRECISIONS: Final = MappingProxyType({"float64": 2.0**-52, "float32": 2.0**-23})
 REFINERS: Final = ("dt", "steps", "rtol")
 """What the effort of a solver may be: a step [s], a number of steps, a relative tolerance."""
 
-TIMEOUT: Final = 60.0
-"""Seconds one run may take where the solver does not say."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ask:
@@ -86,7 +83,7 @@ class Traits:
     precision: str = "float64"
     order: float | None = None
     distribution: str = ""
-    timeout: float = TIMEOUT
+    timeout: float = 60.0
     expected_failures: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -114,12 +111,7 @@ class Traits:
 
 
 def check_equation(name: object) -> None:
-    """Refuse what is neither a model of the reference, nor a set of switches, nor a scheme of the slice model.
-
-    Raises
-    ------
-    ValueError
-    """
+    """Refuse by a ValueError what is neither a model of the reference, nor a set of switches, nor a scheme."""
     from ode_reference.models import MODELS
     from ode_reference.switches import PREFIX, Switches
     from slicemodel.schemes import SCHEMES
@@ -133,10 +125,7 @@ def check_equation(name: object) -> None:
 def traits_of(solver: object, name: str) -> Traits:
     """Return what ``solver`` says of itself; ``name`` serves where it has none.
 
-    Raises
-    ------
-    ValueError
-        If it cannot be called, has no ``solve``, or an attribute is not admissible.
+    Raises ValueError if it cannot be called, has no ``solve``, or an attribute is not admissible.
     """
     solve_of(solver)
     given = {
@@ -149,12 +138,7 @@ def traits_of(solver: object, name: str) -> Traits:
 
 
 def solve_of(solver: object) -> Callable[[Ask], object]:
-    """Return the function of one ask that ``solver`` is, or has as ``solve``.
-
-    Raises
-    ------
-    ValueError
-    """
+    """Return the function of one ask that ``solver`` is, or has as ``solve``; raises ValueError if there is none."""
     solve = getattr(solver, "solve", solver)
     if not callable(solve):
         raise ValueError(f"{shown(solver)} is neither callable nor has a method solve(ask)")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cache
 
 from flipproof.chapters.waterfall.study import NAMES, canonical, sets_before
 from flipproof.foreign.checking import ask_of, times_of
@@ -17,9 +18,6 @@ from flipproof.foreign.specs import Runner
 from ode_reference.switches import Switches
 from slicemodel import Scenario
 from slicemodel.observables import plateau
-
-POINTS = 1000
-LEVEL = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,36 +59,25 @@ class Explanation:
 def explain(one: Runner, other: Runner, throw: Scenario) -> Explanation:
     """Place two solvers, throw the bottle with both, and split their difference.
 
-    Raises
-    ------
-    ForeignError
-        If one of them gives no answer.
+    Raises ForeignError if one of them gives no answer.
     """
-    places = place(one), place(other)
-    asks = [ask_of(runner.traits, throw, LEVEL, POINTS) for runner in (one, other)]
-    answers = [runner(ask) for runner, ask in zip((one, other), asks, strict=True)]
-    values = tuple(plateau(answer.t, answer.omega, throw.omega0) for answer in answers)
-    bars = shares(*_without_idle(*places), throw)
+    first, second = place(one), place(other)
+    a, b = (runner(ask_of(runner.traits, throw, 3, 1000)) for runner in (one, other))
+    values = plateau(a.t, a.omega, throw.omega0), plateau(b.t, b.omega, throw.omega0)
+    # A switch without effect in the equation of one stands as in that of the other.
+    start = replace(first.switches, **{name: getattr(second.switches, name) for name in first.inert})
+    end = replace(second.switches, **{name: getattr(start, name) for name in second.inert})
+    bars = shares(start, end, throw)
     return Explanation(
-        first=places[0],
-        second=places[1],
-        values=(values[0], values[1]),
-        bars=bars,
-        rest=values[1] - values[0] - sum(bars.values()),
+        first=first, second=second, values=values, bars=bars, rest=values[1] - values[0] - sum(bars.values())
     )
-
-
-def _without_idle(one: Place, other: Place) -> tuple[Switches, Switches]:
-    """Return the switches of both, those without effect in the equation of one as they stand in that of the other."""
-    start = replace(one.switches, **{name: getattr(other.switches, name) for name in one.inert})
-    return start, replace(other.switches, **{name: getattr(start, name) for name in other.inert})
 
 
 def shares(start: Switches, end: Switches, throw: Scenario) -> dict[str, float]:
     """Return the mean change of the plateau over all orders of turning the switches from ``start`` to ``end``."""
 
     def of(switches: Switches) -> float:
-        found = curve(switches.name, throw, times_of(throw, POINTS))
+        found = curve(switches.name, throw, times_of(throw, 1000))
         return plateau(found.t, found.omega, throw.omega0)
 
     return {name: mean(changes) for name, changes in changes_of(start, end, of).items()}
@@ -109,13 +96,10 @@ def changes_of(start: Switches, end: Switches, of: Callable[[Switches], float]) 
     of : callable (switches) -> float - the number by the equation of a set of switches; asked for once each
     """
     differing = [f.name for f in fields(Switches) if getattr(start, f.name) != getattr(end, f.name)]
-    known: dict[Switches, float] = {}
+    once = cache(of)
 
     def value(turned: tuple[str, ...]) -> float:
-        switches = canonical(replace(start, **{name: getattr(end, name) for name in turned}))
-        if switches not in known:
-            known[switches] = of(switches)
-        return known[switches]
+        return once(canonical(replace(start, **{name: getattr(end, name) for name in turned})))
 
     return {
         name: [(weight, value((*chosen, name)) - value(chosen)) for chosen, weight in sets_before(name, differing)]

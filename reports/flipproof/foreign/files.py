@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
-import os
-import shlex
-import signal
 import subprocess
 import tempfile
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from flipproof.foreign.answers import PER_SLICE, Answer, AnswerError, answer_of
-from flipproof.foreign.contract import TIMEOUT, Ask, Traits
-from flipproof.foreign.isolated import PATIENCE
-from flipproof.foreign.specs import COMMAND, CSV, ForeignError
-
-FIELDS: Final = ("scenario", "times", "start", "effort", "out")
-"""What a command line may hold in braces: paths of files, and the effort as a number."""
-
-MOST_BYTES: Final = 1 << 30
-"""Size of an answer's file at the most."""
+from flipproof.foreign.contract import Ask, Traits
+from flipproof.foreign.isolated import PATIENCE, end_group, last_line
+from flipproof.foreign.specs import CSV, ForeignError, Runner, words_of
 
 
 def read_answer(path: Path, n_slices: int) -> dict[str, Any]:
@@ -34,9 +24,10 @@ def read_answer(path: Path, n_slices: int) -> dict[str, Any]:
     AnswerError
         Naming file, line and column.
     """
+    most = 1 << 30
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise AnswerError(f"{path} is larger than {MOST_BYTES} bytes")
+        if path.stat().st_size > most:
+            raise AnswerError(f"{path} is larger than {most} bytes")
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = csv.reader(file)
             header = [name.strip() for name in next(rows, [])]
@@ -62,17 +53,27 @@ def read_answer(path: Path, n_slices: int) -> dict[str, Any]:
 
 
 def write_ask(ask: Ask, folder: Path) -> dict[str, str]:
-    """Write what a program is asked into a folder; return the words that stand for ``FIELDS`` on its command line."""
-    paths = {name: folder / f"{name}.{'toml' if name == 'scenario' else 'csv'}" for name in FIELDS if name != "effort"}
-    paths["scenario"].write_text(ask.scenario.to_toml(), encoding="utf-8")
-    paths["times"].write_text("t\n" + "".join(f"{t!r}\n" for t in ask.times.tolist()), encoding="utf-8")
-    paths["start"].write_text("r\n" + "".join(f"{r!r}\n" for r in ask.start.tolist()), encoding="utf-8")
-    return {name: str(path) for name, path in paths.items()} | {
-        "effort": "" if ask.effort is None else repr(ask.effort)
+    """Write what a program is asked into a folder; return what stands on its command line for words in braces."""
+    texts = {
+        "scenario.toml": ask.scenario.to_toml(),
+        "times.csv": "t\n" + "".join(f"{t!r}\n" for t in ask.times.tolist()),
+        "start.csv": "r\n" + "".join(f"{r!r}\n" for r in ask.start.tolist()),
     }
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    paths = {name.partition(".")[0]: str(folder / name) for name in (*texts, "out.csv")}
+    return paths | {"effort": "" if ask.effort is None else repr(ask.effort)}
 
 
-class File:
+def answer_in(path: Path, ask: Ask, name: str, *, own_times: bool = False) -> Answer:
+    """Return the checked answer of a file; a ForeignError calls the file by ``name``."""
+    try:
+        return answer_of(ask, read_answer(path, ask.scenario.n_slices), own_times=own_times)
+    except AnswerError as error:
+        raise ForeignError(str(error).replace(str(path), name)) from None
+
+
+class File(Runner):
     """A curve in a CSV file. It answers at its own times, for whatever throw it is taken to be of."""
 
     def __init__(self, spec: str) -> None:
@@ -83,27 +84,18 @@ class File:
 
     def __call__(self, ask: Ask) -> Answer:
         """Return the curve, at its own times."""
-        try:
-            return answer_of(ask, read_answer(self.path, ask.scenario.n_slices), own_times=True)
-        except AnswerError as error:
-            raise ForeignError(str(error)) from None
-
-    def close(self) -> None:
-        """Nothing runs."""
+        return answer_in(self.path, ask, str(self.path), own_times=True)
 
 
-class Command:
+class Command(Runner):
     """A program: flipproof writes scenario, times and start as files, calls it, and reads the CSV that it wrote."""
 
     def __init__(self, spec: str, timeout: float | None = None) -> None:
-        try:
-            self.words = shlex.split(spec.removeprefix(COMMAND))
-        except ValueError as error:
-            raise ValueError(f"solver {spec!r}: {error}") from None
+        self.words = words_of(spec)
         if not self.words or not any("{out}" in word for word in self.words):
             raise ValueError(f"solver {spec!r}: a command must hold {{out}}, the CSV file that it is to write")
         effort = any("{effort" in word for word in self.words)
-        self.timeout = timeout or TIMEOUT
+        self.timeout = timeout or 60.0
         self._late = 0
         name = next((Path(w).name for w in self.words[1:] if not w.startswith(("-", "{"))), Path(self.words[0]).name)
         self.traits = Traits(name=name, refined_by="dt" if effort else None, timeout=self.timeout)
@@ -121,10 +113,7 @@ class Command:
             out = Path(values["out"])
             if not out.is_file():
                 raise ForeignError(f"{self.words[0]} ended without writing {{out}}")
-            try:
-                return answer_of(ask, read_answer(out, ask.scenario.n_slices))
-            except AnswerError as error:
-                raise ForeignError(str(error).replace(str(out), "{out}")) from None
+            return answer_in(out, ask, "{out}")
 
     def _run(self, words: list[str]) -> None:
         with tempfile.TemporaryFile() as said:
@@ -142,16 +131,8 @@ class Command:
                 raise ForeignError(f"no answer within {self.timeout:g} s; the program was ended") from None
             finally:
                 if process.poll() is None:
-                    if os.name == "posix":
-                        with contextlib.suppress(ProcessLookupError, PermissionError):
-                            os.killpg(process.pid, signal.SIGKILL)
-                    process.kill()
-                    process.wait()
+                    end_group(process)
             if status:
-                said.seek(max(0, said.seek(0, os.SEEK_END) - 4096))
-                lines = [line for line in said.read().decode(errors="replace").splitlines() if line.strip()]
-                last = f": {' '.join(lines[-1].split())}" if lines else ""
-                raise ForeignError(f"{words[0]} ended with status {status}{last}")
-
-    def close(self) -> None:
-        """Nothing runs between asks."""
+                said.seek(max(0, said.seek(0, 2) - 4096))
+                last = last_line(said.read())
+                raise ForeignError(f"{words[0]} ended with status {status}{f': {last}' if last else ''}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import queue
 import signal
@@ -11,26 +12,31 @@ import sys
 import threading
 from typing import Any, Final
 
-from flipproof.foreign.answers import PER_TIME, REQUIRED, Answer, AnswerError, answer_of
+from flipproof.foreign.answers import IMPACT, PER_TIME, REQUIRED, Answer, AnswerError, answer_of
 from flipproof.foreign.contract import Ask, Traits
-from flipproof.foreign.specs import ForeignError
+from flipproof.foreign.specs import ForeignError, Runner
 from flipproof.foreign.wire import BrokenFrameError, receive, send
-from slicemodel.trajectory import IMPACT_FIELDS
-
-LOADING: Final = 60.0
-"""Seconds that a solver's module may take to be imported."""
-
-KEPT: Final = 4096
-"""Bytes of what a solver prints that are kept, from the end."""
 
 PATIENCE: Final = 2
 """Runs in a row without an answer in time after which a solver is not asked again."""
 
-MOST_IMPACTS: Final = 10_000_000
-"""Impacts of one answer at the most."""
+
+def end_group(process: subprocess.Popen[bytes]) -> None:
+    """End a process that leads a group, and whatever it started."""
+    if os.name == "posix":
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
+    process.kill()
+    process.wait()
 
 
-class Isolated:
+def last_line(printed: bytes) -> str:
+    """Return the last line that says something."""
+    said = [line for line in printed.decode(errors="replace").splitlines() if line.strip()]
+    return " ".join(said[-1].split()) if said else ""
+
+
+class Isolated(Runner):
     """The solver that a spec names, in a process that is started when it is first needed and again after a crash.
 
     Parameters
@@ -42,16 +48,12 @@ class Isolated:
     def __init__(self, spec: str, timeout: float | None = None) -> None:
         self.spec, self.timeout = spec, timeout
         self._process: subprocess.Popen[bytes] | None = None
-        self._traits: Traits | None = None
         self._late = 0
 
-    @property
-    def traits(self) -> Traits:
+    @functools.cached_property
+    def traits(self) -> Traits:  # type: ignore[override]  # an attribute, but filled when it is first asked for
         """What the solver says of itself; loads it."""
-        if self._traits is None:
-            self._start()
-        assert self._traits is not None
-        return self._traits
+        return self._start()
 
     def __call__(self, ask: Ask) -> Answer:
         """Return the checked answer.
@@ -65,18 +67,18 @@ class Isolated:
         if self._late >= PATIENCE:
             raise ForeignError(f"not asked: {PATIENCE} runs in a row gave no answer in time")
         if self._process is None:
-            self._start()
+            self.traits = self._start()
         header = {"scenario": ask.scenario.to_mapping(), "effort": ask.effort, "options": dict(ask.options)}
         limit = self.timeout or traits.timeout
-        points = len(ask.times)
-        most = 8 * (points * (len(REQUIRED) + len(PER_TIME) + 2 * ask.scenario.n_slices) + 5 * MOST_IMPACTS)
+        most_impacts = 10_000_000
+        most = 8 * (len(ask.times) * (len(REQUIRED) + len(PER_TIME) + 2 * ask.scenario.n_slices) + 5 * most_impacts)
         header, arrays = self._exchange(header, {"times": ask.times, "start": ask.start}, limit, most)
         self._late = 0
         if "reason" in header:
             raise ForeignError(str(header["reason"]))
         fields: dict[str, Any] = {name: array for name, array in arrays.items() if "." not in name}
         if "impacts.time" in arrays:
-            fields["impacts"] = {name: arrays.get(f"impacts.{name}") for name, _ in IMPACT_FIELDS}
+            fields["impacts"] = {name: arrays.get(f"impacts.{name}") for name in IMPACT}
         try:
             return answer_of(ask, fields)
         except AnswerError as error:
@@ -87,17 +89,15 @@ class Isolated:
         process, self._process = self._process, None
         if process is None:
             return
-        if os.name == "posix":
-            with contextlib.suppress(ProcessLookupError, PermissionError):
-                os.killpg(process.pid, signal.SIGKILL)
-        process.kill()
-        process.wait()
+        end_group(process)
         for stream in (process.stdin, process.stdout, process.stderr):
             if stream is not None:
                 with contextlib.suppress(OSError):
                     stream.close()
 
-    def _start(self) -> None:
+    def _start(self) -> Traits:
+        """Start the process and return what the solver says of itself, loaded within a minute."""
+        # Threads that the solver left behind keep nothing alive.
         code = "from flipproof.foreign import child; child.main(); import os; os._exit(0)"
         self._process = subprocess.Popen(
             [sys.executable, "-c", code],
@@ -109,20 +109,21 @@ class Isolated:
         self._printed = bytearray()
         self._reader = threading.Thread(target=self._drain, args=(self._process.stderr,), daemon=True)
         self._reader.start()
-        header, _ = self._exchange({"spec": self.spec}, {}, LOADING, 0)
+        header, _ = self._exchange({"spec": self.spec}, {}, 60.0, 0)
         if "reason" in header:
             self.close()
             raise ForeignError(f"{self.spec} cannot be loaded: {header['reason']}")
         try:
-            self._traits = Traits(**header["traits"])
+            return Traits(**header["traits"])
         except (TypeError, ValueError, KeyError) as error:
             self.close()
             raise ForeignError(f"{self.spec}: {error}") from None
 
     def _drain(self, stream: Any) -> None:
+        kept = 4096  # bytes of what a solver prints, from the end
         with contextlib.suppress(OSError, ValueError):
             while part := stream.read1(65536):
-                self._printed = (self._printed + part)[-KEPT:]
+                self._printed = (self._printed + part)[-kept:]
 
     def _exchange(
         self, header: dict[str, Any], arrays: dict[str, Any], limit: float, most: int
@@ -150,8 +151,8 @@ class Isolated:
             how = self._ending(reply)
             self.close()
             raise ForeignError(how)
-        found: tuple[dict[str, Any], dict[str, Any]] = reply
-        return found
+        header, arrays = reply
+        return header, arrays
 
     def _ending(self, error: Exception) -> str:
         """Return how the process ended, and the last line it printed."""
@@ -161,13 +162,9 @@ class Isolated:
         except subprocess.TimeoutExpired:
             return str(error)
         self._reader.join(timeout=1.0)
-        said = [line for line in self._printed.decode(errors="replace").splitlines() if line.strip()]
-        last = f"; last line printed: {' '.join(said[-1].split())}" if said else ""
+        said = last_line(bytes(self._printed))
+        how = f"ended with status {status}"
         if status < 0:
-            try:
-                how = f"was ended by {signal.Signals(-status).name}"
-            except ValueError:
-                how = f"was ended by signal {-status}"
-        else:
-            how = f"ended with status {status}"
-        return f"the process {how} before it answered{last}"
+            known = [each.name for each in signal.Signals if each == -status]
+            how = f"was ended by {known[0] if known else f'signal {-status}'}"
+        return f"the process {how} before it answered{f'; last line printed: {said}' if said else ''}"

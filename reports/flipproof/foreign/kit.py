@@ -17,17 +17,16 @@ from typing import Final
 
 import numpy as np
 
-from flipproof.foreign.answers import Answer, AnswerError, answer_of
+from flipproof.foreign.answers import Answer
 from flipproof.foreign.certify import CHECKS, Certificate, certify
 from flipproof.foreign.contract import Ask, Traits
-from flipproof.foreign.files import read_answer, write_ask
-from flipproof.foreign.specs import ForeignError, WaitingError
+from flipproof.foreign.files import answer_in, write_ask
+from flipproof.foreign.specs import Runner, WaitingError
 
 INDEX: Final = "kit.json"
-FORMAT: Final = 1
 
 
-class Kit:
+class Kit(Runner):
     """A folder of asks and answers as a runner.
 
     Parameters
@@ -46,8 +45,8 @@ class Kit:
             index = json.loads((folder / INDEX).read_text(encoding="utf-8"))
             self.traits = Traits(**index["solver"])
             self.asks: list[str] = [str(key) for key in index["asks"]]
-            if index["kit"] != FORMAT:
-                raise ValueError(f"format {index['kit']!r}, must be {FORMAT}")
+            if index["kit"] != 1:
+                raise ValueError(f"format {index['kit']!r}, must be 1")
         except OSError as error:
             raise ValueError(f"{folder}: is no kit ({INDEX}: {error.strerror or error})") from None
         except (ValueError, TypeError, KeyError) as error:
@@ -77,24 +76,17 @@ class Kit:
         return certify(self, CHECKS), self.waiting
 
     def __call__(self, ask: Ask) -> Answer:
-        """Return the answer that lies in the folder of an ask; add the folder if there is none.
-
-        Raises
-        ------
-        ForeignError
-        """
-        place = self._place(ask)
-        path = place / "answer.csv"
+        """Return the answer that lies in the folder of an ask; add the folder if there is none."""
+        path = self._place(ask) / "answer.csv"
         if not path.is_file():
             self.waiting += 1
             raise WaitingError(f"{path.relative_to(self.folder)} is not there yet")
-        try:
-            return answer_of(ask, read_answer(path, ask.scenario.n_slices))
-        except AnswerError as error:
-            raise ForeignError(str(error).replace(str(self.folder), "").lstrip("/")) from None
+        return answer_in(path, ask, str(path.relative_to(self.folder)))
 
     def _place(self, ask: Ask) -> Path:
-        key = _key(ask)
+        """Return the folder of an ask, which equal asks share."""
+        text = json.dumps([ask.scenario.to_mapping(), ask.effort, dict(ask.options)], sort_keys=True)
+        key = hashlib.sha256(text.encode() + np.ascontiguousarray(ask.times).tobytes()).hexdigest()[:16]
         if key in self.asks:
             return self.folder / "asks" / f"{self.asks.index(key) + 1:04d}"
         self.asks.append(key)
@@ -106,16 +98,7 @@ class Kit:
         _write_index(self.folder, self.traits, self.asks)
         return place
 
-    def close(self) -> None:
-        """Nothing runs."""
-
-
-def _key(ask: Ask) -> str:
-    """Return a name that equal asks share."""
-    text = json.dumps([ask.scenario.to_mapping(), ask.effort, dict(ask.options)], sort_keys=True)
-    return hashlib.sha256(text.encode() + np.ascontiguousarray(ask.times).tobytes()).hexdigest()[:16]
-
 
 def _write_index(folder: Path, traits: Traits, asks: list[str]) -> None:
-    index = {"kit": FORMAT, "solver": asdict(traits), "asks": asks}
+    index = {"kit": 1, "solver": asdict(traits), "asks": asks}
     (folder / INDEX).write_text(json.dumps(index, indent=1) + "\n", encoding="utf-8")

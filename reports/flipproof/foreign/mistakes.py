@@ -12,74 +12,9 @@ from flipproof.foreign.contract import Ask
 from flipproof.foreign.subject import Subject
 
 
-class Weight(Subject):
-    """Eq. 8's gravity is kept: + g cos(theta)."""
-
-    def weight(self, y: Any, omega: float) -> float:
-        return float(self.g * np.cos(y[0]))
-
-
-class NoDrag(Subject):
-    """The drag is missing."""
-
-    def drag_on(self, v: Any) -> Any:
-        return 0.0 * v
-
-    def drag_of_body(self, v: Any, mass: float) -> float:
-        return 0.0
-
-
-class DragSign(Subject):
-    """The drag has the wrong sign."""
-
-    def drag_on(self, v: Any) -> Any:
-        return -super().drag_on(v)
-
-
-class DragHalved(Subject):
-    """alpha / 2m stands where alpha / m is meant."""
-
-    def drag_on(self, v: Any) -> Any:
-        return super().drag_on(v) / 2
-
-
-class DragFivePercent(Subject):
-    """The drag is 5 % too strong."""
-
-    def drag_on(self, v: Any) -> Any:
-        return 1.05 * super().drag_on(v)
-
-
-class DragOnCentre(Subject):
-    """The drag is measured against the centre of mass instead of the tube."""
-
-    def drag_on(self, v: Any) -> Any:
-        mean = self.m * v.sum() / (self.m * self.n + self.mb)
-        return super().drag_on(v - mean)
-
-    def drag_of_body(self, v: Any, mass: float) -> float:
-        return 0.0
-
-
-class NoReaction(Subject):
-    """The tube does not feel the drag of the slices."""
-
-    def drag_of_body(self, v: Any, mass: float) -> float:
-        return 0.0
-
-
-class AboutCentreOfMass(Subject):
-    """Slices are thrown away from the centre of mass: the acceleration of the origin is left out."""
-
-    def body(self, r: Any) -> tuple[float, float]:
-        return super().body(r)[0], self.centre(r)
-
-
-class RestingMassForgotten(Subject):
-    """Slices that rest on an end do not count as part of the tube."""
-
-    def body(self, r: Any) -> tuple[float, float]:
-        return self.mb, self.length / 2
+def _spoiled(name: str, words: str, **parts: Any) -> Any:
+    """Return the solver with other ``parts``, each a function of the solver and what the part is given."""
+    return type(name, (Subject,), {"__doc__": words, **parts})
 
 
 class LaggedInertia(Subject):
@@ -116,70 +51,6 @@ class WrongEpsilon(Subject):
         return float((self.m * r.sum() + light * self.length / 2) / (self.m * self.n + light))
 
 
-class SliceMass(Subject):
-    """A slice weighs M_w / (N + 1)."""
-
-    def slice_mass(self, ask: Ask) -> float:
-        return ask.scenario.water_mass / (ask.scenario.n_slices + 1)
-
-
-class RestitutionLow(Subject):
-    """The restitution is 10 % too low."""
-
-    def restitution(self, speed: float, side: int) -> float:
-        return 0.9 * self.e
-
-
-class RestitutionOfEnergy(Subject):
-    """e is taken for the ratio of energies instead of speeds."""
-
-    def restitution(self, speed: float, side: int) -> float:
-        return float(np.sqrt(self.e))
-
-
-class ElasticCap(Subject):
-    """The cap gives back all speed, the base e of it."""
-
-    def restitution(self, speed: float, side: int) -> float:
-        return self.e if side > 0 else 1.0
-
-
-class VelocityThreshold(Subject):
-    """Impacts slower than 0.5 m/s do not rebound."""
-
-    def restitution(self, speed: float, side: int) -> float:
-        return self.e if speed > 0.5 else 0.0
-
-
-class GridRebounds(Subject):
-    """A rebound waits for the end of the step, and the slice is put on the end."""
-
-    def step(self, y: Any, h: float) -> Any:
-        new = self.advance(y, h)
-        return self.let_go(new) if not self.struck(new).any() or self.frozen else self.meet(new, self.struck(new))
-
-
-class NoRecoil(Subject):
-    """An impact does not move the tube."""
-
-    def recoil(self) -> float:
-        return 0.0
-
-
-class RecoilSign(Subject):
-    """The tube recoils to the wrong side."""
-
-    def recoil(self) -> float:
-        return -0.1 / self.mb
-
-
-class StickForEver(Subject):
-    """A slice that rests is never released."""
-
-    def let_go(self, y: Any) -> Any:
-        return y
-
-
 class WallsAtTheEnds(Subject):
     """Slices turn at 0 and L instead of half a slice before."""
 
@@ -188,58 +59,13 @@ class WallsAtTheEnds(Subject):
         self.low, self.high = 0.0, self.length
 
 
-class Euler(Subject):
-    """A step of Euler's method."""
-
-    def advance(self, y: Any, h: float) -> Any:
-        return y + h * self.slope(y)
-
-
 class HalfStep(Subject):
     """Answers are half a step late."""
 
     def solve(self, ask: Ask) -> Any:
-        dt = float(ask.effort or 1e-4)
-        times = np.concatenate([[0.0], ask.times[1:] - dt / 2])
-        return super().solve(Ask(scenario=ask.scenario, times=times, start=ask.start, effort=ask.effort)) | {
-            "t": ask.times
-        }
-
-
-class SinglePrecision(Subject):
-    """The state is kept in float32, undeclared."""
-
-    kind = np.float32
-
-
-class InitialSpin(Subject):
-    """theta advances with omega_0."""
-
-    def turning(self, omega: float) -> float:
-        return float(self.ask.scenario.omega0)
-
-
-class Degrees(Subject):
-    """theta is answered in degrees."""
-
-    def solve(self, ask: Ask) -> Any:
-        found = super().solve(ask)
-        return found | {"theta": np.degrees(found["theta"])}
-
-
-class PositiveSpin(Subject):
-    """The direction of the spin is lost."""
-
-    def spin(self, y: Any) -> float:
-        return abs(super().spin(y))
-
-
-class AirDrag(Subject):
-    """The flight through the air brakes the spin."""
-
-    def spin(self, y: Any) -> float:
-        vx, vy = self.ask.scenario.launch_velocity
-        return super().spin(y) * (1 - 1e-3 * float(np.hypot(vx, vy)))
+        times = np.concatenate([[0.0], ask.times[1:] - float(ask.effort or 1e-4) / 2])
+        late = Ask(scenario=ask.scenario, times=times, start=ask.start, effort=ask.effort)
+        return super().solve(late) | {"t": ask.times}
 
 
 class IceMoves(Subject):
@@ -248,14 +74,6 @@ class IceMoves(Subject):
     def begin(self, ask: Ask) -> None:
         super().begin(ask)
         self.frozen = False
-
-
-class Noise(Subject):
-    """Answers carry random noise of 1e-9."""
-
-    def solve(self, ask: Ask) -> Any:
-        found = super().solve(ask)
-        return found | {"omega": found["omega"] * (1 + 1e-9 * np.random.default_rng().standard_normal(len(ask.times)))}
 
 
 class LateStart(Subject):
@@ -267,16 +85,93 @@ class LateStart(Subject):
         return y
 
 
-MISTAKES: Final[Mapping[str, type[Subject]]] = MappingProxyType(
-    {
-        kind.__name__: kind
-        for kind in (
-            Weight, NoDrag, DragSign, DragHalved, DragFivePercent, DragOnCentre, NoReaction, AboutCentreOfMass,
-            RestingMassForgotten, LaggedInertia, NoOwnInertia, WrongEpsilon, SliceMass, RestitutionLow,
-            RestitutionOfEnergy, ElasticCap, VelocityThreshold, GridRebounds, NoRecoil, RecoilSign, StickForEver,
-            WallsAtTheEnds, Euler, HalfStep, SinglePrecision, InitialSpin, Degrees, PositiveSpin, AirDrag, IceMoves,
-            Noise, LateStart,
-        )
-    }
-)  # fmt: skip
+def _on_the_grid(subject: Any, y: Any, h: float) -> Any:
+    new = subject.advance(y, h)
+    struck = subject.struck(new)
+    return subject.let_go(new) if not struck.any() or subject.frozen else subject.meet(new, struck)
+
+
+def _in_degrees(subject: Any, ask: Ask) -> Any:
+    found = Subject.solve(subject, ask)
+    return found | {"theta": np.degrees(found["theta"])}
+
+
+def _noisy(subject: Any, ask: Ask) -> Any:
+    found = Subject.solve(subject, ask)
+    return found | {"omega": found["omega"] * (1 + 1e-9 * np.random.default_rng().standard_normal(len(ask.times)))}
+
+
+_KINDS: Final = (
+    _spoiled("Weight", "Eq. 8's gravity is kept: + g cos(theta).", weight=lambda s, y, _: float(s.g * np.cos(y[0]))),
+    _spoiled("NoDrag", "The drag is missing.", drag_on=lambda _, v: 0.0 * v, drag_of_body=lambda *_: 0.0),
+    _spoiled("DragSign", "The drag has the wrong sign.", drag_on=lambda s, v: -Subject.drag_on(s, v)),
+    _spoiled(
+        "DragHalved", "alpha / 2m stands where alpha / m is meant.", drag_on=lambda s, v: Subject.drag_on(s, v) / 2
+    ),
+    _spoiled("DragFivePercent", "The drag is 5 % too strong.", drag_on=lambda s, v: 1.05 * Subject.drag_on(s, v)),
+    _spoiled(
+        "DragOnCentre",
+        "The drag is measured against the centre of mass instead of the tube.",
+        drag_on=lambda s, v: Subject.drag_on(s, v - s.m * v.sum() / (s.m * s.n + s.mb)),
+        drag_of_body=lambda *_: 0.0,
+    ),
+    _spoiled("NoReaction", "The tube does not feel the drag of the slices.", drag_of_body=lambda *_: 0.0),
+    _spoiled(
+        "AboutCentreOfMass",
+        "Slices are thrown away from the centre of mass: the acceleration of the origin is left out.",
+        body=lambda s, r: (Subject.body(s, r)[0], s.centre(r)),
+    ),
+    _spoiled(
+        "RestingMassForgotten",
+        "Slices that rest on an end do not count as part of the tube.",
+        body=lambda s, _: (s.mb, s.length / 2),
+    ),
+    LaggedInertia,
+    NoOwnInertia,
+    WrongEpsilon,
+    _spoiled(
+        "SliceMass",
+        "A slice weighs M_w / (N + 1).",
+        slice_mass=lambda _, ask: ask.scenario.water_mass / (ask.scenario.n_slices + 1),
+    ),
+    _spoiled("RestitutionLow", "The restitution is 10 % too low.", restitution=lambda s, *_: 0.9 * s.e),
+    _spoiled(
+        "RestitutionOfEnergy",
+        "e is taken for the ratio of energies instead of speeds.",
+        restitution=lambda s, *_: float(np.sqrt(s.e)),
+    ),
+    _spoiled(
+        "ElasticCap",
+        "The cap gives back all speed, the base e of it.",
+        restitution=lambda s, _, side: s.e if side > 0 else 1.0,
+    ),
+    _spoiled(
+        "VelocityThreshold",
+        "Impacts slower than 0.5 m/s do not rebound.",
+        restitution=lambda s, speed, _: s.e if speed > 0.5 else 0.0,
+    ),
+    _spoiled(
+        "GridRebounds", "A rebound waits for the end of the step, and the slice is put on the end.", step=_on_the_grid
+    ),
+    _spoiled("NoRecoil", "An impact does not move the tube.", recoil=lambda _: 0.0),
+    _spoiled("RecoilSign", "The tube recoils to the wrong side.", recoil=lambda s: -0.1 / s.mb),
+    _spoiled("StickForEver", "A slice that rests is never released.", let_go=lambda _, y: y),
+    WallsAtTheEnds,
+    _spoiled("Euler", "A step of Euler's method.", advance=lambda s, y, h: y + h * s.slope(y)),
+    HalfStep,
+    _spoiled("SinglePrecision", "The state is kept in float32, undeclared.", kind=np.float32),
+    _spoiled("InitialSpin", "theta advances with omega_0.", turning=lambda s, _: float(s.ask.scenario.omega0)),
+    _spoiled("Degrees", "theta is answered in degrees.", solve=_in_degrees),
+    _spoiled("PositiveSpin", "The direction of the spin is lost.", spin=lambda s, y: abs(Subject.spin(s, y))),
+    _spoiled(
+        "AirDrag",
+        "The flight through the air brakes the spin.",
+        spin=lambda s, y: Subject.spin(s, y) * (1 - 1e-3 * float(np.hypot(*s.ask.scenario.launch_velocity))),
+    ),
+    IceMoves,
+    _spoiled("Noise", "Answers carry random noise of 1e-9.", solve=_noisy),
+    LateStart,
+)
+
+MISTAKES: Final[Mapping[str, type[Subject]]] = MappingProxyType({kind.__name__: kind for kind in _KINDS})
 """Every planted mistake by name; its docstring says what it is."""

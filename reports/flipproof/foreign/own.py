@@ -9,28 +9,27 @@ import numpy as np
 
 from flipproof.foreign.answers import Answer, AnswerError, answer_of
 from flipproof.foreign.contract import Ask, Traits
-from flipproof.foreign.specs import ForeignError
+from flipproof.foreign.specs import ForeignError, Runner
 from flipproof.frame.solvers import Solver, solve
 from ode_reference.solver import COLUMN
 
-GRID: float = 1e-9
-"""How far asked times may lie from a uniform grid, as a fraction of their distance."""
 
-
-class Own:
+class Own(Runner):
     """A scheme, model or engine of flipproof as a runner."""
 
     def __init__(self, solver: Solver) -> None:
         self.solver = solver
-        refined = {"slicemodel": "steps", "ode_reference": None, "engine_check": "dt"}[solver.package]
-        # The column is no equation of slices: it stands on no rung and declares none.
-        equations = {"ode_reference": None if solver.name == COLUMN else solver.name, "engine_check": "free-flight"}
-        orders = {"midpoint": 2.0} if solver.package == "slicemodel" else {}
+        equation: str | None = solver.name
+        if solver.package == "engine_check":
+            equation = "free-flight"
+        elif solver.name == COLUMN:  # no equation of slices: it stands on no rung and declares none
+            equation = None
+        order = None if solver.package != "slicemodel" else 2.0 if solver.name == "midpoint" else 1.0
         self.traits = Traits(
             name=solver.name,
-            equation=solver.name if solver.package == "slicemodel" else equations[solver.package],
-            refined_by=refined,
-            order=orders.get(solver.name, 1.0) if solver.package == "slicemodel" else None,
+            equation=equation,
+            refined_by={"slicemodel": "steps", "ode_reference": None, "engine_check": "dt"}[solver.package],
+            order=order,
             distribution="flipproof",
             timeout=600.0,
         )
@@ -49,31 +48,24 @@ class Own:
             found = solve(self.solver.name, ask.scenario, **settings)
             if not found.ok:
                 raise ForeignError(f"status = {found.status!r}: {found.message}")
-            if stride > 1:
-                names = ("t", "theta", "omega", "r", "v", "r_cm", "inertia")
-                given: Any = {name: getattr(found, name)[::stride] for name in names} | {"impacts": found.impacts}
-                return answer_of(ask, given)
-            return answer_of(ask, found)
+            if stride == 1:
+                return answer_of(ask, found)
+            names = ("t", "theta", "omega", "r", "v", "r_cm", "inertia")
+            return answer_of(ask, {n: getattr(found, n)[::stride] for n in names} | {"impacts": found.impacts})
         except ForeignError:
             raise
         except (ValueError, ArithmeticError, MemoryError, RuntimeError) as error:
             raise ForeignError(f"{type(error).__name__}: {error}") from None
 
-    def close(self) -> None:
-        """Nothing runs."""
-
 
 def _grid_of(ask: Ask) -> tuple[int, int]:
     """Return how many steps lie between asked times, and the points of the grid, for at least ``effort`` steps.
 
-    Raises
-    ------
-    AnswerError
-        If the times are not uniform over [0, duration].
+    Times that are not uniform over [0, duration], to 1e-9 of it, raise an AnswerError.
     """
     points, duration = len(ask.times), ask.scenario.duration
     uniform = np.linspace(0.0, duration, points)
-    if points < 2 or float(np.max(np.abs(ask.times - uniform))) > GRID * duration:
+    if points < 2 or float(np.max(np.abs(ask.times - uniform))) > 1e-9 * duration:
         raise AnswerError(f"times are not a uniform grid over [0, {duration:g}] s, which the slice model computes on")
     stride = max(1, math.ceil((ask.effort or 1000.0) / (points - 1) - 1e-9))
     return stride, stride * (points - 1) + 1

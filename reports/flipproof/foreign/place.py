@@ -39,14 +39,8 @@ THROWS: Final = (_throw(3, 0.35, 6.0, 20.0, 0.2), _throw(4, 0.45, 4.0, 20.0, 0.2
 """The throws that tell equations apart: two with drag, gravity and impacts on both ends, and a slow one in which slices
 rest on an end and leave it, and in which a restitution 10 % low changes omega by 0.01 of omega_0."""
 
-LEVEL: Final = 3
-"""Refinement at which a solver is placed; its own change is the larger one of the two refinements before it."""
-
 SURE: Final = 4.0
-"""A solver is off the lattice if its distance to every equation exceeds ``FLOOR`` and this many times its change."""
-
-FLOOR: Final = 2e-4
-"""Distance that is no other equation, fraction of omega_0: what a rest speed of 1e-3 m/s instead of 1e-5 m/s may do."""
+"""A solver is off the lattice if its distance to every equation exceeds ``_room``: this many times its change."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,10 +55,10 @@ class Place:
     distance : float - largest difference of omega(t) to it, fraction of omega_0, on the throw where it exceeds what
         the solver's own change there explains most
     change : float or None - the same between two refinements of the solver; None if it cannot be refined
+    room : float - distance that the solver's own error explains, fraction of omega_0
     following : str, and following_distance : float - the next equation that is a different one
     inert : tuple of str - switches without effect in the nearest equation
-    epsilon : float - spacing of the solver's numbers
-    still : bool - omega never changes: nothing moves inside the bottle
+    still : bool - omega never changes by more than ``moved``: nothing moves inside the bottle
     """
 
     solver: str
@@ -72,16 +66,12 @@ class Place:
     switches: Switches
     distance: float
     change: float | None
+    room: float
     following: str
     following_distance: float
     inert: tuple[str, ...]
-    epsilon: float
     still: bool
-
-    @property
-    def room(self) -> float:
-        """Distance that the solver's own error explains, fraction of omega_0."""
-        return _room(self.change, self.following_distance, self.epsilon)
+    moved: float
 
     @property
     def on_lattice(self) -> bool:
@@ -93,7 +83,7 @@ class Place:
         """What was found, in sentences."""
         if self.still:
             return (
-                f"{self.solver}: omega stays constant within {self.distance_from_still:.1g}: nothing moves inside the "
+                f"{self.solver}: omega stays constant within {self.moved:.1g}: nothing moves inside the "
                 "bottle, which no equation of the ladder says"
             )
         own = "it cannot be refined" if self.change is None else f"its own change under refinement is {self.change:.2g}"
@@ -106,8 +96,6 @@ class Place:
             f"{self.solver} is off the lattice: the nearest equation is {nearest}, farther than its own error "
             f"explains ({self.room:.2g}); {following}. Look for another restitution, drag or mass than the throw's"
         )
-
-    distance_from_still: float = 0.0
 
     def to_mapping(self) -> dict[str, object]:
         """Return the place as JSON-ready data."""
@@ -130,13 +118,7 @@ def name_of(switches: Switches) -> str:
 
 
 def switches_of(equation: str) -> Switches:
-    """Return the switches of an equation, or of the one a scheme converges to.
-
-    Raises
-    ------
-    ValueError
-        If a scheme converges to no equation of the ladder.
-    """
+    """Return the switches of an equation, or of the one a scheme converges to; if that is none, raises ValueError."""
     equation = LIMITS.get(equation, equation)
     if equation.startswith(PREFIX):
         return Switches.from_name(equation)
@@ -154,60 +136,41 @@ def curve(equation: str, scenario: Scenario, times: FloatArray) -> Answer:
 @cache
 def lattice() -> Mapping[Switches, tuple[FloatArray, ...]]:
     """Return omega/omega_0 of each of the 40 different equations on ``THROWS``, by switches."""
-    return {s: curves_of(s, [times_of(throw) for throw in THROWS]) for s in {canonical(s) for s in Switches.every()}}
-
-
-def curves_of(switches: Switches, times: list[FloatArray]) -> tuple[FloatArray, ...]:
-    """Return omega/omega_0 of one equation on ``THROWS`` at the given times."""
-    return tuple(curve(switches.name, throw, t).omega / throw.omega0 for throw, t in zip(THROWS, times, strict=True))
+    return {
+        s: tuple(curve(s.name, throw, times_of(throw)).omega / throw.omega0 for throw in THROWS)
+        for s in {canonical(s) for s in Switches.every()}
+    }
 
 
 def place(runner: Runner) -> Place:
-    """Find the equation that a solver solves.
-
-    Raises
-    ------
-    ForeignError
-        If the solver gives no answer.
-    """
+    """Find the equation that a solver solves; raises ForeignError if it gives no answer."""
     return drive(placing(runner.traits), runner)
 
 
 def placing(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], Place]:
     """Yield the asks by which a solver is placed, at its finest level and two before it; return its place."""
-    levels = (LEVEL, LEVEL - 1, LEVEL - 2) if traits.refined_by is not None else (LEVEL,)
+    levels = (3, 2, 1) if traits.refined_by is not None else (3,)
     answers = yield [ask_of(traits, throw, level) for level in levels for throw in THROWS]
-    rows = [answers[k : k + len(THROWS)] for k in range(0, len(answers), len(THROWS))]
-    finest, *coarser = (
-        tuple(answer.omega / throw.omega0 for answer, throw in zip(row, THROWS, strict=True)) for row in rows
-    )
-    return located(traits.name, finest, coarser, lattice(), traits.epsilon)
-
-
-def located(
-    solver: str,
-    curves: tuple[FloatArray, ...],
-    coarser: list[tuple[FloatArray, ...]],
-    references: Mapping[Switches, tuple[FloatArray, ...]],
-    epsilon: float,
-) -> Place:
-    """Return the place of curves among references; all are omega/omega_0 on the same throws and times."""
+    relative = [answer.omega / throw.omega0 for answer, throw in zip(answers, THROWS * len(levels), strict=True)]
+    curves, *coarser = (tuple(relative[k : k + len(THROWS)]) for k in range(0, len(relative), len(THROWS)))
+    references = lattice()
     distances = {s: max(_apart(curves, reference)) for s, reference in references.items()}
     nearest = min(distances, key=lambda s: (distances[s], s.name))
     following = min((s for s in distances if s != nearest), key=lambda s: (distances[s], s.name))
-    still = max(float(np.max(np.abs(c - 1.0))) for c in curves)
+    moved = max(float(np.max(np.abs(c - 1.0))) for c in curves)
     steps = [_apart(a, b) for a, b in pairwise([curves, *coarser])]
     changes = [max(of_throw) for of_throw in zip(*steps, strict=True)] if steps else [None] * len(curves)
-    distance, change = max(
-        zip(_apart(curves, references[nearest]), changes, strict=True),
-        key=lambda found: found[0] / _room(found[1], distances[following], epsilon),
+    rooms = [_room(each, distances[following], traits.epsilon) for each in changes]
+    distance, change, room = max(
+        zip(_apart(curves, references[nearest]), changes, rooms, strict=True), key=lambda found: found[0] / found[2]
     )
     return Place(
-        solver=solver,
+        solver=traits.name,
         equation=name_of(nearest),
         switches=nearest,
         distance=distance,
         change=change,
+        room=room,
         following=name_of(following),
         following_distance=distances[following],
         inert=tuple(
@@ -215,9 +178,8 @@ def located(
             for field in fields(Switches)
             if canonical(replace(nearest, **{field.name: not getattr(nearest, field.name)})) == nearest
         ),
-        epsilon=epsilon,
-        still=still <= max(1e-9, 64 * epsilon, SURE * (change or 0.0)),
-        distance_from_still=still,
+        still=moved <= max(1e-9, 64 * traits.epsilon, SURE * (change or 0.0)),
+        moved=moved,
     )
 
 
@@ -227,5 +189,8 @@ def _apart(one: tuple[FloatArray, ...], other: tuple[FloatArray, ...]) -> list[f
 
 
 def _room(change: float | None, following: float, epsilon: float) -> float:
-    """Return the distance that a solver's own change explains; where it has none, a fifth of that to the next one."""
-    return max(FLOOR, 64 * epsilon) + (following / 5 if change is None else SURE * change)
+    """Return the distance that a solver's own change explains; where it has none, a fifth of that to the next one.
+
+    A distance of 2e-4, what a rest speed of 1e-3 m/s instead of 1e-5 m/s may do, is no other equation.
+    """
+    return max(2e-4, 64 * epsilon) + (following / 5 if change is None else SURE * change)

@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 from flipproof.foreign.answers import Answer, AnswerError, answer_of
 from flipproof.foreign.certify import CHECKS, FAILED, certify
-from flipproof.foreign.contract import Ask, Traits, traits_of
+from flipproof.foreign.contract import Ask, traits_of
 from flipproof.foreign.mistakes import MISTAKES
-from flipproof.foreign.specs import ForeignError
+from flipproof.foreign.specs import ForeignError, Runner
 from flipproof.foreign.subject import Subject
-from flipproof.frame.findings import Finding
+from flipproof.frame.findings import Finding, regression
+from flipproof.output.columns import rows_csv
 
 CLEAN: Final = "none"
 
 
-class InProcess:
+class InProcess(Runner):
     """A solver object as a runner, in this process: for code of our own only."""
 
     def __init__(self, solver: Any, name: str) -> None:
         self.solver = solver
-        self.traits: Traits = traits_of(solver, name)
+        self.traits = traits_of(solver, name)
 
     def __call__(self, ask: Ask) -> Answer:
         """Return the checked answer."""
@@ -33,9 +33,6 @@ class InProcess:
             raise ForeignError(f"answer: {error}") from None
         except (ArithmeticError, ValueError, LookupError) as error:
             raise ForeignError(f"{type(error).__name__}: {error}") from None
-
-    def close(self) -> None:
-        """Nothing runs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +44,10 @@ class Caught:
     checks: tuple[str, ...]
 
 
-def detect(name: str, checks: Sequence[str] = tuple(CHECKS)) -> Caught:
-    """Plant one mistake and make the checks; ``CLEAN`` plants none."""
+def detect(name: str) -> Caught:
+    """Plant one mistake and make all checks; ``CLEAN`` plants none."""
     kind = Subject if name == CLEAN else MISTAKES[name]
-    found = certify(InProcess(kind(), name), checks)
+    found = certify(InProcess(kind(), name))
     words = "no mistake" if name == CLEAN else (kind.__doc__ or "").partition("\n")[0]
     return Caught(name, words, tuple(r.check for r in found.results if r.verdict == FAILED))
 
@@ -60,41 +57,17 @@ def claim_power(found: Sequence[Caught]) -> tuple[Finding, ...]:
     planted = [caught for caught in found if caught.mistake != CLEAN]
     missed = [caught.mistake for caught in planted if not caught.checks]
     accused = [name for caught in found if caught.mistake == CLEAN for name in caught.checks]
+    count = float(len(planted))
+    note = f"not seen: {', '.join(missed)}" if missed else ""
+    seen, title = count - len(missed), "planted mistakes that at least one check sees"
+    clean = "checks that accuse the solver without a mistake"
     return (
-        Finding(
-            id="power-caught",
-            title="planted mistakes that at least one check sees",
-            value=float(len(planted) - len(missed)),
-            unit=f"of {len(planted)}",
-            kind="regression",
-            admissible=(float(len(planted)), float(len(planted))),
-            note=f"not seen: {', '.join(missed)}" if missed else "",
-        ),
-        Finding(
-            id="power-clean",
-            title="checks that accuse the solver without a mistake",
-            value=float(len(accused)),
-            unit="",
-            kind="regression",
-            admissible=(0.0, 0.0),
-            note=", ".join(accused),
-        ),
+        regression("power-caught", title, seen, f"of {len(planted)}", (count, count), note),
+        regression("power-clean", clean, float(len(accused)), "", (0.0, 0.0), ", ".join(accused)),
     )
 
 
 def matrix_csv(found: Sequence[Caught]) -> str:
     """Return the matrix mistake x check as CSV: 1 where the check fails because of the mistake."""
-    rows = [",".join(["mistake", *CHECKS])]
-    rows += [",".join([caught.mistake, *(str(int(name in caught.checks)) for name in CHECKS)]) for caught in found]
-    return "\n".join(rows) + "\n"
-
-
-def detect_all(pool: Executor | None = None, say: Callable[[Caught], None] = lambda _: None) -> tuple[Caught, ...]:
-    """Plant every mistake, the clean solver first."""
-    names = [CLEAN, *MISTAKES]
-    made: Iterator[Caught] = map(detect, names) if pool is None else pool.map(detect, names)
-    found = []
-    for caught in made:
-        found.append(caught)
-        say(caught)
-    return tuple(found)
+    rows = ([caught.mistake, *(int(name in caught.checks) for name in CHECKS)] for caught in found)
+    return rows_csv(["mistake", *CHECKS], rows)

@@ -15,10 +15,11 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import shlex
 import sys
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final
 
 from flipproof.frame.solvers import catalogue, find
 from slicemodel.scenario import unknown_name
@@ -26,9 +27,6 @@ from slicemodel.scenario import unknown_name
 if TYPE_CHECKING:
     from flipproof.foreign.answers import Answer
     from flipproof.foreign.contract import Ask, Traits
-
-GROUPS: Final = ("flipproof.solvers", "flipproof.engines")
-"""Groups of entry points under which packages offer their solvers."""
 
 CSV: Final = "csv:"
 COMMAND: Final = "cmd:"
@@ -42,23 +40,23 @@ class WaitingError(ForeignError):
     """An answer that somebody is to write is not there yet."""
 
 
-class Runner(Protocol):
-    """A solver that can be asked, wherever it runs."""
+class Runner:
+    """A solver that can be asked, wherever it runs; ``traits`` is what it says of itself."""
 
-    @property
-    def traits(self) -> Traits:
-        """What it says of itself."""
+    traits: Traits
 
     def __call__(self, ask: Ask) -> Answer:
         """Return its checked answer; raise ForeignError if there is none."""
+        raise NotImplementedError
 
     def close(self) -> None:
-        """End what runs for it."""
+        """End what runs for it, if anything does."""
 
 
 def offered() -> dict[str, EntryPoint]:
-    """Return the solvers that installed packages offer, by name; none of them is imported."""
-    return {point.name: point for group in GROUPS for point in entry_points(group=group)}
+    """Return the solvers that installed packages offer as entry points, by name; none of them is imported."""
+    groups = ("flipproof.solvers", "flipproof.engines")
+    return {point.name: point for group in groups for point in entry_points(group=group)}
 
 
 def is_foreign(spec: str) -> bool:
@@ -72,23 +70,13 @@ def is_spec(name: str) -> bool:
 
 
 def check_spec(spec: str) -> None:
-    """Refuse a spec that names nothing; no foreign code runs.
-
-    Raises
-    ------
-    ValueError
-    """
+    """Refuse by a ValueError a spec that names nothing; no foreign code runs."""
     if not spec.startswith((CSV, COMMAND)):
         locate(spec)
 
 
 def check_asked(spec: str) -> None:
-    """Refuse a curve in a file, which cannot be asked for another throw.
-
-    Raises
-    ------
-    ValueError
-    """
+    """Refuse by a ValueError a curve in a file, which cannot be asked for another throw."""
     if spec.startswith(CSV):
         raise ValueError(f"solver {spec!r}: a curve cannot be asked; flipproof compare holds it against a solver")
 
@@ -130,10 +118,9 @@ def opened(spec: str, timeout: float | None = None, *, curves: bool = False) -> 
 def locate(spec: str) -> EntryPoint | tuple[str, str]:
     """Return the entry point that a spec names, or its module or file and the object's name; nothing is imported.
 
-    Raises
-    ------
-    ValueError
+    A spec that names nothing raises a ValueError that says how specs are written.
     """
+    how = "package.module:name, file.py:name, csv:file.csv or cmd:'program {scenario} {times} {out}'"
     place, _, name = spec.rpartition(":")
     if not place:
         points = offered()
@@ -141,34 +128,29 @@ def locate(spec: str) -> EntryPoint | tuple[str, str]:
             return points[spec]
         if spec.endswith(".py"):
             raise ValueError(f"solver {spec!r}: name the object in the file, too: {spec}:solve")
-        raise ValueError(unknown_name("solver", spec, [*catalogue(), *points]) + f"; or write {HOW}")
+        raise ValueError(unknown_name("solver", spec, [*catalogue(), *points]) + f"; or write {how}")
     if not name.isidentifier():
-        raise ValueError(f"solver {spec!r}: {name!r} is no name; write {HOW}")
+        raise ValueError(f"solver {spec!r}: {name!r} is no name; write {how}")
     if place.endswith(".py"):
         if not Path(place).is_file():
             raise ValueError(f"solver {spec!r}: there is no file {place}")
     elif not all(part.isidentifier() for part in place.split(".")):
-        raise ValueError(f"solver {spec!r}: {place!r} is neither a module nor a .py file; write {HOW}")
+        raise ValueError(f"solver {spec!r}: {place!r} is neither a module nor a .py file; write {how}")
     return place, name
 
 
-HOW: Final = "package.module:name, file.py:name, csv:file.csv or cmd:'program {scenario} {times} {out}'"
+def words_of(spec: str) -> list[str]:
+    """Return the words of a command; raises ValueError if a quotation is not closed."""
+    try:
+        return shlex.split(spec.removeprefix(COMMAND))
+    except ValueError as error:
+        raise ValueError(f"solver {spec!r}: {error}") from None
 
 
 def load(spec: str) -> object:
-    """Import what a spec names and return it. This runs foreign code: call it in a process that may be lost.
-
-    Raises
-    ------
-    Exception
-        Whatever the code raises.
-    """
+    """Import what a spec names and return it. This runs foreign code: call it in a process that may be lost."""
     found = locate(spec)
-    if isinstance(found, EntryPoint):
-        solver = found.load()
-    else:
-        place, name = found
-        solver = getattr(_module(place), name)
+    solver = found.load() if isinstance(found, EntryPoint) else getattr(_module(found[0]), found[1])
     return solver() if isinstance(solver, type) else solver
 
 

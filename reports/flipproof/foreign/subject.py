@@ -25,13 +25,6 @@ from slicemodel.trajectory import FloatArray
 IntArray = NDArray[np.int64]
 
 
-MOST_IMPACTS = 500
-"""Impacts of a flight after which it goes on without; a mistake may cause them without end."""
-
-HALVINGS = 42
-"""Halvings of a step by which a rebound is located in it."""
-
-
 class Subject:
     """The solver as it should be. Each part that a mistake may spoil is a method of its own."""
 
@@ -42,8 +35,6 @@ class Subject:
     order: ClassVar[float] = 4.0
     rest_speed = 1e-3
     kind: type = np.float64
-
-    # ------------------------------------------------------------------ the parts
 
     def begin(self, ask: Ask) -> None:
         """Take over the constants of a throw."""
@@ -192,20 +183,18 @@ class Subject:
 
     def step(self, y: FloatArray, h: float) -> FloatArray:
         """Return the state after a step with all its rebounds, each at its own time."""
-        while self.impacts < MOST_IMPACTS:
+        while self.impacts < 500:  # after that it flies on without; a mistake may cause impacts without end
             new = self.advance(y, h)
             if self.frozen or not self.struck(new).any():
                 return self.let_go(new)
             low, high = 0.0, h
-            for _ in range(HALVINGS):
+            for _ in range(42):
                 middle = (low + high) / 2
                 low, high = (low, middle) if self.struck(self.advance(y, middle)).any() else (middle, high)
             self.impacts += 1
             at = self.advance(y, high)
             y, h = self.meet(at, self.struck(at)), h - high
         return self.advance(y, h)
-
-    # ------------------------------------------------------------------ the loop
 
     def steps(self, span: float, dt: float) -> int:
         """Return the steps that lead over ``span`` [s]."""
@@ -229,10 +218,5 @@ class Subject:
             rows.append(y.copy())
             spins.append(self.spin(y))
         states = np.array(rows)
-        return {
-            "t": ask.times,
-            "theta": states[:, 0],
-            "omega": np.array(spins),
-            "r": states[:, 1 : self.n + 1],
-            "v": states[:, self.n + 1 :],
-        }
+        _, r, v = np.split(states, [1, self.n + 1], axis=1)
+        return {"t": ask.times, "theta": states[:, 0], "omega": np.array(spins), "r": r, "v": v}

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
 from flipproof.foreign.certify import EXPECTED, FAILED, IDLE, Certificate
-from flipproof.frame.findings import Finding
-from flipproof.output.junit import junit_text
+from flipproof.frame.findings import Finding, observed, regression
 
 
 def findings_of(certificate: Certificate, id_: str = "certify-", title: str = "") -> tuple[Finding, ...]:
@@ -16,21 +13,10 @@ def findings_of(certificate: Certificate, id_: str = "certify-", title: str = ""
     """
     found = []
     for result in certificate.results:
-        idle = result.verdict in (IDLE, EXPECTED)
-        found.append(
-            Finding(
-                id=f"{id_}{result.check}",
-                title=f"{title}{result.title.rstrip('.')}",
-                value=None if result.verdict == IDLE else float(result.verdict != FAILED),
-                unit="",
-                kind="observation" if idle else "regression",
-                admissible=(-math.inf, math.inf) if idle else (1.0, 1.0),
-                note=result.words,
-            )
-        )
+        about = f"{id_}{result.check}", f"{title}{result.title.rstrip('.')}"
+        value = None if result.verdict == IDLE else float(result.verdict != FAILED)
+        if result.verdict in (IDLE, EXPECTED):
+            found.append(observed(*about, value, note=result.words))
+        else:
+            found.append(regression(*about, value, "", (1.0, 1.0), result.words))
     return tuple(found)
-
-
-def junit_of(certificate: Certificate) -> str:
-    """Return the certificate as JUnit XML."""
-    return junit_text(findings_of(certificate), f"flipproof certify {certificate.traits.name}")

@@ -7,14 +7,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any, BinaryIO, Final
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from slicemodel.trajectory import FloatArray
-
-MOST_HEADER: Final = 1 << 20
-"""Bytes of a header at the most."""
 
 
 class BrokenFrameError(EOFError):
@@ -33,14 +30,9 @@ def send(stream: BinaryIO, header: Mapping[str, Any], arrays: Mapping[str, Float
 
 
 def receive(stream: BinaryIO, most: int) -> tuple[dict[str, Any], dict[str, FloatArray]]:
-    """Read one frame of at most ``most`` bytes of numbers.
-
-    Raises
-    ------
-    BrokenFrameError
-    """
+    """Read one frame of at most ``most`` bytes of numbers; raises BrokenFrameError."""
     size = int.from_bytes(_exactly(stream, 8), "little")
-    if size > MOST_HEADER:
+    if size > 1 << 20:
         raise BrokenFrameError("what came is no frame")
     try:
         header = json.loads(_exactly(stream, size))

@@ -78,14 +78,6 @@ class Absent:
 Claims = Iterator[Finding | Absent]
 
 
-def _nothing(_: Any) -> Iterator[Any]:
-    return iter(())
-
-
-def _no_part(_: Any) -> dict[str, Any]:
-    return {}
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chapter(Generic[F]):
     """One subject of a report.
@@ -108,14 +100,14 @@ class Chapter(Generic[F]):
     name: str
     title: str
     study: Callable[[Ask], Study[F]]
-    claims: Callable[[F], Claims] = _nothing
-    figures: Callable[[F], Iterable[Exhibit]] = _nothing
+    claims: Callable[[F], Claims] = lambda _: iter(())
+    figures: Callable[[F], Iterable[Exhibit]] = lambda _: ()
     template: Path | None = None
     work: Mapping[Size, Any] = field(default_factory=lambda: {"quick": None, "full": None})
     kind: Kind = "observation"
-    summary: Callable[[F], Mapping[str, Any]] = _no_part
-    tables: Callable[[F], Mapping[str, str]] = _no_part
-    page: Callable[[F], Mapping[str, Any]] = _no_part
+    summary: Callable[[F], Mapping[str, Any]] = lambda _: {}
+    tables: Callable[[F], Mapping[str, str]] = lambda _: {}
+    page: Callable[[F], Mapping[str, Any]] = lambda _: {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,11 +127,10 @@ def judged(
 
     Of what was made the claim is given the flight, of an outcome what was found.
     """
-    outcome = attempt(lambda: claim(*map(_evidence, about)))
+
+    def evaluate() -> Finding:
+        evidence = (each.flight if isinstance(each, Made) else each for each in about)
+        return claim(*(each.value if isinstance(each, Outcome) else each for each in evidence))
+
+    outcome = attempt(evaluate)
     return outcome.found if outcome.found is not None else Absent(id, title, outcome.reason, kind)
-
-
-def _evidence(about: Any) -> Any:
-    if isinstance(about, Made):
-        return about.flight
-    return about.value if isinstance(about, Outcome) else about

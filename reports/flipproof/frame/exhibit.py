@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
 from matplotlib.figure import Figure
 
 from flipproof.figures.style import Drawing, draw
-from flipproof.frame.pool import workers
 from flipproof.output.columns import Curves
-
-FEW = 3
-"""Figures that are sooner drawn here than workers are started."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,29 +71,15 @@ class Exhibit:
         return self.drawn or draw(self.maker(*self.data))
 
 
-def drawn(
-    exhibits: Sequence[Exhibit], jobs: int | None = None, *, pool: Executor | None = None, png: bool = True
-) -> tuple[Exhibit, ...]:
-    """Return the exhibits with their figures, in the order given.
+def drawn(exhibits: Sequence[Exhibit], pool: Executor, *, png: bool = True) -> tuple[Exhibit, ...]:
+    """Return the exhibits with their figures, in the order given, drawn by the workers of a pool.
 
-    Parameters
-    ----------
-    exhibits : sequence of Exhibit
-    jobs : int or None
-        Worker processes; None: one per core. One job, and few figures, are drawn in this process. The bytes are the
-        same either way.
-    pool : Executor or None
-        Workers that are there already; then ``jobs`` does not count.
-    png : bool
-        Whether the figures are wanted as PNG, too.
+    The bytes are the same whoever draws; ``png`` says whether the figures are wanted as PNG, too.
     """
-    if pool is None and (jobs == 1 or len(exhibits) <= FEW):
-        return tuple(replace(each, drawn=each.drawn or _draw(each.maker, each.data, png)) for each in exhibits)
-    with workers(jobs) if pool is None else nullcontext(pool) as drawing:
-        # The figures with most to draw first, so that no worker is left with a long one at the end.
-        order = sorted(exhibits, key=lambda exhibit: -len(exhibit.table or ""))
-        pending = {exhibit.name: drawing.submit(_draw, exhibit.maker, exhibit.data, png) for exhibit in order}
-        return tuple(replace(exhibit, drawn=pending[exhibit.name].result()) for exhibit in exhibits)
+    # The figures with most to draw first, so that no worker is left with a long one at the end.
+    order = sorted(exhibits, key=lambda exhibit: -len(exhibit.table or ""))
+    pending = {exhibit.name: pool.submit(_draw, exhibit.maker, exhibit.data, png) for exhibit in order}
+    return tuple(replace(exhibit, drawn=pending[exhibit.name].result()) for exhibit in exhibits)
 
 
 def _draw(maker: Callable[..., Figure], data: tuple[Any, ...], png: bool) -> Drawing:

@@ -21,21 +21,14 @@ class Finding:
 
     Parameters
     ----------
-    id : str
-        Stable name without blanks, unique in a report; an anchor of the page, and the key to compare reports by.
-    title : str
-        The claim in words.
-    value : float or None
-        None if it could not be computed.
+    id : str - stable, without blanks, unique in a report: an anchor of the page, and the key to compare reports by
+    title : str - the claim in words
+    value : float or None - None if it could not be computed
     unit : str
-    admissible : (low, high)
-        Closed interval the value must lie in; (-inf, inf) for an observation.
-    kind : {"regression", "observation"}
-        A failed regression sets the exit status; an observation cannot fail.
-    band : float or None
-        Numerical uncertainty of the value.
-    note : str
-        Where and when, or why it could not be evaluated.
+    admissible : (low, high) - closed interval the value must lie in; (-inf, inf) for an observation
+    kind : {"regression", "observation"} - a failed regression sets the exit status; an observation cannot fail
+    band : float or None - numerical uncertainty of the value
+    note : str - where and when, or why it could not be evaluated
     """
 
     id: str
@@ -66,13 +59,9 @@ class Finding:
     def threshold_text(self) -> str:
         """The admissible interval as the table prints it."""
         low, high = self.admissible
-        if math.isinf(low) and math.isinf(high):
-            return "none"
         if math.isinf(low) or low == 0.0:
-            return f"≤ {high:.3g}"
-        if math.isinf(high):
-            return f"≥ {low:.3g}"
-        return f"{low:.3g} to {high:.3g}"
+            return "none" if math.isinf(low) and math.isinf(high) else f"≤ {high:.3g}"
+        return f"≥ {low:.3g}" if math.isinf(high) else f"{low:.3g} to {high:.3g}"
 
     @property
     def value_text(self) -> str:

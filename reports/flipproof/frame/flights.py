@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
@@ -41,35 +41,28 @@ class Outcome(Generic[T]):
         return self.found
 
 
-class Flights(Mapping[Run, Made]):
+class Flights(dict[Run, Made]):
     """What became of runs and calls, by the run or call itself. ``flights[run]`` raises Missing if it was not made."""
 
     def __init__(self, made: Mapping[Run, Made], called: Mapping[Call, Outcome[Any]] = MappingProxyType({})) -> None:
-        self._made, self._called = dict(made), dict(called)
+        super().__init__(made)
+        self._called = dict(called)
 
-    def __getitem__(self, run: Run) -> Made:
-        if run not in self._made:
-            raise Missing(f"{run.name}: it was not run")
-        return self._made[run]
+    def __missing__(self, run: Run) -> Made:
+        raise Missing(f"{run.name}: it was not run")
 
     def answer(self, call: Call) -> Any:
         """Return what a call returned; raises Missing if it failed."""
         return self._called[call].value
 
-    def __iter__(self) -> Iterator[Run]:
-        return iter(self._made)
-
-    def __len__(self) -> int:
-        return len(self._made)
-
     def trajectory(self, run: Run) -> Trajectory | None:
         """Return the trajectory of a run, or None if there is none."""
-        return self._made[run].trajectory if run in self._made else None
+        return self[run].trajectory if run in self else None
 
     def add(self, made: Mapping[Run, Made], called: Mapping[Call, Outcome[Any]]) -> None:
         """Add what became of another wave."""
-        self._made |= made
-        self._called |= called
+        self.update(made)
+        self._called.update(called)
 
 
 def attempt(study: Callable[..., T], *about: Any) -> Outcome[T]:

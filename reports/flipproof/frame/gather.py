@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,8 +15,29 @@ from flipproof.frame.findings import Finding
 from flipproof.frame.flights import Call, Flights, Outcome, attempt
 from flipproof.frame.pool import Progress, make_all
 from flipproof.frame.solvers import Run
-from flipproof.frame.stages import Stages
 from flipproof.frame.store import RunStore
+
+
+class Stages:
+    """A stopwatch whose laps have names; ``seconds`` holds them in the order in which they were first begun.
+
+    ``begins`` is called with the name of each lap when it begins.
+    """
+
+    def __init__(self, begins: Callable[[str], None] = lambda _: None) -> None:
+        self.seconds: dict[str, float] = {}
+        self._begins = begins
+
+    @contextmanager
+    def lap(self, name: str) -> Iterator[None]:
+        """Add the wall time of a block to the lap of this name."""
+        self._begins(name)
+        self.seconds.setdefault(name, 0.0)
+        began = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] += time.perf_counter() - began
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,16 +70,6 @@ class Told:
     seconds: Mapping[str, float] = field(default_factory=dict)
 
 
-def _asked(parts: Iterable[Part], ask: Ask, work: Mapping[str, Any]) -> list[tuple[Chapter[Any], Any]]:
-    """Return the chapters that a report of this size has, in order, each with its amount of work."""
-    return [
-        (chapter, work.get(chapter.name, chapter.work.get(ask.size)))
-        for part in parts
-        for chapter in part.chapters
-        if ask.size in chapter.work or chapter.name in work
-    ]
-
-
 def gather(
     parts: Iterable[Part],
     ask: Ask,
@@ -84,15 +96,17 @@ def gather(
     flights = Flights({})
     outcomes: dict[str, Outcome[Any]] = {}
     waiting: dict[str, tuple[Any, tuple[Run | Call, ...]]] = {}
-    for chapter, amount in _asked(parts, ask, work):
-        _advance(chapter.name, chapter.study(replace(ask, work=amount)), None, waiting, outcomes)
+    for chapter in (chapter for part in parts for chapter in part.chapters):
+        if ask.size in chapter.work or chapter.name in work:
+            amount = work.get(chapter.name, chapter.work.get(ask.size))
+            _advance(chapter.name, chapter.study(replace(ask, work=amount)), None, waiting, outcomes)
     wave = 0
     while waiting:
         wave += 1
         asked = dict.fromkeys(each for _, requests in waiting.values() for each in requests)
         runs = [each for each in asked if isinstance(each, Run) and each not in flights]
+        calls = [each for each in asked if isinstance(each, Call)]
         with stages.lap(f"runs, wave {wave}"):
-            calls = [each for each in asked if isinstance(each, Call)]
             flights.add(*make_all(pool, runs, progress, calls, store))
         with stages.lap("studies"):
             resumed, waiting = waiting, {}
@@ -103,22 +117,15 @@ def gather(
 
 def _advance(name: str, study: Any, flights: Flights | None, waiting: dict[str, Any], outcomes: dict[str, Any]) -> None:
     """Resume a study with what it asked for; note what it asks next, what it found, or why it ended."""
-    ended: list[Any] = []
-
-    def resumed() -> tuple[Run | Call, ...]:
-        try:
-            return tuple(study.send(flights))
-        except StopIteration as end:
-            ended.append(end.value)
-            return ()
-
-    outcome = attempt(resumed)
-    if ended:
-        outcomes[name] = Outcome(ended[0])
-    elif outcome.reason:
-        outcomes[name] = outcome
+    try:
+        asked = attempt(lambda: tuple(study.send(flights)))
+    except StopIteration as end:
+        outcomes[name] = Outcome(end.value)
+        return
+    if asked.reason:
+        outcomes[name] = asked
     else:
-        waiting[name] = (study, outcome.value)
+        waiting[name] = (study, asked.value)
 
 
 def tell(gathered: Gathered) -> dict[str, Told]:
@@ -135,13 +142,10 @@ def _told(chapter: Chapter[Any], outcome: Outcome[Any]) -> Told:
     said: list[Finding | Absent] = []
     drawn: list[Exhibit] = []
     seconds: dict[str, float] = {}
-    for what in (
-        lambda: said.extend(_clocked(chapter.claims, outcome, seconds)),
-        lambda: drawn.extend(chapter.figures(outcome.value)),
-    ):
-        failure = attempt(lambda what: what() or True, what)
-        if failure.reason and not any(each.id == f"chapter-{chapter.name}" for each in said):
-            said.append(Absent(f"chapter-{chapter.name}", chapter.title, failure.reason, chapter.kind))
+    claims = attempt(lambda: said.extend(_clocked(chapter.claims, outcome, seconds)))
+    figures = attempt(lambda: drawn.extend(chapter.figures(outcome.value)))
+    if reason := claims.reason or figures.reason:
+        said.append(Absent(f"chapter-{chapter.name}", chapter.title, reason, chapter.kind))
     return Told(
         chapter=chapter,
         found=outcome.found,

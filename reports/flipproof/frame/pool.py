@@ -19,12 +19,6 @@ Progress = Callable[[int, int, str], None]
 GROUP = 8
 """Runs of a group: sending a quick one away alone would cost as much as making it."""
 
-QUICK = ("slicemodel", "ode_reference")
-"""Packages whose runs take milliseconds, but for those by a ``method`` of SciPy's."""
-
-COMPILED = ("exact-step", "eq8")
-"""A solver of each compiled loop."""
-
 TRIES = 2
 """Times that a call is made when its worker dies: what killed one worker may have had nothing to do with the call."""
 
@@ -85,15 +79,19 @@ def compile_kernels(pool: Executor) -> None:
     Runs that are sent away after that find them there, whichever worker makes them.
     """
     short = Scenario(n_slices=2, duration=1e-3)
-    wait([pool.submit(make_each, [Run(name, short)]) for name in COMPILED])
+    wait([pool.submit(make_each, [Run(name, short)]) for name in ("exact-step", "eq8")])
 
 
 def _jobs(runs: list[Run]) -> list[list[Run]]:
-    """Return runs by jobs: each that may be slow alone, and these first; the others in groups."""
+    """Return runs by jobs: each that may be slow alone, and these first; the others in groups.
+
+    Runs of schemes and of equations take milliseconds, but for those by a ``method`` of SciPy's.
+    """
     quick: list[Run] = []
     slow: list[Run] = []
     for run in runs:
-        (quick if find(run.solver).package in QUICK and "method" not in run.settings else slow).append(run)
+        fast = find(run.solver).package in ("slicemodel", "ode_reference") and "method" not in run.settings
+        (quick if fast else slow).append(run)
     return [*([run] for run in slow), *(quick[k : k + GROUP] for k in range(0, len(quick), GROUP))]
 
 

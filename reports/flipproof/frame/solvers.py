@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -140,37 +141,29 @@ class Made:
 def make(run: Run) -> Made:
     """Make one run; whatever it raises becomes its reason, so that a report can show the failure in place."""
     began = time.perf_counter()
+    trajectory, reason = None, ""
     try:
-        trajectory = solve(run.solver, run.scenario, **run.settings)
+        found = solve(run.solver, run.scenario, **run.settings)
+        if len(found.t):
+            trajectory = found
+        else:
+            reason = f"{found.status}: {found.message}"
     except (ValueError, ArithmeticError, MemoryError, RuntimeError) as error:
-        return Made(run, None, time.perf_counter() - began, f"{type(error).__name__}: {error}")
-    if len(trajectory.t) == 0:
-        return Made(run, None, time.perf_counter() - began, f"{trajectory.status}: {trajectory.message}")
-    return Made(run, trajectory, time.perf_counter() - began)
+        reason = f"{type(error).__name__}: {error}"
+    return Made(run, trajectory, time.perf_counter() - began, reason)
 
 
 def solve(name: str, scenario: Scenario, **settings: Any) -> Trajectory:
     """Run the named solver with its package's own ``solve``."""
     solver = find(name)
     settings = {solver.keyword: name, **settings}
-    if solver.package == FOREIGN:
-        from flipproof.foreign.solving import solve as solve_foreign
-
-        return solve_foreign(scenario, **settings)
-    if solver.package == "slicemodel":
-        import slicemodel
-
-        return slicemodel.solve(scenario, **settings)
-    if solver.package == "ode_reference":
-        import ode_reference
-
-        return ode_reference.solve(scenario, **settings)
-    import engine_check
-
-    # Without step and tolerance an engine would certify each run, at several times its cost; the report's own
-    # refinement (``chapters.differences``) says what its runs are worth.
-    given = {} if "tolerance" in settings else {"dt": engine_check.DEFAULT_DT}
-    return engine_check.solve(scenario, **{**given, **settings})
+    package = import_module(solver.package)
+    if solver.package == "engine_check" and "tolerance" not in settings:
+        # Without step and tolerance an engine would certify each run, at several times its cost; the report's own
+        # refinement (``chapters.differences``) says what its runs are worth.
+        settings = {"dt": package.DEFAULT_DT, **settings}
+    trajectory: Trajectory = package.solve(scenario, **settings)
+    return trajectory
 
 
 def without_gravity(scenario: Scenario) -> Scenario:

@@ -24,7 +24,6 @@ from concurrent.futures import CancelledError, Executor, Future
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Final
 
 from flipproof.frame.keys import key_of, key_of_call
@@ -32,18 +31,6 @@ from flipproof.frame.solvers import Made, Run
 
 WORDS: Final = "from the store"
 """Name of the store's line in the provenance."""
-
-FILE: Final = "runs-1.sqlite"
-"""Its number rises with every change of the table."""
-
-SLOW: Final = 0.05
-"""Seconds of a run from which it is kept: a faster one is as soon made as read."""
-
-WORTH: Final = 3e7
-"""Bytes at the most for each second that it took: what is kept is read some ten times as fast as that."""
-
-LIMIT: Final = 2**30
-"""Bytes of all entries together; those used longest ago go first."""
 
 BUSY: Final = 10.0
 """Seconds to wait for another program that writes."""
@@ -69,13 +56,12 @@ class RunStore:
 
     Parameters
     ----------
-    place : Path or None
-        The file; ``default_place()`` unless somebody wants another.
-    slow : float - seconds of a run from which it is kept; 0: all of any size
-    limit : int - bytes of all entries together
+    place : Path or None - the file; ``default_place()`` unless somebody wants another
+    slow : float - seconds of a run from which it is kept, a faster one is as soon made as read; 0: all of any size
+    limit : int - bytes of all entries together; those used longest ago go first
     """
 
-    def __init__(self, place: Path | None, *, slow: float = SLOW, limit: int = LIMIT) -> None:
+    def __init__(self, place: Path | None, *, slow: float = 0.05, limit: int = 2**30) -> None:
         self.place, self.slow, self.limit = place, slow, limit
         self.asked, self.calls = 0, 0
         self.found: list[str] = []
@@ -90,9 +76,7 @@ class RunStore:
     def __enter__(self) -> RunStore:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -164,14 +148,17 @@ class RunStore:
             return entry
 
     def _put(self, key: str | None, value: object, seconds: float) -> None:
-        """Keep a value that took so long; not what cannot be pickled, or is made about as fast as it would be read."""
+        """Keep a value that took so long; not what cannot be pickled, or is made about as fast as it would be read.
+
+        What is kept is read some ten times as fast as 3e7 bytes in a second.
+        """
         if key is None:
             return
         try:
             content = pickle.dumps((value, _now("%Y-%m-%d %H:%M")), protocol=pickle.HIGHEST_PROTOCOL)
         except Exception:  # whatever a class raises that cannot be pickled
             return
-        worth = self.slow == 0.0 or len(content) <= WORTH * seconds
+        worth = self.slow == 0.0 or len(content) <= 3e7 * seconds
         if worth and len(content) <= self.limit:
             with self._lock:
                 row = (key, _checksum(key, content), _now(), len(content), content)
@@ -259,7 +246,7 @@ def default_place() -> Path | None:
             home = Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache")
     except RuntimeError:
         return None
-    return home / "flipproof" / FILE
+    return home / "flipproof" / "runs-1.sqlite"  # the number rises with every change of the table
 
 
 def _connect(place: Path) -> sqlite3.Connection:

@@ -9,7 +9,7 @@ what a step costs: each batch first makes a short flight with every solver in it
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -20,25 +20,13 @@ from flipproof.frame.solvers import Made, Run, find, make
 from slicemodel import Trajectory
 from slicemodel.trajectory import FloatArray
 
-REPEATS: Final = 3
-"""Times that a run is made at the most."""
-
-LONG: Final = 0.01
-"""Processor seconds of one run, repeated or not, after which it is not made again: it outlasts what disturbs it."""
-
-WARM: Final = 0.02
-"""Share of the flight that warms a solver up."""
-
 SAME_TIME: Final = 1e-9
 """Share of the duration by which two times may differ and be the same."""
-
-WARMED_BY: Final = ("method", "frame")
-"""Settings, beside the solver, that load code of their own."""
 
 
 def make_timed(runs: Sequence[tuple[Run, FloatArray]]) -> list[Made]:
     """Make runs one after the other; ``seconds`` is processor time, trajectories are kept at the given times only."""
-    for run in _one_of_each(run for run, _ in runs):
+    for run in {_kind(run): run for run, _ in runs}.values():
         make(_short(run))
     return [_made_timed(run, times) for run, times in runs]
 
@@ -59,45 +47,41 @@ def at_times(t: FloatArray, times: FloatArray) -> NDArray[np.int64]:
     return at
 
 
-def batches(runs: list[tuple[Run, FloatArray]], batch: int = 12) -> Iterator[list[tuple[Run, FloatArray]]]:
+def batches(runs: list[tuple[Run, FloatArray]]) -> Iterator[list[tuple[Run, FloatArray]]]:
     """Yield jobs, the slice model's first: one for all of it, so that its loop is compiled in one worker only."""
-    compiled = [job for job in runs if find(job[0].solver).package == "slicemodel"]
-    if compiled:
-        yield compiled
+    compiled: list[tuple[Run, FloatArray]] = []
     groups: dict[tuple[Any, ...], list[tuple[Run, FloatArray]]] = {}
     for run, times in runs:
-        if find(run.solver).package != "slicemodel":
-            groups.setdefault(_kind(run), []).append((run, times))
+        scheme = find(run.solver).package == "slicemodel"
+        (compiled if scheme else groups.setdefault(_kind(run), [])).append((run, times))
+    if compiled:
+        yield compiled
     for group in groups.values():
-        yield from (group[k : k + batch] for k in range(0, len(group), batch))
+        yield from (group[k : k + 12] for k in range(0, len(group), 12))
 
 
 def _kind(run: Run) -> tuple[Any, ...]:
-    return (run.solver, *(run.settings.get(name) for name in WARMED_BY))
-
-
-def _one_of_each(runs: Iterable[Run]) -> list[Run]:
-    return list({_kind(run): run for run in runs}.values())
+    """Return solver and settings that load code of their own."""
+    return run.solver, run.settings.get("method"), run.settings.get("frame")
 
 
 def _short(run: Run) -> Run:
-    scenario = replace(run.scenario, duration=WARM * run.scenario.duration)
-    settings: Mapping[str, Any] = {
-        name: value for name, value in run.settings.items() if name not in ("times", "max_step")
-    }
-    if "steps" in settings:
-        return replace(run, scenario=scenario, settings={**settings, "steps": 16})
-    return replace(run, scenario=scenario, settings={**settings, "times": [scenario.duration]})
+    """Return the first fiftieth of a flight, which warms its solver up."""
+    scenario = replace(run.scenario, duration=0.02 * run.scenario.duration)
+    settings = {name: value for name, value in run.settings.items() if name not in ("times", "max_step")}
+    few: dict[str, Any] = {"steps": 16} if "steps" in settings else {"times": [scenario.duration]}
+    return replace(run, scenario=scenario, settings=settings | few)
 
 
 def _made_timed(run: Run, times: FloatArray) -> Made:
+    """Make a run three times at the most; one of 0.01 s, repeated or not, outlasts what disturbs it."""
     least, together = float("inf"), 0.0
-    for _ in range(REPEATS):
+    for _ in range(3):
         began = time.process_time()
         made = make(run)
         spent = time.process_time() - began
         least, together = min(least, spent), together + spent
-        if together > LONG:
+        if together > 0.01:
             break
     thinned = None if made.trajectory is None else sampled(made.trajectory, times)
     return replace(made, trajectory=thinned, seconds=least)

@@ -13,9 +13,6 @@ import numpy as np
 
 from slicemodel.trajectory import FloatArray
 
-DIGITS: Final = 9
-"""Significant digits of a number."""
-
 TIME: Final = "t [s]"
 
 Curves = Mapping[str, tuple[FloatArray, FloatArray]]
@@ -48,32 +45,30 @@ def curves_csv(curves: Curves) -> str:
 
     A curve that ends early on the times of a longer one shares that one's column.
     """
-    grids: list[FloatArray] = []
-    members: list[list[str]] = []
+    groups: list[tuple[FloatArray, list[str]]] = []
     for name, (t, _) in sorted(curves.items(), key=lambda item: -len(item[1][0])):
-        k = next((k for k, grid in enumerate(grids) if np.array_equal(grid[: len(t)], t)), None)
-        if k is None:
-            grids.append(t)
-            members.append([name])
+        shared = next((names for grid, names in groups if np.array_equal(grid[: len(t)], t)), None)
+        if shared is None:
+            groups.append((t, [name]))
         else:
-            members[k].append(name)
+            shared.append(name)
     order = list(curves)
     columns: dict[str, FloatArray] = {}
-    for k, (grid, names) in enumerate(zip(grids, members, strict=True)):
-        together = sorted(names, key=order.index)
-        columns[TIME if k == 0 else f"t of {together[0].partition(' [')[0]} [s]"] = grid
-        columns |= {name: curves[name][1] for name in together}
+    for grid, names in groups:
+        names.sort(key=order.index)
+        columns[f"t of {names[0].partition(' [')[0]} [s]" if columns else TIME] = grid
+        columns |= {name: curves[name][1] for name in names}
     return columns_csv(columns)
 
 
 def _cell(value: Any) -> str:
-    """Return a number with ``DIGITS`` significant digits; whole numbers and words as they are."""
+    """Return a number with nine significant digits; whole numbers and words as they are."""
     if value is None:
         return ""
     if isinstance(value, (bool, np.bool_)):
         return "yes" if value else "no"
     if isinstance(value, (float, np.floating)):
-        return f"{value:.{DIGITS}g}" if not math.isnan(value) else ""
+        return f"{value:.9g}" if not math.isnan(value) else ""
     return str(value)
 
 

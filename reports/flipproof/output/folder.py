@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
 from flipproof.output.ownership import MARKER, OutputError, check_own, files_of, marker_text, sole_writer
+from flipproof.sweep.files import whole_file
 
 UNFINISHED: Final = ".flipproof-unfinished"
 """Ends the name of the folder, beside the one that is written, that holds the new one and the old one for a moment."""
@@ -18,9 +18,6 @@ UNFINISHED: Final = ".flipproof-unfinished"
 LOCK: Final = "lock"
 NEW: Final = "new"
 OLD: Final = "old"
-
-TRIES: Final = 1000
-"""How often a folder that others remove as they end is made again, before it counts as one that cannot be made."""
 
 
 def check_replaceable(target: Path, kind: str) -> None:
@@ -90,9 +87,12 @@ def _plainly(place: Path) -> Iterator[None]:
 
 @contextmanager
 def _held(beside: Path, target: Path) -> Iterator[None]:
-    """Make the unfinished folder and hold its lock; remove both at the end."""
+    """Make the unfinished folder and hold its lock; remove both at the end.
+
+    A folder that others remove as they end is made again up to a thousand times.
+    """
     with ExitStack() as held:
-        for left in reversed(range(TRIES)):
+        for left in reversed(range(1000)):
             beside.parent.mkdir(parents=True, exist_ok=True)
             try:
                 beside.mkdir(exist_ok=True)
@@ -127,12 +127,6 @@ def _clear(beside: Path, target: Path) -> None:
         shutil.rmtree(place, ignore_errors=True)
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
-
-
 def write_text(path: Path, text: str) -> None:
     """Write one file so that a reader sees the old or the new content, never half of it.
 
@@ -145,21 +139,10 @@ def write_text(path: Path, text: str) -> None:
     """
     path = path.resolve()
     with _plainly(path):
-        if path.exists() and not path.is_file() and not path.is_dir():
+        if path.is_dir():
+            raise OutputError(f"{path} is a folder; name a file")
+        if path.exists() and not path.is_file():
             path.write_text(text, encoding="utf-8")
-        else:
-            _replace(path, text)
-
-
-def _replace(path: Path, text: str) -> None:
-    if path.is_dir():
-        raise OutputError(f"{path} is a folder; name a file")
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        Path(name).chmod(0o666 & ~_umask())
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+            return
+        with whole_file(path) as part:
+            part.write_text(text, encoding="utf-8")

@@ -12,7 +12,6 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import Final
 
 from flipproof.frame.findings import Finding
@@ -21,13 +20,10 @@ FORBIDDEN: Final = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U00
 """Characters that XML 1.0 cannot hold, not even escaped; the reason of a failed run may have any."""
 
 
-NO_TIMES: Final[Mapping[str, float]] = MappingProxyType({})
-
-
 def junit_text(
     findings: Sequence[Finding],
     suite: str = "flipproof",
-    seconds: Mapping[str, float] = NO_TIMES,
+    seconds: Mapping[str, float] | None = None,
     whole: float | None = None,
 ) -> str:
     """Return the findings as one test suite.
@@ -39,12 +35,14 @@ def junit_text(
     seconds : id of a finding -> wall time of its evaluation [s]; zero for one that is missing
     whole : float or None - wall time of everything [s]; None: the sum of ``seconds``
     """
+    seconds = seconds or {}
     cases = [finding for finding in findings if finding.kind == "regression"]
+    verdicts = [finding.verdict for finding in cases]
     counts = {
         "name": suite,
         "tests": str(len(cases)),
-        "failures": str(sum(finding.verdict == "fail" for finding in cases)),
-        "errors": str(sum(finding.verdict == "not evaluated" for finding in cases)),
+        "failures": str(verdicts.count("fail")),
+        "errors": str(verdicts.count("not evaluated")),
         "skipped": "0",
         "time": f"{sum(seconds.values()) if whole is None else whole:.3f}",
     }
@@ -59,8 +57,7 @@ def junit_text(
     for finding in cases:
         _add_case(tests, finding, suite, seconds.get(finding.id, 0.0))
     ElementTree.indent(root, " ")
-    text: str = ElementTree.tostring(root, encoding="unicode")
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ElementTree.tostring(root, encoding="unicode")}\n'
 
 
 def _add_case(tests: ElementTree.Element, finding: Finding, suite: str, seconds: float) -> None:

@@ -17,14 +17,9 @@ from typing import Any, Final
 
 MARKER: Final = ".flipproof"
 VERSION: Final = 1
-MOST_MARKER: Final = 16 * 2**20
-"""Bytes of a marker at the most: a report has some hundred files."""
 
 LEFT_BY_DESKTOPS: Final = (".DS_Store", "Thumbs.db", "desktop.ini")
 """Files that a desktop leaves in folders that were only looked at."""
-
-BEYOND: Final = 2**30
-"""Byte of a lock file that Windows locks: the process number before it must stay readable."""
 
 
 class OutputError(ValueError):
@@ -63,7 +58,7 @@ def check_own(folder: Path, kind: str, ignored: Iterable[str] = ()) -> None:
     if facts["kind"] != kind:
         raise OutputError(f"{folder} holds a flipproof {facts['kind']}, not a {kind}; name another folder")
     if "files" in facts:
-        strangers = sorted(_files(folder) - {MARKER, *facts["files"]})
+        strangers = sorted(files_of(folder) - {MARKER, *facts["files"]})
         if strangers:
             raise OutputError(
                 f"{folder} holds {_some(strangers)}, which flipproof did not write; move it away or name another folder"
@@ -73,8 +68,8 @@ def check_own(folder: Path, kind: str, ignored: Iterable[str] = ()) -> None:
 def _read_marker(folder: Path) -> dict[str, Any]:
     file = folder / MARKER
     try:
-        if file.is_symlink() or not file.is_file() or file.stat().st_size > MOST_MARKER:
-            raise ValueError
+        if file.is_symlink() or not file.is_file() or file.stat().st_size > 16 * 2**20:
+            raise ValueError  # a report has some hundred files
         facts = json.loads(file.read_text(encoding="utf-8"))
         if not isinstance(facts["kind"], str) or not all(isinstance(name, str) for name in facts.get("files", [])):
             raise ValueError
@@ -85,12 +80,8 @@ def _read_marker(folder: Path) -> dict[str, Any]:
     return dict(facts)
 
 
-def files_of(folder: Path) -> list[str]:
+def files_of(folder: Path) -> set[str]:
     """Return the name of every file in a folder and below, from the folder, with forward slashes."""
-    return sorted(_files(folder))
-
-
-def _files(folder: Path) -> set[str]:
     return {
         entry.relative_to(folder).as_posix()
         for entry in folder.rglob("*")
@@ -152,7 +143,7 @@ def _lock(handle: int) -> None:
     if sys.platform == "win32":
         import msvcrt
 
-        os.lseek(handle, BEYOND, os.SEEK_SET)
+        os.lseek(handle, 2**30, os.SEEK_SET)  # the process number before that byte must stay readable
         try:
             msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
         finally:

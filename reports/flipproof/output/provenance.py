@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import functools
-import os
 import platform
+from contextlib import suppress
 from datetime import UTC, datetime
 from importlib import metadata
 
@@ -13,16 +13,17 @@ PACKAGES = ("flipproof", "numpy", "scipy", "numba", "pymunk", "mujoco-core", "ma
 
 def provenance(command: str) -> dict[str, str]:
     """Return name and value of everything that a reader needs to repeat the report."""
-    facts = {
+    from flipproof.frame.processes import cores  # every command asks this module for a version at its start
+
+    return {
         "command": command,
         "made": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "Python": platform.python_version(),
+        **{package: version_of(package) for package in PACKAGES},
+        "system": f"{platform.system()} {platform.machine()}",
+        "processor": _processor(),
+        "cores": str(cores()),
     }
-    facts |= {package: version_of(package) for package in PACKAGES}
-    facts["system"] = f"{platform.system()} {platform.machine()}"
-    facts["processor"] = _processor()
-    facts["cores"] = str(_cores())
-    return facts
 
 
 @functools.cache
@@ -34,16 +35,9 @@ def version_of(package: str) -> str:
         return "checkout" if package == "flipproof" else "not installed"
 
 
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def _processor() -> str:
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as lines:
-            for line in lines:
-                if line.startswith("model name"):
-                    return line.partition(":")[2].strip()
-    except OSError:
-        pass
+    with suppress(OSError), open("/proc/cpuinfo", encoding="utf-8") as lines:
+        for line in lines:
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
     return platform.processor() or "unknown"

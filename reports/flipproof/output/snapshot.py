@@ -27,7 +27,6 @@ from flipproof.page.lead import answered, asides, percent_at
 PLACE: Final = Path(__file__).resolve().parents[2] / "snapshot"
 
 KEPT: Final = ("flipproof", "version", "scenario", "slices", "size", "lead", "headlines", "findings", "differences")
-
 PICTURES: Final = ("omega", "waterfall", "differences")
 
 README: Final = PLACE.parents[1] / "README.md"
@@ -67,7 +66,7 @@ def front_page(summary: Mapping[str, Any]) -> str:
     found = [Headline.from_mapping(mapping) for mapping in summary["headlines"]]
     slices = sorted({n for h in found for n in (h.slices, h.finer_slices) if n is not None})
     head = ("asked", "answer", "largest difference of ω of one pair, % of ω₀", *(f"N = {n}" for n in slices))
-    rows = [(a.question, a.verdict, a.words, *(percent_at(a.headline, n) for n in slices)) for a in answered(found)]
+    rows = [(*words, *(percent_at(headline, n) for n in slices)) for *words, headline in answered(found)]
     table = "".join(f"| {' | '.join(cells)} |\n" for cells in (head, ("---",) * len(head), *rows))
     text = "\n".join(fill(_plain(f"- {said}"), 118, subsequent_indent="  ") for said in asides(found))
     return f"{_plain(table)}\n{text}\n"

@@ -92,9 +92,7 @@ def _figure_mapping(exhibit: Exhibit, section: str) -> dict[str, Any]:
     return {
         "name": exhibit.name,
         "section": section,
-        "title": exhibit.title,
-        "caption": exhibit.caption,
-        "alt": exhibit.alt,
+        **{field: getattr(exhibit, field) for field in ("title", "caption", "alt")},
         "svg": f"{place}.svg",
         "png": f"{place}.png" if exhibit.drawn and exhibit.drawn.png else None,
         "table": None if exhibit.table is None else f"{place}.csv",

@@ -16,18 +16,14 @@ from slicemodel.trajectory import FloatArray
 
 Rows = list[tuple[int, list[str]]]
 
-MOST_BYTES: Final = 2**26
-"""Bytes of a table at the most."""
-
-COLUMNS = ("t", "theta", "omega", "r_cm", "inertia")
-
 
 def trajectory_csv(trajectory: Trajectory) -> str:
     """Return the run as CSV text: t, theta, omega, r_cm, inertia, then r_i and v_i of every slice if they are stored.
 
     Slices count from 0. Numbers have 15 significant digits. What a solver did not give is left out.
     """
-    names = [name for name in COLUMNS if name not in trajectory.diagnostics.get("not_given", ())]
+    known = ("t", "theta", "omega", "r_cm", "inertia")
+    names = [name for name in known if name not in trajectory.diagnostics.get("not_given", ())]
     columns = [getattr(trajectory, name) for name in names]
     if len(trajectory.r) == len(trajectory.t):
         slices = range(trajectory.scenario.n_slices)
@@ -129,7 +125,7 @@ def read_cells(path: Path) -> tuple[list[str], Rows]:
         If the file cannot be read, is empty, names a column twice, or has a row of another length.
     """
     try:
-        lines = read_text(path, MOST_BYTES).removeprefix("\ufeff").splitlines()
+        lines = read_text(path, 2**26).removeprefix("\ufeff").splitlines()
     except UnsuitableFileError as error:
         raise ValueError(f"{path}: {error}") from None
     except (OSError, UnicodeDecodeError) as error:

@@ -32,21 +32,17 @@ def numbers(text: str) -> Markup:
     return Markup(re.sub(r"(?:≤ )?\d[\d.]*e[-+]\d+", r'<span class="name">\g<0></span>', str(escape(text))))
 
 
-FORMULA: Final = re.compile(r"^[a-z]\w*'* = [^:,]*")
-"""What begins like v' = or r_i'' =, up to a colon or comma; words follow."""
-
 TOKEN: Final = re.compile(
     r"\((?P<above>\w+)/(?P<below>\w+)\)|(?P<base>[A-Za-z]+)(?P<first>'*)(?:_(?P<sub>[A-Za-z]+))?(?P<last>'*)"
     r"(?:\^(?P<power>\d))?|(?P<number>\d+)|(?P<sign>[-+=/()])"
 )
 GREEK: Final = {"omega": "ω", "gamma": "γ", "alpha": "α", "theta": "θ", "sum": "\N{N-ARY SUMMATION}"}
-DOTS: Final = {"'": "˙", "''": "¨"}
-"""Primes are derivatives with respect to time."""
 
 
 def equation(text: str) -> Markup:
     """Return an equation of motion with its formula as MathML; words stay words."""
-    found = FORMULA.match(text)
+    # What begins like v' = or r_i'' =, up to a colon or comma; words follow.
+    found = re.match(r"[a-z]\w*'* = [^:,]*", text)
     if found is None:
         return Markup("{}").format(typeset(text))
     formula = Markup("").join(_row(found.group()))
@@ -73,8 +69,8 @@ def _name(word: str) -> Markup:
 def _symbol(base: str, sub: str | None, primes: str, power: str | None) -> Markup:
     tag = "mo" if base == "sum" else "mi"
     made = Markup("<{0}>{1}</{0}>").format(tag, GREEK.get(base, base))
-    if primes:
-        made = Markup("<mover>{}<mo>{}</mo></mover>").format(made, DOTS[primes])
+    if primes:  # derivatives with respect to time
+        made = Markup("<mover>{}<mo>{}</mo></mover>").format(made, "˙" if primes == "'" else "¨")
     if sub:
         kind = "mi" if len(sub) == 1 else "mtext"
         made = Markup("<msub>{0}<{1}>{2}</{1}></msub>").format(made, kind, escape(sub))

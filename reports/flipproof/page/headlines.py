@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 from flipproof.chapters.differences.chapter import BY_ENGINE, EQ8_FREE, PROGRAM_EQ8, TOTAL, Differences
 from flipproof.chapters.differences.study import Difference
@@ -26,14 +26,6 @@ from flipproof.frame.throws import FINER
 
 Measure = Literal["largest", "start", "landing", "share", "order"]
 
-MEASURES: Final[Mapping[Measure, str]] = {
-    "largest": "largest difference of one pair of solvers during the flight",
-    "start": "largest difference of one pair of solvers before the first impact",
-    "landing": "difference of one pair of solvers on landing",
-    "share": "fair share: mean over all orders of mending the assumptions",
-    "order": "change in the order of the ladder, which is no share",
-}
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Headline:
@@ -43,7 +35,7 @@ class Headline:
     ----------
     id : str - what it answers
     what : str - which pair or assumption
-    measure : str - of ``MEASURES``
+    measure : str - what number it is, see above
     value : float - signed if a share
     slices : int - slices it was computed at
     finer, finer_slices : float or None, int or None - the same at another number of slices
@@ -117,54 +109,47 @@ def _pairs(differences: Sequence[Difference], ended: str) -> Iterator[Headline]:
 def _shares(waterfall: Waterfall) -> Iterator[Headline]:
     bars = [bar for bar in waterfall.bars if bar.name != STEP]
 
-    def headline(id_: str, bar: Bar, measure: Measure) -> Headline:
-        finer = bar.finer if measure == "share" else None
+    def share(id_: str, bar: Bar) -> Headline:
         return Headline(
             id=id_,
             what=bar.name,
-            measure=measure,
-            value=bar.average if measure == "share" else bar.forward,
+            measure="share",
+            value=bar.average,
             slices=waterfall.slices,
-            finer=finer,
-            finer_slices=None if finer is None else FINER * waterfall.slices,
-            band=bar.average_band if measure == "share" else bar.forward_band,
-            low=bar.low if measure == "share" else None,
-            high=bar.high if measure == "share" else None,
+            finer=bar.finer,
+            finer_slices=None if bar.finer is None else FINER * waterfall.slices,
+            band=bar.average_band,
+            low=bar.low,
+            high=bar.high,
         )
 
-    ranked = sorted(bars, key=lambda bar: -abs(bar.average))
-    for k, bar in enumerate(ranked):
-        yield headline("share" if k == 0 else f"share-{k + 1}", bar, "share")
+    for k, bar in enumerate(sorted(bars, key=lambda bar: -abs(bar.average)), start=1):
+        yield share("share" if k == 1 else f"share-{k}", bar)
     away = waterfall.away
     if away is not None and away.name != STEP:
-        yield headline("away", away, "order")
-        yield headline("away-share", away, "share")
+        yield Headline(
+            id="away", what=away.name, measure="order", value=away.forward, slices=waterfall.slices,
+            band=away.forward_band,
+        )  # fmt: skip
+        yield share("away-share", away)
 
 
 def _steps(found: StepCosts) -> Iterator[Headline]:
     costs = {cost.way.name: cost for cost in found.costs}
     finer = {cost.way.name: cost for cost in found.more}
-    n = found.slices
-    asked: tuple[tuple[str, str, Measure], ...] = (
-        ("held", HELD, "start"),
-        ("held-through", LOCATED, "largest"),
-        ("step", EVERYTHING, "largest"),
-    )
-    for id_, name, measure in asked:
-        if name not in costs:
-            continue
-        cost, more = costs[name], finer.get(name)
-        value = cost.start if measure == "start" else cost.flight
-        if not math.isfinite(value):
+    for id_, name in {"held": HELD, "held-through": LOCATED, "step": EVERYTHING}.items():
+        cost, more = costs.get(name), finer.get(name)
+        field = "start" if id_ == "held" else "flight"
+        if cost is None or not math.isfinite(getattr(cost, field)):
             continue
         yield Headline(
             id=id_,
             what=cost.way.words,
-            measure=measure,
-            value=value,
-            slices=n,
-            finer=None if more is None else more.start if measure == "start" else more.flight,
-            finer_slices=None if more is None else FINER * n,
-            time=cost.first_impact if measure == "start" else None,
+            measure="start" if id_ == "held" else "largest",
+            value=getattr(cost, field),
+            slices=found.slices,
+            finer=None if more is None else getattr(more, field),
+            finer_slices=None if more is None else FINER * found.slices,
+            time=cost.first_impact if id_ == "held" else None,
             note=f"{cost.steps} steps",
         )

@@ -13,58 +13,50 @@ from markupsafe import Markup
 DIGITS = 1
 """Digits kept after the point of a coordinate, in points of 1/72 inch."""
 
-COORDINATES = re.compile(r'(?<= )(?:d|x|y|points)="[^"]*"|translate\([^)]*\)')
-PATHS = re.compile(r'(?<= )d="[^"]*"')
-COMMANDS = re.compile(r" ?([MLHVCSQTAZmlhvcsqtaz]) ?")
-STYLES = re.compile(r'(?<= )style="[^"]*"')
-NUMBER = re.compile(rf"-?\d+\.\d{{{DIGITS + 1},}}(?:e[-+]?\d+)?")
-SPACES = re.compile(r"\s*\n\s*")
-UNSEEN = re.compile(r"<!--.*?-->|<metadata>.*?</metadata>", re.S)
-GROUP_NAMES = re.compile(r'<g id="([^"]*)"')
 SIZE = re.compile(r'<svg[^>]*? width="([\d.]+)pt" height="([\d.]+)pt"')
 LETTERS = re.compile(r"scale\((0?\.\d+) -0?\.\d+\)")
 """Scale of a line of text, in hundredths of its size."""
 
-SMALLEST = 9.0
-"""Size of the smallest letters of a figure on a narrow screen, where it scrolls by itself [px]."""
-
-REFERENCES = re.compile(r"#([\w.-]+)")
-IDS = re.compile(r'(?<= id=")[^"]*')
-TARGETS = re.compile(r'(?<=href="#)[^"]*|(?<=url\(#)[^)]*')
-ESCAPES = str.maketrans({"%": "%25", "#": "%23", "<": "%3C", "&": "%26"})
-
 
 def compact_svg(svg: str) -> str:
     """Return the same picture in fewer characters: no comments, blanks or long names, shorter coordinates."""
-    svg = COORDINATES.sub(lambda found: NUMBER.sub(_rounded, found.group()), UNSEEN.sub("", svg))
-    svg = PATHS.sub(lambda found: 'd="' + COMMANDS.sub(r"\1", found.group()[3:]), svg)
-    svg = STYLES.sub(lambda found: 'style="' + found.group()[7:].replace(": ", ":").replace("; ", ";"), svg)
-    used = set(REFERENCES.findall(svg))
-    svg = GROUP_NAMES.sub(lambda found: found.group() if found.group(1) in used else "<g", svg)
+    number = re.compile(rf"-?\d+\.\d{{{DIGITS + 1},}}(?:e[-+]?\d+)?")
+    commands = re.compile(r" ?([MLHVCSQTAZmlhvcsqtaz]) ?")
+    ids = re.compile(r'(?<= id=")[^"]*')
+    svg = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>", "", svg, flags=re.S)
+    coordinates = r'(?<= )(?:d|x|y|points)="[^"]*"|translate\([^)]*\)'
+    svg = re.sub(coordinates, lambda found: number.sub(_rounded, found.group()), svg)
+    svg = re.sub(r'(?<= )d="[^"]*"', lambda found: 'd="' + commands.sub(r"\1", found.group()[3:]), svg)
+    styles = r'(?<= )style="[^"]*"'
+    svg = re.sub(styles, lambda found: 'style="' + found.group()[7:].replace(": ", ":").replace("; ", ";"), svg)
+    used = set(re.findall(r"#([\w.-]+)", svg))
+    svg = re.sub(r'<g id="([^"]*)"', lambda found: found.group() if found.group(1) in used else "<g", svg)
     svg = svg.replace("xlink:href", "href")
-    names = {name: f"i{k:x}" for k, name in enumerate(dict.fromkeys(IDS.findall(svg)))}
-    svg = IDS.sub(lambda found: names[found.group()], svg)
-    svg = TARGETS.sub(lambda found: names.get(found.group(), found.group()), svg)
-    return SPACES.sub(" ", svg).strip()
+    names = {name: f"i{k:x}" for k, name in enumerate(dict.fromkeys(ids.findall(svg)))}
+    svg = ids.sub(lambda found: names[found.group()], svg)
+    targets = r'(?<=href="#)[^"]*|(?<=url\(#)[^)]*'
+    svg = re.sub(targets, lambda found: names.get(found.group(), found.group()), svg)
+    return re.sub(r"\s*\n\s*", " ", svg).strip()
 
 
 def data_uri(svg: str) -> Markup:
     """Return an SVG as the value of ``src`` between double quotes: an image of its own, whose ids meet no others."""
-    text = compact_svg(svg).translate(ESCAPES)
+    escapes = str.maketrans({"%": "%25", "#": "%23", "<": "%3C", "&": "%26"})
+    text = compact_svg(svg).translate(escapes)
     return Markup("data:image/svg+xml,") + Markup(text.replace('"', "'" if "'" not in text else "%22"))
 
 
 def shape(svg: str) -> Markup:
     """Return width and height of an SVG as attributes of its image, so that its place is kept before it is drawn.
 
-    With them the least width [px] at which its smallest letters can be read; Matplotlib draws letters as paths.
+    With them the least width [px] at which its smallest letters have 9 px; Matplotlib draws letters as paths.
     """
     found = SIZE.search(svg)
     if found is None:
         return Markup("")
     width, height = map(float, found.groups())
     letters = [100.0 * float(scale) for scale in LETTERS.findall(svg)]
-    least = width * SMALLEST / min(letters, default=SMALLEST)
+    least = width * 9.0 / min(letters, default=9.0)
     return Markup(' width="{}" height="{}" style="--least:{}px"').format(round(width), round(height), round(least))
 
 

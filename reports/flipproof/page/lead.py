@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 from flipproof.chapters.differences.study import PARTING_BAND, moved, percent
 from flipproof.chapters.waterfall.study import NAMES
@@ -43,33 +42,27 @@ def lead_words(headlines: Sequence[Headline]) -> str:
 def answers(headlines: Sequence[Headline]) -> Iterator[tuple[str, list[str]]]:
     """Yield the questions of the front page, each answered by yes or no and its sentences; none if all agree."""
     found = {headline.id: headline for headline in headlines}
-    if _nothing_compared(headlines) or _all_agree(headlines) is not None:
+    if (largest := _largest(headlines)) is None or largest < NOTHING:
         return
-    held = [found[id_].value for id_ in ("held", "held-through") if id_ in found]
-    step = [found["step"].value] if "step" in found else []
-    free = [found["eq8-free"].value] if "eq8-free" in found else []
+
+    def verdict(*ids: str) -> str:
+        return _verdict([found[id_] for id_ in ids if id_ in found])
+
     steps = found["step"].note if "step" in found else "the steps"
-    yield f"Is it justified to hold omega constant over a step? {_verdict(held)}", list(_held(found))
-    yield f"Are {steps} enough? {_verdict(step)}", list(_step(found))
-    yield f"Is Eq. 8 free flight? {_verdict(free)}", list(_equations(found))
+    yield f"Is it justified to hold omega constant over a step? {verdict('held', 'held-through')}", list(_held(found))
+    yield f"Are {steps} enough? {verdict('step')}", list(_step(found))
+    yield f"Is Eq. 8 free flight? {verdict('eq8-free')}", list(_equations(found))
     if "share" in found:
         yield "Which change matters most for the mean omega of the second half?", list(_shares(found))
     if "engine" in found:
-        yield f"Does a physics engine agree? {_verdict([found['engine'].value])}", list(_engine(found["engine"]))
+        yield f"Does a physics engine agree? {verdict('engine')}", list(_engine(found["engine"]))
 
 
-@dataclass(frozen=True, slots=True)
-class Answered:
-    """One line of the table of answers: a question, yes or no, and a number with what it is the difference of."""
+def answered(headlines: Sequence[Headline]) -> Iterator[tuple[str, str, str, Headline]]:
+    """Yield the lines of the table of answers: a question, yes or no, and a number after what it is the difference of.
 
-    question: str
-    verdict: str
-    words: str
-    headline: Headline
-
-
-def answered(headlines: Sequence[Headline]) -> Iterator[Answered]:
-    """Yield the lines of the table of answers; question and verdict stand in the first line of several."""
+    Question and verdict stand in the first line of several.
+    """
     found = {headline.id: headline for headline in headlines}
     steps = found["step"].note if "step" in found else "the steps"
     asked = {
@@ -91,9 +84,9 @@ def answered(headlines: Sequence[Headline]) -> Iterator[Answered]:
     }
     for question, pairs in asked.items():
         there = [(words, found[id_]) for id_, words in pairs.items() if id_ in found]
-        verdict = _verdict([headline.value for _, headline in there])
+        verdict = _verdict([headline for _, headline in there])
         for k, (words, headline) in enumerate(there):
-            yield Answered(question if k == 0 else "", verdict if k == 0 else "", words, headline)
+            yield "" if k else question, "" if k else verdict, words, headline
 
 
 def asides(headlines: Sequence[Headline]) -> Iterator[str]:
@@ -105,36 +98,29 @@ def asides(headlines: Sequence[Headline]) -> Iterator[str]:
         yield " ".join(list(_engine(found["engine"]))[1:])
 
 
-def _verdict(values: Sequence[float]) -> str:
+def _verdict(headlines: Sequence[Headline]) -> str:
     within = percent(PARTING_BAND)
-    if not values:
+    if not headlines:
         return "Not known."
-    return f"Yes, within {within}." if max(values) <= PARTING_BAND else f"No, not within {within}."
+    agree = max(headline.value for headline in headlines) <= PARTING_BAND
+    return f"Yes, within {within}." if agree else f"No, not within {within}."
 
 
-def _compared(headlines: Sequence[Headline]) -> list[float]:
-    return [h.value for h in headlines if h.measure == "largest" and h.id in ("whole", "pair", "program-eq8")]
-
-
-def _nothing_compared(headlines: Sequence[Headline]) -> bool:
-    return not _compared(headlines)
-
-
-def _all_agree(headlines: Sequence[Headline]) -> float | None:
-    """Return the largest difference if it is nothing, else None."""
-    largest = max(_compared(headlines))
-    return largest if largest < NOTHING else None
+def _largest(headlines: Sequence[Headline]) -> float | None:
+    """Return the largest difference of those that tell whether all solvers agree; None if none was computed."""
+    told = [h.value for h in headlines if h.measure == "largest" and h.id in ("whole", "pair", "program-eq8")]
+    return max(told, default=None)
 
 
 def sentences(headlines: Sequence[Headline]) -> Iterator[str]:
     """Yield the verdict sentence by sentence; each can be read alone."""
     found = {headline.id: headline for headline in headlines}
-    if _nothing_compared(headlines):
+    largest = _largest(headlines)
+    if largest is None:
         yield "No two solvers could be compared on this throw; the reasons stand below."
         return
-    agree = _all_agree(headlines)
-    if agree is not None:
-        yield f"On this throw all solvers agree to {percent(agree)} of ω₀."
+    if largest < NOTHING:
+        yield f"On this throw all solvers agree to {percent(largest)} of ω₀."
         return
     yield from _equations(found)
     yield from _shares(found)
@@ -184,7 +170,8 @@ def _shares(found: Mapping[str, Headline]) -> Iterator[str]:
             f"In single orders these six changes move that mean by {signed(low)} to {signed(high)} of ω₀ "
             f"(N = {shares[0].slices}). For ω, θ and v_CM on landing the shares are others; the report has a table."
         )
-    if len(shares) > 1 and tied(shares[0], shares[1]):
+    moves = [abs(h.finer - h.value) for h in shares[:2] if h.finer is not None]
+    if len(shares) > 1 and moves and abs(abs(shares[0].value) - abs(shares[1].value)) <= max(moves):
         yield (
             f"Which of “{shares[0].what}” and “{shares[1].what}” has the larger share is not settled: the number of "
             "slices moves at least one of them by more than they differ."
@@ -237,17 +224,17 @@ def _engine(engine: Headline) -> Iterator[str]:
     yield "Agreement with pymunk tests the solution of free flight, not whether slices describe water."
 
 
-def tied(first: Headline, second: Headline) -> bool:
-    """Return whether two shares differ by less than either moves with the number of slices."""
-    moved = [abs(h.finer - h.value) for h in (first, second) if h.finer is not None]
-    return bool(moved) and abs(abs(first.value) - abs(second.value)) <= max(moved)
-
-
 def amount(headline: Headline) -> str:
-    """Return a number with what belongs to it, as in "13 % of ω₀ (N = 50; 0.35 % of ω₀ less at N = 100)"."""
+    """Return a number with N, and how far it moves with N: of a share, where it moves to.
+
+    As in "13 % of ω₀ (N = 50; 0.35 % of ω₀ less at N = 100)".
+    """
     share = headline.measure in ("share", "order")
-    text = signed if share else percent
-    return f"{text(headline.value)} of ω₀ ({at_slices(headline)})"
+    words = f"N = {headline.slices}"
+    if headline.finer is not None and headline.finer_slices is not None:
+        to = f"{signed(headline.finer)} at N = {headline.finer_slices}"
+        words += f"; {to if share else moved(headline.value, headline.finer, headline.finer_slices)}"
+    return f"{(signed if share else percent)(headline.value)} of ω₀ ({words})"
 
 
 def percent_at(headline: Headline, slices: int) -> str:
@@ -256,18 +243,6 @@ def percent_at(headline: Headline, slices: int) -> str:
     return "–" if value is None else percent(value)
 
 
-def at_slices(headline: Headline) -> str:
-    """Return the number of slices, and how far the number moves with it: of a share, where it moves to."""
-    words = f"N = {headline.slices}"
-    if headline.finer is None or headline.finer_slices is None:
-        return words
-    if headline.measure in ("share", "order"):
-        return f"{words}; {signed(headline.finer)} at N = {headline.finer_slices}"
-    return f"{words}; {moved(headline.value, headline.finer, headline.finer_slices)}"
-
-
-def signed(share: float | None) -> str:
-    """Return a fraction with its sign, two digits; a dash if there is none."""
-    if share is None:
-        return "–"
+def signed(share: float) -> str:
+    """Return a fraction with its sign, two digits."""
     return f"{'+' if share >= 0 else '−'}{percent(abs(share))}"

@@ -29,9 +29,6 @@ from slicemodel.trajectory import FloatArray, Impacts
 FLOWN: Final = ("published-python", "eq8", "free-flight", "pymunk")
 """The solvers whose bottles the page throws."""
 
-SLOW: Final = 9.6
-"""The paper's slow motion: 240 pictures per second shown at 25."""
-
 FRAMES: Final = 301
 """Frames of a flight on the page."""
 
@@ -40,12 +37,6 @@ MOST_SLICES: Final = 50
 
 POSITION_STEP: Final = 1e-4
 """Positions of slices on the page are whole numbers of this, in bottle lengths."""
-
-FARTHEST: Final = 3.0
-"""A slice that left the bottle is drawn no farther from the cap than so many bottle lengths."""
-
-ROWS: Final = 11
-"""Times in the table that says the same in numbers."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,35 +120,24 @@ def cap_and_base(scenario: Scenario, flight: Flight) -> tuple[FloatArray, FloatA
     return centre - flight.r_cm[:, np.newaxis] * along, centre + to_base * along
 
 
-def motion_data(
-    throw: Scenario, made: Mapping[str, Made], solvers: Sequence[str] = FLOWN, *, frames: int = FRAMES
-) -> dict[str, Any] | None:
+def motion_data(throw: Scenario, made: Mapping[str, Made]) -> dict[str, Any] | None:
     """Return what the player needs, ready for JSON; None if no solver flew.
 
     Parameters
     ----------
     throw : Scenario - the throw of all runs, cut as they were
-    made : mapping from name to outcome - a solver that failed is shown with its reason
-    solvers : names, in the order of the bottles
-    frames : int - frames of a whole flight
+    made : mapping from name to outcome - of those in ``FLOWN``; a solver that failed is shown with its reason
     """
-    times = frame_times(throw, frames)
-    shown, failed = [], []
-    for name in solvers:
-        if name not in made:
-            continue
-        trajectory = made[name].trajectory
-        if trajectory is None:
-            failed.append({"name": name, "reason": made[name].reason})
-        else:
-            shown.append((name, flight_of(trajectory, times)))
+    times = frame_times(throw, FRAMES)
+    there = {name: made[name] for name in FLOWN if name in made}
+    shown = {name: flight_of(each.trajectory, times) for name, each in there.items() if each.trajectory is not None}
     if not shown:
         return None
     bottle = throw.bottle
-    first = shown[0][1]
+    first, *_ = shown.values()
     return {
         "duration": throw.duration,
-        "frames": frames,
+        "frames": FRAMES,
         "length": bottle.length,
         "radius": bottle.radius,
         "slice_height": throw.slice_height,
@@ -166,17 +146,19 @@ def motion_data(
         "launch_velocity": list(throw.launch_velocity),
         "release": release_point(throw, float(first.r_cm[0])).tolist(),
         "omega0": throw.omega0,
-        "slow": SLOW,
+        "slow": 9.6,  # the paper's slow motion: 240 pictures per second shown at 25
         "position_step": POSITION_STEP,
-        "flights": [_packed(name, flight, bottle.length) for name, flight in shown],
-        "failed": failed,
-        "table": _table(times, [flight for _, flight in shown]),
+        "flights": [_packed(name, flight, bottle.length) for name, flight in shown.items()],
+        "failed": [{"name": name, "reason": each.reason} for name, each in there.items() if name not in shown],
+        "table": _table(times, list(shown.values())),
     }
 
 
 def _packed(name: str, flight: Flight, length: float) -> dict[str, Any]:
     """Return one flight with its arrays in base64, little-endian."""
-    places = np.rint(np.clip(flight.r / length, -FARTHEST, FARTHEST) / POSITION_STEP)
+    # A slice that left the bottle is drawn no farther from the cap than three bottle lengths.
+    places = np.rint(np.clip(flight.r / length, -3.0, 3.0) / POSITION_STEP)
+    kinds = {"time": "<f4", "slice": "<u4", "end": "<i2", "speed_before": "<f4"}
     impacts = flight.impacts
     return {
         "name": name,
@@ -185,18 +167,11 @@ def _packed(name: str, flight: Flight, length: float) -> dict[str, Any]:
         "message": flight.message,
         "reached": len(flight.t),
         "drawn": flight.drawn.tolist(),
-        "theta": _encoded(flight.theta, "<f4"),
-        "omega": _encoded(flight.omega, "<f4"),
-        "r_cm": _encoded(flight.r_cm, "<f4"),
+        **{field: _encoded(getattr(flight, field), "<f4") for field in ("theta", "omega", "r_cm")},
         "r": _encoded(places, "<i2"),
         "impacts": None
         if impacts is None
-        else {
-            "time": _encoded(impacts.time, "<f4"),
-            "slice": _encoded(impacts.slice, "<u4"),
-            "end": _encoded(impacts.end, "<i2"),
-            "speed": _encoded(impacts.speed_before, "<f4"),
-        },
+        else {field.partition("_")[0]: _encoded(getattr(impacts, field), kind) for field, kind in kinds.items()},
     }
 
 
@@ -205,9 +180,9 @@ def _encoded(values: ArrayLike, kind: str) -> str:
 
 
 def _table(times: FloatArray, flights: Sequence[Flight]) -> list[dict[str, Any]]:
-    """Return angle [degrees] and angular velocity [rad/s] of every flight at a few times; None after its end."""
+    """Return angle [degrees] and angular velocity [rad/s] of every flight at eleven times; None after its end."""
     rows = []
-    for k in np.unique(np.rint(np.linspace(0, len(times) - 1, ROWS)).astype(int)):
+    for k in np.unique(np.rint(np.linspace(0, len(times) - 1, 11)).astype(int)):
         values = [
             {"theta_deg": float(np.degrees(flight.theta[k])), "omega": float(flight.omega[k])}
             if k < len(flight.t)

@@ -1,9 +1,10 @@
-"""The sections of the page: one for each part of the report, rendered from its chapters' own templates."""
+"""The order of the page: the screens of its story, one section for each part of the report, and what stands behind."""
 
 from __future__ import annotations
 
+import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -11,10 +12,34 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from flipproof.frame.chapter import Part
+from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding
 from flipproof.frame.gather import Gathered, Told
 from flipproof.frame.throws import FINER
-from flipproof.page.glossary import linked
+from flipproof.page.glossary import indexed, linked
+
+STORY: Final[Mapping[str, str]] = {
+    "verdict": "What was asked",
+    "answer": "The answer",
+    "motion-story": "One flight, four ways",
+    "live": "Switch gravity off",
+    "shares": "Which assumption costs what",
+    "survives": "What survives",
+    "bottles": "For which bottles",
+    "sure": "How sure we are",
+}
+"""Screen of the story -> its name in the contents, in the order of the page."""
+
+BEHIND: Final[Mapping[str, tuple[str, str]]] = {
+    "findings": ("All findings", "Every claim and every observation of this report, to search and to link to."),
+    "solvers": ("Every solver", "What each solver solves, how it ended on this throw, and why what failed did."),
+    "glossary": ("Glossary", "Every name and symbol of this page in one plain sentence."),
+    "provenance": (
+        "Settings and provenance",
+        "What was thrown, with which versions, on which machine; files for machines.",
+    ),
+}
+"""Section behind the parts of a report, with a template of its name -> its title and what it shows."""
 
 MACROS: Final = '{% from "macros.html.j2" import anchor, draw, minus, missing, scroll, status with context %}\n'
 
@@ -73,25 +98,18 @@ class Section:
 
 def sections(gathered: Gathered, told: Mapping[str, Told], templates: Environment) -> tuple[Section, ...]:
     """Return every part that has a chapter in this report, in order."""
-    return tuple(
-        _section(gathered, part, [told[chapter.name] for chapter in part.chapters if chapter.name in told], templates)
-        for part in gathered.parts
-        if any(chapter.name in told for chapter in part.chapters)
-    )
+    there = ((part, [told[each.name] for each in part.chapters if each.name in told]) for part in gathered.parts)
+    return tuple(_section(gathered, part, chapters, templates) for part, chapters in there if chapters)
 
 
 def _section(gathered: Gathered, part: Part, chapters: Sequence[Told], templates: Environment) -> Section:
+    findings = [finding for each in chapters for finding in each.findings]
     return Section(
         id=part.id,
         title=part.title,
         sentence=part.sentence,
         html=linked("\n".join(_chapter(gathered, each, templates) for each in chapters)),
-        findings=tuple(
-            sorted(
-                (finding for each in chapters for finding in each.findings),
-                key=lambda finding: finding.kind != "regression",
-            )
-        ),
+        findings=tuple(sorted(findings, key=lambda finding: finding.kind != "regression")),
         figure=next((figure.name for each in chapters for figure in each.figures), ""),
     )
 
@@ -113,3 +131,18 @@ def _chapter(gathered: Gathered, told: Told, templates: Environment) -> Markup:
             **extra,
         )
     )
+
+
+def behind(parts: Sequence[Section], templates: Environment, context: Mapping[str, Any]) -> Iterator[Section]:
+    """Yield the sections that stand behind the parts of a report, with links to the glossary."""
+    for id_, (title, sentence) in BEHIND.items():
+        html = templates.get_template(f"{id_}.html.j2").render(context, parts=parts)
+        yield Section(id=id_, title=title, sentence=sentence, html=(indexed if id_ == "glossary" else linked)(html))
+
+
+def shared(figures: Sequence[Exhibit]) -> tuple[str, tuple[str, ...]]:
+    """Return the sentences that three and more captions, and three in four, have; and the captions without them."""
+    split = [re.split(r"(?<=[.?!]) (?=[A-Z“])", figure.caption) for figure in figures]
+    counts = Counter(sentence for sentences in split for sentence in dict.fromkeys(sentences))
+    common = [each for each, count in counts.items() if count >= max(3, 0.75 * len(figures))]
+    return " ".join(common), tuple(" ".join(each for each in sentences if each not in common) for sentences in split)

@@ -24,12 +24,6 @@ BROWSERS = (
 VARIABLE = "FLIPPROOF_CHROMIUM"
 """Environment variable that names the browser's program instead."""
 
-PATIENCE = 10_000
-"""Time the page is given to draw its figures [ms of its own clock, which runs ahead while nothing happens]."""
-
-TIMEOUT = 120.0
-"""Longest time a browser may take [s]; it needs two or three."""
-
 
 class PrintError(ValueError):
     """The page cannot be printed; the message says what to install or to change."""
@@ -43,15 +37,8 @@ def find_browser() -> str | None:
 
 
 def require_browser() -> str:
-    """Return the program of an installed browser.
-
-    Raises
-    ------
-    PrintError
-        If there is none.
-    """
-    browser = find_browser()
-    if browser is not None:
+    """Return the program of an installed browser; raises PrintError if there is none."""
+    if (browser := find_browser()) is not None:
         return browser
     wanted = os.environ.get(VARIABLE)
     if wanted:
@@ -70,16 +57,18 @@ def print_page(page: Path, target: Path) -> None:
     browser = require_browser()
     with tempfile.TemporaryDirectory(prefix="flipproof-print-", ignore_cleanup_errors=True) as profile:
         made = Path(profile) / "page.pdf"
+        # The page has 10 s to draw its figures, by a clock of its own that runs ahead while nothing happens; a browser
+        # needs two or three.
         command = [
             browser, "--headless", "--disable-gpu", "--no-first-run", "--disable-background-networking",
             "--disable-component-update", "--disable-sync", "--no-pdf-header-footer",
-            f"--virtual-time-budget={PATIENCE}", f"--user-data-dir={profile}", f"--print-to-pdf={made}",
+            "--virtual-time-budget=10000", f"--user-data-dir={profile}", f"--print-to-pdf={made}",
             page.resolve().as_uri(),
         ]  # fmt: skip
         if hasattr(os, "geteuid") and os.geteuid() == 0:
             command.insert(1, "--no-sandbox")  # the sandbox refuses to run as root, as containers do
         try:
-            result = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, check=False)
+            result = subprocess.run(command, capture_output=True, text=True, timeout=120.0, check=False)
         except (OSError, subprocess.TimeoutExpired) as error:
             raise PrintError(f"{browser} could not print {page} ({error})") from None
         if not made.is_file() or not made.stat().st_size:

@@ -13,17 +13,13 @@ from markupsafe import Markup
 from flipproof.chapters.differences.study import Difference, moved, percent
 from flipproof.frame.gather import Gathered, Told
 from flipproof.frame.solvers import find
-from flipproof.output.summary import summarise
-from flipproof.page.captions import shared
 from flipproof.page.equations import equation, mathematics, numbers, typeset
 from flipproof.page.glossary import EQUATIONS, TERMS, anchor, symbols
 from flipproof.page.headlines import headlines
-from flipproof.page.inline import data_uri, shape
 from flipproof.page.lead import answer, answers, lead_words
-from flipproof.page.parts import sections
-from flipproof.page.sections import STORY, behind
-from flipproof.page.story.facts import story
-from flipproof.page.story.live import live_data, sliders
+from flipproof.page.live import live_data, sliders
+from flipproof.page.parts import STORY, behind, sections, shared
+from flipproof.page.story import story
 from flipproof.page.templating import environment
 from flipproof.page.touch import touch_data
 
@@ -64,28 +60,21 @@ def restitution_error(certificate: Mapping[str, Any]) -> float | None:
 
 def read_assets() -> dict[str, Markup]:
     """Return the style sheets and scripts of the page, file name -> text."""
-    folder = files("flipproof.page") / "assets"
+    items = (files("flipproof.page") / "assets").iterdir()
     return {
-        item.name: Markup(item.read_text(encoding="utf-8"))
-        for item in folder.iterdir()
-        if item.name.endswith((".css", ".js"))
+        item.name: Markup(item.read_text(encoding="utf-8")) for item in items if item.name.endswith((".css", ".js"))
     }
 
 
 def render(
-    gathered: Gathered,
-    told: Mapping[str, Told],
-    provenance: Mapping[str, str],
-    summary: Mapping[str, Any] | None = None,
+    gathered: Gathered, told: Mapping[str, Told], provenance: Mapping[str, str], summary: Mapping[str, Any]
 ) -> str:
-    """Return the whole page; ``summary``, which its story is told from, is that of the report, made here if None."""
-    summary = summary or summarise(gathered, told, provenance)
+    """Return the whole page; ``summary``, which its story is told from, is that of the report."""
     templates = page_environment()
     verdict = headlines(gathered)
     findings = [finding for each in told.values() for finding in each.findings]
     regressions = [finding for finding in findings if finding.kind == "regression"]
     flown = gathered.found("flights")
-    motion = flown.motion if flown is not None else None
     facts = story(summary, {figure.name: figure.table for each in told.values() for figure in each.figures})
     context = dict(
         scenario=gathered.ask.scenario,
@@ -98,7 +87,7 @@ def render(
         solvers=flown.rows if flown is not None else [],
         problems=[made for made in gathered.flights.values() if made.trajectory is None],
         notes=[note for each in told.values() for note in each.notes],
-        motion=motion,
+        motion=flown.motion if flown is not None else None,
         measured=gathered.found("measured"),
         provenance=provenance,
         settings=gathered.ask.scenario.to_toml(),
@@ -111,7 +100,7 @@ def render(
     )
     parts = sections(gathered, told, templates)
     body = (*parts, *behind(parts, templates, context))
-    left_out = {"motion-story": not motion, "shares": not facts.shares, "bottles": not facts.map}
+    left_out = {"motion-story": not context["motion"], "shares": not facts.shares, "bottles": not facts.map}
     screens = [(id_, words) for id_, words in STORY.items() if not left_out.get(id_)]
     return templates.get_template("report.html.j2").render(
         context, contents=[*screens, *((section.id, section.title) for section in body)], sections=body
@@ -122,11 +111,9 @@ def page_environment() -> Environment:
     """Return the environment of the page's templates, with the filters that they and the chapters' parts use."""
     templates = environment()
     templates.filters |= {
-        "typeset": typeset, "unbroken": unbroken, "amount": amount, "percent": percent, "data_uri": data_uri,
-        "shape": shape, "touch_data": touch_data, "short": short,
-        "restitution_error": restitution_error, "term_anchor": anchor, "equation": equation, "shared": shared,
-        "symbols": symbols,
-        "mathematics": mathematics, "numbers": numbers,
+        "typeset": typeset, "unbroken": unbroken, "amount": amount, "percent": percent, "touch_data": touch_data,
+        "short": short, "restitution_error": restitution_error, "term_anchor": anchor, "equation": equation,
+        "shared": shared, "symbols": symbols, "mathematics": mathematics, "numbers": numbers,
     }  # fmt: skip
     templates.globals["assets"] = read_assets()
     return templates

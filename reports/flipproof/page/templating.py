@@ -5,6 +5,7 @@ from __future__ import annotations
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from flipproof.frame.spoken import spoken
+from flipproof.page.inline import data_uri, shape
 
 
 def environment() -> Environment:
@@ -16,5 +17,5 @@ def environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    templates.filters["spoken"] = spoken
+    templates.filters |= {"spoken": spoken, "data_uri": data_uri, "shape": shape}
     return templates

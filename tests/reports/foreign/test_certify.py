@@ -14,8 +14,9 @@ from flipproof.foreign.mistakes import MISTAKES
 from flipproof.foreign.power import CLEAN, Caught, InProcess, claim_power, matrix_csv
 from flipproof.foreign.specs import load, opened
 from flipproof.foreign.subject import Subject
-from flipproof.foreign.verdicts import findings_of, junit_of
+from flipproof.foreign.verdicts import findings_of
 from flipproof.frame.solvers import solve
+from flipproof.output.junit import junit_text
 from slicemodel import Scenario
 
 VARIANTS = Path(__file__).with_name("rk4_variants.py")
@@ -227,7 +228,7 @@ def test_the_passport_is_json_and_the_verdicts_are_junit():
     assert {"python", "flipproof", "numpy"} <= set(passport["versions"])
     assert [check["verdict"] for check in passport["checks"]] == [PASSED, FAILED, IDLE]
     assert all(abs(e - 0.45) < 0.01 for _, _, e in passport["facts"]["restitution"])
-    suite = ET.fromstring(junit_of(found))
+    suite = ET.fromstring(junit_text(findings_of(found)))
     assert len(list(suite.iter("testcase"))) == 2
     assert len(list(suite.iter("failure"))) == 1
     assert [finding.value for finding in findings_of(found)] == [1.0, 0.0, None]

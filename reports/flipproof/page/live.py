@@ -12,7 +12,7 @@ MOST_SLICES: Final = 50
 """Slices of a throw that a browser solves while a slider moves."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Slider:
     """One slider, in the unit that it shows."""
 
@@ -43,12 +43,9 @@ def sliders(throw: Scenario) -> list[Slider]:
         ("omega0", "spin ω₀", "rad/s", 5.0, 25.0, 0.1, 1, throw.omega0),
     )
     return [
-        Slider(
-            name=name, words=words, unit=unit, low=min(low, value), high=max(high, value), step=step, digits=digits,
-            value=value,
-        )
+        Slider(name, words, unit, min(low, value), max(high, value), step, digits, value)
         for name, words, unit, low, high, step, digits, value in asked
-    ]  # fmt: skip
+    ]
 
 
 def live_data(throw: Scenario) -> dict[str, Any]:

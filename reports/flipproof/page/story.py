@@ -1,19 +1,31 @@
-"""What the screens of the story say, from the summary and the tables of the figures; what is missing is left out."""
+"""What the screens of the story say, from the summary and the tables of the figures; what is missing is left out.
+
+A number is printed with the place in ``summary.json`` that it comes from:
+
+::
+
+    headlines/eq8-free/value                                  keys, and entries of a list by their id or name
+    count findings verdict pass                               entries of a list whose field has, or lists, a value;
+                                                              vectors-* is any text that begins so
+    length paper/experiment                                   entries of a list
+"""
 
 from __future__ import annotations
 
 import csv
 import io
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any, Final
 
+from markupsafe import Markup
+
 from flipproof.chapters.differences.study import PARTING_BAND, percent
 from flipproof.figures.style import SUPERSCRIPTS
 from flipproof.frame.spoken import SPOKEN
-from flipproof.page.story.numbers import Number, Summary
+from flipproof.page.lead import signed
 
 NAMES: Final[Mapping[str, str]] = {name: SPOKEN[name] for name in ("published-python", "eq8", "free-flight")} | {
     "pymunk": "engine (pymunk)"
@@ -72,63 +84,15 @@ PLAIN: Final[Mapping[str, str]] = {
 }
 """Name -> source of a number that is printed as it is."""
 
-ENGINES: Final = ("pymunk", "mujoco")
-"""Engines that the agreement on free flight must be between, to be told as theirs; a quick report certifies neither."""
-
 EXPERIMENTS: Final = {"minimum": "minimum", "change": "change-of-behaviour", "landing": "landing-angle"}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Layer:
-    """One of the three layers of the answer: what was tested, its number, what kind of number, and the verdict."""
-
-    name: str
-    short: str
-    between: str
-    question: str
-    number: Number
-    kind: str
-    section: str
-    finer: Number | None
-    finer_slices: Number | None
-    band: Number | None
-
-    @property
-    def within(self) -> bool:
-        """True if the number stays within the limit that the page calls small."""
-        return self.number.value <= PARTING_BAND
+def _shown(form: str) -> Callable[[float], str]:
+    """Return what prints a number in a form, with a sign of its own length."""
+    return lambda value: form.format(value).replace("-", "−")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Share:
-    """The fair share of one change: the mean over all orders, and the least and the largest of them."""
-
-    name: str
-    words: str
-    mean: Number
-    low: Number
-    high: Number
-    finer: Number | None
-
-
-def plain(value: float) -> str:
-    """Return a number with its three leading digits, with a sign of its own length."""
-    return f"{value:.3g}".replace("-", "−")
-
-
-def rounded(value: float) -> str:
-    """Return a number with two digits."""
-    return f"{value:.2f}".replace("-", "−")
-
-
-def signed(value: float) -> str:
-    """Return a fraction in percent with its sign."""
-    return f"{'+' if value >= 0 else '−'}{percent(abs(value))}"
-
-
-def degrees(value: float) -> str:
-    """Return an angle in whole degrees."""
-    return f"{value:.0f}°".replace("-", "−")
+plain, rounded, degrees = _shown("{:.3g}"), _shown("{:.2f}"), _shown("{:.0f}°")
 
 
 def small(value: float) -> str:
@@ -144,71 +108,56 @@ def story(content: Mapping[str, Any], tables: Mapping[str, str | None]) -> Simpl
     summary = Summary(content)
     numbers = {name: summary.number(source, small) for name, source in SOURCES.items()}
     numbers |= {name: summary.number(source, plain) for name, source in PLAIN.items()}
-    if not all(engine in (summary.at("findings/agreement/title") or "") for engine in ENGINES):
+    numbers["threshold"] = summary.number(PLAIN["threshold"], _shown("{:.4f}"))
+    # The agreement on free flight is told as that of both engines; a quick report certifies neither.
+    if not all(engine in (summary.at("findings/agreement/title") or "") for engine in ("pymunk", "mujoco")):
         numbers["agreement"] = None
-    if numbers["threshold"]:
-        numbers["threshold"] = summary.number(PLAIN["threshold"], lambda value: f"{value:.4f}")
     return SimpleNamespace(
         n=SimpleNamespace(**numbers),
         layers=_layers(summary, numbers),
         shares=_shares(summary),
         experiments={name: _experiment(summary, id_) for name, id_ in EXPERIMENTS.items()},
         nearest=_nearest(summary),
-        times={name: _time(summary, name) for name in ("eq8-free", "whole", "program-eq8")},
+        times={id_: summary.number(f"headlines/{id_}/time", rounded) for id_ in ("eq8-free", "whole", "program-eq8")},
         map=_map(tables.get("map-gamma")),
         names=NAMES,
     )
 
 
-def _layers(summary: Summary, n: Mapping[str, Number | None]) -> list[Layer]:
+def _layers(summary: Summary, n: Mapping[str, Number | None]) -> list[SimpleNamespace]:
+    """Return the three layers of the answer: what was tested, its number, what kind of number, and the verdict."""
     steps = summary.at("headlines/step/note") or "the steps"
+    fields = ("id", "name", "short", "between", "section", "question", "kind")
     asked = (
-        ("step", "The time step", f"Does it matter that the program makes {steps} and holds ω constant over each?",
-         "Largest difference in ω between the program and what Eq. 9 becomes as the step goes to zero", "steps",
-         "step", "time step", ""),
-        ("program_eq8", "The algebra of Eq. 9", "Do the formulas of the program, Eq. 9, solve Eq. 8?",
-         "Largest difference in ω between the program and Eq. 8", "errata", "program-eq8", "algebra",
-         "program against Eq. 8"),
-        ("eq8_free", "The physics of Eq. 8", "Does Eq. 8 describe slices in a bottle that flies freely?",
-         "Largest difference in ω between Eq. 8 and free flight", "assumptions", "eq8-free", "physics",
-         "Eq. 8 against free flight"),
+        ("step", "The time step", "time step", "", "steps",
+         f"Does it matter that the program makes {steps} and holds ω constant over each?",
+         "Largest difference in ω between the program and what Eq. 9 becomes as the step goes to zero"),
+        ("program-eq8", "The algebra of Eq. 9", "algebra", "program against Eq. 8", "errata",
+         "Do the formulas of the program, Eq. 9, solve Eq. 8?",
+         "Largest difference in ω between the program and Eq. 8"),
+        ("eq8-free", "The physics of Eq. 8", "physics", "Eq. 8 against free flight", "assumptions",
+         "Does Eq. 8 describe slices in a bottle that flies freely?",
+         "Largest difference in ω between Eq. 8 and free flight"),
     )  # fmt: skip
-    return [
-        Layer(
-            name=name,
-            short=short,
-            between=between,
-            question=question,
-            number=number,
-            kind=kind,
-            section=section,
-            finer=summary.number(f"headlines/{id_}/finer", percent),
-            finer_slices=summary.number(f"headlines/{id_}/finer_slices", plain),
-            band=summary.number(f"headlines/{id_}/band", small),
-        )
-        for key, name, question, kind, section, id_, short, between in asked
-        if (number := n[key]) is not None
-    ]
+    layers = [SimpleNamespace(**dict(zip(fields, row, strict=True))) for row in asked]
+    for layer in layers:
+        layer.number = n[layer.id.replace("-", "_")]
+        layer.within = layer.number is not None and layer.number.value <= PARTING_BAND
+        for field, shown in {"finer": percent, "finer_slices": plain, "band": small}.items():
+            setattr(layer, field, summary.number(f"headlines/{layer.id}/{field}", shown))
+    return [layer for layer in layers if layer.number is not None]
 
 
-def _shares(summary: Summary) -> list[Share]:
+def _shares(summary: Summary) -> list[SimpleNamespace]:
+    """Return the fair share of each change: the mean over all orders, and the least and the largest of them."""
     found = []
     for headline in summary.at("headlines") or ():
-        if headline["measure"] != "share" or not headline["id"].startswith("share"):
-            continue
-        place = f"headlines/{headline['id']}"
-        mean, low, high = (summary.number(f"{place}/{field}", signed) for field in ("value", "low", "high"))
-        if mean and low and high:
-            found.append(
-                Share(
-                    name=headline["what"],
-                    words=CHANGES.get(headline["what"], ""),
-                    mean=mean,
-                    low=low,
-                    high=high,
-                    finer=summary.number(f"{place}/finer", signed),
-                )
-            )
+        if headline["measure"] == "share" and headline["id"].startswith("share"):
+            places = {"mean": "value", "low": "low", "high": "high", "finer": "finer"}
+            numbers = {n: summary.number(f"headlines/{headline['id']}/{p}", signed) for n, p in places.items()}
+            words = CHANGES.get(headline["what"], "")
+            if numbers["mean"] and numbers["low"] and numbers["high"]:
+                found.append(SimpleNamespace(name=headline["what"], words=words, **numbers))
     return found
 
 
@@ -237,10 +186,6 @@ def _nearest(summary: Summary) -> list[SimpleNamespace]:
     return sorted(found, key=lambda one: -one.nearest.value)
 
 
-def _time(summary: Summary, id_: str) -> Number | None:
-    return summary.number(f"headlines/{id_}/time", lambda value: f"{value:.2f}")
-
-
 def _map(table: str | None) -> dict[str, Any] | None:
     """Return the map over filling and damping for the script, from the CSV of its figure; None without one."""
     if not table:
@@ -249,11 +194,10 @@ def _map(table: str | None) -> dict[str, Any] | None:
     plateau = "plateau of omega/omega_0 {} [1]"
     solvers = [name for name in NAMES if plateau.format(name) in rows[0]]
     fill, damping = (name for name in list(rows[0])[:2])
-    shares = sorted({row["largest fair share"] for row in rows if row.get("largest fair share")})
     return {
         "fills": sorted({float(row[fill]) for row in rows}),
         "dampings": sorted({float(row[damping]) for row in rows}),
-        "shares": shares,
+        "shares": sorted({row["largest fair share"] for row in rows if row.get("largest fair share")}),
         "solvers": solvers,
         "cells": [
             {
@@ -273,3 +217,62 @@ def _value(text: str) -> float | None:
     except ValueError:
         return None
     return value if math.isfinite(value) else None
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number as it is printed; the page keeps its value and its source beside the text."""
+
+    value: float
+    text: str
+    source: str
+
+    def __html__(self) -> str:
+        """Return the number as HTML."""
+        return str(
+            Markup('<data value="{}" data-source="{}">{}</data>').format(repr(self.value), self.source, self.text)
+        )
+
+    def __str__(self) -> str:
+        return self.text
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """The content of ``summary.json``, asked by places."""
+
+    content: Mapping[str, Any]
+
+    def at(self, place: str) -> Any:
+        """Return what stands at a place, or None if nothing does."""
+        found: Any = self.content
+        for key in place.split("/"):
+            if isinstance(found, Mapping):
+                found = found.get(key)
+            elif isinstance(found, list):
+                found = next((entry for entry in found if key in (entry.get("id"), entry.get("name"))), None)
+            else:
+                return None
+        return found
+
+    def evaluate(self, source: str) -> float | None:
+        """Return the value of a source, or None if something of it is missing or no number."""
+        kind, *words = source.split(" ", 3)
+        if kind == "length":
+            return len(self.at(words[0]) or ())
+        if kind == "count":
+            entries, field, wanted = self.at(words[0]) or (), words[1], words[2]
+            return sum(_has(Summary(entry).at(field), wanted) for entry in entries)
+        found = self.at(source)
+        return float(found) if isinstance(found, (int, float)) else None
+
+    def number(self, source: str, shown: Callable[[float], str]) -> Number | None:
+        """Return the number at a source with its text, or None."""
+        value = self.evaluate(source)
+        return None if value is None else Number(value, shown(value), source)
+
+
+def _has(found: Any, wanted: str) -> bool:
+    if isinstance(found, list):
+        return wanted in found
+    return str(found).startswith(wanted[:-1]) if wanted.endswith("*") else found == wanted
