@@ -16,7 +16,7 @@ from flipproof.frame import keys, sources, store
 from flipproof.frame.keys import key_of, key_of_call
 from flipproof.frame.pool import make_all, workers
 from flipproof.frame.solvers import Made, Run, make
-from flipproof.frame.store import RunStore, default_place
+from flipproof.frame.store import RunStore, _write_ahead, default_place
 from slicemodel import Scenario
 
 RUN = Run("eq8", Scenario(n_slices=3, duration=0.1))
@@ -395,3 +395,30 @@ def test_a_fingerprint_is_of_all_files_but_compiled_and_hidden_ones(tmp_path, mo
         sources.fingerprint.cache_clear()
         seen.add(sources.fingerprint("another_room"))
     assert len(seen) == 2
+
+
+class Refusing:
+    """A connection that refuses so many times, at once, as SQLite does where two programs begin one file together."""
+
+    def __init__(self, times, code=sqlite3.SQLITE_BUSY):
+        self.times, self.code = times, code
+
+    def execute(self, _):
+        if not self.times:
+            return self
+        self.times -= 1
+        error = sqlite3.OperationalError("database is locked")
+        error.sqlite_errorcode = self.code
+        raise error
+
+    def fetchall(self):
+        return []
+
+
+def test_two_programs_that_begin_the_store_at_once_both_keep_it(monkeypatch):
+    _write_ahead(Refusing(3))
+    with pytest.raises(sqlite3.OperationalError):
+        _write_ahead(Refusing(1, sqlite3.SQLITE_READONLY))
+    monkeypatch.setattr("flipproof.frame.store.BUSY", 0.05)
+    with pytest.raises(sqlite3.OperationalError):
+        _write_ahead(Refusing(1000))

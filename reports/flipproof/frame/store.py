@@ -252,13 +252,27 @@ def default_place() -> Path | None:
 def _connect(place: Path) -> sqlite3.Connection:
     rows = sqlite3.connect(place, timeout=BUSY, isolation_level=None, check_same_thread=False)
     try:
-        rows.execute("PRAGMA journal_mode = WAL").fetchall()
+        _write_ahead(rows)
         rows.execute("PRAGMA synchronous = NORMAL")
         rows.execute(TABLE)
     except BaseException:
         rows.close()
         raise
     return rows
+
+
+def _write_ahead(rows: sqlite3.Connection) -> None:
+    """Let readers go on while one program writes. Of two that begin a file at once SQLite refuses one without waiting."""
+    until = time.monotonic() + BUSY
+    while True:
+        try:
+            rows.execute("PRAGMA journal_mode = WAL").fetchall()
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > until:
+                raise
+            time.sleep(0.01)
+        else:
+            return
 
 
 def _read(key: str, checksum: object, content: object) -> tuple[Any, str] | None:
