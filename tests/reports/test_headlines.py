@@ -233,9 +233,13 @@ def test_the_answer_follows_from_step_and_equation(step, equation, words):
 @pytest.mark.parametrize(
     ("algebra", "largest", "words"),
     [
-        (0.42, "gravity in Eq. 8", "but it does not solve Eq. 8, and Eq. 8 lets weight push the water."),
-        (0.42, "no recoil in impacts", "but it does not solve Eq. 8, and Eq. 8 is not free flight."),
-        (0.01, "gravity in Eq. 8", "but Eq. 8 lets weight push the water."),
+        (
+            0.42,
+            "gravity in Eq. 8",
+            "but its formulas do not solve Eq. 8, and Eq. 8 lets weight push the water along the bottle.",
+        ),
+        (0.42, "no recoil in impacts", "but its formulas do not solve Eq. 8, and Eq. 8 is not free flight."),
+        (0.01, "gravity in Eq. 8", "but Eq. 8 lets weight push the water along the bottle."),
     ],
 )
 def test_the_answer_names_the_algebra_and_the_weight_where_they_matter(algebra, largest, words):

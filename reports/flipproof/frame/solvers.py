@@ -52,13 +52,13 @@ def find(name: str) -> Solver:
     ValueError
         If there is none; the message names the nearest.
     """
-    solvers = catalogue()
     if name.startswith("switches:"):
         from ode_reference.combinations import model_of
         from ode_reference.switches import Switches
 
         model = model_of(Switches.from_name(name))
         return Solver(name, "ode_reference", "model", model.equation, model.reason)
+    solvers = catalogue()
     if name not in solvers:
         from flipproof.foreign.specs import check_spec, is_spec
 

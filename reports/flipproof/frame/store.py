@@ -262,7 +262,7 @@ def _connect(place: Path) -> sqlite3.Connection:
 
 
 def _write_ahead(rows: sqlite3.Connection) -> None:
-    """Let readers go on while one program writes. Of two that begin a file at once SQLite refuses one without waiting."""
+    """Let readers go on while one program writes. Of two that begin a file at once SQLite refuses one right away."""
     until = time.monotonic() + BUSY
     while True:
         try:
