@@ -217,7 +217,7 @@ def test_the_lead_knows_ice_divergence_and_nothing_at_all():
 @pytest.mark.parametrize(
     ("step", "equation", "words"),
     [
-        (0.005, 0.55, "Not as it stands: the program's steps are short enough, but Eq. 8 is not free flight."),
+        (0.005, 0.55, "Not as it stands: its steps are short enough, but Eq. 8 is not free flight."),
         (0.01, 0.01, "On this throw the step is short enough, and Eq. 8 is free flight within 1 % of ω₀."),
         (0.02, 0.001, "On this throw Eq. 8 is free flight within 1 % of ω₀. The step is too long."),
         (0.02, 0.55, "On this throw the step is too long, and Eq. 8 is not free flight."),
@@ -236,10 +236,10 @@ def test_the_answer_follows_from_step_and_equation(step, equation, words):
         (
             0.42,
             "gravity in Eq. 8",
-            "but its formulas do not solve Eq. 8, and Eq. 8 lets weight push the water along the bottle.",
+            "but its formulas do not solve Eq. 8, and Eq. 8 lets weight push the water.",
         ),
         (0.42, "no recoil in impacts", "but its formulas do not solve Eq. 8, and Eq. 8 is not free flight."),
-        (0.01, "gravity in Eq. 8", "but Eq. 8 lets weight push the water along the bottle."),
+        (0.01, "gravity in Eq. 8", "but Eq. 8 lets weight push the water."),
     ],
 )
 def test_the_answer_names_the_algebra_and_the_weight_where_they_matter(algebra, largest, words):

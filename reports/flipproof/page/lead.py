@@ -24,9 +24,9 @@ def answer(headlines: Sequence[Headline]) -> str:
     within = percent(PARTING_BAND)
     weight = "pair" in found and found["pair"].what == NAMES["weightless"]
     solved = "program-eq8" not in found or found["program-eq8"].value <= PARTING_BAND
-    physics = "Eq. 8 lets weight push the water along the bottle" if weight else "Eq. 8 is not free flight"
+    physics = "Eq. 8 lets weight push the water" if weight else "Eq. 8 is not free flight"
     return {
-        (True, False): "Not as it stands: the program's steps are short enough, but "
+        (True, False): "Not as it stands: its steps are short enough, but "
         f"{'' if solved else 'its formulas do not solve Eq. 8, and '}{physics}.",
         (True, True): f"On this throw the step is short enough, and Eq. 8 is free flight within {within} of ω₀.",
         (False, True): f"On this throw Eq. 8 is free flight within {within} of ω₀. The step is too long.",
