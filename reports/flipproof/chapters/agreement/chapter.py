@@ -133,7 +133,7 @@ def study(ask: Ask) -> Study[Agreed]:
 
 def agreement_on(equation: str, runs: Mapping[str, Run], coarser: Run, flights: Flights) -> Agreement:
     """Compare the solvers of one equation, each within its own band, up to the horizon of the engines."""
-    made = {name: run for name, each in runs.items() if (run := flights.trajectory(each)) is not None and run.ok}
+    made = {name: run for name, run in flights.trajectories(runs).items() if run.ok}
     bands: dict[str, FloatArray] = {
         name: run.diagnostics["omega_band"] for name, run in made.items() if "omega_band" in run.diagnostics
     }

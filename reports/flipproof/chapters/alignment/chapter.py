@@ -16,7 +16,7 @@ from flipproof.chapters.alignment.found import SHIFT_BAND, Alignment, Table, end
 from flipproof.chapters.alignment.study import study_alignment
 from flipproof.chapters.alignment.tube import Tube, study_tube
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Outcome, Study, attempt, observed
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Outcome, Study, attempt, known, observed
 from flipproof.output.columns import rows_csv
 from slicemodel.trajectory import BASE, CAP
 
@@ -43,9 +43,9 @@ class Events:
     tubes: Mapping[tuple[str, str], Outcome[Tube]]
 
     @property
-    def aligned(self) -> list[tuple[tuple[str, str], Alignment]]:
+    def aligned(self) -> dict[tuple[str, str], Alignment]:
         """The pairs that could be aligned."""
-        return [(pair, each.found) for pair, each in self.alignments.items() if each.found is not None]
+        return known(self.alignments)
 
 
 def study(ask: Ask) -> Study[Events]:
@@ -78,7 +78,7 @@ def claims(found: Events) -> Claims:
 
 def figures(found: Events) -> Iterator[Exhibit]:
     """Yield contacts and impacts of every pair."""
-    for (first, second), alignment in found.aligned:
+    for (first, second), alignment in found.aligned.items():
         yield Exhibit(
             name=f"gantt-{first}-{second}",
             title=f"Contacts and impacts: {first} and {second}",

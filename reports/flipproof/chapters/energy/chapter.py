@@ -6,8 +6,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Finding, Made, Outcome, Run, Study, attempt, judged
-from flipproof.frame.findings import regression
+from flipproof.frame.chapter import (
+    Absent,
+    Ask,
+    Chapter,
+    Claims,
+    Finding,
+    Made,
+    Outcome,
+    Run,
+    Study,
+    attempt,
+    judged,
+    known,
+    regression,
+)
 from ode_reference.models import LADDER
 from slicemodel import Trajectory
 
@@ -22,7 +35,7 @@ class Energy:
     @property
     def made(self) -> dict[str, Mapping[str, float]]:
         """The ledgers that were made."""
-        return {model: each.found for model, each in self.ledgers.items() if each.found is not None}
+        return known(self.ledgers)
 
 
 def study(ask: Ask) -> Study[Energy]:

@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Final
 
 from flipproof.chapters.predictability.figure import figure_predictability
 from flipproof.chapters.predictability.study import Predictability, plan_predictability, study_predictability
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Outcome, Study, attempt, judged, observed
+from flipproof.frame.chapter import (
+    Ask,
+    Chapter,
+    Claims,
+    Exhibit,
+    Finding,
+    Outcome,
+    Study,
+    attempt,
+    judged,
+    known,
+    observed,
+)
 from flipproof.output.columns import curves_csv
 
 Found = Mapping[str, Outcome[Predictability]]
@@ -21,8 +32,7 @@ def study(ask: Ask) -> Study[Found]:
     flights = yield [*(ask.solvers[name] for name in levels), *changed]
 
     def measured(name: str) -> Predictability:
-        members = [[flights[run].flight for run in level] for level in levels[name]]
-        return study_predictability(flights[ask.solvers[name]].flight, members)
+        return study_predictability(flights[ask.solvers[name]].flight, flights.levels(levels[name]))
 
     return {name: attempt(measured, name) for name in levels}
 
@@ -46,7 +56,7 @@ def claim_predictability(solver: str, study: Predictability) -> Finding:
 
 def figures(found: Found) -> Iterator[Exhibit]:
     """Yield the spread after every change."""
-    studies = [each.found for each in found.values() if each.found is not None]
+    studies = list(known(found).values())
     if not studies:
         return
     words = " ".join(f"{study.words}." for study in studies)
@@ -77,6 +87,5 @@ CHAPTER: Final = Chapter(
     study=study,
     claims=claims,
     figures=figures,
-    template=Path(__file__).with_name("part.html.j2"),
     work={"quick": (1e-9,), "full": (1e-9, 1e-6)},
 )

@@ -24,19 +24,8 @@ from flipproof.chapters.stability.study import (
     study_stability,
 )
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import (
-    Ask,
-    Chapter,
-    Claims,
-    Exhibit,
-    Finding,
-    Made,
-    Run,
-    Study,
-    judged,
-    observed,
-    regression,
-)
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Made, Run, Study, judged
+from flipproof.frame.findings import Finding, observed, regression
 from flipproof.output.columns import rows_csv
 from slicemodel import Trajectory
 
@@ -64,13 +53,12 @@ def claims(found: Found) -> Claims:
 def claim_rule_of_iterations(panels: Sequence[StabilityPanel]) -> Finding:
     """With the iterations that the rule asks for, and a step up to twice the default, pymunk follows free flight."""
     errors = np.concatenate([panel.by_the_rule for panel in panels])
-    return Finding(
+    return regression(
         id="engine-rule-of-iterations",
         title=f"pymunk with enough iterations and Δt ≤ {RULE_DT:g} s: largest error of ω(t) against free flight",
         # A NaN among them stays NaN, and fails.
         value=float(errors.max()) if len(errors) else None,
         unit="of ω₀",
-        kind="regression",
         admissible=(0.0, GOOD),
         band=float(np.max([panel.band for panel in panels])),
         note=f"{len(errors)} runs; " + "; ".join(panel.words for panel in panels),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Final
 
 from flipproof.chapters.waterfall.figure import figure_waterfall
@@ -114,6 +113,5 @@ CHAPTER: Final = Chapter(
     study=study,
     claims=claims,
     figures=figures,
-    template=Path(__file__).with_name("part.html.j2"),
     work={"quick": 50, "full": 50},
 )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
 from flipproof.chapters.work_precision.claims import claim_work_precision
@@ -241,7 +240,6 @@ CHAPTER: Final = Chapter(
     study=study,
     claims=claim_work_precision,
     figures=figures,
-    template=Path(__file__).with_name("part.html.j2"),
     work={"full": FULL},
     summary=lambda found: {"work_precision": summarise_work_precision(found)},
     page=lambda found: {"tables": list(tabulate_work_precision(found))},
