@@ -6,21 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from flipproof.frame.chapter import (
-    Absent,
-    Ask,
-    Chapter,
-    Claims,
-    Finding,
-    Made,
-    Outcome,
-    Run,
-    Study,
-    attempt,
-    judged,
-    known,
-    regression,
-)
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Made, Run, Study, judged
+from flipproof.frame.findings import Finding, regression
+from flipproof.frame.flights import Outcome, attempt, known
 from ode_reference.models import LADDER
 from slicemodel import Trajectory
 

@@ -9,20 +9,9 @@ import numpy as np
 
 from flipproof.chapters.model_form.study import ModelForm, Richardson, richardson, study_model_form
 from flipproof.chapters.step_size.study import errors_of, plan_step_size
-from flipproof.frame.chapter import (
-    Ask,
-    Call,
-    Chapter,
-    Claims,
-    Finding,
-    Outcome,
-    Run,
-    Study,
-    attempt,
-    judged,
-    known,
-    observed,
-)
+from flipproof.frame.chapter import Ask, Chapter, Claims, Run, Study, judged
+from flipproof.frame.findings import Finding, observed
+from flipproof.frame.flights import Call, Outcome, attempt, known
 
 FORMS: Final = (
     ("exact-step", "eq8"),

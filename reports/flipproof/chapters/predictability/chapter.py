@@ -7,19 +7,9 @@ from typing import Final
 
 from flipproof.chapters.predictability.figure import figure_predictability
 from flipproof.chapters.predictability.study import Predictability, plan_predictability, study_predictability
-from flipproof.frame.chapter import (
-    Ask,
-    Chapter,
-    Claims,
-    Exhibit,
-    Finding,
-    Outcome,
-    Study,
-    attempt,
-    judged,
-    known,
-    observed,
-)
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Study, judged
+from flipproof.frame.findings import Finding, observed
+from flipproof.frame.flights import Outcome, attempt, known
 from flipproof.output.columns import curves_csv
 
 Found = Mapping[str, Outcome[Predictability]]
