@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from flipproof.chapters.guests.split import Split
 from flipproof.chapters.guests.study import Guest, Guests
-from flipproof.chapters.waterfall.figure import DOWN, UP, WHOLE
+from flipproof.chapters.waterfall.chapter import DOWN, UP, WHOLE
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.figures.style import ASSUMPTIONS, MARKERS, new_figure, shared_legend, solver_style, styled
 from flipproof.frame.exhibit import Exhibit
