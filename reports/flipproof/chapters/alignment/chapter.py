@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from flipproof.chapters.alignment.found import SHIFT_BAND, Alignment, Table, end_name
-from flipproof.chapters.alignment.study import study_alignment
+from flipproof.chapters.alignment.study import SHIFT_BAND, Alignment, Table, end_name, study_alignment
 from flipproof.chapters.alignment.tube import Tube, study_tube
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Outcome, Study, attempt, known, observed

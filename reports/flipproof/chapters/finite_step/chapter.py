@@ -39,25 +39,15 @@ EVERYTHING: Final = "everything"
 HELD: Final = "held"
 LOCATED: Final = "held-located"
 
+WAIT, LOCATE = "rebounds wait for the grid", "rebounds located inside the step"
+PUBLISHED: Final = "published-python"
 WAYS: Final = (
-    Way(
-        EVERYTHING,
-        "published-python",
-        {},
-        "the published program: coefficients held, J and r_CM a step behind, rebounds wait for the grid",
-    ),
-    Way(
-        HELD,
-        "published-python",
-        {"lagged": False},
-        "the published program without its lag: coefficients held, rebounds wait for the grid",
-    ),
-    Way("exact", "exact-step", {}, "exact step: coefficients held, rebounds wait for the grid"),
-    Way(
-        LOCATED, "exact-step", {"rebound": "in-step"}, "exact step: coefficients held, rebounds located inside the step"
-    ),
-    Way("waiting", "midpoint", {"rebound": "grid"}, "midpoint: coefficients at mid-step, rebounds wait for the grid"),
-    Way("neither", "midpoint", {}, "midpoint: coefficients at mid-step, rebounds located inside the step"),
+    Way(EVERYTHING, PUBLISHED, {}, f"the published program: coefficients held, J and r_CM a step behind, {WAIT}"),
+    Way(HELD, PUBLISHED, {"lagged": False}, f"the published program without its lag: coefficients held, {WAIT}"),
+    Way("exact", "exact-step", {}, f"exact step: coefficients held, {WAIT}"),
+    Way(LOCATED, "exact-step", {"rebound": "in-step"}, f"exact step: coefficients held, {LOCATE}"),
+    Way("waiting", "midpoint", {"rebound": "grid"}, f"midpoint: coefficients at mid-step, {WAIT}"),
+    Way("neither", "midpoint", {}, f"midpoint: coefficients at mid-step, {LOCATE}"),
 )
 
 
@@ -117,13 +107,9 @@ def claims(found: StepCosts) -> Claims:
     Its band is what an equation without recoil may be off by on the throws of a report.
     """
     for cost in found.costs:
-        before = "no slice strikes an end"
-        if not math.isnan(cost.start):
-            before = f"{cost.start:.2g} of ω₀ before the first impact"
-        title, note = (
-            f"{cost.way.words}: largest difference in ω from {cost.way.model}",
-            f"{cost.steps} steps; {before}",
-        )
+        start = f"{cost.start:.2g} of ω₀ before the first impact"
+        note = f"{cost.steps} steps; {'no slice strikes an end' if math.isnan(cost.start) else start}"
+        title = f"{cost.way.words}: largest difference in ω from {cost.way.model}"
         yield observed(f"finite-step-{cost.way.name}", title, cost.flight, "of ω₀", note, band=1e-9)
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from flipproof.chapters.alignment.found import LEAST_SPEED, count_key, ordinal
+from flipproof.chapters.alignment.study import LEAST_SPEED, count_key, ordinal
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, first_crossing, percent
 from flipproof.frame.solvers import Run
 from slicemodel import Impacts, Scenario, Trajectory
