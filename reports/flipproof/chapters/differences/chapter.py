@@ -60,7 +60,6 @@ class Differences:
     slices: int
     ended: str
     missing: Mapping[tuple[str, str, str], str]
-    band_words: str = BAND_WORDS
 
 
 def study(ask: Ask) -> Study[Differences]:
@@ -227,4 +226,5 @@ CHAPTER: Final = Chapter(
     figures=figures,
     work={"check": None, "quick": None, "full": None},
     summary=summary,
+    page=lambda _: {"band_words": BAND_WORDS},
 )

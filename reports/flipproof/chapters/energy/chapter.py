@@ -20,11 +20,6 @@ class Energy:
     checks: Mapping[str, Made]
     ledgers: Mapping[str, Outcome[Mapping[str, float]]]
 
-    @property
-    def made(self) -> dict[str, Mapping[str, float]]:
-        """The ledgers that were made."""
-        return known(self.ledgers)
-
 
 def study(ask: Ask) -> Study[Energy]:
     """Keep the ledger of every model, on both throws."""
@@ -54,4 +49,11 @@ def claim_energy(run: Trajectory) -> Finding:
     return regression(f"energy-{run.method}", title, missed, "of the initial energy", (0.0, 1e-9))
 
 
-CHAPTER: Final = Chapter(name="energy", title="Where the energy goes", study=study, claims=claims, kind="regression")
+CHAPTER: Final = Chapter(
+    name="energy",
+    title="Where the energy goes",
+    study=study,
+    claims=claims,
+    kind="regression",
+    page=lambda found: {"made": known(found.ledgers)},
+)

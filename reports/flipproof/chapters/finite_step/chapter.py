@@ -16,7 +16,7 @@ import numpy as np
 
 from flipproof.chapters.solvers import LIMITS
 from flipproof.frame.chapter import Ask, Chapter, Claims, Run, Study, attempt, observed
-from flipproof.frame.throws import FINER, finer
+from flipproof.frame.throws import finer
 from slicemodel import Trajectory
 
 
@@ -72,7 +72,6 @@ class StepCosts:
     costs: tuple[StepCost, ...]
     more: tuple[StepCost, ...]
     slices: int
-    finer_slices: int
 
 
 def study(ask: Ask) -> Study[StepCosts]:
@@ -88,7 +87,7 @@ def study(ask: Ask) -> Study[StepCosts]:
     def costs(of: dict[Way, tuple[Run, Run]]) -> tuple[StepCost, ...]:
         return tuple(cost_of(way, flights[run].whole, flights[truth].whole) for way, (run, truth) in of.items())
 
-    return StepCosts(costs(pairs), attempt(costs, more).found or (), ask.throw.n_slices, FINER * ask.throw.n_slices)
+    return StepCosts(costs(pairs), attempt(costs, more).found or (), ask.throw.n_slices)
 
 
 def cost_of(way: Way, run: Trajectory, reference: Trajectory) -> StepCost:

@@ -21,7 +21,7 @@ from flipproof.chapters.step_size.study import (
 )
 from flipproof.figures.style import MARKERS, STYLES, new_figure, shared_legend, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Missing, Run, Study, judged
-from flipproof.frame.findings import Finding, Kind, observed
+from flipproof.frame.findings import Finding, Kind, observed, regression
 from flipproof.frame.flights import Flights, Outcome, attempt, known
 from flipproof.output.columns import rows_csv
 
@@ -112,18 +112,15 @@ def claim_order(study: StepSize, where: str, *, kind: Kind = "regression") -> Fi
     if study.exact:
         note = "there is no step error to be seen: all errors are at round-off"
         return observed(id_, title, float(study.error.max()), "of ω₀", note)
-    return Finding(
-        id=id_,
-        title=title,
-        value=study.order if study.refined or kind == "observation" else math.nan,
-        unit="",
-        kind=kind,
-        admissible=(0.9, 1.1) if kind == "regression" else (-math.inf, math.inf),
-        band=study.order_error,
-        note=f"error {study.mean_error[0]:.2g} → {study.mean_error[-1]:.2g} of ω₀ "
+    note = (
+        f"error {study.mean_error[0]:.2g} → {study.mean_error[-1]:.2g} of ω₀ "
         f"from Δt = {study.mean_dt[0]:.2g} s to {study.mean_dt[-1]:.2g} s"
-        + ("" if study.refined else "; refinement does not always help"),
+        + ("" if study.refined else "; refinement does not always help")
     )
+    if kind == "observation":
+        return observed(id_, title, study.order, note=note, band=study.order_error)
+    order = study.order if study.refined else math.nan
+    return regression(id_, title, order, "", (0.9, 1.1), note, band=study.order_error)
 
 
 def figures(found: Orders) -> Iterator[Exhibit]:
