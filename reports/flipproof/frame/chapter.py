@@ -11,7 +11,7 @@ Evidence is absent in one way only: whatever needs it raises Missing, and the fr
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
@@ -86,7 +86,7 @@ def _no_part(_: Any) -> dict[str, Any]:
     return {}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Chapter(Generic[F]):
     """One subject of a report.
 
@@ -110,6 +110,7 @@ class Chapter(Generic[F]):
     study: Callable[[Ask], Study[F]]
     claims: Callable[[F], Claims] = _nothing
     figures: Callable[[F], Iterable[Exhibit]] = _nothing
+    _: KW_ONLY
     template: Path | None = None
     work: Mapping[Size, Any] = field(default_factory=lambda: {"quick": None, "full": None})
     kind: Kind = "observation"

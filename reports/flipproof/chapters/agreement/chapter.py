@@ -171,4 +171,4 @@ def claims(found: Agreed) -> Claims:
         )
 
 
-CHAPTER: Final = Chapter(name="agreement", title="One equation by several solvers", study=study, claims=claims)
+CHAPTER: Final = Chapter("agreement", "One equation by several solvers", study, claims)

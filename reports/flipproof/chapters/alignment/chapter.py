@@ -194,6 +194,4 @@ def _gantt_handles(alignment: Alignment) -> list[Patch | Line2D]:
     ]
 
 
-CHAPTER: Final = Chapter(
-    name="alignment", title="Contacts and impacts side by side", study=study, claims=claims, figures=figures
-)
+CHAPTER: Final = Chapter("alignment", "Contacts and impacts side by side", study, claims, figures)

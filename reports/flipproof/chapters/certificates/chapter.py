@@ -50,4 +50,4 @@ def claims(found: Certificates) -> Claims:
         yield observed(id_, title, certificate["band"], "of ω₀", "; ".join(words))
 
 
-CHAPTER: Final = Chapter(name="certificates", title="Certificates", study=study, claims=claims)
+CHAPTER: Final = Chapter("certificates", "Certificates", study, claims)

@@ -279,10 +279,5 @@ def figure_gallery(findings: Sequence[Finding], engines: Sequence[str]) -> Figur
 
 
 CHAPTER: Final = Chapter(
-    name="engine-facts",
-    title="Engine behaviour that a user may not expect",
-    study=study,
-    claims=claims,
-    kind="regression",
-    figures=figures,
+    "engine-facts", "Engine behaviour that a user may not expect", study, claims, figures, kind="regression"
 )

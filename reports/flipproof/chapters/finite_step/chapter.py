@@ -112,6 +112,4 @@ def claims(found: StepCosts) -> Claims:
         yield observed(f"finite-step-{cost.way.name}", title, cost.flight, "of ω₀", note, band=1e-9)
 
 
-CHAPTER: Final = Chapter(
-    name="finite-step", title="What a step of finite length costs, taken apart", study=study, claims=claims
-)
+CHAPTER: Final = Chapter("finite-step", "What a step of finite length costs, taken apart", study, claims)

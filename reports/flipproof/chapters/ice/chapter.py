@@ -145,11 +145,5 @@ def draw(drifts: Sequence[Drift]) -> Figure:
 
 
 CHAPTER: Final = Chapter(
-    name="ice",
-    title="Ice",
-    study=study,
-    claims=claims,
-    kind="regression",
-    figures=figures,
-    work={"check": False, "quick": True, "full": True},
+    "ice", "Ice", study, claims, figures, kind="regression", work={"check": False, "quick": True, "full": True}
 )

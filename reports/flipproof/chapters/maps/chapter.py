@@ -150,11 +150,5 @@ def _cells_csv(study: ValidityMap) -> str:
 
 
 CHAPTER: Final = Chapter(
-    name="maps",
-    title="For which bottles",
-    study=study,
-    claims=claims,
-    figures=figures,
-    work={"full": 20},
-    page=lambda _: {"slices": SLICES},
+    "maps", "For which bottles", study, claims, figures, work={"full": 20}, page=lambda _: {"slices": SLICES}
 )

@@ -42,10 +42,5 @@ def claim_vectors(vector: Vector, flight: Trajectory) -> Finding:
 
 
 CHAPTER: Final = Chapter(
-    name="vectors",
-    title="Published vectors",
-    study=study,
-    claims=claims,
-    kind="regression",
-    work={"check": None, "quick": None, "full": None},
+    "vectors", "Published vectors", study, claims, kind="regression", work={"check": None, "quick": None, "full": None}
 )

@@ -166,10 +166,5 @@ def figure_waterfall(waterfall: Waterfall) -> Figure:
 
 
 CHAPTER: Final = Chapter(
-    name="waterfall",
-    title="What each assumption costs",
-    study=study,
-    claims=claims,
-    figures=figures,
-    work={"quick": 50, "full": 50},
+    "waterfall", "What each assumption costs", study, claims, figures, work={"quick": 50, "full": 50}
 )
