@@ -71,12 +71,7 @@ def deviations(vector: Vector, trajectory: Trajectory) -> dict[str, float]:
     points = int(np.searchsorted(vector.columns["t"], vector.until, side="right"))
     if len(trajectory.t) < points:
         return {"t": float("inf")}
-    ours = {
-        "t": trajectory.t,
-        "theta": trajectory.theta,
-        "omega": trajectory.omega,
-        "r_cm": trajectory.r_cm,
-        "inertia": trajectory.inertia,
+    ours = {name: getattr(trajectory, name) for name in ("t", "theta", "omega", "r_cm", "inertia")} | {
         "r_first": trajectory.r[:, 0],
         "r_middle": trajectory.r[:, vector.middle_slice],
         "r_last": trajectory.r[:, -1],

@@ -7,14 +7,7 @@ from typing import Final
 
 from matplotlib.figure import Figure
 
-from flipproof.chapters.waterfall.study import (
-    Waterfall,
-    observe,
-    plan_finer,
-    plan_waterfall,
-    program_run,
-    split_all,
-)
+from flipproof.chapters.waterfall.study import Waterfall, observe, plan_finer, plan_waterfall, program_run, split_all
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, observed
 from flipproof.frame.throws import FINER
