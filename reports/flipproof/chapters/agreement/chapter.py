@@ -161,14 +161,10 @@ def claims(found: Agreed) -> Claims:
     for equation, agreement in found.agreements.items():
         widest = max(agreement.pairs, key=lambda pair: pair.largest)
         pairs = [f"{p.first} and {p.second} {p.largest:.1e}, {100 * p.share:.0f} % within" for p in agreement.pairs]
-        yield observed(
-            "agreement" if equation == FREE else f"agreement-{equation}",
-            f"{', '.join(agreement.names)}: {agreement.words}",
-            widest.largest,
-            "of ω₀",
-            f"{'; '.join(pairs)}; up to {1e3 * agreement.until:.0f} ms",
-            band=widest.bands,
-        )
+        id_ = "agreement" if equation == FREE else f"agreement-{equation}"
+        title = f"{', '.join(agreement.names)}: {agreement.words}"
+        note = f"{'; '.join(pairs)}; up to {1e3 * agreement.until:.0f} ms"
+        yield observed(id_, title, widest.largest, "of ω₀", note, band=widest.bands)
 
 
 CHAPTER: Final = Chapter("agreement", "One equation by several solvers", study, claims)

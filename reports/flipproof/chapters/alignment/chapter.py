@@ -183,13 +183,11 @@ def _gantt_handles(alignment: Alignment) -> list[Patch | Line2D]:
         f"extra in {alignment.second} ({len(alignment.extra)})",
         "after a fork ({} + {})".format(*map(len, alignment.after_fork)),
     )
-    colours = [colour for colour, _ in IMPACTS.values()]
+    marks = [("v", "#444444", "impact on the base"), ("^", "#444444", "impact on the cap")]
+    marks += [("o", colour, words) for (colour, _), words in zip(IMPACTS.values(), labels, strict=True)]
     return [
-        Patch(color=END_COLOURS[BASE], label="in contact with the base"),
-        Patch(color=END_COLOURS[CAP], label="in contact with the cap"),
-        Line2D([], [], linestyle="", marker="v", color="#444444", label="impact on the base"),
-        Line2D([], [], linestyle="", marker="^", color="#444444", label="impact on the cap"),
-        *(Line2D([], [], linestyle="", marker="o", color=c, label=x) for c, x in zip(colours, labels, strict=True)),
+        *(Patch(color=colour, label=f"in contact with the {end_name(end)}") for end, colour in END_COLOURS.items()),
+        *(Line2D([], [], linestyle="", marker=mark, color=colour, label=words) for mark, colour, words in marks),
         Line2D([], [], linestyle="", marker="*", markersize=9, color="black", label=f"fork ({len(alignment.forks)})"),
     ]
 

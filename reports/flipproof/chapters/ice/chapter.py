@@ -93,14 +93,9 @@ def claim_welded_order(*runs: Trajectory) -> Finding:
     dt = [run.settings.get("step", np.nan) for run in runs]
     sizes = np.array([measure("", run).largest for run in runs])
     order = float(np.polyfit(np.log(dt), np.log(sizes), 1)[0]) if np.all(sizes > 0) else float("nan")
-    return regression(
-        "ice-welded-order",
-        "ice: drift of the welded engine falls with Δt at its printed order",
-        order,
-        "",
-        (printed - 0.3, printed + 0.3),
-        "drift " + ", ".join(f"{size:.2g} at Δt = {step:.2g} s" for step, size in zip(dt, sizes, strict=True)),
-    )
+    title = "ice: drift of the welded engine falls with Δt at its printed order"
+    note = "drift " + ", ".join(f"{size:.2g} at Δt = {step:.2g} s" for step, size in zip(dt, sizes, strict=True))
+    return regression("ice-welded-order", title, order, "", (printed - 0.3, printed + 0.3), note)
 
 
 def figures(found: Ice) -> Iterator[Exhibit]:

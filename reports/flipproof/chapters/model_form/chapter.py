@@ -61,14 +61,11 @@ def claims(found: Found) -> Claims:
 
 def claim_limit(scheme: str, limit: Richardson) -> Finding:
     """Where omega(T) / omega_0 of a scheme goes as its step goes to zero, with its grid-convergence index."""
-    how = f"observed order {limit.order:.2f}; band: grid-convergence index; " if limit.ok else ""
-    return observed(
-        id=f"limit-{scheme}",
-        title=f"{scheme}: ω(T)/ω₀ extrapolated to Δt = 0 (Richardson)",
-        value=limit.value if limit.ok else None,
-        band=limit.gci if limit.ok else None,
-        note=how + limit.reason,
-    )
+    id_, title = f"limit-{scheme}", f"{scheme}: ω(T)/ω₀ extrapolated to Δt = 0 (Richardson)"
+    if not limit.ok:
+        return observed(id_, title, None, note=limit.reason)
+    note = f"observed order {limit.order:.2f}; band: grid-convergence index; {limit.reason}"
+    return observed(id_, title, limit.value, note=note, band=limit.gci)
 
 
 def claim_model_form(id_: str, title: str, form: ModelForm) -> Finding:

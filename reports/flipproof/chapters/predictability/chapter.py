@@ -47,12 +47,8 @@ def claims(found: Found) -> Claims:
 
 def claim_predictability(solver: str, study: Predictability) -> Finding:
     """How much a tiny change of the release is amplified, and up to when a curve means anything."""
-    return observed(
-        id=f"predictability-{solver}",
-        title=f"{solver}: largest amplification of a change of {study.sizes[0]:.0e} of the release",
-        value=float(study.amplification[0]),
-        note=study.words,
-    )
+    title = f"{solver}: largest amplification of a change of {study.sizes[0]:.0e} of the release"
+    return observed(f"predictability-{solver}", title, float(study.amplification[0]), note=study.words)
 
 
 def figures(found: Found) -> Iterator[Exhibit]:

@@ -31,14 +31,9 @@ def claim_vectors(vector: Vector, flight: Trajectory) -> Finding:
     # The two sides differ by the order of additions and, for MATLAB, by amplified round-off.
     admissible = {"published-python": (0.0, 1e-10), "published-matlab": (0.0, 1e-8)}
     worst = max(off, key=lambda column: math.inf if math.isnan(off[column]) else off[column])
-    return regression(
-        id=f"vectors-{vector.name}",
-        title=f"{vector.scheme} reproduces the published run {vector.name}",
-        value=float(off[worst]),
-        unit="relative",
-        admissible=admissible[vector.scheme],
-        note=f"largest in column {worst}, over {len(off)} columns",
-    )
+    title = f"{vector.scheme} reproduces the published run {vector.name}"
+    note = f"largest in column {worst}, over {len(off)} columns"
+    return regression(f"vectors-{vector.name}", title, float(off[worst]), "relative", admissible[vector.scheme], note)
 
 
 CHAPTER: Final = Chapter(
