@@ -33,32 +33,26 @@ def claims(found: tuple[Waterfall, ...]) -> Claims:
 
 def claim_waterfall(waterfall: Waterfall) -> Finding:
     """From the published program to free flight, split over the assumptions; the bars sum to the whole."""
-    largest = waterfall.largest
-    return observed(
-        id=f"waterfall-{waterfall.observable.name}",
-        title=f"{waterfall.observable.words}: free flight minus published program",
-        value=waterfall.total,
-        unit="" if waterfall.observable.unit == "1" else waterfall.observable.unit,
-        band=waterfall.end_band,
-        note=f"largest fair share (mean over all orders): {largest.name}, {largest.average:+.3g} ± "
+    largest, observable = waterfall.largest, waterfall.observable
+    note = (
+        f"largest fair share (mean over all orders): {largest.name}, {largest.average:+.3g} ± "
         f"{largest.average_band:.1g}, from {largest.low:+.3g} to {largest.high:+.3g} in single orders, at "
         f"N = {waterfall.slices}"
         + (f", {largest.finer:+.3g} at N = {FINER * waterfall.slices}" if largest.finer is not None else "")
-        + f"; the bars miss the whole by {waterfall.residual:.1g}",
+        + f"; the bars miss the whole by {waterfall.residual:.1g}"
     )
+    unit = "" if observable.unit == "1" else observable.unit
+    title = f"{observable.words}: free flight minus published program"
+    return observed(f"waterfall-{observable.name}", title, waterfall.total, unit, note, band=waterfall.end_band)
 
 
 def claim_overlap(waterfall: Waterfall) -> Finding:
     """From free flight, whose slices overlap, to the column, which cannot: the margin of the waterfall."""
     finer = waterfall.finer_overlap
-    return observed(
-        id="waterfall-overlap",
-        title=f"{waterfall.observable.words}: column minus free flight, what forbidding overlap changes",
-        value=waterfall.overlap,
-        band=waterfall.end_band,
-        note=f"a difference of two models, no share; free flight at N = {waterfall.slices}, the column has no slices"
-        + (f"; {finer:+.3g} at N = {FINER * waterfall.slices}" if finer is not None else ""),
-    )
+    title = f"{waterfall.observable.words}: column minus free flight, what forbidding overlap changes"
+    note = f"a difference of two models, no share; free flight at N = {waterfall.slices}, the column has no slices"
+    note += f"; {finer:+.3g} at N = {FINER * waterfall.slices}" if finer is not None else ""
+    return observed("waterfall-overlap", title, waterfall.overlap, note=note, band=waterfall.end_band)
 
 
 def figures(found: tuple[Waterfall, ...]) -> Iterator[Exhibit]:
