@@ -11,8 +11,7 @@ from made_up import trajectory_of
 import ode_reference
 import slicemodel
 from flipproof.chapters.alignment.chapter import even_rows, figure_gantt
-from flipproof.chapters.alignment.found import count_key, ordinal
-from flipproof.chapters.alignment.study import rest_intervals, study_alignment
+from flipproof.chapters.alignment.study import count_key, ordinal, rest_intervals, study_alignment
 from flipproof.figures.style import draw
 from slicemodel import Impacts, Scenario, Trajectory
 

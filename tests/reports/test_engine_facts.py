@@ -7,8 +7,7 @@ from dataclasses import replace
 import pytest
 
 from flipproof.chapters.engine_facts import worlds
-from flipproof.chapters.engine_facts.chapter import EngineFacts, figure_gallery, figures
-from flipproof.chapters.engine_facts.study import FACTS, plan_engine_facts
+from flipproof.chapters.engine_facts.chapter import FACTS, EngineFacts, figure_gallery, figures, plan_engine_facts
 from flipproof.frame.solvers import Made, make
 from slicemodel import Scenario
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_up import trajectory_of
 
-from flipproof.chapters.paper.chapter import CHAPTER
+from flipproof.chapters import chapters_named
 from flipproof.frame.flights import Flights as Answers
 from flipproof.frame.flights import Outcome
 from flipproof.frame.solvers import Made, Missing, Run, make
@@ -709,9 +709,9 @@ def test_the_page_shows_every_verdict_with_word_sign_and_number(runs, read_page)
         "{% macro anchor(id, words) %}<a href='#{{ id }}'>{{ words }}</a>{% endmacro %}"
         "{% macro scroll(words) %}<div>{{ caller() }}</div>{% endmacro %}"
     )
-    text = templates.from_string(macros + CHAPTER.template.read_text(encoding="utf-8")).render(
-        paper=verdicts, figures=()
-    )
+    text = templates.from_string(
+        macros + chapters_named("paper")[0].chapters[0].template.read_text(encoding="utf-8")
+    ).render(paper=verdicts, figures=())
     page = read_page(text)
     assert len(set(page.ids)) == len(page.ids)
     assert {f"paper-{claim.id}" for claim in CLAIMS} <= set(page.ids)

@@ -9,7 +9,7 @@ import pytest
 from made_up import trajectory_of
 
 from flipproof.chapters.differences.study import study_difference
-from flipproof.chapters.predictability.figure import figure_predictability
+from flipproof.chapters.predictability.chapter import figure_predictability
 from flipproof.chapters.predictability.study import (
     SIZES,
     fit_growth,

@@ -9,8 +9,7 @@ from made_up import trajectory_of
 import ode_reference
 from flipproof.build import ask_of
 from flipproof.chapters.waterfall import study as waterfall
-from flipproof.chapters.waterfall.chapter import claim_overlap, study
-from flipproof.chapters.waterfall.figure import figure_waterfall
+from flipproof.chapters.waterfall.chapter import claim_overlap, figure_waterfall, study
 from flipproof.chapters.waterfall.study import (
     NAMES,
     OBSERVABLES,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, Final, cast
 
@@ -46,10 +46,25 @@ class Film:
 
 
 def draw_frames(film: Film) -> Iterator[Picture]:
-    """Yield every frame as red, green and blue, shape (height, width, 3); both sides are even, as MP4 needs."""
-    canvas, show = _scene(film)
-    for k in range(len(film.t)):
-        show(k)
+    """Return the frames of a film, one after the other."""
+    return pictures(*_scene(film), range(len(film.t)))
+
+
+def laid_out(figure: Figure) -> Any:
+    """Return the canvas of a figure that keeps its layout: to do it again for every frame would make panels tremble."""
+    canvas = cast(Any, FigureCanvasAgg(figure))
+    canvas.draw()
+    figure.set_layout_engine("none")
+    return canvas
+
+
+def pictures(canvas: Any, show: Callable[[Any], None], frames: Iterable[Any]) -> Iterator[Picture]:
+    """Yield every frame as red, green and blue, shape (height, width, 3); both sides are even, as MP4 needs.
+
+    ``show`` moves all that is on the canvas to a frame.
+    """
+    for frame in frames:
+        show(frame)
         canvas.draw()
         picture = np.asarray(canvas.buffer_rgba())
         height, width = (side - side % 2 for side in picture.shape[:2])
@@ -58,10 +73,9 @@ def draw_frames(film: Film) -> Iterator[Picture]:
 
 @styled
 def _scene(film: Film) -> tuple[Any, Callable[[int], None]]:
-    """Return a canvas with a figure that is laid out, and what moves all in it to a frame."""
+    """Return a canvas with all that is shown, and what moves it to a frame."""
     count = len(film.flights)
     figure = Figure(figsize=(2.4 * max(count, 2), 5.6), dpi=100, layout="constrained")
-    canvas = cast(Any, FigureCanvasAgg(figure))
     # Laid out apart, so that the labels of the traces leave the panels of the bottles alone.
     above, below = figure.subfigures(2, 1, height_ratios=(1.45, 1.0), squeeze=False)[:, 0]
     panels = list(above.subplots(1, count, squeeze=False)[0])
@@ -86,9 +100,7 @@ def _scene(film: Film) -> tuple[Any, Callable[[int], None]]:
             cursor.set_xdata([film.t[k], film.t[k]])
 
     show(0)
-    canvas.draw()
-    figure.set_layout_engine("none")  # laid out by now; to do it again for every frame would make panels tremble
-    return canvas, show
+    return laid_out(figure), show
 
 
 def _bottle(axes: Axes, film: Film, k: int, caps: FloatArray, bases: FloatArray) -> Callable[[int], None]:

@@ -11,9 +11,6 @@ from flipproof.figures.style import new_figure, shared_legend, styled
 from flipproof.output.columns import Curves
 from slicemodel.trajectory import FloatArray
 
-OLD = {"color": "#56B4E9", "linestyle": "-", "linewidth": 3.0}
-NEW = {"color": "#1a1a1a", "linestyle": (0, (4, 3)), "linewidth": 1.3}
-
 
 def differences(old: Curves, new: Curves) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Return new minus old by the curves' names, at the old curve's times up to where the shorter of the two ends.
@@ -33,8 +30,8 @@ def figure_report_pair(old: Curves, new: Curves, apart: Mapping[str, tuple[Float
     """One row per curve that both have: left both of them, right new minus old on its own scale."""
     figure, grid = new_figure(len(apart), 2, size=(8.0, 1.1 + 1.7 * len(apart)), sharex=True, squeeze=False)
     for (left, right), (name, (t, difference)) in zip(grid, apart.items(), strict=True):
-        left.plot(*old[name], label="old", **OLD)
-        left.plot(*new[name], label="new", **NEW)
+        left.plot(*old[name], label="old", color="#56B4E9", linewidth=3.0)
+        left.plot(*new[name], label="new", color="#1a1a1a", linestyle=(0, (4, 3)), linewidth=1.3)
         left.set_title(name, fontsize=10, loc="left")
         left.set_ylabel("ω / ω₀ [1]")
         right.plot(t, difference, color="#D55E00", linewidth=1.2)

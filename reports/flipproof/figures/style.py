@@ -38,7 +38,6 @@ STYLES: dict[str, dict[str, Any]] = {
 ASSUMPTIONS = (
     "#E69F00", "#6A5ACD", "#CC79A7", "#882255", "#999933", "#0072B2", "#44AA99", "#D55E00", "#999999", "#000000",
 )  # fmt: skip
-ICE_FLOOR = 1e-18
 OTHERS = ("#CC79A7", "#E69F00", "#000000", "#999933", "#882255")
 MARKERS = "os^Dv<>"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -18,7 +18,7 @@ from flipproof.film.fit.problem import ALSO, SLICES, Measurement, Quantity, pose
 from flipproof.film.fit.reading import QUANTITIES
 from flipproof.frame.chapter import Ask, Call, Chapter, Part, Study
 from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.findings import Finding
+from flipproof.frame.findings import Finding, observed
 from flipproof.output.columns import columns_csv
 from flipproof.output.tables import read_curve
 from slicemodel import Scenario
@@ -66,26 +66,16 @@ class Measured:
 
     def findings(self) -> tuple[Finding, ...]:
         """Return one observation for each solver, and one for each fit."""
-        label = self.measurement.label
-        observed: dict[str, Any] = {"unit": self.measurement.unit, "kind": "observation", "band": self.noise}
-        thrown = [
-            Finding(
-                id=f"measured-{name}", title=f"{HELD[name]} as thrown, held against {label}", value=misfit,
-                note="root mean square of measured minus computed, nothing fitted; the band is the noise of a value",
-                **observed,
-            )
-            for name, misfit in self.misfits.items()
-        ]  # fmt: skip
-        fitted = [
-            Finding(
-                id=f"measured-fit-{one.solver}", title=f"{HELD[one.solver]} fitted to {label}",
-                value=one.root_mean_square,
-                note=", ".join(f"{i.name} = {i.value:.4g} [{i.low:.4g}, {i.high:.4g}]" for i in one.intervals),
-                **observed,
-            )
-            for one in self.fits
-        ]  # fmt: skip
-        return (*thrown, *fitted)
+        label, unit, made = self.measurement.label, self.measurement.unit, []
+        for name, misfit in self.misfits.items():
+            title = f"{HELD[name]} as thrown, held against {label}"
+            note = "root mean square of measured minus computed, nothing fitted; the band is the noise of a value"
+            made.append(observed(f"measured-{name}", title, misfit, unit, note, band=self.noise))
+        for one in self.fits:
+            id_, title = f"measured-fit-{one.solver}", f"{HELD[one.solver]} fitted to {label}"
+            note = ", ".join(f"{i.name} = {i.value:.4g} [{i.low:.4g}, {i.high:.4g}]" for i in one.intervals)
+            made.append(observed(id_, title, one.root_mean_square, unit, note, band=self.noise))
+        return tuple(made)
 
     def exhibit(self) -> Exhibit:
         """Return the figure: the measurement over the solvers, and what is left of it."""

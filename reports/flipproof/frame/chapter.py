@@ -11,20 +11,20 @@ Evidence is absent in one way only: whatever needs it raises Missing, and the fr
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
 from flipproof.frame.exhibit import Exhibit, Touch
 from flipproof.frame.findings import Finding, Kind, observed, regression
-from flipproof.frame.flights import Call, Flights, Outcome, attempt
+from flipproof.frame.flights import Call, Flights, Outcome, attempt, known
 from flipproof.frame.solvers import Made, Missing, Run
 from flipproof.frame.throws import REFERENCE
 from slicemodel import Scenario
 
 __all__ = [
     "Absent", "Ask", "Call", "Chapter", "Claims", "Exhibit", "Finding", "Flights", "Kind", "Made", "Missing", "Outcome",
-    "Part", "Run", "Size", "Study", "Touch", "attempt", "judged", "observed", "regression",
+    "Part", "Run", "Size", "Study", "Touch", "attempt", "judged", "known", "observed", "regression",
 ]  # fmt: skip
 """All that a chapter is written with."""
 
@@ -78,7 +78,7 @@ class Absent:
 Claims = Iterator[Finding | Absent]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Chapter(Generic[F]):
     """One subject of a report.
 
@@ -102,6 +102,7 @@ class Chapter(Generic[F]):
     study: Callable[[Ask], Study[F]]
     claims: Callable[[F], Claims] = lambda _: iter(())
     figures: Callable[[F], Iterable[Exhibit]] = lambda _: ()
+    _: KW_ONLY
     template: Path | None = None
     work: Mapping[Size, Any] = field(default_factory=lambda: {"quick": None, "full": None})
     kind: Kind = "observation"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 Kind = Literal["regression", "observation"]
@@ -96,7 +96,15 @@ def observed(
 
 
 def regression(
-    id: str, title: str, value: float | None, unit: str, admissible: tuple[float, float], note: str = ""
+    id: str,
+    title: str,
+    value: float | None,
+    unit: str,
+    admissible: tuple[float, float],
+    note: str = "",
+    *,
+    band: float | None = None,
 ) -> Finding:
     """Return a claim that fails unless its value lies in the closed interval ``admissible``."""
-    return Finding(id=id, title=title, value=value, unit=unit, kind="regression", admissible=admissible, note=note)
+    finding = Finding(id=id, title=title, value=value, unit=unit, kind="regression", band=band, note=note)
+    return replace(finding, admissible=admissible)

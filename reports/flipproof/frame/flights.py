@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
@@ -11,6 +11,7 @@ from flipproof.frame.solvers import Made, Missing, Run
 from slicemodel import Trajectory
 
 T = TypeVar("T")
+Key = TypeVar("Key", bound=Hashable)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +60,23 @@ class Flights(dict[Run, Made]):
         """Return the trajectory of a run, or None if there is none."""
         return self[run].trajectory if run in self else None
 
+    def trajectories(self, runs: Mapping[Key, Run]) -> dict[Key, Trajectory]:
+        """Return the trajectories of those of some runs that have one."""
+        return {key: flown for key, run in runs.items() if (flown := self.trajectory(run)) is not None}
+
+    def levels(self, runs: Iterable[Iterable[Run]]) -> list[list[Trajectory]]:
+        """Return the flights of levels of runs; raises Missing if one was not made."""
+        return [[self[run].flight for run in level] for level in runs]
+
     def add(self, made: Mapping[Run, Made], called: Mapping[Call, Outcome[Any]]) -> None:
         """Add what became of another wave."""
         self.update(made)
         self._called.update(called)
+
+
+def known(outcomes: Mapping[Key, Outcome[T]]) -> dict[Key, T]:
+    """Return what was found, without those for whom nothing was."""
+    return {key: each.found for key, each in outcomes.items() if each.found is not None}
 
 
 def attempt(study: Callable[..., T], *about: Any) -> Outcome[T]:

@@ -38,24 +38,14 @@ class Case:
 
     def facts(self) -> dict[str, Any]:
         """Return what tells this case from another."""
-        return {
-            "throw": self.aim.throw.to_mapping(),
-            "height": self.aim.height,
-            "scatter": [self.scatter.spin, self.scatter.angle, self.scatter.speed],
-            "throws": self.throws,
-            "stream": self.stream,
-            **self.settings(),
-        }
+        throw, scatter = self.aim.throw.to_mapping(), [self.scatter.spin, self.scatter.angle, self.scatter.speed]
+        counted = {"throws": self.throws, "stream": self.stream}
+        return {"throw": throw, "scatter": scatter, **counted, **self.settings()}
 
     def settings(self) -> dict[str, Any]:
         """Return what the landing is called with."""
-        return {
-            "height": self.aim.height,
-            "restitution": self.restitution,
-            "friction": self.friction,
-            "law": self.law,
-            "program": self.program,
-        }
+        table = {"height": self.aim.height, "restitution": self.restitution, "friction": self.friction}
+        return {**table, "law": self.law, "program": self.program}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
-from flipproof.figures.film import GLASS, Picture, outline, slice_corners
+from flipproof.figures.film import GLASS, Picture, laid_out, outline, pictures, slice_corners
 from flipproof.figures.style import styled
 from ode_reference.landing import Path, path
 from ode_reference.landing_flight import FLIGHT_DT, release
@@ -56,34 +54,24 @@ def film_times(bottles: Sequence[Shown], slow: float, fps: int) -> FloatArray:
 
 
 def draw_landing(bottles: Sequence[Shown], times: FloatArray, slow: float) -> Iterator[Picture]:
-    """Yield every frame as red, green and blue, shape (height, width, 3); both sides are even, as MP4 needs."""
-    canvas, title, drawn, cursor = _scene(bottles)
-    for time in times.tolist():
-        title.set_text(f"t = {time:.3f} s, {slow:g} times slower")
-        for bottle, (glass, water) in zip(bottles, drawn, strict=True):
-            _move(bottle, glass, water, time)
-        cursor.set_xdata([time, time])
-        canvas.draw()
-        picture = np.asarray(canvas.buffer_rgba())
-        height, width = (side - side % 2 for side in picture.shape[:2])
-        yield np.ascontiguousarray(picture[:height, :width, :3])
+    """Return the frames at these times, one after the other."""
+    return pictures(*_scene(bottles, slow), times.tolist())
 
 
 @styled
-def _scene(bottles: Sequence[Shown]) -> tuple[Any, Any, list[tuple[Line2D, PolyCollection]], Line2D]:
-    """Return canvas, title, glass and water of every bottle, and the cursor of the energies; all panels one scale."""
+def _scene(bottles: Sequence[Shown], slow: float) -> tuple[Any, Callable[[float], None]]:
+    """Return a canvas with all that is shown, on one scale, and what moves it to a time."""
     figure = Figure(figsize=(3.6 * max(len(bottles), 2), 6.4), dpi=100, layout="constrained")
-    canvas = cast(Any, FigureCanvasAgg(figure))
     above, below = figure.subfigures(2, 1, height_ratios=(2.0, 1.0), squeeze=False)[:, 0]
     panels = above.subplots(1, len(bottles), squeeze=False)[0]
     reach = max(b.touch.scenario.bottle.length / 2 + b.touch.scenario.bottle.radius for b in bottles)
     width = max(float(np.ptp(b.motion.centre[:, 0])) for b in bottles) + 2 * reach
     height = max(float(b.motion.centre[:, 1].max()) for b in bottles) + reach
     energies = below.subplots()
-    drawn = []
+    moves = []
     for k, (axes, bottle) in enumerate(zip(panels, bottles, strict=True)):
         colour = COLOURS[k % len(COLOURS)]
-        drawn.append(_panel(axes, bottle, colour, width, height))
+        moves.append(_panel(axes, bottle, colour, width, height))
         energy = np.minimum(bottle.motion.energy / bottle.motion.saddle, 40.0)
         energies.plot(bottle.begin + bottle.motion.t, energy, color=colour, linewidth=1.4, label=bottle.name)
     energies.axhline(1.0, color="black", linewidth=1.0)
@@ -93,12 +81,18 @@ def _scene(bottles: Sequence[Shown]) -> tuple[Any, Any, list[tuple[Line2D, PolyC
     energies.legend(loc="upper right", ncols=len(bottles))
     cursor = energies.axvline(0.0, color="black", linewidth=0.8, linestyle=":")
     title = figure.suptitle(" ", fontsize=10, family="monospace")
-    canvas.draw()
-    figure.set_layout_engine("none")  # laid out by now; to do it again for every frame would make panels tremble
-    return canvas, title, drawn, cursor
+
+    def show(time: float) -> None:
+        title.set_text(f"t = {time:.3f} s, {slow:g} times slower")
+        for move in moves:
+            move(time)
+        cursor.set_xdata([time, time])
+
+    return laid_out(figure), show
 
 
-def _panel(axes: Axes, bottle: Shown, colour: str, width: float, height: float) -> tuple[Line2D, PolyCollection]:
+def _panel(axes: Axes, bottle: Shown, colour: str, width: float, height: float) -> Callable[[float], None]:
+    """Draw a bottle; return what moves it to a time, or to its last one if it ended, or to its first if it is early."""
     x, table = bottle.motion.centre[:, 0], 0.04
     middle = float(x.min() + x.max()) / 2
     axes.set(xlim=(middle - width / 2, middle + width / 2), ylim=(-table, height), aspect="equal")
@@ -109,14 +103,13 @@ def _panel(axes: Axes, bottle: Shown, colour: str, width: float, height: float) 
     water = PolyCollection([], facecolors=tint, edgecolors="none")
     axes.add_collection(water)
     (glass,) = axes.plot([], [], color=GLASS, linewidth=1.4)
-    return glass, water
-
-
-def _move(bottle: Shown, glass: Line2D, water: PolyCollection, time: float) -> None:
-    """Draw a bottle at a time, or at its last one if it ended before, or at its first if it begins later."""
     motion, scenario = bottle.motion, bottle.touch.scenario
-    k = int(np.clip(np.searchsorted(motion.t, time - bottle.begin), 0, len(motion.t) - 1))
-    along = np.array([math.sin(motion.theta[k]), -math.cos(motion.theta[k])])
-    cap = motion.centre[k] - scenario.bottle.length / 2 * along
-    glass.set_data(*outline(scenario, cap, along).T)
-    water.set_verts(list(slice_corners(scenario, motion.r[k], cap, along)))
+
+    def move(time: float) -> None:
+        k = int(np.clip(np.searchsorted(motion.t, time - bottle.begin), 0, len(motion.t) - 1))
+        along = np.array([math.sin(motion.theta[k]), -math.cos(motion.theta[k])])
+        cap = motion.centre[k] - scenario.bottle.length / 2 * along
+        glass.set_data(*outline(scenario, cap, along).T)
+        water.set_verts(list(slice_corners(scenario, motion.r[k], cap, along)))
+
+    return move

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
@@ -17,20 +17,9 @@ from slicemodel import Outcome, Scenario, Table, Touch
 from slicemodel.observables import centre_of_mass, centre_of_mass_at_rest, toppling_angle
 from slicemodel.scenario import ScenarioError
 
-LANDING: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "outcome": "TEXT",
-        "touch_time": "REAL",
-        "touch_theta": "REAL",
-        "touch_omega": "REAL",
-        "touch_speed": "REAL",
-        "touch_energy": "REAL",
-        "static_margin": "REAL",
-        "certified": "REAL",
-        "margin": "REAL",
-        "slid": "REAL",
-        "bounces": "INTEGER",
-    }
+READ: Final = ("touch_time", "touch_theta", "touch_omega", "touch_speed", "touch_energy", "static_margin")
+LANDING: Final = MappingProxyType(
+    {"outcome": "TEXT", **dict.fromkeys((*READ, "certified", "margin", "slid"), "REAL"), "bounces": "INTEGER"}
 )
 """What a row holds of a landing -> its SQLite type."""
 
@@ -136,14 +125,9 @@ def touch_readings(touch: Touch) -> dict[str, Any]:
     scenario = touch.scenario
     r_cm = float(centre_of_mass(scenario, touch.r))
     energy, speed = touch_energy(touch, r_cm)
-    return {
-        "touch_time": touch.time,
-        "touch_theta": touch.theta,
-        "touch_omega": touch.omega,
-        "touch_speed": speed,
-        "touch_energy": energy / saddle(scenario),
-        "static_margin": float(toppling_angle(scenario, r_cm)) - abs(touch.tilt),
-    }
+    margin = float(toppling_angle(scenario, r_cm)) - abs(touch.tilt)
+    numbers = (touch.time, touch.theta, touch.omega, speed, energy / saddle(scenario), margin)
+    return dict(zip(READ, numbers, strict=True))
 
 
 def saddle(scenario: Scenario) -> float:

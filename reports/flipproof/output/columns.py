@@ -19,7 +19,7 @@ Curves = Mapping[str, tuple[FloatArray, FloatArray]]
 """Header -> times [s] and values, of equal length."""
 
 
-def rows_csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+def rows_csv(header: Sequence[str], rows: Iterable[Sequence[Any]], digits: int | None = 9) -> str:
     """Return rows as CSV; what is None or not a number is an empty cell.
 
     Parameters
@@ -27,11 +27,13 @@ def rows_csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
     header : sequence of str
         One per cell; a column of numbers ends in its unit, as in "dt [s]".
     rows : iterable of sequences
+    digits : int or None
+        Significant digits of a number; None: all that it has.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(header)
-    writer.writerows([_cell(value) for value in row] for row in rows)
+    writer.writerows([_cell(value, digits) for value in row] for row in rows)
     return text.getvalue()
 
 
@@ -61,14 +63,14 @@ def curves_csv(curves: Curves) -> str:
     return columns_csv(columns)
 
 
-def _cell(value: Any) -> str:
-    """Return a number with nine significant digits; whole numbers and words as they are."""
+def _cell(value: Any, digits: int | None) -> str:
+    """Return a number with as many significant digits; whole numbers and words as they are."""
     if value is None:
         return ""
     if isinstance(value, (bool, np.bool_)):
         return "yes" if value else "no"
     if isinstance(value, (float, np.floating)):
-        return f"{value:.9g}" if not math.isnan(value) else ""
+        return "" if math.isnan(value) else repr(float(value)) if digits is None else f"{value:.{digits}g}"
     return str(value)
 
 

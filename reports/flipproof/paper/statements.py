@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-from flipproof.frame.findings import Finding, finite_or_none
+from flipproof.frame.findings import Finding, finite_or_none, observed
 
 Verdict = Literal["holds", "fails", "cannot be decided", "not judged"]
 Kind = Literal["claim", "admitted limit"]
@@ -305,13 +305,8 @@ class Statement:
     def findings(self) -> Iterator[Finding]:
         """Yield one finding for each judgement; observations, since what fails is the paper's and not this project."""
         for judgement in self.judgements:
-            number = judgement.deciding
-            yield Finding(
-                id=f"paper-{self.id}-{judgement.solver}",
-                title=f"{self.place}: {self.says} By {judgement.solver}: {self.word(judgement)}",
-                value=None if number is None or math.isnan(number.value) else number.value,
-                unit=number.unit if number else "",
-                kind="observation",
-                band=None if number is None or math.isnan(number.band) else number.band,
-                note=judgement.words,
-            )
+            number, title = judgement.deciding, f"{self.place}: {self.says} By {judgement.solver}"
+            value = None if number is None or math.isnan(number.value) else number.value
+            band = None if number is None or math.isnan(number.band) else number.band
+            title, unit = f"{title}: {self.word(judgement)}", number.unit if number else ""
+            yield observed(f"paper-{self.id}-{judgement.solver}", title, value, unit, judgement.words, band=band)

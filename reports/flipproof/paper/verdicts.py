@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, ClassVar, Final
 
-from flipproof.frame.findings import Finding
+from flipproof.frame.findings import Finding, regression
 from flipproof.paper import claims_figure_5, claims_figures_6_7, claims_figures_8_9
 from flipproof.paper.claim import judge
 from flipproof.paper.claims_figures_8_9 import claim_filling_of_change
@@ -128,12 +128,11 @@ def claim_weight_slows_the_tenth(runs: PaperRuns, solver: str) -> Finding:
     """At a filling of 0.1 the bottle keeps 0.88 of its spin where no weight acts on its water, 0.63 in the program."""
     run = runs.trajectory(solver, WEIGHTLESS_KEY)
     low, high = STEADY[solver]
-    return Finding(
+    return regression(
         id=f"paper-weight-{solver}",
         title=f"{solver}: filled to {STEADY_FILLING:g} the bottle keeps {(low + high) / 2:.2f} of its spin",
         value=None if run is None else steady_level(run),
         unit=OMEGA,
-        kind="regression",
         admissible=(low, high),
         band=BANDS.get(solver),
         note="mean over the second half of the flight"

@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.chapters.waterfall.figure import figure_waterfall
+from flipproof.chapters.waterfall.chapter import figure_waterfall
 from flipproof.chapters.waterfall.study import PROGRAM, Waterfall, plan_waterfall, split_all
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import Run

@@ -133,7 +133,7 @@ def study(ask: Ask) -> Study[Agreed]:
 
 def agreement_on(equation: str, runs: Mapping[str, Run], coarser: Run, flights: Flights) -> Agreement:
     """Compare the solvers of one equation, each within its own band, up to the horizon of the engines."""
-    made = {name: run for name, each in runs.items() if (run := flights.trajectory(each)) is not None and run.ok}
+    made = {name: run for name, run in flights.trajectories(runs).items() if run.ok}
     bands: dict[str, FloatArray] = {
         name: run.diagnostics["omega_band"] for name, run in made.items() if "omega_band" in run.diagnostics
     }
@@ -161,14 +161,10 @@ def claims(found: Agreed) -> Claims:
     for equation, agreement in found.agreements.items():
         widest = max(agreement.pairs, key=lambda pair: pair.largest)
         pairs = [f"{p.first} and {p.second} {p.largest:.1e}, {100 * p.share:.0f} % within" for p in agreement.pairs]
-        yield observed(
-            "agreement" if equation == FREE else f"agreement-{equation}",
-            f"{', '.join(agreement.names)}: {agreement.words}",
-            widest.largest,
-            "of ω₀",
-            f"{'; '.join(pairs)}; up to {1e3 * agreement.until:.0f} ms",
-            band=widest.bands,
-        )
+        id_ = "agreement" if equation == FREE else f"agreement-{equation}"
+        title = f"{', '.join(agreement.names)}: {agreement.words}"
+        note = f"{'; '.join(pairs)}; up to {1e3 * agreement.until:.0f} ms"
+        yield observed(id_, title, widest.largest, "of ω₀", note, band=widest.bands)
 
 
-CHAPTER: Final = Chapter(name="agreement", title="One equation by several solvers", study=study, claims=claims)
+CHAPTER: Final = Chapter("agreement", "One equation by several solvers", study, claims)

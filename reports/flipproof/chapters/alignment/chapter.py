@@ -12,11 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from flipproof.chapters.alignment.found import SHIFT_BAND, Alignment, Table, end_name
-from flipproof.chapters.alignment.study import study_alignment
+from flipproof.chapters.alignment.study import SHIFT_BAND, Alignment, Table, end_name, study_alignment
 from flipproof.chapters.alignment.tube import Tube, study_tube
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Outcome, Study, attempt, observed
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Outcome, Study, attempt, known, observed
 from flipproof.output.columns import rows_csv
 from slicemodel.trajectory import BASE, CAP
 
@@ -43,9 +42,9 @@ class Events:
     tubes: Mapping[tuple[str, str], Outcome[Tube]]
 
     @property
-    def aligned(self) -> list[tuple[tuple[str, str], Alignment]]:
+    def aligned(self) -> dict[tuple[str, str], Alignment]:
         """The pairs that could be aligned."""
-        return [(pair, each.found) for pair, each in self.alignments.items() if each.found is not None]
+        return known(self.alignments)
 
 
 def study(ask: Ask) -> Study[Events]:
@@ -78,7 +77,7 @@ def claims(found: Events) -> Claims:
 
 def figures(found: Events) -> Iterator[Exhibit]:
     """Yield contacts and impacts of every pair."""
-    for (first, second), alignment in found.aligned:
+    for (first, second), alignment in found.aligned.items():
         yield Exhibit(
             name=f"gantt-{first}-{second}",
             title=f"Contacts and impacts: {first} and {second}",
@@ -184,17 +183,13 @@ def _gantt_handles(alignment: Alignment) -> list[Patch | Line2D]:
         f"extra in {alignment.second} ({len(alignment.extra)})",
         "after a fork ({} + {})".format(*map(len, alignment.after_fork)),
     )
-    colours = [colour for colour, _ in IMPACTS.values()]
+    marks = [("v", "#444444", "impact on the base"), ("^", "#444444", "impact on the cap")]
+    marks += [("o", colour, words) for (colour, _), words in zip(IMPACTS.values(), labels, strict=True)]
     return [
-        Patch(color=END_COLOURS[BASE], label="in contact with the base"),
-        Patch(color=END_COLOURS[CAP], label="in contact with the cap"),
-        Line2D([], [], linestyle="", marker="v", color="#444444", label="impact on the base"),
-        Line2D([], [], linestyle="", marker="^", color="#444444", label="impact on the cap"),
-        *(Line2D([], [], linestyle="", marker="o", color=c, label=x) for c, x in zip(colours, labels, strict=True)),
+        *(Patch(color=colour, label=f"in contact with the {end_name(end)}") for end, colour in END_COLOURS.items()),
+        *(Line2D([], [], linestyle="", marker=mark, color=colour, label=words) for mark, colour, words in marks),
         Line2D([], [], linestyle="", marker="*", markersize=9, color="black", label=f"fork ({len(alignment.forks)})"),
     ]
 
 
-CHAPTER: Final = Chapter(
-    name="alignment", title="Contacts and impacts side by side", study=study, claims=claims, figures=figures
-)
+CHAPTER: Final = Chapter("alignment", "Contacts and impacts side by side", study, claims, figures)

@@ -24,7 +24,7 @@ def study(ask: Ask) -> Study[Certificates]:
     """Read the certificates of the engines' runs."""
     runs = {name: ask.solvers[name] for name in WITNESSES if name in ask.solvers}
     flights = yield runs.values()
-    flown = {name: run for name, each in runs.items() if (run := flights.trajectory(each)) is not None}
+    flown = flights.trajectories(runs)
     return Certificates(
         {name: run.diagnostics["certificate"] for name, run in flown.items() if "certificate" in run.diagnostics},
         tuple(name for name, run in runs.items() if "tolerance" not in run.settings),
@@ -50,4 +50,4 @@ def claims(found: Certificates) -> Claims:
         yield observed(id_, title, certificate["band"], "of ω₀", "; ".join(words))
 
 
-CHAPTER: Final = Chapter(name="certificates", title="Certificates", study=study, claims=claims)
+CHAPTER: Final = Chapter("certificates", "Certificates", study, claims)

@@ -15,13 +15,14 @@ from flipproof.chapters.predictability.study import parting_words
 from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, WITNESSES
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Flights, Run, Study, Touch, attempt, observed
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Run, Study, Touch
+from flipproof.frame.findings import observed
+from flipproof.frame.flights import Flights, attempt, known
 from flipproof.frame.solvers import find
 from flipproof.frame.throws import finer
 from flipproof.frame.twins import BAND_WORDS, twins
 from flipproof.output.columns import curves_csv
 from ode_reference.models import LADDER
-from slicemodel import Trajectory
 
 TOTAL: Final = "published program to free flight"
 BY_ENGINE: Final = "free flight, event-driven and by an engine"
@@ -59,7 +60,6 @@ class Differences:
     slices: int
     ended: str
     missing: Mapping[tuple[str, str, str], str]
-    band_words: str = BAND_WORDS
 
 
 def study(ask: Ask) -> Study[Differences]:
@@ -79,11 +79,8 @@ def study(ask: Ask) -> Study[Differences]:
         more |= {name: fine(runs[name]) for name in (*SCHEMES, *LADDER)}
         flights = yield [*more.values(), *runs.values(), *(twin for model in LADDER for twin in twins(runs[model]))]
         bands = run_bands(runs, flights)
-    flown = {name: run for name, each in runs.items() if (run := flights.trajectory(each)) is not None}
-
-    def refined(*names: str) -> tuple[Trajectory, Trajectory] | None:
-        one, other = (flights.trajectory(more[name]) if name in more else None for name in names)
-        return (one, other) if one is not None and other is not None and one.ok and other.ok else None
+    flown = flights.trajectories(runs)
+    refined = {name: run for name, run in flights.trajectories(more).items() if run.ok}
 
     def compared(name: str, first: str, second: str) -> Difference:
         return study_difference(
@@ -92,11 +89,11 @@ def study(ask: Ask) -> Study[Differences]:
             flights[runs[second]].flight,
             impacts_of=flown.get(LIMITS.get(first, first)),
             band=bands[first] + bands[second] if first in bands and second in bands else None,
-            finer=refined(first, second),
+            finer=(refined[first], refined[second]) if {first, second} <= set(refined) else None,
         )
 
     tried = {pair: attempt(compared, *pair) for pair in PAIRS if set(pair[1:]) <= set(runs)}
-    pairs = tuple(outcome.found for outcome in tried.values() if outcome.found is not None)
+    pairs = tuple(known(tried).values())
     growths = []
     for difference in pairs:
         if difference.parting_time is not None:
@@ -123,14 +120,14 @@ def run_bands(runs: Mapping[str, Run], flights: Flights) -> dict[str, float]:
     tenth of the rest speed), and never less than MODEL_FLOOR; for an engine that of its certificate.
     """
     bands = dict.fromkeys(SCHEMES, 0.0)
+    flown = flights.trajectories(runs)
     for model in LADDER:
-        usual = flights.trajectory(runs[model])
         for other in map(flights.trajectory, twins(runs[model])):
-            if usual is not None and other is not None and usual.ok and other.ok:
-                bands[model] = max(bands.get(model, MODEL_FLOOR), study_difference(model, usual, other).largest)
-    for name in WITNESSES:
-        run = flights.trajectory(runs[name]) if name in runs else None
-        certificate = {} if run is None else run.diagnostics.get("certificate", {})
+            if model in flown and other is not None and flown[model].ok and other.ok:
+                apart = study_difference(model, flown[model], other).largest
+                bands[model] = max(bands.get(model, MODEL_FLOOR), apart)
+    for name in (name for name in WITNESSES if name in flown):
+        certificate = flown[name].diagnostics.get("certificate", {})
         if certificate.get("band") is not None:
             bands[name] = certificate["band"]
     return bands
@@ -229,4 +226,5 @@ CHAPTER: Final = Chapter(
     figures=figures,
     work={"check": None, "quick": None, "full": None},
     summary=summary,
+    page=lambda _: {"band_words": BAND_WORDS},
 )

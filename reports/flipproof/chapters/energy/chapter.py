@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Finding, Made, Outcome, Run, Study, attempt, judged
-from flipproof.frame.findings import regression
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Made, Run, Study, judged
+from flipproof.frame.findings import Finding, regression
+from flipproof.frame.flights import Outcome, attempt, known
 from ode_reference.models import LADDER
 from slicemodel import Trajectory
 
@@ -18,11 +19,6 @@ class Energy:
 
     checks: Mapping[str, Made]
     ledgers: Mapping[str, Outcome[Mapping[str, float]]]
-
-    @property
-    def made(self) -> dict[str, Mapping[str, float]]:
-        """The ledgers that were made."""
-        return {model: each.found for model, each in self.ledgers.items() if each.found is not None}
 
 
 def study(ask: Ask) -> Study[Energy]:
@@ -53,4 +49,11 @@ def claim_energy(run: Trajectory) -> Finding:
     return regression(f"energy-{run.method}", title, missed, "of the initial energy", (0.0, 1e-9))
 
 
-CHAPTER: Final = Chapter(name="energy", title="Where the energy goes", study=study, claims=claims, kind="regression")
+CHAPTER: Final = Chapter(
+    name="energy",
+    title="Where the energy goes",
+    study=study,
+    claims=claims,
+    kind="regression",
+    page=lambda found: {"made": known(found.ledgers)},
+)

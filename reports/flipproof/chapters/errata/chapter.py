@@ -69,6 +69,4 @@ def claims(found: Mapping[str, Erratum]) -> Claims:
         yield observed(f"erratum-{id_}", title, value, erratum.unit, note, band=band)
 
 
-CHAPTER: Final = Chapter(
-    name="errata", title="Errata", study=study, claims=claims, work={"check": None, "quick": None, "full": None}
-)
+CHAPTER: Final = Chapter("errata", "Errata", study, claims, work={"check": None, "quick": None, "full": None})

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from flipproof.chapters.differences.study import largest_change
 from flipproof.chapters.errata.erratum import ROUND_OFF, Erratum
 from flipproof.frame.solvers import solve
 from slicemodel import Scenario
@@ -180,8 +181,7 @@ def erratum_gravity(throw: Scenario) -> Erratum:
     change = {}
     for model in ("eq8", "free-flight"):
         here, far = (solve(model, replace(early, gravity=g)) for g in (throw.gravity, 0.0))
-        complete = here.ok and far.ok
-        change[model] = float(np.abs(here.omega - far.omega).max()) / abs(throw.omega0) if complete else math.nan
+        change[model] = largest_change(here, far)
     return Erratum(
         place="Eq. 6, 8",
         prints="m g cos θ in the frame of C_M",

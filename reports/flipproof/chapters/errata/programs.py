@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cache
-from typing import Final, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -51,21 +51,18 @@ def erratum_matlab_reset() -> Erratum:
     )
 
 
-MATLAB_FUNCTIONS: Final = (
-    "FindCenterOfMass", "InertiaMomentumWater", "InertiaMomentumBottle", "InstantaneousAngularFrequency", "FindTheta",
-    "FindNewlocation", "CheckBoundaryConditions",
-)  # fmt: skip
-"""Functions that the MATLAB supplement defines."""
-
-
 def erratum_matlab_comment(line: str = "rho =1000; density of water") -> Erratum:
     """Show that Main.m as printed stops at a comment without its percent sign; ``line`` is exactly as printed.
 
     A statement is stray if it assigns nothing and calls no function of the supplement.
     """
+    functions = (
+        "FindCenterOfMass", "InertiaMomentumWater", "InertiaMomentumBottle", "InstantaneousAngularFrequency",
+        "FindTheta", "FindNewlocation", "CheckBoundaryConditions",
+    )  # fmt: skip
     statements = (part.strip() for part in line.split("%")[0].split(";"))
     named = (part for part in statements if part and "=" not in part)
-    stray = [part for part in named if part.partition("(")[0] not in MATLAB_FUNCTIONS]
+    stray = [part for part in named if part.partition("(")[0] not in functions]
     return Erratum(
         place="Supplement, Main.m",
         prints=line,

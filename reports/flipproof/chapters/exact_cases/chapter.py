@@ -46,14 +46,9 @@ def claim_exact_cases(model: str, errors: Mapping[str, float]) -> Finding:
     """The reference reproduces every case that has an exact solution, to a billionth of omega_0 and of the length."""
     worst = max(errors.values(), key=lambda error: math.inf if math.isnan(error) else error)
     digits = {case: 16.0 if error == 0.0 else min(16.0, -math.log10(error)) for case, error in errors.items()}
-    return regression(
-        f"exact-cases-{model}",
-        f"{model}: largest error against exact solutions",
-        worst,
-        "relative",
-        (0.0, 1e-9),
-        "digits shared: " + ", ".join(f"{case} {shared:.0f}" for case, shared in digits.items()),
-    )
+    note = "digits shared: " + ", ".join(f"{case} {shared:.0f}" for case, shared in digits.items())
+    title = f"{model}: largest error against exact solutions"
+    return regression(f"exact-cases-{model}", title, worst, "relative", (0.0, 1e-9), note)
 
 
 CHAPTER: Final = Chapter(

@@ -16,7 +16,7 @@ import numpy as np
 
 from flipproof.chapters.solvers import LIMITS
 from flipproof.frame.chapter import Ask, Chapter, Claims, Run, Study, attempt, observed
-from flipproof.frame.throws import FINER, finer
+from flipproof.frame.throws import finer
 from slicemodel import Trajectory
 
 
@@ -39,25 +39,15 @@ EVERYTHING: Final = "everything"
 HELD: Final = "held"
 LOCATED: Final = "held-located"
 
+WAIT, LOCATE = "rebounds wait for the grid", "rebounds located inside the step"
+PUBLISHED: Final = "published-python"
 WAYS: Final = (
-    Way(
-        EVERYTHING,
-        "published-python",
-        {},
-        "the published program: coefficients held, J and r_CM a step behind, rebounds wait for the grid",
-    ),
-    Way(
-        HELD,
-        "published-python",
-        {"lagged": False},
-        "the published program without its lag: coefficients held, rebounds wait for the grid",
-    ),
-    Way("exact", "exact-step", {}, "exact step: coefficients held, rebounds wait for the grid"),
-    Way(
-        LOCATED, "exact-step", {"rebound": "in-step"}, "exact step: coefficients held, rebounds located inside the step"
-    ),
-    Way("waiting", "midpoint", {"rebound": "grid"}, "midpoint: coefficients at mid-step, rebounds wait for the grid"),
-    Way("neither", "midpoint", {}, "midpoint: coefficients at mid-step, rebounds located inside the step"),
+    Way(EVERYTHING, PUBLISHED, {}, f"the published program: coefficients held, J and r_CM a step behind, {WAIT}"),
+    Way(HELD, PUBLISHED, {"lagged": False}, f"the published program without its lag: coefficients held, {WAIT}"),
+    Way("exact", "exact-step", {}, f"exact step: coefficients held, {WAIT}"),
+    Way(LOCATED, "exact-step", {"rebound": "in-step"}, f"exact step: coefficients held, {LOCATE}"),
+    Way("waiting", "midpoint", {"rebound": "grid"}, f"midpoint: coefficients at mid-step, {WAIT}"),
+    Way("neither", "midpoint", {}, f"midpoint: coefficients at mid-step, {LOCATE}"),
 )
 
 
@@ -82,7 +72,6 @@ class StepCosts:
     costs: tuple[StepCost, ...]
     more: tuple[StepCost, ...]
     slices: int
-    finer_slices: int
 
 
 def study(ask: Ask) -> Study[StepCosts]:
@@ -98,7 +87,7 @@ def study(ask: Ask) -> Study[StepCosts]:
     def costs(of: dict[Way, tuple[Run, Run]]) -> tuple[StepCost, ...]:
         return tuple(cost_of(way, flights[run].whole, flights[truth].whole) for way, (run, truth) in of.items())
 
-    return StepCosts(costs(pairs), attempt(costs, more).found or (), ask.throw.n_slices, FINER * ask.throw.n_slices)
+    return StepCosts(costs(pairs), attempt(costs, more).found or (), ask.throw.n_slices)
 
 
 def cost_of(way: Way, run: Trajectory, reference: Trajectory) -> StepCost:
@@ -117,16 +106,10 @@ def claims(found: StepCosts) -> Claims:
     Its band is what an equation without recoil may be off by on the throws of a report.
     """
     for cost in found.costs:
-        before = "no slice strikes an end"
-        if not math.isnan(cost.start):
-            before = f"{cost.start:.2g} of ω₀ before the first impact"
-        title, note = (
-            f"{cost.way.words}: largest difference in ω from {cost.way.model}",
-            f"{cost.steps} steps; {before}",
-        )
+        start = f"{cost.start:.2g} of ω₀ before the first impact"
+        note = f"{cost.steps} steps; {'no slice strikes an end' if math.isnan(cost.start) else start}"
+        title = f"{cost.way.words}: largest difference in ω from {cost.way.model}"
         yield observed(f"finite-step-{cost.way.name}", title, cost.flight, "of ω₀", note, band=1e-9)
 
 
-CHAPTER: Final = Chapter(
-    name="finite-step", title="What a step of finite length costs, taken apart", study=study, claims=claims
-)
+CHAPTER: Final = Chapter("finite-step", "What a step of finite length costs, taken apart", study, claims)

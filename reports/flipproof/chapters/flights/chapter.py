@@ -47,11 +47,6 @@ class Flown:
         return [solver_row(name, made) for name, made in self.made.items()]
 
     @property
-    def rows_drawn(self) -> list[dict[str, Any]]:
-        """The rows of the flights that are drawn."""
-        return [row for row in self.rows if row["name"] in FLIGHTS]
-
-    @property
     def motion(self) -> dict[str, Any] | None:
         """What the moving bottles are drawn from."""
         return motion_data(self.throw, self.made)
@@ -234,6 +229,7 @@ CHAPTER: Final = Chapter(
     title="The flights",
     study=study,
     figures=figures,
+    page=lambda found: {"rows": found.rows, "drawn": FLIGHTS},
     summary=lambda found: {"solvers": found.rows},
     tables=lambda found: {
         f"trajectories/{name}/data.csv": trajectory_csv(made.trajectory)

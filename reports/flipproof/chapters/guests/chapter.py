@@ -9,7 +9,7 @@ from flipproof.chapters.guests.figures import draw_guests
 from flipproof.chapters.guests.study import Guest, Guests, study
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.foreign.verdicts import findings_of
-from flipproof.frame.chapter import Chapter, Finding, observed
+from flipproof.frame.chapter import Absent, Chapter, Finding, Kind, observed
 from flipproof.output.tables import trajectory_csv
 
 
@@ -25,14 +25,8 @@ def _claims(guest: Guest) -> Iterator[Finding]:
         yield from findings_of(visit.certificate, f"{head}-certify-", f"{label}: ")
     for name, reason in visit.problems.items():
         fails = name in ("solver", "ice") or name.startswith("flight")
-        yield Finding(
-            id=f"{head}-{name.replace(' ', '-')}-missing",
-            title=f"{label}: {name}",
-            value=None,
-            unit="",
-            kind="regression" if fails else "observation",
-            note=reason,
-        )
+        kind: Kind = "regression" if fails else "observation"
+        yield Absent(f"{head}-{name.replace(' ', '-')}-missing", f"{label}: {name}", reason, kind).finding
     for rung, difference in guest.differences.items():
         title, note = f"{label} and {rung}: largest difference in ω", f"at t = {difference.largest_time:.4g} s"
         yield observed(f"{head}-{rung}", title, difference.largest, "of ω₀", note, band=difference.band)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from flipproof.chapters.guests.split import Split
 from flipproof.chapters.guests.study import Guest, Guests
-from flipproof.chapters.waterfall.figure import DOWN, UP, WHOLE
+from flipproof.chapters.waterfall.chapter import DOWN, UP, WHOLE
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.figures.style import ASSUMPTIONS, MARKERS, new_figure, shared_legend, solver_style, styled
 from flipproof.frame.exhibit import Exhibit
@@ -112,10 +112,11 @@ def figure_differences(guests: Sequence[Guest]) -> Figure:
 
 
 def _draw_convergence(guests: Sequence[Guest]) -> Exhibit:
-    rows = ["guest,equation,effort,seconds,error [omega_0]"]
-    for guest in guests:
-        for one, error in zip(guest.visit.efforts, guest.errors, strict=True):
-            rows.append(f"{guest.slug},{guest.equation},{one.effort!r},{one.seconds:.4g},{error:.9g}")
+    rows = (
+        (guest.slug, guest.equation, repr(one.effort), f"{one.seconds:.4g}", error)
+        for guest in guests
+        for one, error in zip(guest.visit.efforts, guest.errors, strict=True)
+    )
     words = "; ".join(f"{guest.label}: {guest.errors[0]:.2g} to {guest.errors[-1]:.2g} of omega_0" for guest in guests)
     return Exhibit(
         name="guests-convergence",
@@ -126,7 +127,7 @@ def _draw_convergence(guests: Sequence[Guest]) -> Exhibit:
         alt=f"Log-log plot of error against effort. {words}.",
         maker=figure_convergence,
         data=(guests,),
-        table="\n".join(rows) + "\n",
+        table=rows_csv(("guest", "equation", "effort", "seconds", "error [omega_0]"), rows),
     )
 
 

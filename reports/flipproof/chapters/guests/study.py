@@ -168,7 +168,7 @@ def study(ask: Ask) -> Study[Guests]:
     solvers = {name: run for name, run in ask.solvers.items() if name in LADDER or ask.size != "check"}
     ladder = {rung: solvers[rung] for rung in LADDER}
     flights = yield [*calls.values(), *solvers.values(), *(twin for run in ladder.values() for twin in twins(run))]
-    flown = {name: run for name, each in solvers.items() if (run := flights.trajectory(each)) is not None and run.ok}
+    flown = {name: run for name, run in flights.trajectories(solvers).items() if run.ok}
     rungs = {rung: flown[rung] for rung in LADDER if rung in flown}
     others = {name: run for name, run in flown.items() if name not in rungs}
     found = study_guests(received(calls, flights), rungs, run_bands(ask.solvers, flights), others)

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from flipproof.chapters.horizon.study import Ensemble, Horizon, Kind, Reach, plan_horizon, study_horizon
-from flipproof.chapters.predictability.figure import SIZE_LINES
+from flipproof.chapters.predictability.chapter import SIZE_LINES
 from flipproof.chapters.predictability.study import HORIZON_BAND
 from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, observed, regression

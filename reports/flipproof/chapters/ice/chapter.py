@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from flipproof.chapters.solvers import ENGINE
-from flipproof.figures.style import ICE_FLOOR, STYLES, new_figure, shared_legend, styled
+from flipproof.figures.style import STYLES, new_figure, shared_legend, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged, regression
 from flipproof.output.columns import curves_csv
 from slicemodel import Scenario, Trajectory
@@ -93,14 +93,9 @@ def claim_welded_order(*runs: Trajectory) -> Finding:
     dt = [run.settings.get("step", np.nan) for run in runs]
     sizes = np.array([measure("", run).largest for run in runs])
     order = float(np.polyfit(np.log(dt), np.log(sizes), 1)[0]) if np.all(sizes > 0) else float("nan")
-    return regression(
-        "ice-welded-order",
-        "ice: drift of the welded engine falls with Δt at its printed order",
-        order,
-        "",
-        (printed - 0.3, printed + 0.3),
-        "drift " + ", ".join(f"{size:.2g} at Δt = {step:.2g} s" for step, size in zip(dt, sizes, strict=True)),
-    )
+    title = "ice: drift of the welded engine falls with Δt at its printed order"
+    note = "drift " + ", ".join(f"{size:.2g} at Δt = {step:.2g} s" for step, size in zip(dt, sizes, strict=True))
+    return regression("ice-welded-order", title, order, "", (printed - 0.3, printed + 0.3), note)
 
 
 def figures(found: Ice) -> Iterator[Exhibit]:
@@ -127,28 +122,23 @@ def figures(found: Ice) -> Iterator[Exhibit]:
 def draw(drifts: Sequence[Drift]) -> Figure:
     """Draw the drifts on a logarithmic scale with a floor; each that is zero gets a line of its own above it."""
     figure, axes = new_figure(size=(8.0, 4.3))
+    least = 1e-18  # that is drawn
     others = iter(("#882255", "#CC79A7", "#E69F00"))
     exact = 0
     for ice in drifts:
-        floor = ICE_FLOOR * 3.0**exact
+        floor = least * 3.0**exact
         exact += ice.largest == 0.0
         words = f"{ice.label}: {'none' if ice.largest == 0.0 else f'{ice.largest:.1e}'}"
         known = STYLES.get(ENGINE if ice.label == f"{ENGINE} rigid" else ice.label)
         colour = known["color"] if known else next(others)
         axes.semilogy(ice.t, np.maximum(ice.drift, floor), color=colour, linewidth=1.5, label=words)
-    axes.set_ylim(ICE_FLOOR / 3, 1e-2)
-    axes.set(xlabel="time t [s]", ylabel=f"|ω / ω₀ − 1| [1], zero drawn below {1000 * ICE_FLOOR:.0e}")
+    axes.set_ylim(least / 3, 1e-2)
+    axes.set(xlabel="time t [s]", ylabel=f"|ω / ω₀ − 1| [1], zero drawn below {1000 * least:.0e}")
     axes.margins(x=0.01)
     shared_legend(figure, axes, columns=2)
     return figure
 
 
 CHAPTER: Final = Chapter(
-    name="ice",
-    title="Ice",
-    study=study,
-    claims=claims,
-    kind="regression",
-    figures=figures,
-    work={"check": False, "quick": True, "full": True},
+    "ice", "Ice", study, claims, figures, kind="regression", work={"check": False, "quick": True, "full": True}
 )

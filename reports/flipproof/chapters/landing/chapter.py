@@ -75,9 +75,9 @@ def _water_and_ice(found: Found, family: str) -> Iterator[Finding]:
         difference, low, high = water.share.minus(ice.share)
         others = {KINDS[kind].words: found.cell(family, kind, filling) for kind in WATER[1:]}
         laws = ", ".join(f"{law} {cell.share.value:.3f}" for law, cell in others.items() if cell is not None)
-        verdict = "water stands more often" if low > 0 else "ice stands more often" if high < 0 else "undistinguished"
+        verdict = _judged(low, high, ("water stands more often", "ice stands more often", "undistinguished"))
         title = f"P(upright) of water minus ice at filling {filling:g} (abstract, section 3: redistribution helps)"
-        note = f"95 % interval {low:+.3f} to {high:+.3f}: {verdict}; law together; {laws}; {found.assumed}"
+        note = f"{verdict}; law together; {laws}; {found.assumed}"
         yield observed(f"landing-water-minus-ice-{filling:g}", title, difference, "", note, band=(high - low) / 2)
 
 
@@ -97,8 +97,7 @@ def _best_filling(found: Found, family: str) -> Finding:
     difference, low, high = best[1].share.minus(other[1].share)
     note = (
         f"best inside: {best[0]:g} with {share(best):.3f}, outside: {other[0]:g} with {share(other):.3f}; "
-        f"difference {difference:+.3f}, 95 % interval {low:+.3f} to {high:+.3f}: "
-        f"{'decided' if low > 0 or high < 0 else 'not decided'}; {found.assumed}"
+        f"difference {difference:+.3f}, {_judged(low, high, ('decided', 'decided', 'not decided'))}; {found.assumed}"
     )
     return observed(name, title, max(curve, key=share)[0], note=note)
 
@@ -127,8 +126,7 @@ def _slow_rotation(found: Found, family: str) -> Finding:
         return observed(name, title, None, note="water was not thrown")
     slow, fast = found.slow[family, "together"]
     difference, low, high = slow.minus(fast)
-    words = f"{low:+.3f} to {high:+.3f}: {_judged(low, high)}; {found.assumed}"
-    note = f"halves of |omega| at the touch within each filling; 95 % interval {words}"
+    note = f"halves of |omega| at the touch within each filling; {_judged(low, high)}; {found.assumed}"
     return observed(name, title, difference, note=note, band=(high - low) / 2)
 
 
@@ -140,10 +138,9 @@ def _bounces(found: Found, family: str) -> Finding:
     if water is None or ice is None:
         return observed(name, title, None, note="water or ice was not thrown at this filling")
     difference, band = ice.bounces - water.bounces, math.hypot(ice.bounces_band, water.bounces_band)
-    low, high = difference - band, difference + band
-    means = f"ice {ice.bounces:.2f}, water {water.bounces:.2f}"
-    words = f"95 % interval {low:+.2f} to {high:+.2f}: {_judged(low, high)}; {found.assumed}"
-    return observed(name, title, difference, "bounces", f"until the outcome is certain; {means}; {words}", band=band)
+    words = _judged(difference - band, difference + band, digits=2)
+    note = f"until the outcome is certain; ice {ice.bounces:.2f}, water {water.bounces:.2f}; {words}; {found.assumed}"
+    return observed(name, title, difference, "bounces", note, band=band)
 
 
 def _model_uncertainty(found: Found, family: str) -> Finding:
@@ -201,9 +198,12 @@ def _witnesses(stored: Mapping[str, Any]) -> Iterator[Finding]:
         )
 
 
-def _judged(low: float, high: float) -> str:
-    """Return what an interval says of a claim that is true above 0."""
-    return "holds" if low > 0 else "fails" if high < 0 else "cannot be decided"
+def _judged(
+    low: float, high: float, words: Sequence[str] = ("holds", "fails", "cannot be decided"), digits: int = 3
+) -> str:
+    """Return an interval, and the first of the words if it lies above 0, the second if below, the third if neither."""
+    verdict = words[0] if low > 0 else words[1] if high < 0 else words[2]
+    return f"95 % interval {low:+.{digits}f} to {high:+.{digits}f}: {verdict}"
 
 
 CHAPTER: Final = Chapter(

@@ -16,14 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from flipproof.chapters.landing.study import AXIS_KINDS, KINDS, OPTIMAL, WATER_AND_ICE, Cell, Found, Kind
-from flipproof.chapters.landing.tables import (
-    energies_csv,
-    map_csv,
-    share_line,
-    shares_csv,
-    static_csv,
-    witnesses_csv,
-)
+from flipproof.chapters.landing.tables import energies_csv, map_csv, share_line, shares_csv, static_csv, witnesses_csv
 from flipproof.figures.style import new_figure, shared_legend, styled
 from flipproof.frame.exhibit import Exhibit
 from flipproof.landing.aim import FAMILIES

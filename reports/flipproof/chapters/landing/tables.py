@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from flipproof.chapters.landing.study import KINDS, Found
 from flipproof.landing.aim import FAMILIES
+from flipproof.output.columns import rows_csv
 
 
 def shares_csv(found: Found) -> str:
@@ -27,7 +26,7 @@ def shares_csv(found: Found) -> str:
         "P(upright) [1]", "low [1]", "high [1]", "omega0 [rad/s]", "table height [m]", "aimed time [s]",
         "mean |omega| at touch [rad/s]", "mean speed at touch [m/s]", "mean energy at touch [E_s]", "mean bounces",
     )  # fmt: skip
-    return _csv(names, rows)
+    return rows_csv(names, rows, digits=None)
 
 
 def map_csv(found: Found) -> str:
@@ -39,7 +38,9 @@ def map_csv(found: Found) -> str:
         for j, omega0 in enumerate(omegas.tolist())
         for i, fill in enumerate(fillings.tolist())
     ]
-    return _csv(("fill_fraction [1]", "omega0 [rad/s]", "landed", "outcome", "theta at touch [degrees]"), rows)
+    return rows_csv(
+        ("fill_fraction [1]", "omega0 [rad/s]", "landed", "outcome", "theta at touch [degrees]"), rows, digits=None
+    )
 
 
 def static_csv(found: Found) -> str:
@@ -49,7 +50,7 @@ def static_csv(found: Found) -> str:
         for (family, kind), counts in found.static.items()
         for (said, true), count in counts.items()
     ]
-    return _csv(("family", "landed", "tilt below toppling angle at touch", "upright", "throws"), rows)
+    return rows_csv(("family", "landed", "tilt below toppling angle at touch", "upright", "throws"), rows, digits=None)
 
 
 def energies_csv(found: Found) -> str:
@@ -59,7 +60,7 @@ def energies_csv(found: Found) -> str:
         for k, run in enumerate(found.energies)
         for t, e in zip(run.t.tolist(), run.energy.tolist(), strict=True)
     ]
-    return _csv(("landed", "throw", "outcome", "t [s]", "energy [E_s]"), rows)
+    return rows_csv(("landed", "throw", "outcome", "t [s]", "energy [E_s]"), rows, digits=None)
 
 
 def witnesses_csv(stored: Mapping[str, Any]) -> str:
@@ -70,17 +71,9 @@ def witnesses_csv(stored: Mapping[str, Any]) -> str:
         for matrix in case["matrices"]
         for pair, count in matrix["outcomes"].items()
     ]
-    return _csv(("slices", "law", "first", "second", "outcome of first", "outcome of second", "touches"), rows)
-
-
-def _csv(names: Iterable[str], rows: Iterable[Sequence[object]]) -> str:
-    """Return rows as CSV, every digit of a number; one that is none is an empty cell."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(names)
-    for row in rows:
-        writer.writerow(["" if isinstance(cell, float) and math.isnan(cell) else cell for cell in row])
-    return text.getvalue()
+    return rows_csv(
+        ("slices", "law", "first", "second", "outcome of first", "outcome of second", "touches"), rows, digits=None
+    )
 
 
 def share_line(found: Found, family: str) -> str:

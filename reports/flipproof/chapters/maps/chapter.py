@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -21,7 +20,7 @@ from flipproof.chapters.maps.study import (
     plan_map,
     study_readings,
 )
-from flipproof.frame.chapter import Absent, Ask, Call, Chapter, Claims, Exhibit, Outcome, Study, attempt
+from flipproof.frame.chapter import Absent, Ask, Call, Chapter, Claims, Exhibit, Outcome, Study, attempt, known
 from flipproof.frame.twins import BAND_WORDS
 from flipproof.output.columns import rows_csv
 
@@ -67,9 +66,7 @@ def claims(found: Maps) -> Claims:
 
 def figures(found: Maps) -> Iterator[Exhibit]:
     """Yield every map."""
-    for each in found.values():
-        if each.found is not None:
-            yield _exhibit(each.found)
+    yield from map(_exhibit, known(found).values())
 
 
 def _exhibit(study: ValidityMap) -> Exhibit:
@@ -153,12 +150,5 @@ def _cells_csv(study: ValidityMap) -> str:
 
 
 CHAPTER: Final = Chapter(
-    name="maps",
-    title="For which bottles",
-    study=study,
-    claims=claims,
-    figures=figures,
-    template=Path(__file__).with_name("part.html.j2"),
-    work={"full": 20},
-    page=lambda _: {"slices": SLICES},
+    "maps", "For which bottles", study, claims, figures, work={"full": 20}, page=lambda _: {"slices": SLICES}
 )

@@ -37,14 +37,8 @@ LADDER: Final = ("published-python", *MODELS)
 """From what was published to what is right; each differs from the next by one mistake."""
 
 RUNGS: Final = (
-    "step size",
-    "sign of Eq. 9d",
-    "roots of Eq. 9a",
-    "drag reference",
-    "gravity",
-    "moving origin",
-    "recoil",
-)
+    "step size", "sign of Eq. 9d", "roots of Eq. 9a", "drag reference", "gravity", "moving origin", "recoil"
+)  # fmt: skip
 """The mistake between each entry of LADDER and the next."""
 
 SETS: Final = {

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from flipproof.chapters.model_form.study import ModelForm, Richardson, richardson, study_model_form
 from flipproof.chapters.step_size.study import errors_of, plan_step_size
-from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Finding, Outcome, Run, Study, attempt, judged, observed
-from slicemodel import Trajectory
+from flipproof.frame.chapter import Ask, Chapter, Claims, Run, Study, judged
+from flipproof.frame.findings import Finding, observed
+from flipproof.frame.flights import Call, Outcome, attempt, known
 
 FORMS: Final = (
     ("exact-step", "eq8"),
@@ -32,21 +32,19 @@ def study(ask: Ask) -> Study[Found]:
     truths = {pair: Run(pair[1], ask.throw, {}, pair[1]) for pair in ask.work}
     flights = yield [*truths.values(), *(run for grids in levels.values() for level in grids for run in level)]
 
-    def grids(scheme: str) -> list[list[Trajectory]]:
-        return [[flights[run].flight for run in level] for level in levels[scheme]]
-
     def fit(scheme: str, model: str) -> Call:
         truth = flights[truths[scheme, model]].flight
-        return Call(study_model_form, errors_of(truth, grids(scheme)), f"{scheme} against {model}")
+        return Call(study_model_form, errors_of(truth, flights.levels(levels[scheme])), f"{scheme} against {model}")
 
     def limit(scheme: str) -> Richardson:
         # The mean over the grids of a level: a single one carries the luck of its impact phases.
-        steps = [float(np.mean([run.settings["dt"] for run in level])) for level in grids(scheme)]
-        ends = [float(np.mean([run.omega[-1] for run in level])) / ask.throw.omega0 for level in grids(scheme)]
+        grids = flights.levels(levels[scheme])
+        steps = [float(np.mean([run.settings["dt"] for run in level])) for level in grids]
+        ends = [float(np.mean([run.omega[-1] for run in level])) / ask.throw.omega0 for level in grids]
         return richardson(steps, ends)
 
     calls = {pair: attempt(fit, *pair) for pair in truths}
-    flights = yield [call.found for call in calls.values() if call.found is not None]
+    flights = yield known(calls).values()
     forms = {pair: attempt(lambda call: flights.answer(call.value), call) for pair, call in calls.items()}
     return forms, {scheme: attempt(limit, scheme) for scheme in levels}
 
@@ -63,14 +61,11 @@ def claims(found: Found) -> Claims:
 
 def claim_limit(scheme: str, limit: Richardson) -> Finding:
     """Where omega(T) / omega_0 of a scheme goes as its step goes to zero, with its grid-convergence index."""
-    how = f"observed order {limit.order:.2f}; band: grid-convergence index; " if limit.ok else ""
-    return observed(
-        id=f"limit-{scheme}",
-        title=f"{scheme}: ω(T)/ω₀ extrapolated to Δt = 0 (Richardson)",
-        value=limit.value if limit.ok else None,
-        band=limit.gci if limit.ok else None,
-        note=how + limit.reason,
-    )
+    id_, title = f"limit-{scheme}", f"{scheme}: ω(T)/ω₀ extrapolated to Δt = 0 (Richardson)"
+    if not limit.ok:
+        return observed(id_, title, None, note=limit.reason)
+    note = f"observed order {limit.order:.2f}; band: grid-convergence index; {limit.reason}"
+    return observed(id_, title, limit.value, note=note, band=limit.gci)
 
 
 def claim_model_form(id_: str, title: str, form: ModelForm) -> Finding:
@@ -83,7 +78,6 @@ CHAPTER: Final = Chapter(
     title="Step size or another equation?",
     study=study,
     claims=claims,
-    template=Path(__file__).with_name("part.html.j2"),
     work={"quick": FORMS[:2], "full": FORMS},
-    page=lambda found: {"fits": [(pair, each.found) for pair, each in found[0].items() if each.found is not None]},
+    page=lambda found: {"fits": list(known(found[0]).items())},
 )

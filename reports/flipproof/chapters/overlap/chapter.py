@@ -14,6 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
+from flipproof.chapters.ice.chapter import measure
 from flipproof.chapters.maps.study import vary
 from flipproof.figures.style import STYLES, new_figure, shared_legend, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, observed, regression
@@ -151,27 +152,21 @@ def claims(found: Found) -> Claims:
 
 def claim_full_bottle(run: Trajectory | None) -> Finding:
     """A full bottle whose slices exclude each other keeps its angular velocity: it is ice."""
-    drift = None if run is None else float(np.abs(run.omega / run.scenario.omega0 - 1.0).max())
-    return regression(
-        id="engine-full-bottle",
-        title="full bottle, slices exclude each other: largest |ω/ω₀ − 1|",
-        value=drift,
-        unit="",
-        admissible=(0.0, 1e-3),
-        note="" if run is None else f"N = {run.scenario.n_slices}, Δt = {run.settings['step']:.1g} s; falls with Δt",
-    )
+    title = "full bottle, slices exclude each other: largest |ω/ω₀ − 1|"
+    drift, note = None, ""
+    if run is not None:
+        drift = measure("", run).largest
+        note = f"N = {run.scenario.n_slices}, Δt = {run.settings['step']:.1g} s; falls with Δt"
+    return regression("engine-full-bottle", title, drift, "", (0.0, 1e-3), note)
 
 
 def claim_overlap(study: Overlap) -> Finding:
     """What a full bottle loses because its slices may share their place."""
-    return observed(
-        id="overlap-full-bottle",
-        title="full bottle: how far the plateau of ω/ω₀ lies below ice when slices overlap",
-        value=study.missing_from_ice(PASS),
-        note=f"{study.missing_from_ice(EXCLUDE):.2g} when they exclude each other, "
-        f"{study.missing_from_ice(COLUMN):.2g} for a column; N = {study.slices}; the paper expects a full bottle to "
-        "behave like ice",
-    )
+    title = "full bottle: how far the plateau of ω/ω₀ lies below ice when slices overlap"
+    exclude, column = study.missing_from_ice(EXCLUDE), study.missing_from_ice(COLUMN)
+    note = f"{exclude:.2g} when they exclude each other, {column:.2g} for a column; N = {study.slices}; "
+    note += "the paper expects a full bottle to behave like ice"
+    return observed("overlap-full-bottle", title, study.missing_from_ice(PASS), note=note)
 
 
 def claim_column(study: Overlap) -> Finding:
@@ -179,13 +174,10 @@ def claim_column(study: Overlap) -> Finding:
     cost = study.cost_to_column
     known = np.flatnonzero(np.isfinite(cost)).tolist()
     each = ", ".join(f"{cost[k]:+.3f} at {study.fills[k]:.0%}" for k in known)
-    return observed(
-        id="overlap-column",
-        title="plateau of ω/ω₀ of free flight, whose slices overlap, minus that of a column: the largest over fillings",
-        value=float(max((cost[k] for k in known), key=abs)) if known else None,
-        note=f"a difference of two models, no share; free flight at N = {study.slices}, the column has no slices; "
-        + (each or "not computed at any filling"),
-    )
+    title = "plateau of ω/ω₀ of free flight, whose slices overlap, minus that of a column: the largest over fillings"
+    note = f"a difference of two models, no share; free flight at N = {study.slices}, the column has no slices; "
+    largest = float(max((cost[k] for k in known), key=abs)) if known else None
+    return observed("overlap-column", title, largest, note=note + (each or "not computed at any filling"))
 
 
 def figures(found: Found) -> Iterator[Exhibit]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 from flipproof.frame.chapter import Ask, Chapter, Study
@@ -36,7 +35,6 @@ CHAPTER: Final = Chapter(
     study=study,
     claims=lambda found: found.verdicts.findings(),
     figures=lambda found: exhibits_paper(found.runs),
-    template=Path(__file__).with_name("part.html.j2"),
     work={"full": None},
     summary=lambda found: {"paper": found.verdicts.to_mapping()},
     page=lambda found: {"paper": found.verdicts},

@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from pathlib import Path
-from typing import Final
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
 
-from flipproof.chapters.predictability.figure import figure_predictability
-from flipproof.chapters.predictability.study import Predictability, plan_predictability, study_predictability
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Outcome, Study, attempt, judged, observed
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from flipproof.chapters.predictability.study import (
+    HORIZON_BAND,
+    Predictability,
+    plan_predictability,
+    study_predictability,
+)
+from flipproof.figures.style import new_figure, solver_style, styled
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Study, judged
+from flipproof.frame.findings import Finding, observed
+from flipproof.frame.flights import Outcome, attempt, known
 from flipproof.output.columns import curves_csv
+
+SIZE_LINES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (3, 1.5, 1, 1.5)), (0, (1, 1.5)))
 
 Found = Mapping[str, Outcome[Predictability]]
 
@@ -21,8 +33,7 @@ def study(ask: Ask) -> Study[Found]:
     flights = yield [*(ask.solvers[name] for name in levels), *changed]
 
     def measured(name: str) -> Predictability:
-        members = [[flights[run].flight for run in level] for level in levels[name]]
-        return study_predictability(flights[ask.solvers[name]].flight, members)
+        return study_predictability(flights[ask.solvers[name]].flight, flights.levels(levels[name]))
 
     return {name: attempt(measured, name) for name in levels}
 
@@ -36,17 +47,13 @@ def claims(found: Found) -> Claims:
 
 def claim_predictability(solver: str, study: Predictability) -> Finding:
     """How much a tiny change of the release is amplified, and up to when a curve means anything."""
-    return observed(
-        id=f"predictability-{solver}",
-        title=f"{solver}: largest amplification of a change of {study.sizes[0]:.0e} of the release",
-        value=float(study.amplification[0]),
-        note=study.words,
-    )
+    title = f"{solver}: largest amplification of a change of {study.sizes[0]:.0e} of the release"
+    return observed(f"predictability-{solver}", title, float(study.amplification[0]), note=study.words)
 
 
 def figures(found: Found) -> Iterator[Exhibit]:
     """Yield the spread after every change."""
-    studies = [each.found for each in found.values() if each.found is not None]
+    studies = list(known(found).values())
     if not studies:
         return
     words = " ".join(f"{study.words}." for study in studies)
@@ -71,12 +78,43 @@ def figures(found: Found) -> Iterator[Exhibit]:
     )
 
 
+@styled
+def figure_predictability(studies: Sequence[Predictability]) -> Figure:
+    """Spread of ω after tiny changes of the release, one panel per solver and one line style per size."""
+    figure, panels = new_figure(
+        1, len(studies), size=(max(8.0, 2.9 * len(studies)), 4.4), sharex=True, sharey=True, squeeze=False
+    )
+    for k, (axes, study) in enumerate(zip(panels[0], studies, strict=True)):
+        colour = solver_style(study.solver, k)["color"]
+        axes.axhline(HORIZON_BAND, color="#444444", linewidth=1.0, linestyle=":")
+        for j, (row, horizon) in enumerate(zip(study.spread, study.horizons, strict=True)):
+            shown = np.where(np.isfinite(row), row, np.nan)
+            axes.plot(study.t, shown, color=colour, linestyle=SIZE_LINES[j % len(SIZE_LINES)], linewidth=1.3)
+            if horizon is not None:
+                axes.plot(horizon, HORIZON_BAND, "o", color=colour, markeredgecolor="white", markersize=7, zorder=4)
+        axes.set_yscale("log")
+        axes.set_title(study.solver, fontsize=10, loc="left", color=colour)
+        axes.set_xlabel("time t [s]")
+        axes.margins(x=0.01)
+    panels[0][0].set_ylabel("largest |change of ω| / ω₀ [1]")
+    handles = [
+        Line2D(
+            [], [], color="#444444", linestyle=SIZE_LINES[j % len(SIZE_LINES)], label=f"release changed by {size:.0e}"
+        )
+        for j, size in enumerate(studies[0].sizes)
+    ]
+    handles.append(Line2D([], [], color="#444444", linestyle=":", linewidth=1.0, label=f"band {HORIZON_BAND:g}"))
+    if any(study.horizon is not None for study in studies):
+        handles.append(Line2D([], [], linestyle="", marker="o", color="#444444", label="horizon"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    return figure
+
+
 CHAPTER: Final = Chapter(
     name="predictability",
     title="How far a small change of the release moves ω",
     study=study,
     claims=claims,
     figures=figures,
-    template=Path(__file__).with_name("part.html.j2"),
     work={"quick": (1e-9,), "full": (1e-9, 1e-6)},
 )

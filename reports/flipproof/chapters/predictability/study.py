@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from flipproof.chapters.alignment.found import LEAST_SPEED, count_key, ordinal
+from flipproof.chapters.alignment.study import LEAST_SPEED, count_key, ordinal
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, first_crossing, percent
 from flipproof.frame.solvers import Run
 from slicemodel import Impacts, Scenario, Trajectory
@@ -23,9 +23,6 @@ from slicemodel.trajectory import FloatArray
 
 SIZES = (1e-9, 1e-8, 1e-7, 1e-6)
 """Changes of the release: of theta_0 in rad and, at once, of omega_0 as a fraction."""
-
-DIRECTIONS = ((1, 1), (-1, -1), (1, -1), (-1, 1))
-"""Signs of the changes of theta_0 and omega_0. Free flight does not feel theta_0, so omega_0 must change with it."""
 
 HORIZON_BAND = 1e-3
 """A flight is predictable while the difference in omega stays below this fraction of omega_0."""
@@ -187,6 +184,8 @@ def plan_predictability(
 
     The unchanged run is the solver's own with the same settings.
     """
+    # Signs of the changes of theta_0 and omega_0. Free flight does not feel theta_0, so omega_0 must change with it.
+    directions = ((1, 1), (-1, -1), (1, -1), (-1, 1))
     return [
         [
             Run(
@@ -195,7 +194,7 @@ def plan_predictability(
                 dict(settings or {}),
                 label=f"{solver}, release changed by {size:.0e} ({'+-'[turn < 0]}θ₀, {'+-'[spin < 0]}ω₀)",
             )
-            for turn, spin in DIRECTIONS[:members]
+            for turn, spin in directions[:members]
         ]
         for size in sorted(sizes)
     ]

@@ -14,9 +14,6 @@ from slicemodel import Scenario, Trajectory
 BAND: Final = 1e-7
 """Fraction of omega_0 by which the reference may change by another method with a tenth of its rest speed."""
 
-WIDER_BANDS: Final = {"accelerating-origin": 1e-4, "free-flight": 3e-3}
-"""The same where a slice that rests pushes the tube and one that bounces below the rest speed does not."""
-
 CROSS_CHECKED: Final = ("published-limit", "eq8")
 """Models that a second integration method is held against."""
 
@@ -60,12 +57,14 @@ def claims(found: Found) -> Claims:
 def claim_reference_converged(usual: Trajectory, witness: Trajectory) -> Finding:
     """An independent integration of all 2N + 1 equations with a tenth of the rest speed gives the same flight."""
     one, other = usual.settings, witness.settings
+    # Where a slice that rests pushes the tube and one that bounces below the rest speed does not.
+    wider = {"accelerating-origin": 1e-4, "free-flight": 3e-3}
     return claim_change(
         f"reference-{usual.method}",
         f"{usual.method}: ω(t) is converged in rest speed, and solve_ivp {other['method']} confirms it",
         usual,
         witness,
-        WIDER_BANDS.get(usual.method, BAND),
+        wider.get(usual.method, BAND),
         differ=one["method"] != other["method"] and 10 * other["rest_speed"] <= one["rest_speed"] * 1.001,
         note=f"rest speed {one['rest_speed']:g} → {other['rest_speed']:g} m/s; {one['method']} → "
         f"{other['method']}, rtol {other['rtol']:g}, longest step {other['max_step']:g} s",

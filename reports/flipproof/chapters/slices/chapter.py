@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 import matplotlib as mpl
@@ -13,7 +12,7 @@ from matplotlib.figure import Figure
 
 from flipproof.chapters.solvers import SCHEMES
 from flipproof.figures.style import new_figure, shared_legend, styled
-from flipproof.frame.chapter import Ask, Chapter, Exhibit, Run, Study, attempt
+from flipproof.frame.chapter import Ask, Chapter, Exhibit, Run, Study, attempt, known
 from flipproof.output.columns import curves_csv
 from slicemodel import Trajectory
 
@@ -42,11 +41,9 @@ def study(ask: Ask) -> Study[Found]:
         for scheme in SCHEMES
     }
     flights = yield [run for cuts in runs.values() for run in cuts]
-    counted = {
-        scheme: attempt(lambda cuts: compare([flights[run].flight for run in cuts]), cuts)
-        for scheme, cuts in runs.items()
-    }
-    return {scheme: each.found for scheme, each in counted.items() if each.found is not None}
+    return known(
+        {scheme: attempt(lambda cuts: compare(*flights.levels([cuts])), cuts) for scheme, cuts in runs.items()}
+    )
 
 
 def compare(runs: list[Trajectory]) -> SliceCount:
@@ -108,6 +105,5 @@ CHAPTER: Final = Chapter(
     title="How many slices",
     study=study,
     figures=figures,
-    template=Path(__file__).with_name("part.html.j2"),
     work={"quick": (5, 20, 50, 200), "full": (5, 10, 20, 50, 100, 200, 500)},
 )

@@ -24,19 +24,8 @@ from flipproof.chapters.stability.study import (
     study_stability,
 )
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import (
-    Ask,
-    Chapter,
-    Claims,
-    Exhibit,
-    Finding,
-    Made,
-    Run,
-    Study,
-    judged,
-    observed,
-    regression,
-)
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Made, Run, Study, judged
+from flipproof.frame.findings import Finding, observed, regression
 from flipproof.output.columns import rows_csv
 from slicemodel import Trajectory
 
@@ -64,13 +53,12 @@ def claims(found: Found) -> Claims:
 def claim_rule_of_iterations(panels: Sequence[StabilityPanel]) -> Finding:
     """With the iterations that the rule asks for, and a step up to twice the default, pymunk follows free flight."""
     errors = np.concatenate([panel.by_the_rule for panel in panels])
-    return Finding(
+    return regression(
         id="engine-rule-of-iterations",
         title=f"pymunk with enough iterations and Δt ≤ {RULE_DT:g} s: largest error of ω(t) against free flight",
         # A NaN among them stays NaN, and fails.
         value=float(errors.max()) if len(errors) else None,
         unit="of ω₀",
-        kind="regression",
         admissible=(0.0, GOOD),
         band=float(np.max([panel.band for panel in panels])),
         note=f"{len(errors)} runs; " + "; ".join(panel.words for panel in panels),
@@ -80,15 +68,10 @@ def claim_rule_of_iterations(panels: Sequence[StabilityPanel]) -> Finding:
 def claim_default_iterations_explode(panels: Sequence[StabilityPanel]) -> Finding:
     """No run with pymunk's own number of iterations reaches the end of the flight, whatever its step."""
     grades = np.concatenate([panel.at_default for panel in panels])
-    stopped = int((grades == "explodes").sum())
-    return regression(
-        id="engine-default-explodes",
-        title=f"pymunk with its default {DEFAULT_ITERATIONS} iterations: runs that do not explode",
-        value=float(len(grades) - stopped) if len(grades) else None,
-        unit="",
-        admissible=(0.0, 0.0),
-        note=f"of {len(grades)}, at every step of the chart; each is reported as diverged with its reason",
-    )
+    whole = float((grades != "explodes").sum()) if len(grades) else None
+    title = f"pymunk with its default {DEFAULT_ITERATIONS} iterations: runs that do not explode"
+    note = f"of {len(grades)}, at every step of the chart; each is reported as diverged with its reason"
+    return regression("engine-default-explodes", title, whole, "", (0.0, 0.0), note)
 
 
 def claim_whole_and_wrong(panels: Sequence[StabilityPanel]) -> Finding:
@@ -96,25 +79,16 @@ def claim_whole_and_wrong(panels: Sequence[StabilityPanel]) -> Finding:
     counts = {grade: sum(panel.counts[grade] for panel in panels) for grade in ("wrong", "good", "excellent")}
     errors = np.concatenate([panel.error[panel.grade == "wrong"] for panel in panels])
     note = f"by up to {100 * errors.max():.2g} % of ω₀; only a reference tells" if len(errors) else "none on this chart"
-    return observed(
-        id="engine-whole-and-wrong",
-        title=f"pymunk: runs that break no invariant and are wrong by more than {GOOD:.0%} of ω₀",
-        value=float(counts["wrong"]),
-        unit=f"of {sum(counts.values())}",
-        note=note,
-    )
+    title = f"pymunk: runs that break no invariant and are wrong by more than {GOOD:.0%} of ω₀"
+    return observed("engine-whole-and-wrong", title, float(counts["wrong"]), f"of {sum(counts.values())}", note)
 
 
 def claim_explosion_is_reported(trajectory: Trajectory) -> Finding:
     """At the engine's default of 10 iterations the run explodes, and is reported as diverged instead of shown."""
-    diverged = trajectory.status == "diverged"
-    return observed(
-        id="engine-default-iterations",
-        title=f"{trajectory.method} with its default 10 iterations: last output time before an invariant breaks",
-        value=float(trajectory.t[-1]) if diverged else None,
-        unit="s",
-        note=trajectory.message or "the run did not diverge",
-    )
+    title = f"{trajectory.method} with its default 10 iterations: last output time before an invariant breaks"
+    until = float(trajectory.t[-1]) if trajectory.status == "diverged" else None
+    note = trajectory.message or "the run did not diverge"
+    return observed("engine-default-iterations", title, until, "s", note)
 
 
 def figures(found: Found) -> Iterator[Exhibit]:

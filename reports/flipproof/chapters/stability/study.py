@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from flipproof.chapters.differences.study import largest_change
 from flipproof.chapters.maps.study import vary
 from flipproof.frame.solvers import Made, Run
 from flipproof.frame.twins import twins
@@ -181,7 +182,7 @@ def _panel(throw: Scenario, layout: Layout, mass_ratio: float, slices: int, made
     grade, reason = np.full(shape, "not run", dtype="<U12"), np.full(shape, "", dtype="<U160")
     reference, cells = _plan_panel(throw, layout, mass_ratio, slices)
     truth, *others = (_whole(made[run]) for run in (reference, *twins(reference)))
-    apart = [math.nan if truth is None or other is None else _apart(other, truth) for other in others]
+    apart = [math.nan if truth is None or other is None else largest_change(truth, other) for other in others]
     for at, (cost, run) in cells.items():
         flight = made[run].trajectory if cost <= layout.budget else None
         if cost > layout.budget:
@@ -194,7 +195,7 @@ def _panel(throw: Scenario, layout: Layout, mass_ratio: float, slices: int, made
         elif truth is None:
             reason[at] = "free-flight has no result to hold it against"
         else:
-            error[at] = _apart(flight, truth)
+            error[at] = largest_change(truth, flight)
             level[at] = abs(_plateau(flight) - _plateau(truth))
             grade[at] = grade_of(error[at])
     return StabilityPanel(
@@ -224,10 +225,6 @@ def grade_of(error: float) -> str:
     if not error <= GOOD:
         return "wrong"
     return "excellent" if error <= EXCELLENT else "good"
-
-
-def _apart(flight: Trajectory, truth: Trajectory) -> float:
-    return float(np.abs(flight.omega - truth.omega).max() / abs(truth.scenario.omega0))
 
 
 def _plateau(flight: Trajectory) -> float:

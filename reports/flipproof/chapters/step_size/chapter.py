@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -21,22 +20,9 @@ from flipproof.chapters.step_size.study import (
     study_step_size,
 )
 from flipproof.figures.style import MARKERS, STYLES, new_figure, shared_legend, solver_style, styled
-from flipproof.frame.chapter import (
-    Ask,
-    Chapter,
-    Claims,
-    Exhibit,
-    Finding,
-    Flights,
-    Kind,
-    Missing,
-    Outcome,
-    Run,
-    Study,
-    attempt,
-    judged,
-    observed,
-)
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Missing, Run, Study, judged
+from flipproof.frame.findings import Finding, Kind, observed, regression
+from flipproof.frame.flights import Flights, Outcome, attempt, known
 from flipproof.output.columns import rows_csv
 
 CHECKED: Final = ("before the first impact", "across impacts")
@@ -82,11 +68,10 @@ def study(ask: Ask) -> Study[Orders]:
         for _, _, levels, start, part in asked
         for scheme in SCHEMES
     }
-    flights = yield [run for each in starts.values() if each.found is not None for run in each.found.runs]
+    flights = yield [run for grids in known(starts).values() for run in grids.runs]
 
     def measured(grids: Grids) -> StepSize:
-        levels = [[flights[run].flight for run in level] for level in grids.levels]
-        return study_step_size(flights[grids.truth].flight, levels)
+        return study_step_size(flights[grids.truth].flight, flights.levels(grids.levels))
 
     found = {part: attempt(measured, grids) for part, grids in whole.items()}
     return found | {part: attempt(lambda each: measured(each.value), each) for part, each in starts.items()}
@@ -117,7 +102,7 @@ def claims(found: Orders) -> Claims:
 
 def _measured(found: Orders, where: str) -> list[StepSize]:
     """Return the studies of a part that could be made."""
-    return [each.found for (part, _), each in found.items() if part == where and each.found is not None]
+    return [each for (part, _), each in known(found).items() if part == where]
 
 
 def claim_order(study: StepSize, where: str, *, kind: Kind = "regression") -> Finding:
@@ -127,18 +112,15 @@ def claim_order(study: StepSize, where: str, *, kind: Kind = "regression") -> Fi
     if study.exact:
         note = "there is no step error to be seen: all errors are at round-off"
         return observed(id_, title, float(study.error.max()), "of ω₀", note)
-    return Finding(
-        id=id_,
-        title=title,
-        value=study.order if study.refined or kind == "observation" else math.nan,
-        unit="",
-        kind=kind,
-        admissible=(0.9, 1.1) if kind == "regression" else (-math.inf, math.inf),
-        band=study.order_error,
-        note=f"error {study.mean_error[0]:.2g} → {study.mean_error[-1]:.2g} of ω₀ "
+    note = (
+        f"error {study.mean_error[0]:.2g} → {study.mean_error[-1]:.2g} of ω₀ "
         f"from Δt = {study.mean_dt[0]:.2g} s to {study.mean_dt[-1]:.2g} s"
-        + ("" if study.refined else "; refinement does not always help"),
+        + ("" if study.refined else "; refinement does not always help")
     )
+    if kind == "observation":
+        return observed(id_, title, study.order, note=note, band=study.order_error)
+    order = study.order if study.refined else math.nan
+    return regression(id_, title, order, "", (0.9, 1.1), note, band=study.order_error)
 
 
 def figures(found: Orders) -> Iterator[Exhibit]:
@@ -224,7 +206,6 @@ CHAPTER: Final = Chapter(
     claims=claims,
     kind="regression",
     figures=figures,
-    template=Path(__file__).with_name("part.html.j2"),
     work={"check": 0, "quick": 6, "full": 7},
     page=lambda found: {"studies": _measured(found, WHOLE)},
 )

@@ -13,7 +13,7 @@ from slicemodel import Scenario, Trajectory
 from slicemodel.trajectory import FloatArray
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Vector:
     """One published run: the throw, the scheme that must reproduce it, and what was printed (column -> values)."""
 
@@ -43,49 +43,24 @@ def folder() -> Path:
 
 def load_all() -> tuple[Vector, ...]:
     """Return every published vector, the Python program's first."""
-    runs = [
-        (
-            "published-python",
-            entry["file"],
-            Scenario(
-                water_mass=entry["water_mass"],
-                n_slices=entry["n_slices"],
-                drag=entry["alpha"],
-                restitution=-entry["beta"],
-                omega0=entry["omega_0"],
-                theta0=entry["theta_0"],
-                duration=entry["t_max"],
-            ),
-            entry["n_slices"] // 2,
-            entry["t_max"],
-        )
-        for entry in json.loads((folder() / "python_vectors.json").read_text(encoding="utf-8"))
-    ]
+    vectors = []
+    for entry in json.loads((folder() / "python_vectors.json").read_text(encoding="utf-8")):
+        named = {"n_slices": "n_slices", "water_mass": "water_mass", "drag": "alpha", "omega0": "omega_0"}
+        named |= {"theta0": "theta_0", "duration": "t_max"}
+        throw = Scenario(restitution=-entry["beta"], **{name: entry[printed] for name, printed in named.items()})
+        vectors.append(_vector(entry["file"], "published-python", throw, throw.n_slices // 2, throw.duration))
     # MATLAB counts slices from 1. Its default run is compared up to 0.2 s: its slices are thrown out to infinity later.
     default, no_drag = Scenario(n_slices=500, drag=0.01, duration=1.0), Scenario(n_slices=100, drag=0.0, duration=0.3)
-    runs += [
-        ("published-matlab", "matlab_default.csv", default, 249, 0.2),
-        ("published-matlab", "matlab_no_drag.csv", no_drag, 49, 0.3),
-    ]
-    return tuple(
-        Vector(
-            name=file.removesuffix(".csv"),
-            scenario=scenario,
-            scheme=scheme,
-            middle_slice=middle,
-            until=until,
-            columns=_columns(file),
-        )
-        for scheme, file, scenario, middle, until in runs
-    )
+    vectors.append(_vector("matlab_default.csv", "published-matlab", default, 249, 0.2))
+    vectors.append(_vector("matlab_no_drag.csv", "published-matlab", no_drag, 49, 0.3))
+    return tuple(vectors)
 
 
-def _columns(file: str) -> MappingProxyType[str, FloatArray]:
-    path = folder() / file
-    with path.open(encoding="utf-8") as lines:
+def _vector(file: str, scheme: str, scenario: Scenario, middle_slice: int, until: float) -> Vector:
+    with (folder() / file).open(encoding="utf-8") as lines:
         header = lines.readline().strip().split(",")
-        table = np.loadtxt(lines, delimiter=",")
-    return MappingProxyType(dict(zip(header, table.T, strict=True)))
+        columns = dict(zip(header, np.loadtxt(lines, delimiter=",").T, strict=True))
+    return Vector(file.removesuffix(".csv"), scenario, scheme, middle_slice, until, MappingProxyType(columns))
 
 
 def deviations(vector: Vector, trajectory: Trajectory) -> dict[str, float]:
@@ -96,12 +71,7 @@ def deviations(vector: Vector, trajectory: Trajectory) -> dict[str, float]:
     points = int(np.searchsorted(vector.columns["t"], vector.until, side="right"))
     if len(trajectory.t) < points:
         return {"t": float("inf")}
-    ours = {
-        "t": trajectory.t,
-        "theta": trajectory.theta,
-        "omega": trajectory.omega,
-        "r_cm": trajectory.r_cm,
-        "inertia": trajectory.inertia,
+    ours = {name: getattr(trajectory, name) for name in ("t", "theta", "omega", "r_cm", "inertia")} | {
         "r_first": trajectory.r[:, 0],
         "r_middle": trajectory.r[:, vector.middle_slice],
         "r_last": trajectory.r[:, -1],

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Final
 
-from flipproof.chapters.waterfall.figure import figure_waterfall
-from flipproof.chapters.waterfall.study import (
-    Waterfall,
-    observe,
-    plan_finer,
-    plan_waterfall,
-    program_run,
-    split_all,
-)
+from matplotlib.figure import Figure
+
+from flipproof.chapters.waterfall.study import Waterfall, observe, plan_finer, plan_waterfall, program_run, split_all
+from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, observed
 from flipproof.frame.throws import FINER
 from flipproof.output.columns import rows_csv
+
+UP, DOWN, WHOLE = "#0072B2", "#D55E00", "#666666"
 
 
 def study(ask: Ask) -> Study[tuple[Waterfall, ...]]:
@@ -37,32 +33,26 @@ def claims(found: tuple[Waterfall, ...]) -> Claims:
 
 def claim_waterfall(waterfall: Waterfall) -> Finding:
     """From the published program to free flight, split over the assumptions; the bars sum to the whole."""
-    largest = waterfall.largest
-    return observed(
-        id=f"waterfall-{waterfall.observable.name}",
-        title=f"{waterfall.observable.words}: free flight minus published program",
-        value=waterfall.total,
-        unit="" if waterfall.observable.unit == "1" else waterfall.observable.unit,
-        band=waterfall.end_band,
-        note=f"largest fair share (mean over all orders): {largest.name}, {largest.average:+.3g} ± "
+    largest, observable = waterfall.largest, waterfall.observable
+    note = (
+        f"largest fair share (mean over all orders): {largest.name}, {largest.average:+.3g} ± "
         f"{largest.average_band:.1g}, from {largest.low:+.3g} to {largest.high:+.3g} in single orders, at "
         f"N = {waterfall.slices}"
         + (f", {largest.finer:+.3g} at N = {FINER * waterfall.slices}" if largest.finer is not None else "")
-        + f"; the bars miss the whole by {waterfall.residual:.1g}",
+        + f"; the bars miss the whole by {waterfall.residual:.1g}"
     )
+    unit = "" if observable.unit == "1" else observable.unit
+    title = f"{observable.words}: free flight minus published program"
+    return observed(f"waterfall-{observable.name}", title, waterfall.total, unit, note, band=waterfall.end_band)
 
 
 def claim_overlap(waterfall: Waterfall) -> Finding:
     """From free flight, whose slices overlap, to the column, which cannot: the margin of the waterfall."""
     finer = waterfall.finer_overlap
-    return observed(
-        id="waterfall-overlap",
-        title=f"{waterfall.observable.words}: column minus free flight, what forbidding overlap changes",
-        value=waterfall.overlap,
-        band=waterfall.end_band,
-        note=f"a difference of two models, no share; free flight at N = {waterfall.slices}, the column has no slices"
-        + (f"; {finer:+.3g} at N = {FINER * waterfall.slices}" if finer is not None else ""),
-    )
+    title = f"{waterfall.observable.words}: column minus free flight, what forbidding overlap changes"
+    note = f"a difference of two models, no share; free flight at N = {waterfall.slices}, the column has no slices"
+    note += f"; {finer:+.3g} at N = {FINER * waterfall.slices}" if finer is not None else ""
+    return observed("waterfall-overlap", title, waterfall.overlap, note=note, band=waterfall.end_band)
 
 
 def figures(found: tuple[Waterfall, ...]) -> Iterator[Exhibit]:
@@ -108,12 +98,60 @@ def _bars_csv(waterfall: Waterfall) -> str:
     )  # fmt: skip
 
 
+@styled
+def figure_waterfall(waterfall: Waterfall) -> Figure:
+    """Left: the fair shares, each bar from the value before to the value after. Right: the same in single orders.
+
+    Below, hatched: what forbidding overlap changes, from free flight to the column.
+    """
+    figure, (ladder, orders) = new_figure(1, 2, size=(8.0, 4.9), sharey=True, width_ratios=(1.5, 1.0))
+    names = ["published program", *(bar.name for bar in waterfall.bars), "free flight"]
+    places = list(range(len(names), 0, -1))
+    ladder.barh(places[0], waterfall.start, color=WHOLE, height=0.6)
+    ladder.barh(places[-1], waterfall.end, color=WHOLE, height=0.6, xerr=waterfall.end_band, capsize=3)
+    level = waterfall.start
+    for place, bar in zip(places[1:-1], waterfall.bars, strict=True):
+        ladder.barh(
+            place, bar.average, left=level, color=UP if bar.average >= 0 else DOWN, height=0.6,
+            xerr=bar.average_band, capsize=3, ecolor="#222222",
+        )  # fmt: skip
+        level += bar.average
+        ladder.plot([level, level], [place - 1.3, place + 0.3], color="#888888", linewidth=0.8)
+        orders.plot([bar.low, bar.high], [place, place], color="#BBBBBB", linewidth=4.0, solid_capstyle="butt")
+        orders.errorbar(
+            bar.average, place, xerr=bar.average_band, fmt="o", color="black", capsize=3, markersize=6
+        )  # fmt: skip
+        orders.plot(bar.forward, place + 0.24, ">", color=UP if bar.forward >= 0 else DOWN, markersize=5)
+        orders.plot(bar.backward, place - 0.24, "<", color="#888888", markersize=5)
+    for place, value in ((places[0], waterfall.start), (places[-1], waterfall.end)):
+        ladder.annotate(
+            f"{value:.3f}", (0, place), xytext=(6, 0), textcoords="offset points", va="center", color="white"
+        )
+    ladder.barh(
+        0, waterfall.overlap, left=waterfall.end, color="none", edgecolor=UP if waterfall.overlap >= 0 else DOWN,
+        hatch="////", height=0.6, xerr=waterfall.end_band, capsize=3, ecolor="#222222",
+    )  # fmt: skip
+    ladder.axhline(0.5, color="#444444", linewidth=0.8, linestyle=":")
+    orders.axhline(0.5, color="#444444", linewidth=0.8, linestyle=":")
+    orders.annotate("a difference of two models,\nno share", (0.02, 0), xycoords=("axes fraction", "data"), va="center",
+                    fontsize=8)  # fmt: skip
+    ladder.set_yticks([*places, 0], [*names, "no overlap: column"])
+    ladder.set_xlabel(f"{waterfall.observable.words} [{waterfall.observable.unit}]")
+    ladder.set_title("fair shares: means over all orders", fontsize=10, loc="left")
+    orders.axvline(0.0, color="#444444", linewidth=0.8)
+    orders.set_xlabel(f"change [{waterfall.observable.unit}]")
+    orders.set_title("in single orders", fontsize=10, loc="left")
+    for axes in (ladder, orders):
+        axes.grid(visible=False, axis="y")
+    orders.plot([], [], ">", color=UP, label="in the order of the ladder")
+    orders.plot([], [], "<", color="#888888", label="in reverse")
+    orders.plot([], [], color="#BBBBBB", linewidth=4.0, label="range of all orders")
+    orders.plot([], [], "o", color="black", label="mean over all orders")
+    handles, labels = orders.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    return figure
+
+
 CHAPTER: Final = Chapter(
-    name="waterfall",
-    title="What each assumption costs",
-    study=study,
-    claims=claims,
-    figures=figures,
-    template=Path(__file__).with_name("part.html.j2"),
-    work={"quick": 50, "full": 50},
+    "waterfall", "What each assumption costs", study, claims, figures, work={"quick": 50, "full": 50}
 )

@@ -206,23 +206,13 @@ def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) 
     start = observed[program]
     none, everything = Switches(), _with(NAMES)
     step = values[none] - start
-    bars = [
-        Bar(
-            name=STEP,
-            forward=step,
-            backward=step,
-            average=step,
-            low=step,
-            high=step,
-            forward_band=bands[none],
-            average_band=bands[none],
-            finer=more[none] - observed[finer(program)] if more else None,
-        )
-    ]
+    # The same in every order.
+    alike = dict.fromkeys(("forward", "backward", "average", "low", "high"), step)
+    alike |= dict.fromkeys(("forward_band", "average_band"), bands[none])
+    bars = [Bar(name=STEP, finer=more[none] - observed[finer(program)] if more else None, **alike)]
     order = list(NAMES)
     for k, name in enumerate(order):
-        before, after = order[:k], order[k + 1 :]
-        sets = list(sets_before(name, NAMES))
+        before, after, sets = order[:k], order[k + 1 :], list(sets_before(name, NAMES))
         changes = [_change(name, chosen, values) for chosen, _ in sets]
         bars.append(
             Bar(

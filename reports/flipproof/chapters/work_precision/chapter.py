@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
 from flipproof.chapters.work_precision.claims import claim_work_precision
@@ -126,21 +125,15 @@ def _results(study: WorkPrecision) -> Table:
 
     rows = []
     for curve in study.curves.values():
-        whole, failed = curve.whole, curve.failed
-        first_last = f"{whole[0].error:.1e} to {whole[-1].error:.1e}" if whole else "–"
-        order = f"{curve.slope:.2f} ± {curve.slope_error:.2f}"
-        rows.append(
-            (
-                curve.contender.name,
-                curve.contender.equation,
-                first_last + (" (floor)" if any(point.at_floor for point in whole) else ""),
-                f"{whole[-1].plateau:.1e}" if whole else "–",
-                order if math.isfinite(curve.slope) else f"– ({curve.slope_reason})",
-                *(price(curve, error, "work") for error in errors),
-                price(curve, 1e-3, "seconds"),
-                f"{len(failed)} of {len(curve.points)}: {failed[0].settings}: {failed[0].reason}" if failed else "",
-            )
-        )
+        who, whole, failed = (curve.contender.name, curve.contender.equation), curve.whole, curve.failed
+        reached = f"{whole[0].error:.1e} to {whole[-1].error:.1e}" if whole else "–"
+        reached += " (floor)" if any(point.at_floor for point in whole) else ""
+        flat = f"{whole[-1].plateau:.1e}" if whole else "–"
+        slope = f"{curve.slope:.2f} ± {curve.slope_error:.2f}"
+        order = slope if math.isfinite(curve.slope) else f"– ({curve.slope_reason})"
+        prices = [price(curve, error, "work") for error in errors]
+        why = f"{len(failed)} of {len(curve.points)}: {failed[0].settings}: {failed[0].reason}" if failed else ""
+        rows.append((*who, reached, flat, order, *prices, price(curve, 1e-3, "seconds"), why))
     return Table(
         f"work-results-{study.case.name}",
         f"What an error costs: {study.case.title}",
@@ -164,16 +157,9 @@ def _settings(study: WorkPrecision) -> Table:
     for curve in study.curves.values():
         rival, levels = curve.contender, curve.contender.levels
         name, first = next(iter(levels[0][0].items()))
-        rows.append(
-            (
-                rival.name,
-                rival.equation,
-                f"{name} {first:.3g} to {levels[-1][-1][name]:.3g}",
-                f"{len(levels)}" + (f" of {len(levels[0])} grids" if len(levels[0]) > 1 else ""),
-                words_of(curve.held),
-                counted[rival.family],
-            )
-        )
+        refined = f"{name} {first:.3g} to {levels[-1][-1][name]:.3g}"
+        count = f"{len(levels)}" + (f" of {len(levels[0])} grids" if len(levels[0]) > 1 else "")
+        rows.append((rival.name, rival.equation, refined, count, words_of(curve.held), counted[rival.family]))
     return Table(
         f"work-settings-{study.case.name}",
         f"Settings: {study.case.title}",
@@ -186,13 +172,9 @@ def _settings(study: WorkPrecision) -> Table:
 
 def _references(study: WorkPrecision) -> Table:
     rows = []
-    for reference in study.references.values():
-        floors = (
-            f"{floor:.1e}" if math.isfinite(floor) else "–" for floor in (reference.floor, reference.plateau_floor)
-        )
-        rows.append(
-            (reference.equation, *floors, reference.words + (f" ({reference.reason})" if reference.reason else ""))
-        )
+    for one in study.references.values():
+        floors = (f"{floor:.1e}" if math.isfinite(floor) else "–" for floor in (one.floor, one.plateau_floor))
+        rows.append((one.equation, *floors, one.words + (f" ({one.reason})" if one.reason else "")))
     return Table(
         f"work-references-{study.case.name}",
         f"References: {study.case.title}",
@@ -241,7 +223,6 @@ CHAPTER: Final = Chapter(
     study=study,
     claims=claim_work_precision,
     figures=figures,
-    template=Path(__file__).with_name("part.html.j2"),
     work={"full": FULL},
     summary=lambda found: {"work_precision": summarise_work_precision(found)},
     page=lambda found: {"tables": list(tabulate_work_precision(found))},

@@ -51,26 +51,18 @@ def _pair(study: WorkPrecision, first: Curve, second: Curve) -> Finding:
 
     limit = {(False, True): "at least, ", (True, False): "at most, "}.get((steps_a.bound, steps_b.bound), "")
     count_a, count_b = (f"{'at most ' if steps.bound else ''}{steps.value:.0f}" for steps in (steps_a, steps_b))
-    return observed(
-        id=id_,
-        title=limit + title,
-        value=steps_a.value / steps_b.value,
-        note=f"error {error:.1e} of ω₀: {count_a} steps of {one}, {count_b} of {other}; "
-        f"{against('work', 'updates of one slice')}, {against('seconds', 'ms of processor time', 1e3)}",
-    )
+    note = f"error {error:.1e} of ω₀: {count_a} steps of {one}, {count_b} of {other}; "
+    note += f"{against('work', 'updates of one slice')}, {against('seconds', 'ms of processor time', 1e3)}"
+    return observed(id_, limit + title, steps_a.value / steps_b.value, note=note)
 
 
 def _order_of_midpoint(study: WorkPrecision) -> Iterator[Finding]:
     curve = study.named("midpoint")
     if curve is not None:
-        yield observed(
-            id=f"work-order-midpoint-{study.case.name}",
-            title=f"observed order in cost of midpoint, {study.case.title}",
-            value=None if math.isnan(curve.slope) else curve.slope,
-            band=curve.slope_error,
-            note=curve.slope_reason
-            or "order 2 where nothing strikes; v_CM jumps at an impact, and drag feels a mean of it for one whole step",
-        )
+        id_, title = f"work-order-midpoint-{study.case.name}", f"observed order in cost of midpoint, {study.case.title}"
+        words = "order 2 where nothing strikes; v_CM jumps at an impact, and drag feels a mean of it for one whole step"
+        order = None if math.isnan(curve.slope) else curve.slope
+        yield observed(id_, title, order, note=curve.slope_reason or words, band=curve.slope_error)
 
 
 def _cheapest(study: WorkPrecision, equation: str, error: float) -> Iterator[Finding]:
@@ -88,41 +80,32 @@ def _cheapest(study: WorkPrecision, equation: str, error: float) -> Iterator[Fin
     work = ranked("work")
     keepers = {name for _, name, _ in work}
     others = [curve.contender.name for curve in study.of(equation) if curve.contender.name not in keepers]
-    yield observed(
-        id=f"work-cheapest-{equation}-{error:.0e}",
-        title=f"{equation} to {error:.0e} of ω₀: updates of the second cheapest over the cheapest",
-        value=work[1][0] / work[0][0] if len(work) > 1 else None,
-        note=f"updates: {words('work', '')}; processor time: {words('seconds', ' s')}"
-        + (f"; not reached by {', '.join(others)}" if others else ""),
-    )
+    title = f"{equation} to {error:.0e} of ω₀: updates of the second cheapest over the cheapest"
+    note = f"updates: {words('work', '')}; processor time: {words('seconds', ' s')}"
+    note += f"; not reached by {', '.join(others)}" if others else ""
+    ratio = work[1][0] / work[0][0] if len(work) > 1 else None
+    yield observed(f"work-cheapest-{equation}-{error:.0e}", title, ratio, note=note)
 
 
 def _floors(study: WorkPrecision) -> Finding:
     floors = {name: reference.floor for name, reference in study.references.items() if math.isfinite(reference.floor)}
     highest = max(floors, key=lambda name: floors[name])
     at = [curve.contender.name for curve in study.of(highest) if any(point.at_floor for point in curve.points)]
-    return observed(
-        id="work-floor",
-        title="highest floor of a reference, below which no contender is ranked",
-        value=floors[highest],
-        unit="of ω₀",
-        note=f"{highest}; at the floor: {', '.join(at) or 'none'}; others: "
-        + ", ".join(f"{name} {floor:.0e}" for name, floor in floors.items() if name != highest),
-    )
+    others = ", ".join(f"{name} {floor:.0e}" for name, floor in floors.items() if name != highest)
+    note = f"{highest}; at the floor: {', '.join(at) or 'none'}; others: {others}"
+    title = "highest floor of a reference, below which no contender is ranked"
+    return observed("work-floor", title, floors[highest], "of ω₀", note)
 
 
 def _failures(study: WorkPrecision) -> Iterator[Finding]:
     failed = {key: curve.failed for key, curve in study.curves.items() if curve.failed}
     if failed:
-        yield observed(
-            id="work-failed",
-            title=f"levels that failed, of {sum(len(curve.points) for curve in study.curves.values())}",
-            value=float(sum(map(len, failed.values()))),
-            note="; ".join(
-                f"{key}: {len(points)} of {len(study.curves[key].points)}, {shortened(points[0].reason, 90)}"
-                for key, points in failed.items()
-            ),
+        title = f"levels that failed, of {sum(len(curve.points) for curve in study.curves.values())}"
+        note = "; ".join(
+            f"{key}: {len(points)} of {len(study.curves[key].points)}, {shortened(points[0].reason, 90)}"
+            for key, points in failed.items()
         )
+        yield observed("work-failed", title, float(sum(map(len, failed.values()))), note=note)
 
 
 def _price_of_impacts(studies: Mapping[str, WorkPrecision]) -> Iterator[Finding]:
@@ -137,9 +120,6 @@ def _price_of_impacts(studies: Mapping[str, WorkPrecision]) -> Iterator[Finding]
             rates.append(None if found is None else found.value / study.case.scenario.duration)
         smooth, through = rates
         if smooth is not None and through is not None:
-            yield observed(
-                id=f"work-impacts-{equation}",
-                title=f"{equation}: updates of DOP853 per second of flight, through impacts over before the first",
-                value=through / smooth,
-                note=f"error 3e-4 of ω₀; {smooth:.2g} updates per second before, {through:.2g} through all impacts",
-            )
+            title = f"{equation}: updates of DOP853 per second of flight, through impacts over before the first"
+            note = f"error 3e-4 of ω₀; {smooth:.2g} updates per second before, {through:.2g} through all impacts"
+            yield observed(f"work-impacts-{equation}", title, through / smooth, note=note)
