@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import matplotlib
 import pytest
@@ -55,7 +56,7 @@ def pytest_collection_modifyitems(items):
 @pytest.fixture(scope="session")
 def gathered() -> Gathered:
     """Gathered once per process."""
-    ask = ask_of(Scenario(), "quick", 20, tuple(WITNESSES))
+    ask = replace(ask_of(Scenario(), "quick", 20, tuple(WITNESSES)), reference=Scenario().with_slices(20))
     return gather_report(ask, work={"work-precision": contenders.QUICK})
 
 
