@@ -61,6 +61,8 @@ COMMANDS = pytest.mark.parametrize(
     ],
     ids=lambda value: str(value[0]) if isinstance(value, list) else str(value),
 )
+
+
 @pytest.fixture
 def place(tmp_path):
     """Return a folder with a throw, and the snapshot's summary with every claim failed."""
