@@ -18,6 +18,7 @@ from flipproof.chapters.landing.figures import figures, witnesses
 from flipproof.chapters.landing.study import AIMING, Key, Size, aiming, cell_of, filled, share_of, standing
 from flipproof.chapters.landing.tables import page, shares_csv
 from flipproof.cli.main import main
+from flipproof.frame.exhibit import drawn
 from flipproof.frame.gather import tell
 from flipproof.frame.pool import Here
 from flipproof.frame.store import RunStore
@@ -274,7 +275,7 @@ def test_every_finding_and_figure_says_what_is_assumed(found):
         if "P(upright)" in finding.title:
             assert "e_table = 0.3" in finding.note
             assert "scatter 5 %" in finding.note
-    exhibits = figures(found)
+    exhibits = drawn(figures(found), 1, png=False)
     assert len({exhibit.name for exhibit in exhibits}) == len(exhibits) == 6
     for exhibit in exhibits:
         assert exhibit.drawing.svg.startswith("<?xml")
@@ -457,7 +458,7 @@ def test_a_throw_that_cannot_land_fails_nothing():
     assert told.found.cells == {}
     assert not [finding for finding in told.findings if finding.failed]
     assert {finding.kind for finding in told.findings if finding.id == "landing-undecided"} == {"observation"}
-    assert all(figure.drawing.svg.startswith("<?xml") for figure in told.figures)
+    assert all(figure.drawing.svg.startswith("<?xml") for figure in drawn(told.figures, 1, png=False))
 
 
 def test_a_folder_that_is_not_the_studys_is_refused(tmp_path):
