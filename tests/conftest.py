@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import matplotlib
 import pytest
@@ -11,6 +12,7 @@ from flipproof.build import Report, ask_of, build, gather_report
 from flipproof.chapters.solvers import WITNESSES
 from flipproof.chapters.work_precision import contenders
 from flipproof.frame.gather import Gathered
+from flipproof.frame.pool import Here
 from flipproof.output.provenance import provenance
 from slicemodel import Scenario
 
@@ -55,8 +57,9 @@ def pytest_collection_modifyitems(items):
 @pytest.fixture(scope="session")
 def gathered() -> Gathered:
     """Gathered once per process."""
-    ask = ask_of(Scenario(), "quick", 20, tuple(WITNESSES))
-    return gather_report(ask, work={"work-precision": contenders.QUICK})
+    ask = replace(ask_of(Scenario(), "quick", 20, tuple(WITNESSES)), reference=Scenario().with_slices(20))
+    # In this process: test_report.py has a report made by workers, whose start costs a fifth of all of it.
+    return gather_report(ask, work={"work-precision": contenders.QUICK}, pool=Here())
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,7 @@
 """Consoles of every kind, interrupts at any time, and errors of flipproof's own: one line and the right status."""
 
 import io
+import json
 import os
 import signal
 import subprocess
@@ -9,6 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
+from made_up import command
 
 from flipproof.cli import console
 from flipproof.cli import main as cli
@@ -45,8 +47,7 @@ def test_no_letter_of_the_sources_becomes_a_question_mark():
     assert unknown <= {"\ufffd"}
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
-@pytest.mark.parametrize(
+COMMANDS = pytest.mark.parametrize(
     ("status", "arguments"),
     [
         (0, ["--help"]),
@@ -60,13 +61,40 @@ def test_no_letter_of_the_sources_becomes_a_question_mark():
     ],
     ids=lambda value: str(value[0]) if isinstance(value, list) else str(value),
 )
-def test_a_command_ends_with_its_own_status_on_a_poor_console(tmp_path, encoding, status, arguments):
+
+
+@pytest.fixture
+def place(tmp_path):
+    """Return a folder with a throw, and the snapshot's summary with every claim failed."""
     (tmp_path / "throw.toml").write_text("[scenario]\nn_slices = 4\n", encoding="utf-8")
     text = SNAPSHOT.read_text(encoding="utf-8").replace('"verdict": "pass"', '"verdict": "fail"')
     (tmp_path / "changed.json").write_text(text, encoding="utf-8")
-    told = flipproof(tmp_path, *arguments, encoding=encoding)
+    return tmp_path
+
+
+@COMMANDS
+def test_a_command_ends_with_its_own_status_on_a_poor_console(place, status, arguments):
+    told = flipproof(place, *arguments, encoding="ascii")
     assert told.returncode == status, told.stderr
     assert "Traceback" not in told.stderr
+
+
+@COMMANDS
+def test_it_does_so_on_a_console_of_another_encoding(place, monkeypatch, status, arguments):
+    """In this process: what ends a program on such a console is what it writes."""
+    monkeypatch.chdir(place)
+    streams = {name: io.TextIOWrapper(io.BytesIO(), encoding="cp1252") for name in ("stdout", "stderr")}
+    for name, stream in streams.items():
+        monkeypatch.setattr(sys, name, stream)
+    try:
+        ended = cli.main([str(argument) for argument in arguments])
+    except SystemExit as left:
+        ended = left.code
+    for stream in streams.values():
+        stream.flush()
+    said = streams["stderr"].buffer.getvalue().decode("cp1252")
+    assert ended == status, said
+    assert "Traceback" not in said
 
 
 def test_an_error_of_flipproofs_own_has_its_own_status(monkeypatch, capsys):
@@ -101,26 +129,33 @@ def test_an_error_message_is_never_endless():
     assert len(readable("word " * 10_000)) < 2100
 
 
-def test_what_is_echoed_is_cut(tmp_path):
+def test_what_is_echoed_is_cut(capsys):
     for arguments in (["simulate", "--steps", "9" * 5000 + "x"], ["simulate", "--solver", "z" * 50_000]):
-        told = flipproof(tmp_path, *arguments)
-        assert told.returncode == 2
-        assert told.stderr.startswith("flipproof: error: ")
-        assert len(told.stderr) < 1500
+        status, _, said = command(capsys, *arguments)
+        assert status == 2
+        assert said.startswith("flipproof: error: ")
+        assert len(said) < 1500
 
 
-@pytest.mark.parametrize("place", ["/dev/zero", "large.toml", "pipe"])
-def test_an_endless_scenario_ends_at_once(tmp_path, place):
+@pytest.mark.parametrize("endless", ["/dev/zero", "large.toml", "pipe"])
+def test_an_endless_scenario_ends_at_once(tmp_path, endless):
+    """One process makes all commands, since one that reads on would never come back."""
     os.mkfifo(tmp_path / "pipe")
     with (tmp_path / "large.toml").open("wb") as file:
         file.truncate(40 * 2**20)
-    track = ("track", place, "--cap", "cap", "--base", "base", "--length-unit", "m")
-    others = (("sweep", place, "--out", "sweep"), ("fit", place), track) if place != "large.toml" else ()
-    for arguments in (("simulate", place), *others):
-        told = flipproof(tmp_path, *arguments)
-        assert told.returncode == 2
-        assert told.stderr.count("\n") == 1
-        assert place in told.stderr
+    track = ["track", endless, "--cap", "cap", "--base", "base", "--length-unit", "m"]
+    others = [["sweep", endless, "--out", "sweep"], ["fit", endless], track] if endless != "large.toml" else []
+    commands = [["simulate", endless], *others]
+    code = "import json, sys; from flipproof.cli.main import main; print([main(c) for c in json.loads(sys.argv[1])])"
+    told = subprocess.run(
+        [sys.executable, "-c", code, json.dumps(commands)],
+        cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=120,
+        check=False,
+    )  # fmt: skip
+    assert told.stdout == f"{[2] * len(commands)}\n"
+    said = told.stderr.splitlines()
+    assert len(said) == len(commands)
+    assert all(endless in line for line in said)
     assert not (tmp_path / "sweep").exists()
 
 

@@ -33,12 +33,7 @@ def test_the_noise_of_a_filmed_angle_is_that_of_two_markers():
     assert abs(np.corrcoef(off[1:], off[:-1])[0, 1]) < 0.12
 
 
-def films(few, many):
-    """Return numbers of films: few on every push, many among the long forms."""
-    return pytest.mark.parametrize("count", [few, pytest.param(many, marks=pytest.mark.slow)])
-
-
-@films(3, 8)
+@pytest.mark.parametrize("count", [3, pytest.param(8, marks=pytest.mark.slow)])
 def test_intervals_hold_the_truth_and_are_not_overlong(count):
     twins = [fit_twin(seed, "midpoint", slices=20) for seed in range(300, 300 + count)]
     held = sum(twin.covers("drag") and twin.covers("restitution") for twin in twins)
@@ -66,10 +61,10 @@ def test_the_papers_omega_tells_less_than_theta_but_nothing_wrong():
     assert by_omega.width("drag") < 1.0
 
 
-@films(2, 4)
+@pytest.mark.parametrize(("count", "slices"), [(2, 8), pytest.param(4, 20, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("model", ["eq8", "free-flight"])
-def test_intervals_of_an_equation_with_exact_events_hold_the_truth(model, count):
-    twins = [fit_twin(seed, model, slices=20) for seed in range(300, 300 + count)]
+def test_intervals_of_an_equation_with_exact_events_hold_the_truth(model, count, slices):
+    twins = [fit_twin(seed, model, slices=slices) for seed in range(300, 300 + count)]
     held = sum(twin.covers("drag") and twin.covers("restitution") for twin in twins)
     assert held >= 0.75 * count, [(twin.seed, twin.intervals) for twin in twins]
     assert median(twin.width("drag") for twin in twins) < 0.15

@@ -2,7 +2,9 @@
 
 import json
 import math
+import shutil
 import sqlite3
+from contextlib import nullcontext
 from dataclasses import replace
 
 import pytest
@@ -16,6 +18,7 @@ from flipproof.chapters.landing.figures import figures, witnesses
 from flipproof.chapters.landing.study import AIMING, Key, Size, aiming, cell_of, filled, share_of, standing
 from flipproof.chapters.landing.tables import page, shares_csv
 from flipproof.cli.main import main
+from flipproof.frame.exhibit import drawn
 from flipproof.frame.gather import tell
 from flipproof.frame.pool import Here
 from flipproof.frame.store import RunStore
@@ -26,6 +29,7 @@ from flipproof.landing.throw import land_throw, told
 from flipproof.landing.upright import drive, make_case, make_upright
 from flipproof.landing.work import LANDING, Landed, flown, make_landing, saddle, touch_readings
 from flipproof.sweep.errors import SweepError
+from flipproof.sweep.workers import Workers
 from ode_reference import fly, land
 from ode_reference.landing_forms import Block
 from slicemodel import Scenario, Table
@@ -271,7 +275,7 @@ def test_every_finding_and_figure_says_what_is_assumed(found):
         if "P(upright)" in finding.title:
             assert "e_table = 0.3" in finding.note
             assert "scatter 5 %" in finding.note
-    exhibits = figures(found)
+    exhibits = drawn(figures(found), 1, png=False)
     assert len({exhibit.name for exhibit in exhibits}) == len(exhibits) == 6
     for exhibit in exhibits:
         assert exhibit.drawing.svg.startswith("<?xml")
@@ -331,22 +335,42 @@ def test_the_stored_witnesses_are_enough_and_agree(found):
         assert "reached" in finding.note
 
 
-def test_the_sweep_makes_the_same_and_goes_on(found, tmp_path):
-    said = []
-    out = tmp_path / "study"
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    """Return the folder of a study that a worker process made, what it said on the way, and its last words."""
+    said, out = [], tmp_path_factory.mktemp("swept") / "study"
     words = make_upright(THROW, SMALL, out, quiet, said.append, jobs=1)
+    return out, said, words
+
+
+@pytest.fixture
+def copied(swept, tmp_path, monkeypatch):
+    """Return a copy of that study, to be gone on with in this process and without figures, which are drawn there."""
+    here = Workers(executor=Here(), capacity=lambda: 1, died=())
+    monkeypatch.setattr("flipproof.sweep.command.local_workers", lambda _: nullcontext(here))
+    monkeypatch.setattr("flipproof.landing.upright.figures", lambda _: ())
+    return shutil.copytree(swept[0], tmp_path / "study")
+
+
+def test_the_sweep_makes_the_same(found, swept):
+    out, said, words = swept
     assert "P(upright), family B" in words
     assert said[0].startswith("aims: ")
     assert (out / "upright.csv").read_text(encoding="utf-8") == shares_csv(found)
+    assert len(list(out.glob("*.svg"))) == len(list(out.glob("*.png"))) == 6
+
+
+def test_the_sweep_goes_on(found, copied):
+    out = copied
     file = out / "throws" / "sweep.sqlite"
     with sqlite3.connect(file) as rows:
         rows.execute("DELETE FROM points WHERE number % 3 = 0")
     rows.close()
     (out / "upright.csv").unlink()
-    make_upright(THROW, SMALL, out, quiet, said.append, jobs=1)
+    make_upright(THROW, SMALL, out, quiet, lambda _: None, jobs=1)
     assert (out / "upright.csv").read_text(encoding="utf-8") == shares_csv(found)
     with pytest.raises(SweepError, match="holds another design"):
-        make_upright(THROW, replace(SMALL, seed=2), out, quiet, said.append, jobs=1)
+        make_upright(THROW, replace(SMALL, seed=2), out, quiet, lambda _: None, jobs=1)
     with sqlite3.connect(file) as rows:
         names = [row[1] for row in rows.execute("PRAGMA table_info(points)")]
         outcomes = {row[0] for row in rows.execute("SELECT outcome FROM points")}
@@ -364,9 +388,8 @@ def spoil(file, begin):
 
 
 @pytest.mark.parametrize("named", ["", "throws/sweep.sqlite"])
-def test_a_damaged_study_is_salvaged_and_gone_on_with(found, named, tmp_path):
-    out, new = tmp_path / "study", tmp_path / "new"
-    make_upright(THROW, SMALL, out, quiet, lambda _: None, jobs=1)
+def test_a_damaged_study_is_salvaged_and_gone_on_with(found, named, copied, tmp_path):
+    out, new = copied, tmp_path / "new"
     spoil(out / "throws" / "sweep.sqlite", b"upright")
     with pytest.raises(SweepError, match=rf"can be saved: the same command with --salvage {out}/throws/sweep\.sqlite"):
         make_upright(THROW, SMALL, out, quiet, lambda _: None, jobs=1)
@@ -381,10 +404,9 @@ def test_a_damaged_study_is_salvaged_and_gone_on_with(found, named, tmp_path):
     assert (new / "upright.csv").read_text(encoding="utf-8") == shares_csv(found)
 
 
-def test_a_study_is_salvaged_without_its_aims(tmp_path):
+def test_a_study_is_salvaged_without_its_aims(copied, tmp_path):
     """Aims are made anew; which throws are counted is known only after them."""
-    out, new = tmp_path / "study", tmp_path / "new"
-    make_upright(THROW, SMALL, out, quiet, lambda _: None, jobs=1)
+    out, new = copied, tmp_path / "new"
     (out / "aims" / "sweep.sqlite").write_bytes(b"")
     words = make_upright(THROW, SMALL, new, quiet, lambda _: None, jobs=1, damaged=out)
     aims, throws = words.splitlines()
@@ -397,7 +419,8 @@ def test_a_study_is_salvaged_without_its_aims(tmp_path):
     assert not (tmp_path / "more").exists()
 
 
-def test_workers_of_a_scheduler_make_the_same(found, tmp_path):
+def test_workers_of_a_scheduler_make_the_same(found, tmp_path, monkeypatch):
+    monkeypatch.setattr("flipproof.landing.upright.figures", lambda _: ())
     with LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0", silence_logs=50
     ) as cluster:
@@ -435,7 +458,7 @@ def test_a_throw_that_cannot_land_fails_nothing():
     assert told.found.cells == {}
     assert not [finding for finding in told.findings if finding.failed]
     assert {finding.kind for finding in told.findings if finding.id == "landing-undecided"} == {"observation"}
-    assert all(figure.drawing.svg.startswith("<?xml") for figure in told.figures)
+    assert all(figure.drawing.svg.startswith("<?xml") for figure in drawn(told.figures, 1, png=False))
 
 
 def test_a_folder_that_is_not_the_studys_is_refused(tmp_path):

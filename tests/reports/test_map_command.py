@@ -17,6 +17,7 @@ from made_up import study_map
 
 from flipproof.chapters.maps.study import CURVE, LADDER, RUNGS
 from flipproof.chapters.waterfall.study import OBSERVABLES, observe, split_all
+from flipproof.figures.style import Drawing
 from flipproof.frame.pool import Here
 from flipproof.frame.solvers import make
 from flipproof.sweep.design import design_of
@@ -109,11 +110,11 @@ def test_a_map_killed_midway_goes_on_to_the_rows_and_the_picture_of_an_undisturb
     there = len(stored(tmp_path / "killed"))
     assert 0 < there < 20 * 42
     assert not (tmp_path / "killed" / "map.png").exists()
-    status, out, _ = run(capsys, *options, "--out", tmp_path / "killed")
-    assert status == 0
-    assert f"; {there} were there\ncells by largest fair share: " in out
     with monkeypatch.context() as patch:
         patch.setattr("flipproof.sweep.command.local_workers", lambda _: nullcontext(Workers(**HERE)))
+        status, out, _ = run(capsys, *options, "--out", tmp_path / "killed")
+        assert status == 0
+        assert f"; {there} were there\ncells by largest fair share: " in out
         assert run(capsys, *options, "--out", tmp_path / "whole")[0] == 0
     assert stored(tmp_path / "killed") == stored(tmp_path / "whole")
     for name in ("map.svg", "map.png", "map.csv", "map.json"):
@@ -248,8 +249,12 @@ def test_the_waterfall_command_draws_every_observable(capsys, tmp_path, monkeypa
     assert "164 points" in out
     for observable in OBSERVABLES:
         assert (tmp_path / "out" / f"waterfall-{observable.name}.png").stat().st_size > 10_000
+    drawn = Drawing("<svg/>", b"anew")
+    monkeypatch.setattr("flipproof.sweep.split.draw", lambda _: drawn)
     status, out, _ = run(capsys, *options)
     assert "; 164 were there" in out
+    for observable in OBSERVABLES:
+        assert (tmp_path / "out" / f"waterfall-{observable.name}.png").read_bytes() == b"anew"
 
 
 @pytest.mark.parametrize(

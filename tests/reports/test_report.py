@@ -31,7 +31,6 @@ from flipproof.frame.exhibit import drawn
 from flipproof.frame.gather import tell
 from flipproof.frame.pool import make_all, workers
 from flipproof.frame.solvers import Run, make
-from flipproof.frame.throws import REFERENCE
 from flipproof.output.ownership import MARKER, marker_text
 from flipproof.page.equations import typeset
 from slicemodel import Scenario
@@ -233,7 +232,7 @@ def test_a_failed_regression_sets_status_1_and_says_which(monkeypatch, capsys, t
 def test_a_solver_that_fails_is_shown_in_place(monkeypatch, capsys, tmp_path, gathered):
     """The page, the summary and the verdicts for CI systems give the reason; the rest of the report is whole."""
     reason = "SetupError: the world is not the one that was meant"
-    runs = [gathered.ask.solvers[ENGINE], Run(ENGINE, REFERENCE, {"dt": CHECK_DT})]
+    runs = [gathered.ask.solvers[ENGINE], Run(ENGINE, gathered.ask.reference, {"dt": CHECK_DT})]
     chapters = ("flights", "differences", "certificates", "agreement", "engine-facts")
     broken = spoiled(gathered, runs, reason, chapters)
     folder = tmp_path / "latest"

@@ -16,7 +16,7 @@ from ode_reference import combinations, contact, motion, witness
 from slicemodel import Scenario
 
 TESTS = Path(__file__).resolve().parents[1]
-THROW = dataclasses.replace(Scenario().with_slices(6), duration=0.4)
+THROW = dataclasses.replace(Scenario().with_slices(4), duration=0.25)
 STEPS = 40
 
 

@@ -322,6 +322,15 @@ def test_one_damaged_byte_is_seen_and_costs_one_row_at_the_most(kind, request, t
     assert unseen < 60
 
 
+def test_a_schema_that_is_no_text_is_damage_too(sound, tmp_path):
+    """SQLite quotes the byte that it does not understand, and Python cannot read the quotation."""
+    file = copied(sound, tmp_path / "damaged")
+    content = file.read_bytes()
+    file.write_bytes(content.replace(b"CREATE TABLE design", b"CREATE \xa0ABLE design", 1))
+    assert file.read_bytes() != content
+    assert f"{POINTS} of {POINTS} points can be saved" in complaint(file.parent, design())
+
+
 def complaint(folder, made):
     """Return what is said when a sweep is opened, or nothing."""
     try:

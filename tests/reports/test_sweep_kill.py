@@ -37,7 +37,7 @@ def undisturbed(tmp_path_factory):
     """Return a design's file, and the folder of a sweep that nothing disturbed."""
     place = tmp_path_factory.mktemp("undisturbed")
     (place / "sweep.toml").write_text(sweep_kill.DESIGN.format(samples=POINTS // 2))
-    sweep_kill.finish(sweep_kill.start(place / "sweep.toml", place / "out"))
+    sweep_kill.finish(sweep_kill.start(place / "sweep.toml", place / "out", "--jobs", "1"))
     return place / "sweep.toml", place / "out"
 
 

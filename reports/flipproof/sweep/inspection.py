@@ -51,6 +51,8 @@ def inspect(file: Path, design: Plan, code: str, patience: float) -> None:
             if result_code(error) in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
                 raise
             wrong = str(error)
+        except UnicodeDecodeError:  # raised in place of SQLite's error, which quotes what it cannot read
+            wrong = "its schema is no text"
     if wrong:
         raise damage(file, design, code, wrong)
 
