@@ -275,7 +275,7 @@ def test_every_finding_and_figure_says_what_is_assumed(found):
         if "P(upright)" in finding.title:
             assert "e_table = 0.3" in finding.note
             assert "scatter 5 %" in finding.note
-    exhibits = drawn(figures(found), 1, png=False)
+    exhibits = drawn(figures(found), Here(), png=False)
     assert len({exhibit.name for exhibit in exhibits}) == len(exhibits) == 6
     for exhibit in exhibits:
         assert exhibit.drawing.svg.startswith("<?xml")
@@ -458,7 +458,7 @@ def test_a_throw_that_cannot_land_fails_nothing():
     assert told.found.cells == {}
     assert not [finding for finding in told.findings if finding.failed]
     assert {finding.kind for finding in told.findings if finding.id == "landing-undecided"} == {"observation"}
-    assert all(figure.drawing.svg.startswith("<?xml") for figure in drawn(told.figures, 1, png=False))
+    assert all(figure.drawing.svg.startswith("<?xml") for figure in drawn(told.figures, Here(), png=False))
 
 
 def test_a_folder_that_is_not_the_studys_is_refused(tmp_path):
