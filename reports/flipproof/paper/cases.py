@@ -95,22 +95,30 @@ def _entries() -> dict[str, list[Entry]]:
     }
 
 
+SLICES_VARY: Final = ("beta", "beta at 5 /s", "slices", "slices at 5 /s", "slices at alpha 1")
+"""Families whose subject is the number of slices."""
+
+WHOLE: Final = ("filling", "long", "flight", "beta", "beta at 5 /s", "drag")
+"""Families whose slices are looked at."""
+
+
 def _families() -> dict[str, tuple[Case, ...]]:
     keys: dict[tuple[Scenario, int, bool], str] = {}
     # A long flight has the step of the short one to 0.1 %.
     intervals = (paper_steps() - 1) * number("figure-9-duration") / number("duration")
     long_steps = 1 + LONG_THIN * round(intervals / LONG_THIN)
+    steps_vary = {f"steps {filling:g}" for filling in numbers("figure-S1-filling")}
 
     def case(name: str, key: str, value: float, scenario: Scenario) -> Case:
-        steps = long_steps if name == "long" else round(value) if name.startswith("steps") else paper_steps()
-        slices_vary = name.startswith(("beta", "slices"))
+        steps = long_steps if name == "long" else round(value) if name in steps_vary else paper_steps()
+        slices_vary = name in SLICES_VARY
         return Case(
             key=keys.setdefault((scenario, steps, slices_vary), key),
             value=value,
             scenario=scenario,
             steps=steps,
             slices_vary=slices_vary,
-            whole=name.startswith(("filling", "long", "flight", "beta", "drag")),
+            whole=name in WHOLE,
             thin=LONG_THIN if name == "long" else 1,
         )
 
