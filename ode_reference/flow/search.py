@@ -42,7 +42,7 @@ STANDING = 1e-14
 
 @inner
 def first_zero(now, table, order):
-    """Return the first zero in [0, 1] of the polynomial, positive or zero at 0; NONE if there is none.
+    """Return the first zero in [0, 1] of the polynomial, positive or zero at 0; NONE if none is before ``root``.
 
     The parabola with value and slope of the polynomial and the most negative curvature that the coefficients allow
     lies below it: its zero is never beyond the polynomial's own, and the last steps are as long as Newton's.

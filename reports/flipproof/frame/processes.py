@@ -148,7 +148,7 @@ class Processes(Executor):
 
 
 class _Worker:
-    """One process and the pipe to it."""
+    """One process and the pipe to it; ``ready`` from its first word on, which says that it could start."""
 
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")
