@@ -7,8 +7,7 @@ from made_up import page_of, spoiled
 from engine_check.solver import DEFAULT_TOLERANCE
 from flipproof.chapters.solvers import CERTIFIED, TOLERANCE, UNCERTIFIED_DT, WITNESSES, solver_runs, witnesses
 from flipproof.frame.gather import tell
-from flipproof.frame.solvers import make
-from flipproof.frame.throws import REFERENCE
+from flipproof.frame.solvers import REFERENCE, make
 
 ENGINES = ("flights", "differences", "certificates", "agreement")
 

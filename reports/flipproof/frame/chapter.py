@@ -17,9 +17,7 @@ from typing import Any, Generic, Literal, TypeVar
 
 from flipproof.frame.exhibit import Exhibit, Touch
 from flipproof.frame.findings import Finding, Kind, observed, regression
-from flipproof.frame.flights import Call, Flights, Outcome, attempt, known
-from flipproof.frame.solvers import Made, Missing, Run
-from flipproof.frame.throws import REFERENCE
+from flipproof.frame.solvers import REFERENCE, Call, Flights, Made, Missing, Outcome, Run, attempt, known
 from slicemodel import Scenario
 
 __all__ = [

@@ -12,9 +12,8 @@ from typing import Any
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Part
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding
-from flipproof.frame.flights import Call, Flights, Outcome, attempt
 from flipproof.frame.pool import Progress, make_all
-from flipproof.frame.solvers import Run
+from flipproof.frame.solvers import Call, Flights, Outcome, Run, attempt
 from flipproof.frame.store import RunStore
 
 

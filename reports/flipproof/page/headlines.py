@@ -22,7 +22,7 @@ from flipproof.chapters.finite_step.chapter import EVERYTHING, HELD, LOCATED, St
 from flipproof.chapters.solvers import FREE
 from flipproof.chapters.waterfall.study import NAMES, STEP, Bar, Waterfall
 from flipproof.frame.gather import Gathered
-from flipproof.frame.throws import FINER
+from flipproof.frame.solvers import FINER
 
 Measure = Literal["largest", "start", "landing", "share", "order"]
 

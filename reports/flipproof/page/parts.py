@@ -15,7 +15,7 @@ from flipproof.frame.chapter import Part
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding
 from flipproof.frame.gather import Gathered, Told
-from flipproof.frame.throws import FINER
+from flipproof.frame.solvers import FINER
 from flipproof.page.glossary import indexed, linked
 
 STORY: Final[Mapping[str, str]] = {

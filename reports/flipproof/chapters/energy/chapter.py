@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Made, Run, Study, judged
-from flipproof.frame.findings import Finding, regression
-from flipproof.frame.flights import Outcome, attempt, known
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Finding, Study, judged, regression
+from flipproof.frame.solvers import Made, Outcome, Run, attempt, known
 from ode_reference.models import LADDER
 from slicemodel import Trajectory
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from flipproof.chapters.solvers import LIMITS
 from flipproof.frame.chapter import Ask, Chapter, Claims, Run, Study, attempt, observed
-from flipproof.frame.throws import finer
+from flipproof.frame.solvers import finer
 from slicemodel import Trajectory
 
 

@@ -9,9 +9,8 @@ import numpy as np
 
 from flipproof.chapters.model_form.study import ModelForm, Richardson, richardson, study_model_form
 from flipproof.chapters.step_size.study import errors_of, plan_step_size
-from flipproof.frame.chapter import Ask, Chapter, Claims, Run, Study, judged
-from flipproof.frame.findings import Finding, observed
-from flipproof.frame.flights import Call, Outcome, attempt, known
+from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Study, judged, observed
+from flipproof.frame.solvers import Call, Outcome, Run, attempt, known
 
 FORMS: Final = (
     ("exact-step", "eq8"),

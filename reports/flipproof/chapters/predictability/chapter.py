@@ -16,9 +16,8 @@ from flipproof.chapters.predictability.study import (
     study_predictability,
 )
 from flipproof.figures.style import new_figure, solver_style, styled
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Study, judged
-from flipproof.frame.findings import Finding, observed
-from flipproof.frame.flights import Outcome, attempt, known
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, judged, observed
+from flipproof.frame.solvers import Outcome, attempt, known
 from flipproof.output.columns import curves_csv
 
 SIZE_LINES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (3, 1.5, 1, 1.5)), (0, (1, 1.5)))

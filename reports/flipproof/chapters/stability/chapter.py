@@ -24,8 +24,8 @@ from flipproof.chapters.stability.study import (
     study_stability,
 )
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Made, Run, Study, judged
-from flipproof.frame.findings import Finding, observed, regression
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, judged, observed, regression
+from flipproof.frame.solvers import Made, Run
 from flipproof.output.columns import rows_csv
 from slicemodel import Trajectory
 

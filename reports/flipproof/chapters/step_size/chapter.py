@@ -20,9 +20,8 @@ from flipproof.chapters.step_size.study import (
     study_step_size,
 )
 from flipproof.figures.style import MARKERS, STYLES, new_figure, shared_legend, solver_style, styled
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Missing, Run, Study, judged
-from flipproof.frame.findings import Finding, Kind, observed, regression
-from flipproof.frame.flights import Flights, Outcome, attempt, known
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Kind, Study, judged, observed, regression
+from flipproof.frame.solvers import Flights, Missing, Outcome, Run, attempt, known
 from flipproof.output.columns import rows_csv
 
 CHECKED: Final = ("before the first impact", "across impacts")

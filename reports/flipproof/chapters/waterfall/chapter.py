@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from flipproof.chapters.waterfall.study import Waterfall, observe, plan_finer, plan_waterfall, program_run, split_all
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, observed
-from flipproof.frame.throws import FINER
+from flipproof.frame.solvers import FINER
 from flipproof.output.columns import rows_csv
 
 UP, DOWN, WHOLE = "#0072B2", "#D55E00", "#666666"

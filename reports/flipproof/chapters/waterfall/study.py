@@ -22,8 +22,7 @@ from itertools import chain, combinations
 from types import MappingProxyType
 from typing import Final, NamedTuple, TypeVar
 
-from flipproof.frame.solvers import Run
-from flipproof.frame.throws import finer
+from flipproof.frame.solvers import Run, finer
 from flipproof.frame.twins import band, twins
 from ode_reference.solver import COLUMN
 from ode_reference.switches import Switches
