@@ -75,8 +75,8 @@ def study_agreement(
     if len(names) < 2:
         raise ValueError(f"runs = {list(names)}: an agreement takes at least two")
     first = runs[names[0]]
-    for name in names[1:]:
-        if runs[name].scenario != first.scenario or not np.array_equal(runs[name].t, first.t):
+    for name, run in runs.items():
+        if run.scenario != first.scenario or not np.array_equal(run.t, first.t):
             raise ValueError(f"{name} and {names[0]} are not runs of one throw at the same times")
     seen = first.t <= until
     pairs = []
@@ -100,12 +100,8 @@ def _words(names: tuple[str, ...], pairs: list[Pair]) -> str:
     return f"outside their bands: {named}; no single one of them explains it"
 
 
-@dataclass(frozen=True, slots=True)
-class Agreed:
-    """Equation -> the comparison of those who solve it, at a number of slices."""
-
-    agreements: Mapping[str, Agreement]
-    slices: int
+Agreed = Mapping[str, Agreement]
+"""Equation -> the comparison of those who solve it."""
 
 
 def study(ask: Ask) -> Study[Agreed]:
@@ -127,8 +123,7 @@ def study(ask: Ask) -> Study[Agreed]:
         coarser[equation] = Run(equation, ask.throw, coarse, f"{equation}, {SOLVE_IVP}, coarser")
     every = [run for each in runs.values() for run in each.values()]
     flights = yield [*every, *coarser.values(), *(twin for name in runs for twin in twins(runs[name][name]))]
-    agreements = {name: agreement_on(name, each, coarser[name], flights) for name, each in runs.items()}
-    return Agreed(agreements, ask.throw.n_slices)
+    return {name: agreement_on(name, each, coarser[name], flights) for name, each in runs.items()}
 
 
 def agreement_on(equation: str, runs: Mapping[str, Run], coarser: Run, flights: Flights) -> Agreement:
@@ -158,7 +153,7 @@ def band_over_time(run: Run, others_of: Iterable[Run], flights: Flights) -> Floa
 
 def claims(found: Agreed) -> Claims:
     """Yield for each equation the largest difference of a pair, and which solver differs from all others."""
-    for equation, agreement in found.agreements.items():
+    for equation, agreement in found.items():
         widest = max(agreement.pairs, key=lambda pair: pair.largest)
         pairs = [f"{p.first} and {p.second} {p.largest:.1e}, {100 * p.share:.0f} % within" for p in agreement.pairs]
         id_ = "agreement" if equation == FREE else f"agreement-{equation}"

@@ -40,9 +40,8 @@ def claims(found: Certificates) -> Claims:
         words = [f"Δt = {settings['step']:.3g} s" if settings.get("step") else "no step was completed"]
         if settings.get("iterations") is not None:
             words.append(f"{settings['iterations']} iterations")
-        hits = {"grid": "hits on the step's grid", "located": "hits located by us"}.get(settings.get("hits"))
-        if hits is not None:
-            words.append(hits)
+        if settings.get("hits") is not None:
+            words.append({"grid": "hits on the step's grid", "located": "hits located by us"}[settings["hits"]])
         words.append(f"order {order:.2f}" if order is not None else f"no order: {certificate['order_reason']}")
         if certificate["reason"]:
             words.append(certificate["reason"])

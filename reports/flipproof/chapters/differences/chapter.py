@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, percent, study_difference
-from flipproof.chapters.predictability.study import parting_words
+from flipproof.chapters.predictability.chapter import parting_words
 from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, WITNESSES
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.figures.style import new_figure, styled
@@ -72,8 +72,9 @@ def study(ask: Ask) -> Study[Differences]:
         bands: dict[str, float] = {}
         more: dict[str, Run] = {}
     else:
-        more = {ENGINE: finer(runs[ENGINE])} if ask.size == "full" else {}
-        more |= {name: fine(runs[name]) for name in (*SCHEMES, *LADDER)}
+        again = (*((ENGINE,) if ask.size == "full" else ()), *SCHEMES, *LADDER)
+        more = {name: finer(runs[name]) for name in again}
+        more |= {name: replace(more[name], settings={**more[name].settings, "store": "summary"}) for name in SCHEMES}
         flights = yield [*more.values(), *runs.values(), *(twin for model in LADDER for twin in twins(runs[model]))]
         bands = run_bands(runs, flights)
     flown = flights.trajectories(runs)
@@ -89,24 +90,18 @@ def study(ask: Ask) -> Study[Differences]:
             finer=(refined[first], refined[second]) if {first, second} <= set(refined) else None,
         )
 
+    def growth(difference: Difference) -> str:
+        located = flown.get(LIMITS.get(difference.first, difference.first))
+        return parting_words(difference, None if located is None else located.impacts)
+
     tried = {pair: attempt(compared, *pair) for pair in PAIRS if set(pair[1:]) <= set(runs)}
     pairs = tuple(known(tried).values())
-    growths = []
-    for difference in pairs:
-        if difference.parting_time is not None:
-            located = flown.get(LIMITS.get(difference.first, difference.first))
-            growths.append(parting_words(difference, None if located is None else located.impacts))
+    growths = tuple(growth(difference) for difference in pairs if difference.parting_time is not None)
     free, ended = flown.get(FREE), ""
     if free is not None and not free.ok:
         ended = f"up to t = {1e3 * free.t[-1]:.0f} ms, where {free.method} {free.status}"
     missing = {pair: outcome.reason for pair, outcome in tried.items() if outcome.reason}
-    return Differences(pairs, tuple(growths), ask.throw.n_slices, ended, missing)
-
-
-def fine(run: Run) -> Run:
-    """Return the run at ``FINER`` times the slices; a scheme then stores a summary."""
-    more = finer(run)
-    return Run(more.solver, more.scenario, {**more.settings, "store": "summary"} if more.settings else {}, more.label)
+    return Differences(pairs, growths, ask.throw.n_slices, ended, missing)
 
 
 def run_bands(runs: Mapping[str, Run], flights: Flights) -> dict[str, float]:

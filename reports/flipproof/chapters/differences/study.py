@@ -90,7 +90,8 @@ def study_difference(
     omega = (np.interp(t, second.t, second.omega) - first.omega[: len(t)]) / first.scenario.omega0
     size = np.abs(omega)
     k = int(size.argmax())
-    parting = first_crossing(t, size, PARTING_BAND)
+    parting, impacts = first_crossing(t, size, PARTING_BAND), None if impacts_of is None else impacts_of.impacts
+    before = 0 if parting is None or impacts is None else int(np.searchsorted(impacts.time, parting, side="right"))
     return Difference(
         name=name,
         first=first.label,
@@ -101,7 +102,7 @@ def study_difference(
         largest_time=float(t[k]),
         final=float(omega[-1]),
         parting_time=parting,
-        parting_impact=_last_impact(parting, impacts_of),
+        parting_impact=impacts[before - 1] if impacts is not None and before else None,
         band=band,
         slices=first.scenario.n_slices,
         finer=None if finer is None else (finer[0].scenario.n_slices, study_difference(name, *finer).largest),
@@ -110,23 +111,13 @@ def study_difference(
 
 def first_crossing(t: FloatArray, size: FloatArray, band: float) -> float | None:
     """Return when ``size`` first exceeds ``band``, linear between points; None if never."""
-    above = size > band
-    if not above.any():
+    above = np.flatnonzero(size > band)
+    if not len(above):
         return None
-    k = int(above.argmax())
-    if k == 0:
+    if (k := int(above[0])) == 0:
         return float(t[0])
     share = (band - size[k - 1]) / (size[k] - size[k - 1])
     return float(t[k - 1] + share * (t[k] - t[k - 1]))
-
-
-def _last_impact(parting: float | None, trajectory: Trajectory | None) -> Impact | None:
-    """Return the last impact up to ``parting``, if there is one."""
-    if parting is None or trajectory is None or trajectory.impacts is None:
-        return None
-    impacts = trajectory.impacts
-    k = int(np.searchsorted(impacts.time, parting, side="right"))
-    return impacts[k - 1] if k else None
 
 
 def claim_change(

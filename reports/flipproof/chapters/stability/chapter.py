@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -149,7 +150,7 @@ LOOKS = {
 def figure_stability(panels: Sequence[StabilityPanel]) -> Figure:
     """Grades over step and iterations, one panel per bottle: colour, sign and number in every cell."""
     columns = min(2, len(panels))
-    rows = math.ceil(len(panels) / columns)
+    rows = -(-len(panels) // columns)
     height = 1.2 + rows * (1.0 + 0.4 * len(panels[0].iterations))
     figure, axes = new_figure(rows, columns, size=(8.0, height), squeeze=False)
     for at, panel in zip(axes.flat, panels, strict=False):
@@ -165,8 +166,9 @@ def figure_stability(panels: Sequence[StabilityPanel]) -> Figure:
         for grade, (colour, _, words) in LOOKS.items()
         if any(panel.counts[grade] for panel in panels)
     ]
-    handles.append(Line2D([], [], color="black", linewidth=2.0, label="rule: enough iterations above it"))
-    handles.append(Line2D([], [], color="black", linewidth=1.2, linestyle="--", label="pymunk's default iterations"))
+    line = partial(Line2D, [], [], color="black")
+    handles.append(line(linewidth=2.0, label="rule: enough iterations above it"))
+    handles.append(line(linewidth=1.2, linestyle="--", label="pymunk's default iterations"))
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 
@@ -181,16 +183,13 @@ def _draw_panel(axes: Axes, panel: StabilityPanel) -> None:
     axes.set_yticks(range(len(panel.iterations)), [str(n) for n in panel.iterations])
     axes.grid(visible=False)
     for row in np.flatnonzero(panel.iterations == DEFAULT_ITERATIONS):
-        axes.add_patch(
-            Rectangle((-0.47, row - 0.47), len(panel.dt) - 0.06, 0.94, fill=False, linestyle="--", linewidth=1.2)
-        )
+        corner, width = (-0.47, row - 0.47), len(panel.dt) - 0.06
+        axes.add_patch(Rectangle(corner, width, 0.94, fill=False, linestyle="--", linewidth=1.2))
     # Rows are numbers of iterations, not a scale: the rule lies below the first row that follows it.
     axes.axhline(int((panel.iterations < panel.enough).sum()) - 0.5, color="black", linewidth=2.5)
     known = "" if math.isnan(panel.band) else f", reference ± {100 * panel.band:.1g} %"
-    axes.set_title(
-        f"M_w / M_b = {panel.mass_ratio:g}, N = {panel.slices}\nrule: {panel.enough} iterations{known}",
-        fontsize=9.5, loc="left",
-    )  # fmt: skip
+    words = f"M_w / M_b = {panel.mass_ratio:g}, N = {panel.slices}\nrule: {panel.enough} iterations{known}"
+    axes.set_title(words, fontsize=9.5, loc="left")
 
 
 def _cell_text(panel: StabilityPanel, row: int, column: int) -> str:

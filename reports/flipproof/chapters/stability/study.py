@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from flipproof.chapters.differences.study import largest_change
 from flipproof.chapters.maps.study import vary
-from flipproof.frame.solvers import Made, Run
+from flipproof.frame.solvers import Made, Run, attempt
 from flipproof.frame.twins import twins
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import plateau
@@ -181,7 +181,7 @@ def _panel(throw: Scenario, layout: Layout, mass_ratio: float, slices: int, made
     error, level, held = (np.full(shape, np.nan) for _ in range(3))
     grade, reason = np.full(shape, "not run", dtype="<U12"), np.full(shape, "", dtype="<U160")
     reference, cells = _plan_panel(throw, layout, mass_ratio, slices)
-    truth, *others = (_whole(made[run]) for run in (reference, *twins(reference)))
+    truth, *others = (attempt(lambda run: made[run].whole, run).found for run in (reference, *twins(reference)))
     apart = [math.nan if truth is None or other is None else largest_change(truth, other) for other in others]
     for at, (cost, run) in cells.items():
         flight = made[run].trajectory if cost <= layout.budget else None
@@ -212,11 +212,6 @@ def _panel(throw: Scenario, layout: Layout, mass_ratio: float, slices: int, made
         enough=enough_iterations(reference.scenario),
         band=float(np.max(apart)),
     )
-
-
-def _whole(made: Made) -> Trajectory | None:
-    """Return the trajectory of a run that reached the end."""
-    return made.trajectory if made.trajectory is not None and made.trajectory.ok else None
 
 
 def grade_of(error: float) -> str:
