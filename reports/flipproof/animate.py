@@ -69,12 +69,9 @@ def film_of(runs: Sequence[Trajectory], t: FloatArray, *, fps: int, slow: float)
 
 
 def check_target(path: Path) -> None:
-    """Refuse a file that could not be written after all the work.
+    """Refuse by a FilmError a file that could not be written after all the work.
 
-    Raises
-    ------
-    FilmError
-        If its name has another ending, its folder is not there, it is a folder, or ffmpeg is needed and missing.
+    Its name has another ending, its folder is not there, it is a folder, or ffmpeg is needed and missing.
     """
     if path.suffix.lower() not in (".gif", ".mp4"):
         raise FilmError(f"--out {path}: the name ends in {path.suffix or 'nothing'} (admissible: .gif, .mp4)")
@@ -91,10 +88,7 @@ def check_target(path: Path) -> None:
 def write_film(film: Film, path: Path, step: Step) -> None:
     """Draw every frame and write the film; ``path`` is as it was until the new film is whole.
 
-    Raises
-    ------
-    FilmError
-        If ``path`` will not do, or ffmpeg fails.
+    A path that will not do, or an ffmpeg that fails, raises a FilmError.
     """
     write_pictures(draw_frames(film), len(film.t), film.fps, path, step)
 

@@ -27,15 +27,9 @@ GLASS: Final = "#57606a"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Film:
-    """What is shown.
+    """What is shown: ``t`` is the time of flight of every frame, shape (F,) [s], ``slow`` times slower than the flight.
 
-    Parameters
-    ----------
-    throw : Scenario
-    t : (F,) - time of flight of every frame [s]
-    flights : one per bottle
-    fps : int - frames shown in a second
-    slow : float - how many times slower than the flight
+    There is one flight per bottle, and ``fps`` frames are shown in a second.
     """
 
     throw: Scenario

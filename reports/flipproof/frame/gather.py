@@ -81,15 +81,8 @@ def gather(
 ) -> Gathered:
     """Drive every study to its end, wave by wave; the runs of a wave are made together, equal ones once.
 
-    Parameters
-    ----------
-    parts : what the report has
-    ask : Ask
-    pool : executor of worker processes
-    progress : callable (made, planned, label)
-    work : chapter -> amount of work in place of that of the size, or although the size has none
-    stages : the stopwatch of the report, if somebody watches it
-    store : where slow runs and calls are looked for and kept
+    ``work`` is the amount of work of a chapter in place of that of the size, or although the size has none; ``stages``
+    the stopwatch of the report, if somebody watches it; ``store`` where slow runs and calls are looked for and kept.
     """
     parts, stages, work = tuple(parts), stages or Stages(), work or {}
     flights = Flights({})
@@ -129,12 +122,8 @@ def _advance(name: str, study: Any, flights: Flights | None, waiting: dict[str, 
 
 def tell(gathered: Gathered) -> dict[str, Told]:
     """Return what every chapter tells, by its name; no figure is drawn yet."""
-    return {
-        chapter.name: _told(chapter, gathered.outcomes[chapter.name])
-        for part in gathered.parts
-        for chapter in part.chapters
-        if chapter.name in gathered.outcomes
-    }
+    chapters = {chapter.name: chapter for part in gathered.parts for chapter in part.chapters}
+    return {name: _told(each, gathered.outcomes[name]) for name, each in chapters.items() if name in gathered.outcomes}
 
 
 def _told(chapter: Chapter[Any], outcome: Outcome[Any]) -> Told:

@@ -59,17 +59,15 @@ def make_all(
                 progress(len(made), len(runs) + len(pending_calls), result.run.name)
     called: dict[Call, Outcome[Any]] = {}
     for call, answer in pending_calls.items():
-        called[call] = _answered(call, answer)
+        try:
+            called[call] = attempt(answer.result)
+        except WorkerDiedError as error:
+            called[call] = Outcome(
+                None, f"{call.label}: the worker process died {TRIES} times with this call ({error})"
+            )
         progress(len(made) + len(called), len(runs) + len(pending_calls), call.label)
     # In the order asked, whichever worker was faster: what is read off this table must not depend on load.
     return {run: made[run] for run in runs}, called
-
-
-def _answered(call: Call, answer: Future[Any]) -> Outcome[Any]:
-    try:
-        return attempt(answer.result)
-    except WorkerDiedError as error:
-        return Outcome(None, f"{call.label}: the worker process died {TRIES} times with this call ({error})")
 
 
 def compile_kernels(pool: Executor) -> None:

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import import_module
-from types import MappingProxyType
 from typing import Any, Final, Generic, TypeVar
 
 import numpy as np
@@ -56,11 +55,7 @@ def find(name: str) -> Solver:
     """Return the solver of that name; "switches:110000" and its like are combinations of the ladder's rungs.
 
     Other names with a colon, and entry points, are specs of somebody else's solver (``flipproof.foreign.specs``).
-
-    Raises
-    ------
-    ValueError
-        If there is none; the message names the nearest.
+    Without any of that name a ValueError names the nearest.
     """
     if name.startswith("switches:"):
         from ode_reference.combinations import model_of
@@ -218,9 +213,9 @@ class Outcome(Generic[T]):
 class Flights(dict[Run, Made]):
     """What became of runs and calls, by the run or call itself. ``flights[run]`` raises Missing if it was not made."""
 
-    def __init__(self, made: Mapping[Run, Made], called: Mapping[Call, Outcome[Any]] = MappingProxyType({})) -> None:
+    def __init__(self, made: Mapping[Run, Made], called: Mapping[Call, Outcome[Any]] | None = None) -> None:
         super().__init__(made)
-        self._called = dict(called)
+        self._called = dict(called or {})
 
     def __missing__(self, run: Run) -> Made:
         raise Missing(f"{run.name}: it was not run")

@@ -57,14 +57,9 @@ PLAIN: Final = """{{ draw(figures) }}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """One section of the page.
+    """One section of the page: anchor, heading, in one sentence what it shows, and its content without these.
 
-    Parameters
-    ----------
-    id, title, sentence : str - anchor, heading, and in one sentence what it shows
-    html : Markup - its content, without heading and sentence
-    findings : tuple of Finding - those that must hold first
-    figure : name of its first figure, "" if it has none
+    Of its findings those that must hold come first; ``figure`` is the name of its first figure, "" if it has none.
     """
 
     id: str

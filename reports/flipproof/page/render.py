@@ -17,11 +17,10 @@ from flipproof.page.equations import equation, mathematics, numbers, typeset
 from flipproof.page.glossary import EQUATIONS, TERMS, anchor, symbols
 from flipproof.page.headlines import headlines
 from flipproof.page.lead import answer, answers, lead_words
-from flipproof.page.live import live_data, sliders
+from flipproof.page.live import live_data, sliders, touch_data
 from flipproof.page.parts import STORY, behind, sections, shared
 from flipproof.page.story import story
 from flipproof.page.templating import environment
-from flipproof.page.touch import touch_data
 
 
 def unbroken(text: str) -> str:

@@ -60,16 +60,13 @@ def study_agreement(
 ) -> Agreement:
     """Compare every solver with every other, on the times of the first run.
 
+    Fewer than two runs, or runs of other throws or at other output times, raise a ValueError.
+
     Parameters
     ----------
-    runs : mapping name -> Trajectory - of one throw, at the same output times; at least two
-    bands : mapping name -> float or array, shape (P,) - how far each omega(t) may be off by its own account [omega_0]
-    until : float - the horizon [s]: later times are not compared
-
-    Raises
-    ------
-    ValueError
-        If fewer than two runs are given, or their throws or output times differ.
+    runs : name -> run
+    bands : name -> how far omega(t) may be off by its own account, shape () or (P,) [omega_0]
+    until : the horizon [s]: later times are not compared
     """
     names = tuple(runs)
     if len(names) < 2:

@@ -32,17 +32,13 @@ class Difference:
 
     Parameters
     ----------
-    name : str - the assumption that separates the two
-    first, second : str - labels of the runs
-    t : (P,) [s]
-    omega : (P,) - (omega_second - omega_first) / omega_0, signed
-    largest : float - max |omega| over time, at ``largest_time``
-    final : float - omega at the last common time
-    parting_time : float or None - first time |omega| exceeds PARTING_BAND, interpolated [s]; None if it never does
-    parting_impact : Impact or None - last impact at or before the parting, in the run given for it
-    band : float or None - numerical uncertainty of ``largest``: the sum of the two runs' own
-    slices : int - of both runs
-    finer : (int, float) or None - another number of slices, and ``largest`` of the same two solvers at it
+    name, first, second : the assumption that separates the two, and the labels of the runs
+    t, omega : (P,) - times [s] and (omega_second - omega_first) / omega_0, signed
+    largest, largest_time, final : max |omega| over time and when it is reached [s]; omega at the last common time
+    parting_time : first time |omega| exceeds PARTING_BAND, interpolated [s]; None if it never does
+    parting_impact : last impact at or before the parting, in the run given for it
+    band : numerical uncertainty of ``largest``: the sum of the two runs' own
+    finer : another number of slices than ``slices``, and ``largest`` of the same two solvers at it
     """
 
     name: str
@@ -125,10 +121,7 @@ def claim_change(
 ) -> Finding:
     """Return the claim that two runs agree; a run compared with itself, or not whole, proves nothing.
 
-    Raises
-    ------
-    Missing
-        If the runs do not ``differ`` in their settings, or one is not whole.
+    Runs that do not ``differ`` in their settings, or one that is not whole, raise Missing.
     """
     if not differ:
         raise Missing("the two runs have the same settings: comparing them proves nothing")

@@ -35,10 +35,7 @@ class Way:
         return LIMITS[self.scheme]
 
 
-EVERYTHING: Final = "everything"
-HELD: Final = "held"
-LOCATED: Final = "held-located"
-
+EVERYTHING, HELD, LOCATED = "everything", "held", "held-located"
 WAIT, LOCATE = "rebounds wait for the grid", "rebounds located inside the step"
 PUBLISHED: Final = "published-python"
 WAYS: Final = (

@@ -147,7 +147,7 @@ def figures(found: Frozen) -> Iterator[Exhibit]:
         if found.defect[name].any()
     )
     explained = " Before the first impact the error of the velocity is {:.2f} of what they add up to."
-    d_omega, d_theta, d_r_cm, damping = found.changes
+    changes = ("|d omega|/omega per step [1]", "|d theta| per step [rad]", "|d r_CM|/L per step [1]", "gamma/omega [1]")
     yield Exhibit(
         name="frozen",
         title="What holding the coefficients constant costs, step by step",
@@ -164,10 +164,7 @@ def figures(found: Frozen) -> Iterator[Exhibit]:
         table=columns_csv(
             {
                 TIME: found.t,
-                "|d omega|/omega per step [1]": d_omega,
-                "|d theta| per step [rad]": d_theta,
-                "|d r_CM|/L per step [1]": d_r_cm,
-                "gamma/omega [1]": damping,
+                **dict(zip(changes, found.changes, strict=True)),
                 **{f"defect of a frozen {quantity} per step [m/s]": found.defect[quantity] for quantity in QUANTITIES},
                 "defects added up to the end of the step [m/s]": found.cumulative,
                 "error of r' there [m/s]": found.velocity_error,
@@ -180,17 +177,12 @@ def figures(found: Frozen) -> Iterator[Exhibit]:
 @styled
 def figure_frozen(study: Frozen) -> Figure:
     """Draw how every coefficient changes in a step, the defect that holding it causes, and what becomes of them."""
-    coefficients = dict(zip(QUANTITIES, ("ω", "θ (gravity)", "r_CM", "v_CM (drag)"), strict=True))
-    colours = dict(zip(QUANTITIES, ("#D55E00", "#0072B2", "#009E73", "#CC79A7"), strict=True))
+    coefficients, colours = ("ω", "θ (gravity)", "r_CM", "v_CM (drag)"), ("#D55E00", "#0072B2", "#009E73", "#CC79A7")
     figure, panels = new_figure(3, size=(8.0, 8.6), sharex=True)
     changes, defects, errors = panels
-    d_omega, d_theta, d_r_cm, damping = study.changes
-    for words, values, colour, dash in (
-        ("|Δω| / ω", d_omega, colours["omega"], "-"),
-        ("|Δθ| [rad]", d_theta, colours["theta"], "-"),
-        ("|Δr_CM| / L", d_r_cm, colours["r_cm"], "-"),
-        ("γ / ω, not a change", damping, "#000000", ":"),
-    ):
+    looks = (("|Δω| / ω", colours[0], "-"), ("|Δθ| [rad]", colours[1], "-"), ("|Δr_CM| / L", colours[2], "-"),
+             ("γ / ω, not a change", "#000000", ":"))  # fmt: skip
+    for values, (words, colour, dash) in zip(study.changes, looks, strict=True):
         changes.semilogy(study.t, _shown(values), color=colour, linewidth=1.2, linestyle=dash, label=words)
     changes.set_title(f"change in one step of {study.dt * 1e3:.2g} ms, exact-step", fontsize=10, loc="left")
     changes.set_ylabel("change per step [1]")
@@ -199,8 +191,7 @@ def figure_frozen(study: Frozen) -> Figure:
         if not values.any():
             continue
         time, peak = study.peak[quantity]
-        label = f"{coefficients[quantity]}: largest in {100 * study.share[quantity]:.0f} % of the steps"
-        colour = colours[quantity]
+        label, colour = f"{coefficients[k]}: largest in {100 * study.share[quantity]:.0f} % of the steps", colours[k]
         if quantity == "v_cm":  # jumps at every impact: its range within a window leaves the others to be seen
             t, least, most = envelope(study.t, values)
             label += f" (range within {1e3 * (t[1] - t[0]):.2g} ms)"

@@ -69,14 +69,12 @@ class Ensemble:
 
     Parameters
     ----------
-    kind : {"angle", "release", "order"}
-    size : float - of the change [rad], and of omega_0 as a fraction; NaN for another order, which has none
-    members : int - the unchanged flight included
-    t : (P,) [s]
-    width : (P,) - (largest - smallest omega) / |omega_0|; infinite where a member has ended
-    horizon : float or None - first time the width exceeds HORIZON_BAND [s]; None: never
-    growth : Growth - of the width, up to the horizon
-    ended : float or None - where the first member ends, if that is before the end of the throw [s]
+    size : of the change [rad], and of omega_0 as a fraction; NaN for another order, which has none
+    members : how many flights, the unchanged one included
+    t, width : (P,) - times [s] and (largest - smallest omega) / |omega_0|; infinite where a member has ended
+    horizon : first time the width exceeds HORIZON_BAND [s]; None: never
+    growth : of the width, up to the horizon
+    ended : where the first member ends, if that is before the end of the throw [s]
     """
 
     kind: Kind

@@ -44,10 +44,9 @@ class ModelForm:
 
     Parameters
     ----------
-    order, floor : float - p and F of error = C dt^p + F; NaN if there is no fit
+    order, floor : p and F of error = C dt^p + F; NaN if there is no fit
     order_interval, floor_interval : (low, high) - 95 % profile intervals, if the scatter is independent and log-normal
-    verdict : {"step size", "model form", "undecided", "failure"}
-    reason : str - the verdict in words
+    reason : the verdict in words
     """
 
     order: float = math.nan
@@ -112,10 +111,8 @@ def _refusal(dt: FloatArray, error: FloatArray, members: int) -> tuple[Verdict, 
     rise = error[1:] / np.minimum.accumulate(error)[:-1]
     k = int(rise.argmax())
     if rise[k] > allowed:
-        return (
-            "failure",
-            f"oscillation: at Δt = {dt[k + 1]:.2g} s the error is {rise[k]:.1f} times that of a coarser step",
-        )
+        words = f"at Δt = {dt[k + 1]:.2g} s the error is {rise[k]:.1f} times that of a coarser step"
+        return "failure", f"oscillation: {words}"
     return None
 
 
@@ -227,13 +224,9 @@ def _edge(excess: Callable[[float], float], centre: float, width: float, bound: 
 class Richardson:
     """The limit of a value as the step goes to zero, from the three finest grids alone.
 
-    Parameters
-    ----------
-    order : float - observed; NaN if it could not be found
-    value : float - f_1 + (f_1 - f_2) / (r^p - 1), extrapolated to dt = 0
-    gci : float - grid-convergence index of the finest grid, an uncertainty in the unit of the value
-    ok : bool
-    reason : str - why not, or how it was found
+    ``order`` is the observed one, ``value`` f_1 + (f_1 - f_2) / (r^p - 1), extrapolated to dt = 0; ``gci`` the
+    grid-convergence index of the finest grid, an uncertainty in the unit of the value. ``reason`` says why it is not
+    ok, or how it was found.
     """
 
     order: float = math.nan
@@ -255,13 +248,18 @@ def richardson(dt: Sequence[float], values: Sequence[float]) -> Richardson:
         return Richardson(reason="a value is not finite")
     finest = np.argsort(dt)[:3]
     h, f = np.asarray(dt)[finest], np.asarray(values)[finest]
-    p = _order_of_three(h, f)
-    if math.isnan(p):
-        turns_back = (f[2] - f[1]) * (f[1] - f[0]) < 0
-        return Richardson(
-            reason="oscillation: the value turns back" if turns_back else "the values do not approach a limit"
-        )
-    gap = (f[0] - f[1]) / ((h[1] / h[0]) ** p - 1.0)
+    fine, coarse = f[1] - f[0], f[2] - f[1]
+    if coarse * fine < 0.0:
+        return Richardson(reason="oscillation: the value turns back")
+
+    def excess(p: float) -> float:
+        return float((h[2] ** p - h[1] ** p) / (h[1] ** p - h[0] ** p) - coarse / fine)
+
+    low, high = 1e-3, 20.0
+    if coarse * fine == 0.0 or excess(low) * excess(high) > 0.0:
+        return Richardson(reason="the values do not approach a limit")
+    p = float(brentq(excess, low, high))
+    gap = -fine / ((h[1] / h[0]) ** p - 1.0)
     ok = abs(p - 1.0) <= 0.5
     return Richardson(
         order=p,
@@ -270,19 +268,6 @@ def richardson(dt: Sequence[float], values: Sequence[float]) -> Richardson:
         ok=ok,
         reason="three finest grids" if ok else f"order too {'high' if p > 1.0 else 'low'}: {p:.2f}, not 1",
     )
-
-
-def _order_of_three(h: FloatArray, f: FloatArray) -> float:
-    """Return the order that three values show, or NaN."""
-    fine, coarse = f[1] - f[0], f[2] - f[1]
-    if fine == 0.0 or coarse * fine <= 0.0:
-        return math.nan
-
-    def excess(p: float) -> float:
-        return float((h[2] ** p - h[1] ** p) / (h[1] ** p - h[0] ** p) - coarse / fine)
-
-    low, high = 1e-3, 20.0
-    return math.nan if excess(low) * excess(high) > 0.0 else float(brentq(excess, low, high))
 
 
 FORMS: Final = (
@@ -325,15 +310,16 @@ def claims(found: Found) -> Claims:
     """Yield where every scheme goes, and what stays of its error against an equation."""
     forms, limits = found
     for scheme, limit in limits.items():
-        yield judged(claim_limit, scheme, limit, id=f"limit-{scheme}", title=f"limit of {scheme}", kind="observation")
+        id_ = f"limit-{scheme}"
+        yield judged(claim_limit, id_, scheme, limit, id=id_, title=f"limit of {scheme}", kind="observation")
     for (scheme, model), form in forms.items():
         id_, title = f"model-form-{scheme}-{model}", f"{scheme} against {model}"
         yield judged(claim_model_form, id_, title, form, id=id_, title=title, kind="observation")
 
 
-def claim_limit(scheme: str, limit: Richardson) -> Finding:
+def claim_limit(id_: str, scheme: str, limit: Richardson) -> Finding:
     """Where omega(T) / omega_0 of a scheme goes as its step goes to zero, with its grid-convergence index."""
-    id_, title = f"limit-{scheme}", f"{scheme}: ω(T)/ω₀ extrapolated to Δt = 0 (Richardson)"
+    title = f"{scheme}: ω(T)/ω₀ extrapolated to Δt = 0 (Richardson)"
     if not limit.ok:
         return observed(id_, title, None, note=limit.reason)
     note = f"observed order {limit.order:.2f}; band: grid-convergence index; {limit.reason}"
@@ -342,7 +328,7 @@ def claim_limit(scheme: str, limit: Richardson) -> Finding:
 
 def claim_model_form(id_: str, title: str, form: ModelForm) -> Finding:
     """What stays of a scheme's error as its step goes to zero decides between step size and another equation."""
-    return observed(id=id_, title=f"{title}: {form.verdict}", value=form.floor, unit="of ω₀", note=form.reason)
+    return observed(id_, f"{title}: {form.verdict}", form.floor, "of ω₀", form.reason)
 
 
 CHAPTER: Final = Chapter(

@@ -37,13 +37,11 @@ class Overlap:
 
     Parameters
     ----------
-    fills : array - fill fractions M_w / M_max
-    throw : Scenario - the emptiest; restitution is at the ends and between slices
-    level : name -> array
-        Mean of omega / omega_0 over the second half, for PASS, EXCLUDE, CHECK and COLUMN, which is water as one
-        stretching column (``ode_reference.column``); NaN where the run failed.
-    reason : name -> F strings - "" or why the run cannot be used
-    band : array - twice what halving the step changed for EXCLUDE
+    fills, throw : fill fractions M_w / M_max, and the bottle of the first; restitution is also that between slices
+    level : name -> mean of omega / omega_0 over the second half, for PASS, EXCLUDE, CHECK and COLUMN, which is water as
+        one stretching column (``ode_reference.column``); NaN where the run failed
+    reason : name -> F strings, "" or why the run cannot be used
+    band : twice what halving the step changed for EXCLUDE
     """
 
     fills: FloatArray

@@ -121,19 +121,15 @@ class Predictability:
 
     Parameters
     ----------
-    solver : str
-    sizes : (S,) - of the changes, rising
-    t : (P,) [s]
+    sizes, t : (S,) sizes of the changes, rising; (P,) times [s]
     spread : (S, P) - max |omega_member - omega| / |omega_0| over the members; infinite where a member has ended
-    horizons : S times or None - when the spread first exceeds ``HORIZON_BAND`` [s]; None: predictable to the end
-    round_off_horizon : float or None
-        The same for a change of the size of round-off, amplified as the smallest change is. It means something only
-        while the flight is smooth.
-    growth : Growth - of the spread after the smallest change, up to its horizon
-    rough_from : float or None
-        First time at which amplifications of two sizes differ by more than a factor of 10 [s]: the flight is not smooth
-        there, or the solver's own error exceeds the smallest change.
-    ended : float or None - where the run ends, if that is before the end of the throw [s]
+    horizons : when the spread first exceeds ``HORIZON_BAND`` [s]; None: predictable to the end
+    round_off_horizon : the same for a change of the size of round-off, amplified as the smallest change is; it means
+        something only while the flight is smooth
+    growth : of the spread after the smallest change, up to its horizon
+    rough_from : first time at which amplifications of two sizes differ by more than a factor of 10 [s]: the flight is
+        not smooth there, or the solver's own error exceeds the smallest change
+    ended : where the run ends, if that is before the end of the throw [s]
     """
 
     solver: str
@@ -198,13 +194,7 @@ def plan_predictability(
 
 
 def study_predictability(base: Trajectory, members: Sequence[Sequence[Trajectory]]) -> Predictability:
-    """Measure how far changed releases move the flight.
-
-    Parameters
-    ----------
-    base : Trajectory - the unchanged flight
-    members : sizes of members - flights of the runs of ``plan_predictability``, in its order
-    """
+    """Measure how far changed releases, those of ``plan_predictability`` in its order, move the flight ``base``."""
     throw = base.scenario
 
     def size(changed: Scenario) -> float:

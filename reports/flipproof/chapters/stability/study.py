@@ -43,13 +43,10 @@ class Layout:
 
     Parameters
     ----------
-    panels : tuple of (M_w / M_b [1], slices)
-    dt : tuple of steps, falling [s]
-    iterations : tuple of iterations, rising
-    duration : float
-        Flight that is looked at [s]; a whole number of the longest step, which divides the output times.
-    budget : float
-        Slices times iterations times steps beyond which a cell is not run [1]; 1e7 takes about a second.
+    panels : M_w / M_b [1] and slices of each
+    dt, iterations : steps, falling [s], and iterations, rising
+    duration : flight that is looked at [s]; a whole number of the longest step, which divides the output times
+    budget : slices times iterations times steps beyond which a cell is not run; 1e7 takes about a second
     """
 
     panels: tuple[tuple[float, int], ...]
@@ -86,17 +83,15 @@ class StabilityPanel:
 
     Parameters
     ----------
-    mass_ratio : float - M_w / M_b [1]
-    slices : int
-    duration : float [s]
+    mass_ratio : M_w / M_b [1]
     dt, iterations : (columns,) [s], (rows,)
-    grade : array of str - of GRADES
-    error : array - max |omega - omega of the reference| / |omega_0|; NaN where a run did not reach the end
-    plateau_error : array - the same of the mean over the second half
-    held_until : array - last output time before the watch stopped a run [s]; NaN where it did not
-    reason : array of str - why a run stopped or was not made; "" where it is whole
-    enough : int - iterations that the rule asks for
-    band : float - by how much twins of the reference differ from it, fraction of omega_0; NaN if unknown
+    grade : of GRADES
+    error : max |omega - omega of the reference| / |omega_0|; NaN where a run did not reach the end
+    plateau_error : the same of the mean over the second half
+    held_until : last output time before the watch stopped a run [s]; NaN where it did not
+    reason : why a run stopped or was not made; "" where it is whole
+    enough : iterations that the rule asks for
+    band : by how much twins of the reference differ from it, fraction of omega_0; NaN if unknown
     """
 
     mass_ratio: float

@@ -139,8 +139,17 @@ def figures(found: Orders) -> Iterator[Exhibit]:
         alt=f"Two log-log plots of error against step. {words}",
         maker=figure_step_size,
         data=(studies, starts),
-        table=_errors_csv(studies, starts),
-    )
+        table=rows_csv(
+            ("part of the flight", "scheme", "held against", "mean dt [s]", "mean error [of omega_0]",
+             "least error [of omega_0]", "largest error [of omega_0]", "fitted order [1]", "its standard error [1]"),
+            (
+                (part, each.scheme, each.model, dt, mean, errors.min(), errors.max(), each.order, each.order_error)
+                for part, parted in (("whole flight", studies), ("before the first impact", starts))
+                for each in parted
+                for dt, mean, errors in zip(each.mean_dt, each.mean_error, each.error, strict=True)
+            ),
+        ),
+    )  # fmt: skip
 
 
 def _converges(study: StepSize) -> str:
@@ -153,20 +162,6 @@ def _converges(study: StepSize) -> str:
     )
 
 
-def _errors_csv(flights: Sequence[StepSize], starts: Sequence[StepSize]) -> str:
-    """Return the error at every step size, with the range of its grids and the order that was fitted."""
-    return rows_csv(
-        ("part of the flight", "scheme", "held against", "mean dt [s]", "mean error [of omega_0]",
-         "least error [of omega_0]", "largest error [of omega_0]", "fitted order [1]", "its standard error [1]"),
-        (
-            (part, study.scheme, study.model, dt, mean, errors.min(), errors.max(), study.order, study.order_error)
-            for part, studies in (("whole flight", flights), ("before the first impact", starts))
-            for study in studies
-            for dt, mean, errors in zip(study.mean_dt, study.mean_error, study.error, strict=True)
-        ),
-    )  # fmt: skip
-
-
 @styled
 def figure_step_size(flights: Sequence[StepSize], starts: Sequence[StepSize]) -> Figure:
     """Error against step size: over the whole flight (left) and before the first impact (right)."""
@@ -177,14 +172,10 @@ def figure_step_size(flights: Sequence[StepSize], starts: Sequence[StepSize]) ->
             spread = study.error.min(axis=1), study.error.max(axis=1)
             low, high = np.maximum(spread, ROUND_OFF)
             axes.fill_between(study.mean_dt, low, high, color=style["color"], alpha=0.25, linewidth=0)
-            axes.loglog(
-                study.mean_dt, np.maximum(study.mean_error, ROUND_OFF), marker=MARKERS[k], color=style["color"],
-                linewidth=1.4, label=f"{study.scheme} → {study.model}",
-            )  # fmt: skip
-            axes.text(
-                0.03, 0.96 - 0.07 * k, f"{study.scheme}: order {study.order:.2f}", transform=axes.transAxes,
-                va="top", fontsize=9, color=STYLES.get(study.model, style)["color"],
-            )  # fmt: skip
+            look = {"color": style["color"], "linewidth": 1.4, "label": f"{study.scheme} → {study.model}"}
+            axes.loglog(study.mean_dt, np.maximum(study.mean_error, ROUND_OFF), marker=MARKERS[k], **look)
+            words, colour = f"{study.scheme}: order {study.order:.2f}", STYLES.get(study.model, style)["color"]
+            axes.text(0.03, 0.96 - 0.07 * k, words, transform=axes.transAxes, va="top", fontsize=9, color=colour)
         if studies:
             dt = studies[0].mean_dt
             top = max(ROUND_OFF, *(study.mean_error[0] for study in studies)) * 2.0
@@ -194,7 +185,7 @@ def figure_step_size(flights: Sequence[StepSize], starts: Sequence[StepSize]) ->
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.yaxis.set_minor_formatter(NullFormatter())
     panels[0].set_ylabel("max |ω − ω of its equation| / ω₀ [1]")
-    shared_legend(figure, panels[0] if flights else panels[1], columns=3)
+    shared_legend(figure, panels[0])
     return figure
 
 

@@ -95,31 +95,22 @@ def study_step_size(reference: Trajectory, runs: Sequence[Sequence[Trajectory]])
 def errors_of(reference: Trajectory, runs: Sequence[Sequence[Trajectory]]) -> tuple[FloatArray, FloatArray]:
     """Return step [s] and max |omega - omega_reference| / omega_0 of every run, shape (levels, members).
 
-    The error is NaN where a run is not complete.
-
-    Parameters
-    ----------
-    reference : Trajectory - on uniform times
-    runs : levels of members - as ``plan_step_size`` plans them
-
-    Raises
-    ------
-    ValueError
-        If a run shares fewer than LEAST_COMMON intervals with the reference.
+    The error is NaN where a run is not complete. The reference is on uniform times, the runs are as ``plan_step_size``
+    plans them; one that shares fewer than LEAST_COMMON intervals with the reference raises a ValueError.
     """
+
+    def error(run: Trajectory) -> float:
+        if not (run.ok and reference.ok):
+            return math.nan
+        fine, coarse = len(run.t) - 1, len(reference.t) - 1
+        common = math.gcd(fine, coarse)
+        if common < LEAST_COMMON:
+            raise ValueError(f"{fine} steps and {coarse} reference intervals share only {common} intervals")
+        difference = run.omega[:: fine // common] - reference.omega[:: coarse // common]
+        return float(np.abs(difference).max() / abs(reference.scenario.omega0))
+
     dt = np.array([[run.settings["dt"] for run in level] for level in runs])
-    return dt, np.array([[_error(reference, run) for run in level] for level in runs])
-
-
-def _error(reference: Trajectory, run: Trajectory) -> float:
-    if not (run.ok and reference.ok):
-        return math.nan
-    fine, coarse = len(run.t) - 1, len(reference.t) - 1
-    common = math.gcd(fine, coarse)
-    if common < LEAST_COMMON:
-        raise ValueError(f"{fine} steps and {coarse} reference intervals share only {common} intervals")
-    difference = run.omega[:: fine // common] - reference.omega[:: coarse // common]
-    return float(np.abs(difference).max() / abs(reference.scenario.omega0))
+    return dt, np.array([[error(run) for run in level] for level in runs])
 
 
 def observed_order(dt: FloatArray, error: FloatArray) -> tuple[float, float]:

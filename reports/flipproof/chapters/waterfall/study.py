@@ -182,17 +182,9 @@ def plan_finer(throw: Scenario, steps: int) -> list[Run]:
 
 
 def split_all(program: Run, observed: Mapping[Run, Mapping[str, float]]) -> tuple[Waterfall, ...]:
-    """Split every observable.
+    """Split every observable of the runs of ``plan_waterfall``, and of all of ``plan_finer`` or none.
 
-    Parameters
-    ----------
-    program : Run - the published program's
-    observed : run -> value by observable - of ``plan_waterfall``, and of all of ``plan_finer`` or none
-
-    Raises
-    ------
-    ArithmeticError
-        If a split does not sum to the whole difference within round-off.
+    A split that does not sum to the whole difference within round-off raises an ArithmeticError.
     """
     return tuple(_split(o, program, {run: values[o.name] for run, values in observed.items()}) for o in OBSERVABLES)
 
