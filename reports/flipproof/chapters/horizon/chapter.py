@@ -101,12 +101,10 @@ class Ensemble:
     @property
     def words(self) -> str:
         """Width, horizon and growth in words."""
-        when, from_ = ("never ", "") if self.horizon is None else ("", f" from {self.horizon * 1e3:.1f} ms")
-        return (
-            f"{self.what}: width at most {self.largest:.1e} of ω₀, {self.width[-1]:.1e} at the end, {when}beyond "
-            f"{HORIZON_BAND:g}{from_}; {self.growth.words}"
-            + ("" if self.ended is None else f"; a member ends at {self.ended * 1e3:.1f} ms")
-        )
+        left, ended = self.horizon, "" if self.ended is None else f"; a member ends at {self.ended * 1e3:.1f} ms"
+        when = f"never beyond {HORIZON_BAND:g}" if left is None else f"beyond {HORIZON_BAND:g} from {left * 1e3:.1f} ms"
+        widths = f"width at most {self.largest:.1e} of ω₀, {self.width[-1]:.1e} at the end"
+        return f"{self.what}: {widths}, {when}; {self.growth.words}{ended}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq, least_squares
 from scipy.stats import f as f_distribution
 
-from flipproof.chapters.step_size.study import ROUND_OFF, errors_of, plan_step_size
+from flipproof.chapters.step_size.chapter import ROUND_OFF, errors_of, plan_step_size
 from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Study, judged, observed
 from flipproof.frame.solvers import Call, Outcome, Run, attempt, known
 from slicemodel.trajectory import FloatArray
