@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -46,27 +46,21 @@ class Slider:
 
 def sliders(throw: Scenario) -> list[Slider]:
     """Return the sliders of a throw, each wide enough for its value."""
-    asked: tuple[tuple[str, str, str, float, float, float, int, float], ...] = (
-        ("g", "gravity g", "m/s²", 0.0, 20.0, 0.01, 2, throw.gravity),
-        ("theta0", "angle of release θ₀", "°", -180.0, 180.0, 1.0, 0, math.degrees(throw.theta0)),
-        ("fill", "filling", "%", 10.0, 100.0, 1.0, 0, 100.0 * throw.fill_fraction),
-        ("gamma", "drag γ", "/s", 0.0, 20.0, 0.1, 1, throw.damping_rate),
-        ("e", "restitution e", "", 0.0, 0.8, 0.01, 2, throw.restitution),
-        ("omega0", "spin ω₀", "rad/s", 5.0, 25.0, 0.1, 1, throw.omega0),
+    asked = (
+        Slider("g", "gravity g", "m/s²", 0.0, 20.0, 0.01, 2, throw.gravity),
+        Slider("theta0", "angle of release θ₀", "°", -180.0, 180.0, 1.0, 0, math.degrees(throw.theta0)),
+        Slider("fill", "filling", "%", 10.0, 100.0, 1.0, 0, 100.0 * throw.fill_fraction),
+        Slider("gamma", "drag γ", "/s", 0.0, 20.0, 0.1, 1, throw.damping_rate),
+        Slider("e", "restitution e", "", 0.0, 0.8, 0.01, 2, throw.restitution),
+        Slider("omega0", "spin ω₀", "rad/s", 5.0, 25.0, 0.1, 1, throw.omega0),
     )
-    return [
-        Slider(name, words, unit, min(low, value), max(high, value), step, digits, value)
-        for name, words, unit, low, high, step, digits, value in asked
-    ]
+    return [replace(one, low=min(one.low, one.value), high=max(one.high, one.value)) for one in asked]
 
 
 def live_data(throw: Scenario) -> dict[str, Any]:
     """Return the throw as the script takes it, in SI units."""
-    bottle = throw.bottle
     return {
-        "bottle": {
-            "length": bottle.length, "radius": bottle.radius, "mass": bottle.mass, "capacity": bottle.capacity
-        },
+        "bottle": asdict(throw.bottle),
         "slices": min(throw.n_slices, MOST_SLICES),
         "duration": throw.duration,
         "g": throw.gravity,
@@ -75,7 +69,7 @@ def live_data(throw: Scenario) -> dict[str, Any]:
         "gamma": throw.damping_rate,
         "e": throw.restitution,
         "omega0": throw.omega0,
-    }  # fmt: skip
+    }
 
 
 def touch_data(touch: Touch) -> dict[str, Any]:

@@ -78,17 +78,13 @@ class Section:
     def count_words(self) -> str:
         """The findings in words, as in "12 claims hold, 3 observations"; nothing if there are none."""
         counts = self.counts
-        words = (
-            ("pass", "claim holds", "claims hold"),
-            ("fail", "claim fails", "claims fail"),
-            ("observed", "observation", "observations"),
-            ("not evaluated", "not evaluated", "not evaluated"),
-        )
-        return ", ".join(
-            f"{counts[verdict]} {one if counts[verdict] == 1 else many}"
-            for verdict, one, many in words
-            if verdict in counts
-        )
+        words = {
+            "pass": ("claim holds", "claims hold"),
+            "fail": ("claim fails", "claims fail"),
+            "observed": ("observation", "observations"),
+            "not evaluated": ("not evaluated", "not evaluated"),
+        }
+        return ", ".join(f"{counts[each]} {said[counts[each] != 1]}" for each, said in words.items() if each in counts)
 
 
 def sections(gathered: Gathered, told: Mapping[str, Told], templates: Environment) -> tuple[Section, ...]:

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from flipproof.chapters.solvers import WITNESSES
 from flipproof.frame.chapter import Ask, Chapter, Claims, Study, observed
 
 
-@dataclass(frozen=True, slots=True)
-class Certificates:
+class Certificates(NamedTuple):
     """Name -> certificate as ``engine_check.Certificate.to_mapping`` gives it; and those that have none."""
 
     certificates: Mapping[str, Mapping[str, Any]]
     uncertified: tuple[str, ...]
     size: str
-    omega0: float
 
 
 def study(ask: Ask) -> Study[Certificates]:
@@ -29,7 +26,6 @@ def study(ask: Ask) -> Study[Certificates]:
         {name: run.diagnostics["certificate"] for name, run in flown.items() if "certificate" in run.diagnostics},
         tuple(name for name, run in runs.items() if "tolerance" not in run.settings),
         ask.size,
-        ask.scenario.omega0,
     )
 
 

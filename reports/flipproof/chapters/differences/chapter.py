@@ -118,11 +118,8 @@ def run_bands(runs: Mapping[str, Run], flights: Flights) -> dict[str, float]:
             if model in flown and other is not None and flown[model].ok and other.ok:
                 apart = study_difference(model, flown[model], other).largest
                 bands[model] = max(bands.get(model, MODEL_FLOOR), apart)
-    for name in (name for name in WITNESSES if name in flown):
-        certificate = flown[name].diagnostics.get("certificate", {})
-        if certificate.get("band") is not None:
-            bands[name] = certificate["band"]
-    return bands
+    certified = {name: flown[name].diagnostics.get("certificate", {}) for name in WITNESSES if name in flown}
+    return bands | {name: each["band"] for name, each in certified.items() if each.get("band") is not None}
 
 
 def claims(found: Differences) -> Claims:
@@ -187,10 +184,10 @@ def draw(differences: Sequence[Difference]) -> Figure:
     grid[0, 0].set(yscale="log", ylim=(LEAST, MOST))
     for axes in grid[:, 0]:
         axes.set_ylabel("|difference| [1]")
-    for column in range(columns):
-        lowest = grid[(len(differences) - 1 - column) // columns, column]
-        lowest.set_xlabel("time t [s]")
-        lowest.tick_params(labelbottom=True)
+    # The lowest panel of every column.
+    for axes in grid.flat[max(len(differences) - columns, 0) : len(differences)]:
+        axes.set_xlabel("time t [s]")
+        axes.tick_params(labelbottom=True)
     return figure
 
 
