@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Part
+from flipproof.frame.chapter import Absent, Ask, Chapter, Part
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding
 from flipproof.frame.pool import Progress, make_all
@@ -130,8 +130,15 @@ def _told(chapter: Chapter[Any], outcome: Outcome[Any]) -> Told:
     said: list[Finding | Absent] = []
     drawn: list[Exhibit] = []
     seconds: dict[str, float] = {}
-    claims = attempt(lambda: said.extend(_clocked(chapter.claims, outcome, seconds)))
-    figures = attempt(lambda: drawn.extend(chapter.figures(outcome.value)))
+
+    def claim() -> None:
+        began = time.perf_counter()
+        for each in chapter.claims(outcome.value):
+            seconds[each.id] = time.perf_counter() - began
+            said.append(each)
+            began = time.perf_counter()
+
+    claims, figures = attempt(claim), attempt(lambda: drawn.extend(chapter.figures(outcome.value)))
     if reason := claims.reason or figures.reason:
         said.append(Absent(f"chapter-{chapter.name}", chapter.title, reason, chapter.kind))
     return Told(
@@ -142,12 +149,3 @@ def _told(chapter: Chapter[Any], outcome: Outcome[Any]) -> Told:
         notes=tuple((each.title, each.reason) for each in said if isinstance(each, Absent)),
         seconds=seconds,
     )
-
-
-def _clocked(claims: Callable[[Any], Claims], outcome: Outcome[Any], seconds: dict[str, float]) -> Claims:
-    """Yield the claims on what was found, and note how long each took."""
-    began = time.perf_counter()
-    for each in claims(outcome.value):
-        seconds[each.id] = time.perf_counter() - began
-        yield each
-        began = time.perf_counter()

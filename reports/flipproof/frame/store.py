@@ -21,7 +21,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError, Executor, Future
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
@@ -51,7 +51,7 @@ DELETE FROM kept WHERE key IN (
 """
 
 
-class RunStore:
+class RunStore(AbstractContextManager["RunStore"]):
     """Runs by what decides them. Use as a context manager; ``RunStore(None)`` keeps nothing and finds nothing.
 
     Parameters
@@ -72,9 +72,6 @@ class RunStore:
         self._problem = "not asked for"
         if place is not None:
             self._open(place)
-
-    def __enter__(self) -> RunStore:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

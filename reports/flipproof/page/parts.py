@@ -89,20 +89,20 @@ class Section:
 
 def sections(gathered: Gathered, told: Mapping[str, Told], templates: Environment) -> tuple[Section, ...]:
     """Return every part that has a chapter in this report, in order."""
+
+    def section(part: Part, chapters: Sequence[Told]) -> Section:
+        findings = [finding for each in chapters for finding in each.findings]
+        return Section(
+            id=part.id,
+            title=part.title,
+            sentence=part.sentence,
+            html=linked("\n".join(_chapter(gathered, each, templates) for each in chapters)),
+            findings=tuple(sorted(findings, key=lambda finding: finding.kind != "regression")),
+            figure=next((figure.name for each in chapters for figure in each.figures), ""),
+        )
+
     there = ((part, [told[each.name] for each in part.chapters if each.name in told]) for part in gathered.parts)
-    return tuple(_section(gathered, part, chapters, templates) for part, chapters in there if chapters)
-
-
-def _section(gathered: Gathered, part: Part, chapters: Sequence[Told], templates: Environment) -> Section:
-    findings = [finding for each in chapters for finding in each.findings]
-    return Section(
-        id=part.id,
-        title=part.title,
-        sentence=part.sentence,
-        html=linked("\n".join(_chapter(gathered, each, templates) for each in chapters)),
-        findings=tuple(sorted(findings, key=lambda finding: finding.kind != "regression")),
-        figure=next((figure.name for each in chapters for figure in each.figures), ""),
-    )
+    return tuple(section(part, chapters) for part, chapters in there if chapters)
 
 
 def _chapter(gathered: Gathered, told: Told, templates: Environment) -> Markup:

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any
 
-from jinja2 import Environment
 from markupsafe import Markup
 
 from flipproof.chapters.differences.study import Difference, moved, percent
@@ -18,6 +17,7 @@ from flipproof.page.glossary import EQUATIONS, TERMS, anchor, symbols
 from flipproof.page.headlines import headlines
 from flipproof.page.lead import answer, answers, lead_words
 from flipproof.page.live import live_data, sliders, touch_data
+from flipproof.page.motion import motion_data
 from flipproof.page.parts import STORY, behind, sections, shared
 from flipproof.page.story import story
 from flipproof.page.templating import environment
@@ -69,7 +69,13 @@ def render(
     gathered: Gathered, told: Mapping[str, Told], provenance: Mapping[str, str], summary: Mapping[str, Any]
 ) -> str:
     """Return the whole page; ``summary``, which its story is told from, is that of the report."""
-    templates = page_environment()
+    templates = environment()
+    templates.filters |= {
+        "typeset": typeset, "unbroken": unbroken, "amount": amount, "percent": percent, "touch_data": touch_data,
+        "short": short, "restitution_error": restitution_error, "term_anchor": anchor, "equation": equation,
+        "shared": shared, "symbols": symbols, "mathematics": mathematics, "numbers": numbers,
+    }  # fmt: skip
+    templates.globals["assets"] = read_assets()
     verdict = headlines(gathered)
     findings = [finding for each in told.values() for finding in each.findings]
     regressions = [finding for finding in findings if finding.kind == "regression"]
@@ -86,7 +92,7 @@ def render(
         solvers=flown.rows if flown is not None else [],
         problems=[made for made in gathered.flights.values() if made.trajectory is None],
         notes=[note for each in told.values() for note in each.notes],
-        motion=flown.motion if flown is not None else None,
+        motion=motion_data(flown.throw, flown.made) if flown is not None else None,
         measured=gathered.found("measured"),
         provenance=provenance,
         settings=gathered.ask.scenario.to_toml(),
@@ -104,15 +110,3 @@ def render(
     return templates.get_template("report.html.j2").render(
         context, contents=[*screens, *((section.id, section.title) for section in body)], sections=body
     )
-
-
-def page_environment() -> Environment:
-    """Return the environment of the page's templates, with the filters that they and the chapters' parts use."""
-    templates = environment()
-    templates.filters |= {
-        "typeset": typeset, "unbroken": unbroken, "amount": amount, "percent": percent, "touch_data": touch_data,
-        "short": short, "restitution_error": restitution_error, "term_anchor": anchor, "equation": equation,
-        "shared": shared, "symbols": symbols, "mathematics": mathematics, "numbers": numbers,
-    }  # fmt: skip
-    templates.globals["assets"] = read_assets()
-    return templates

@@ -155,17 +155,16 @@ def _shares(summary: Summary) -> list[SimpleNamespace]:
         if headline["measure"] == "share" and headline["id"].startswith("share"):
             places = {"mean": "value", "low": "low", "high": "high", "finer": "finer"}
             numbers = {n: summary.number(f"headlines/{headline['id']}/{p}", signed) for n, p in places.items()}
-            words = CHANGES.get(headline["what"], "")
             if numbers["mean"] and numbers["low"] and numbers["high"]:
+                words = CHANGES.get(headline["what"], "")
                 found.append(SimpleNamespace(name=headline["what"], words=words, **numbers))
     return found
 
 
 def _experiment(summary: Summary, id_: str) -> SimpleNamespace | None:
+    place, shown = f"paper/experiment/{id_}/equations", degrees if id_ == "landing-angle" else rounded
     if summary.at(f"paper/experiment/{id_}") is None:
         return None
-    shown = degrees if id_ == "landing-angle" else rounded
-    place = f"paper/experiment/{id_}/equations"
     equations = {solver: summary.number(f"{place}/{solver}/value", shown) for solver in NAMES if solver != "pymunk"}
     verdicts = {solver: summary.at(f"{place}/{solver}/verdict") for solver in equations}
     return SimpleNamespace(values=equations, verdicts=verdicts)

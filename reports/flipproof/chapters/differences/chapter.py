@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any, Final
+from dataclasses import asdict, replace
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -45,8 +45,7 @@ MODEL_FLOOR: Final = 1e-9
 """Least band of a model, fraction of omega_0: the digits that independent methods share; none finer is claimed."""
 
 
-@dataclass(frozen=True, slots=True)
-class Differences:
+class Differences(NamedTuple):
     """Every pair both of whose flights were made, how each difference grows, and up to when free flight goes.
 
     ``ended`` says where free flight stopped early, "" if it did not; ``missing`` why a pair could not be compared.

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Finding, Study, judged, regression
 from flipproof.frame.solvers import Made, Outcome, Run, attempt, known
@@ -12,8 +11,7 @@ from ode_reference.models import LADDER
 from slicemodel import Trajectory
 
 
-@dataclass(frozen=True, slots=True)
-class Energy:
+class Energy(NamedTuple):
     """Every model's flight of the paper's own throw, and its ledger on the report's."""
 
     checks: Mapping[str, Made]

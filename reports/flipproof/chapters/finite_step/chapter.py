@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -62,8 +62,7 @@ class StepCost:
     flight: float
 
 
-@dataclass(frozen=True, slots=True)
-class StepCosts:
+class StepCosts(NamedTuple):
     """What each way costs at the report's slices; the same at ``FINER`` times as many, nothing if a run is missing."""
 
     costs: tuple[StepCost, ...]

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -17,7 +16,6 @@ from flipproof.frame.chapter import Ask, Chapter, Exhibit, Made, Study, Touch
 from flipproof.frame.solvers import find
 from flipproof.output.columns import curves_csv, json_ready
 from flipproof.output.tables import trajectory_csv
-from flipproof.page.motion import motion_data
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray
@@ -29,8 +27,7 @@ AXES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Flown:
+class Flown(NamedTuple):
     """What became of every solver on the throw, by its name."""
 
     throw: Scenario
@@ -45,11 +42,6 @@ class Flown:
     def rows(self) -> list[dict[str, Any]]:
         """What a report says of every solver: status, end, plateau, impacts, diagnostics."""
         return [solver_row(name, made) for name, made in self.made.items()]
-
-    @property
-    def motion(self) -> dict[str, Any] | None:
-        """What the moving bottles are drawn from."""
-        return motion_data(self.throw, self.made)
 
 
 def study(ask: Ask) -> Study[Flown]:

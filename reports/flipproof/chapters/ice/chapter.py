@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Final
+from dataclasses import replace
+from typing import Final, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -20,8 +20,7 @@ ADMISSIBLE: Final = {"slicemodel": 1e-12, "ode_reference": 1e-12, "engine_check"
 """max |omega/omega_0 - 1| by package: round-off where omega is computed from J, else the engine's own drift."""
 
 
-@dataclass(frozen=True, slots=True)
-class Drift:
+class Drift(NamedTuple):
     """|omega / omega_0 - 1| of one frozen run over time, shape (P,)."""
 
     label: str
@@ -34,8 +33,7 @@ class Drift:
         return float(self.drift.max())
 
 
-@dataclass(frozen=True, slots=True)
-class Ice:
+class Ice(NamedTuple):
     """Frozen runs by label: of every solver, and of an engine whose masses joints hold, the step halved twice."""
 
     rigid: Mapping[str, Made]

@@ -102,7 +102,7 @@ def study_overlap(fills: Sequence[float], runs: Mapping[str, Sequence[Run]], mad
         fills=np.asarray(fills),
         throw=runs[PASS][0].scenario,
         level=level,
-        reason={name: found[name][1] for name in level},
+        reason={name: list(found[name][1]) for name in level},
         band=2.0 * np.abs(level[EXCLUDE] - found[COARSER][0]),
     )
 

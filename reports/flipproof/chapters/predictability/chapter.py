@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import cycle
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -38,8 +38,7 @@ GROWTH_WINDOW = 0.05
 """Growth before and after a parting is fitted over this time [s]."""
 
 
-@dataclass(frozen=True, slots=True)
-class Growth:
+class Growth(NamedTuple):
     """Exponential growth rate of a difference [1/s] with its standard error; NaN if it cannot be fitted."""
 
     rate: float = math.nan
