@@ -45,7 +45,6 @@ class Flight:
 
     Parameters
     ----------
-    name : str
     t, theta, omega, r_cm : (F,) [s, rad, rad/s, m]
     r : (F, n) - positions of the slices that are drawn, from the cap [m]
     drawn : (n,) - their numbers, from 0 (starts on the base)

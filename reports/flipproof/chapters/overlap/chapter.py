@@ -212,26 +212,21 @@ def figure_overlap(study: Overlap) -> Figure:
     """Plateau over fill fraction; what overlap costs is the distance between the two engine curves, ice is the top."""
     figure, axes = new_figure(size=(8.0, 4.6))
     axes.axhline(ICE, color="#444444", linestyle=":", linewidth=1.4)
-    axes.annotate(
-        "ice: nothing moves (expected of a full bottle)", (0.5, ICE), xytext=(0, 5), textcoords="offset points",
-        ha="center", fontsize=9, color="#444444",
-    )  # fmt: skip
+    text: dict[str, Any] = {"textcoords": "offset points", "ha": "center"}
+    words = "ice: nothing moves (expected of a full bottle)"
+    axes.annotate(words, (0.5, ICE), xytext=(0, 5), fontsize=9, color="#444444", **text)
     for name, look in LOOKS.items():
         axes.plot(study.fills, study.level[name], label=name, markersize=6, **look)
     exclude = study.level[EXCLUDE]
     axes.errorbar(study.fills, exclude, yerr=study.band, fmt="none", ecolor="#222222", capsize=3)
-    axes.fill_between(
-        study.fills, study.level[PASS], exclude, color="#0072B2", alpha=0.12, linewidth=0,
-        label="what overlap takes away",
-    )  # fmt: skip
+    shade: dict[str, Any] = {"color": "#0072B2", "alpha": 0.12, "linewidth": 0, "label": "what overlap takes away"}
+    axes.fill_between(study.fills, study.level[PASS], exclude, **shade)
     # Each run that failed is marked at the foot of its fill fraction, so that a gap in a curve is not taken for data.
     for k, (name, look) in enumerate(LOOKS.items()):
         for fill, reason in zip(study.fills, study.reason[name], strict=True):
             if reason:
-                axes.annotate(
-                    f"× {reason.partition(':')[0]}", (fill, 0.0), xytext=(0, 3 + 10 * k), textcoords="offset points",
-                    ha="center", fontsize=7.5, color=look["color"],
-                )  # fmt: skip
+                foot, words = (fill, 0.0), f"× {reason.partition(':')[0]}"
+                axes.annotate(words, foot, xytext=(0, 3 + 10 * k), fontsize=7.5, color=look["color"], **text)
     axes.set(xlim=(0.0, 1.05), ylim=(0.0, 1.12))
     axes.set(xlabel="fill fraction M_w / M_max [1]", ylabel="mean of ω/ω₀ over the second half [1]")
     title = f"{study.throw.n_slices} slices, restitution {study.throw.restitution:g} at the ends and between slices"

@@ -105,12 +105,10 @@ def figure_waterfall(waterfall: Waterfall) -> Figure:
     places = list(range(len(names), 0, -1))
     ladder.barh(places[0], waterfall.start, color=WHOLE, height=0.6)
     ladder.barh(places[-1], waterfall.end, color=WHOLE, height=0.6, xerr=waterfall.end_band, capsize=3)
-    level = waterfall.start
+    level, look = waterfall.start, {"height": 0.6, "capsize": 3, "ecolor": "#222222"}
     for place, bar in zip(places[1:-1], waterfall.bars, strict=True):
-        ladder.barh(
-            place, bar.average, left=level, color=UP if bar.average >= 0 else DOWN, height=0.6,
-            xerr=bar.average_band, capsize=3, ecolor="#222222",
-        )  # fmt: skip
+        colour = UP if bar.average >= 0 else DOWN
+        ladder.barh(place, bar.average, left=level, color=colour, xerr=bar.average_band, **look)
         level += bar.average
         ladder.plot([level, level], [place - 1.3, place + 0.3], color="#888888", linewidth=0.8)
         orders.plot([bar.low, bar.high], [place, place], color="#BBBBBB", linewidth=4.0, solid_capstyle="butt")
@@ -120,10 +118,8 @@ def figure_waterfall(waterfall: Waterfall) -> Figure:
     text: dict[str, Any] = {"xytext": (6, 0), "textcoords": "offset points", "va": "center", "color": "white"}
     for place, value in ((places[0], waterfall.start), (places[-1], waterfall.end)):
         ladder.annotate(f"{value:.3f}", (0, place), **text)
-    ladder.barh(
-        0, waterfall.overlap, left=waterfall.end, color="none", edgecolor=UP if waterfall.overlap >= 0 else DOWN,
-        hatch="////", height=0.6, xerr=waterfall.end_band, capsize=3, ecolor="#222222",
-    )  # fmt: skip
+    hatched: dict[str, Any] = {"color": "none", "edgecolor": UP if waterfall.overlap >= 0 else DOWN, "hatch": "////"}
+    ladder.barh(0, waterfall.overlap, left=waterfall.end, xerr=waterfall.end_band, **hatched, **look)
     for axes in (ladder, orders):
         axes.axhline(0.5, color="#444444", linewidth=0.8, linestyle=":")
         axes.grid(visible=False, axis="y")
