@@ -17,7 +17,6 @@ from flipproof.page.glossary import EQUATIONS, TERMS, anchor, symbols
 from flipproof.page.headlines import headlines
 from flipproof.page.lead import answer, answers, lead_words
 from flipproof.page.live import live_data, sliders, touch_data
-from flipproof.page.motion import motion_data
 from flipproof.page.parts import STORY, behind, sections, shared
 from flipproof.page.story import story
 from flipproof.page.templating import environment
@@ -92,7 +91,7 @@ def render(
         solvers=flown.rows if flown is not None else [],
         problems=[made for made in gathered.flights.values() if made.trajectory is None],
         notes=[note for each in told.values() for note in each.notes],
-        motion=motion_data(flown.throw, flown.made) if flown is not None else None,
+        motion=flown.motion if flown is not None else None,
         measured=gathered.found("measured"),
         provenance=provenance,
         settings=gathered.ask.scenario.to_toml(),

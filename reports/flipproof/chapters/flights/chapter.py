@@ -16,6 +16,7 @@ from flipproof.frame.chapter import Ask, Chapter, Exhibit, Made, Study, Touch
 from flipproof.frame.solvers import find
 from flipproof.output.columns import curves_csv, json_ready
 from flipproof.output.tables import trajectory_csv
+from flipproof.page.motion import motion_data
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray
@@ -42,6 +43,11 @@ class Flown(NamedTuple):
     def rows(self) -> list[dict[str, Any]]:
         """What a report says of every solver: status, end, plateau, impacts, diagnostics."""
         return [solver_row(name, made) for name, made in self.made.items()]
+
+    @property
+    def motion(self) -> dict[str, Any] | None:
+        """What the moving bottles are drawn from."""
+        return motion_data(self.throw, self.made)
 
 
 def study(ask: Ask) -> Study[Flown]:
