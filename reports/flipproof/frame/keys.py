@@ -11,7 +11,6 @@ import platform
 from collections.abc import Callable, Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -19,13 +18,11 @@ import numpy as np
 from flipproof.frame.solvers import Run, find
 from flipproof.output.provenance import PACKAGES, version_of
 
-SOURCES: Final = MappingProxyType(
-    {
-        "slicemodel": ("slicemodel", "flipproof.frame.solvers"),
-        "ode_reference": ("ode_reference", "slicemodel", "flipproof.frame.solvers"),
-        "engine_check": ("engine_check", "slicemodel", "flipproof.frame.solvers"),
-    }
-)
+SOURCES: Final[Mapping[str, tuple[str, ...]]] = {
+    "slicemodel": ("slicemodel", "flipproof.frame.solvers"),
+    "ode_reference": ("ode_reference", "slicemodel", "flipproof.frame.solvers"),
+    "engine_check": ("engine_check", "slicemodel", "flipproof.frame.solvers"),
+}
 """Package -> the sources that its runs are made by. Somebody else's solver is not among them and never kept."""
 
 COMPUTING: Final = ("flipproof", "numpy", "scipy", "numba", "pymunk", "mujoco-core")

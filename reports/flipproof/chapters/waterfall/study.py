@@ -19,7 +19,6 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain, combinations
-from types import MappingProxyType
 from typing import Final, NamedTuple, TypeVar
 
 from flipproof.frame.solvers import Run, finer
@@ -30,16 +29,14 @@ from slicemodel import Scenario, Trajectory, observables
 from slicemodel.trajectory import FloatArray
 
 PROGRAM: Final = "published-python"
-NAMES: Final = MappingProxyType(
-    {
-        "signs": "signs of Eq. 9d: no damping",
-        "roots": "roots of Eq. 9a: γ ≪ ω",
-        "drag_on_centre": "drag against C_M",
-        "weightless": "gravity in Eq. 8",
-        "origin": "origin at rest, drag on the tube",
-        "recoil": "no recoil in impacts",
-    }
-)
+NAMES: Final[Mapping[str, str]] = {
+    "signs": "signs of Eq. 9d: no damping",
+    "roots": "roots of Eq. 9a: γ ≪ ω",
+    "drag_on_centre": "drag against C_M",
+    "weightless": "gravity in Eq. 8",
+    "origin": "origin at rest, drag on the tube",
+    "recoil": "no recoil in impacts",
+}
 """Switch -> the assumption it mends, in the order of the ladder."""
 
 Value = TypeVar("Value", float, FloatArray)
