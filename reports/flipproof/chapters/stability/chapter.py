@@ -101,10 +101,11 @@ def figures(found: Found) -> Iterator[Exhibit]:
     missing = sorted({cell.reason for panel in panels for cell in panel.cells.values() if cell.grade == "not run"})
     duration, burst = panels[0].layout.duration, default.count("explodes")
     caption = (
-        f"Every cell is a flight of {duration:g} s, held against event-driven free flight; the sign in it says the same "
-        f"as its colour. Of the {len(default)} flights with pymunk's own {DEFAULT_ITERATIONS} iterations (dashed) {burst} "
-        "explode; their times from left to right show that a finer step does not help. Where a column reads the same from some row upwards, more iterations no longer change "
-        f"anything, and only a shorter step does. {counts['wrong']} flights break no invariant and are wrong by more "
+        f"Every cell is a flight of {duration:g} s, held against event-driven free flight; the sign in it says the "
+        f"same as its colour. Of the {len(default)} flights with pymunk's own {DEFAULT_ITERATIONS} iterations (dashed) "
+        f"{burst} explode; their times from left to right show that a finer step does not help. Where a column reads "
+        "the same from some row upwards, more iterations no longer change anything, and only a shorter step does. "
+        f"{counts['wrong']} flights break no invariant and are wrong by more "
         f"than 1 %; {counts['good'] + counts['excellent']} are good; {counts['explodes'] + counts['sinks in']} were "
         "stopped, at the time that their cell shows."
     )
