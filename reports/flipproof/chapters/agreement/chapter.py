@@ -97,11 +97,7 @@ def _words(names: tuple[str, ...], pairs: list[Pair]) -> str:
     return f"outside their bands: {named}; no single one of them explains it"
 
 
-Agreed = Mapping[str, Agreement]
-"""Equation -> the comparison of those who solve it."""
-
-
-def study(ask: Ask) -> Study[Agreed]:
+def study(ask: Ask) -> Study[Mapping[str, Agreement]]:
     """Compare, for free flight and for Eq. 8, the solvers that reached the end and know their band.
 
     Beside the equation itself and its witness these are engines. The witness's own band is by how much it differs from
@@ -148,7 +144,7 @@ def band_over_time(run: Run, others_of: Iterable[Run], flights: Flights) -> Floa
     return np.asarray(np.maximum.accumulate(np.max([*moved, np.full(len(usual.t), MODEL_FLOOR)], axis=0)))
 
 
-def claims(found: Agreed) -> Claims:
+def claims(found: Mapping[str, Agreement]) -> Claims:
     """Yield for each equation the largest difference of a pair, and which solver differs from all others."""
     for equation, agreement in found.items():
         widest = max(agreement.pairs, key=lambda pair: pair.largest)

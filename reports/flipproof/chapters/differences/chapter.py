@@ -53,7 +53,6 @@ class Differences(NamedTuple):
 
     pairs: tuple[Difference, ...]
     growths: tuple[str, ...]
-    slices: int
     ended: str
     missing: Mapping[tuple[str, str, str], str]
 
@@ -100,7 +99,7 @@ def study(ask: Ask) -> Study[Differences]:
     if free is not None and not free.ok:
         ended = f"up to t = {1e3 * free.t[-1]:.0f} ms, where {free.method} {free.status}"
     missing = {pair: outcome.reason for pair, outcome in tried.items() if outcome.reason}
-    return Differences(pairs, growths, ask.throw.n_slices, ended, missing)
+    return Differences(pairs, growths, ended, missing)
 
 
 def run_bands(runs: Mapping[str, Run], flights: Flights) -> dict[str, float]:
