@@ -44,7 +44,8 @@ def answers(headlines: Sequence[Headline]) -> Iterator[tuple[str, list[str]]]:
     found = {headline.id: headline for headline in headlines}
     if (largest := _largest(headlines)) is None or largest < NOTHING:
         return
-    steps, held = found["step"].note if "step" in found else "the steps", _verdict(found, "held", "held-through")
+    steps = found["step"].note if "step" in found else "the steps"
+    held = _verdict(found, "held", "held-through")
     yield f"Is it justified to hold omega constant over a step? {held}", list(_held(found))
     yield f"Are {steps} enough? {_verdict(found, 'step')}", list(_step(found))
     yield f"Is Eq. 8 free flight? {_verdict(found, 'eq8-free')}", list(_equations(found))
@@ -94,9 +95,10 @@ def asides(headlines: Sequence[Headline]) -> Iterator[str]:
 
 
 def _verdict(found: Mapping[str, Headline], *ids: str) -> str:
-    values, within = [found[id_].value for id_ in ids if id_ in found], percent(PARTING_BAND)
+    values = [found[id_].value for id_ in ids if id_ in found]
     if not values:
         return "Not known."
+    within = percent(PARTING_BAND)
     return f"Yes, within {within}." if max(values) <= PARTING_BAND else f"No, not within {within}."
 
 

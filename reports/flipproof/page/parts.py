@@ -84,7 +84,8 @@ class Section:
             "observed": ("observation", "observations"),
             "not evaluated": ("not evaluated", "not evaluated"),
         }
-        return ", ".join(f"{counts[each]} {said[counts[each] != 1]}" for each, said in words.items() if each in counts)
+        there = [(counts[verdict], *said) for verdict, said in words.items() if verdict in counts]
+        return ", ".join(f"{n} {one if n == 1 else many}" for n, one, many in there)
 
 
 def sections(gathered: Gathered, told: Mapping[str, Told], templates: Environment) -> tuple[Section, ...]:

@@ -162,7 +162,8 @@ def _shares(summary: Summary) -> list[SimpleNamespace]:
 
 
 def _experiment(summary: Summary, id_: str) -> SimpleNamespace | None:
-    place, shown = f"paper/experiment/{id_}/equations", degrees if id_ == "landing-angle" else rounded
+    shown = degrees if id_ == "landing-angle" else rounded
+    place = f"paper/experiment/{id_}/equations"
     if summary.at(f"paper/experiment/{id_}") is None:
         return None
     equations = {solver: summary.number(f"{place}/{solver}/value", shown) for solver in NAMES if solver != "pymunk"}

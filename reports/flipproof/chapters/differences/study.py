@@ -86,7 +86,8 @@ def study_difference(
     omega = (np.interp(t, second.t, second.omega) - first.omega[: len(t)]) / first.scenario.omega0
     size = np.abs(omega)
     k = int(size.argmax())
-    parting, impacts = first_crossing(t, size, PARTING_BAND), None if impacts_of is None else impacts_of.impacts
+    parting = first_crossing(t, size, PARTING_BAND)
+    impacts = None if impacts_of is None else impacts_of.impacts
     before = 0 if parting is None or impacts is None else int(np.searchsorted(impacts.time, parting, side="right"))
     return Difference(
         name=name,

@@ -101,7 +101,8 @@ class Ensemble:
     @property
     def words(self) -> str:
         """Width, horizon and growth in words."""
-        left, ended = self.horizon, "" if self.ended is None else f"; a member ends at {self.ended * 1e3:.1f} ms"
+        left = self.horizon
+        ended = "" if self.ended is None else f"; a member ends at {self.ended * 1e3:.1f} ms"
         when = f"never beyond {HORIZON_BAND:g}" if left is None else f"beyond {HORIZON_BAND:g} from {left * 1e3:.1f} ms"
         widths = f"width at most {self.largest:.1e} of ω₀, {self.width[-1]:.1e} at the end"
         return f"{self.what}: {widths}, {when}; {self.growth.words}{ended}"
@@ -308,7 +309,8 @@ def figure_horizon(studies: Sequence[Horizon]) -> Figure:
         at.axhline(HORIZON_BAND, color=red, linewidth=1.2, linestyle=":")
     place: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "va": "bottom", "fontsize": 9, "color": red}
     axes[0, 0].annotate(f"band {HORIZON_BAND:g}", (0.02, HORIZON_BAND), **place)
-    entry, lines = partial(Line2D, [], []), zip(sizes, cycle(SIZE_LINES), strict=False)
+    entry = partial(Line2D, [], [])
+    lines = zip(sizes, cycle(SIZE_LINES), strict=False)
     handles = [entry(color=grey, linestyle=line, label=f"change of {size:.0e}") for size, line in lines]
     if any(study.of_kind("order") for study in made):
         handles.append(entry(color="black", linewidth=1.8, label="other orders of the bodies"))

@@ -295,7 +295,8 @@ def figure_predictability(studies: Sequence[Predictability]) -> Figure:
         axes.set_xlabel("time t [s]")
         axes.margins(x=0.01)
     panels[0].set_ylabel("largest |change of ω| / ω₀ [1]")
-    entry, lines = partial(Line2D, [], [], color="#444444"), zip(studies[0].sizes, cycle(SIZE_LINES), strict=False)
+    entry = partial(Line2D, [], [], color="#444444")
+    lines = zip(studies[0].sizes, cycle(SIZE_LINES), strict=False)
     handles = [entry(linestyle=line, label=f"release changed by {size:.0e}") for size, line in lines]
     handles.append(entry(linestyle=":", linewidth=1.0, label=f"band {HORIZON_BAND:g}"))
     if any(study.horizon is not None for study in studies):

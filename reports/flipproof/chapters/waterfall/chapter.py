@@ -105,7 +105,8 @@ def figure_waterfall(waterfall: Waterfall) -> Figure:
     places = list(range(len(names), 0, -1))
     ladder.barh(places[0], waterfall.start, color=WHOLE, height=0.6)
     ladder.barh(places[-1], waterfall.end, color=WHOLE, height=0.6, xerr=waterfall.end_band, capsize=3)
-    level, look = waterfall.start, {"height": 0.6, "capsize": 3, "ecolor": "#222222"}
+    level = waterfall.start
+    look = {"height": 0.6, "capsize": 3, "ecolor": "#222222"}
     for place, bar in zip(places[1:-1], waterfall.bars, strict=True):
         colour = UP if bar.average >= 0 else DOWN
         ladder.barh(place, bar.average, left=level, color=colour, xerr=bar.average_band, **look)
