@@ -11,7 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from itertools import chain
+from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -151,16 +152,8 @@ Orders = Mapping[tuple[str, str], Outcome[StepSize]]
 """Part and scheme -> its study."""
 
 
-class Grids(NamedTuple):
-    """A scheme's grids on one throw, and the run of its equation."""
-
-    truth: Run
-    levels: list[list[Run]]
-
-    @property
-    def runs(self) -> list[Run]:
-        """Every run."""
-        return [self.truth, *(run for level in self.levels for run in level)]
+Grids = list[list[Run]]
+"""The run of an equation, alone; then a scheme's grids on the same throw, level by level."""
 
 
 def study(ask: Ask) -> Study[Orders]:
@@ -171,26 +164,23 @@ def study(ask: Ask) -> Study[Orders]:
     # Throw, first multiple of the 37 intervals that all grids share (a divisor of the 999 of the default output times),
     # levels, and the names of both parts.
     asked = [(ask.reference, 108, 4, *CHECKED)] + ([(ask.throw, 27, ask.work, START, WHOLE)] if ask.work else [])
-    whole = {
-        (part, scheme): Grids(
-            Run(LIMITS[scheme], throw, {}, LIMITS[scheme]), plan_step_size(throw, scheme, 37, multiple, levels)
-        )
-        for throw, multiple, levels, _, part in asked
-        for scheme in SCHEMES
-    }
-    flights = yield [run for grids in whole.values() for run in grids.runs]
-    starts = {
-        (start, scheme): attempt(_start, whole[part, scheme].truth, flights, scheme, levels)
-        for _, _, levels, start, part in asked
-        for scheme in SCHEMES
-    }
-    flights = yield [run for grids in known(starts).values() for run in grids.runs]
+    grids: dict[tuple[str, str], Outcome[Grids]] = {}
+    for throw, multiple, levels, _, part in asked:
+        for scheme in SCHEMES:
+            truth = Run(LIMITS[scheme], throw)
+            grids[part, scheme] = Outcome([[truth], *plan_step_size(throw, scheme, 37, multiple, levels)])
+    flights = yield chain.from_iterable(chain.from_iterable(known(grids).values()))
+    for throw, _, levels, start, _ in asked:
+        for scheme in SCHEMES:
+            truth = Run(LIMITS[scheme], throw)
+            grids[start, scheme] = attempt(_start, truth, flights, scheme, levels)
+    flights = yield chain.from_iterable(chain.from_iterable(known(grids).values()))
 
-    def measured(grids: Grids) -> StepSize:
-        return study_step_size(flights[grids.truth].flight, flights.levels(grids.levels))
+    def measured(each: Outcome[Grids]) -> StepSize:
+        (truth,), *levels = flights.levels(each.value)
+        return study_step_size(truth, levels)
 
-    found = {part: attempt(measured, grids) for part, grids in whole.items()}
-    return found | {part: attempt(lambda each: measured(each.value), each) for part, each in starts.items()}
+    return {part: attempt(measured, each) for part, each in grids.items()}
 
 
 def _start(truth: Run, flights: Flights, scheme: str, levels: int) -> Grids:
@@ -200,7 +190,7 @@ def _start(truth: Run, flights: Flights, scheme: str, levels: int) -> Grids:
         raise Missing(f"{truth.solver} strikes no end")
     times = np.linspace(0.0, start.duration, 10)
     before = Run(truth.solver, start, {"times": times}, f"{truth.solver} before the first impact")
-    return Grids(before, plan_step_size(start, scheme, base=9, multiple=14, count=levels))
+    return [[before], *plan_step_size(start, scheme, base=9, multiple=14, count=levels)]
 
 
 def claims(found: Orders) -> Claims:
@@ -211,9 +201,8 @@ def claims(found: Orders) -> Claims:
             title = f"{scheme} converges to {LIMITS[scheme]}, {where}"
             yield judged(claim_order, found[where, scheme], where, id=id_, title=title)
         for where in (START, WHOLE):
-            for measured in _measured(found, where):
-                if measured.scheme == scheme:
-                    yield claim_order(measured, where, kind="observation")
+            if (where, scheme) in found and (measured := found[where, scheme].found) is not None:
+                yield claim_order(measured, where, kind="observation")
 
 
 def _measured(found: Orders, where: str) -> list[StepSize]:
