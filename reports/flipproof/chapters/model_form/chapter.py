@@ -278,7 +278,6 @@ FORMS: Final = (
 )
 """Scheme and equation: is what is left as the step goes to zero the step's, or another equation?"""
 
-
 Found = tuple[Mapping[tuple[str, str], Outcome[ModelForm]], Mapping[str, Outcome[Richardson]]]
 """The fit of every pair of scheme and equation, and where each scheme goes as its step goes to zero."""
 
@@ -286,11 +285,11 @@ Found = tuple[Mapping[tuple[str, str], Outcome[ModelForm]], Mapping[str, Outcome
 def study(ask: Ask) -> Study[Found]:
     """Halve the step of the schemes of FORMS; fit omega of the pairs that ``ask.work`` lists, in workers."""
     levels = {scheme: plan_step_size(ask.throw, scheme, base=37, multiple=54, count=6) for scheme in dict(FORMS)}
-    truths = {pair: Run(pair[1], ask.throw, {}, pair[1]) for pair in ask.work}
-    flights = yield [*truths.values(), *(run for grids in levels.values() for level in grids for run in level)]
+    grids = (run for each in levels.values() for level in each for run in level)
+    flights = yield [*(Run(model, ask.throw) for _, model in ask.work), *grids]
 
     def fit(scheme: str, model: str) -> Call:
-        truth = flights[truths[scheme, model]].flight
+        truth = flights[Run(model, ask.throw)].flight
         return Call(study_model_form, errors_of(truth, flights.levels(levels[scheme])), f"{scheme} against {model}")
 
     def limit(scheme: str) -> Richardson:
@@ -300,7 +299,7 @@ def study(ask: Ask) -> Study[Found]:
         ends = [float(np.mean([run.omega[-1] for run in level])) / ask.throw.omega0 for level in grids]
         return richardson(steps, ends)
 
-    calls = {pair: attempt(fit, *pair) for pair in truths}
+    calls = {pair: attempt(fit, *pair) for pair in ask.work}
     flights = yield known(calls).values()
     forms = {pair: attempt(lambda call: flights.answer(call.value), call) for pair, call in calls.items()}
     return forms, {scheme: attempt(limit, scheme) for scheme in levels}

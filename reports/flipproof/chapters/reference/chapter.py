@@ -17,7 +17,6 @@ BAND: Final = 1e-7
 CROSS_CHECKED: Final = ("published-limit", "eq8")
 """Models that a second integration method is held against."""
 
-
 Found = Mapping[str, list[Made]]
 """Model -> its flight of the paper's own throw: as it is, by the witness, and by a second method if asked for."""
 
