@@ -52,7 +52,7 @@ def test_every_witness_has_its_certificate(gathered, report, read_page):
     found = gathered.found("certificates")
     assert tuple(found.certificates) == witnesses(gathered.ask.throw)
     assert all(certificate["status"] == "certified" for certificate in found.certificates.values())
-    agreements = gathered.found("agreement").agreements
+    agreements = gathered.found("agreement")
     assert set(agreements["free-flight"].names) == {"free-flight", "solve_ivp", "pymunk", "mujoco"}
     assert set(agreements["eq8"].names) == {"eq8", "solve_ivp", "pymunk rotating"}
     assert not any(agreement.words.startswith("all but") for agreement in agreements.values())
@@ -63,7 +63,7 @@ def test_every_witness_has_its_certificate(gathered, report, read_page):
 def test_an_engine_that_is_not_installed_is_named_with_its_reason(gathered):
     poorer = without(gathered, "mujoco")
     assert "mujoco" not in poorer.found("certificates").certificates
-    assert set(poorer.found("agreement").agreements["free-flight"].names) == {"free-flight", "solve_ivp", "pymunk"}
+    assert set(poorer.found("agreement")["free-flight"].names) == {"free-flight", "solve_ivp", "pymunk"}
     told = tell(poorer)
     assert "RuntimeError: not installed" in poorer.found("flights").made["mujoco"].reason
     assert not [finding.id for each in told.values() for finding in each.findings if finding.failed]
@@ -71,7 +71,7 @@ def test_an_engine_that_is_not_installed_is_named_with_its_reason(gathered):
 
 def test_without_any_engine_the_equations_are_held_against_the_witness(gathered):
     poorest = without(gathered, "mujoco", "pymunk", "pymunk rotating")
-    agreements = poorest.found("agreement").agreements
+    agreements = poorest.found("agreement")
     assert {name: agreement.names for name, agreement in agreements.items()} == {
         "free-flight": ("free-flight", "solve_ivp"),
         "eq8": ("eq8", "solve_ivp"),
