@@ -26,7 +26,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from flipproof.figures.style import solver_style, styled
-from flipproof.page.motion import Flight, cap_and_base, flight_of, frame_times, parabola, release_point
+from flipproof.page.motion import Flight, cap_and_base, flight_of, parabola, release_point
 from flipproof.sweep.files import whole_file
 from slicemodel import Scenario, Trajectory
 from slicemodel.scenario import shortened
@@ -72,7 +72,7 @@ def plan_film(throw: Scenario, slow: float, fps: int) -> FloatArray:
     frames = throw.duration * slow * fps + 1
     if frames > MOST_FRAMES:
         raise FilmError(f"--slow {slow:g} at --fps {fps} makes {frames:.4g} frames (admissible: at most {MOST_FRAMES})")
-    return frame_times(throw, max(round(frames), 2))
+    return np.linspace(0.0, throw.duration, max(round(frames), 2))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

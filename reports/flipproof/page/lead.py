@@ -42,7 +42,7 @@ def lead_words(headlines: Sequence[Headline]) -> str:
 def answers(headlines: Sequence[Headline]) -> Iterator[tuple[str, list[str]]]:
     """Yield the questions of the front page, each answered by yes or no and its sentences; none if all agree."""
     found = {headline.id: headline for headline in headlines}
-    if (largest := _largest(headlines)) is None or largest < NOTHING:
+    if (largest := _largest(found)) is None or largest < NOTHING:
         return
     steps = found["step"].note if "step" in found else "the steps"
     held = _verdict(found, "held", "held-through")
@@ -102,16 +102,15 @@ def _verdict(found: Mapping[str, Headline], *ids: str) -> str:
     return f"Yes, within {within}." if max(values) <= PARTING_BAND else f"No, not within {within}."
 
 
-def _largest(headlines: Sequence[Headline]) -> float | None:
+def _largest(found: Mapping[str, Headline]) -> float | None:
     """Return the largest difference of those that tell whether all solvers agree; None if none was computed."""
-    told = [h.value for h in headlines if h.measure == "largest" and h.id in ("whole", "pair", "program-eq8")]
-    return max(told, default=None)
+    return max((found[id_].value for id_ in ("whole", "program-eq8", "pair") if id_ in found), default=None)
 
 
 def sentences(headlines: Sequence[Headline]) -> Iterator[str]:
     """Yield the verdict sentence by sentence; each can be read alone."""
     found = {headline.id: headline for headline in headlines}
-    largest = _largest(headlines)
+    largest = _largest(found)
     if largest is None:
         yield "No two solvers could be compared on this throw; the reasons stand below."
         return

@@ -64,11 +64,6 @@ class Flight:
     impacts: Impacts | None
 
 
-def frame_times(scenario: Scenario, frames: int) -> FloatArray:
-    """Return the times of the frames, from release to landing, shape (frames,) [s]."""
-    return np.linspace(0.0, scenario.duration, frames)
-
-
 def flight_of(trajectory: Trajectory, times: FloatArray) -> Flight:
     """Return a run at those of ``times`` that it reached, linear between its own output times."""
     reached = times[times <= trajectory.t[-1] * (1 + 1e-12)]
@@ -122,7 +117,7 @@ def motion_data(throw: Scenario, made: Mapping[str, Made]) -> dict[str, Any] | N
 
     ``throw`` is that of all runs, cut as they were; of ``made`` those in ``FLOWN`` are shown, by their names.
     """
-    times = frame_times(throw, FRAMES)
+    times = np.linspace(0.0, throw.duration, FRAMES)
     there = {name: made[name] for name in FLOWN if name in made}
     shown = {name: flight_of(each.trajectory, times) for name, each in there.items() if each.trajectory is not None}
     if not shown:
