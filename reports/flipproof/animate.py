@@ -77,9 +77,9 @@ def plan_film(throw: Scenario, slow: float, fps: int) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Film:
-    """What is shown: ``t`` is the time of flight of every frame, shape (F,) [s], ``slow`` times slower than the flight.
+    """What is shown, ``slow`` times slower than the flight and with ``fps`` frames in a second.
 
-    There is one flight per bottle, and ``fps`` frames are shown in a second.
+    ``t`` is the time of flight of every frame, shape (F,) [s]; there is one flight per bottle.
     """
 
     throw: Scenario

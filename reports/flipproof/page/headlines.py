@@ -34,7 +34,7 @@ class Headline:
     Parameters
     ----------
     id, what, measure : what it answers, which pair or assumption, and what number it is, see above
-    value, slices : signed if a share; slices it was computed at
+    value : signed if a share; computed at so many ``slices``
     finer, finer_slices : the same at another number of slices
     band : numerical uncertainty
     time : when the largest difference occurs [s]

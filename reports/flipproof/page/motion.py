@@ -113,9 +113,10 @@ def cap_and_base(scenario: Scenario, flight: Flight) -> tuple[FloatArray, FloatA
 
 
 def motion_data(throw: Scenario, made: Mapping[str, Made]) -> dict[str, Any] | None:
-    """Return what the player needs, ready for JSON; None if no solver flew, one that failed with its reason.
+    """Return what the player needs, ready for JSON; None if no solver flew.
 
-    ``throw`` is that of all runs, cut as they were; of ``made`` those in ``FLOWN`` are shown, by their names.
+    ``throw`` is that of all runs, cut as they were; of ``made``, by name, those in ``FLOWN`` are shown, and one that
+    failed with its reason.
     """
     times = np.linspace(0.0, throw.duration, FRAMES)
     there = {name: made[name] for name in FLOWN if name in made}
