@@ -177,12 +177,13 @@ def figures(found: Frozen) -> Iterator[Exhibit]:
 @styled
 def figure_frozen(study: Frozen) -> Figure:
     """Draw how every coefficient changes in a step, the defect that holding it causes, and what becomes of them."""
-    coefficients, colours = ("ω", "θ (gravity)", "r_CM", "v_CM (drag)"), ("#D55E00", "#0072B2", "#009E73", "#CC79A7")
+    coefficients = dict(zip(QUANTITIES, ("ω", "θ (gravity)", "r_CM", "v_CM (drag)"), strict=True))
+    colours = dict(zip(QUANTITIES, ("#D55E00", "#0072B2", "#009E73", "#CC79A7"), strict=True))
     figure, panels = new_figure(3, size=(8.0, 8.6), sharex=True)
     changes, defects, errors = panels
-    looks = (("|Δω| / ω", colours[0], "-"), ("|Δθ| [rad]", colours[1], "-"), ("|Δr_CM| / L", colours[2], "-"),
-             ("γ / ω, not a change", "#000000", ":"))  # fmt: skip
-    for values, (words, colour, dash) in zip(study.changes, looks, strict=True):
+    labels = ("|Δω| / ω", "|Δθ| [rad]", "|Δr_CM| / L", "γ / ω, not a change")
+    looks = [*((colours[quantity], "-") for quantity in QUANTITIES[:3]), ("#000000", ":")]
+    for values, words, (colour, dash) in zip(study.changes, labels, looks, strict=True):
         changes.semilogy(study.t, _shown(values), color=colour, linewidth=1.2, linestyle=dash, label=words)
     changes.set_title(f"change in one step of {study.dt * 1e3:.2g} ms, exact-step", fontsize=10, loc="left")
     changes.set_ylabel("change per step [1]")
@@ -191,7 +192,8 @@ def figure_frozen(study: Frozen) -> Figure:
         if not values.any():
             continue
         time, peak = study.peak[quantity]
-        label, colour = f"{coefficients[k]}: largest in {100 * study.share[quantity]:.0f} % of the steps", colours[k]
+        label = f"{coefficients[quantity]}: largest in {100 * study.share[quantity]:.0f} % of the steps"
+        colour = colours[quantity]
         if quantity == "v_cm":  # jumps at every impact: its range within a window leaves the others to be seen
             t, least, most = envelope(study.t, values)
             label += f" (range within {1e3 * (t[1] - t[0]):.2g} ms)"
