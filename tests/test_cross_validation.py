@@ -8,8 +8,7 @@ import ode_reference
 import slicemodel
 from flipproof.chapters.ice.chapter import ADMISSIBLE
 from flipproof.chapters.solvers import LIMITS, SCHEMES
-from flipproof.chapters.step_size.chapter import claim_order
-from flipproof.chapters.step_size.study import before_first_impact, plan_step_size, study_step_size
+from flipproof.chapters.step_size.chapter import before_first_impact, claim_order, plan_step_size, study_step_size
 from slicemodel import Bottle, Scenario, observables
 
 # Other bottles, fillings, angles, spins and restitutions; each shifts the phase of every impact.

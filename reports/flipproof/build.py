@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from concurrent.futures import Executor
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -48,14 +49,10 @@ class Report:
 
 
 def ask_of(scenario: Scenario, size: Size, slices: int | None = None, certified: tuple[str, ...] | None = None) -> Ask:
-    """Return what a report asks of its chapters.
+    """Return what a report of a throw asks of its chapters.
 
-    Parameters
-    ----------
-    scenario : the throw as given
-    size : {"check", "quick", "full"}
-    slices : at which solvers are compared; None: SLICES, or the scenario's own if they are fewer
-    certified : witnesses that are certified; None: those of the size
+    ``slices`` are those at which solvers are compared; None: SLICES, or the scenario's own if they are fewer.
+    ``certified`` are the witnesses that are certified; None: those of the size.
     """
     throw = scenario.with_slices(slices or min(SLICES, scenario.n_slices))
     ask = Ask(scenario=scenario, throw=throw, size=size)
@@ -86,22 +83,13 @@ def build(
 ) -> Report:
     """Evaluate every claim, draw every figure and write the page, all in memory.
 
-    Parameters
-    ----------
-    gathered : Gathered
-    provenance : mapping
-    pool : Executor or None - workers that draw; None: this process
-    png : bool - whether figures are made as PNG, too
+    Figures are drawn by the workers of ``pool``, or in this process; ``png`` says whether as PNG, too.
     """
     told = tell(gathered)
     with gathered.stages.lap("figures"):
-        figures = [figure for each in told.values() for figure in each.figures]
-        exhibits = drawn(figures, pool or Here(), png=png)
-    by_name = {exhibit.name: exhibit for exhibit in exhibits}
-    told = {
-        name: replace(each, figures=tuple(by_name[figure.name] for figure in each.figures))
-        for name, each in told.items()
-    }
+        exhibits = drawn([figure for each in told.values() for figure in each.figures], pool or Here(), png=png)
+    rest = iter(exhibits)
+    told = {name: replace(each, figures=tuple(islice(rest, len(each.figures)))) for name, each in told.items()}
     summary = summarise(gathered, told, provenance)
     with gathered.stages.lap("page"):
         html = render(gathered, told, provenance, summary)

@@ -10,9 +10,19 @@ from hypothesis import strategies as st
 from made_up import trajectory_of
 from PIL import Image
 
-from flipproof.animate import HOLD, FilmError, check_target, film_of, frame_durations, plan_film, write_film
+from flipproof.animate import (
+    HOLD,
+    FilmError,
+    check_target,
+    draw_frames,
+    film_of,
+    frame_durations,
+    outline,
+    plan_film,
+    slice_corners,
+    write_film,
+)
 from flipproof.cli.animate import add_animate, chosen_solvers
-from flipproof.figures.film import draw_frames, outline, slice_corners
 from flipproof.page.motion import FLOWN
 from slicemodel import Scenario
 

@@ -12,7 +12,7 @@ import pytest
 
 from flipproof.build import ask_of
 from flipproof.chapters import parts
-from flipproof.chapters.horizon.study import Reach
+from flipproof.chapters.horizon.chapter import Reach
 from flipproof.chapters.overlap.chapter import Amount
 from flipproof.chapters.stability.study import Layout
 from flipproof.check.diff import Change, change_of, compare_summaries, read_summary, scenario_changes, within

@@ -14,7 +14,7 @@ from flipproof.chapters.differences.chapter import BY_ENGINE, EQ8_FREE, PROGRAM_
 from flipproof.chapters.differences.study import percent
 from flipproof.chapters.finite_step.chapter import EVERYTHING, HELD, LOCATED, WAYS
 from flipproof.chapters.waterfall.study import STEP
-from flipproof.frame.throws import FINER
+from flipproof.frame.solvers import FINER
 from flipproof.output.snapshot import BEGIN, END, PLACE, README, front_page, write_front_page
 from flipproof.page.headlines import Headline, Measure, headlines
 from flipproof.page.lead import amount, answer, lead_words, sentences, signed

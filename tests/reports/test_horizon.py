@@ -10,8 +10,17 @@ from made_up import trajectory_of
 from engine_check import PymunkKnobs
 from engine_check.pymunk_settings import insertion_order
 from engine_check.pymunk_world import build
-from flipproof.chapters.horizon.chapter import claim_angle, claim_horizon, claims, figure_horizon, figures
-from flipproof.chapters.horizon.study import Reach, plan_horizon, study_ensemble, study_horizon
+from flipproof.chapters.horizon.chapter import (
+    Reach,
+    claim_angle,
+    claim_horizon,
+    claims,
+    figure_horizon,
+    figures,
+    plan_horizon,
+    study_ensemble,
+    study_horizon,
+)
 from flipproof.frame.solvers import Made, make, solve
 from slicemodel import Scenario, Trajectory
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flipproof.chapters.model_form.study import ModelForm, richardson, study_model_form
-from flipproof.chapters.step_size.study import before_first_impact, errors_of, plan_step_size
+from flipproof.chapters.model_form.chapter import ModelForm, richardson, study_model_form
+from flipproof.chapters.step_size.chapter import before_first_impact, errors_of, plan_step_size
 from flipproof.frame.solvers import make, solve
 from slicemodel import Bottle, Scenario
 

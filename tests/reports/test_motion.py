@@ -18,7 +18,6 @@ from flipproof.page.motion import (
     cap_and_base,
     drawn_slices,
     flight_of,
-    frame_times,
     motion_data,
 )
 from flipproof.page.templating import environment
@@ -63,7 +62,7 @@ def rendered(data):
 
 
 def test_the_centre_of_mass_of_every_drawn_bottle_is_on_the_parabola_and_the_cap_starts_at_the_origin():
-    flight = flight_of(flown(), frame_times(THROW, 50))
+    flight = flight_of(flown(), np.linspace(0.0, THROW.duration, 50))
     cap, base = cap_and_base(THROW, flight)
     centre = cap + (base - cap) * (flight.r_cm / THROW.bottle.length)[:, np.newaxis]
     t = flight.t

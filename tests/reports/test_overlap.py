@@ -69,7 +69,7 @@ def test_levels_bands_cost_and_distance_from_ice_are_read_off():
     assert "at most −0.598, at filling 100 %" in next(figures((study, None))).caption
     assert study.missing_from_ice(EXCLUDE) == pytest.approx(0.004)
     assert study.missing_from_ice(PASS) == pytest.approx(0.6)
-    assert study.restitution == 0.5
+    assert study.throw.restitution == 0.5
 
 
 def test_a_failure_keeps_its_reason_and_leaves_a_gap():

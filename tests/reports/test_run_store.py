@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flipproof.frame import keys, sources, store
+from flipproof.frame import keys, store
 from flipproof.frame.keys import key_of, key_of_call
 from flipproof.frame.pool import make_all, workers
 from flipproof.frame.solvers import Made, Run, make
@@ -157,10 +157,10 @@ def test_a_changed_source_makes_runs_again(place, tmp_path, monkeypatch):
     kept(place, RUN)
     assert found(place) is not None
     (room / "motion.py").write_text("G = 9.82\n")
-    sources.fingerprint.cache_clear()
+    keys.fingerprint.cache_clear()
     assert found(place) is None
     (room / "motion.py").write_text("G = 9.81\n")
-    sources.fingerprint.cache_clear()
+    keys.fingerprint.cache_clear()
     assert found(place) is not None
 
 
@@ -392,8 +392,8 @@ def test_a_fingerprint_is_of_all_files_but_compiled_and_hidden_ones(tmp_path, mo
     seen = set()
     for name in ("__init__.py", "data.json", "__pycache__/kernel.nbi", ".hidden"):
         (room / name).write_text("1")
-        sources.fingerprint.cache_clear()
-        seen.add(sources.fingerprint("another_room"))
+        keys.fingerprint.cache_clear()
+        seen.add(keys.fingerprint("another_room"))
     assert len(seen) == 2
 
 

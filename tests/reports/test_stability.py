@@ -48,6 +48,13 @@ def chart(spoil, layout=SMALL):
     return study_stability(THROW, layout, made)
 
 
+def grades(panel):
+    """Return the grades of a chart, a list a row."""
+    columns = len(panel.layout.dt)
+    listed = [cell.grade for cell in panel.cells.values()]
+    return [listed[k : k + columns] for k in range(0, len(listed), columns)]
+
+
 def test_the_plan_has_different_runs_explicit_settings_and_references_with_twins():
     runs = plan_stability(THROW, FULL)
     assert len({run.label for run in runs}) == len(runs)
@@ -86,17 +93,17 @@ def test_every_grade_is_given_for_its_reason_and_no_other():
         "dt 0.0002 s, 10 iterations": lambda run: flight(run, 0.0009),
     }
     (panel,) = chart(spoil)
-    assert panel.grade.tolist() == [["explodes", "good"], ["sinks in", "excellent"], ["wrong", "not run"]]
-    assert panel.held_until[0, 0] == pytest.approx(0.004)
-    assert panel.held_until[1, 0] == pytest.approx(0.008)
-    assert panel.error[2, 0] == pytest.approx(0.011)
-    assert panel.plateau_error[2, 0] == pytest.approx(0.011, rel=0.05, abs=0.0)
-    assert panel.reason[0, 0] == "diverged: joints; raise iterations"
-    assert "more than 2.0e+05" in panel.reason[2, 1]
+    assert grades(panel) == [["explodes", "good"], ["sinks in", "excellent"], ["wrong", "not run"]]
+    assert panel.cells[0, 0].held_until == pytest.approx(0.004)
+    assert panel.cells[1, 0].held_until == pytest.approx(0.008)
+    assert panel.cells[2, 0].error == pytest.approx(0.011)
+    assert panel.cells[2, 0].plateau_error == pytest.approx(0.011, rel=0.05, abs=0.0)
+    assert panel.cells[0, 0].reason == "diverged: joints; raise iterations"
+    assert "more than 2.0e+05" in panel.cells[2, 1].reason
     assert panel.band == pytest.approx(3e-11, rel=1e-4, abs=0.0)  # both are perfect, one of them faster
     assert panel.enough == 50
-    assert sum(panel.counts.values()) == panel.grade.size
-    assert panel.at_default.tolist() == ["sinks in", "excellent"]
+    assert sum(panel.counts.values()) == len(panel.cells)
+    assert panel.at_default == ["sinks in", "excellent"]
 
 
 def test_an_error_that_is_no_number_is_wrong():
@@ -105,18 +112,18 @@ def test_an_error_that_is_no_number_is_wrong():
 
 def test_a_cell_without_a_run_or_a_reference_is_never_good():
     (panel,) = chart({"dt 0.002 s, 60": lambda run: Made(run, None, 0.0, "MemoryError: too much")})
-    assert (panel.grade[2, 0], panel.reason[2, 0]) == ("not run", "MemoryError: too much")
+    assert (panel.cells[2, 0].grade, panel.cells[2, 0].reason) == ("not run", "MemoryError: too much")
     (panel,) = chart({"free-flight": lambda run: Made(run, None, 0.0, "stalled")})
-    assert (panel.grade == "not run").all()
+    assert all(cell.grade == "not run" for cell in panel.cells.values())
     assert np.isnan(panel.band)
-    assert "free-flight has no result" in panel.reason[0, 0]
+    assert "free-flight has no result" in panel.cells[0, 0].reason
     assert claim_rule_of_iterations([panel]).failed
 
 
 def test_the_band_is_what_the_reference_moves():
     (panel,) = chart({"free-flight, twin in release": lambda run: flight(run, 0.0004)})
     assert panel.band == pytest.approx(0.0004)
-    assert panel.error[0, 0] == 0.0
+    assert panel.cells[0, 0].error == 0.0
 
 
 def test_the_claims_count_what_the_chart_shows():
@@ -129,7 +136,7 @@ def test_the_claims_count_what_the_chart_shows():
     stopped = chart({"dt 0.0002 s, 60": lambda run: flight(run, message="x; reduce dt", points=2)}, wide)
     assert claim_rule_of_iterations(stopped).verdict == "fail"
     assert claim_default_iterations_explode(stopped).failed
-    nan = [replace(panels[0], error=panels[0].error * np.nan)]
+    nan = [replace(panels[0], cells={at: cell._replace(error=np.nan) for at, cell in panels[0].cells.items()})]
     assert claim_rule_of_iterations(nan).verdict == "fail"
     wrong = chart({"60 iterations": lambda run: flight(run, 0.02)}, wide)
     assert claim_rule_of_iterations(wrong).failed
@@ -144,7 +151,7 @@ def test_the_figure_signs_every_cell_and_draws_rule_and_default():
     assert len([axes for axes in figure.axes if axes.get_visible()]) == 3
     axes = figure.axes[0]
     cells = [text.get_text() for text in axes.texts]
-    assert len(cells) == panel.grade.size
+    assert len(cells) == len(panel.cells)
     assert cells[0] == "×\n4 ms"
     assert cells[2] == "++\n0 %"
     assert [line.get_ydata()[0] for line in axes.lines] == [1.5]
@@ -163,10 +170,10 @@ def test_pymunk_explodes_at_its_default_and_follows_free_flight_by_the_rule():
     layout = replace(SMALL, budget=1e6)
     panels = study_stability(THROW, layout, {run: make(run) for run in plan_stability(THROW, layout)})
     (panel,) = panels
-    assert panel.grade[:2].tolist() == [["explodes"] * 2] * 2
+    assert grades(panel)[:2] == [["explodes"] * 2] * 2
     # A finer step explodes sooner.
-    assert (panel.held_until[:2, 1] < panel.held_until[:2, 0]).all()
-    assert panel.error[2, 1] < panel.error[2, 0] < 0.02
+    assert all(panel.cells[row, 1].held_until < panel.cells[row, 0].held_until for row in (0, 1))
+    assert panel.cells[2, 1].error < panel.cells[2, 0].error < 0.02
     assert panel.band < 1e-5
     assert claim_rule_of_iterations(panels).verdict == "pass"
     assert claim_default_iterations_explode(panels).verdict == "pass"

@@ -15,17 +15,16 @@ from flipproof.chapters.engine_facts.chapter import claim_gravity_cancels
 from flipproof.chapters.ice.chapter import measure
 from flipproof.chapters.reference.chapter import claim_reference_converged, claim_second_method
 from flipproof.chapters.slices.chapter import compare
-from flipproof.chapters.step_size.chapter import claim_order
-from flipproof.chapters.step_size.study import (
+from flipproof.chapters.step_size.chapter import (
     PHASES,
     before_first_impact,
+    claim_order,
     observed_order,
     plan_step_size,
     study_step_size,
 )
 from flipproof.frame.findings import Finding
-from flipproof.frame.flights import Flights
-from flipproof.frame.solvers import Made, Missing, Run
+from flipproof.frame.solvers import Flights, Made, Missing, Run
 from flipproof.frame.twins import twins
 from slicemodel import Impacts, Scenario, Trajectory
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flipproof.frame.exhibit import Touch
-from flipproof.page.touch import NONE, POINTS, touch_data
+from flipproof.page.live import NONE, POINTS, touch_data
 
 
 def read(data, name):

@@ -35,9 +35,6 @@ WITNESSES: Final[Mapping[str, tuple[str, Mapping[str, Any]]]] = {
 }
 """Name -> engine and settings of every engine run that a report certifies, where the throw allows it."""
 
-TOLERANCE: Final = DEFAULT_TOLERANCE
-"""What the certificates of a report must hold, fraction of omega_0: as ``engine_check.solve`` asks by itself."""
-
 UNCERTIFIED_DT: Final = 1.25e-4
 """Step of a witness that is not certified [s]: where a certificate begins."""
 
@@ -66,7 +63,8 @@ def solver_runs(throw: Scenario, steps: int, certified: tuple[str, ...]) -> dict
     runs = {}
     for name in witnesses(throw):
         engine, settings = WITNESSES[name]
-        accuracy = {"tolerance": TOLERANCE} if name in certified else {"dt": UNCERTIFIED_DT}
+        # A certificate of a report must hold what ``engine_check.solve`` asks by itself.
+        accuracy = {"tolerance": DEFAULT_TOLERANCE} if name in certified else {"dt": UNCERTIFIED_DT}
         runs[name] = Run(engine, throw, {**settings, **accuracy}, name)
     runs |= {model: Run(model, throw, {}, model) for model in reversed(LADDER)}
     return runs | {scheme: Run(scheme, throw, {"steps": steps}, scheme) for scheme in (*SCHEMES, *OTHER_SCHEMES)}

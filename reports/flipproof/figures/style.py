@@ -54,7 +54,6 @@ STYLE: dict[Any, Any] = {
     "svg.hashsalt": "flipproof",
 }
 
-
 INDEXED = re.compile(r"(?<![A-Za-z_$])([A-Zrvetθω])_(CM|[Mwbcfs]|max|table)(?![\w$])")
 """A symbol with its index in plain text."""
 

@@ -15,7 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from flipproof.foreign.specs import COMMAND, CSV, is_foreign, locate, words_of
-from flipproof.frame.sources import files_in
+from flipproof.frame.keys import files_in
 
 
 def content_of(spec: str) -> str:

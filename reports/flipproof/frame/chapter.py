@@ -17,9 +17,7 @@ from typing import Any, Generic, Literal, TypeVar
 
 from flipproof.frame.exhibit import Exhibit, Touch
 from flipproof.frame.findings import Finding, Kind, observed, regression
-from flipproof.frame.flights import Call, Flights, Outcome, attempt, known
-from flipproof.frame.solvers import Made, Missing, Run
-from flipproof.frame.throws import REFERENCE
+from flipproof.frame.solvers import REFERENCE, Call, Flights, Made, Missing, Outcome, Run, attempt, known
 from slicemodel import Scenario
 
 __all__ = [
@@ -39,13 +37,11 @@ class Ask:
 
     Parameters
     ----------
-    scenario : Scenario - the throw as given
-    throw : Scenario - the same, cut into the slices at which solvers are compared
-    reference : Scenario - the throw of the regression claims, which what is observed on the user's cannot fail
-    size : {"check", "quick", "full"} - how much work is done
-    work : the chapter's own amount of work at this size
-    steps : int - points of a scheme's grid
-    solvers : name -> run - how each solver flies the throw; chapters that look at one flight ask for the same run
+    scenario, throw : the throw as given, and the same cut into the slices at which solvers are compared
+    reference : the throw of the regression claims, which what is observed on the user's cannot fail
+    work : the chapter's own amount of work at this ``size``
+    steps : points of a scheme's grid
+    solvers : name -> how each solver flies the throw; chapters that look at one flight ask for the same run
     """
 
     scenario: Scenario
@@ -80,21 +76,17 @@ Claims = Iterator[Finding | Absent]
 
 @dataclass(frozen=True, slots=True)
 class Chapter(Generic[F]):
-    """One subject of a report.
+    """One subject of a report; its ``name`` is stable and without blanks.
 
     Parameters
     ----------
-    name : str - stable, without blanks
-    title : str
-    study : callable (Ask) -> generator that yields runs and calls, and returns what was found
-    claims : callable (found) -> findings
-    figures : callable (found) -> exhibits
+    study : generator that yields runs and calls, and returns what was found
     template : file of the chapter's part of the page; None: ``part.html.j2`` beside it, or its figures alone
     work : size of a report -> amount of work that the study is asked for; a size that is missing leaves the chapter out
-    kind : {"regression", "observation"} - what it is if the study cannot be made at all; a regression fails the report
-    summary : callable (found) -> entries of ``summary.json``
-    tables : callable (found) -> path in the report folder -> text of a file
-    page : callable (found) -> what the template is given beside what was found
+    kind : what it is if the study cannot be made at all; a regression fails the report
+    summary : entries of ``summary.json``
+    tables : path in the report folder -> text of a file
+    page : what the template is given beside what was found
     """
 
     name: str

@@ -19,12 +19,11 @@ class Touch:
 
     Parameters
     ----------
-    label : str - of the vertical axis, with its unit
-    curves : mapping - curve -> times [s] and values, of equal length
-    shown : tuple of str - curves that are shown at first; empty: all
-    digits : int - after the point of a value
-    limits : (float, float) or None - ends of a logarithmic axis, on which absolute values are drawn; None: linear
-    beside : bool - whether the figure stays in sight above it
+    label : of the vertical axis, with its unit
+    curves : curve -> times [s] and values, of equal length; those ``shown`` at first, empty: all
+    digits : after the point of a value
+    limits : ends of a logarithmic axis, on which absolute values are drawn; None: linear
+    beside : whether the figure stays in sight above it
     """
 
     label: str
@@ -37,22 +36,14 @@ class Touch:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exhibit:
-    """A figure with its words.
+    """A figure with its words: ``caption`` says how to read it, ``alt`` what this throw shows, with its numbers.
 
     Parameters
     ----------
-    name, title, caption, alt : str
-        ``caption`` says how to read the figure, ``alt`` what this throw shows, with its numbers.
-    maker : callable
-        A function of a module that makes the figure of ``data``: both must reach a worker process.
-    data : tuple
-        Arguments of ``maker``.
-    table : str or None
-        The numbers that are drawn, as CSV with a unit in every header.
-    drawn : Drawing or None
-        The finished figure; None if nobody has drawn it yet.
-    touch : Touch or None
-        How it is drawn to be touched; None if it is a picture only.
+    maker : callable - a function of a module that makes the figure of ``data``: both must reach a worker process
+    table : str or None - the numbers that are drawn, as CSV with a unit in every header
+    drawn : Drawing or None - the finished figure; None if nobody has drawn it yet
+    touch : Touch or None - how it is drawn to be touched; None if it is a picture only
     """
 
     name: str

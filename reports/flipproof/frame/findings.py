@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 Kind = Literal["regression", "observation"]
@@ -21,14 +21,13 @@ class Finding:
 
     Parameters
     ----------
-    id : str - stable, without blanks, unique in a report: an anchor of the page, and the key to compare reports by
-    title : str - the claim in words
-    value : float or None - None if it could not be computed
-    unit : str
-    admissible : (low, high) - closed interval the value must lie in; (-inf, inf) for an observation
-    kind : {"regression", "observation"} - a failed regression sets the exit status; an observation cannot fail
-    band : float or None - numerical uncertainty of the value
-    note : str - where and when, or why it could not be evaluated
+    id : stable, without blanks, unique in a report: an anchor of the page, and the key to compare reports by
+    title : the claim in words
+    value : None if it could not be computed
+    admissible : closed interval the value must lie in; (-inf, inf) for an observation
+    kind : a failed regression sets the exit status; an observation cannot fail
+    band : numerical uncertainty of the value
+    note : where and when, or why it could not be evaluated
     """
 
     id: str
@@ -77,15 +76,14 @@ class Finding:
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the finding as JSON-ready data: infinite bounds become null, other infinities and NaN become words."""
-        mapping = asdict(self)
-        mapping["admissible"] = [None if math.isinf(bound) else bound for bound in self.admissible]
-        for name in ("value", "band"):
-            number = mapping[name]
-            if number is not None and not math.isfinite(number):
-                mapping[name] = str(number)
-        mapping["threshold"] = self.threshold_text
-        mapping["verdict"] = self.verdict
-        return mapping
+        numbers = {"value": self.value, "band": self.band}
+        return {
+            **asdict(self),
+            **{name: x if x is None or math.isfinite(x) else str(x) for name, x in numbers.items()},
+            "admissible": [None if math.isinf(bound) else bound for bound in self.admissible],
+            "threshold": self.threshold_text,
+            "verdict": self.verdict,
+        }
 
 
 def observed(
@@ -106,5 +104,6 @@ def regression(
     band: float | None = None,
 ) -> Finding:
     """Return a claim that fails unless its value lies in the closed interval ``admissible``."""
-    finding = Finding(id=id, title=title, value=value, unit=unit, kind="regression", band=band, note=note)
-    return replace(finding, admissible=admissible)
+    return Finding(
+        id=id, title=title, value=value, unit=unit, kind="regression", admissible=admissible, band=band, note=note
+    )

@@ -9,12 +9,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Part
+from flipproof.frame.chapter import Absent, Ask, Chapter, Part
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding
-from flipproof.frame.flights import Call, Flights, Outcome, attempt
 from flipproof.frame.pool import Progress, make_all
-from flipproof.frame.solvers import Run
+from flipproof.frame.solvers import Call, Flights, Outcome, Run, attempt
 from flipproof.frame.store import RunStore
 
 
@@ -82,15 +81,8 @@ def gather(
 ) -> Gathered:
     """Drive every study to its end, wave by wave; the runs of a wave are made together, equal ones once.
 
-    Parameters
-    ----------
-    parts : what the report has
-    ask : Ask
-    pool : executor of worker processes
-    progress : callable (made, planned, label)
-    work : chapter -> amount of work in place of that of the size, or although the size has none
-    stages : the stopwatch of the report, if somebody watches it
-    store : where slow runs and calls are looked for and kept
+    ``work`` is the amount of work of a chapter in place of that of the size, or although the size has none; ``stages``
+    the stopwatch of the report, if somebody watches it; ``store`` where slow runs and calls are looked for and kept.
     """
     parts, stages, work = tuple(parts), stages or Stages(), work or {}
     flights = Flights({})
@@ -130,20 +122,23 @@ def _advance(name: str, study: Any, flights: Flights | None, waiting: dict[str, 
 
 def tell(gathered: Gathered) -> dict[str, Told]:
     """Return what every chapter tells, by its name; no figure is drawn yet."""
-    return {
-        chapter.name: _told(chapter, gathered.outcomes[chapter.name])
-        for part in gathered.parts
-        for chapter in part.chapters
-        if chapter.name in gathered.outcomes
-    }
+    chapters = {chapter.name: chapter for part in gathered.parts for chapter in part.chapters}
+    return {name: _told(each, gathered.outcomes[name]) for name, each in chapters.items() if name in gathered.outcomes}
 
 
 def _told(chapter: Chapter[Any], outcome: Outcome[Any]) -> Told:
     said: list[Finding | Absent] = []
     drawn: list[Exhibit] = []
     seconds: dict[str, float] = {}
-    claims = attempt(lambda: said.extend(_clocked(chapter.claims, outcome, seconds)))
-    figures = attempt(lambda: drawn.extend(chapter.figures(outcome.value)))
+
+    def claim() -> None:
+        began = time.perf_counter()
+        for each in chapter.claims(outcome.value):
+            seconds[each.id] = time.perf_counter() - began
+            said.append(each)
+            began = time.perf_counter()
+
+    claims, figures = attempt(claim), attempt(lambda: drawn.extend(chapter.figures(outcome.value)))
     if reason := claims.reason or figures.reason:
         said.append(Absent(f"chapter-{chapter.name}", chapter.title, reason, chapter.kind))
     return Told(
@@ -154,12 +149,3 @@ def _told(chapter: Chapter[Any], outcome: Outcome[Any]) -> Told:
         notes=tuple((each.title, each.reason) for each in said if isinstance(each, Absent)),
         seconds=seconds,
     )
-
-
-def _clocked(claims: Callable[[Any], Claims], outcome: Outcome[Any], seconds: dict[str, float]) -> Claims:
-    """Yield the claims on what was found, and note how long each took."""
-    began = time.perf_counter()
-    for each in claims(outcome.value):
-        seconds[each.id] = time.perf_counter() - began
-        yield each
-        began = time.perf_counter()

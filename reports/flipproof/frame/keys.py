@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import io
 import json
 import pickle
 import platform
-from collections.abc import Callable, Mapping
-from types import MappingProxyType
+from collections.abc import Callable, Iterator, Mapping
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from flipproof.frame.solvers import Run, find
-from flipproof.frame.sources import fingerprint
 from flipproof.output.provenance import PACKAGES, version_of
 
-SOURCES: Final = MappingProxyType(
-    {
-        "slicemodel": ("slicemodel", "flipproof.frame.solvers"),
-        "ode_reference": ("ode_reference", "slicemodel", "flipproof.frame.solvers"),
-        "engine_check": ("engine_check", "slicemodel", "flipproof.frame.solvers"),
-    }
-)
+SOURCES: Final[Mapping[str, tuple[str, ...]]] = {
+    "slicemodel": ("slicemodel", "flipproof.frame.solvers"),
+    "ode_reference": ("ode_reference", "slicemodel", "flipproof.frame.solvers"),
+    "engine_check": ("engine_check", "slicemodel", "flipproof.frame.solvers"),
+}
 """Package -> the sources that its runs are made by. Somebody else's solver is not among them and never kept."""
 
 COMPUTING: Final = ("flipproof", "numpy", "scipy", "numba", "pymunk", "mujoco-core")
@@ -68,3 +67,30 @@ def _plain(value: object) -> Any:
     if isinstance(value, np.ndarray | np.generic):
         return [str(value.dtype), value.tolist()]
     raise TypeError(f"{type(value).__name__} has no key")
+
+
+@functools.cache
+def fingerprint(*names: str) -> str:
+    """Return the SHA-256 of modules, and of packages with their data and all that is in them; nothing is imported.
+
+    Two checkouts have one version and different sources, so the sources count.
+    """
+    sources = hashlib.sha256()
+    for name in names:
+        spec = find_spec(name)
+        assert spec is not None
+        assert spec.origin is not None
+        origin = Path(spec.origin)
+        package = spec.submodule_search_locations is not None
+        for file in sorted(files_in(origin.parent)) if package else [origin]:
+            sources.update(f"{name}/{file.relative_to(origin.parent).as_posix()}\0".encode())
+            sources.update(file.read_bytes())
+    return sources.hexdigest()
+
+
+def files_in(folder: Path) -> Iterator[Path]:
+    """Yield the files of a folder, but for what Python and numba have compiled and for hidden ones."""
+    for entry in folder.rglob("*"):
+        parts = entry.relative_to(folder).parts
+        if entry.is_file() and not any(part.startswith(".") or part == "__pycache__" for part in parts):
+            yield entry

@@ -7,9 +7,8 @@ from concurrent.futures import Executor, Future, as_completed, wait
 from contextlib import AbstractContextManager
 from typing import Any
 
-from flipproof.frame.flights import Call, Outcome, attempt
 from flipproof.frame.processes import WorkerDiedError, processes
-from flipproof.frame.solvers import Made, Run, find, make
+from flipproof.frame.solvers import Call, Made, Outcome, Run, attempt, find, make
 from flipproof.frame.store import RunStore
 from slicemodel import Scenario
 
@@ -37,6 +36,7 @@ def make_all(
     interrupted at any time. Both results are in the order asked.
     """
     runs, store = list(dict.fromkeys(runs)), store or RunStore(None)
+    died = f"the worker process died {TRIES} times with this"
     keeping = store.remembering(pool)
     pending_calls = {call: (pool if call.timed else keeping).submit(call.function, *call.arguments) for call in calls}
     made: dict[Run, Made] = {run: found for run in runs if (found := store.find(run)) is not None}
@@ -53,24 +53,20 @@ def make_all(
                     # Each alone, so that only the run that kills its worker is lost.
                     jobs += [[run] for run in job]
                     continue
-                results = [Made(job[0], None, 0.0, f"the worker process died {TRIES} times with this run ({error})")]
+                results = [Made(job[0], None, 0.0, f"{died} run ({error})")]
             for result in results:
                 store.keep(result)
                 made[result.run] = result
                 progress(len(made), len(runs) + len(pending_calls), result.run.name)
     called: dict[Call, Outcome[Any]] = {}
     for call, answer in pending_calls.items():
-        called[call] = _answered(call, answer)
+        try:
+            called[call] = attempt(answer.result)
+        except WorkerDiedError as error:
+            called[call] = Outcome(None, f"{call.label}: {died} call ({error})")
         progress(len(made) + len(called), len(runs) + len(pending_calls), call.label)
     # In the order asked, whichever worker was faster: what is read off this table must not depend on load.
     return {run: made[run] for run in runs}, called
-
-
-def _answered(call: Call, answer: Future[Any]) -> Outcome[Any]:
-    try:
-        return attempt(answer.result)
-    except WorkerDiedError as error:
-        return Outcome(None, f"{call.label}: the worker process died {TRIES} times with this call ({error})")
 
 
 def compile_kernels(pool: Executor) -> None:

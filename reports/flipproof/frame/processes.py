@@ -16,7 +16,7 @@ import threading
 import traceback
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any
@@ -76,13 +76,11 @@ class Processes(Executor):
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Take no more calls; end every process when its calls are answered."""
         self._ended = True
-        while cancel_futures:
-            try:
+        with suppress(queue.Empty):
+            while cancel_futures:
                 call = self._calls.get_nowait()
-            except queue.Empty:
-                break
-            if call is not None:
-                call[0].cancel()
+                if call is not None:
+                    call[0].cancel()
         for _ in self._threads:
             self._calls.put(None)
         if wait:

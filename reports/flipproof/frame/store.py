@@ -21,7 +21,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError, Executor, Future
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
@@ -51,7 +51,7 @@ DELETE FROM kept WHERE key IN (
 """
 
 
-class RunStore:
+class RunStore(AbstractContextManager["RunStore"]):
     """Runs by what decides them. Use as a context manager; ``RunStore(None)`` keeps nothing and finds nothing.
 
     Parameters
@@ -73,9 +73,6 @@ class RunStore:
         if place is not None:
             self._open(place)
 
-    def __enter__(self) -> RunStore:
-        return self
-
     def __exit__(self, *_: object) -> None:
         self.close()
 
@@ -89,12 +86,8 @@ class RunStore:
     def find(self, run: Run) -> Made | None:
         """Return the run as it was kept; None if it was not, or not by this code, or what was kept is damaged."""
         self.asked += 1
-        entry = self._get(key_of(run)) if self._rows is not None else None
-        if entry is None:
-            return None
-        (trajectory, seconds), made = entry
-        self.found.append(made)
-        return Made(run, trajectory, seconds)
+        kept = self._get(key_of(run), self.found) if self._rows is not None else None
+        return None if kept is None else Made(run, *kept[0])
 
     def keep(self, made: Made) -> None:
         """Keep a run that was slow and ended in a trajectory."""
@@ -108,12 +101,7 @@ class RunStore:
     def find_call(self, key: str | None) -> tuple[Any] | None:
         """Return the answer of a call as it was kept, alone in a tuple, or None."""
         self.calls += 1
-        entry = self._get(key)
-        if entry is None:
-            return None
-        answer, made = entry
-        self.found_calls.append(made)
-        return (answer,)
+        return self._get(key, self.found_calls)
 
     def keep_call(self, key: str | None, answer: object, seconds: float) -> None:
         """Keep the answer of a call that was slow."""
@@ -130,8 +118,8 @@ class RunStore:
         made = f"made {when[0]} UTC" + (f" to {when[-1]} UTC" if when[-1] != when[0] else "") if when else ""
         return {WORDS: ", ".join(part for part in (runs, calls, made) if part)}
 
-    def _get(self, key: str | None) -> tuple[Any, str] | None:
-        """Return what was kept under a key and when it was made."""
+    def _get(self, key: str | None, found: list[str]) -> tuple[Any] | None:
+        """Return what was kept under a key, alone in a tuple, or None; note in ``found`` when it was made."""
         with self._lock:
             if self._rows is None or key is None:
                 return None
@@ -140,12 +128,16 @@ class RunStore:
             except sqlite3.Error as error:
                 self._give_up(error)
                 return None
-            entry = None if row is None else _read(key, *row)
-            if entry is not None:
-                self._write("UPDATE kept SET used = ? WHERE key = ?", (_now(), key))
-            elif row is not None:
+            if row is None:
+                return None
+            entry = _read(key, *row)
+            if entry is None:
                 self._write("DELETE FROM kept WHERE key = ?", (key,))
-            return entry
+                return None
+            self._write("UPDATE kept SET used = ? WHERE key = ?", (_now(), key))
+            value, made = entry
+            found.append(made)
+            return (value,)
 
     def _put(self, key: str | None, value: object, seconds: float) -> None:
         """Keep a value that took so long; not what cannot be pickled, or is made about as fast as it would be read.
@@ -277,13 +269,11 @@ def _write_ahead(rows: sqlite3.Connection) -> None:
 
 def _read(key: str, checksum: object, content: object) -> tuple[Any, str] | None:
     """Return what an entry holds and when it was made; None if it is damaged."""
-    if not isinstance(content, bytes) or checksum != _checksum(key, content):
-        return None
-    try:
-        value, made = pickle.loads(content)
-    except Exception:  # a class of another form: anything may come of it
-        return None
-    return value, made
+    with suppress(Exception):  # a class of another form: anything may come of it
+        if isinstance(content, bytes) and checksum == _checksum(key, content):
+            value, made = pickle.loads(content)
+            return value, made
+    return None
 
 
 def _checksum(key: str, content: bytes) -> str:

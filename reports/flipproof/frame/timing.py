@@ -34,16 +34,13 @@ def make_timed(runs: Sequence[tuple[Run, FloatArray]]) -> list[Made]:
 def at_times(t: FloatArray, times: FloatArray) -> NDArray[np.int64]:
     """Return the indices at which ``t`` holds ``times``.
 
-    Raises
-    ------
-    ValueError
-        If one of them is not there: an interpolation would have an error of its own.
+    One that is not there raises a ValueError: an interpolation would have an error of its own.
     """
     slack = SAME_TIME * times[-1]
     at: NDArray[np.int64] = np.minimum(np.searchsorted(t, times - slack), len(t) - 1)
-    if not np.all(np.abs(t[at] - times) <= slack):
-        missing = times[~(np.abs(t[at] - times) <= slack)][0]
-        raise ValueError(f"the run holds no point at t = {missing:.9g} s; its grid does not share the common times")
+    missing = times[~(np.abs(t[at] - times) <= slack)]
+    if len(missing):
+        raise ValueError(f"the run holds no point at t = {missing[0]:.9g} s; its grid does not share the common times")
     return at
 
 
@@ -75,16 +72,13 @@ def _short(run: Run) -> Run:
 
 def _made_timed(run: Run, times: FloatArray) -> Made:
     """Make a run three times at the most; one of 0.01 s, repeated or not, outlasts what disturbs it."""
-    least, together = float("inf"), 0.0
-    for _ in range(3):
+    spent: list[float] = []
+    while len(spent) < 3 and sum(spent) <= 0.01:
         began = time.process_time()
         made = make(run)
-        spent = time.process_time() - began
-        least, together = min(least, spent), together + spent
-        if together > 0.01:
-            break
+        spent.append(time.process_time() - began)
     thinned = None if made.trajectory is None else sampled(made.trajectory, times)
-    return replace(made, trajectory=thinned, seconds=least)
+    return replace(made, trajectory=thinned, seconds=min(spent))
 
 
 def sampled(trajectory: Trajectory, times: FloatArray) -> Trajectory:

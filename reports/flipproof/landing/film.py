@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from flipproof.figures.film import GLASS, Picture, laid_out, outline, pictures, slice_corners
+from flipproof.animate import GLASS, Picture, laid_out, outline, pictures, slice_corners
 from flipproof.figures.style import styled
 from ode_reference.landing import Path, path
 from ode_reference.landing_flight import FLIGHT_DT, release

@@ -52,18 +52,14 @@ def equation(text: str) -> Markup:
 def _row(formula: str) -> Iterator[Markup]:
     for token in TOKEN.finditer(formula):
         if token["above"]:
-            yield Markup("<mfrac>{}{}</mfrac>").format(_name(token["above"]), _name(token["below"]))
+            words = (token[part].partition("_") for part in ("above", "below"))
+            yield Markup("<mfrac>{}{}</mfrac>").format(*(_symbol(base, sub, "", None) for base, _, sub in words))
         elif token["number"]:
             yield Markup("<mn>{}</mn>").format(token["number"])
         elif token["sign"]:
             yield Markup('<mo stretchy="false">{}</mo>').format(token["sign"].replace("-", "−"))
         else:
             yield _symbol(token["base"], token["sub"], (token["first"] or "") + (token["last"] or ""), token["power"])
-
-
-def _name(word: str) -> Markup:
-    base, _, sub = word.partition("_")
-    return _symbol(base, sub or None, "", None)
 
 
 def _symbol(base: str, sub: str | None, primes: str, power: str | None) -> Markup:

@@ -22,7 +22,7 @@ from flipproof.chapters.finite_step.chapter import EVERYTHING, HELD, LOCATED, St
 from flipproof.chapters.solvers import FREE
 from flipproof.chapters.waterfall.study import NAMES, STEP, Bar, Waterfall
 from flipproof.frame.gather import Gathered
-from flipproof.frame.throws import FINER
+from flipproof.frame.solvers import FINER
 
 Measure = Literal["largest", "start", "landing", "share", "order"]
 
@@ -33,16 +33,13 @@ class Headline:
 
     Parameters
     ----------
-    id : str - what it answers
-    what : str - which pair or assumption
-    measure : str - what number it is, see above
-    value : float - signed if a share
-    slices : int - slices it was computed at
-    finer, finer_slices : float or None, int or None - the same at another number of slices
-    band : float or None - numerical uncertainty
-    time : float or None - when the largest difference occurs [s]
-    low, high : float or None - range over single orders, of a share
-    note : str - what limits it, "" if nothing does
+    id, what, measure : what it answers, which pair or assumption, and what number it is, see above
+    value : signed if a share; computed at so many ``slices``
+    finer, finer_slices : the same at another number of slices
+    band : numerical uncertainty
+    time : when the largest difference occurs [s]
+    low, high : range over single orders, of a share
+    note : what limits it, "" if nothing does
     """
 
     id: str
@@ -107,8 +104,6 @@ def _pairs(differences: Sequence[Difference], ended: str) -> Iterator[Headline]:
 
 
 def _shares(waterfall: Waterfall) -> Iterator[Headline]:
-    bars = [bar for bar in waterfall.bars if bar.name != STEP]
-
     def share(id_: str, bar: Bar) -> Headline:
         return Headline(
             id=id_,
@@ -123,6 +118,7 @@ def _shares(waterfall: Waterfall) -> Iterator[Headline]:
             high=bar.high,
         )
 
+    bars = [bar for bar in waterfall.bars if bar.name != STEP]
     for k, bar in enumerate(sorted(bars, key=lambda bar: -abs(bar.average)), start=1):
         yield share("share" if k == 1 else f"share-{k}", bar)
     away = waterfall.away
@@ -138,18 +134,17 @@ def _steps(found: StepCosts) -> Iterator[Headline]:
     costs = {cost.way.name: cost for cost in found.costs}
     finer = {cost.way.name: cost for cost in found.more}
     for id_, name in {"held": HELD, "held-through": LOCATED, "step": EVERYTHING}.items():
-        cost, more = costs.get(name), finer.get(name)
-        field = "start" if id_ == "held" else "flight"
-        if cost is None or not math.isfinite(getattr(cost, field)):
-            continue
-        yield Headline(
-            id=id_,
-            what=cost.way.words,
-            measure="start" if id_ == "held" else "largest",
-            value=getattr(cost, field),
-            slices=found.slices,
-            finer=None if more is None else getattr(more, field),
-            finer_slices=None if more is None else FINER * found.slices,
-            time=cost.first_impact if id_ == "held" else None,
-            note=f"{cost.steps} steps",
-        )
+        cost, more, held = costs[name], finer.get(name), id_ == "held"
+        value = cost.start if held else cost.flight
+        if math.isfinite(value):
+            yield Headline(
+                id=id_,
+                what=cost.way.words,
+                measure="start" if held else "largest",
+                value=value,
+                slices=found.slices,
+                finer=None if more is None else more.start if held else more.flight,
+                finer_slices=None if more is None else FINER * found.slices,
+                time=cost.first_impact if held else None,
+                note=f"{cost.steps} steps",
+            )

@@ -42,20 +42,17 @@ def lead_words(headlines: Sequence[Headline]) -> str:
 def answers(headlines: Sequence[Headline]) -> Iterator[tuple[str, list[str]]]:
     """Yield the questions of the front page, each answered by yes or no and its sentences; none if all agree."""
     found = {headline.id: headline for headline in headlines}
-    if (largest := _largest(headlines)) is None or largest < NOTHING:
+    if (largest := _largest(found)) is None or largest < NOTHING:
         return
-
-    def verdict(*ids: str) -> str:
-        return _verdict([found[id_] for id_ in ids if id_ in found])
-
     steps = found["step"].note if "step" in found else "the steps"
-    yield f"Is it justified to hold omega constant over a step? {verdict('held', 'held-through')}", list(_held(found))
-    yield f"Are {steps} enough? {verdict('step')}", list(_step(found))
-    yield f"Is Eq. 8 free flight? {verdict('eq8-free')}", list(_equations(found))
+    held = _verdict(found, "held", "held-through")
+    yield f"Is it justified to hold omega constant over a step? {held}", list(_held(found))
+    yield f"Are {steps} enough? {_verdict(found, 'step')}", list(_step(found))
+    yield f"Is Eq. 8 free flight? {_verdict(found, 'eq8-free')}", list(_equations(found))
     if "share" in found:
         yield "Which change matters most for the mean omega of the second half?", list(_shares(found))
     if "engine" in found:
-        yield f"Does a physics engine agree? {verdict('engine')}", list(_engine(found["engine"]))
+        yield f"Does a physics engine agree? {_verdict(found, 'engine')}", list(_engine(found["engine"]))
 
 
 def answered(headlines: Sequence[Headline]) -> Iterator[tuple[str, str, str, Headline]]:
@@ -84,9 +81,8 @@ def answered(headlines: Sequence[Headline]) -> Iterator[tuple[str, str, str, Hea
     }
     for question, pairs in asked.items():
         there = [(words, found[id_]) for id_, words in pairs.items() if id_ in found]
-        verdict = _verdict([headline for _, headline in there])
         for k, (words, headline) in enumerate(there):
-            yield "" if k else question, "" if k else verdict, words, headline
+            yield "" if k else question, "" if k else _verdict(found, *pairs), words, headline
 
 
 def asides(headlines: Sequence[Headline]) -> Iterator[str]:
@@ -98,24 +94,23 @@ def asides(headlines: Sequence[Headline]) -> Iterator[str]:
         yield " ".join(list(_engine(found["engine"]))[1:])
 
 
-def _verdict(headlines: Sequence[Headline]) -> str:
-    within = percent(PARTING_BAND)
-    if not headlines:
+def _verdict(found: Mapping[str, Headline], *ids: str) -> str:
+    values = [found[id_].value for id_ in ids if id_ in found]
+    if not values:
         return "Not known."
-    agree = max(headline.value for headline in headlines) <= PARTING_BAND
-    return f"Yes, within {within}." if agree else f"No, not within {within}."
+    within = percent(PARTING_BAND)
+    return f"Yes, within {within}." if max(values) <= PARTING_BAND else f"No, not within {within}."
 
 
-def _largest(headlines: Sequence[Headline]) -> float | None:
+def _largest(found: Mapping[str, Headline]) -> float | None:
     """Return the largest difference of those that tell whether all solvers agree; None if none was computed."""
-    told = [h.value for h in headlines if h.measure == "largest" and h.id in ("whole", "pair", "program-eq8")]
-    return max(told, default=None)
+    return max((found[id_].value for id_ in ("whole", "program-eq8", "pair") if id_ in found), default=None)
 
 
 def sentences(headlines: Sequence[Headline]) -> Iterator[str]:
     """Yield the verdict sentence by sentence; each can be read alone."""
     found = {headline.id: headline for headline in headlines}
-    largest = _largest(headlines)
+    largest = _largest(found)
     if largest is None:
         yield "No two solvers could be compared on this throw; the reasons stand below."
         return

@@ -1,15 +1,27 @@
-"""The sliders: what a reader may change of the throw, and what the script needs to solve it."""
+"""What a reader may touch: sliders that change the throw, and figures whose curves the page's script draws."""
 
 from __future__ import annotations
 
+import base64
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
+import numpy as np
+
+from flipproof.frame.exhibit import Touch
+from flipproof.frame.spoken import spoken
 from slicemodel import Scenario
+from slicemodel.trajectory import FloatArray
 
 MOST_SLICES: Final = 50
 """Slices of a throw that a browser solves while a slider moves."""
+
+POINTS: Final = 500
+"""Points of a curve at the most."""
+
+NONE: Final = 65535
+"""What stands for a number that there is not; the others count from 0 to one less."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,27 +46,21 @@ class Slider:
 
 def sliders(throw: Scenario) -> list[Slider]:
     """Return the sliders of a throw, each wide enough for its value."""
-    asked: tuple[tuple[str, str, str, float, float, float, int, float], ...] = (
-        ("g", "gravity g", "m/s²", 0.0, 20.0, 0.01, 2, throw.gravity),
-        ("theta0", "angle of release θ₀", "°", -180.0, 180.0, 1.0, 0, math.degrees(throw.theta0)),
-        ("fill", "filling", "%", 10.0, 100.0, 1.0, 0, 100.0 * throw.fill_fraction),
-        ("gamma", "drag γ", "/s", 0.0, 20.0, 0.1, 1, throw.damping_rate),
-        ("e", "restitution e", "", 0.0, 0.8, 0.01, 2, throw.restitution),
-        ("omega0", "spin ω₀", "rad/s", 5.0, 25.0, 0.1, 1, throw.omega0),
+    asked = (
+        Slider("g", "gravity g", "m/s²", 0.0, 20.0, 0.01, 2, throw.gravity),
+        Slider("theta0", "angle of release θ₀", "°", -180.0, 180.0, 1.0, 0, math.degrees(throw.theta0)),
+        Slider("fill", "filling", "%", 10.0, 100.0, 1.0, 0, 100.0 * throw.fill_fraction),
+        Slider("gamma", "drag γ", "/s", 0.0, 20.0, 0.1, 1, throw.damping_rate),
+        Slider("e", "restitution e", "", 0.0, 0.8, 0.01, 2, throw.restitution),
+        Slider("omega0", "spin ω₀", "rad/s", 5.0, 25.0, 0.1, 1, throw.omega0),
     )
-    return [
-        Slider(name, words, unit, min(low, value), max(high, value), step, digits, value)
-        for name, words, unit, low, high, step, digits, value in asked
-    ]
+    return [replace(one, low=min(one.low, one.value), high=max(one.high, one.value)) for one in asked]
 
 
 def live_data(throw: Scenario) -> dict[str, Any]:
     """Return the throw as the script takes it, in SI units."""
-    bottle = throw.bottle
     return {
-        "bottle": {
-            "length": bottle.length, "radius": bottle.radius, "mass": bottle.mass, "capacity": bottle.capacity
-        },
+        "bottle": asdict(throw.bottle),
         "slices": min(throw.n_slices, MOST_SLICES),
         "duration": throw.duration,
         "g": throw.gravity,
@@ -63,4 +69,44 @@ def live_data(throw: Scenario) -> dict[str, Any]:
         "gamma": throw.damping_rate,
         "e": throw.restitution,
         "omega0": throw.omega0,
-    }  # fmt: skip
+    }
+
+
+def touch_data(touch: Touch) -> dict[str, Any]:
+    """Return axes and curves of a figure for the script; a number is a part of the range of all, of 65534."""
+    longest = max((t for t, _ in touch.curves.values()), key=len)
+    t = np.linspace(longest[0], longest[-1], min(POINTS, len(longest)))
+    values = {name: np.interp(t, *curve, left=np.nan, right=np.nan) for name, curve in touch.curves.items()}
+    if touch.limits is not None:  # logarithms of absolute values, none below a tenth of the axis's end
+        least = touch.limits[0] / 10
+        values = {name: np.log10(np.maximum(np.abs(each), least)) for name, each in values.items()}
+    finite = np.concatenate([each[np.isfinite(each)] for each in values.values()])
+    low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
+    room = 0.04 * (high - low) or 1.0
+    y: dict[str, Any] = {"label": touch.label, "digits": touch.digits, "high": high + room}
+    y["low"] = 0.0 if 0.0 <= low < 0.5 * high else low - room
+    if touch.limits is not None:
+        y |= {"low": touch.limits[0], "high": touch.limits[1], "log": True, "percent": True}
+    return {
+        "t": {"low": float(t[0]), "high": float(t[-1]), "count": len(t)},
+        "x": "time t [s]",
+        "y": y,
+        "low": low,
+        "high": high,
+        "lines": [
+            {
+                "name": name,
+                "words": spoken(name),
+                "off": bool(touch.shown) and name not in touch.shown,
+                "values": _text(each, low, high),
+            }
+            for name, each in values.items()
+        ],
+    }
+
+
+def _text(values: FloatArray, low: float, high: float) -> str:
+    parts = np.full(len(values), NONE, dtype="<u2")
+    there = np.isfinite(values)
+    parts[there] = np.rint((values[there] - low) / ((high - low) or 1.0) * (NONE - 1))
+    return base64.b64encode(parts.tobytes()).decode("ascii")

@@ -45,7 +45,6 @@ class Flight:
 
     Parameters
     ----------
-    name : str
     t, theta, omega, r_cm : (F,) [s, rad, rad/s, m]
     r : (F, n) - positions of the slices that are drawn, from the cap [m]
     drawn : (n,) - their numbers, from 0 (starts on the base)
@@ -63,11 +62,6 @@ class Flight:
     status: str
     message: str
     impacts: Impacts | None
-
-
-def frame_times(scenario: Scenario, frames: int) -> FloatArray:
-    """Return the times of the frames, from release to landing, shape (frames,) [s]."""
-    return np.linspace(0.0, scenario.duration, frames)
 
 
 def flight_of(trajectory: Trajectory, times: FloatArray) -> Flight:
@@ -95,9 +89,7 @@ def flight_of(trajectory: Trajectory, times: FloatArray) -> Flight:
 
 def drawn_slices(n_slices: int) -> NDArray[np.int64]:
     """Return the numbers of the slices that are drawn: all, or MOST_SLICES of them with the first and the last."""
-    if n_slices <= MOST_SLICES:
-        return np.arange(n_slices, dtype=np.int64)
-    return np.rint(np.linspace(0, n_slices - 1, MOST_SLICES)).astype(np.int64)
+    return np.rint(np.linspace(0, n_slices - 1, min(n_slices, MOST_SLICES))).astype(np.int64)
 
 
 def release_point(scenario: Scenario, r_cm: float) -> FloatArray:
@@ -123,12 +115,10 @@ def cap_and_base(scenario: Scenario, flight: Flight) -> tuple[FloatArray, FloatA
 def motion_data(throw: Scenario, made: Mapping[str, Made]) -> dict[str, Any] | None:
     """Return what the player needs, ready for JSON; None if no solver flew.
 
-    Parameters
-    ----------
-    throw : Scenario - the throw of all runs, cut as they were
-    made : mapping from name to outcome - of those in ``FLOWN``; a solver that failed is shown with its reason
+    ``throw`` is that of all runs, cut as they were; of ``made``, by name, those in ``FLOWN`` are shown, and one that
+    failed with its reason.
     """
-    times = frame_times(throw, FRAMES)
+    times = np.linspace(0.0, throw.duration, FRAMES)
     there = {name: made[name] for name in FLOWN if name in made}
     shown = {name: flight_of(each.trajectory, times) for name, each in there.items() if each.trajectory is not None}
     if not shown:
@@ -181,13 +171,10 @@ def _encoded(values: ArrayLike, kind: str) -> str:
 
 def _table(times: FloatArray, flights: Sequence[Flight]) -> list[dict[str, Any]]:
     """Return angle [degrees] and angular velocity [rad/s] of every flight at eleven times; None after its end."""
-    rows = []
-    for k in np.unique(np.rint(np.linspace(0, len(times) - 1, 11)).astype(int)):
-        values = [
-            {"theta_deg": float(np.degrees(flight.theta[k])), "omega": float(flight.omega[k])}
-            if k < len(flight.t)
-            else None
-            for flight in flights
-        ]
-        rows.append({"t": float(times[k]), "values": values})
-    return rows
+
+    def at(flight: Flight, k: int) -> dict[str, float] | None:
+        there = k < len(flight.t)
+        return {"theta_deg": float(np.degrees(flight.theta[k])), "omega": float(flight.omega[k])} if there else None
+
+    shown = np.unique(np.rint(np.linspace(0, len(times) - 1, 11)).astype(int)).tolist()
+    return [{"t": float(times[k]), "values": [at(flight, k) for flight in flights]} for k in shown]

@@ -15,7 +15,7 @@ from flipproof.frame.chapter import Part
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding
 from flipproof.frame.gather import Gathered, Told
-from flipproof.frame.throws import FINER
+from flipproof.frame.solvers import FINER
 from flipproof.page.glossary import indexed, linked
 
 STORY: Final[Mapping[str, str]] = {
@@ -57,14 +57,9 @@ PLAIN: Final = """{{ draw(figures) }}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """One section of the page.
+    """One section of the page: anchor, heading, in one sentence what it shows, and its content without these.
 
-    Parameters
-    ----------
-    id, title, sentence : str - anchor, heading, and in one sentence what it shows
-    html : Markup - its content, without heading and sentence
-    findings : tuple of Finding - those that must hold first
-    figure : name of its first figure, "" if it has none
+    Of its findings those that must hold come first; ``figure`` is the name of its first figure, "" if it has none.
     """
 
     id: str
@@ -83,35 +78,32 @@ class Section:
     def count_words(self) -> str:
         """The findings in words, as in "12 claims hold, 3 observations"; nothing if there are none."""
         counts = self.counts
-        words = (
-            ("pass", "claim holds", "claims hold"),
-            ("fail", "claim fails", "claims fail"),
-            ("observed", "observation", "observations"),
-            ("not evaluated", "not evaluated", "not evaluated"),
-        )
-        return ", ".join(
-            f"{counts[verdict]} {one if counts[verdict] == 1 else many}"
-            for verdict, one, many in words
-            if verdict in counts
-        )
+        words = {
+            "pass": ("claim holds", "claims hold"),
+            "fail": ("claim fails", "claims fail"),
+            "observed": ("observation", "observations"),
+            "not evaluated": ("not evaluated", "not evaluated"),
+        }
+        there = [(counts[verdict], *said) for verdict, said in words.items() if verdict in counts]
+        return ", ".join(f"{n} {one if n == 1 else many}" for n, one, many in there)
 
 
 def sections(gathered: Gathered, told: Mapping[str, Told], templates: Environment) -> tuple[Section, ...]:
     """Return every part that has a chapter in this report, in order."""
+
+    def section(part: Part, chapters: Sequence[Told]) -> Section:
+        findings = [finding for each in chapters for finding in each.findings]
+        return Section(
+            id=part.id,
+            title=part.title,
+            sentence=part.sentence,
+            html=linked("\n".join(_chapter(gathered, each, templates) for each in chapters)),
+            findings=tuple(sorted(findings, key=lambda finding: finding.kind != "regression")),
+            figure=next((figure.name for each in chapters for figure in each.figures), ""),
+        )
+
     there = ((part, [told[each.name] for each in part.chapters if each.name in told]) for part in gathered.parts)
-    return tuple(_section(gathered, part, chapters, templates) for part, chapters in there if chapters)
-
-
-def _section(gathered: Gathered, part: Part, chapters: Sequence[Told], templates: Environment) -> Section:
-    findings = [finding for each in chapters for finding in each.findings]
-    return Section(
-        id=part.id,
-        title=part.title,
-        sentence=part.sentence,
-        html=linked("\n".join(_chapter(gathered, each, templates) for each in chapters)),
-        findings=tuple(sorted(findings, key=lambda finding: finding.kind != "regression")),
-        figure=next((figure.name for each in chapters for figure in each.figures), ""),
-    )
+    return tuple(section(part, chapters) for part, chapters in there if chapters)
 
 
 def _chapter(gathered: Gathered, told: Told, templates: Environment) -> Markup:

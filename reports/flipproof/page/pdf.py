@@ -47,13 +47,7 @@ def require_browser() -> str:
 
 
 def print_page(page: Path, target: Path) -> None:
-    """Print an HTML file to an A4 PDF.
-
-    Raises
-    ------
-    PrintError
-        If no browser is there or it made no PDF.
-    """
+    """Print an HTML file to an A4 PDF; raises PrintError if no browser is there or it made no PDF."""
     browser = require_browser()
     with tempfile.TemporaryDirectory(prefix="flipproof-print-", ignore_cleanup_errors=True) as profile:
         made = Path(profile) / "page.pdf"

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any
 
-from jinja2 import Environment
 from markupsafe import Markup
 
 from flipproof.chapters.differences.study import Difference, moved, percent
@@ -17,11 +16,10 @@ from flipproof.page.equations import equation, mathematics, numbers, typeset
 from flipproof.page.glossary import EQUATIONS, TERMS, anchor, symbols
 from flipproof.page.headlines import headlines
 from flipproof.page.lead import answer, answers, lead_words
-from flipproof.page.live import live_data, sliders
+from flipproof.page.live import live_data, sliders, touch_data
 from flipproof.page.parts import STORY, behind, sections, shared
 from flipproof.page.story import story
 from flipproof.page.templating import environment
-from flipproof.page.touch import touch_data
 
 
 def unbroken(text: str) -> str:
@@ -70,7 +68,13 @@ def render(
     gathered: Gathered, told: Mapping[str, Told], provenance: Mapping[str, str], summary: Mapping[str, Any]
 ) -> str:
     """Return the whole page; ``summary``, which its story is told from, is that of the report."""
-    templates = page_environment()
+    templates = environment()
+    templates.filters |= {
+        "typeset": typeset, "unbroken": unbroken, "amount": amount, "percent": percent, "touch_data": touch_data,
+        "short": short, "restitution_error": restitution_error, "term_anchor": anchor, "equation": equation,
+        "shared": shared, "symbols": symbols, "mathematics": mathematics, "numbers": numbers,
+    }  # fmt: skip
+    templates.globals["assets"] = read_assets()
     verdict = headlines(gathered)
     findings = [finding for each in told.values() for finding in each.findings]
     regressions = [finding for finding in findings if finding.kind == "regression"]
@@ -105,15 +109,3 @@ def render(
     return templates.get_template("report.html.j2").render(
         context, contents=[*screens, *((section.id, section.title) for section in body)], sections=body
     )
-
-
-def page_environment() -> Environment:
-    """Return the environment of the page's templates, with the filters that they and the chapters' parts use."""
-    templates = environment()
-    templates.filters |= {
-        "typeset": typeset, "unbroken": unbroken, "amount": amount, "percent": percent, "touch_data": touch_data,
-        "short": short, "restitution_error": restitution_error, "term_anchor": anchor, "equation": equation,
-        "shared": shared, "symbols": symbols, "mathematics": mathematics, "numbers": numbers,
-    }  # fmt: skip
-    templates.globals["assets"] = read_assets()
-    return templates

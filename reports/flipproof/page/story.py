@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -24,6 +23,7 @@ from markupsafe import Markup
 
 from flipproof.chapters.differences.study import PARTING_BAND, percent
 from flipproof.figures.style import SUPERSCRIPTS
+from flipproof.frame.findings import finite_or_none
 from flipproof.frame.spoken import SPOKEN
 from flipproof.page.lead import signed
 
@@ -155,17 +155,17 @@ def _shares(summary: Summary) -> list[SimpleNamespace]:
         if headline["measure"] == "share" and headline["id"].startswith("share"):
             places = {"mean": "value", "low": "low", "high": "high", "finer": "finer"}
             numbers = {n: summary.number(f"headlines/{headline['id']}/{p}", signed) for n, p in places.items()}
-            words = CHANGES.get(headline["what"], "")
             if numbers["mean"] and numbers["low"] and numbers["high"]:
+                words = CHANGES.get(headline["what"], "")
                 found.append(SimpleNamespace(name=headline["what"], words=words, **numbers))
     return found
 
 
 def _experiment(summary: Summary, id_: str) -> SimpleNamespace | None:
-    if summary.at(f"paper/experiment/{id_}") is None:
-        return None
     shown = degrees if id_ == "landing-angle" else rounded
     place = f"paper/experiment/{id_}/equations"
+    if summary.at(f"paper/experiment/{id_}") is None:
+        return None
     equations = {solver: summary.number(f"{place}/{solver}/value", shown) for solver in NAMES if solver != "pymunk"}
     verdicts = {solver: summary.at(f"{place}/{solver}/verdict") for solver in equations}
     return SimpleNamespace(values=equations, verdicts=verdicts)
@@ -194,6 +194,11 @@ def _map(table: str | None) -> dict[str, Any] | None:
     plateau = "plateau of omega/omega_0 {} [1]"
     solvers = [name for name in NAMES if plateau.format(name) in rows[0]]
     fill, damping = (name for name in list(rows[0])[:2])
+
+    def mean(row: Mapping[str, str], solver: str) -> float | None:
+        text = row[plateau.format(solver)]
+        return finite_or_none(float(text)) if text else None
+
     return {
         "fills": sorted({float(row[fill]) for row in rows}),
         "dampings": sorted({float(row[damping]) for row in rows}),
@@ -204,34 +209,23 @@ def _map(table: str | None) -> dict[str, Any] | None:
                 "x": float(row[fill]),
                 "y": float(row[damping]),
                 "which": row.get("largest fair share", ""),
-                "mean": [_value(row[plateau.format(name)]) for name in solvers],
+                "mean": [mean(row, name) for name in solvers],
             }
             for row in rows
         ],
     }
 
 
-def _value(text: str) -> float | None:
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
-
-
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A number as it is printed; the page keeps its value and its source beside the text."""
+    """A number as it is printed; as HTML it keeps its value and its source beside the text."""
 
     value: float
     text: str
     source: str
 
     def __html__(self) -> str:
-        """Return the number as HTML."""
-        return str(
-            Markup('<data value="{}" data-source="{}">{}</data>').format(repr(self.value), self.source, self.text)
-        )
+        return Markup('<data value="{!r}" data-source="{}">{}</data>').format(self.value, self.source, self.text)
 
     def __str__(self) -> str:
         return self.text

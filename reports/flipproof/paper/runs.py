@@ -9,8 +9,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from flipproof.frame.flights import Call, Flights
-from flipproof.frame.solvers import Made, Run, make
+from flipproof.frame.solvers import Call, Flights, Made, Run, make
 from flipproof.paper import observe
 from flipproof.paper.cases import Case, all_cases, family
 from flipproof.paper.costs import Cost, measure_event_driven, measure_published

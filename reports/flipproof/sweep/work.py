@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipproof.foreign.content import content_of
+from flipproof.frame.keys import fingerprint
 from flipproof.frame.solvers import Run, find, make
-from flipproof.frame.sources import fingerprint
 from flipproof.output.provenance import provenance, version_of
 from flipproof.sweep.design import Point
 from ode_reference.solver import COLUMN

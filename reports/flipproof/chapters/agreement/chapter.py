@@ -60,23 +60,20 @@ def study_agreement(
 ) -> Agreement:
     """Compare every solver with every other, on the times of the first run.
 
+    Fewer than two runs, or runs of other throws or at other output times, raise a ValueError.
+
     Parameters
     ----------
-    runs : mapping name -> Trajectory - of one throw, at the same output times; at least two
-    bands : mapping name -> float or array, shape (P,) - how far each omega(t) may be off by its own account [omega_0]
-    until : float - the horizon [s]: later times are not compared
-
-    Raises
-    ------
-    ValueError
-        If fewer than two runs are given, or their throws or output times differ.
+    runs : name -> run
+    bands : name -> how far omega(t) may be off by its own account, shape () or (P,) [omega_0]
+    until : the horizon [s]: later times are not compared
     """
     names = tuple(runs)
     if len(names) < 2:
         raise ValueError(f"runs = {list(names)}: an agreement takes at least two")
     first = runs[names[0]]
-    for name in names[1:]:
-        if runs[name].scenario != first.scenario or not np.array_equal(runs[name].t, first.t):
+    for name, run in runs.items():
+        if run.scenario != first.scenario or not np.array_equal(run.t, first.t):
             raise ValueError(f"{name} and {names[0]} are not runs of one throw at the same times")
     seen = first.t <= until
     pairs = []
@@ -100,15 +97,7 @@ def _words(names: tuple[str, ...], pairs: list[Pair]) -> str:
     return f"outside their bands: {named}; no single one of them explains it"
 
 
-@dataclass(frozen=True, slots=True)
-class Agreed:
-    """Equation -> the comparison of those who solve it, at a number of slices."""
-
-    agreements: Mapping[str, Agreement]
-    slices: int
-
-
-def study(ask: Ask) -> Study[Agreed]:
+def study(ask: Ask) -> Study[Mapping[str, Agreement]]:
     """Compare, for free flight and for Eq. 8, the solvers that reached the end and know their band.
 
     Beside the equation itself and its witness these are engines. The witness's own band is by how much it differs from
@@ -127,8 +116,7 @@ def study(ask: Ask) -> Study[Agreed]:
         coarser[equation] = Run(equation, ask.throw, coarse, f"{equation}, {SOLVE_IVP}, coarser")
     every = [run for each in runs.values() for run in each.values()]
     flights = yield [*every, *coarser.values(), *(twin for name in runs for twin in twins(runs[name][name]))]
-    agreements = {name: agreement_on(name, each, coarser[name], flights) for name, each in runs.items()}
-    return Agreed(agreements, ask.throw.n_slices)
+    return {name: agreement_on(name, each, coarser[name], flights) for name, each in runs.items()}
 
 
 def agreement_on(equation: str, runs: Mapping[str, Run], coarser: Run, flights: Flights) -> Agreement:
@@ -156,9 +144,9 @@ def band_over_time(run: Run, others_of: Iterable[Run], flights: Flights) -> Floa
     return np.asarray(np.maximum.accumulate(np.max([*moved, np.full(len(usual.t), MODEL_FLOOR)], axis=0)))
 
 
-def claims(found: Agreed) -> Claims:
+def claims(found: Mapping[str, Agreement]) -> Claims:
     """Yield for each equation the largest difference of a pair, and which solver differs from all others."""
-    for equation, agreement in found.agreements.items():
+    for equation, agreement in found.items():
         widest = max(agreement.pairs, key=lambda pair: pair.largest)
         pairs = [f"{p.first} and {p.second} {p.largest:.1e}, {100 * p.share:.0f} % within" for p in agreement.pairs]
         id_ = "agreement" if equation == FREE else f"agreement-{equation}"

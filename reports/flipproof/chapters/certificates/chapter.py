@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from flipproof.chapters.solvers import WITNESSES
 from flipproof.frame.chapter import Ask, Chapter, Claims, Study, observed
 
 
-@dataclass(frozen=True, slots=True)
-class Certificates:
+class Certificates(NamedTuple):
     """Name -> certificate as ``engine_check.Certificate.to_mapping`` gives it; and those that have none."""
 
     certificates: Mapping[str, Mapping[str, Any]]
     uncertified: tuple[str, ...]
     size: str
-    omega0: float
 
 
 def study(ask: Ask) -> Study[Certificates]:
@@ -29,7 +26,6 @@ def study(ask: Ask) -> Study[Certificates]:
         {name: run.diagnostics["certificate"] for name, run in flown.items() if "certificate" in run.diagnostics},
         tuple(name for name, run in runs.items() if "tolerance" not in run.settings),
         ask.size,
-        ask.scenario.omega0,
     )
 
 
@@ -40,9 +36,8 @@ def claims(found: Certificates) -> Claims:
         words = [f"Δt = {settings['step']:.3g} s" if settings.get("step") else "no step was completed"]
         if settings.get("iterations") is not None:
             words.append(f"{settings['iterations']} iterations")
-        hits = {"grid": "hits on the step's grid", "located": "hits located by us"}.get(settings.get("hits"))
-        if hits is not None:
-            words.append(hits)
+        if settings.get("hits") is not None:
+            words.append({"grid": "hits on the step's grid", "located": "hits located by us"}[settings["hits"]])
         words.append(f"order {order:.2f}" if order is not None else f"no order: {certificate['order_reason']}")
         if certificate["reason"]:
             words.append(certificate["reason"])

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Final
+from dataclasses import asdict, replace
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, percent, study_difference
-from flipproof.chapters.predictability.study import parting_words
+from flipproof.chapters.predictability.chapter import parting_words
 from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, WITNESSES
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Run, Study, Touch
-from flipproof.frame.findings import observed
-from flipproof.frame.flights import Flights, attempt, known
-from flipproof.frame.solvers import find
-from flipproof.frame.throws import finer
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Run, Study, Touch, observed
+from flipproof.frame.solvers import Flights, attempt, find, finer, known
 from flipproof.frame.twins import BAND_WORDS, twins
 from flipproof.output.columns import curves_csv
 from ode_reference.models import LADDER
@@ -48,8 +45,7 @@ MODEL_FLOOR: Final = 1e-9
 """Least band of a model, fraction of omega_0: the digits that independent methods share; none finer is claimed."""
 
 
-@dataclass(frozen=True, slots=True)
-class Differences:
+class Differences(NamedTuple):
     """Every pair both of whose flights were made, how each difference grows, and up to when free flight goes.
 
     ``ended`` says where free flight stopped early, "" if it did not; ``missing`` why a pair could not be compared.
@@ -57,7 +53,6 @@ class Differences:
 
     pairs: tuple[Difference, ...]
     growths: tuple[str, ...]
-    slices: int
     ended: str
     missing: Mapping[tuple[str, str, str], str]
 
@@ -75,8 +70,9 @@ def study(ask: Ask) -> Study[Differences]:
         bands: dict[str, float] = {}
         more: dict[str, Run] = {}
     else:
-        more = {ENGINE: finer(runs[ENGINE])} if ask.size == "full" else {}
-        more |= {name: fine(runs[name]) for name in (*SCHEMES, *LADDER)}
+        again = (*((ENGINE,) if ask.size == "full" else ()), *SCHEMES, *LADDER)
+        more = {name: finer(runs[name]) for name in again}
+        more |= {name: replace(more[name], settings={**more[name].settings, "store": "summary"}) for name in SCHEMES}
         flights = yield [*more.values(), *runs.values(), *(twin for model in LADDER for twin in twins(runs[model]))]
         bands = run_bands(runs, flights)
     flown = flights.trajectories(runs)
@@ -92,24 +88,18 @@ def study(ask: Ask) -> Study[Differences]:
             finer=(refined[first], refined[second]) if {first, second} <= set(refined) else None,
         )
 
+    def growth(difference: Difference) -> str:
+        located = flown.get(LIMITS.get(difference.first, difference.first))
+        return parting_words(difference, None if located is None else located.impacts)
+
     tried = {pair: attempt(compared, *pair) for pair in PAIRS if set(pair[1:]) <= set(runs)}
     pairs = tuple(known(tried).values())
-    growths = []
-    for difference in pairs:
-        if difference.parting_time is not None:
-            located = flown.get(LIMITS.get(difference.first, difference.first))
-            growths.append(parting_words(difference, None if located is None else located.impacts))
+    growths = tuple(growth(difference) for difference in pairs if difference.parting_time is not None)
     free, ended = flown.get(FREE), ""
     if free is not None and not free.ok:
         ended = f"up to t = {1e3 * free.t[-1]:.0f} ms, where {free.method} {free.status}"
     missing = {pair: outcome.reason for pair, outcome in tried.items() if outcome.reason}
-    return Differences(pairs, tuple(growths), ask.throw.n_slices, ended, missing)
-
-
-def fine(run: Run) -> Run:
-    """Return the run at ``FINER`` times the slices; a scheme then stores a summary."""
-    more = finer(run)
-    return Run(more.solver, more.scenario, {**more.settings, "store": "summary"} if more.settings else {}, more.label)
+    return Differences(pairs, growths, ended, missing)
 
 
 def run_bands(runs: Mapping[str, Run], flights: Flights) -> dict[str, float]:
@@ -126,11 +116,8 @@ def run_bands(runs: Mapping[str, Run], flights: Flights) -> dict[str, float]:
             if model in flown and other is not None and flown[model].ok and other.ok:
                 apart = study_difference(model, flown[model], other).largest
                 bands[model] = max(bands.get(model, MODEL_FLOOR), apart)
-    for name in (name for name in WITNESSES if name in flown):
-        certificate = flown[name].diagnostics.get("certificate", {})
-        if certificate.get("band") is not None:
-            bands[name] = certificate["band"]
-    return bands
+    certified = {name: flown[name].diagnostics.get("certificate", {}) for name in WITNESSES if name in flown}
+    return bands | {name: each["band"] for name, each in certified.items() if each.get("band") is not None}
 
 
 def claims(found: Differences) -> Claims:
@@ -195,10 +182,10 @@ def draw(differences: Sequence[Difference]) -> Figure:
     grid[0, 0].set(yscale="log", ylim=(LEAST, MOST))
     for axes in grid[:, 0]:
         axes.set_ylabel("|difference| [1]")
-    for column in range(columns):
-        lowest = grid[(len(differences) - 1 - column) // columns, column]
-        lowest.set_xlabel("time t [s]")
-        lowest.tick_params(labelbottom=True)
+    # The lowest panel of every column.
+    for axes in grid.flat[max(len(differences) - columns, 0) : len(differences)]:
+        axes.set_xlabel("time t [s]")
+        axes.tick_params(labelbottom=True)
     return figure
 
 

@@ -32,17 +32,13 @@ class Difference:
 
     Parameters
     ----------
-    name : str - the assumption that separates the two
-    first, second : str - labels of the runs
-    t : (P,) [s]
-    omega : (P,) - (omega_second - omega_first) / omega_0, signed
-    largest : float - max |omega| over time, at ``largest_time``
-    final : float - omega at the last common time
-    parting_time : float or None - first time |omega| exceeds PARTING_BAND, interpolated [s]; None if it never does
-    parting_impact : Impact or None - last impact at or before the parting, in the run given for it
-    band : float or None - numerical uncertainty of ``largest``: the sum of the two runs' own
-    slices : int - of both runs
-    finer : (int, float) or None - another number of slices, and ``largest`` of the same two solvers at it
+    name, first, second : the assumption that separates the two, and the labels of the runs
+    t, omega : (P,) - times [s] and (omega_second - omega_first) / omega_0, signed
+    largest, largest_time, final : max |omega| over time and when it is reached [s]; omega at the last common time
+    parting_time : first time |omega| exceeds PARTING_BAND, interpolated [s]; None if it never does
+    parting_impact : last impact at or before the parting, in the run given for it
+    band : numerical uncertainty of ``largest``: the sum of the two runs' own
+    finer : another number of slices than ``slices``, and ``largest`` of the same two solvers at it
     """
 
     name: str
@@ -91,6 +87,8 @@ def study_difference(
     size = np.abs(omega)
     k = int(size.argmax())
     parting = first_crossing(t, size, PARTING_BAND)
+    impacts = None if impacts_of is None else impacts_of.impacts
+    before = 0 if parting is None or impacts is None else int(np.searchsorted(impacts.time, parting, side="right"))
     return Difference(
         name=name,
         first=first.label,
@@ -101,7 +99,7 @@ def study_difference(
         largest_time=float(t[k]),
         final=float(omega[-1]),
         parting_time=parting,
-        parting_impact=_last_impact(parting, impacts_of),
+        parting_impact=impacts[before - 1] if impacts is not None and before else None,
         band=band,
         slices=first.scenario.n_slices,
         finer=None if finer is None else (finer[0].scenario.n_slices, study_difference(name, *finer).largest),
@@ -110,23 +108,13 @@ def study_difference(
 
 def first_crossing(t: FloatArray, size: FloatArray, band: float) -> float | None:
     """Return when ``size`` first exceeds ``band``, linear between points; None if never."""
-    above = size > band
-    if not above.any():
+    above = np.flatnonzero(size > band)
+    if not len(above):
         return None
-    k = int(above.argmax())
-    if k == 0:
+    if (k := int(above[0])) == 0:
         return float(t[0])
     share = (band - size[k - 1]) / (size[k] - size[k - 1])
     return float(t[k - 1] + share * (t[k] - t[k - 1]))
-
-
-def _last_impact(parting: float | None, trajectory: Trajectory | None) -> Impact | None:
-    """Return the last impact up to ``parting``, if there is one."""
-    if parting is None or trajectory is None or trajectory.impacts is None:
-        return None
-    impacts = trajectory.impacts
-    k = int(np.searchsorted(impacts.time, parting, side="right"))
-    return impacts[k - 1] if k else None
 
 
 def claim_change(
@@ -134,10 +122,7 @@ def claim_change(
 ) -> Finding:
     """Return the claim that two runs agree; a run compared with itself, or not whole, proves nothing.
 
-    Raises
-    ------
-    Missing
-        If the runs do not ``differ`` in their settings, or one is not whole.
+    Runs that do not ``differ`` in their settings, or one that is not whole, raise Missing.
     """
     if not differ:
         raise Missing("the two runs have the same settings: comparing them proves nothing")

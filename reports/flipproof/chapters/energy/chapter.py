@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Made, Run, Study, judged
-from flipproof.frame.findings import Finding, regression
-from flipproof.frame.flights import Outcome, attempt, known
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Finding, Study, judged, regression
+from flipproof.frame.solvers import Made, Outcome, Run, attempt, known
 from ode_reference.models import LADDER
 from slicemodel import Trajectory
 
 
-@dataclass(frozen=True, slots=True)
-class Energy:
+class Energy(NamedTuple):
     """Every model's flight of the paper's own throw, and its ledger on the report's."""
 
     checks: Mapping[str, Made]
@@ -33,27 +30,21 @@ def study(ask: Ask) -> Study[Energy]:
 
 
 def claims(found: Energy) -> Claims:
-    """Yield that every ledger closes on the paper's own throw."""
+    """Yield that the works of all forces and the losses in impacts add up, on the paper's own throw, to the change."""
+
+    def closes(id_: str, title: str, run: Trajectory) -> Finding:
+        ledger = run.diagnostics["energy"]
+        missed = abs(float(ledger["residual"]) / float(ledger["initial"]))
+        return regression(id_, title, missed, "of the initial energy", (0.0, 1e-9))
+
     for model, made in found.checks.items():
-        yield judged(claim_energy, made, id=f"energy-{model}", title=f"{model}: the energy ledger closes")
+        id_, title = f"energy-{model}", f"{model}: the energy ledger closes"
+        yield judged(closes, id_, title, made, id=id_, title=title)
     for model, each in found.ledgers.items():
         if each.found is None:
             yield Absent(f"ledger-{model}", f"ledger of {model}", each.reason, "observation")
 
 
-def claim_energy(run: Trajectory) -> Finding:
-    """The works of all forces and the losses in impacts add up to the change of energy."""
-    ledger = run.diagnostics["energy"]
-    missed = abs(float(ledger["residual"]) / float(ledger["initial"]))
-    title = f"{run.method}: the energy ledger closes"
-    return regression(f"energy-{run.method}", title, missed, "of the initial energy", (0.0, 1e-9))
-
-
 CHAPTER: Final = Chapter(
-    name="energy",
-    title="Where the energy goes",
-    study=study,
-    claims=claims,
-    kind="regression",
-    page=lambda found: {"made": known(found.ledgers)},
+    "energy", "Where the energy goes", study, claims, kind="regression", page=lambda it: {"made": known(it.ledgers)}
 )

@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from flipproof.chapters.solvers import LIMITS
 from flipproof.frame.chapter import Ask, Chapter, Claims, Run, Study, attempt, observed
-from flipproof.frame.throws import finer
+from flipproof.frame.solvers import finer
 from slicemodel import Trajectory
 
 
@@ -35,10 +35,7 @@ class Way:
         return LIMITS[self.scheme]
 
 
-EVERYTHING: Final = "everything"
-HELD: Final = "held"
-LOCATED: Final = "held-located"
-
+EVERYTHING, HELD, LOCATED = "everything", "held", "held-located"
 WAIT, LOCATE = "rebounds wait for the grid", "rebounds located inside the step"
 PUBLISHED: Final = "published-python"
 WAYS: Final = (
@@ -65,8 +62,7 @@ class StepCost:
     flight: float
 
 
-@dataclass(frozen=True, slots=True)
-class StepCosts:
+class StepCosts(NamedTuple):
     """What each way costs at the report's slices; the same at ``FINER`` times as many, nothing if a run is missing."""
 
     costs: tuple[StepCost, ...]

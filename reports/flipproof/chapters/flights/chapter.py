@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -29,8 +28,7 @@ AXES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Flown:
+class Flown(NamedTuple):
     """What became of every solver on the throw, by its name."""
 
     throw: Scenario
@@ -170,7 +168,7 @@ def _apart(ends: Mapping[str, float], unit: str, digits: str) -> str:
     finite = {name: value for name, value in ends.items() if math.isfinite(value)}
     if len(finite) < 2:
         return ""
-    low, high = min(finite, key=lambda name: finite[name]), max(finite, key=lambda name: finite[name])
+    low, high = min(finite, key=finite.__getitem__), max(finite, key=finite.__getitem__)
     words = f"They end up to {finite[high] - finite[low]:{digits}}{unit} apart ({low} to {high})"
     pairs = [abs(finite[s] - finite[LIMITS[s]]) for s in SCHEMES if s in finite and LIMITS[s] in finite]
     return words + (f", a scheme and its own equation up to {max(pairs):{digits}}{unit}." if pairs else ".")

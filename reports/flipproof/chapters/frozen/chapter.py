@@ -147,7 +147,7 @@ def figures(found: Frozen) -> Iterator[Exhibit]:
         if found.defect[name].any()
     )
     explained = " Before the first impact the error of the velocity is {:.2f} of what they add up to."
-    d_omega, d_theta, d_r_cm, damping = found.changes
+    changes = ("|d omega|/omega per step [1]", "|d theta| per step [rad]", "|d r_CM|/L per step [1]", "gamma/omega [1]")
     yield Exhibit(
         name="frozen",
         title="What holding the coefficients constant costs, step by step",
@@ -164,10 +164,7 @@ def figures(found: Frozen) -> Iterator[Exhibit]:
         table=columns_csv(
             {
                 TIME: found.t,
-                "|d omega|/omega per step [1]": d_omega,
-                "|d theta| per step [rad]": d_theta,
-                "|d r_CM|/L per step [1]": d_r_cm,
-                "gamma/omega [1]": damping,
+                **dict(zip(changes, found.changes, strict=True)),
                 **{f"defect of a frozen {quantity} per step [m/s]": found.defect[quantity] for quantity in QUANTITIES},
                 "defects added up to the end of the step [m/s]": found.cumulative,
                 "error of r' there [m/s]": found.velocity_error,
@@ -184,13 +181,9 @@ def figure_frozen(study: Frozen) -> Figure:
     colours = dict(zip(QUANTITIES, ("#D55E00", "#0072B2", "#009E73", "#CC79A7"), strict=True))
     figure, panels = new_figure(3, size=(8.0, 8.6), sharex=True)
     changes, defects, errors = panels
-    d_omega, d_theta, d_r_cm, damping = study.changes
-    for words, values, colour, dash in (
-        ("|Δω| / ω", d_omega, colours["omega"], "-"),
-        ("|Δθ| [rad]", d_theta, colours["theta"], "-"),
-        ("|Δr_CM| / L", d_r_cm, colours["r_cm"], "-"),
-        ("γ / ω, not a change", damping, "#000000", ":"),
-    ):
+    labels = ("|Δω| / ω", "|Δθ| [rad]", "|Δr_CM| / L", "γ / ω, not a change")
+    looks = [*((colours[quantity], "-") for quantity in QUANTITIES[:3]), ("#000000", ":")]
+    for values, words, (colour, dash) in zip(study.changes, labels, looks, strict=True):
         changes.semilogy(study.t, _shown(values), color=colour, linewidth=1.2, linestyle=dash, label=words)
     changes.set_title(f"change in one step of {study.dt * 1e3:.2g} ms, exact-step", fontsize=10, loc="left")
     changes.set_ylabel("change per step [1]")

@@ -1,26 +1,212 @@
-"""Up to when an engine's omega(t) means anything: ensembles of flights that should be one flight."""
+"""Up to when the omega(t) of an engine means anything: ensembles of flights that should be one flight.
+
+    angle    released at theta_0 +- size: free flight does not feel it, so what it does to omega is arithmetic
+    release  theta_0 and omega_0 changed by the size (``predictability``): what the flight itself amplifies
+    order    bodies entered in another order: what the engine's own sweep leaves open
+
+The width of an ensemble at a time is its largest minus its smallest omega. Up to the horizon, where the width first
+leaves a band, one member stands for all. Nothing is cut off there: the width is kept to the end, and it is
+infinite from where a member has ended.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import cycle
-from typing import Any, Final
+from typing import Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from flipproof.chapters.horizon.study import Ensemble, Horizon, Kind, Reach, plan_horizon, study_horizon
-from flipproof.chapters.predictability.chapter import SIZE_LINES
-from flipproof.chapters.predictability.study import HORIZON_BAND
+from flipproof.chapters.differences.study import first_crossing
+from flipproof.chapters.predictability.chapter import (
+    HORIZON_BAND,
+    SIZE_LINES,
+    SIZES,
+    Growth,
+    fit_growth,
+    plan_predictability,
+)
 from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, observed, regression
+from flipproof.frame.solvers import Made, Run, attempt, find
 from flipproof.output.columns import curves_csv
+from slicemodel import Scenario, Trajectory
+from slicemodel.trajectory import FloatArray
 
-WIDTH_FLOOR = 1e-16
-"""Least width that is drawn."""
+Kind = Literal["angle", "release", "order"]
+
+LEAST: Final = 1e-16
+"""Width below which none is drawn."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reach:
+    """How much of it: solvers, sizes of the changes (rising), seeds of the order, slices."""
+
+    solvers: tuple[str, ...] = ("pymunk", "mujoco", "free-flight")
+    sizes: tuple[float, ...] = SIZES
+    seeds: tuple[int, ...] = (1, 2, 3, 4)
+    slices: int = 20
+
+
+class Level(NamedTuple):
+    """The runs of an ensemble, the unchanged one first. ``size`` is NaN for another order, which has none."""
+
+    kind: Kind
+    size: float
+    runs: list[Run]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ensemble:
+    """Flights that differ in one small thing.
+
+    Parameters
+    ----------
+    size : of the change [rad], and of omega_0 as a fraction; NaN for another order, which has none
+    members : how many flights, the unchanged one included
+    t, width : (P,) - times [s] and (largest - smallest omega) / |omega_0|; infinite where a member has ended
+    horizon : first time the width exceeds HORIZON_BAND [s]; None: never
+    growth : of the width, up to the horizon
+    ended : where the first member ends, if that is before the end of the throw [s]
+    """
+
+    kind: Kind
+    size: float
+    members: int
+    t: FloatArray
+    width: FloatArray
+    horizon: float | None
+    growth: Growth
+    ended: float | None
+
+    @property
+    def largest(self) -> float:
+        """Largest width of the flight, fraction of omega_0; infinite if a member has ended early."""
+        return float(self.width.max())
+
+    @property
+    def what(self) -> str:
+        """What differs, in words."""
+        if self.kind == "order":
+            return f"{self.members} orders of the bodies"
+        return f"{'θ₀' if self.kind == 'angle' else 'θ₀ and ω₀'} changed by {self.size:.0e}"
+
+    @property
+    def words(self) -> str:
+        """Width, horizon and growth in words."""
+        left = self.horizon
+        ended = "" if self.ended is None else f"; a member ends at {self.ended * 1e3:.1f} ms"
+        when = f"never beyond {HORIZON_BAND:g}" if left is None else f"beyond {HORIZON_BAND:g} from {left * 1e3:.1f} ms"
+        widths = f"width at most {self.largest:.1e} of ω₀, {self.width[-1]:.1e} at the end"
+        return f"{self.what}: {widths}, {when}; {self.growth.words}{ended}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Horizon:
+    """The ensembles of one solver; ``problems`` says of those that are missing why they are."""
+
+    solver: str
+    ensembles: tuple[Ensemble, ...]
+    problems: tuple[str, ...] = ()
+
+    @property
+    def horizon(self) -> float | None:
+        """Earliest horizon of all ensembles [s]; None: there is none up to the end."""
+        return min((e.horizon for e in self.ensembles if e.horizon is not None), default=None)
+
+    def of_kind(self, *kinds: Kind) -> list[Ensemble]:
+        """Return the ensembles of these kinds, each in order of their size."""
+        return [ensemble for kind in kinds for ensemble in self.ensembles if ensemble.kind == kind]
+
+    def widest(self, *kinds: Kind) -> Ensemble | None:
+        """Return the ensemble that becomes widest, of these kinds or of all."""
+        chosen = self.of_kind(*kinds) if kinds else self.ensembles
+        return max(chosen, key=lambda ensemble: ensemble.largest, default=None)
+
+    @property
+    def words(self) -> str:
+        """The widest ensemble of each kind in words, and what is missing."""
+        parts = [widest.words for kind in get_args(Kind) if (widest := self.widest(kind)) is not None]
+        parts += [f"missing: {reason}" for reason in self.problems]
+        return f"{self.solver}: " + ". ".join(parts) + "."
+
+
+def plan_horizon(throw: Scenario, reach: Reach) -> dict[str, list[Level]]:
+    """Return the runs of every ensemble, by solver."""
+    few = throw.with_slices(reach.slices)
+    return {solver: _levels(few, solver, reach) for solver in reach.solvers}
+
+
+def _levels(throw: Scenario, solver: str, reach: Reach) -> list[Level]:
+    from engine_check.pymunk_settings import enough_iterations
+
+    settings: dict[str, Any] = {"times": np.linspace(0.0, throw.duration, 251)}
+    if find(solver).package == "engine_check":
+        settings["dt"] = 2e-4
+    sweeps = solver == "pymunk"  # the engine that sweeps over its bodies, and so has an order of them
+    if sweeps:
+        settings["iterations"] = enough_iterations(throw)
+
+    def run(words: str, at: Scenario = throw, **changes: Any) -> Run:
+        return Run(solver, at, settings | changes, f"horizon, {solver}, {words}")
+
+    base = run("as it is")
+    levels = []
+    for size in reach.sizes:
+        turned = [run(f"angle {by:+.0e}", replace(throw, theta0=throw.theta0 + by)) for by in (size, -size)]
+        levels.append(Level("angle", size, [base, *turned]))
+    plans = plan_predictability(throw, solver, sizes=reach.sizes, settings=settings)
+    levels += [Level("release", size, [base, *runs]) for size, runs in zip(sorted(reach.sizes), plans, strict=True)]
+    if sweeps and reach.seeds:
+        levels.append(Level("order", math.nan, [base, *(run(f"order {seed}", shuffle=seed) for seed in reach.seeds)]))
+    return levels
+
+
+def study_horizon(plan: Mapping[str, Sequence[Level]], made: Mapping[Run, Made]) -> tuple[Horizon, ...]:
+    """Read the ensembles that were planned.
+
+    A solver that could not be run, such as an engine that is not installed, stays, with the reason.
+    """
+
+    def measured(level: Level) -> Ensemble:
+        return study_ensemble(level.kind, level.size, [made[run].flight for run in level.runs])
+
+    found = []
+    for solver, levels in plan.items():
+        tried = [attempt(measured, level) for level in levels]
+        problems = dict.fromkeys(each.reason for each in tried if each.reason)
+        ensembles = tuple(each.found for each in tried if each.found is not None)
+        found.append(Horizon(solver=solver, ensembles=ensembles, problems=tuple(problems)))
+    return tuple(found)
+
+
+def study_ensemble(kind: Kind, size: float, members: Sequence[Trajectory]) -> Ensemble:
+    """Measure the width over time of two flights or more on the same output times, the unchanged one first."""
+    t = max((member.t for member in members), key=len)
+    shortest = min(len(member.t) for member in members)
+    width = np.full(len(t), np.inf)
+    omega = [member.omega[:shortest] for member in members]
+    width[:shortest] = np.ptp(omega, axis=0) / abs(members[0].scenario.omega0)
+    horizon = first_crossing(t, width, HORIZON_BAND)
+    # A member that is the longest but still stopped early ends the ensemble as well.
+    stopped = [float(member.t[-1]) for member in members if member.status not in ("ok", "escaped")]
+    return Ensemble(
+        kind=kind,
+        size=size,
+        members=len(members),
+        t=t,
+        width=width,
+        horizon=horizon,
+        growth=fit_growth(t, width, stop=math.inf if horizon is None else horizon),
+        ended=min(stopped, default=None),
+    )
 
 
 def study(ask: Ask) -> Study[tuple[Horizon, ...]]:
@@ -35,8 +221,8 @@ def claims(found: tuple[Horizon, ...]) -> Claims:
     for horizon in found:
         yield claim_horizon(horizon)
         yield claim_angle(horizon)
-        order, title = horizon.widest("order"), f"{horizon.solver}: width of ω among orders in which the bodies enter"
-        if order is not None:
+        if (order := horizon.widest("order")) is not None:
+            title = f"{horizon.solver}: width of ω among orders in which the bodies enter"
             yield observed(f"horizon-order-{horizon.solver}", title, order.largest, "of ω₀", order.words)
 
 
@@ -69,16 +255,11 @@ def figures(found: tuple[Horizon, ...]) -> Iterator[Exhibit]:
     if not any(study.ensembles for study in found):
         return
     words = " ".join(study.words for study in found).replace("ω₀", "omega_0").replace("θ₀", "theta_0")
-    numbers, curves = [], {}
+    numbers = []
     for study in found:
+        when = "" if study.horizon is None else f", beyond the band first at {study.horizon * 1e3:.0f} ms"
         widest = study.widest()
-        if widest is None:
-            numbers.append(f"{study.solver} was not run")
-        else:
-            when = "" if study.horizon is None else f", beyond the band first at {study.horizon * 1e3:.0f} ms"
-            numbers.append(f"{study.solver} at most {widest.largest:.1g} of ω₀{when}")
-        for e in study.ensembles:
-            curves[f"width of omega/omega_0 {study.solver}, {e.what} [1]"] = e.t, e.width
+        numbers.append(f"{study.solver} " + (f"at most {widest.largest:.1g} of ω₀{when}" if widest else "was not run"))
     yield Exhibit(
         name="horizon",
         title="Up to when an engine's ω(t) means anything",
@@ -91,7 +272,13 @@ def figures(found: tuple[Horizon, ...]) -> Iterator[Exhibit]:
         alt=f"Logarithmic plots of the width of ensembles over time. {words}",
         maker=figure_horizon,
         data=(found,),
-        table=curves_csv(curves),
+        table=curves_csv(
+            {
+                f"width of omega/omega_0 {study.solver}, {each.what} [1]": (each.t, each.width)
+                for study in found
+                for each in study.ensembles
+            }
+        ),
     )
 
 
@@ -102,10 +289,8 @@ def figure_horizon(studies: Sequence[Horizon]) -> Figure:
     At least one solver must have ensembles; one that has none is named in the legend.
     """
     red, grey = "#B00020", "#444444"
-    rows: dict[str, tuple[Kind, ...]] = {
-        "arithmetic: angle, order": ("angle", "order"),
-        "flight: angle and spin": ("release",),
-    }
+    arithmetic: tuple[Kind, ...] = ("angle", "order")
+    rows = {"arithmetic: angle, order": arithmetic, "flight: angle and spin": ("release",)}
     made = [study for study in studies if study.ensembles]
     figure, axes = new_figure(len(rows), len(made), size=(8.0, 6.2), sharex=True, sharey=True, squeeze=False)
     sizes = sorted({e.size for study in made for e in study.ensembles if math.isfinite(e.size)})
@@ -120,18 +305,18 @@ def figure_horizon(studies: Sequence[Horizon]) -> Figure:
     finite = [e.width[np.isfinite(e.width)].max(initial=0.0) for study in made for e in study.ensembles]
     for at in axes.flat:
         # Before the first line: nothing is left to scale where all widths are zero.
-        at.set_ylim(WIDTH_FLOOR / 3, 10 * max(HORIZON_BAND, *finite))
+        at.set_ylim(LEAST / 3, 10 * max(HORIZON_BAND, *finite))
         at.axhline(HORIZON_BAND, color=red, linewidth=1.2, linestyle=":")
     place: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "va": "bottom", "fontsize": 9, "color": red}
     axes[0, 0].annotate(f"band {HORIZON_BAND:g}", (0.02, HORIZON_BAND), **place)
+    entry = partial(Line2D, [], [])
     lines = zip(sizes, cycle(SIZE_LINES), strict=False)
-    handles = [Line2D([], [], color=grey, linestyle=line, label=f"change of {size:.0e}") for size, line in lines]
+    handles = [entry(color=grey, linestyle=line, label=f"change of {size:.0e}") for size, line in lines]
     if any(study.of_kind("order") for study in made):
-        handles.append(Line2D([], [], color="black", linewidth=1.8, label="other orders of the bodies"))
+        handles.append(entry(color="black", linewidth=1.8, label="other orders of the bodies"))
     if any(study.horizon is not None for study in made):
-        handles.append(Line2D([], [], linestyle="", marker="o", color=grey, label="horizon: band left"))
-    idle = [study.solver for study in studies if not study.ensembles]
-    handles += [Line2D([], [], linestyle="", label=f"{solver}: not run") for solver in idle]
+        handles.append(entry(linestyle="", marker="o", color=grey, label="horizon: band left"))
+    handles += [entry(linestyle="", label=f"{each.solver}: not run") for each in studies if not each.ensembles]
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 
@@ -141,7 +326,7 @@ def _draw_widths(axes: Axes, ensembles: Sequence[Ensemble], sizes: Sequence[floa
     axes.margins(x=0.01)
     for ensemble in ensembles:
         seen = np.isfinite(ensemble.width) & (ensemble.width > 0.0)
-        shown = np.where(seen, np.maximum(ensemble.width, WIDTH_FLOOR), np.nan)
+        shown = np.where(seen, np.maximum(ensemble.width, LEAST), np.nan)
         if seen.any() and ensemble.kind == "order":
             axes.plot(ensemble.t, shown, color="black", linewidth=1.8)
         elif seen.any():

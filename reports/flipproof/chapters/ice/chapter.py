@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Final
+from dataclasses import replace
+from typing import Final, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,16 +13,15 @@ from flipproof.chapters.solvers import ENGINE
 from flipproof.figures.style import STYLES, new_figure, shared_legend, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged, regression
 from flipproof.output.columns import curves_csv
-from slicemodel import Scenario, Trajectory
+from slicemodel import Trajectory
 from slicemodel.trajectory import FloatArray
 
 ADMISSIBLE: Final = {"slicemodel": 1e-12, "ode_reference": 1e-12, "engine_check": 1e-6}
 """max |omega/omega_0 - 1| by package: round-off where omega is computed from J, else the engine's own drift."""
 
 
-@dataclass(frozen=True, slots=True)
-class Drift:
-    """|omega / omega_0 - 1| of one frozen run over time."""
+class Drift(NamedTuple):
+    """|omega / omega_0 - 1| of one frozen run over time, shape (P,)."""
 
     label: str
     t: FloatArray
@@ -34,8 +33,7 @@ class Drift:
         return float(self.drift.max())
 
 
-@dataclass(frozen=True, slots=True)
-class Ice:
+class Ice(NamedTuple):
     """Frozen runs by label: of every solver, and of an engine whose masses joints hold, the step halved twice."""
 
     rigid: Mapping[str, Made]
@@ -48,23 +46,16 @@ def study(ask: Ask) -> Study[Ice]:
     solvers = ("published-python", "exact-step", "published-limit", "eq8", "free-flight")
     rigid = {name: Run(name, ice, label=f"ice, {name}") for name in solvers}
     rigid[f"{ENGINE} rigid"] = Run(ENGINE, ice, {"ice": "rigid"}, f"ice, {ENGINE} rigid")
+    welded = {}
     # The drift of welded ice hardly depends on its slices.
-    welded = _welded(replace(ask.reference.with_slices(20), frozen=True)) if ask.work else {}
+    few = replace(ask.reference.with_slices(20), frozen=True)
+    # Output times by which the engine's step, a whole part of each interval and 0.4 ms at the most, really halves.
+    times = np.linspace(0.0, few.duration, 1 + int(np.ceil(few.duration / 4e-4)))
+    for dt in float(times[1]) / np.array([1, 2, 4]) if ask.work else ():
+        label = f"{ENGINE} welded, Δt = {dt:.2g} s"
+        welded[label] = Run(ENGINE, few, {"ice": "welded", "dt": float(dt), "times": times}, f"ice, {label}")
     flights = yield [*rigid.values(), *welded.values()]
     return Ice(*({label: flights[run] for label, run in runs.items()} for runs in (rigid, welded)))
-
-
-def _welded(ice: Scenario) -> dict[str, Run]:
-    """Return runs at output times by which the engine's step, a whole part of each interval, really halves.
-
-    The longest step is 0.4 ms.
-    """
-    times = np.linspace(0.0, ice.duration, 1 + int(np.ceil(ice.duration / 4e-4)))
-    runs = {}
-    for dt in float(times[1]) / np.array([1, 2, 4]):
-        label = f"{ENGINE} welded, Δt = {dt:.2g} s"
-        runs[label] = Run(ENGINE, ice, {"ice": "welded", "dt": float(dt), "times": times}, f"ice, {label}")
-    return runs
 
 
 def measure(label: str, run: Trajectory) -> Drift:

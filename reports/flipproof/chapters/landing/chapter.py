@@ -13,7 +13,7 @@ from flipproof.chapters.landing.study import KINDS, OPTIMAL, WATER, Cases, Cell,
 from flipproof.chapters.landing.tables import page
 from flipproof.frame.chapter import Ask, Call, Chapter, Flights, Study
 from flipproof.frame.findings import Finding, observed, regression
-from flipproof.frame.throws import REFERENCE
+from flipproof.frame.solvers import REFERENCE
 from flipproof.landing.design import Case
 from flipproof.landing.upright import make_case
 from flipproof.landing.work import Landed

@@ -37,19 +37,15 @@ class Overlap:
 
     Parameters
     ----------
-    fills : array - fill fractions M_w / M_max
-    slices : int
-    restitution : float - at the ends and between slices
-    level : name -> array
-        Mean of omega / omega_0 over the second half, for PASS, EXCLUDE, CHECK and COLUMN, which is water as one
-        stretching column (``ode_reference.column``); NaN where the run failed.
-    reason : name -> F strings - "" or why the run cannot be used
-    band : array - twice what halving the step changed for EXCLUDE
+    fills, throw : fill fractions M_w / M_max, and the bottle of the first; restitution is also that between slices
+    level : name -> mean of omega / omega_0 over the second half, for PASS, EXCLUDE, CHECK and COLUMN, which is water as
+        one stretching column (``ode_reference.column``); NaN where the run failed
+    reason : name -> F strings, "" or why the run cannot be used
+    band : twice what halving the step changed for EXCLUDE
     """
 
     fills: FloatArray
-    slices: int
-    restitution: float
+    throw: Scenario
     level: Mapping[str, FloatArray]
     reason: Mapping[str, Sequence[str]]
     band: FloatArray
@@ -90,28 +86,25 @@ def plan_overlap(throw: Scenario, fills: Sequence[float], slices: int, dt: float
 
 def study_overlap(fills: Sequence[float], runs: Mapping[str, Sequence[Run]], made: Mapping[Run, Made]) -> Overlap:
     """Read the runs that ``plan_overlap`` planned over these fill fractions."""
-    read = {name: [_plateau(made[run]) for run in curve] for name, curve in runs.items()}
-    level = {name: np.array([found for found, _ in curve]) for name, curve in read.items()}
-    throw = runs[PASS][0].scenario
-    names = (PASS, EXCLUDE, CHECK, COLUMN)
+
+    def read(each: Made) -> tuple[float, str]:
+        """Return the plateau of a run, or NaN and why it cannot be used."""
+        flight = each.trajectory
+        if flight is None:
+            return np.nan, each.reason
+        if not flight.ok:
+            return np.nan, f"{flight.status}: {flight.message}"
+        return plateau(flight.t, flight.omega, flight.scenario.omega0), ""
+
+    found = {name: list(zip(*(read(made[run]) for run in curve), strict=True)) for name, curve in runs.items()}
+    level = {name: np.array(found[name][0]) for name in (PASS, EXCLUDE, CHECK, COLUMN)}
     return Overlap(
         fills=np.asarray(fills),
-        slices=throw.n_slices,
-        restitution=throw.restitution,
-        level={name: level[name] for name in names},
-        reason={name: [reason for _, reason in read[name]] for name in names},
-        band=2.0 * np.abs(level[EXCLUDE] - level[COARSER]),
+        throw=runs[PASS][0].scenario,
+        level=level,
+        reason={name: list(found[name][1]) for name in level},
+        band=2.0 * np.abs(level[EXCLUDE] - found[COARSER][0]),
     )
-
-
-def _plateau(made: Made) -> tuple[float, str]:
-    """Return the plateau of a run, or NaN and why it cannot be used."""
-    flight = made.trajectory
-    if flight is None:
-        return np.nan, made.reason
-    if not flight.ok:
-        return np.nan, f"{flight.status}: {flight.message}"
-    return plateau(flight.t, flight.omega, flight.scenario.omega0), ""
 
 
 class Amount(NamedTuple):
@@ -145,28 +138,17 @@ def study(ask: Ask) -> Study[Found]:
 def claims(found: Found) -> Claims:
     """Yield that a full bottle is ice, and by how much it is not when slices overlap."""
     overlap, full_bottle = found
-    yield claim_full_bottle(full_bottle)
-    yield claim_overlap(overlap)
-    yield claim_column(overlap)
-
-
-def claim_full_bottle(run: Trajectory | None) -> Finding:
-    """A full bottle whose slices exclude each other keeps its angular velocity: it is ice."""
-    title = "full bottle, slices exclude each other: largest |ω/ω₀ − 1|"
-    drift, note = None, ""
-    if run is not None:
-        drift = measure("", run).largest
-        note = f"N = {run.scenario.n_slices}, Δt = {run.settings['step']:.1g} s; falls with Δt"
-    return regression("engine-full-bottle", title, drift, "", (0.0, 1e-3), note)
-
-
-def claim_overlap(study: Overlap) -> Finding:
-    """What a full bottle loses because its slices may share their place."""
+    title, drift, note = "full bottle, slices exclude each other: largest |ω/ω₀ − 1|", None, ""
+    if full_bottle is not None:
+        drift = measure("", full_bottle).largest
+        note = f"N = {full_bottle.scenario.n_slices}, Δt = {full_bottle.settings['step']:.1g} s; falls with Δt"
+    yield regression("engine-full-bottle", title, drift, "", (0.0, 1e-3), note)
     title = "full bottle: how far the plateau of ω/ω₀ lies below ice when slices overlap"
-    exclude, column = study.missing_from_ice(EXCLUDE), study.missing_from_ice(COLUMN)
-    note = f"{exclude:.2g} when they exclude each other, {column:.2g} for a column; N = {study.slices}; "
+    exclude, column = overlap.missing_from_ice(EXCLUDE), overlap.missing_from_ice(COLUMN)
+    note = f"{exclude:.2g} when they exclude each other, {column:.2g} for a column; N = {overlap.throw.n_slices}; "
     note += "the paper expects a full bottle to behave like ice"
-    return observed("overlap-full-bottle", title, study.missing_from_ice(PASS), note=note)
+    yield observed("overlap-full-bottle", title, overlap.missing_from_ice(PASS), note=note)
+    yield claim_column(overlap)
 
 
 def claim_column(study: Overlap) -> Finding:
@@ -175,7 +157,9 @@ def claim_column(study: Overlap) -> Finding:
     known = np.flatnonzero(np.isfinite(cost)).tolist()
     each = ", ".join(f"{cost[k]:+.3f} at {study.fills[k]:.0%}" for k in known)
     title = "plateau of ω/ω₀ of free flight, whose slices overlap, minus that of a column: the largest over fillings"
-    note = f"a difference of two models, no share; free flight at N = {study.slices}, the column has no slices; "
+    note = (
+        f"a difference of two models, no share; free flight at N = {study.throw.n_slices}, the column has no slices; "
+    )
     largest = float(max((cost[k] for k in known), key=abs)) if known else None
     return observed("overlap-column", title, largest, note=note + (each or "not computed at any filling"))
 
@@ -187,8 +171,14 @@ def figures(found: Found) -> Iterator[Exhibit]:
         f"filling {fill:.0%}: " + ", ".join(f"{name} {level[k]:.3f}" for name, level in study.level.items())
         for k, fill in enumerate(study.fills)
     )
-    cost = study.cost_to_column
-    most = ""
+    columns: dict[str, Any] = {"fill fraction [1]": study.fills}
+    for name, level in study.level.items():
+        columns[f"plateau of omega/omega_0 {name} [1]"] = level
+        if name == EXCLUDE and np.isfinite(study.band).any():
+            columns[f"band {name} [1]"] = study.band
+        if any(study.reason[name]):
+            columns[f"missing because: {name}"] = study.reason[name]
+    cost, most = study.cost_to_column, ""
     if np.isfinite(cost).any():
         k = int(np.nanargmax(np.abs(cost)))
         most = f"; at most {cost[k]:+.3f}, at filling {100 * study.fills[k]:.0f} %".replace("-", "−")
@@ -199,27 +189,14 @@ def figures(found: Found) -> Iterator[Exhibit]:
         "down. In the same engine, slices that are rods and exclude each other keep the angular velocity of a full "
         "bottle. The two curves differ by what overlap does. Water as one stretching column cannot overlap either, and "
         "has no parameter to choose; free flight minus the column is what overlap changes between two exact equations. "
-        f"That is a difference of two models, free flight at N = {study.slices}, and no share{most}. In the "
+        f"That is a difference of two models, free flight at N = {study.throw.n_slices}, and no share{most}. In the "
         "paper's experiment the fall is largest at fillings of 0.25 to 0.5, and a filling of 0.1 turns like ice. Bars: "
         "twice what halving the step changes.",
         alt=f"Line plot of the plateau of omega over omega_0 against the fill fraction; ice is 1. {rows}.",
         maker=figure_overlap,
         data=(study,),
-        table=_plateaus_csv(study),
+        table=columns_csv(columns | {"free flight minus column [1]": cost}),
     )
-
-
-def _plateaus_csv(study: Overlap) -> str:
-    """Return the plateau of every curve, the band, and why a run is missing."""
-    columns: dict[str, Any] = {"fill fraction [1]": study.fills}
-    for name, level in study.level.items():
-        columns[f"plateau of omega/omega_0 {name} [1]"] = level
-        if name == EXCLUDE and np.isfinite(study.band).any():
-            columns[f"band {name} [1]"] = study.band
-        if any(study.reason[name]):
-            columns[f"missing because: {name}"] = study.reason[name]
-    columns["free flight minus column [1]"] = study.cost_to_column
-    return columns_csv(columns)
 
 
 LOOKS = {
@@ -235,29 +212,24 @@ def figure_overlap(study: Overlap) -> Figure:
     """Plateau over fill fraction; what overlap costs is the distance between the two engine curves, ice is the top."""
     figure, axes = new_figure(size=(8.0, 4.6))
     axes.axhline(ICE, color="#444444", linestyle=":", linewidth=1.4)
-    axes.annotate(
-        "ice: nothing moves (expected of a full bottle)", (0.5, ICE), xytext=(0, 5), textcoords="offset points",
-        ha="center", fontsize=9, color="#444444",
-    )  # fmt: skip
+    text: dict[str, Any] = {"textcoords": "offset points", "ha": "center"}
+    words = "ice: nothing moves (expected of a full bottle)"
+    axes.annotate(words, (0.5, ICE), xytext=(0, 5), fontsize=9, color="#444444", **text)
     for name, look in LOOKS.items():
         axes.plot(study.fills, study.level[name], label=name, markersize=6, **look)
     exclude = study.level[EXCLUDE]
     axes.errorbar(study.fills, exclude, yerr=study.band, fmt="none", ecolor="#222222", capsize=3)
-    axes.fill_between(
-        study.fills, study.level[PASS], exclude, color="#0072B2", alpha=0.12, linewidth=0,
-        label="what overlap takes away",
-    )  # fmt: skip
+    shade: dict[str, Any] = {"color": "#0072B2", "alpha": 0.12, "linewidth": 0, "label": "what overlap takes away"}
+    axes.fill_between(study.fills, study.level[PASS], exclude, **shade)
     # Each run that failed is marked at the foot of its fill fraction, so that a gap in a curve is not taken for data.
     for k, (name, look) in enumerate(LOOKS.items()):
         for fill, reason in zip(study.fills, study.reason[name], strict=True):
             if reason:
-                axes.annotate(
-                    f"× {reason.partition(':')[0]}", (fill, 0.0), xytext=(0, 3 + 10 * k), textcoords="offset points",
-                    ha="center", fontsize=7.5, color=look["color"],
-                )  # fmt: skip
+                foot, words = (fill, 0.0), f"× {reason.partition(':')[0]}"
+                axes.annotate(words, foot, xytext=(0, 3 + 10 * k), fontsize=7.5, color=look["color"], **text)
     axes.set(xlim=(0.0, 1.05), ylim=(0.0, 1.12))
     axes.set(xlabel="fill fraction M_w / M_max [1]", ylabel="mean of ω/ω₀ over the second half [1]")
-    title = f"{study.slices} slices, restitution {study.restitution:g} at the ends and between slices"
+    title = f"{study.throw.n_slices} slices, restitution {study.throw.restitution:g} at the ends and between slices"
     axes.set_title(title, fontsize=10, loc="left")
     shared_legend(figure, axes, columns=2)
     return figure

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from flipproof.frame.chapter import Ask, Chapter, Study
 from flipproof.paper.figures import exhibits_paper
@@ -11,8 +10,7 @@ from flipproof.paper.runs import PaperRuns, group_calls, plan_claims, plan_figur
 from flipproof.paper.verdicts import PaperVerdicts, judge_paper
 
 
-@dataclass(frozen=True, slots=True)
-class Paper:
+class Paper(NamedTuple):
     """The paper's own throws, and what becomes of its statements."""
 
     runs: PaperRuns

@@ -17,22 +17,19 @@ BAND: Final = 1e-7
 CROSS_CHECKED: Final = ("published-limit", "eq8")
 """Models that a second integration method is held against."""
 
-
 Found = Mapping[str, list[Made]]
 """Model -> its flight of the paper's own throw: as it is, by the witness, and by a second method if asked for."""
 
 
 def study(ask: Ask) -> Study[Found]:
     """Fly each model of ``ask.work`` twice; those of CROSS_CHECKED a third time by the method that stands beside."""
-    models, second = ask.work
+    (models, second), throw = ask.work, ask.reference
     runs = {}
     for model in reversed(models):
-        runs[model] = [
-            Run(model, ask.reference, {}, model),
-            Run(model, ask.reference, witnessed(ask.reference, model), f"{model}, solve_ivp DOP853"),
-        ]
+        witness = Run(model, throw, witnessed(throw, model), f"{model}, solve_ivp DOP853")
+        runs[model] = [Run(model, throw, {}, model), witness]
         if second and model in CROSS_CHECKED:
-            runs[model].append(Run(model, ask.reference, {"method": second}, f"{model}, {second}"))
+            runs[model].append(Run(model, throw, {"method": second}, f"{model}, {second}"))
     # The slowest first.
     flights = yield [each[way] for way in (2, 1, 0) for each in runs.values() if way < len(each)]
     return {model: [flights[run] for run in runs[model]] for model in LADDER if model in runs}

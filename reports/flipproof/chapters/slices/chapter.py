@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -17,8 +16,7 @@ from flipproof.output.columns import curves_csv
 from slicemodel import Trajectory
 
 
-@dataclass(frozen=True, slots=True)
-class SliceCount:
+class SliceCount(NamedTuple):
     """One scheme at several numbers of slices, and its distance from the finest cut, max |d omega| / omega_0."""
 
     trajectories: list[Trajectory]

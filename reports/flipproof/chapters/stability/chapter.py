@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -19,13 +20,14 @@ from flipproof.chapters.stability.study import (
     GOOD,
     QUICK,
     RULE_DT,
+    Cell,
     StabilityPanel,
     plan_stability,
     study_stability,
 )
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Made, Run, Study, judged
-from flipproof.frame.findings import Finding, observed, regression
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, judged, observed, regression
+from flipproof.frame.solvers import Made, Run
 from flipproof.output.columns import rows_csv
 from slicemodel import Trajectory
 
@@ -52,12 +54,12 @@ def claims(found: Found) -> Claims:
 
 def claim_rule_of_iterations(panels: Sequence[StabilityPanel]) -> Finding:
     """With the iterations that the rule asks for, and a step up to twice the default, pymunk follows free flight."""
-    errors = np.concatenate([panel.by_the_rule for panel in panels])
+    errors = [error for panel in panels for error in panel.by_the_rule]
     return regression(
         id="engine-rule-of-iterations",
         title=f"pymunk with enough iterations and Δt ≤ {RULE_DT:g} s: largest error of ω(t) against free flight",
         # A NaN among them stays NaN, and fails.
-        value=float(errors.max()) if len(errors) else None,
+        value=float(np.max(errors)) if errors else None,
         unit="of ω₀",
         admissible=(0.0, GOOD),
         band=float(np.max([panel.band for panel in panels])),
@@ -67,8 +69,8 @@ def claim_rule_of_iterations(panels: Sequence[StabilityPanel]) -> Finding:
 
 def claim_default_iterations_explode(panels: Sequence[StabilityPanel]) -> Finding:
     """No run with pymunk's own number of iterations reaches the end of the flight, whatever its step."""
-    grades = np.concatenate([panel.at_default for panel in panels])
-    whole = float((grades != "explodes").sum()) if len(grades) else None
+    grades = [grade for panel in panels for grade in panel.at_default]
+    whole = float(len(grades) - grades.count("explodes")) if grades else None
     title = f"pymunk with its default {DEFAULT_ITERATIONS} iterations: runs that do not explode"
     note = f"of {len(grades)}, at every step of the chart; each is reported as diverged with its reason"
     return regression("engine-default-explodes", title, whole, "", (0.0, 0.0), note)
@@ -77,8 +79,8 @@ def claim_default_iterations_explode(panels: Sequence[StabilityPanel]) -> Findin
 def claim_whole_and_wrong(panels: Sequence[StabilityPanel]) -> Finding:
     """How many runs break no invariant and are wrong all the same: only a reference tells."""
     counts = {grade: sum(panel.counts[grade] for panel in panels) for grade in ("wrong", "good", "excellent")}
-    errors = np.concatenate([panel.error[panel.grade == "wrong"] for panel in panels])
-    note = f"by up to {100 * errors.max():.2g} % of ω₀; only a reference tells" if len(errors) else "none on this chart"
+    errors = [cell.error for panel in panels for cell in panel.cells.values() if cell.grade == "wrong"]
+    note = f"by up to {100 * np.max(errors):.2g} % of ω₀; only a reference tells" if errors else "none on this chart"
     title = f"pymunk: runs that break no invariant and are wrong by more than {GOOD:.0%} of ω₀"
     return observed("engine-whole-and-wrong", title, float(counts["wrong"]), f"of {sum(counts.values())}", note)
 
@@ -95,14 +97,15 @@ def figures(found: Found) -> Iterator[Exhibit]:
     """Yield the stability chart."""
     panels, _ = found
     counts = {grade: sum(panel.counts[grade] for panel in panels) for grade in panels[0].counts}
-    default = np.concatenate([panel.at_default for panel in panels])
-    missing = sorted({reason for panel in panels for reason in panel.reason[panel.grade == "not run"]})
+    default = [grade for panel in panels for grade in panel.at_default]
+    missing = sorted({cell.reason for panel in panels for cell in panel.cells.values() if cell.grade == "not run"})
+    duration, burst = panels[0].layout.duration, default.count("explodes")
     caption = (
-        f"Every cell is a flight of {panels[0].duration:g} s, held against event-driven free flight; the sign in it "
-        f"says the same as its colour. Of the {len(default)} flights with pymunk's own {DEFAULT_ITERATIONS} iterations "
-        f"(dashed) {int((default == 'explodes').sum())} explode; their times from left to right show that a finer step "
-        "does not help. Where a column reads the same from some row upwards, more iterations no longer change "
-        f"anything, and only a shorter step does. {counts['wrong']} flights break no invariant and are wrong by more "
+        f"Every cell is a flight of {duration:g} s, held against event-driven free flight; the sign in it says the "
+        f"same as its colour. Of the {len(default)} flights with pymunk's own {DEFAULT_ITERATIONS} iterations (dashed) "
+        f"{burst} explode; their times from left to right show that a finer step does not help. Where a column reads "
+        "the same from some row upwards, more iterations no longer change anything, and only a shorter step does. "
+        f"{counts['wrong']} flights break no invariant and are wrong by more "
         f"than 1 %; {counts['good'] + counts['excellent']} are good; {counts['explodes'] + counts['sinks in']} were "
         "stopped, at the time that their cell shows."
     )
@@ -125,11 +128,9 @@ def _cells_csv(panels: Sequence[StabilityPanel]) -> str:
         ("mass ratio M_w/M_b [1]", "slices [1]", "iterations [1]", "iterations by the rule [1]", "dt [s]", "grade",
          "largest error of omega [of omega_0]", "error of the plateau [of omega_0]", "stopped after [s]", "reason"),
         (
-            (panel.mass_ratio, panel.slices, panel.iterations[row], panel.enough, panel.dt[column], grade,
-             panel.error[row, column], panel.plateau_error[row, column], panel.held_until[row, column],
-             panel.reason[row, column])
+            (panel.mass_ratio, panel.slices, panel.layout.iterations[row], panel.enough, panel.layout.dt[column], *cell)
             for panel in panels
-            for (row, column), grade in np.ndenumerate(panel.grade)
+            for (row, column), cell in panel.cells.items()
         ),
     )  # fmt: skip
 
@@ -149,8 +150,8 @@ LOOKS = {
 def figure_stability(panels: Sequence[StabilityPanel]) -> Figure:
     """Grades over step and iterations, one panel per bottle: colour, sign and number in every cell."""
     columns = min(2, len(panels))
-    rows = math.ceil(len(panels) / columns)
-    height = 1.2 + rows * (1.0 + 0.4 * len(panels[0].iterations))
+    rows = -(-len(panels) // columns)
+    height = 1.2 + rows * (1.0 + 0.4 * len(panels[0].layout.iterations))
     figure, axes = new_figure(rows, columns, size=(8.0, height), squeeze=False)
     for at, panel in zip(axes.flat, panels, strict=False):
         _draw_panel(at, panel)
@@ -165,44 +166,41 @@ def figure_stability(panels: Sequence[StabilityPanel]) -> Figure:
         for grade, (colour, _, words) in LOOKS.items()
         if any(panel.counts[grade] for panel in panels)
     ]
-    handles.append(Line2D([], [], color="black", linewidth=2.0, label="rule: enough iterations above it"))
-    handles.append(Line2D([], [], color="black", linewidth=1.2, linestyle="--", label="pymunk's default iterations"))
+    line = partial(Line2D, [], [], color="black")
+    handles.append(line(linewidth=2.0, label="rule: enough iterations above it"))
+    handles.append(line(linewidth=1.2, linestyle="--", label="pymunk's default iterations"))
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 
 
 def _draw_panel(axes: Axes, panel: StabilityPanel) -> None:
-    for (row, column), grade in np.ndenumerate(panel.grade):
+    steps, iterations = panel.layout.dt, panel.layout.iterations
+    for (row, column), cell in panel.cells.items():
         corner = (column - 0.5, row - 0.5)
-        axes.add_patch(Rectangle(corner, 1, 1, facecolor=LOOKS[grade][0], edgecolor="white", linewidth=1.0))
-        axes.text(column, row, _cell_text(panel, row, column), ha="center", va="center", fontsize=7.5)
-    axes.set(xlim=(-0.5, len(panel.dt) - 0.5), ylim=(-0.5, len(panel.iterations) - 0.5))
-    axes.set_xticks(range(len(panel.dt)), [f"{1e3 * dt:g}" for dt in panel.dt])
-    axes.set_yticks(range(len(panel.iterations)), [str(n) for n in panel.iterations])
+        axes.add_patch(Rectangle(corner, 1, 1, facecolor=LOOKS[cell.grade][0], edgecolor="white", linewidth=1.0))
+        axes.text(column, row, _cell_text(cell, steps[0]), ha="center", va="center", fontsize=7.5)
+    axes.set(xlim=(-0.5, len(steps) - 0.5), ylim=(-0.5, len(iterations) - 0.5))
+    axes.set_xticks(range(len(steps)), [f"{1e3 * dt:g}" for dt in steps])
+    axes.set_yticks(range(len(iterations)), [str(n) for n in iterations])
     axes.grid(visible=False)
-    for row in np.flatnonzero(panel.iterations == DEFAULT_ITERATIONS):
-        axes.add_patch(
-            Rectangle((-0.47, row - 0.47), len(panel.dt) - 0.06, 0.94, fill=False, linestyle="--", linewidth=1.2)
-        )
+    if DEFAULT_ITERATIONS in iterations:
+        corner, width = (-0.47, iterations.index(DEFAULT_ITERATIONS) - 0.47), len(steps) - 0.06
+        axes.add_patch(Rectangle(corner, width, 0.94, fill=False, linestyle="--", linewidth=1.2))
     # Rows are numbers of iterations, not a scale: the rule lies below the first row that follows it.
-    axes.axhline(int((panel.iterations < panel.enough).sum()) - 0.5, color="black", linewidth=2.5)
+    axes.axhline(sum(n < panel.enough for n in iterations) - 0.5, color="black", linewidth=2.5)
     known = "" if math.isnan(panel.band) else f", reference ± {100 * panel.band:.1g} %"
-    axes.set_title(
-        f"M_w / M_b = {panel.mass_ratio:g}, N = {panel.slices}\nrule: {panel.enough} iterations{known}",
-        fontsize=9.5, loc="left",
-    )  # fmt: skip
+    words = f"M_w / M_b = {panel.mass_ratio:g}, N = {panel.slices}\nrule: {panel.enough} iterations{known}"
+    axes.set_title(words, fontsize=9.5, loc="left")
 
 
-def _cell_text(panel: StabilityPanel, row: int, column: int) -> str:
-    grade = panel.grade[row, column]
-    sign = LOOKS[grade][1]
-    if grade == "not run":
+def _cell_text(cell: Cell, longest: float) -> str:
+    sign, held = LOOKS[cell.grade][1], cell.held_until
+    if cell.grade == "not run":
         return sign
-    if grade in ("explodes", "sinks in"):
-        held = panel.held_until[row, column]
+    if cell.grade in ("explodes", "sinks in"):
         # Not even the first output after release, one longest step later.
-        return f"{sign}\n{1e3 * held:.0f} ms" if held > 0.0 else f"{sign}\n< {1e3 * panel.dt.max():g} ms"
-    return f"{sign}\n{100 * panel.error[row, column]:.2g} %"
+        return f"{sign}\n{1e3 * held:.0f} ms" if held > 0.0 else f"{sign}\n< {1e3 * longest:g} ms"
+    return f"{sign}\n{100 * cell.error:.2g} %"
 
 
 CHAPTER: Final = Chapter(

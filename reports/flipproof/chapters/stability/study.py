@@ -10,14 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipproof.chapters.differences.study import largest_change
 from flipproof.chapters.maps.study import vary
-from flipproof.frame.solvers import Made, Run
+from flipproof.frame.solvers import Made, Run, attempt
 from flipproof.frame.twins import twins
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import plateau
@@ -43,13 +42,10 @@ class Layout:
 
     Parameters
     ----------
-    panels : tuple of (M_w / M_b [1], slices)
-    dt : tuple of steps, falling [s]
-    iterations : tuple of iterations, rising
-    duration : float
-        Flight that is looked at [s]; a whole number of the longest step, which divides the output times.
-    budget : float
-        Slices times iterations times steps beyond which a cell is not run [1]; 1e7 takes about a second.
+    panels : M_w / M_b [1] and slices of each
+    dt, iterations : steps, falling [s], and iterations, rising
+    duration : flight that is looked at [s]; a whole number of the longest step, which divides the output times
+    budget : slices times iterations times steps beyond which a cell is not run; 1e7 takes about a second
     """
 
     panels: tuple[tuple[float, int], ...]
@@ -80,55 +76,63 @@ QUICK: Final = Layout(
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StabilityPanel:
-    """Chart of one bottle. Arrays over cells have shape (iterations, dt).
+class Cell(NamedTuple):
+    """What became of one flight.
 
     Parameters
     ----------
-    mass_ratio : float - M_w / M_b [1]
-    slices : int
-    duration : float [s]
-    dt, iterations : (columns,) [s], (rows,)
-    grade : array of str - of GRADES
-    error : array - max |omega - omega of the reference| / |omega_0|; NaN where a run did not reach the end
-    plateau_error : array - the same of the mean over the second half
-    held_until : array - last output time before the watch stopped a run [s]; NaN where it did not
-    reason : array of str - why a run stopped or was not made; "" where it is whole
-    enough : int - iterations that the rule asks for
-    band : float - by how much twins of the reference differ from it, fraction of omega_0; NaN if unknown
+    grade : one of GRADES
+    error, plateau_error : max |omega - omega of the reference| / |omega_0|, and the same of the mean over the second
+        half; NaN where the run did not reach the end
+    held_until : last output time before the watch stopped the run [s]; NaN where it did not
+    reason : why the run stopped or was not made; "" where it is whole
     """
 
+    grade: str = "not run"
+    error: float = math.nan
+    plateau_error: float = math.nan
+    held_until: float = math.nan
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class StabilityPanel:
+    """Chart of one bottle: its cells by row, of iterations, and column, of steps.
+
+    Parameters
+    ----------
+    mass_ratio : M_w / M_b [1]
+    enough : iterations that the rule asks for
+    band : by how much twins of the reference differ from it, fraction of omega_0; NaN if unknown
+    """
+
+    layout: Layout
     mass_ratio: float
     slices: int
-    duration: float
-    dt: FloatArray
-    iterations: NDArray[np.int64]
-    grade: NDArray[np.str_]
-    error: FloatArray
-    plateau_error: FloatArray
-    held_until: FloatArray
-    reason: NDArray[np.str_]
+    cells: Mapping[tuple[int, int], Cell]
     enough: int
     band: float
 
     @property
     def counts(self) -> dict[str, int]:
         """Number of cells of each grade, best first."""
-        return {grade: int((self.grade == grade).sum()) for grade in GRADES}
+        return {grade: sum(cell.grade == grade for cell in self.cells.values()) for grade in GRADES}
 
     @property
-    def by_the_rule(self) -> FloatArray:
+    def by_the_rule(self) -> list[float]:
         """Errors of the cells that were run by the rule: enough iterations, dt up to RULE_DT; infinite if stopped."""
-        follow = (self.iterations >= self.enough)[:, np.newaxis] & (self.dt <= RULE_DT * (1 + 1e-12))
-        errors = np.where(np.isfinite(self.held_until), np.inf, self.error)
-        return np.asarray(errors[follow & (self.grade != "not run")])
+        return [
+            math.inf if math.isfinite(cell.held_until) else cell.error
+            for (row, column), cell in self.cells.items()
+            if self.layout.iterations[row] >= self.enough
+            if self.layout.dt[column] <= RULE_DT * (1 + 1e-12) and cell.grade != "not run"
+        ]
 
     @property
-    def at_default(self) -> NDArray[np.str_]:
+    def at_default(self) -> list[str]:
         """Grades at pymunk's own iterations, of the cells that were run."""
-        row = self.grade[self.iterations == DEFAULT_ITERATIONS]
-        return np.asarray(row[row != "not run"])
+        default = [cell for (row, _), cell in self.cells.items() if self.layout.iterations[row] == DEFAULT_ITERATIONS]
+        return [cell.grade for cell in default if cell.grade != "not run"]
 
     @property
     def words(self) -> str:
@@ -177,46 +181,28 @@ def study_stability(throw: Scenario, layout: Layout, made: Mapping[Run, Made]) -
 def _panel(throw: Scenario, layout: Layout, mass_ratio: float, slices: int, made: Mapping[Run, Made]) -> StabilityPanel:
     from engine_check.pymunk_settings import enough_iterations
 
-    shape = (len(layout.iterations), len(layout.dt))
-    error, level, held = (np.full(shape, np.nan) for _ in range(3))
-    grade, reason = np.full(shape, "not run", dtype="<U12"), np.full(shape, "", dtype="<U160")
-    reference, cells = _plan_panel(throw, layout, mass_ratio, slices)
-    truth, *others = (_whole(made[run]) for run in (reference, *twins(reference)))
+    reference, planned = _plan_panel(throw, layout, mass_ratio, slices)
+    truth, *others = (attempt(lambda run: made[run].whole, run).found for run in (reference, *twins(reference)))
     apart = [math.nan if truth is None or other is None else largest_change(truth, other) for other in others]
-    for at, (cost, run) in cells.items():
-        flight = made[run].trajectory if cost <= layout.budget else None
+
+    def cell(cost: float, run: Run) -> Cell:
         if cost > layout.budget:
-            reason[at] = f"{cost:.1e} slices × iterations × steps, more than {layout.budget:.1e}"
-        elif flight is None:
-            reason[at] = shortened(made[run].reason, 160)
-        elif not flight.ok:
-            grade[at] = "sinks in" if flight.reason == "penetration" else "explodes"
-            reason[at], held[at] = shortened(flight.message, 160), flight.t[-1]
-        elif truth is None:
-            reason[at] = "free-flight has no result to hold it against"
-        else:
-            error[at] = largest_change(truth, flight)
-            level[at] = abs(_plateau(flight) - _plateau(truth))
-            grade[at] = grade_of(error[at])
+            return Cell(reason=f"{cost:.1e} slices × iterations × steps, more than {layout.budget:.1e}")
+        flight = made[run].trajectory
+        if flight is None:
+            return Cell(reason=shortened(made[run].reason, 160))
+        if not flight.ok:
+            grade = "sinks in" if flight.reason == "penetration" else "explodes"
+            return Cell(grade, held_until=float(flight.t[-1]), reason=shortened(flight.message, 160))
+        if truth is None:
+            return Cell(reason="free-flight has no result to hold it against")
+        error = largest_change(truth, flight)
+        return Cell(grade_of(error), error, abs(_plateau(flight) - _plateau(truth)))
+
+    cells = {at: cell(*each) for at, each in planned.items()}
     return StabilityPanel(
-        mass_ratio=mass_ratio,
-        slices=slices,
-        duration=layout.duration,
-        dt=np.asarray(layout.dt, dtype=np.float64),
-        iterations=np.asarray(layout.iterations, dtype=np.int64),
-        grade=grade,
-        error=error,
-        plateau_error=level,
-        held_until=held,
-        reason=reason,
-        enough=enough_iterations(reference.scenario),
-        band=float(np.max(apart)),
+        layout, mass_ratio, slices, cells, enough_iterations(reference.scenario), float(np.max(apart))
     )
-
-
-def _whole(made: Made) -> Trajectory | None:
-    """Return the trajectory of a run that reached the end."""
-    return made.trajectory if made.trajectory is not None and made.trajectory.ok else None
 
 
 def grade_of(error: float) -> str:

@@ -1,29 +1,146 @@
-"""Error against step size: each scheme against the equation that it converges to."""
+"""How the error of a scheme falls with its step, against the equation it really solves.
+
+A rebound waits for the grid, so the error at one step size depends on where in its step each impact falls. Single runs
+then scatter by more than a factor of two, and an order read off them is luck. Each step size is therefore an ensemble
+of grids: every member has other impact phases, and their mean error has an order. All grids of a study share a set of
+times, and errors are taken there: an interpolation would have an error of its own, larger than that of a good scheme.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Final, NamedTuple
+from dataclasses import dataclass, replace
+from itertools import chain
+from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from flipproof.chapters.solvers import LIMITS, SCHEMES
-from flipproof.chapters.step_size.study import (
-    PHASES,
-    ROUND_OFF,
-    StepSize,
-    before_first_impact,
-    plan_step_size,
-    study_step_size,
-)
 from flipproof.figures.style import MARKERS, STYLES, new_figure, shared_legend, solver_style, styled
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Missing, Run, Study, judged
-from flipproof.frame.findings import Finding, Kind, observed, regression
-from flipproof.frame.flights import Flights, Outcome, attempt, known
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Kind, Study, judged, observed, regression
+from flipproof.frame.solvers import Flights, Missing, Outcome, Run, attempt, known
 from flipproof.output.columns import rows_csv
+from slicemodel import Scenario, Trajectory
+from slicemodel.trajectory import FloatArray
+
+PHASES = 8
+"""Members of the ensemble at each step size."""
+
+ROUND_OFF = 1e-13
+"""Errors below this fraction of omega_0 are not the step's."""
+
+LEAST_COMMON = 8
+"""Common times, less one, that a run and its reference must share at the least."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepSize:
+    """Error against step size, one row per level and one column per phase.
+
+    ``dt`` and ``error`` have shape (levels, phases); error is max |omega - omega_reference| / omega_0 over the flight.
+    ``order`` is the slope of log mean error against log mean dt with its standard error; NaN if any error is not
+    finite or if the errors are at round-off.
+    """
+
+    scheme: str
+    model: str
+    dt: FloatArray
+    error: FloatArray
+    order: float
+    order_error: float
+
+    @property
+    def refined(self) -> bool:
+        """True if every level is better than the one before it: nothing less proves refinement."""
+        mean = self.mean_error
+        return bool(np.all(np.isfinite(mean)) and np.all(np.diff(mean) < 0))
+
+    @property
+    def exact(self) -> bool:
+        """True if every error is at round-off: nothing depends on the step (ice, or a tube that nothing moves)."""
+        return bool(np.all(self.error < ROUND_OFF))
+
+    @property
+    def mean_dt(self) -> FloatArray:
+        """Geometric mean step of every level [s]."""
+        return np.asarray(np.exp(np.log(self.dt).mean(axis=1)))
+
+    @property
+    def mean_error(self) -> FloatArray:
+        """Root-mean-square error of every level."""
+        return np.asarray(np.sqrt((self.error**2).mean(axis=1)))
+
+
+def plan_step_size(scenario: Scenario, scheme: str, base: int, multiple: int, count: int) -> list[list[Run]]:
+    """Return the runs of every level: PHASES multiples of ``base`` steps from ``multiple`` on, doubled at each level.
+
+    All their grids share ``base + 1`` times.
+    """
+    return [
+        [
+            Run(scheme, scenario, {"steps": steps + 1, "store": "summary"}, f"{scheme}, {steps} steps")
+            for steps in (base * (multiple + phase) * 2**level for phase in range(PHASES))
+        ]
+        for level in range(count)
+    ]
+
+
+def study_step_size(reference: Trajectory, runs: Sequence[Sequence[Trajectory]]) -> StepSize:
+    """Measure the observed order of a scheme against its limit equation; arguments and errors as of ``errors_of``."""
+    dt, error = errors_of(reference, runs)
+    return StepSize(runs[0][0].method, reference.method, dt, error, *observed_order(dt, error))
+
+
+def errors_of(reference: Trajectory, runs: Sequence[Sequence[Trajectory]]) -> tuple[FloatArray, FloatArray]:
+    """Return step [s] and max |omega - omega_reference| / omega_0 of every run, shape (levels, members).
+
+    The error is NaN where a run is not complete. The reference is on uniform times, the runs are as ``plan_step_size``
+    plans them; one that shares fewer than LEAST_COMMON intervals with the reference raises a ValueError.
+    """
+
+    def error(run: Trajectory) -> float:
+        if not (run.ok and reference.ok):
+            return math.nan
+        fine, coarse = len(run.t) - 1, len(reference.t) - 1
+        common = math.gcd(fine, coarse)
+        if common < LEAST_COMMON:
+            raise ValueError(f"{fine} steps and {coarse} reference intervals share only {common} intervals")
+        difference = run.omega[:: fine // common] - reference.omega[:: coarse // common]
+        return float(np.abs(difference).max() / abs(reference.scenario.omega0))
+
+    dt = np.array([[run.settings["dt"] for run in level] for level in runs])
+    return dt, np.array([[error(run) for run in level] for level in runs])
+
+
+def observed_order(dt: FloatArray, error: FloatArray) -> tuple[float, float]:
+    """Fit log(rms error) = p log(dt) + c over the levels; return p and its standard error.
+
+    NaN for both if an error is not finite, or if errors reach ROUND_OFF, where an order means nothing.
+    """
+    if not np.all(np.isfinite(error)) or error.min() < ROUND_OFF or len(dt) < 3:
+        return math.nan, math.nan
+    x = np.log(dt).mean(axis=1)
+    y = 0.5 * np.log((error**2).mean(axis=1))
+    x = x - x.mean()
+    slope = float((x @ y) / (x @ x))
+    residual = y - y.mean() - slope * x
+    variance = float(residual @ residual) / (len(x) - 2)
+    return slope, float(np.sqrt(variance / (x @ x)))
+
+
+def before_first_impact(scenario: Scenario, reference: Trajectory) -> Scenario | None:
+    """Return the throw cut off at 0.9 of the time of the first impact, or None if no slice ever strikes an end.
+
+    A slice that rests on an end from the start does not strike it.
+    """
+    assert reference.impacts is not None
+    if len(reference.impacts) == 0:
+        return None
+    return replace(scenario, duration=0.9 * float(reference.impacts.time[0]))
+
 
 CHECKED: Final = ("before the first impact", "across impacts")
 """The two parts of the paper's own throw on which the order is a regression."""
@@ -35,16 +152,8 @@ Orders = Mapping[tuple[str, str], Outcome[StepSize]]
 """Part and scheme -> its study."""
 
 
-class Grids(NamedTuple):
-    """A scheme's grids on one throw, and the run of its equation."""
-
-    truth: Run
-    levels: list[list[Run]]
-
-    @property
-    def runs(self) -> list[Run]:
-        """Every run."""
-        return [self.truth, *(run for level in self.levels for run in level)]
+Grids = list[list[Run]]
+"""The run of an equation, alone; then a scheme's grids on the same throw, level by level."""
 
 
 def study(ask: Ask) -> Study[Orders]:
@@ -55,26 +164,23 @@ def study(ask: Ask) -> Study[Orders]:
     # Throw, first multiple of the 37 intervals that all grids share (a divisor of the 999 of the default output times),
     # levels, and the names of both parts.
     asked = [(ask.reference, 108, 4, *CHECKED)] + ([(ask.throw, 27, ask.work, START, WHOLE)] if ask.work else [])
-    whole = {
-        (part, scheme): Grids(
-            Run(LIMITS[scheme], throw, {}, LIMITS[scheme]), plan_step_size(throw, scheme, 37, multiple, levels)
-        )
-        for throw, multiple, levels, _, part in asked
-        for scheme in SCHEMES
-    }
-    flights = yield [run for grids in whole.values() for run in grids.runs]
-    starts = {
-        (start, scheme): attempt(_start, whole[part, scheme].truth, flights, scheme, levels)
-        for _, _, levels, start, part in asked
-        for scheme in SCHEMES
-    }
-    flights = yield [run for grids in known(starts).values() for run in grids.runs]
+    grids: dict[tuple[str, str], Outcome[Grids]] = {}
+    for throw, multiple, levels, _, part in asked:
+        for scheme in SCHEMES:
+            truth = Run(LIMITS[scheme], throw)
+            grids[part, scheme] = Outcome([[truth], *plan_step_size(throw, scheme, 37, multiple, levels)])
+    flights = yield chain.from_iterable(chain.from_iterable(known(grids).values()))
+    for throw, _, levels, start, _ in asked:
+        for scheme in SCHEMES:
+            truth = Run(LIMITS[scheme], throw)
+            grids[start, scheme] = attempt(_start, truth, flights, scheme, levels)
+    flights = yield chain.from_iterable(chain.from_iterable(known(grids).values()))
 
-    def measured(grids: Grids) -> StepSize:
-        return study_step_size(flights[grids.truth].flight, flights.levels(grids.levels))
+    def measured(each: Outcome[Grids]) -> StepSize:
+        (truth,), *levels = flights.levels(each.value)
+        return study_step_size(truth, levels)
 
-    found = {part: attempt(measured, grids) for part, grids in whole.items()}
-    return found | {part: attempt(lambda each: measured(each.value), each) for part, each in starts.items()}
+    return {part: attempt(measured, each) for part, each in grids.items()}
 
 
 def _start(truth: Run, flights: Flights, scheme: str, levels: int) -> Grids:
@@ -84,7 +190,7 @@ def _start(truth: Run, flights: Flights, scheme: str, levels: int) -> Grids:
         raise Missing(f"{truth.solver} strikes no end")
     times = np.linspace(0.0, start.duration, 10)
     before = Run(truth.solver, start, {"times": times}, f"{truth.solver} before the first impact")
-    return Grids(before, plan_step_size(start, scheme, base=9, multiple=14, count=levels))
+    return [[before], *plan_step_size(start, scheme, base=9, multiple=14, count=levels)]
 
 
 def claims(found: Orders) -> Claims:
@@ -95,9 +201,8 @@ def claims(found: Orders) -> Claims:
             title = f"{scheme} converges to {LIMITS[scheme]}, {where}"
             yield judged(claim_order, found[where, scheme], where, id=id_, title=title)
         for where in (START, WHOLE):
-            for measured in _measured(found, where):
-                if measured.scheme == scheme:
-                    yield claim_order(measured, where, kind="observation")
+            if (where, scheme) in found and (measured := found[where, scheme].found) is not None:
+                yield claim_order(measured, where, kind="observation")
 
 
 def _measured(found: Orders, where: str) -> list[StepSize]:
@@ -140,8 +245,17 @@ def figures(found: Orders) -> Iterator[Exhibit]:
         alt=f"Two log-log plots of error against step. {words}",
         maker=figure_step_size,
         data=(studies, starts),
-        table=_errors_csv(studies, starts),
-    )
+        table=rows_csv(
+            ("part of the flight", "scheme", "held against", "mean dt [s]", "mean error [of omega_0]",
+             "least error [of omega_0]", "largest error [of omega_0]", "fitted order [1]", "its standard error [1]"),
+            (
+                (part, each.scheme, each.model, dt, mean, errors.min(), errors.max(), each.order, each.order_error)
+                for part, parted in (("whole flight", studies), ("before the first impact", starts))
+                for each in parted
+                for dt, mean, errors in zip(each.mean_dt, each.mean_error, each.error, strict=True)
+            ),
+        ),
+    )  # fmt: skip
 
 
 def _converges(study: StepSize) -> str:
@@ -154,20 +268,6 @@ def _converges(study: StepSize) -> str:
     )
 
 
-def _errors_csv(flights: Sequence[StepSize], starts: Sequence[StepSize]) -> str:
-    """Return the error at every step size, with the range of its grids and the order that was fitted."""
-    return rows_csv(
-        ("part of the flight", "scheme", "held against", "mean dt [s]", "mean error [of omega_0]",
-         "least error [of omega_0]", "largest error [of omega_0]", "fitted order [1]", "its standard error [1]"),
-        (
-            (part, study.scheme, study.model, dt, mean, errors.min(), errors.max(), study.order, study.order_error)
-            for part, studies in (("whole flight", flights), ("before the first impact", starts))
-            for study in studies
-            for dt, mean, errors in zip(study.mean_dt, study.mean_error, study.error, strict=True)
-        ),
-    )  # fmt: skip
-
-
 @styled
 def figure_step_size(flights: Sequence[StepSize], starts: Sequence[StepSize]) -> Figure:
     """Error against step size: over the whole flight (left) and before the first impact (right)."""
@@ -178,14 +278,10 @@ def figure_step_size(flights: Sequence[StepSize], starts: Sequence[StepSize]) ->
             spread = study.error.min(axis=1), study.error.max(axis=1)
             low, high = np.maximum(spread, ROUND_OFF)
             axes.fill_between(study.mean_dt, low, high, color=style["color"], alpha=0.25, linewidth=0)
-            axes.loglog(
-                study.mean_dt, np.maximum(study.mean_error, ROUND_OFF), marker=MARKERS[k], color=style["color"],
-                linewidth=1.4, label=f"{study.scheme} → {study.model}",
-            )  # fmt: skip
-            axes.text(
-                0.03, 0.96 - 0.07 * k, f"{study.scheme}: order {study.order:.2f}", transform=axes.transAxes,
-                va="top", fontsize=9, color=STYLES.get(study.model, style)["color"],
-            )  # fmt: skip
+            look = {"color": style["color"], "linewidth": 1.4, "label": f"{study.scheme} → {study.model}"}
+            axes.loglog(study.mean_dt, np.maximum(study.mean_error, ROUND_OFF), marker=MARKERS[k], **look)
+            words, colour = f"{study.scheme}: order {study.order:.2f}", STYLES.get(study.model, style)["color"]
+            axes.text(0.03, 0.96 - 0.07 * k, words, transform=axes.transAxes, va="top", fontsize=9, color=colour)
         if studies:
             dt = studies[0].mean_dt
             top = max(ROUND_OFF, *(study.mean_error[0] for study in studies)) * 2.0
@@ -195,7 +291,7 @@ def figure_step_size(flights: Sequence[StepSize], starts: Sequence[StepSize]) ->
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.yaxis.set_minor_formatter(NullFormatter())
     panels[0].set_ylabel("max |ω − ω of its equation| / ω₀ [1]")
-    shared_legend(figure, panels[0] if flights else panels[1], columns=3)
+    shared_legend(figure, panels[0])
     return figure
 
 

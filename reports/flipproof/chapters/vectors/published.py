@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 
@@ -22,7 +22,7 @@ class Vector:
     scheme: str
     middle_slice: int
     until: float
-    columns: MappingProxyType[str, FloatArray]
+    columns: Mapping[str, FloatArray]
 
     @property
     def steps(self) -> int:
@@ -60,7 +60,7 @@ def _vector(file: str, scheme: str, scenario: Scenario, middle_slice: int, until
     with (folder() / file).open(encoding="utf-8") as lines:
         header = lines.readline().strip().split(",")
         columns = dict(zip(header, np.loadtxt(lines, delimiter=",").T, strict=True))
-    return Vector(file.removesuffix(".csv"), scenario, scheme, middle_slice, until, MappingProxyType(columns))
+    return Vector(file.removesuffix(".csv"), scenario, scheme, middle_slice, until, columns)
 
 
 def deviations(vector: Vector, trajectory: Trajectory) -> dict[str, float]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Final
+from typing import Any, Final
 
 from matplotlib.figure import Figure
 
 from flipproof.chapters.waterfall.study import Waterfall, observe, plan_finer, plan_waterfall, program_run, split_all
-from flipproof.figures.style import new_figure, styled
+from flipproof.figures.style import new_figure, shared_legend, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, observed
-from flipproof.frame.throws import FINER
+from flipproof.frame.solvers import FINER
 from flipproof.output.columns import rows_csv
 
 UP, DOWN, WHOLE = "#0072B2", "#D55E00", "#666666"
@@ -34,12 +34,11 @@ def claims(found: tuple[Waterfall, ...]) -> Claims:
 def claim_waterfall(waterfall: Waterfall) -> Finding:
     """From the published program to free flight, split over the assumptions; the bars sum to the whole."""
     largest, observable = waterfall.largest, waterfall.observable
+    finer = f", {largest.finer:+.3g} at N = {FINER * waterfall.slices}" if largest.finer is not None else ""
     note = (
         f"largest fair share (mean over all orders): {largest.name}, {largest.average:+.3g} ± "
         f"{largest.average_band:.1g}, from {largest.low:+.3g} to {largest.high:+.3g} in single orders, at "
-        f"N = {waterfall.slices}"
-        + (f", {largest.finer:+.3g} at N = {FINER * waterfall.slices}" if largest.finer is not None else "")
-        + f"; the bars miss the whole by {waterfall.residual:.1g}"
+        f"N = {waterfall.slices}{finer}; the bars miss the whole by {waterfall.residual:.1g}"
     )
     unit = "" if observable.unit == "1" else observable.unit
     title = f"{observable.words}: free flight minus published program"
@@ -62,14 +61,11 @@ def figures(found: tuple[Waterfall, ...]) -> Iterator[Exhibit]:
     yield Exhibit(
         name="waterfall",
         title="From the published program to free flight",
-        caption=(
-            f"At N = {waterfall.slices} slices. Left: each bar is the fair share of one assumption, the mean over all "
-            "orders in which the assumptions can be mended; blue raises, orange lowers. Right: the same assumption in "
-            "single orders. Where the marks lie apart the assumptions interact, and the bar of one order is not a "
-            "share. Error bars are numerical. Below the dotted line, hatched: what forbidding overlap changes, from "
-            "free flight, whose slices overlap, to water as one column, which cannot. That is a difference of two "
-            "models and no share."
-        ),
+        caption=f"At N = {waterfall.slices} slices. Left: each bar is the fair share of one assumption, the mean over "
+        "all orders in which the assumptions can be mended; blue raises, orange lowers. Right: the same assumption in "
+        "single orders. Where the marks lie apart the assumptions interact, and the bar of one order is not a share. "
+        "Error bars are numerical. Below the dotted line, hatched: what forbidding overlap changes, from free flight, "
+        "whose slices overlap, to water as one column, which cannot. That is a difference of two models and no share.",
         alt=f"Waterfall of the mean of omega over omega_0 in the second half: from {waterfall.start:.3f} to "
         f"{waterfall.end:.3f}. Means over all orders: {bars}. The largest is {waterfall.largest.name}. "
         f"From there to water as one column, which cannot overlap: {waterfall.overlap:+.3f}.",
@@ -110,45 +106,37 @@ def figure_waterfall(waterfall: Waterfall) -> Figure:
     ladder.barh(places[0], waterfall.start, color=WHOLE, height=0.6)
     ladder.barh(places[-1], waterfall.end, color=WHOLE, height=0.6, xerr=waterfall.end_band, capsize=3)
     level = waterfall.start
+    look = {"height": 0.6, "capsize": 3, "ecolor": "#222222"}
     for place, bar in zip(places[1:-1], waterfall.bars, strict=True):
-        ladder.barh(
-            place, bar.average, left=level, color=UP if bar.average >= 0 else DOWN, height=0.6,
-            xerr=bar.average_band, capsize=3, ecolor="#222222",
-        )  # fmt: skip
+        colour = UP if bar.average >= 0 else DOWN
+        ladder.barh(place, bar.average, left=level, color=colour, xerr=bar.average_band, **look)
         level += bar.average
         ladder.plot([level, level], [place - 1.3, place + 0.3], color="#888888", linewidth=0.8)
         orders.plot([bar.low, bar.high], [place, place], color="#BBBBBB", linewidth=4.0, solid_capstyle="butt")
-        orders.errorbar(
-            bar.average, place, xerr=bar.average_band, fmt="o", color="black", capsize=3, markersize=6
-        )  # fmt: skip
+        orders.errorbar(bar.average, place, xerr=bar.average_band, fmt="o", color="black", capsize=3, markersize=6)
         orders.plot(bar.forward, place + 0.24, ">", color=UP if bar.forward >= 0 else DOWN, markersize=5)
         orders.plot(bar.backward, place - 0.24, "<", color="#888888", markersize=5)
+    text: dict[str, Any] = {"xytext": (6, 0), "textcoords": "offset points", "va": "center", "color": "white"}
     for place, value in ((places[0], waterfall.start), (places[-1], waterfall.end)):
-        ladder.annotate(
-            f"{value:.3f}", (0, place), xytext=(6, 0), textcoords="offset points", va="center", color="white"
-        )
-    ladder.barh(
-        0, waterfall.overlap, left=waterfall.end, color="none", edgecolor=UP if waterfall.overlap >= 0 else DOWN,
-        hatch="////", height=0.6, xerr=waterfall.end_band, capsize=3, ecolor="#222222",
-    )  # fmt: skip
-    ladder.axhline(0.5, color="#444444", linewidth=0.8, linestyle=":")
-    orders.axhline(0.5, color="#444444", linewidth=0.8, linestyle=":")
-    orders.annotate("a difference of two models,\nno share", (0.02, 0), xycoords=("axes fraction", "data"), va="center",
-                    fontsize=8)  # fmt: skip
+        ladder.annotate(f"{value:.3f}", (0, place), **text)
+    hatched: dict[str, Any] = {"color": "none", "edgecolor": UP if waterfall.overlap >= 0 else DOWN, "hatch": "////"}
+    ladder.barh(0, waterfall.overlap, left=waterfall.end, xerr=waterfall.end_band, **hatched, **look)
+    for axes in (ladder, orders):
+        axes.axhline(0.5, color="#444444", linewidth=0.8, linestyle=":")
+        axes.grid(visible=False, axis="y")
+    place_of: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "va": "center", "fontsize": 8}
+    orders.annotate("a difference of two models,\nno share", (0.02, 0), **place_of)
     ladder.set_yticks([*places, 0], [*names, "no overlap: column"])
     ladder.set_xlabel(f"{waterfall.observable.words} [{waterfall.observable.unit}]")
     ladder.set_title("fair shares: means over all orders", fontsize=10, loc="left")
     orders.axvline(0.0, color="#444444", linewidth=0.8)
     orders.set_xlabel(f"change [{waterfall.observable.unit}]")
     orders.set_title("in single orders", fontsize=10, loc="left")
-    for axes in (ladder, orders):
-        axes.grid(visible=False, axis="y")
     orders.plot([], [], ">", color=UP, label="in the order of the ladder")
     orders.plot([], [], "<", color="#888888", label="in reverse")
     orders.plot([], [], color="#BBBBBB", linewidth=4.0, label="range of all orders")
     orders.plot([], [], "o", color="black", label="mean over all orders")
-    handles, labels = orders.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    shared_legend(figure, orders, columns=4)
     return figure
 
 

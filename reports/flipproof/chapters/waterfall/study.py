@@ -19,11 +19,9 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain, combinations
-from types import MappingProxyType
 from typing import Final, NamedTuple, TypeVar
 
-from flipproof.frame.solvers import Run
-from flipproof.frame.throws import finer
+from flipproof.frame.solvers import Run, finer
 from flipproof.frame.twins import band, twins
 from ode_reference.solver import COLUMN
 from ode_reference.switches import Switches
@@ -31,16 +29,14 @@ from slicemodel import Scenario, Trajectory, observables
 from slicemodel.trajectory import FloatArray
 
 PROGRAM: Final = "published-python"
-NAMES: Final = MappingProxyType(
-    {
-        "signs": "signs of Eq. 9d: no damping",
-        "roots": "roots of Eq. 9a: γ ≪ ω",
-        "drag_on_centre": "drag against C_M",
-        "weightless": "gravity in Eq. 8",
-        "origin": "origin at rest, drag on the tube",
-        "recoil": "no recoil in impacts",
-    }
-)
+NAMES: Final[Mapping[str, str]] = {
+    "signs": "signs of Eq. 9d: no damping",
+    "roots": "roots of Eq. 9a: γ ≪ ω",
+    "drag_on_centre": "drag against C_M",
+    "weightless": "gravity in Eq. 8",
+    "origin": "origin at rest, drag on the tube",
+    "recoil": "no recoil in impacts",
+}
 """Switch -> the assumption it mends, in the order of the ladder."""
 
 Value = TypeVar("Value", float, FloatArray)
@@ -183,17 +179,9 @@ def plan_finer(throw: Scenario, steps: int) -> list[Run]:
 
 
 def split_all(program: Run, observed: Mapping[Run, Mapping[str, float]]) -> tuple[Waterfall, ...]:
-    """Split every observable.
+    """Split every observable of the runs of ``plan_waterfall``, and of all of ``plan_finer`` or none.
 
-    Parameters
-    ----------
-    program : Run - the published program's
-    observed : run -> value by observable - of ``plan_waterfall``, and of all of ``plan_finer`` or none
-
-    Raises
-    ------
-    ArithmeticError
-        If a split does not sum to the whole difference within round-off.
+    A split that does not sum to the whole difference within round-off raises an ArithmeticError.
     """
     return tuple(_split(o, program, {run: values[o.name] for run, values in observed.items()}) for o in OBSERVABLES)
 

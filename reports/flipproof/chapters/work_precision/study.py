@@ -26,7 +26,7 @@ from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
-from flipproof.chapters.step_size.study import ROUND_OFF, observed_order
+from flipproof.chapters.step_size.chapter import ROUND_OFF, observed_order
 from flipproof.chapters.work_precision.contenders import AT_REST, Case, Contender, Effort, contenders, left_out
 from flipproof.frame.solvers import Made, Run
 from flipproof.frame.timing import at_times
