@@ -104,7 +104,7 @@ class Subject:
         """Return y'."""
         free = (self.side == 0) & (not self.frozen)
         omega = self.spin(y)
-        rates = np.empty(len(y), self.kind)
+        rates: FloatArray = np.empty(len(y), self.kind)
         rates[0] = self.turning(omega)
         rates[1 : self.n + 1] = free * y[self.n + 1 :]
         rates[self.n + 1 :] = free * self.acceleration(y, omega)
@@ -184,7 +184,8 @@ class Subject:
     def struck(self, y: FloatArray) -> IntArray:
         """Return which end each free slice has passed: 1 base, -1 cap, 0 none."""
         r = y[1 : self.n + 1]
-        return (self.side == 0) * ((r > self.high).astype(np.int64) - (r < self.low))
+        past = (r > self.high).astype(np.int64) - (r < self.low)
+        return np.where(self.side == 0, past, 0)
 
     def step(self, y: FloatArray, h: float) -> FloatArray:
         """Return the state after a step with all its rebounds, each at its own time."""
