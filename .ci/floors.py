@@ -1,6 +1,6 @@
 """Print the lowest version that pyproject.toml declares of every dependency, as constraints for pip.
 
-Linters are left out: they see the code, not the user.
+Linters are left out: they see the code, not the user. ``floors.py linters`` prints them, as requirements for pip.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import sys
 import tomllib
 from pathlib import Path
 
-LEFT_OUT = ("dev",)
+LINTERS = "dev"
 FLOOR = re.compile(r"(?P<name>[A-Za-z0-9_.-]+)\s*>=\s*(?P<version>[0-9.]+)(?:\s*,.*)?")
 
 
@@ -20,7 +20,7 @@ def floors(text: str) -> list[str]:
     project = declared["project"]
     requirements = [*declared["build-system"]["requires"], *project["dependencies"]]
     for extra, listed in project["optional-dependencies"].items():
-        requirements += [] if extra in LEFT_OUT else listed
+        requirements += [] if extra == LINTERS else listed
     pins = {}
     for requirement in requirements:
         if requirement.startswith(f"{project['name']}["):
@@ -32,5 +32,12 @@ def floors(text: str) -> list[str]:
     return [f"{name}=={version}" for name, version in sorted(pins.items())]
 
 
+def linters(text: str) -> list[str]:
+    """Return the requirements of the extra ``dev`` but the project's own."""
+    project = tomllib.loads(text)["project"]
+    return [wanted for wanted in project["optional-dependencies"][LINTERS] if not wanted.startswith(project["name"])]
+
+
 if __name__ == "__main__":
-    sys.stdout.write("\n".join(floors(Path("pyproject.toml").read_text(encoding="utf-8"))) + "\n")
+    wanted = linters if sys.argv[1:] == ["linters"] else floors
+    sys.stdout.write("\n".join(wanted(Path("pyproject.toml").read_text(encoding="utf-8"))) + "\n")

@@ -64,7 +64,8 @@ class Subject:
     def inertia(self, r: FloatArray) -> float:
         """Return J about C_M [kg m^2] (Eq. 11b, 11c)."""
         c = self.centre(r)
-        return float(self.m * ((r - c) ** 2).sum() + self.own_inertia + self.mb * (self.length / 2 - c) ** 2)
+        from_centre = r - c
+        return float(self.m * (from_centre @ from_centre) + self.own_inertia + self.mb * (self.length / 2 - c) ** 2)
 
     def spin(self, y: FloatArray) -> float:
         """Return omega [rad/s]."""
@@ -77,8 +78,8 @@ class Subject:
     def body(self, r: FloatArray) -> tuple[float, float]:
         """Return mass [kg] and centre [m] of the tube and what rests in it."""
         held = self.side != 0
-        mass = self.mb + self.m * int(held.sum())
-        return mass, float((self.mb * self.length / 2 + self.m * r[held].sum()) / mass)
+        mass = self.mb + self.m * int(np.count_nonzero(held))
+        return mass, float((self.mb * self.length / 2 + self.m * (held @ r)) / mass)
 
     def drag_on(self, v: FloatArray) -> FloatArray:
         """Return the acceleration of each slice by its own drag [m/s^2]."""
@@ -86,25 +87,28 @@ class Subject:
 
     def drag_of_body(self, v: FloatArray, mass: float) -> float:
         """Return the acceleration of the slices against the body by what drags on it [m/s^2]."""
-        return float(-(self.drag / mass) * v[self.side == 0].sum())
+        return float(-(self.drag / mass) * ((self.side == 0) @ v))
 
     def weight(self, y: FloatArray, omega: float) -> float:
         """Return the acceleration by weight in the bottle's frame; in free flight there is none [m/s^2]."""
         del y, omega
         return 0.0
 
-    def acceleration(self, y: FloatArray) -> FloatArray:
+    def acceleration(self, y: FloatArray, omega: float) -> FloatArray:
         """Return r'' of all slices as if they were free [m/s^2]."""
-        r, v, omega = y[1 : self.n + 1], y[self.n + 1 :], self.spin(y)
+        r, v = y[1 : self.n + 1], y[self.n + 1 :]
         mass, centre = self.body(r)
         return omega * omega * (r - centre) + self.drag_on(v) + self.drag_of_body(v, mass) + self.weight(y, omega)
 
     def slope(self, y: FloatArray) -> FloatArray:
         """Return y'."""
         free = (self.side == 0) & (not self.frozen)
-        v = np.where(free, y[self.n + 1 :], 0.0)
-        a = np.where(free, self.acceleration(y), 0.0)
-        return np.concatenate([[self.turning(self.spin(y))], v, a]).astype(self.kind)
+        omega = self.spin(y)
+        rates: FloatArray = np.empty(len(y), self.kind)
+        rates[0] = self.turning(omega)
+        rates[1 : self.n + 1] = free * y[self.n + 1 :]
+        rates[self.n + 1 :] = free * self.acceleration(y, omega)
+        return rates
 
     def advance(self, y: FloatArray, h: float) -> FloatArray:
         """Return the state after one smooth step."""
@@ -169,17 +173,19 @@ class Subject:
     def let_go(self, y: FloatArray) -> FloatArray:
         """Release the slices that their end no longer presses, unless it would press them again as soon as they go."""
         held = self.side.copy()
-        going = held * self.acceleration(y) < 0
-        if going.any():
+        if held.any():
+            omega = self.spin(y)
+            going = held * self.acceleration(y, omega) < 0
             self.side[going] = 0
-            back = going & (held * self.acceleration(y) >= 0)
+            back = going & (held * self.acceleration(y, omega) >= 0)
             self.side[back] = held[back]
         return y
 
     def struck(self, y: FloatArray) -> IntArray:
         """Return which end each free slice has passed: 1 base, -1 cap, 0 none."""
         r = y[1 : self.n + 1]
-        return np.where(self.side != 0, 0, np.where(r > self.high, 1, np.where(r < self.low, -1, 0)))
+        past = (r > self.high).astype(np.int64) - (r < self.low)
+        return np.where(self.side == 0, past, 0)
 
     def step(self, y: FloatArray, h: float) -> FloatArray:
         """Return the state after a step with all its rebounds, each at its own time."""
