@@ -29,7 +29,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,7 +40,7 @@ import numpy as np
 from flipproof.sweep.axes import DAMPING, FILL, Axis, Choices, Range, Value, read_axes
 from flipproof.sweep.entries import Entry, as_json, read_entries
 from flipproof.sweep.errors import SweepError, refuse, refuse_unknown
-from slicemodel.scenario import Bottle, Scenario, ScenarioError, UnsuitableFileError, not_whole, read_text
+from slicemodel.scenario import Bottle, Scenario, ScenarioError, not_whole, read_toml
 from slicemodel.trajectory import FloatArray
 
 if TYPE_CHECKING:
@@ -217,16 +216,9 @@ def read_design(path: Path) -> Design:
         Naming file, table, key, value, and what is admissible or nearest.
     """
     try:
-        text = read_text(path, 2**25)  # a million values with all their digits
-        document = tomllib.loads(text)
-    except UnsuitableFileError as error:
-        raise SweepError(f"{path}: {error}") from None
-    except OSError as error:
-        raise SweepError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except RecursionError:
-        raise SweepError(f"{path}: is nested too deeply") from None
-    except ValueError as error:  # bad TOML, bad UTF-8
-        raise SweepError(f"{path}: is not valid TOML ({error})") from None
+        document, text = read_toml(path, 2**25)  # a million values with all their digits
+    except ScenarioError as error:
+        raise SweepError(str(error)) from None
     return design_of(document, str(path), text)
 
 
