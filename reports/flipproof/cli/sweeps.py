@@ -51,7 +51,7 @@ def command_sweep(options: argparse.Namespace) -> int:
 def command_map(options: argparse.Namespace) -> int:
     """Make the runs of a map that have no row yet, and draw it."""
     throw = read_scenario(options.scenario, options.slices)
-    from flipproof.sweep.validity_map import Plan, make_map
+    from flipproof.sweep.planned import Plan, make_map
 
     plan = Plan.of_size(throw, options.axis, *options.size)
     return fill(options, lambda begin, where: make_map(plan, options.out, begin, **where))
@@ -60,7 +60,7 @@ def command_map(options: argparse.Namespace) -> int:
 def command_waterfall(options: argparse.Namespace) -> int:
     """Make the runs of a waterfall that have no row yet, and draw it."""
     throw = read_scenario(options.scenario, options.slices)
-    from flipproof.sweep.split import make_split
+    from flipproof.sweep.planned import make_split
 
     return fill(options, lambda begin, where: make_split(throw, options.out, begin, **where))
 

@@ -4,6 +4,5 @@ A file (``design``) states which fields vary and which solvers throw each bottle
 them in batches to ``workers``, processes of this machine or of a Dask cluster, which do nothing but ``work``. What
 comes back is written by this program alone (``store``) and can be exported (``export``).
 
-A study that plans its runs can have them made so (``planned``): the map of validity (``validity_map``) and the
-waterfall (``split``) do.
+A study that plans its runs can have them made so (``planned``): the map of validity and the waterfall do.
 """

@@ -11,7 +11,7 @@ from typing import Any
 from flipproof.sweep.damaged import count
 from flipproof.sweep.design import Plan
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.schema import APPLICATION, SCHEMA, columns, intact, kinds
+from flipproof.sweep.schema import APPLICATION, SCHEMA, columns, intact
 from slicemodel.scenario import shortened
 
 
@@ -134,7 +134,7 @@ def _wrong_design(file: Path, connection: sqlite3.Connection, design: Plan, code
 
 
 def _wrong_rows(connection: sqlite3.Connection, design: Plan) -> str:
-    types, names = kinds(design), columns(design)
+    types, names = list(columns(design).values()), list(columns(design))
     known = {number: (facts, sum_) for number, facts, sum_ in connection.execute("SELECT * FROM versions")}
     for number, cells in known.items():
         if not intact(cells, ("TEXT", "TEXT")):

@@ -33,7 +33,7 @@ def salvage(damaged: Path, out: Path, design: Plan, code: str) -> str:
             raise SweepError(f"{file} holds no whole row of this design made by flipproof {code}")
         with Store(out, design, code) as store:
             known = versions(file)
-            found, place = rows(file, design, code), columns(design).index("trajectory")
+            found, place = rows(file, design, code), list(columns(design)).index("trajectory")
             while chunk := list(islice(found, 1000)):  # rows in one transaction
                 for row in chunk:
                     _copy_flight(file.parent, out, row[place])

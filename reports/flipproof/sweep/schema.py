@@ -79,14 +79,9 @@ CREATE INDEX points_by_solver ON points (solver, status);
 """
 
 
-def columns(design: Plan) -> tuple[str, ...]:
-    """Return the columns of the table of points, in order."""
-    return tuple(name for name, *_ in _points(design))
-
-
-def kinds(design: Plan) -> tuple[str, ...]:
-    """Return the SQLite type of every column of the table of points."""
-    return tuple(kind for _, kind, *_ in _points(design))
+def columns(design: Plan) -> dict[str, str]:
+    """Return the columns of the table of points, in order, and the SQLite type of each."""
+    return {name: kind for name, kind, *_ in _points(design)}
 
 
 # SQLite keeps a negative zero as zero, and a real number without a fraction as an integer.

@@ -36,7 +36,7 @@ from flipproof.sweep.entries import as_json
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import TEMPORARY, sweep_away_parts, whole_file, write_whole
 from flipproof.sweep.inspection import damage, inspect, is_damage, result_code
-from flipproof.sweep.schema import APPLICATION, FILE, PAGE, SCHEMA, SHARED, checksum, columns, kinds, points_table
+from flipproof.sweep.schema import APPLICATION, FILE, PAGE, SCHEMA, SHARED, checksum, columns, points_table
 from flipproof.sweep.work import CURVES, Outcome, Returned
 from slicemodel.trajectory import FloatArray
 
@@ -62,8 +62,8 @@ class Store(AbstractContextManager["Store"]):
             damaged, if another program is writing to it, or if it cannot be written.
         """
         self.folder, self.design, self.code = folder, design, code
-        self._kinds = kinds(design)[:-1]
-        self._marks = ", ".join("?" * len(columns(design)))
+        self._columns = columns(design)
+        self._marks = ", ".join("?" * len(self._columns))
         self._held = ExitStack()
         with self._plainly():
             _check_folder(folder)
@@ -131,7 +131,7 @@ class Store(AbstractContextManager["Store"]):
 
         Their cells stand in the order of ``columns``; ``versions`` are those there by the id that rows refer to.
         """
-        place = columns(self.design).index("versions")
+        place = list(self._columns).index("versions")
         with self._plainly(), _transaction(self.connection):
             ids = {row[place]: 0 for row in rows}
             for old in ids:
@@ -172,7 +172,7 @@ class Store(AbstractContextManager["Store"]):
     def _signed(self, cells: Sequence[Any]) -> tuple[Any, ...]:
         """Return cells with their checksum; cells that the tables refuse, and will say so, get none."""
         try:
-            return (*cells, checksum(cells, self._kinds))
+            return (*cells, checksum(cells, list(self._columns.values())[:-1]))
         except (ValueError, TypeError, OverflowError):
             return (*cells, "")
 
