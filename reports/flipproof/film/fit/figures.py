@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.film.fit.compare import Contender
-from flipproof.film.fit.problem import SYMBOLS, UNITS
+from flipproof.film.fit.problem import UNITS
 from flipproof.output.columns import columns_csv
 
 MEASURED = {"color": "#000000", "marker": ".", "linestyle": "none", "markersize": 2.5, "zorder": 5}
@@ -51,8 +51,8 @@ def figure_allowed(contenders: Sequence[Contender]) -> Figure:
         problem = one.estimate.problem
         drag, restitution = one.intervals[:2]
         colour = solver_style(one.solver, k)["color"]
-        allowed = [problem.value("drag", float(u)) for u in one.estimate.cloud[:, 0]]
-        axes.plot(allowed, one.estimate.cloud[:, 1], ".", color=colour, markersize=2, alpha=0.4, rasterized=True)
+        drags, restitutions, *_ = problem.parameters(one.estimate.cloud).T
+        axes.plot(drags, restitutions, ".", color=colour, markersize=2, alpha=0.4, rasterized=True)
         for interval, line in ((drag, axes.axvline), (restitution, axes.axhline)):
             for end in (interval.low, interval.high):
                 line(end, color="#444444", linestyle=":", linewidth=1.0)
@@ -61,7 +61,7 @@ def figure_allowed(contenders: Sequence[Contender]) -> Figure:
             margin = 0.35 * (interval.high - interval.low) or 1e-3
             low, high = interval.searched
             limit(max(low, interval.low - margin) - 0.02 * margin, min(high, interval.high + margin) + 0.02 * margin)
-        axes.set_xlabel(f"{SYMBOLS['drag']} of one of {problem.throw.n_slices} slices [{UNITS['drag']}]")
+        axes.set_xlabel(f"α of one of {problem.throw.n_slices} slices [{UNITS['drag']}]")
         axes.set_title(one.solver, fontsize=10, loc="left")
         axes.locator_params(axis="x", nbins=5)
     grid[0][0].set_ylabel("restitution e [1]")

@@ -8,15 +8,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from flipproof.figures.style import draw
-from flipproof.film.fit.compare import Contender, verdict
-from flipproof.film.fit.figures import figure_allowed, figure_residuals, residual_table
-from flipproof.film.fit.uncertainty import correlation
+from flipproof.film.fit.compare import Contender, correlation, verdict
 from flipproof.output.folder import write_text
 
 
 def write(contenders: Sequence[Contender], text: str, folder: Path, provenance: Mapping[str, str]) -> None:
     """Write everything into an existing folder."""
+    from flipproof.figures.style import draw
+    from flipproof.film.fit.figures import figure_allowed, figure_residuals, residual_table
+
     for name, figure in (("residuals", figure_residuals(contenders)), ("allowed", figure_allowed(contenders))):
         drawing = draw(figure)
         write_text(folder / f"{name}.svg", drawing.svg)

@@ -14,7 +14,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from flipproof.frame.solvers import FOREIGN
+from flipproof.frame.solvers import FOREIGN, catalogue, find, solve
 from slicemodel import Scenario
 from slicemodel.scenario import unknown_name
 from slicemodel.trajectory import FloatArray
@@ -26,7 +26,6 @@ Operator = Callable[[FloatArray, FloatArray], FloatArray]
 ALWAYS: Final = ("drag", "restitution")
 ALSO: Final = ("omega0", "theta0")
 UNITS: Final[Mapping[str, str]] = {"drag": "kg/s", "restitution": "", "omega0": "rad/s", "theta0": "rad"}
-SYMBOLS: Final[Mapping[str, str]] = {"drag": "α", "restitution": "e", "omega0": "ω₀", "theta0": "θ₀"}
 
 FEWEST: Final = 12
 """Frames of a flight that can be fitted at the least."""
@@ -120,21 +119,21 @@ class Problem:
         return len(self.measured.t)
 
     @property
-    def _damping_scale(self) -> float:
-        return abs(self.throw.omega0) / 20.0
+    def _drag_scale(self) -> float:
+        return 2.0 * self.throw.slice_mass * (abs(self.throw.omega0) / 20.0)
 
     # ------------------------------------------------------------------ coordinates
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Return lowest and highest admissible coordinates, each of shape (K,)."""
-        reach = 0.3 * abs(self.throw.omega0)
+        omega0, theta0 = self.throw.omega0, self.throw.theta0
         # At a damping rate of 5 omega0 a slice creeps less than a fifth of its distance from the centre in the time the
         # bottle turns by 2 rad.
         limits = {
-            "drag": (0.0, math.asinh(5.0 * abs(self.throw.omega0) / self._damping_scale)),
+            "drag": (0.0, math.asinh(5.0 * abs(omega0) / (abs(omega0) / 20.0))),
             "restitution": (0.0, 1.0),
-            "omega0": (self.throw.omega0 - reach, self.throw.omega0 + reach),
-            "theta0": (self.throw.theta0 - 0.5, self.throw.theta0 + 0.5),
+            "omega0": (omega0 - 0.3 * abs(omega0), omega0 + 0.3 * abs(omega0)),
+            "theta0": (theta0 - 0.5, theta0 + 0.5),
         }
         low, high = np.array([limits[name] for name in self.free]).T
         return low, high
@@ -146,15 +145,15 @@ class Problem:
 
     def value(self, name: str, coordinate: float) -> float:
         """Return a parameter [SI] from its coordinate."""
-        if name == "drag":
-            return 2.0 * self.throw.slice_mass * self._damping_scale * math.sinh(coordinate)
-        return float(coordinate)
+        return self._drag_scale * math.sinh(coordinate) if name == "drag" else float(coordinate)
+
+    def parameters(self, points: FloatArray) -> FloatArray:
+        """Return the parameters [SI] at many coordinates (M, K), of the same shape."""
+        return np.array([[self.value(name, float(c)) for name, c in zip(self.free, x, strict=True)] for x in points])
 
     def coordinate(self, name: str, value: float) -> float:
         """Return the coordinate of a parameter [SI]."""
-        if name == "drag":
-            return math.asinh(value / (2.0 * self.throw.slice_mass * self._damping_scale))
-        return float(value)
+        return math.asinh(value / self._drag_scale) if name == "drag" else float(value)
 
     def start(self) -> FloatArray:
         """Return the coordinates of the throw itself, moved inside the bounds, shape (K,)."""
@@ -166,10 +165,8 @@ class Problem:
 
     def throw_at(self, x: FloatArray) -> Scenario:
         """Return the throw at the coordinates ``x``, shape (K,)."""
-        low, high = self.bounds()
-        inside = np.clip(x, low, high)
-        changed = {name: self.value(name, float(c)) for name, c in zip(self.free, inside, strict=True)}
-        return replace(self.throw, **changed)  # type: ignore[arg-type]
+        values = self.parameters(np.clip(x, *self.bounds())[np.newaxis])[0].tolist()
+        return replace(self.throw, **dict(zip(self.free, values, strict=True)))
 
     def predicted(self, x: FloatArray) -> FloatArray:
         """Return what would be measured at the coordinates ``x``, shape (P,); NaN where the solver gave up."""
@@ -202,16 +199,6 @@ def flights(throws: Sequence[Scenario], solver: str, times: FloatArray) -> tuple
     times themselves. Where the latter gives no answer, theta and omega are NaN. Refuses solvers as ``package_of``.
     """
     package = package_of(solver)
-    if package == FOREIGN:
-        from flipproof.foreign.solving import solve
-        from flipproof.foreign.specs import ForeignError
-
-        found = np.full((2, len(throws), len(times)), np.nan)
-        for k, throw in enumerate(throws):
-            with suppress(ForeignError):
-                run = solve(throw, spec=solver, times=times)
-                found[:, k] = run.theta, run.omega
-        return found[0], found[1]
     if package == "slicemodel":
         from slicemodel.batch import solve_batch
 
@@ -219,15 +206,19 @@ def flights(throws: Sequence[Scenario], solver: str, times: FloatArray) -> tuple
         steps = math.ceil(throws[0].duration / 5e-4) + 1
         batch = solve_batch(throws, solver, steps)
         return sampled(np.linspace(0.0, throws[0].duration, steps), batch.theta, batch.omega, times)
-    from ode_reference import solve as solve_one
-    from ode_reference import solve_batch as solve_exactly
+    import ode_reference
+    from flipproof.foreign.specs import ForeignError
     from ode_reference.solver import COLUMN
 
-    if solver == COLUMN:
-        columns = [solve_one(throw, solver, times) for throw in throws]
-        return np.array([one.theta for one in columns]), np.array([one.omega for one in columns])
-    flown = solve_exactly(throws, solver, times)
-    return flown.theta, flown.omega
+    if package == "ode_reference" and solver != COLUMN:
+        flown = ode_reference.solve_batch(throws, solver, times)
+        return flown.theta, flown.omega
+    found = np.full((2, len(throws), len(times)), np.nan)
+    for k, throw in enumerate(throws):
+        with suppress(ForeignError):
+            run = solve(solver, throw, times=times)
+            found[:, k] = run.theta, run.omega
+    return found[0], found[1]
 
 
 def sampled(grid: FloatArray, theta: FloatArray, omega: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -247,7 +238,6 @@ def sampled(grid: FloatArray, theta: FloatArray, omega: FloatArray, times: Float
 def package_of(solver: str) -> str:
     """Return the package of a solver that can be fitted; an engine, a curve in a file, an unknown name are refused."""
     from flipproof.foreign.specs import check_asked
-    from flipproof.frame.solvers import catalogue, find
 
     package = find(solver).package
     if package == "engine_check":

@@ -80,13 +80,10 @@ class Request:
             raise ValueError(f"landing = {self.landing:g} s does not follow release = {self.release:g} s")
         if self.frame_rate is not None and not 1 <= self.frame_rate <= 1e6:
             raise ValueError(f"frame_rate = {self.frame_rate:g} 1/s is outside [1, 1e6]")
-        for name, unit, known in (
-            ("length_unit", self.length_unit, ("", *METRES)),
-            ("angle_unit", self.angle_unit, ("", *RADIANS)),
-            ("time_unit", self.time_unit, tuple(SECONDS)),
-        ):
-            if unit not in known:
-                raise ValueError(f"{name} = {unit!r} is unknown; known: {', '.join(word for word in known if word)}")
+        for name, known in (("length_unit", METRES), ("angle_unit", RADIANS), ("time_unit", SECONDS)):
+            unit = getattr(self, name)
+            if unit not in known and (unit or name == "time_unit"):
+                raise ValueError(f"{name} = {unit!r} is unknown; known: {', '.join(known)}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -186,12 +183,9 @@ def _flight(request: Request, spin: MeasuredSpin, metres: float) -> Flight:
     """
 
     def found(gravity: float | None) -> tuple[Flight, Parabola]:
+        height = None if request.table_height is None else request.table_height / metres
         flight = find_flight(
-            spin,
-            release=request.release,
-            landing=request.landing,
-            table_height=None if request.table_height is None else request.table_height / metres,
-            gravity=gravity,
+            spin, release=request.release, landing=request.landing, table_height=height, gravity=gravity
         )
         return flight, fit_axis(spin.t, spin.cap, spin.base, flight.inside & spin.measured, flight.release)
 
@@ -237,8 +231,8 @@ def _length_unit(request: Request, table: TrackTable) -> str:
 
 def _centre(request: Request, table: TrackTable, spin: MeasuredSpin, metres: float) -> FloatArray | None:
     """Return the tracked centre of mass on the frame grid, shape (P, 2) [m]; None if there is none."""
-    given = [name for name, value in (("ice top", request.ice_top), ("centre of mass", request.centre),
-                                      ("r_cm", request.r_cm)) if value is not None]  # fmt: skip
+    ways = {"ice top": request.ice_top, "centre of mass": request.centre, "r_cm": request.r_cm}
+    given = [way for way, value in ways.items() if value is not None]
     if len(given) > 1:
         raise ValueError(f"{' and '.join(given)} all say where the centre of mass is; give one of them")
     if request.r_cm is not None:

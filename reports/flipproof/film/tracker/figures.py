@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -18,8 +20,8 @@ def figure_tracks(measured: Measurement) -> Figure:
     """Coordinates of cap and base over time with the parabola of C_M, as in Fig. 3a."""
     figure, panels = new_figure(2, size=(8.0, 6.0), sharex=True)
     spin, inside, fit = measured.spin, measured.flight.inside, measured.track or measured.axis
+    _shade(panels, measured)
     for k, (axes, name) in enumerate(zip(panels, "xy", strict=True)):
-        _shade(axes, measured)
         for points, colour, label in ((spin.cap, CAP, "cap"), (spin.base, BASE, "base")):
             axes.plot(spin.t, points[:, k] * measured.metres, ".", color=colour, markersize=3.5, label=label)
         if measured.track is not None and measured.track_points is not None:
@@ -43,8 +45,7 @@ def figure_spin(measured: Measurement) -> Figure:
     """Angle and angular velocity over time with noise band, as in Fig. 4a and 4b."""
     figure, (above, below) = new_figure(2, size=(8.0, 6.4), sharex=True)
     spin = measured.spin
-    for axes in (above, below):
-        _shade(axes, measured)
+    _shade((above, below), measured)
     above.plot(spin.t, spin.theta, ".", color=BASE, markersize=3.5, label="θ by Eq. 1")
     if spin.interpolated.any():
         t, theta = spin.t[spin.interpolated], spin.theta[spin.interpolated]
@@ -91,8 +92,7 @@ def figure_axis(measured: Measurement) -> Figure:
     spin, metres = measured.spin, measured.metres
     apart = np.hypot(*(spin.base - spin.cap).T) * metres
     median, expected = measured.calibration.length * metres, measured.calibration.expected * metres
-    for axes in (above, below):
-        _shade(axes, measured)
+    _shade((above, below), measured)
     above.axhspan(
         median - 2 * expected, median + 2 * expected, color=FIT, alpha=0.2, linewidth=0, label="noise, ± 2 s.d."
     )
@@ -109,13 +109,14 @@ def figure_axis(measured: Measurement) -> Figure:
     return figure
 
 
-def _shade(axes: Axes, measured: Measurement) -> None:
+def _shade(panels: Iterable[Axes], measured: Measurement) -> None:
     """Grey what is not flight."""
     spin, flight = measured.spin, measured.flight
-    axes.axvspan(spin.t[0], flight.release, color="#000000", alpha=0.08, linewidth=0)
-    if flight.landed:
-        axes.axvspan(flight.landing, spin.t[-1], color="#000000", alpha=0.08, linewidth=0)
-    axes.margins(x=0.01)
+    for axes in panels:
+        axes.axvspan(spin.t[0], flight.release, color="#000000", alpha=0.08, linewidth=0)
+        if flight.landed:
+            axes.axvspan(flight.landing, spin.t[-1], color="#000000", alpha=0.08, linewidth=0)
+        axes.margins(x=0.01)
 
 
 FIGURES = {"tracks": figure_tracks, "spin": figure_spin, "normalised": figure_normalised, "axis": figure_axis}

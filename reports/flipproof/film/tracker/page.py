@@ -14,6 +14,7 @@ import numpy as np
 from flipproof.film.tracker.bench import Measurement
 from flipproof.film.tracker.parabola import Parabola
 from flipproof.output.columns import columns_csv
+from flipproof.output.folder import write_text
 from flipproof.page.templating import environment
 
 COLUMNS = {
@@ -32,17 +33,6 @@ COLUMNS = {
     "line": "line of the file, 0 if the frame has none",
 }
 """Columns of track.csv and what they are."""
-
-
-def csv_text(measured: Measurement) -> str:
-    """Return a measurement as CSV, one row per frame; an empty cell where there is no value."""
-    spin = measured.spin
-    columns = (
-        spin.t, spin.theta, spin.omega, spin.band, spin.omega_paper, spin.band_paper, measured.r_cm, spin.measured,
-        spin.interpolated, measured.flight.inside, measured.reduced_time, spin.omega / measured.omega0, spin.lines,
-    )  # fmt: skip
-    shown = (column if column.dtype.kind == "f" else column.astype(int) for column in columns)
-    return columns_csv(dict(zip(COLUMNS, shown, strict=True)))
 
 
 def summary(measured: Measurement) -> dict[str, Any]:
@@ -106,20 +96,25 @@ def write(measured: Measurement, folder: Path, provenance: Mapping[str, str]) ->
     from flipproof.figures.style import draw
     from flipproof.film.tracker.figures import FIGURES
 
-    (folder / "track.csv").write_text(csv_text(measured), encoding="utf-8")
+    spin = measured.spin
+    columns = (
+        spin.t, spin.theta, spin.omega, spin.band, spin.omega_paper, spin.band_paper, measured.r_cm, spin.measured,
+        spin.interpolated, measured.flight.inside, measured.reduced_time, spin.omega / measured.omega0, spin.lines,
+    )  # fmt: skip
+    shown = (column if column.dtype.kind == "f" else column.astype(int) for column in columns)
+    write_text(folder / "track.csv", columns_csv(dict(zip(COLUMNS, shown, strict=True))))
     drawn = {}
     for name, figure in FIGURES.items():
         drawing = draw(figure(measured))
         drawn[name] = drawing.svg[drawing.svg.index("<svg") :]
-        (folder / f"{name}.svg").write_text(drawing.svg, encoding="utf-8")
+        write_text(folder / f"{name}.svg", drawing.svg)
         (folder / f"{name}.png").write_bytes(drawing.png)
     numbers = summary(measured) | {"provenance": dict(provenance)}
-    text = json.dumps(_finite(numbers), indent=2, ensure_ascii=False) + "\n"
-    (folder / "summary.json").write_text(text, encoding="utf-8")
+    write_text(folder / "summary.json", json.dumps(_finite(numbers), indent=2, ensure_ascii=False) + "\n")
     fit = measured.track or measured.axis
     page = environment().get_template("track.html.j2")
     html = page.render(measured=measured, fit=fit, summary=numbers, figures=drawn, provenance=provenance)
-    (folder / "index.html").write_text(html, encoding="utf-8")
+    write_text(folder / "index.html", html)
 
 
 def _finite(value: Any) -> Any:

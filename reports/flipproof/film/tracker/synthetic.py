@@ -60,12 +60,7 @@ def synthetic_video(run: Trajectory) -> SyntheticVideo:
     cap[down] = base[down] - length * axis[down]
     centre[down] = cap[down] + r_cm[down, None] * axis[down]
     return SyntheticVideo(
-        t=tau - tau[0],
-        cap=cap,
-        base=base,
-        centre=centre,
-        release=float(-tau[0]),
-        landing=float(flight - tau[0]),
+        t=tau - tau[0], cap=cap, base=base, centre=centre, release=float(-tau[0]), landing=float(flight - tau[0])
     )
 
 
