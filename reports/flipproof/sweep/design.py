@@ -243,13 +243,13 @@ def design_of(document: Mapping[str, Any], source: str, text: str = "") -> Desig
         raise SweepError(f"{source}: has no table [sweep.fields]; it names the fields to vary")
     axes = read_axes(fields, f"{source}: [sweep.fields]", grid=kind == GRID)
     entries = read_entries(document.get("solvers"), source)
-    samples, seed = _samples(table, where, axes, grid=kind == GRID)
+    shares, seed = _shares(table, where, axes, grid=kind == GRID)
     design = Design(
         text=text,
         base=_base(document, source, axes),
         axes=axes,
         entries=entries,
-        shares=None if samples is None else latin_shares(samples, len(axes), seed or 0),
+        shares=shares,
         seed=seed,
         trajectories=trajectories,
         curves=int(curves),
@@ -262,23 +262,24 @@ def design_of(document: Mapping[str, Any], source: str, text: str = "") -> Desig
     return design
 
 
-def _samples(
+def _shares(
     table: Mapping[str, Any], where: str, axes: tuple[Axis, ...], *, grid: bool
-) -> tuple[int | None, int | None]:
-    """Return samples and seed of a Latin hypercube, None and None for a grid."""
+) -> tuple[FloatArray | None, int | None]:
+    """Return places and seed of a Latin hypercube, None and None for a grid."""
     if grid:
         for key in ("samples", "seed"):
             if key in table:
                 raise SweepError(f'{where} {key} = {table[key]!r} belongs to design = "{LATIN}", not to a grid')
         return None, None
-    samples, seed = table.get("samples"), table.get("seed", 0)
+    samples: Any = table.get("samples")
+    seed = table.get("seed", 0)
     refuse(not_whole(f"{where} samples", samples, 1, MOST_POINTS) or not_whole(f"{where} seed", seed, 0, 2**63 - 1))
     if not any(isinstance(axis, Range) and axis.kind == "real" for axis in axes):
         raise SweepError(
             f'{where} design = "{LATIN}" needs a field {{from = ..., to = ...}} of real numbers in [sweep.fields]; '
             "without one its throws would repeat themselves: take a grid"
         )
-    return int(samples), int(seed)  # type: ignore[arg-type]
+    return latin_shares(samples, len(axes), seed), seed
 
 
 def _base(document: Mapping[str, Any], source: str, axes: tuple[Axis, ...]) -> Mapping[str, Mapping[str, Any]]:

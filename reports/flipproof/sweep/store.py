@@ -65,11 +65,14 @@ class Store(AbstractContextManager["Store"]):
         self._columns = columns(design)
         self._marks = ", ".join("?" * len(self._columns))
         self._held = ExitStack()
-        with self._plainly():
-            _check_folder(folder)
-            folder.mkdir(parents=True, exist_ok=True)
         try:
             with self._plainly():
+                if folder.is_dir():
+                    parts = (entry.name for entry in folder.iterdir() if entry.name.endswith(TEMPORARY))
+                    check_own(folder, KIND, ignored=(LOCK, *parts))
+                elif folder.exists():
+                    raise SweepError(f"{folder} is a file; --out names a folder")
+                folder.mkdir(parents=True, exist_ok=True)
                 self._held.enter_context(sole_writer(folder / LOCK, folder))
                 if not (folder / MARKER).exists():
                     write_whole(folder / MARKER, marker_text(KIND).encode())
@@ -212,14 +215,6 @@ class Store(AbstractContextManager["Store"]):
 def read_curves(blob: bytes) -> FloatArray:
     """Return the curves of a row, shape (4, P), in the order of ``CURVES``."""
     return np.frombuffer(blob, dtype="<f8").reshape(len(CURVES), -1)
-
-
-def _check_folder(folder: Path) -> None:
-    if folder.exists() and not folder.is_dir():
-        raise SweepError(f"{folder} is a file; --out names a folder")
-    if folder.exists():
-        parts = (entry.name for entry in folder.iterdir() if entry.name.endswith(TEMPORARY))
-        check_own(folder, KIND, ignored=(LOCK, *parts))
 
 
 @contextmanager
