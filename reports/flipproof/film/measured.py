@@ -102,10 +102,7 @@ class Measured:
 def read_measured(path: Path) -> Measurement:
     """Read a flight: a track of ``flipproof track``, or any CSV with t and theta or omega from release to landing.
 
-    Raises
-    ------
-    ValueError
-        Naming file, line and column.
+    What cannot be read raises a ValueError that names file, line and column.
     """
     curve = read_curve(path)
     quantity: Quantity | None = next((name for name in QUANTITIES if name in curve.series), None)

@@ -208,13 +208,7 @@ Plan: TypeAlias = "Design | Throws"
 
 
 def read_design(path: Path) -> Design:
-    """Read a sweep's file.
-
-    Raises
-    ------
-    SweepError
-        Naming file, table, key, value, and what is admissible or nearest.
-    """
+    """Read a sweep's file; a SweepError names file, table, key, value, and what is admissible or nearest."""
     try:
         document, text = read_toml(path, 2**25)  # a million values with all their digits
     except ScenarioError as error:

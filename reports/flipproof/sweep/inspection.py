@@ -18,16 +18,8 @@ from slicemodel.scenario import shortened
 def inspect(file: Path, design: Plan, code: str, patience: float) -> None:
     """Read a sweep's file through and refuse it unless every row is as it was written, of this design and this code.
 
-    Parameters
-    ----------
-    patience : seconds to wait for another program that holds the file
-
-    Raises
-    ------
-    SweepError
-        Naming the file, what is wrong with it, and how many points can be saved from it.
-    sqlite3.Error
-        If another program holds the file.
+    A SweepError names the file, what is wrong with it, and how many points can be saved from it; if another program
+    holds the file for more than ``patience`` seconds, that is an sqlite3.Error.
     """
     try:
         if file.is_dir():

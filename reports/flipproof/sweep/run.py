@@ -79,10 +79,7 @@ def local_workers(jobs: int | None) -> Iterator[Workers]:
 def dask_workers(address: str) -> Iterator[Workers]:
     """Give the workers of the scheduler at ``address``, such as tcp://127.0.0.1:8786.
 
-    Raises
-    ------
-    SweepError
-        If Dask is not installed, or nobody answers at the address.
+    A SweepError says that Dask is not installed, or that nobody answers there.
     """
     try:
         distributed: Any = import_module("distributed")
@@ -144,10 +141,7 @@ class Batch:
 def run_sweep(store: Store, workers: Workers, progress: Progress) -> None:
     """Make every point that has no row, and store it.
 
-    Raises
-    ------
-    SweepError
-        If rows cannot be written, workers run other code, die whatever they are given, or are gone.
+    A SweepError says that rows cannot be written, or that workers run other code, die on everything, or are gone.
     """
     design, done = store.design, store.done()
     lines = [

@@ -24,7 +24,7 @@ import json
 import os
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -34,7 +34,7 @@ from flipproof.output.ownership import MARKER, OutputError, check_own, marker_te
 from flipproof.sweep.design import Plan, key_of
 from flipproof.sweep.entries import as_json
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.files import TEMPORARY, sweep_away_parts, whole_file, write_whole
+from flipproof.sweep.files import TEMPORARY, whole_file, write_whole
 from flipproof.sweep.inspection import damage, inspect, is_damage, result_code
 from flipproof.sweep.schema import APPLICATION, FILE, PAGE, SCHEMA, SHARED, checksum, columns, points_table
 from flipproof.sweep.work import CURVES, Outcome, Returned
@@ -49,22 +49,19 @@ BUSY: Final = 10.0
 """Seconds to wait for somebody who holds the file."""
 
 
-class Store(AbstractContextManager["Store"]):
+class Store(ExitStack):
     """The rows of one design in a folder. Use as a context manager; the folder is locked until it ends."""
 
     def __init__(self, folder: Path, design: Plan, code: str) -> None:
         """Open or begin the store.
 
-        Raises
-        ------
-        SweepError
-            If the folder holds something else, another design, rows of other code or another schema, if its file is
-            damaged, if another program is writing to it, or if it cannot be written.
+        A SweepError refuses a folder that holds something else, another design, rows of other code or another schema,
+        whose file is damaged, to which another program is writing, or that cannot be written.
         """
         self.folder, self.design, self.code = folder, design, code
         self._columns = columns(design)
         self._marks = ", ".join("?" * len(self._columns))
-        self._held = ExitStack()
+        super().__init__()
         try:
             with self._plainly():
                 if folder.is_dir():
@@ -73,7 +70,7 @@ class Store(AbstractContextManager["Store"]):
                 elif folder.exists():
                     raise SweepError(f"{folder} is a file; --out names a folder")
                 folder.mkdir(parents=True, exist_ok=True)
-                self._held.enter_context(sole_writer(folder / LOCK, folder))
+                self.enter_context(sole_writer(folder / LOCK, folder))
                 if not (folder / MARKER).exists():
                     write_whole(folder / MARKER, marker_text(KIND).encode())
                 self.fresh = not os.path.lexists(self.file)
@@ -82,10 +79,11 @@ class Store(AbstractContextManager["Store"]):
                 else:
                     inspect(self.file, design, code, BUSY)
                 connection = sqlite3.connect(self.file, timeout=BUSY, isolation_level=None)
-                self.connection = self._held.enter_context(closing(connection))
+                self.connection = self.enter_context(closing(connection))
                 self.connection.execute("PRAGMA journal_mode = WAL").fetchall()
                 self.connection.execute("PRAGMA synchronous = NORMAL")
-                sweep_away_parts(folder)
+                for part in folder.rglob(f"*{TEMPORARY}"):  # what a killed program left half-written
+                    part.unlink(missing_ok=True)
         except BaseException:
             self.close()
             raise
@@ -94,13 +92,6 @@ class Store(AbstractContextManager["Store"]):
     def file(self) -> Path:
         """The SQLite file."""
         return self.folder / FILE
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the file and let go of the folder."""
-        self._held.close()
 
     def done(self) -> bytearray:
         """Return one byte for each point of the design: 1 if its row is there, and its flight if flights are kept."""

@@ -234,12 +234,8 @@ class Budget:
 def affordable(problem: Problem, minutes: float = MINUTES) -> Budget:
     """Time a flight of somebody else's solver and return the best search that ``minutes`` allow.
 
-    Raises
-    ------
-    ForeignError
-        If the solver does not answer the throw from which the search begins.
-    ValueError
-        If no search can be made in the time; the message says how long the coarse one takes.
+    A solver that does not answer the throw from which the search begins raises a ForeignError, a time in which no
+    search can be made a ValueError that says how long the coarse one takes.
     """
     took = []
     for _ in range(3):  # the fastest counts, since the first one loads the solver

@@ -125,13 +125,7 @@ class Measurement:
 
 
 def measure(request: Request) -> Measurement:
-    """Read the files and analyse them.
-
-    Raises
-    ------
-    ValueError
-        In one line: a file that cannot be read, a track or a unit that is missing, no flight.
-    """
+    """Read the files and analyse them; raise ValueError if one cannot be read, or track, unit or flight are missing."""
     table = read_track_table(*request.files)
     metres = METRES[_length_unit(request, table)]
     seconds = SECONDS[request.time_unit]
@@ -295,11 +289,8 @@ def _fitted_omega(spin: MeasuredSpin, flight: Flight, flight_time: float) -> tup
 def check_angles(table: TrackTable, spin: MeasuredSpin, track: str, unit: str) -> str:
     """Compare a track's own angle (of a tape or a vector from cap to base) with theta of Eq. 1; say how they agree.
 
-    Raises
-    ------
-    ValueError
-        If the track has no angle or its unit is not given, or if it turns at another rate than the bottle, or its omega
-        is not d theta/dt; the message says if another unit would fit.
+    A ValueError refuses a track without an angle, an angle without unit, one that turns at another rate than the
+    bottle, and an omega that is not d theta/dt; the message says if another unit would fit.
     """
     if not unit:
         raise ValueError(

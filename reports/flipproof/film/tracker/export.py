@@ -20,7 +20,6 @@ class Style:
 
     Parameters
     ----------
-    name : of the file that shows it, without its ending
     delimiter, decimal, newline : signs
     multi : the first line of an export of several tracks, "" for none
     closing : True if the rows of names end with a delimiter
@@ -31,7 +30,6 @@ class Style:
     digits : of a number; 0 prints every digit, as "unformatted" does
     """
 
-    name: str
     delimiter: str = "\t"
     decimal: str = "."
     newline: str = "\n"
@@ -44,22 +42,21 @@ class Style:
     digits: int = 0
 
 
-STYLES: Final = MappingProxyType({
-    style.name: style
-    for style in (
-        Style(name="tab", digits=4),
-        Style(name="tab_unformatted"),
-        Style(name="semicolon_decimal_comma", delimiter=";", decimal=",", digits=4),
-        Style(name="comma", delimiter=",", digits=4, comment="synthetic"),
-        Style(name="space", delimiter=" ", underscores=True, digits=5),
-        Style(name="byte_order_mark", encoding="utf-8-sig", newline="\r\n", decimal=",", digits=4),
-        Style(name="utf16", encoding="utf-16", digits=4),
-        Style(name="older_headings", multi="multi:", subscripts=True, digits=4),
-        Style(name="single", multi="", digits=4),
-        Style(name="copied_table", multi="", closing=False, underscores=True, digits=4, comment="synthetic"),
-    )
-})  # fmt: skip
-"""Every style in which examples and tests write."""
+STYLES: Final = MappingProxyType(
+    {
+        "tab": Style(digits=4),
+        "tab_unformatted": Style(),
+        "semicolon_decimal_comma": Style(delimiter=";", decimal=",", digits=4),
+        "comma": Style(delimiter=",", digits=4, comment="synthetic"),
+        "space": Style(delimiter=" ", underscores=True, digits=5),
+        "byte_order_mark": Style(encoding="utf-8-sig", newline="\r\n", decimal=",", digits=4),
+        "utf16": Style(encoding="utf-16", digits=4),
+        "older_headings": Style(multi="multi:", subscripts=True, digits=4),
+        "single": Style(multi="", digits=4),
+        "copied_table": Style(multi="", closing=False, underscores=True, digits=4, comment="synthetic"),
+    }
+)
+"""Every style in which examples and tests write, by the name of its file there."""
 
 
 def tracker_number(value: float, digits: int, decimal: str) -> str:
@@ -81,13 +78,7 @@ def tracker_number(value: float, digits: int, decimal: str) -> str:
 
 
 def tracker_text(t: FloatArray, tracks: Mapping[str, Mapping[str, FloatArray]], style: Style) -> str:
-    """Return an export of several tracks.
-
-    Parameters
-    ----------
-    t : (P,)
-    tracks : columns by name, each (P,), NaN where missing, by track
-    """
+    """Return an export of tracks at times ``t`` (P,): by track its columns by name, each (P,), NaN where missing."""
     end = style.delimiter if style.closing else ""
     names, titles = style.delimiter, ["t"]
     for k, (name, columns) in enumerate(tracks.items()):

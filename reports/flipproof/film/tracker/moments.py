@@ -96,18 +96,20 @@ def find_flight(
     if release is None or landing is None:
         first, last = _stretch(spin, points, gravity)
         landed = landed or last < int(points[-1])
-    landing_how = "given"
-    if landing is None and table_height is not None:
+    if landing is not None:
+        landing_how = "given"
+    elif table_height is not None:
         last, landing_how = _at_table(spin, first, table_height)
         landed = True
-    elif landing is None and not landed:
-        landing_how = "the record ends in flight"
-    elif landing is None:
+    elif landed:
         last, landing_how = _sharpened(spin, first, last)
-    release_how = "given"
-    if release is None and first == points[0]:
+    else:
+        landing_how = "the record ends in flight"
+    if release is not None:
+        release_how = "given"
+    elif first == points[0]:
         release_how = "the record begins in flight"
-    elif release is None:
+    else:
         first, release_how = _onset(spin, first, last, gravity)
     inside = np.zeros(len(spin.t), dtype=np.bool_)
     inside[first : last + 1] = True

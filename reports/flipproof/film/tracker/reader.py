@@ -52,11 +52,7 @@ Heading = tuple[str, str, str]
 
 
 def read_track_table(path: Path | str, *more: Path | str) -> TrackTable:
-    """Read a Tracker export, or several of one clip whose tracks are to be used together.
-
-    Parameters
-    ----------
-    path, more : files; rows are joined by equal times
+    """Read a Tracker export, or several of one clip whose tracks are used together, their rows joined by equal times.
 
     Raises
     ------

@@ -175,12 +175,8 @@ Rows = list[tuple[Line, list[str]]]
 def read_lines(path: Path) -> tuple[list[Line], str]:
     """Return the lines of a file without blank ones and comments, and its encoding in words.
 
-    Comments begin with ``//``, or with ``#`` other than that of ``#multi:``.
-
-    Raises
-    ------
-    TrackFileError
-        Unreadable, too large, a Tracker project instead of an export, not UTF-8 or marked UTF-16, or not text.
+    Comments begin with ``//``, or with ``#`` other than that of ``#multi:``. A TrackFileError refuses what is
+    unreadable, too large, a Tracker project instead of an export, not UTF-8 or marked UTF-16, or not text.
     """
     if path.suffix.lower() in (".trk", ".trz"):
         raise TrackFileError(f"{path}: is a Tracker project, which holds pixels, not positions; {EXPORT}")
