@@ -12,8 +12,15 @@ from pathlib import Path
 import numpy as np
 
 import ode_reference
-from flipproof.film.tracker.export import STYLES, data_track_text, frame_times, tracker_text
-from flipproof.film.tracker.synthetic import SyntheticVideo, synthetic_video, with_noise
+from flipproof.film.tracker.export import (
+    STYLES,
+    SyntheticVideo,
+    data_track_text,
+    frame_times,
+    synthetic_video,
+    tracker_text,
+    with_noise,
+)
 from slicemodel import Scenario
 
 NOISE = 5e-4

@@ -133,11 +133,33 @@ def command_track(options: argparse.Namespace) -> int:
 
     given = {field.name: getattr(options, field.name) for field in fields(Request)}
     measured = measure(Request(**given | {"files": tuple(options.files)}))
-    from flipproof.film.tracker.page import lines, write
 
-    written = _written(options, "track", lambda folder, made: write(measured, folder, made), "index.html")
-    print("\n".join([*lines(measured), *written]))
+    def write(folder: Path, made: Mapping[str, str]) -> None:
+        from flipproof.film.tracker.page import write
+
+        write(measured, folder, made)
+
+    print("\n".join([*_track_lines(measured), *_written(options, "track", write, "index.html")]))
     return 0
+
+
+def _track_lines(measured: Any) -> list[str]:
+    spin, flight, fit = measured.spin, measured.flight, measured.track or measured.axis
+    how = "C_M as tracked" if measured.track else "found from the axis"
+    found = [
+        f"{measured.table.source}: {len(spin.t)} frames at {1 / spin.frame_time:.4g}/s, {spin.measured.sum()} with cap "
+        f"and base, {spin.interpolated.sum()} interpolated ({'; '.join(measured.table.dialects)})",
+        f"release  t = {flight.release:.4f} s ({flight.release_how})",
+        f"landing  t = {flight.landing:.4f} s ({flight.landing_how})",
+        f"omega_0  {measured.omega0:.2f} +- {measured.omega0_deviation:.2g} rad/s; second half of the flight: "
+        f"{measured.mean:.3f} omega_0",
+        f"parabola v_0 = ({fit.v0x:.3f} +- {fit.sd_v0x:.1g}, {fit.v0y:.3f} +- {fit.sd_v0y:.1g}) m/s, "
+        f"g = {fit.g:.2f} +- {fit.sd_g:.1g} m/s^2 ({how})",
+        f"length   cap to base {measured.calibration.length * measured.metres:.4f} m, scatter "
+        f"{measured.calibration.spread * measured.metres * 1e3:.2g} mm, noise explains "
+        f"{measured.calibration.expected * measured.metres * 1e3:.2g} mm",
+    ]
+    return found + [f"WARNING  {warning}" for warning in measured.warnings]
 
 
 def _written(
@@ -226,10 +248,13 @@ def command_fit(options: argparse.Namespace) -> int:
     remarks += _disagreements(problems[0], throw, also)
     contenders = compare(_estimates(problems, options.starts, options.minutes))
     text = _report(contenders, remarks)
-    from flipproof.film.fit.folder import write
 
-    written = _written(options, "fit", lambda folder, made: write(contenders, text, folder, made), "fit.txt")
-    print("\n".join([text, *written]))
+    def write(folder: Path, made: Mapping[str, str]) -> None:
+        from flipproof.film.fit.folder import write
+
+        write(contenders, text, folder, made)
+
+    print("\n".join([text, *_written(options, "fit", write, "fit.txt")]))
     return 0
 
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.film.fit.compare import Contender, compare, verdict
 from flipproof.film.fit.estimate import estimate
-from flipproof.film.fit.figures import MEASURED
+from flipproof.film.fit.folder import MEASURED
 from flipproof.film.fit.problem import ALSO, SLICES, Measurement, Quantity, pose, predict
 from flipproof.film.fit.reading import QUANTITIES
 from flipproof.frame.chapter import Ask, Call, Chapter, Part, Study

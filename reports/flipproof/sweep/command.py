@@ -34,10 +34,7 @@ LEFT_OUT: Final = ("parameters", "versions", "curves", "checksum")
 
 
 def sweep(file: Path, out: Path, begin: Begin, **how: Any) -> str:
-    """Make every point of the design in ``file`` that has no row in ``out``; return one line that tells what is there.
-
-    Parameters, and what is raised, as for ``fill``.
-    """
+    """Make every point of the design in ``file`` that has no row in ``out``, as ``fill`` does; return its one line."""
     design = read_design(file)
     if not how.get("damaged") and not (out / FILE).exists():
         # Before the folder knows the design, so that the mended file may have the same folder.
@@ -50,17 +47,13 @@ def fill(
 ) -> str:
     """Make every point of ``design`` that has no row in ``out``; return lines that tell what is there.
 
+    If the file, the folder, the workers or the disk will not do, a SweepError says so; what was stored is kept.
+
     Parameters
     ----------
-    begin : callable (points there, points of the design) -> progress
     end : callable (complete store, line that tells what is there) -> lines to return
     damaged : path or None - a damaged sweep of this design: ``out`` is begun with its whole rows, no point is made
     how : ``jobs``, ``dask`` and ``export_to`` of ``completed``
-
-    Raises
-    ------
-    SweepError
-        If the file, the folder, the workers or the disk will not do; what was stored is kept.
     """
     if damaged:
         return salvage(damaged, out, design, code_identity())

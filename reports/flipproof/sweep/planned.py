@@ -132,10 +132,7 @@ class Plan:
 
 
 def make_map(plan: Plan, out: Path, begin: Begin, **how: Any) -> str:
-    """Make every run of the map that has no row in ``out``, draw the map; return lines that tell what is there.
-
-    Parameters and errors as for ``flipproof.sweep.command.fill``.
-    """
+    """Make every run of the map that has no row in ``out``, as ``fill`` does, and draw it; return its lines."""
     runs = plan.runs()
 
     def end(store: Store, summary: str) -> str:
@@ -218,9 +215,9 @@ def releases(runs: list[Run]) -> dict[str, list[Value]]:
 
 
 def make_split(throw: Scenario, out: Path, begin: Begin, **how: Any) -> str:
-    """Make every run of the waterfall that has no row in ``out``, draw it; return its table and what is there.
+    """Make every run of the waterfall that has no row in ``out``, as ``fill`` does, and draw it; return its table.
 
-    Parameters and errors as for ``flipproof.sweep.command.fill``; a run that is not whole is one: a split needs all.
+    A run that is not whole is refused: a split needs all.
     """
     runs = plan_split(throw)
 

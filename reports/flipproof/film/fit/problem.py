@@ -251,18 +251,13 @@ def package_of(solver: str) -> str:
 def pose(
     measured: Measurement, throw: Scenario, solver: str, *, also: Sequence[str] = (), slices: int | None = None
 ) -> Problem:
-    """Return the problem of fitting ``solver`` to ``measured``.
+    """Return the problem of fitting ``solver`` to ``measured``; a ValueError names what cannot be fitted, and why.
 
     Parameters
     ----------
     throw : Scenario - what is known of the throw; its duration gives way to the measured one
     also : names from ``ALSO`` - fitted too; they start from the measurement's first frames
     slices : int or None - None: ``SLICES``, or the throw's if fewer
-
-    Raises
-    ------
-    ValueError
-        Naming what cannot be fitted and why.
     """
     for name in also:
         if name not in ALSO:

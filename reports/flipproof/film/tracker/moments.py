@@ -69,20 +69,13 @@ def find_flight(
     table_height: float | None = None,
     gravity: float | None = None,
 ) -> Flight:
-    """Return the flight of a record.
+    """Return the flight of a record; raise NoFlightError if none is found.
 
     Parameters
     ----------
-    release, landing : [s] - given by the user instead of found
-    table_height : y of the table in the unit of the tracks; the landing is when the base comes down to it
+    release, landing : [s] - given by the user instead of found; outside the record or with few frames: ValueError
+    table_height : y of the table in the unit of the tracks; the landing is when the base comes down to it, if it does
     gravity : in the unit of the tracks per s^2 if that is known, which tells flight from a hand more sharply
-
-    Raises
-    ------
-    NoFlightError
-        If none is found.
-    ValueError
-        If what is given lies outside the record, leaves too few frames, or the base never comes down to the table.
     """
     for name, given in (("release", release), ("landing", landing)):
         if given is not None and not spin.t[0] - spin.frame_time <= given <= spin.t[-1] + spin.frame_time:
