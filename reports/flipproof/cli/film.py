@@ -8,7 +8,6 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -129,7 +128,7 @@ def command_track(options: argparse.Namespace) -> int:
 
     if options.out is not None:
         check_replaceable(options.out, "track")
-    from flipproof.film.tracker.bench import Request, measure
+    from flipproof.film.tracker.bench import Request, lines, measure
 
     given = {field.name: getattr(options, field.name) for field in fields(Request)}
     measured = measure(Request(**given | {"files": tuple(options.files)}))
@@ -139,27 +138,8 @@ def command_track(options: argparse.Namespace) -> int:
 
         write(measured, folder, made)
 
-    print("\n".join([*_track_lines(measured), *_written(options, "track", write, "index.html")]))
+    print("\n".join([*lines(measured), *_written(options, "track", write, "index.html")]))
     return 0
-
-
-def _track_lines(measured: Any) -> list[str]:
-    spin, flight, fit = measured.spin, measured.flight, measured.track or measured.axis
-    how = "C_M as tracked" if measured.track else "found from the axis"
-    found = [
-        f"{measured.table.source}: {len(spin.t)} frames at {1 / spin.frame_time:.4g}/s, {spin.measured.sum()} with cap "
-        f"and base, {spin.interpolated.sum()} interpolated ({'; '.join(measured.table.dialects)})",
-        f"release  t = {flight.release:.4f} s ({flight.release_how})",
-        f"landing  t = {flight.landing:.4f} s ({flight.landing_how})",
-        f"omega_0  {measured.omega0:.2f} +- {measured.omega0_deviation:.2g} rad/s; second half of the flight: "
-        f"{measured.mean:.3f} omega_0",
-        f"parabola v_0 = ({fit.v0x:.3f} +- {fit.sd_v0x:.1g}, {fit.v0y:.3f} +- {fit.sd_v0y:.1g}) m/s, "
-        f"g = {fit.g:.2f} +- {fit.sd_g:.1g} m/s^2 ({how})",
-        f"length   cap to base {measured.calibration.length * measured.metres:.4f} m, scatter "
-        f"{measured.calibration.spread * measured.metres * 1e3:.2g} mm, noise explains "
-        f"{measured.calibration.expected * measured.metres * 1e3:.2g} mm",
-    ]
-    return found + [f"WARNING  {warning}" for warning in measured.warnings]
 
 
 def _written(
@@ -240,14 +220,14 @@ def command_fit(options: argparse.Namespace) -> int:
     throw = read_scenario(options.scenario)
     measured, remarks = _read(options)
 
-    from flipproof.film.fit.compare import compare
-    from flipproof.film.fit.problem import pose
+    from flipproof.film.fit.compare import compare, report
+    from flipproof.film.fit.problem import disagreements, pose
 
     also = tuple(options.also)
     problems = [pose(measured, throw, name, also=also, slices=options.slices) for name in options.model]
-    remarks += _disagreements(problems[0], throw, also)
+    remarks += disagreements(problems[0], throw, also)
     contenders = compare(_estimates(problems, options.starts, options.minutes))
-    text = _report(contenders, remarks)
+    text = report(contenders, remarks)
 
     def write(folder: Path, made: Mapping[str, str]) -> None:
         from flipproof.film.fit.folder import write
@@ -272,19 +252,6 @@ def _read(options: argparse.Namespace) -> tuple[Any, list[str]]:
     tracks = {"cap": options.cap, "base": options.base, "length_unit": options.length_unit}
     measured, words = read_tracker(options.file, **tracks, **known)
     return measured, [words]
-
-
-def _disagreements(problem: Any, throw: Any, also: tuple[str, ...]) -> list[str]:
-    """Return what of the scenario the first frames contradict although it is not fitted."""
-    from flipproof.film.fit.problem import first_frames
-
-    near = {"omega0": 0.1 * abs(throw.omega0), "theta0": 0.05}
-    return [
-        f"the first frames say {name} = {value:.3g}, the scenario {getattr(throw, name):.3g}: correct it or add "
-        f"--also {name}"
-        for name, value in sorted(first_frames(problem.measured).items())
-        if name not in also and abs(value - getattr(throw, name)) > near[name]
-    ]
 
 
 def _estimates(problems: Sequence[Any], starts: int | None, minutes: float | None) -> list[Any]:
@@ -323,57 +290,6 @@ def _ticker(step: Callable[..., None], solver: str, planned: int | None) -> Call
             print(words, file=sys.stderr, flush=True)
 
     return tick
-
-
-def _report(contenders: Sequence[Any], remarks: Sequence[str]) -> str:
-    from flipproof.film.fit.compare import verdict
-
-    problem = contenders[0].estimate.problem
-    measured = problem.measured
-    how = "given" if measured.noise is not None else "estimated from neighbouring values"
-    lines = [
-        f"{measured.label}: {len(measured.t)} values of {measured.quantity} over {measured.t[-1]:.3f} s; noise of one "
-        f"{problem.noise:.3g} {measured.unit} ({how})"
-    ]
-    if measured.quantity == "omega":
-        lines.append("neighbouring values of omega share noise; intervals are widened by the residuals' autocovariance")
-    lines += remarks
-    for one in contenders:
-        lines += ["", *_fit_lines(one)]
-    lines += ["", verdict(contenders)]
-    return "\n".join(lines)
-
-
-def _fit_lines(one: Any) -> list[str]:
-    from flipproof.film.fit.compare import correlation, digits, promise, told
-    from flipproof.film.fit.problem import UNITS
-
-    estimate = one.estimate
-    throw = estimate.problem.throw
-    lines = [f"{one.solver}, {throw.n_slices} slices; {promise(one.solver, fits=one.fits)}"]
-    for found in one.intervals:
-        places = digits(found)
-        numbers = f"{found.value:.{places}f} [{found.low:.{places}f}, {found.high:.{places}f}]"
-        note = told(found)
-        lines.append(f"  {found.name:12} {numbers} {UNITS[found.name]}{'  ' + note if note else ''}")
-        if found.name == "drag":
-            gamma = [value / (2 * throw.slice_mass) for value in (found.value, found.low, found.high)]
-            lines.append(f"  {'alpha/2m':12} {gamma[0]:.4g} [{gamma[1]:.4g}, {gamma[2]:.4g}] /s")
-    pairs, names = correlation(estimate), estimate.problem.free
-    words = [f"{names[i]}-{names[j]} {pairs[i, j]:+.2f}" for i, j in combinations(range(len(names)), 2)]
-    lines.append(f"  correlation  {', '.join(words)}")
-    lines.append(
-        f"  chi^2        {estimate.chi2:.0f} for {estimate.freedom} degrees of freedom; residual "
-        f"{one.root_mean_square:.3g} {estimate.problem.measured.unit} (root mean square)"
-    )
-    levels = estimate.minima[:, -1]
-    same = int((levels < levels.min() + 1.0).sum())
-    lines.append(
-        f"  search       {estimate.flights} flights; {same} of {len(levels)} descents end there; intervals "
-        f"{math.sqrt(max(1.0, estimate.temperature)):.2f} times wider for misfit or shared noise, "
-        f"{math.sqrt(estimate.roughness):.2f} for roughness"
-    )
-    return lines
 
 
 def _positive(text: str) -> float:

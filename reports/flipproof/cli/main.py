@@ -327,13 +327,10 @@ def command_simulate(options: argparse.Namespace) -> int:
 
     scenario = read_scenario(options.scenario, options.slices)
     solver = find(options.solver)
-    settings: dict[str, Any] = {}
-    if options.steps is not None:
-        if solver.package != "slicemodel":
-            raise ValueError(f"--steps {options.steps}: {solver.name} is not a scheme and chooses its own steps")
-        settings["steps"] = options.steps
+    if options.steps is not None and solver.package != "slicemodel":
+        raise ValueError(f"--steps {options.steps}: {solver.name} is not a scheme and chooses its own steps")
     check_outputs(options, "out")
-    trajectory = solve(solver.name, scenario, **settings)
+    trajectory = solve(solver.name, scenario, **({} if options.steps is None else {"steps": options.steps}))
     table = trajectory_csv(trajectory)
     if options.out:
         write_text(options.out, table)

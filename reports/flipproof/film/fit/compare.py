@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Final, Literal
 
 import numpy as np
 
 from flipproof.film.fit.estimate import Estimate
-from flipproof.film.fit.problem import package_of
+from flipproof.film.fit.problem import UNITS, package_of
 from flipproof.film.fit.region import fits
 from slicemodel.trajectory import FloatArray
 
@@ -195,3 +196,50 @@ def digits(interval: Interval) -> int:
     """Return the digits after the point that an interval is worth: two of its width."""
     width = interval.high - interval.low
     return min(12, max(0, 1 - math.floor(math.log10(width)))) if width > 0 else 6
+
+
+def report(contenders: Sequence[Contender], remarks: Sequence[str]) -> str:
+    """Return estimates and comparison as lines for a terminal, after ``remarks`` on how the measurement was read."""
+    problem = contenders[0].estimate.problem
+    measured = problem.measured
+    how = "given" if measured.noise is not None else "estimated from neighbouring values"
+    lines = [
+        f"{measured.label}: {len(measured.t)} values of {measured.quantity} over {measured.t[-1]:.3f} s; noise of one "
+        f"{problem.noise:.3g} {measured.unit} ({how})"
+    ]
+    if measured.quantity == "omega":
+        lines.append("neighbouring values of omega share noise; intervals are widened by the residuals' autocovariance")
+    lines += remarks
+    for one in contenders:
+        lines += ["", *_fit_lines(one)]
+    lines += ["", verdict(contenders)]
+    return "\n".join(lines)
+
+
+def _fit_lines(one: Contender) -> list[str]:
+    estimate = one.estimate
+    throw = estimate.problem.throw
+    lines = [f"{one.solver}, {throw.n_slices} slices; {promise(one.solver, fits=one.fits)}"]
+    for found in one.intervals:
+        places = digits(found)
+        numbers = f"{found.value:.{places}f} [{found.low:.{places}f}, {found.high:.{places}f}]"
+        note = told(found)
+        lines.append(f"  {found.name:12} {numbers} {UNITS[found.name]}{'  ' + note if note else ''}")
+        if found.name == "drag":
+            gamma = [value / (2 * throw.slice_mass) for value in (found.value, found.low, found.high)]
+            lines.append(f"  {'alpha/2m':12} {gamma[0]:.4g} [{gamma[1]:.4g}, {gamma[2]:.4g}] /s")
+    pairs, names = correlation(estimate), estimate.problem.free
+    words = [f"{names[i]}-{names[j]} {pairs[i, j]:+.2f}" for i, j in combinations(range(len(names)), 2)]
+    lines.append(f"  correlation  {', '.join(words)}")
+    lines.append(
+        f"  chi^2        {estimate.chi2:.0f} for {estimate.freedom} degrees of freedom; residual "
+        f"{one.root_mean_square:.3g} {estimate.problem.measured.unit} (root mean square)"
+    )
+    levels = estimate.minima[:, -1]
+    same = int((levels < levels.min() + 1.0).sum())
+    lines.append(
+        f"  search       {estimate.flights} flights; {same} of {len(levels)} descents end there; intervals "
+        f"{math.sqrt(max(1.0, estimate.temperature)):.2f} times wider for misfit or shared noise, "
+        f"{math.sqrt(estimate.roughness):.2f} for roughness"
+    )
+    return lines

@@ -31,9 +31,6 @@ LIKELY: Final = 5.024
 REACH: Final = 15.0
 """chi^2 above the lowest up to which parameters are explored at the least: 0.06 % of two lie beyond, 0.5 % of four."""
 
-DRAWN: Final = 2000
-"""Points that the posterior is drawn with."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effort:
@@ -122,7 +119,7 @@ def estimate(problem: Problem, effort: Effort = USUAL, *, tick: Tick = lambda _:
     for _ in range(4):
         within = needed * variance
         known = explored(land, known, within, effort.points)
-        cloud = known.x[known.drawn(variance, DRAWN)]
+        cloud = known.x[known.drawn(variance)]
         steps = np.clip(0.5 * cloud.std(axis=0), problem.coarse_steps() / 40.0, problem.coarse_steps())
         first = int(np.argmin(known.chi2))
         if known.chi2[first] < lowest:
@@ -141,7 +138,7 @@ def estimate(problem: Problem, effort: Effort = USUAL, *, tick: Tick = lambda _:
     return Estimate(
         problem=problem, x=best, chi2=float(loss(land.residual(best) * land.scale)),
         temperature=variance * land.scale**2, roughness=rough,
-        minima=np.column_stack((ends, loss(residuals)))[order], cloud=known.x[known.drawn(variance, DRAWN)],
+        minima=np.column_stack((ends, loss(residuals)))[order], cloud=known.x[known.drawn(variance)],
         reach=np.array([likely.min(axis=0), likely.max(axis=0)]), flights=land.flights,
     )  # fmt: skip
 

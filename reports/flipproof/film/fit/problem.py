@@ -305,3 +305,14 @@ def first_frames(measured: Measurement) -> dict[str, float]:
     if angle:
         return {"theta0": float(found(0.0)), "omega0": float(found.deriv()(0.0))}
     return {"omega0": float(found(0.0))}
+
+
+def disagreements(problem: Problem, throw: Scenario, also: Sequence[str]) -> list[str]:
+    """Return what of the scenario the first frames contradict although it is not fitted."""
+    near = {"omega0": 0.1 * abs(throw.omega0), "theta0": 0.05}
+    return [
+        f"the first frames say {name} = {value:.3g}, the scenario {getattr(throw, name):.3g}: correct it or add "
+        f"--also {name}"
+        for name, value in sorted(first_frames(problem.measured).items())
+        if name not in also and abs(value - getattr(throw, name)) > near[name]
+    ]

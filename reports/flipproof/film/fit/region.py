@@ -80,9 +80,6 @@ def loss(residuals: FloatArray) -> FloatArray:
     return np.asarray(np.where(size <= HUBER, size * size, 2.0 * HUBER * size - HUBER * HUBER).sum(axis=-1))
 
 
-Draws = NDArray[np.intp]
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Points:
     """Points of the landscape that were flown.
@@ -116,7 +113,7 @@ class Points:
         low = chi2 <= max(level, np.sort(chi2)[min(fewest, len(chi2)) - 1])
         return Points(x=x[low], rows=rows[low], chi2=chi2[low])
 
-    def drawn(self, temperature: float, count: int) -> Draws:
+    def drawn(self, temperature: float, count: int = 2000) -> NDArray[np.intp]:
         """Return indices of ``count`` points, each as often as exp(-chi^2 / 2T) says (systematic resampling)."""
         weights = np.exp(-0.5 * (self.chi2 - self.chi2.min()) / temperature)
         ladder = (np.arange(count) + 0.5) / count
@@ -243,7 +240,7 @@ def roughness(region: Points, variance: float, seed: int) -> float:
     return max(1.0, rough / even) if even > 0 else 1.0
 
 
-def _fall(rows: FloatArray, truths: Draws, noise: FloatArray) -> float:
+def _fall(rows: FloatArray, truths: NDArray[np.intp], noise: FloatArray) -> float:
     """Return by how much the lowest of all ``rows`` is below the truth's on average when noise is added to a truth."""
     true = rows[truths]
     apart = (true**2).sum(axis=1)[:, None] - 2.0 * true @ rows.T + (rows**2).sum(axis=1)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -24,12 +23,6 @@ from flipproof.film.tracker.parabola import Parabola, distance_from_cap, fit_axi
 from flipproof.film.tracker.reader import read_track_table
 from flipproof.film.tracker.table import METRES, RADIANS, SECONDS, TrackFileError, TrackTable
 from slicemodel.trajectory import FloatArray
-
-CLEARLY: Final = 4.0
-"""Standard deviations by which the film's gravity must miss the known one."""
-
-AGREES: Final = 0.1
-"""Relative difference of turning rates that passes as agreement."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,6 +163,26 @@ def measure(request: Request) -> Measurement:
     )  # fmt: skip
 
 
+def lines(measured: Measurement) -> list[str]:
+    """Return a measurement in a few lines for a terminal."""
+    spin, flight, fit = measured.spin, measured.flight, measured.track or measured.axis
+    how = "C_M as tracked" if measured.track else "found from the axis"
+    found = [
+        f"{measured.table.source}: {len(spin.t)} frames at {1 / spin.frame_time:.4g}/s, {spin.measured.sum()} with cap "
+        f"and base, {spin.interpolated.sum()} interpolated ({'; '.join(measured.table.dialects)})",
+        f"release  t = {flight.release:.4f} s ({flight.release_how})",
+        f"landing  t = {flight.landing:.4f} s ({flight.landing_how})",
+        f"omega_0  {measured.omega0:.2f} +- {measured.omega0_deviation:.2g} rad/s; second half of the flight: "
+        f"{measured.mean:.3f} omega_0",
+        f"parabola v_0 = ({fit.v0x:.3f} +- {fit.sd_v0x:.1g}, {fit.v0y:.3f} +- {fit.sd_v0y:.1g}) m/s, "
+        f"g = {fit.g:.2f} +- {fit.sd_g:.1g} m/s^2 ({how})",
+        f"length   cap to base {measured.calibration.length * measured.metres:.4f} m, scatter "
+        f"{measured.calibration.spread * measured.metres * 1e3:.2g} mm, noise explains "
+        f"{measured.calibration.expected * measured.metres * 1e3:.2g} mm",
+    ]
+    return found + [f"WARNING  {warning}" for warning in measured.warnings]
+
+
 def _flight(request: Request, spin: MeasuredSpin, metres: float) -> Flight:
     """Return the flight, found with the gravity that the film shows if that is clearly not the known one.
 
@@ -184,6 +197,7 @@ def _flight(request: Request, spin: MeasuredSpin, metres: float) -> Flight:
         return flight, fit_axis(spin.t, spin.cap, spin.base, flight.inside & spin.measured, flight.release)
 
     gravity = GRAVITY / metres
+    clearly = 4.0  # standard deviations by which the film's gravity must miss the known one
     try:
         free, free_fit = found(None)
     except NoFlightError as error:
@@ -194,10 +208,10 @@ def _flight(request: Request, spin: MeasuredSpin, metres: float) -> Flight:
         flight, fit = free, free_fit
     # A flight found without knowing gravity must be much longer to be believed instead.
     longer = free.inside.sum() > 1.25 * flight.inside.sum()
-    if longer and abs(free_fit.g - gravity) > CLEARLY * free_fit.sd_g:
+    if longer and abs(free_fit.g - gravity) > clearly * free_fit.sd_g:
         flight, fit = free, free_fit
     for _ in range(3):
-        if abs(fit.g - gravity) <= max(CLEARLY * fit.sd_g, 0.005 * abs(gravity)):  # which shifts no end of a flight
+        if abs(fit.g - gravity) <= max(clearly * fit.sd_g, 0.005 * abs(gravity)):  # which shifts no end of a flight
             break
         gravity = fit.g
         try:
@@ -326,8 +340,8 @@ def check_angles(table: TrackTable, spin: MeasuredSpin, track: str, unit: str) -
 
 def _refuse(what: str, ratios: Mapping[str, float], unit: str, against: str) -> None:
     """Refuse a ratio that is not 1 in the given unit, and name the unit in which it is."""
-    if abs(ratios[unit] - 1) <= AGREES:
+    fits = [each for each, ratio in ratios.items() if abs(ratio - 1) <= 0.1]
+    if unit in fits:
         return
-    fits = [each for each, ratio in ratios.items() if abs(ratio - 1) <= AGREES]
     advice = f"it seems to be in {fits[0]}: --angle-unit {fits[0]}" if fits else "it belongs to something else"
     raise ValueError(f"{what} in {unit} is {ratios[unit]:.3g} times {against}; {advice}")

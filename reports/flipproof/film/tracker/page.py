@@ -131,10 +131,6 @@ def _shade(panels: Iterable[Axes], measured: Measurement) -> None:
         axes.margins(x=0.01)
 
 
-FIGURES = {"tracks": figure_tracks, "spin": figure_spin, "normalised": figure_normalised, "axis": figure_axis}
-"""Every figure of a measurement by name."""
-
-
 COLUMNS = {
     "t": "time [s]",
     "theta": "angle of cap to base from the downward vertical [rad]",
@@ -199,7 +195,8 @@ def write(measured: Measurement, folder: Path, provenance: Mapping[str, str]) ->
     shown = (column if column.dtype.kind == "f" else column.astype(int) for column in columns)
     write_text(folder / "track.csv", columns_csv(dict(zip(COLUMNS, shown, strict=True))))
     drawn = {}
-    for name, figure in FIGURES.items():
+    figures = {"tracks": figure_tracks, "spin": figure_spin, "normalised": figure_normalised, "axis": figure_axis}
+    for name, figure in figures.items():
         drawing = draw(figure(measured))
         drawn[name] = drawing.svg[drawing.svg.index("<svg") :]
         write_text(folder / f"{name}.svg", drawing.svg)
