@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -64,18 +64,17 @@ class Measured:
             f"the release fitted, {HELD[best.solver]} is nearest. {verdict(self.fits)}"
         )
 
-    def findings(self) -> tuple[Finding, ...]:
-        """Return one observation for each solver, and one for each fit."""
-        label, unit, made = self.measurement.label, self.measurement.unit, []
+    def findings(self) -> Iterator[Finding]:
+        """Yield one observation for each solver, and one for each fit."""
+        label, unit = self.measurement.label, self.measurement.unit
         for name, misfit in self.misfits.items():
             title = f"{HELD[name]} as thrown, held against {label}"
             note = "root mean square of measured minus computed, nothing fitted; the band is the noise of a value"
-            made.append(observed(f"measured-{name}", title, misfit, unit, note, band=self.noise))
+            yield observed(f"measured-{name}", title, misfit, unit, note, band=self.noise)
         for one in self.fits:
             id_, title = f"measured-fit-{one.solver}", f"{HELD[one.solver]} fitted to {label}"
             note = ", ".join(f"{i.name} = {i.value:.4g} [{i.low:.4g}, {i.high:.4g}]" for i in one.intervals)
-            made.append(observed(id_, title, one.root_mean_square, unit, note, band=self.noise))
-        return tuple(made)
+            yield observed(id_, title, one.root_mean_square, unit, note, band=self.noise)
 
     def exhibit(self) -> Exhibit:
         """Return the figure: the measurement over the solvers, and what is left of it."""
@@ -143,7 +142,7 @@ def part_measured(measurement: Measurement) -> Part:
         name="measured",
         title="Your measurement",
         study=study,
-        claims=lambda found: iter(found.findings()),
+        claims=Measured.findings,
         figures=lambda found: (found.exhibit(),),
         template=Path(__file__).with_name("measured.html.j2"),
     )

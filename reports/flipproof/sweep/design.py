@@ -89,17 +89,13 @@ class Point:
         content = {"content": self.content} if self.content else {}
         return {**self.throw, "solver": self.solver, "settings": self.settings, **content}
 
-    def text(self) -> str:
-        """Return the parameters as JSON, keys in order; it reads back to the last bit."""
-        return as_json(self.parameters())
-
     def key(self, code: str) -> str:
         """Return the key of this point as made by the code."""
-        return key_of(self.text(), code)
+        return key_of(as_json(self.parameters()), code)
 
 
 def key_of(text: str, code: str) -> str:
-    """Return the SHA-256 of a point's ``text``, floats to the last bit, and of the code that makes the point."""
+    """Return the SHA-256 of a point's parameters as JSON, and of the code that makes the point."""
     return hashlib.sha256(f"{code}\n{text}".encode()).hexdigest()
 
 

@@ -155,7 +155,7 @@ class Store(ExitStack):
 
     def _row(self, outcome: Outcome | Landed, flight: str | None, versions: int) -> tuple[Any, ...]:
         point = self.design.point(outcome.number)
-        parameters = point.text()
+        parameters = as_json(point.parameters())
         curves = None if outcome.curves is None else outcome.curves.astype("<f8").tobytes()
         return self._signed((
             outcome.number, key_of(parameters, self.code), *point.values, point.solver, as_json(point.settings),

@@ -192,12 +192,6 @@ def told(interval: Interval) -> str:
     return f"bounded from above only: {low:.3g} is not excluded" if interval.verdict == "bounded above" else ""
 
 
-def digits(interval: Interval) -> int:
-    """Return the digits after the point that an interval is worth: two of its width."""
-    width = interval.high - interval.low
-    return min(12, max(0, 1 - math.floor(math.log10(width)))) if width > 0 else 6
-
-
 def report(contenders: Sequence[Contender], remarks: Sequence[str]) -> str:
     """Return estimates and comparison as lines for a terminal, after ``remarks`` on how the measurement was read."""
     problem = contenders[0].estimate.problem
@@ -221,7 +215,8 @@ def _fit_lines(one: Contender) -> list[str]:
     throw = estimate.problem.throw
     lines = [f"{one.solver}, {throw.n_slices} slices; {promise(one.solver, fits=one.fits)}"]
     for found in one.intervals:
-        places = digits(found)
+        width = found.high - found.low  # of which two digits are shown
+        places = min(12, max(0, 1 - math.floor(math.log10(width)))) if width > 0 else 6
         numbers = f"{found.value:.{places}f} [{found.low:.{places}f}, {found.high:.{places}f}]"
         note = told(found)
         lines.append(f"  {found.name:12} {numbers} {UNITS[found.name]}{'  ' + note if note else ''}")

@@ -84,11 +84,11 @@ class Estimate:
     @property
     def freedom(self) -> int:
         """Values less parameters."""
-        return self.problem.points - len(self.x)
+        return len(self.problem.measured.t) - len(self.x)
 
     def residual(self) -> FloatArray:
         """Return measured minus predicted [rad or rad/s], shape (P,)."""
-        return self.problem.measured.values - self.problem.predicted(self.x)
+        return np.asarray(self.problem.measured.values - self.problem.predicted(self.x[np.newaxis])[0])
 
 
 def estimate(problem: Problem, effort: Effort = USUAL, *, tick: Tick = lambda _: None, seed: int = 0) -> Estimate:
@@ -99,7 +99,7 @@ def estimate(problem: Problem, effort: Effort = USUAL, *, tick: Tick = lambda _:
     """
     land = Landscape(problem, tick=tick)
     scanned, ends = _descents(land, effort.grid, effort.starts)
-    if effort.again and not fits(float(loss(land.residuals(ends)).min()), problem.points - len(problem.free)):
+    if effort.again and not fits(float(loss(land.residuals(ends)).min()), len(problem.measured.t) - len(problem.free)):
         # Either the equation is wrong, or every descent ended in a side minimum: look between the starts.
         drags, restitutions = effort.grid
         more = _descents(land, (2 * drags + 1, 2 * restitutions + 1), 4 * effort.starts)

@@ -100,7 +100,7 @@ def summary(contenders: Sequence[Contender], provenance: Mapping[str, str]) -> d
     return {
         "measured": problem.measured.label,
         "quantity": problem.measured.quantity,
-        "values": problem.points,
+        "values": len(problem.measured.t),
         "noise": problem.noise,
         "verdict": verdict(contenders),
         "fits": [_fit(one) for one in contenders],

@@ -114,11 +114,6 @@ class Problem:
     noise: float
 
     @property
-    def points(self) -> int:
-        """Number of measured values."""
-        return len(self.measured.t)
-
-    @property
     def _drag_scale(self) -> float:
         return 2.0 * self.throw.slice_mass * (abs(self.throw.omega0) / 20.0)
 
@@ -163,22 +158,18 @@ class Problem:
 
     # ------------------------------------------------------------------ prediction
 
-    def throw_at(self, x: FloatArray) -> Scenario:
-        """Return the throw at the coordinates ``x``, shape (K,)."""
-        values = self.parameters(np.clip(x, *self.bounds())[np.newaxis])[0].tolist()
-        return replace(self.throw, **dict(zip(self.free, values, strict=True)))
-
-    def predicted(self, x: FloatArray) -> FloatArray:
-        """Return what would be measured at the coordinates ``x``, shape (P,); NaN where the solver gave up."""
-        return np.asarray(predict([self.throw_at(x)], self.solver, self.measured)[0])
+    def predicted(self, points: FloatArray) -> FloatArray:
+        """Return what would be measured at many coordinates (M, K), shape (M, P); NaN where the solver gave up."""
+        inside = self.parameters(np.clip(points, *self.bounds())).tolist()
+        throws = [replace(self.throw, **dict(zip(self.free, values, strict=True))) for values in inside]
+        return predict(throws, self.solver, self.measured)
 
     def residuals(self, points: FloatArray) -> FloatArray:
         """Return (measured - predicted) / noise at many coordinates (M, K), shape (M, P).
 
         Where a solver gave up the residual counts as ``FAR``.
         """
-        predicted = predict([self.throw_at(x) for x in points], self.solver, self.measured)
-        difference = (self.measured.values - predicted) / self.noise
+        difference = (self.measured.values - self.predicted(points)) / self.noise
         return np.asarray(np.where(np.isfinite(difference), difference, FAR))
 
 

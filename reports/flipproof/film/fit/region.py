@@ -16,6 +16,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import toeplitz
 from scipy.optimize import least_squares
 from scipy.stats import chi2 as distribution
 from scipy.stats.qmc import Halton
@@ -216,8 +217,7 @@ def autocovariance(residual: FloatArray) -> FloatArray:
     lags = np.arange(count)
     taper = np.clip(1.0 - lags / (reach + 1.0), 0.0, None)
     products = np.array([residual[: count - k] @ residual[k:] / count if taper[k] else 0.0 for k in lags])
-    row = taper * products
-    return np.asarray(row[np.abs(lags[:, np.newaxis] - lags)])
+    return np.asarray(toeplitz(taper * products))
 
 
 def roughness(region: Points, variance: float, seed: int) -> float:

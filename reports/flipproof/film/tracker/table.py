@@ -132,8 +132,7 @@ MINUS: Final = "\u2212"
 """Minus sign that Java prints in some languages."""
 
 NUMBERS: Final = {
-    ".": re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?"),
-    ",": re.compile(r"[+-]?(?:[0-9]+(?:,[0-9]*)?|,[0-9]+)(?:[eE][+-]?[0-9]{1,4})?"),
+    sign: re.compile(rf"[+-]?(?:[0-9]+(?:[{sign}][0-9]*)?|[{sign}][0-9]+)(?:[eE][+-]?[0-9]{{1,4}})?") for sign in ".,"
 }
 """Decimal sign -> what a number looks like."""
 
