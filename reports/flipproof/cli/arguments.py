@@ -117,16 +117,11 @@ number = reader("a number in (-1e6, 1e6)", float, lambda value: abs(value) < 1e6
 def check_outputs(options: argparse.Namespace, *names: str) -> None:
     """Refuse by a ValueError, before the work begins, files of options that could not be written after it."""
     for name in names:
-        if path := getattr(options, name):
-            check_writable(f"--{name}", path)
-
-
-def check_writable(option: str, path: Path) -> None:
-    """Refuse by a ValueError, before the work begins, a file that could not be written after it."""
-    if path.is_dir():
-        raise ValueError(f"{option} {path} is a folder; name a file")
-    if not path.parent.is_dir():
-        raise ValueError(f"{option} {path}: the folder {path.parent} does not exist")
+        path = getattr(options, name)
+        if path and path.is_dir():
+            raise ValueError(f"--{name} {path} is a folder; name a file")
+        if path and not path.parent.is_dir():
+            raise ValueError(f"--{name} {path}: the folder {path.parent} does not exist")
 
 
 def refuse_overwriting(options: argparse.Namespace) -> None:

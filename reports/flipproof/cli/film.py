@@ -14,7 +14,7 @@ from typing import Any
 from flipproof.cli.arguments import (
     SCENARIO_HELP,
     add_command,
-    check_writable,
+    check_outputs,
     command_line,
     count,
     digits,
@@ -165,8 +165,7 @@ def command_export(options: argparse.Namespace) -> int:
 
     if options.length_unit not in METRES:
         raise ValueError(f"length_unit = {options.length_unit!r} is unknown; known: {', '.join(METRES)}")
-    if options.out:
-        check_writable("--out", options.out)
+    check_outputs(options, "out")
     scenario = read_scenario(options.scenario, options.slices)
     scenario = replace(scenario, launch_velocity=_velocity(scenario.launch_velocity, options))
     times = frame_times(scenario, options.frame_rate)
