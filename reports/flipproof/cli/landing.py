@@ -135,14 +135,12 @@ def command_upright(options: argparse.Namespace) -> int:
     from flipproof.landing.aim import FAMILIES
     from flipproof.landing.scatter import Scatter
     from flipproof.landing.upright import make_upright
+    from flipproof.sweep.errors import refuse_unknown
     from slicemodel import Table
-    from slicemodel.scenario import unknown_name
 
     Table(height=0.0, restitution=options.restitution, friction=options.friction)
     families = tuple(dict.fromkeys(name.strip() for name in options.families.split(",")))
-    for family in families:
-        if family not in FAMILIES:
-            raise ValueError(unknown_name("--families", family, FAMILIES))
+    refuse_unknown("--families", families, FAMILIES)
     if throw.frozen:
         raise ValueError("scenario.frozen = true: the study throws water and ice beside it; leave it out")
     size = Size(
