@@ -17,6 +17,12 @@ from slicemodel.trajectory import FloatArray
 
 Verdict = Literal["told", "bounded above", "bounded below", "not told"]
 
+INDISTINCT: Final = 4.0
+"""Difference of AIC up to which two equations are said to do equally well."""
+
+COUNTED: Final = ("eq8", "free-flight")
+"""Equations of the reference whose intervals held the truth in at least 90 of 100 twins (``benchmarks/twins.py``)."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Interval:
@@ -84,13 +90,6 @@ def correlation(estimate: Estimate) -> FloatArray:
     spread = values.std(axis=0)
     centred = np.where(spread > 0, (values - values.mean(axis=0)) / np.where(spread > 0, spread, 1.0), 0.0)
     return np.asarray(centred.T @ centred / len(values))
-
-
-INDISTINCT: Final = 4.0
-"""Difference of AIC up to which two equations are said to do equally well."""
-
-COUNTED: Final = ("eq8", "free-flight")
-"""Equations of the reference whose intervals held the truth in at least 90 of 100 twins (``benchmarks/twins.py``)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -197,6 +197,8 @@ def _levelled(land: Landscape, points: FloatArray) -> tuple[FloatArray, FloatArr
     return best, lowest
 
 
+# ---------------------------------------------------------------------- what a search costs
+
 COARSE: Final = Effort(grid=(5, 4), starts=2, points=60, again=False)
 """A search of a quarter to a sixth of the flights: the same estimates, and ends of intervals that are less certain."""
 

@@ -121,6 +121,8 @@ def column_name(heading: str) -> tuple[str, str]:
     return name, unit
 
 
+# ---------------------------------------------------------------------- bytes, lines and cells
+
 MOST_BYTES: Final = 50_000_000
 """Larger files are no export: an hour at 240 frames/s with ten columns holds about this."""
 
