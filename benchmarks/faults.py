@@ -79,7 +79,7 @@ FAULTS = (
     ("reports/flipproof/chapters/stability/study.py", "if not error <= GOOD:", "if error > GOOD:", "test_stability.py"),
     ("reports/flipproof/film/tracker/smoothing.py", "np.sqrt(1 - own[usable])", "(1 - own[usable])",
      "tracker/test_tracker_kinematics.py"),
-    ("reports/flipproof/film/fit/uncertainty.py", "middle + np.sqrt(estimate.roughness)", "middle + estimate.roughness",
+    ("reports/flipproof/film/fit/compare.py", "middle + np.sqrt(estimate.roughness)", "middle + estimate.roughness",
      "test_fit.py"),
     ("reports/flipproof/page/motion.py", "- 0.5 * scenario.gravity", "- scenario.gravity", "test_motion.py"),
     ("reports/flipproof/sweep/run.py", "(points[:middle], points[middle:])", "(points[:middle], points[middle + 1 :])",

@@ -21,10 +21,9 @@ from typing import Any
 
 import ode_reference
 from flipproof.sweep.design import read_design
-from flipproof.sweep.run import run_sweep
+from flipproof.sweep.run import Workers, run_sweep
 from flipproof.sweep.store import Store
 from flipproof.sweep.work import code_identity
-from flipproof.sweep.workers import Workers
 
 DESIGN = """\
 [scenario]

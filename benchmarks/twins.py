@@ -28,11 +28,11 @@ from typing import Any, Final
 import numpy as np
 from tqdm import tqdm
 
+from flipproof.film.fit.compare import Interval, intervals
 from flipproof.film.fit.estimate import Estimate, estimate
-from flipproof.film.fit.landscape import loss
 from flipproof.film.fit.problem import ALSO, SLICES, Measurement, Quantity, flights, pose
 from flipproof.film.fit.reading import averaged_omega
-from flipproof.film.fit.uncertainty import Interval, intervals
+from flipproof.film.fit.region import loss
 from flipproof.film.tracker.kinematics import angle, direction
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray

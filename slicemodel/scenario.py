@@ -171,6 +171,21 @@ def read_text(path: Path, most: int) -> str:
     return content.decode("utf-8")
 
 
+def read_toml(path: str | PathLike[str], most: int) -> tuple[dict[str, Any], str]:
+    """Return the tables of a TOML file of at most ``most`` bytes, and its text; a ScenarioError names the file."""
+    try:
+        text = read_text(Path(path), most)
+        return tomllib.loads(text), text
+    except UnsuitableFileError as error:
+        raise ScenarioError(f"{path}: {error}") from None
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except RecursionError:
+        raise ScenarioError(f"{path}: is nested too deeply") from None
+    except ValueError as error:  # bad TOML, bad UTF-8, numbers of thousands of digits
+        raise ScenarioError(f"{path}: is not valid TOML ({error})") from None
+
+
 def refuse_devices(path: Path) -> None:
     """Refuse a device, a pipe or a socket, which may have no end or never begin, unless this program has it open.
 
@@ -377,18 +392,8 @@ class Scenario:
             Naming file, table and key: unreadable file, bad TOML, unknown table or key
             (with the nearest known name), impossible value.
         """
-        name = str(path)
-        try:
-            document = tomllib.loads(read_text(Path(path), MOST_FILE))
-        except UnsuitableFileError as error:
-            raise ScenarioError(f"{name}: {error}") from None
-        except OSError as error:
-            raise ScenarioError(f"{name}: cannot be read ({error.strerror or error})") from None
-        except RecursionError:
-            raise ScenarioError(f"{name}: is nested too deeply") from None
-        except ValueError as error:  # bad TOML, bad UTF-8, numbers of thousands of digits
-            raise ScenarioError(f"{name}: is not valid TOML ({error})") from None
-        return cls.from_mapping(document, source=name)
+        document, _ = read_toml(path, MOST_FILE)
+        return cls.from_mapping(document, source=str(path))
 
     @classmethod
     def from_mapping(cls, document: Mapping[str, Any], *, source: str = "scenario") -> Scenario:

@@ -6,15 +6,17 @@ hand before the flight and a table after it. Only the way of writing differs fro
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 import ode_reference
-from flipproof.film.tracker.export import STYLES, data_track_text, frame_times, tracker_text
-from flipproof.film.tracker.synthetic import SyntheticVideo, synthetic_video, with_noise
+from flipproof.film.tracker.export import SyntheticVideo, data_track_text, frame_times, synthetic_video, with_noise
 from slicemodel import Scenario
+from slicemodel.trajectory import FloatArray
 
 NOISE = 5e-4
 LOST = (20, 57, 58, 101)
@@ -30,6 +32,83 @@ THROW = Scenario(
 
 ICE_THROW = replace(THROW, frozen=True, omega0=20.0, theta0=np.pi / 2, duration=0.549, launch_velocity=(0.5, 1.94))
 """The same bottle with ice, upright after two."""
+
+
+class Style(NamedTuple):
+    """How one kind of export is written.
+
+    Parameters
+    ----------
+    delimiter, decimal, newline : signs
+    multi : the first line of an export of several tracks, "" for none
+    closing : True if the rows of names end with a delimiter
+    encoding : a codec of Python
+    subscripts : True for the older ``v_{x}``, else ``vx``
+    underscores : True if names hold underscores for spaces, as a copied table does
+    comment : lines that begin with // above the table
+    digits : of a number; 0 prints every digit, as "unformatted" does
+    """
+
+    delimiter: str = "\t"
+    decimal: str = "."
+    newline: str = "\n"
+    multi: str = "#multi:"
+    closing: bool = True
+    encoding: str = "utf-8"
+    subscripts: bool = False
+    underscores: bool = False
+    comment: str = ""
+    digits: int = 0
+
+
+STYLES = {
+    "tab": Style(digits=4),
+    "tab_unformatted": Style(),
+    "semicolon_decimal_comma": Style(delimiter=";", decimal=",", digits=4),
+    "comma": Style(delimiter=",", digits=4, comment="synthetic"),
+    "space": Style(delimiter=" ", underscores=True, digits=5),
+    "byte_order_mark": Style(encoding="utf-8-sig", newline="\r\n", decimal=",", digits=4),
+    "utf16": Style(encoding="utf-16", digits=4),
+    "older_headings": Style(multi="multi:", subscripts=True, digits=4),
+    "single": Style(multi="", digits=4),
+    "copied_table": Style(multi="", closing=False, underscores=True, digits=4, comment="synthetic"),
+}
+"""Every style by the name of the file that shows it."""
+
+
+def tracker_number(value: float, digits: int, decimal: str) -> str:
+    """Return a number as Tracker prints it: fixed from 0.1 to 1000, else with E, and 0.0; NaN is an empty cell.
+
+    ``digits`` significant digits, 0 for the shortest form that reads back exactly.
+    """
+    if np.isnan(value):
+        return ""
+    if value == 0:
+        return f"0{decimal}0"
+    if 0.1 <= abs(value) < 1000:
+        text = f"{value:#.{digits}g}" if digits else repr(float(value))
+    else:
+        printed = f"{value:.{digits - 1}e}" if digits else np.format_float_scientific(value, trim="0")
+        mantissa, _, exponent = printed.partition("e")
+        text = f"{mantissa}E{int(exponent)}"
+    return text.replace(".", decimal)
+
+
+def tracker_text(t: FloatArray, tracks: Mapping[str, Mapping[str, FloatArray]], style: Style) -> str:
+    """Return an export of tracks at times ``t`` (P,): by track its columns by name, each (P,), NaN where missing."""
+    end = style.delimiter if style.closing else ""
+    names, titles = style.delimiter, ["t"]
+    for k, (name, columns) in enumerate(tracks.items()):
+        shown = name.replace(" ", "_") if style.underscores else name
+        cells = len(columns) - (1 if k == len(tracks) - 1 and not style.closing else 0)
+        names += shown + style.delimiter * cells
+        titles += [f"{title[0]}_{{{title[1:]}}}" if style.subscripts and len(title) > 1 else title for title in columns]
+    lines = [f"// {style.comment}"] if style.comment else []
+    lines += [style.multi] if style.multi else []
+    lines += [names, style.delimiter.join(titles) + end]
+    values = np.column_stack((t, *(column for columns in tracks.values() for column in columns.values())))
+    lines += [style.delimiter.join(tracker_number(v, style.digits, style.decimal) for v in row) for row in values]
+    return style.newline.join(lines) + style.newline
 
 
 def video(throw: Scenario) -> SyntheticVideo:

@@ -11,14 +11,12 @@ import pytest
 from twins import film
 
 import ode_reference
-from flipproof.cli.fit import add_fit
-from flipproof.film.fit.compare import compare, promise, told, verdict
+from flipproof.cli.film import add_film
+from flipproof.film.fit.compare import compare, correlation, intervals, promise, told, verdict
 from flipproof.film.fit.estimate import Effort, estimate, scan
-from flipproof.film.fit.landscape import HUBER, Landscape, loss
 from flipproof.film.fit.problem import ALWAYS, FAR, Measurement, Problem, first_frames, noise_of, pose, predict
 from flipproof.film.fit.reading import averaged_omega, read_flight
-from flipproof.film.fit.region import Points, autocovariance, explored, roughness, temperature
-from flipproof.film.fit.uncertainty import correlation, intervals
+from flipproof.film.fit.region import HUBER, Landscape, Points, autocovariance, explored, loss, roughness, temperature
 from flipproof.film.tracker.kinematics import angle
 from slicemodel import Scenario
 
@@ -361,7 +359,7 @@ def test_a_table_is_cut_from_release_to_landing_and_empty_cells_are_left_out(tmp
 
 def run(*arguments):
     parser = argparse.ArgumentParser()
-    add_fit(parser.add_subparsers(required=True))
+    add_film(parser.add_subparsers(required=True))
     options = parser.parse_args(["fit", *map(str, arguments)])
     return options.action(options)
 

@@ -29,7 +29,7 @@ from flipproof.landing.throw import land_throw, told
 from flipproof.landing.upright import drive, make_case, make_upright
 from flipproof.landing.work import LANDING, Landed, flown, make_landing, saddle, touch_readings
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.workers import Workers
+from flipproof.sweep.run import Workers
 from ode_reference import fly, land
 from ode_reference.landing_forms import Block
 from slicemodel import Scenario, Table

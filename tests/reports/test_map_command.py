@@ -22,12 +22,21 @@ from flipproof.frame.pool import Here
 from flipproof.frame.solvers import make
 from flipproof.sweep.design import design_of
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.planned import design_of_runs, read_runs
-from flipproof.sweep.split import ENDS, plan_split, releases, split_rows, waterfall_csv
+from flipproof.sweep.planned import (
+    ENDS,
+    Plan,
+    design_of_runs,
+    map_csv,
+    map_facts,
+    plan_split,
+    read_runs,
+    releases,
+    split_rows,
+    waterfall_csv,
+)
+from flipproof.sweep.run import Workers
 from flipproof.sweep.store import Store
-from flipproof.sweep.validity_map import Plan, map_csv, map_facts
 from flipproof.sweep.work import code_identity, make_batch
-from flipproof.sweep.workers import Workers
 from slicemodel import Scenario
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -250,7 +259,7 @@ def test_the_waterfall_command_draws_every_observable(capsys, tmp_path, monkeypa
     for observable in OBSERVABLES:
         assert (tmp_path / "out" / f"waterfall-{observable.name}.png").stat().st_size > 10_000
     drawn = Drawing("<svg/>", b"anew")
-    monkeypatch.setattr("flipproof.sweep.split.draw", lambda _: drawn)
+    monkeypatch.setattr("flipproof.sweep.planned.draw", lambda _: drawn)
     status, out, _ = run(capsys, *options)
     assert "; 164 were there" in out
     for observable in OBSERVABLES:

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from flipproof.cli import main as cli
+from flipproof.sweep.command import export
 from flipproof.sweep.damaged import POINT, _records, count, rows
 from flipproof.sweep.design import design_of
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.export import export
 from flipproof.sweep.files import TEMPORARY
 from flipproof.sweep.salvage import salvage
 from flipproof.sweep.schema import PAGE, columns
@@ -364,7 +364,7 @@ def test_rows_of_every_length_are_read(tmp_path):
         points = [replace(outcome(k, 0), message="x" * (150 * k)) for k in range(POINTS)]
         store.add([Returned(CODE, {}, points, 0.1)])
         file = store.file
-    found = {row[0]: row[columns(design(0)).index("message")] for row in rows(file, design(0), CODE)}
+    found = {row[0]: row[list(columns(design(0))).index("message")] for row in rows(file, design(0), CODE)}
     assert found == {k: "x" * (150 * k) for k in range(POINTS)}
 
 

@@ -225,7 +225,7 @@ def test_every_mistake_is_one_line_and_status_2(undisturbed, capsys, tmp_path, a
 
 
 def test_nobody_at_the_address_is_one_line(undisturbed, capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("flipproof.sweep.workers.CONNECT", 0.5)
+    monkeypatch.setattr("flipproof.sweep.run.CONNECT", 0.5)
     design, _ = undisturbed
     status, _, err = run(capsys, design, "--out", tmp_path / "out", "--dask", "tcp://127.0.0.1:1")
     assert status == 2
@@ -236,7 +236,7 @@ def test_dask_that_is_not_installed_is_one_line(undisturbed, capsys, tmp_path, m
     def missing(name):
         raise ModuleNotFoundError(name=name)
 
-    monkeypatch.setattr("flipproof.sweep.workers.import_module", missing)
+    monkeypatch.setattr("flipproof.sweep.run.import_module", missing)
     design, _ = undisturbed
     status, _, err = run(capsys, design, "--out", tmp_path / "out", "--dask", "tcp://127.0.0.1:1")
     assert status == 2

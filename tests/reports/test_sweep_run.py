@@ -14,10 +14,18 @@ from flipproof.frame.processes import Processes, WorkerDiedError
 from flipproof.sweep import run
 from flipproof.sweep.design import design_of
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.run import DEATHS_IN_A_ROW, GROWTH, LONE_DEATHS, MOST_BYTES, Line, run_sweep
+from flipproof.sweep.run import (
+    DEATHS_IN_A_ROW,
+    GROWTH,
+    LONE_DEATHS,
+    MOST_BYTES,
+    Line,
+    Workers,
+    local_workers,
+    run_sweep,
+)
 from flipproof.sweep.store import Store
 from flipproof.sweep.work import Outcome, Returned
-from flipproof.sweep.workers import Workers, local_workers
 
 CODE = "0.1.0+test"
 

@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 
 from flipproof.output.ownership import MARKER, marker_text
-from flipproof.sweep import export as exporting
+from flipproof.sweep.command import LEFT_OUT, check_export, export
 from flipproof.sweep.design import design_of
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.export import LEFT_OUT, check_export, export
 from flipproof.sweep.files import whole_file
 from flipproof.sweep.schema import columns
 from flipproof.sweep.store import Store
@@ -360,6 +359,6 @@ def test_an_export_that_cannot_be_written_is_refused_first(tmp_path, monkeypatch
     with pytest.raises(SweepError, match="its folder does not exist"):
         check_export(tmp_path / "nowhere" / "rows.csv", tmp_path)
     check_export(tmp_path / "sweep" / "rows.csv", tmp_path / "sweep")
-    monkeypatch.setattr(exporting, "import_module", missing)
+    monkeypatch.setattr("flipproof.sweep.command.import_module", missing)
     with pytest.raises(SweepError, match="needs pyarrow: install flipproof with its extra 'parquet'"):
         check_export(tmp_path / "rows.parquet", tmp_path)

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import os
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NoReturn
+from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 
 from flipproof.cli.console import readable
 
 if TYPE_CHECKING:
     from flipproof.frame.findings import Finding
     from flipproof.frame.store import RunStore
+
+Read = TypeVar("Read")
 
 SCENARIO_HELP: Final = "scenario file (TOML with tables [scenario] and [bottle]); default: the paper's own throw"
 
@@ -78,37 +79,49 @@ def check_guests(specs: Sequence[str]) -> None:
             raise ValueError(f"--with {spec} is there twice")
 
 
-def count(text: str) -> int:
-    """Return a whole number of at least 1."""
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
+def reader(words: str, read: Callable[[str], Read], admissible: Callable[[Read], bool]) -> Callable[[str], Read]:
+    """Return what reads an argument; one that cannot be read, or is not admissible, is said not to be ``words``."""
+
+    def read_argument(text: str) -> Read:
+        with suppress(ValueError):
+            value = read(text)
+            if admissible(value):
+                return value
+        raise argparse.ArgumentTypeError(f"{text!r} is not {words}")
+
+    return read_argument
+
+
+def digits(text: str) -> int:
+    """Return the whole number that digits say; raise ValueError for anything else."""
+    if not text.isdecimal():
+        raise ValueError(text)
     return int(text)
 
 
-def number(text: str) -> float:
-    """Return a number that is neither endless nor absurd."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not abs(value) < 1e6:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number in (-1e6, 1e6)")
-    return value
+def sides(text: str) -> tuple[int, int]:
+    """Return the two whole numbers of COLUMNSxROWS; raise ValueError for anything else."""
+    columns, _, rows = text.partition("x")
+    return digits(columns), digits(rows)
+
+
+def numbers(text: str) -> tuple[float, ...]:
+    """Return numbers between commas."""
+    return tuple(number(part.strip()) for part in text.split(","))
+
+
+count = reader("a whole number of at least 1", digits, lambda value: value >= 1)
+number = reader("a number in (-1e6, 1e6)", float, lambda value: abs(value) < 1e6)
 
 
 def check_outputs(options: argparse.Namespace, *names: str) -> None:
     """Refuse by a ValueError, before the work begins, files of options that could not be written after it."""
     for name in names:
-        if path := getattr(options, name):
-            check_writable(f"--{name}", path)
-
-
-def check_writable(option: str, path: Path) -> None:
-    """Refuse by a ValueError, before the work begins, a file that could not be written after it."""
-    if path.is_dir():
-        raise ValueError(f"{option} {path} is a folder; name a file")
-    if not path.parent.is_dir():
-        raise ValueError(f"{option} {path}: the folder {path.parent} does not exist")
+        path = getattr(options, name)
+        if path and path.is_dir():
+            raise ValueError(f"--{name} {path} is a folder; name a file")
+        if path and not path.parent.is_dir():
+            raise ValueError(f"--{name} {path}: the folder {path.parent} does not exist")
 
 
 def refuse_overwriting(options: argparse.Namespace) -> None:

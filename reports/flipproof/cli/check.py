@@ -18,10 +18,13 @@ from flipproof.cli.arguments import (
     check_outputs,
     count,
     read_scenario,
+    reader,
     store_of,
     write_json,
     write_junit,
 )
+
+tolerance = reader("a finite number of at least 0", float, lambda value: 0.0 <= value < math.inf)
 
 TOLERANCE_HELP: Final = (
     "what a finding may move beyond its bands, in its own unit (default 1e-6: round-off of another machine; 0 for the "
@@ -114,17 +117,6 @@ def _groups(text: str) -> tuple[str, ...]:
     if unknown or not given:
         raise argparse.ArgumentTypeError(f"{', '.join(unknown) or text!r} is not among {', '.join(known)}")
     return tuple(group for group in known if group in given)
-
-
-def tolerance(text: str) -> float:
-    """Return a finite number of at least 0."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not 0.0 <= value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number of at least 0")
-    return value
 
 
 def add_compare(commands: Any) -> None:

@@ -80,9 +80,10 @@ def command_completion(options: argparse.Namespace) -> int:
 
 def script(shell: str, top: argparse.ArgumentParser, solvers: list[str]) -> str:
     """Return the script for a shell; a file's name is completed where there are no words."""
-    commands = _commands(top)
+    (found,) = (action for action in top._actions if isinstance(action, argparse._SubParsersAction))
+    commands: dict[str, argparse.ArgumentParser] = dict(found.choices)
     if shell == "fish":
-        return FISH + "".join(f"complete -c flipproof {line}\n" for line in _fish(top, solvers))
+        return FISH + "".join(f"complete -c flipproof {line}\n" for line in _fish(top, commands, solvers))
     first = shlex.quote(" ".join([*commands, *_options(top)]))
     head = HEAD.format(shell=shell, prefix=ZSH if shell == "zsh" else "", commands=first)
     lines = [line for name, command in commands.items() for line in _values(name, command, solvers)]
@@ -91,25 +92,26 @@ def script(shell: str, top: argparse.ArgumentParser, solvers: list[str]) -> str:
         f'        "{name} -"*) words={shlex.quote(" ".join(_options(each)))} ;;' for name, each in commands.items()
     ]
     for name, command in commands.items():
-        words = [word for action in _positionals(command) for word in _words(action, solvers)]
+        words = _first_words(command, solvers)
         if words:
-            lines.append(f'        "{name} "*) words={shlex.quote(" ".join(dict.fromkeys(words)))} ;;')
+            lines.append(f'        "{name} "*) words={shlex.quote(words)} ;;')
     return head + "\n".join(lines) + "\n" + TAIL
 
 
-def _fish(top: argparse.ArgumentParser, solvers: list[str]) -> Iterator[str]:
+def _fish(
+    top: argparse.ArgumentParser, commands: dict[str, argparse.ArgumentParser], solvers: list[str]
+) -> Iterator[str]:
     """Yield a line for every command and option, with what fish says beside it, and for every word."""
     first = "-n __flipproof_first"
     yield from (f"{first} -l {action.option_strings[-1][2:]}" for action in top._actions if action.option_strings)
-    for name, command in _commands(top).items():
+    for name, command in commands.items():
         yield f"{first} -a {name} -d {_for_fish(command.description or '')}"
         here = f"-n '__flipproof_is {name}'"
-        positionals = _positionals(command)
+        positionals = command._get_positional_actions()
         if not positionals or any(action.choices is not None for action in positionals):
             yield f"{here} -f"  # no file's name stands there
-        words = [word for action in positionals for word in _words(action, solvers)]
-        if words:
-            yield f"{here} -a {_for_fish(' '.join(dict.fromkeys(words)))}"
+        if offered := _first_words(command, solvers):
+            yield f"{here} -a {_for_fish(offered)}"
         for action in command._actions:
             words = _words(action, solvers)
             # After -r fish offers files, too, after -x words only.
@@ -127,19 +129,9 @@ def _for_fish(text: str) -> str:
     return f"'{escaped}'"
 
 
-def _commands(top: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
-    """Return the parser of every command by its name."""
-    (found,) = (action for action in top._actions if isinstance(action, argparse._SubParsersAction))
-    return dict(found.choices)
-
-
 def _options(parser: argparse.ArgumentParser) -> list[str]:
     """Return the long options of a parser."""
     return [word for action in parser._actions for word in action.option_strings if word.startswith("--")]
-
-
-def _positionals(parser: argparse.ArgumentParser) -> list[argparse.Action]:
-    return [action for action in parser._actions if not action.option_strings]
 
 
 def _values(name: str, command: argparse.ArgumentParser, solvers: list[str]) -> Iterator[str]:
@@ -156,6 +148,11 @@ def _values(name: str, command: argparse.ArgumentParser, solvers: list[str]) -> 
                 free += cases
     if free:
         yield f"        {'|'.join(free)}) return ;;"
+
+
+def _first_words(command: argparse.ArgumentParser, solvers: list[str]) -> str:
+    """Return what may stand for the arguments of a command that are no options, as far as that is words."""
+    return " ".join(dict.fromkeys(w for action in command._get_positional_actions() for w in _words(action, solvers)))
 
 
 def _words(action: argparse.Action, solvers: list[str]) -> list[str]:

@@ -9,10 +9,27 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, number, progress_bar, read_scenario
+from flipproof.cli.arguments import (
+    SCENARIO_HELP,
+    add_command,
+    count,
+    digits,
+    number,
+    numbers,
+    progress_bar,
+    read_scenario,
+    reader,
+    sides,
+)
 from flipproof.cli.sweeps import add_store, fill
 
 SLICES: Final = 20
+
+seed = reader("a whole number in [0, 2^63)", digits, lambda value: value < 2**63)
+cells = reader("COLUMNSxROWS, each in [2, 200], such as 24x24", sides, lambda each: min(each) >= 2 and max(each) <= 200)
+scatter = reader(
+    "SPIN,DEGREES,SPEED, three numbers in [0, inf)", numbers, lambda values: len(values) == 3 and min(values) >= 0.0
+)
 
 
 def add_landing(commands: Any) -> None:
@@ -48,12 +65,12 @@ def add_landing(commands: Any) -> None:
         "--families", default="A,B", metavar="A,B", help="A: omega_0 as thrown, height of the table solved for; B: "
         "time of flight as thrown, omega_0 solved for (%(default)s)",
     )  # fmt: skip
-    upright.add_argument("--scatter", type=_scatter, metavar="SPIN,DEGREES,SPEED", help="standard deviations: share of "
+    upright.add_argument("--scatter", type=scatter, metavar="SPIN,DEGREES,SPEED", help="standard deviations: share of "
                          "omega_0, of theta_0 [degrees], of the launch velocity [m/s] (0.05,5,0.1)")  # fmt: skip
-    upright.add_argument("--seed", type=_seed, default=1, metavar="N", help="seed of all throws (%(default)s)")
-    upright.add_argument("--map", type=_cells, default=(24, 24), metavar="CxR", help="cells of the map (24x24)")
+    upright.add_argument("--seed", type=seed, default=1, metavar="N", help="seed of all throws (%(default)s)")
+    upright.add_argument("--map", type=cells, default=(24, 24), metavar="CxR", help="cells of the map (24x24)")
     upright.add_argument(
-        "--engine", type=_seed, default=60, metavar="N", help="throws a point by soft contacts; 0: none (%(default)s)"
+        "--engine", type=seed, default=60, metavar="N", help="throws a point by soft contacts; 0: none (%(default)s)"
     )
     _add_table(upright)
     add_store(upright)
@@ -118,14 +135,12 @@ def command_upright(options: argparse.Namespace) -> int:
     from flipproof.landing.aim import FAMILIES
     from flipproof.landing.scatter import Scatter
     from flipproof.landing.upright import make_upright
+    from flipproof.sweep.errors import refuse_unknown
     from slicemodel import Table
-    from slicemodel.scenario import unknown_name
 
     Table(height=0.0, restitution=options.restitution, friction=options.friction)
     families = tuple(dict.fromkeys(name.strip() for name in options.families.split(",")))
-    for family in families:
-        if family not in FAMILIES:
-            raise ValueError(unknown_name("--families", family, FAMILIES))
+    refuse_unknown("--families", families, FAMILIES)
     if throw.frozen:
         raise ValueError("scenario.frozen = true: the study throws water and ice beside it; leave it out")
     size = Size(
@@ -152,30 +167,10 @@ def command_upright(options: argparse.Namespace) -> int:
 
 def _shares(text: str) -> tuple[float, ...]:
     """Return increasing fill fractions in (0, 1]."""
-    values = tuple(number(part.strip()) for part in text.split(","))
+    values = numbers(text)
     for value in values:
         if not 0.0 < value <= 1.0:
             raise argparse.ArgumentTypeError(f"{value:g} is outside (0, 1], as a fill fraction has to be")
     if list(values) != sorted(set(values)):
         raise argparse.ArgumentTypeError(f"{text!r} does not increase")
     return values
-
-
-def _scatter(text: str) -> tuple[float, float, float]:
-    values = [number(part.strip()) for part in text.split(",")]
-    if len(values) != 3 or min(values) < 0.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is not SPIN,DEGREES,SPEED, three numbers in [0, inf)")
-    return values[0], values[1], values[2]
-
-
-def _seed(text: str) -> int:
-    if not text.isdecimal() or int(text) >= 2**63:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number in [0, 2^63)")
-    return int(text)
-
-
-def _cells(text: str) -> tuple[int, int]:
-    columns, _, rows = text.partition("x")
-    if not all(side.isdecimal() and 2 <= int(side) <= 200 for side in (columns, rows)):
-        raise argparse.ArgumentTypeError(f"{text!r} is not COLUMNSxROWS, each in [2, 200], such as 24x24")
-    return int(columns), int(rows)

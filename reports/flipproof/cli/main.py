@@ -41,13 +41,12 @@ from flipproof.cli.arguments import (
 from flipproof.cli.check import add_checks, add_compare
 from flipproof.cli.completion import add_completion
 from flipproof.cli.console import readable, speak_plainly
-from flipproof.cli.fit import add_fit
+from flipproof.cli.film import add_film
 from flipproof.cli.foreign import add_foreign, add_models
 from flipproof.cli.landing import add_landing
 from flipproof.cli.paper import add_paper
 from flipproof.cli.start import INTERRUPTED, INTERRUPTED_WORDS, SIGNALS
 from flipproof.cli.sweeps import add_sweeps
-from flipproof.cli.tracker import add_tracker
 
 BAD_INPUT: Final = 2
 """Exit status of a mistake in what was given; 3 is that of one in flipproof."""
@@ -246,8 +245,7 @@ def parser() -> argparse.ArgumentParser:
     add_paper(commands)
     add_checks(commands)
     add_sweeps(commands)
-    add_tracker(commands)
-    add_fit(commands)
+    add_film(commands)
     add_animate(commands)
     add_landing(commands)
     add_foreign(commands)
@@ -329,13 +327,10 @@ def command_simulate(options: argparse.Namespace) -> int:
 
     scenario = read_scenario(options.scenario, options.slices)
     solver = find(options.solver)
-    settings: dict[str, Any] = {}
-    if options.steps is not None:
-        if solver.package != "slicemodel":
-            raise ValueError(f"--steps {options.steps}: {solver.name} is not a scheme and chooses its own steps")
-        settings["steps"] = options.steps
+    if options.steps is not None and solver.package != "slicemodel":
+        raise ValueError(f"--steps {options.steps}: {solver.name} is not a scheme and chooses its own steps")
     check_outputs(options, "out")
-    trajectory = solve(solver.name, scenario, **settings)
+    trajectory = solve(solver.name, scenario, **({} if options.steps is None else {"steps": options.steps}))
     table = trajectory_csv(trajectory)
     if options.out:
         write_text(options.out, table)

@@ -9,10 +9,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, read_scenario
+from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, read_scenario, reader, sides
 from flipproof.cli.start import INTERRUPTED
 
 SLICES: Final = 50
+
+size = reader(
+    "COLUMNSxROWS, each in [2, 1000], such as 20x20", sides, lambda cells: min(cells) >= 2 and max(cells) <= 1000
+)
 
 
 def add_sweeps(commands: Any) -> None:
@@ -27,7 +31,7 @@ def add_sweeps(commands: Any) -> None:
         "--axis", choices=("gamma", "step", "restitution"), required=True, help="what varies beside the fill fraction"
     )
     drawn.add_argument(
-        "--size", type=_size, default=(20, 20), metavar="CxR", help="fill fractions by values of the axis (20x20)"
+        "--size", type=size, default=(20, 20), metavar="CxR", help="fill fractions by values of the axis (20x20)"
     )
     drawn.add_argument("--slices", type=count, default=SLICES, metavar="N", help="slices of every throw (%(default)s)")
     add_store(drawn)
@@ -51,7 +55,7 @@ def command_sweep(options: argparse.Namespace) -> int:
 def command_map(options: argparse.Namespace) -> int:
     """Make the runs of a map that have no row yet, and draw it."""
     throw = read_scenario(options.scenario, options.slices)
-    from flipproof.sweep.validity_map import Plan, make_map
+    from flipproof.sweep.planned import Plan, make_map
 
     plan = Plan.of_size(throw, options.axis, *options.size)
     return fill(options, lambda begin, where: make_map(plan, options.out, begin, **where))
@@ -60,7 +64,7 @@ def command_map(options: argparse.Namespace) -> int:
 def command_waterfall(options: argparse.Namespace) -> int:
     """Make the runs of a waterfall that have no row yet, and draw it."""
     throw = read_scenario(options.scenario, options.slices)
-    from flipproof.sweep.split import make_split
+    from flipproof.sweep.planned import make_split
 
     return fill(options, lambda begin, where: make_split(throw, options.out, begin, **where))
 
@@ -89,14 +93,6 @@ def _address(text: str) -> str:
     if not match or not 1 <= int(match[1]) <= 65535:
         raise argparse.ArgumentTypeError(f"{text!r} is not tcp://HOST:PORT with a port in [1, 65535]")
     return text
-
-
-def _size(text: str) -> tuple[int, int]:
-    columns, _, rows = text.partition("x")
-    least, most = 2, 1000  # cells along a side of a map
-    if not all(side.isdecimal() and least <= int(side) <= most for side in (columns, rows)):
-        raise argparse.ArgumentTypeError(f"{text!r} is not COLUMNSxROWS, each in [{least}, {most}], such as 20x20")
-    return int(columns), int(rows)
 
 
 def fill(options: argparse.Namespace, make: Callable[[Any, dict[str, Any]], str]) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.film.fit.compare import Contender, compare, verdict
 from flipproof.film.fit.estimate import estimate
-from flipproof.film.fit.figures import MEASURED
+from flipproof.film.fit.folder import MEASURED
 from flipproof.film.fit.problem import ALSO, SLICES, Measurement, Quantity, pose, predict
 from flipproof.film.fit.reading import QUANTITIES
 from flipproof.frame.chapter import Ask, Call, Chapter, Part, Study
@@ -64,18 +64,17 @@ class Measured:
             f"the release fitted, {HELD[best.solver]} is nearest. {verdict(self.fits)}"
         )
 
-    def findings(self) -> tuple[Finding, ...]:
-        """Return one observation for each solver, and one for each fit."""
-        label, unit, made = self.measurement.label, self.measurement.unit, []
+    def findings(self) -> Iterator[Finding]:
+        """Yield one observation for each solver, and one for each fit."""
+        label, unit = self.measurement.label, self.measurement.unit
         for name, misfit in self.misfits.items():
             title = f"{HELD[name]} as thrown, held against {label}"
             note = "root mean square of measured minus computed, nothing fitted; the band is the noise of a value"
-            made.append(observed(f"measured-{name}", title, misfit, unit, note, band=self.noise))
+            yield observed(f"measured-{name}", title, misfit, unit, note, band=self.noise)
         for one in self.fits:
             id_, title = f"measured-fit-{one.solver}", f"{HELD[one.solver]} fitted to {label}"
             note = ", ".join(f"{i.name} = {i.value:.4g} [{i.low:.4g}, {i.high:.4g}]" for i in one.intervals)
-            made.append(observed(id_, title, one.root_mean_square, unit, note, band=self.noise))
-        return tuple(made)
+            yield observed(id_, title, one.root_mean_square, unit, note, band=self.noise)
 
     def exhibit(self) -> Exhibit:
         """Return the figure: the measurement over the solvers, and what is left of it."""
@@ -102,10 +101,7 @@ class Measured:
 def read_measured(path: Path) -> Measurement:
     """Read a flight: a track of ``flipproof track``, or any CSV with t and theta or omega from release to landing.
 
-    Raises
-    ------
-    ValueError
-        Naming file, line and column.
+    What cannot be read raises a ValueError that names file, line and column.
     """
     curve = read_curve(path)
     quantity: Quantity | None = next((name for name in QUANTITIES if name in curve.series), None)
@@ -146,7 +142,7 @@ def part_measured(measurement: Measurement) -> Part:
         name="measured",
         title="Your measurement",
         study=study,
-        claims=lambda found: iter(found.findings()),
+        claims=Measured.findings,
         figures=lambda found: (found.exhibit(),),
         template=Path(__file__).with_name("measured.html.j2"),
     )

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from flipproof.sweep.design import Plan
-from flipproof.sweep.schema import PAGE, as_stored, intact, kinds
+from flipproof.sweep.schema import PAGE, as_stored, columns, intact
 
 POINT: Final = re.compile(rb"[\x04-\x7f]\x00\x81\x0d")
 VERSIONS: Final = re.compile(rb"[\x04-\x06]\x00(?:[\x0d-\x7f]|[\x80-\xff]{1,2}[\x00-\x7f])\x1d(?=\{)")
@@ -44,7 +44,7 @@ PageOf = Callable[[int], bytes]
 
 def rows(file: Path, design: Plan, code: str) -> Iterator[Row]:
     """Yield the rows of the design's points, made by ``code``, that are whole in a damaged file, some of them twice."""
-    types = kinds(design)
+    types = list(columns(design).values())
     for row in _records(file, POINT, len(types)):
         number = row[0]
         if number < design.size and intact(row, types) and row[1] == design.point(number).key(code):

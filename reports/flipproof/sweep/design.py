@@ -29,7 +29,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,7 +40,7 @@ import numpy as np
 from flipproof.sweep.axes import DAMPING, FILL, Axis, Choices, Range, Value, read_axes
 from flipproof.sweep.entries import Entry, as_json, read_entries
 from flipproof.sweep.errors import SweepError, refuse, refuse_unknown
-from slicemodel.scenario import Bottle, Scenario, ScenarioError, UnsuitableFileError, not_whole, read_text
+from slicemodel.scenario import Bottle, Scenario, ScenarioError, not_whole, read_toml
 from slicemodel.trajectory import FloatArray
 
 if TYPE_CHECKING:
@@ -90,17 +89,13 @@ class Point:
         content = {"content": self.content} if self.content else {}
         return {**self.throw, "solver": self.solver, "settings": self.settings, **content}
 
-    def text(self) -> str:
-        """Return the parameters as JSON, keys in order; it reads back to the last bit."""
-        return as_json(self.parameters())
-
     def key(self, code: str) -> str:
         """Return the key of this point as made by the code."""
-        return key_of(self.text(), code)
+        return key_of(as_json(self.parameters()), code)
 
 
 def key_of(text: str, code: str) -> str:
-    """Return the SHA-256 of a point's ``text``, floats to the last bit, and of the code that makes the point."""
+    """Return the SHA-256 of a point's parameters as JSON, and of the code that makes the point."""
     return hashlib.sha256(f"{code}\n{text}".encode()).hexdigest()
 
 
@@ -209,24 +204,11 @@ Plan: TypeAlias = "Design | Throws"
 
 
 def read_design(path: Path) -> Design:
-    """Read a sweep's file.
-
-    Raises
-    ------
-    SweepError
-        Naming file, table, key, value, and what is admissible or nearest.
-    """
+    """Read a sweep's file; a SweepError names file, table, key, value, and what is admissible or nearest."""
     try:
-        text = read_text(path, 2**25)  # a million values with all their digits
-        document = tomllib.loads(text)
-    except UnsuitableFileError as error:
-        raise SweepError(f"{path}: {error}") from None
-    except OSError as error:
-        raise SweepError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except RecursionError:
-        raise SweepError(f"{path}: is nested too deeply") from None
-    except ValueError as error:  # bad TOML, bad UTF-8
-        raise SweepError(f"{path}: is not valid TOML ({error})") from None
+        document, text = read_toml(path, 2**25)  # a million values with all their digits
+    except ScenarioError as error:
+        raise SweepError(str(error)) from None
     return design_of(document, str(path), text)
 
 
@@ -251,13 +233,13 @@ def design_of(document: Mapping[str, Any], source: str, text: str = "") -> Desig
         raise SweepError(f"{source}: has no table [sweep.fields]; it names the fields to vary")
     axes = read_axes(fields, f"{source}: [sweep.fields]", grid=kind == GRID)
     entries = read_entries(document.get("solvers"), source)
-    samples, seed = _samples(table, where, axes, grid=kind == GRID)
+    shares, seed = _shares(table, where, axes, grid=kind == GRID)
     design = Design(
         text=text,
         base=_base(document, source, axes),
         axes=axes,
         entries=entries,
-        shares=None if samples is None else latin_shares(samples, len(axes), seed or 0),
+        shares=shares,
         seed=seed,
         trajectories=trajectories,
         curves=int(curves),
@@ -270,23 +252,24 @@ def design_of(document: Mapping[str, Any], source: str, text: str = "") -> Desig
     return design
 
 
-def _samples(
+def _shares(
     table: Mapping[str, Any], where: str, axes: tuple[Axis, ...], *, grid: bool
-) -> tuple[int | None, int | None]:
-    """Return samples and seed of a Latin hypercube, None and None for a grid."""
+) -> tuple[FloatArray | None, int | None]:
+    """Return places and seed of a Latin hypercube, None and None for a grid."""
     if grid:
         for key in ("samples", "seed"):
             if key in table:
                 raise SweepError(f'{where} {key} = {table[key]!r} belongs to design = "{LATIN}", not to a grid')
         return None, None
-    samples, seed = table.get("samples"), table.get("seed", 0)
+    samples: Any = table.get("samples")
+    seed = table.get("seed", 0)
     refuse(not_whole(f"{where} samples", samples, 1, MOST_POINTS) or not_whole(f"{where} seed", seed, 0, 2**63 - 1))
     if not any(isinstance(axis, Range) and axis.kind == "real" for axis in axes):
         raise SweepError(
             f'{where} design = "{LATIN}" needs a field {{from = ..., to = ...}} of real numbers in [sweep.fields]; '
             "without one its throws would repeat themselves: take a grid"
         )
-    return int(samples), int(seed)  # type: ignore[arg-type]
+    return latin_shares(samples, len(axes), seed), seed
 
 
 def _base(document: Mapping[str, Any], source: str, axes: tuple[Axis, ...]) -> Mapping[str, Mapping[str, Any]]:

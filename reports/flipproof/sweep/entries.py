@@ -87,10 +87,7 @@ def _plain(value: object) -> bool:
 def try_entries(entries: tuple[Entry, ...]) -> None:
     """Throw one slice for a microsecond with every solver, so that a setting out of range is one line and not a sweep.
 
-    Raises
-    ------
-    SweepError
-        With the solver's own words.
+    That line, a SweepError, has the solver's own words.
     """
     for entry in entries:
         # Output times belong to the duration of a throw; the grid is only counted here.

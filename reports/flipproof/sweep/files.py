@@ -31,9 +31,3 @@ def write_whole(path: Path, content: bytes) -> None:
     """Write a file so that a reader sees the old or the new content."""
     with whole_file(path) as part:
         part.write_bytes(content)
-
-
-def sweep_away_parts(folder: Path) -> None:
-    """Remove what a killed program left half-written in a folder that is flipproof's own and locked."""
-    for part in folder.rglob(f"*{TEMPORARY}"):
-        part.unlink(missing_ok=True)

@@ -11,23 +11,15 @@ from typing import Any
 from flipproof.sweep.damaged import count
 from flipproof.sweep.design import Plan
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.schema import APPLICATION, SCHEMA, columns, intact, kinds
+from flipproof.sweep.schema import APPLICATION, SCHEMA, columns, intact
 from slicemodel.scenario import shortened
 
 
 def inspect(file: Path, design: Plan, code: str, patience: float) -> None:
     """Read a sweep's file through and refuse it unless every row is as it was written, of this design and this code.
 
-    Parameters
-    ----------
-    patience : seconds to wait for another program that holds the file
-
-    Raises
-    ------
-    SweepError
-        Naming the file, what is wrong with it, and how many points can be saved from it.
-    sqlite3.Error
-        If another program holds the file.
+    A SweepError names the file, what is wrong with it, and how many points can be saved from it; if another program
+    holds the file for more than ``patience`` seconds, that is an sqlite3.Error.
     """
     try:
         if file.is_dir():
@@ -134,7 +126,7 @@ def _wrong_design(file: Path, connection: sqlite3.Connection, design: Plan, code
 
 
 def _wrong_rows(connection: sqlite3.Connection, design: Plan) -> str:
-    types, names = kinds(design), columns(design)
+    types, names = list(columns(design).values()), list(columns(design))
     known = {number: (facts, sum_) for number, facts, sum_ in connection.execute("SELECT * FROM versions")}
     for number, cells in known.items():
         if not intact(cells, ("TEXT", "TEXT")):

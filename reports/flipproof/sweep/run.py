@@ -1,25 +1,29 @@
 """The loop of a sweep: points out in batches, rows in, until every point has a row.
 
-The loop knows an ``Executor`` and nothing else of where points are made. It keeps a bounded number of batches in
-flight, so a sweep of a million points needs no more memory than they do, and it writes whatever has come back in one
-transaction: a killed sweep loses what was in flight.
+The loop knows ``Workers`` and nothing else of where points are made: processes of this machine, or those of a Dask
+cluster. It keeps a bounded number of batches in flight, so a sweep of a million points needs no more memory than they
+do, and it writes whatever has come back in one transaction: a killed sweep loses what was in flight. Flights come back
+as arrays: workers on other machines need no folder in common with this program, but the same version of flipproof.
 """
 
 from __future__ import annotations
 
+import logging
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import islice
-from typing import Final
+from typing import Any, Final
 
+from flipproof.frame.processes import WorkerDiedError, processes
 from flipproof.sweep.design import Point
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.store import Store
 from flipproof.sweep.work import Outcome, Returned, make_batch, versions
-from flipproof.sweep.workers import Workers
 
 TARGET: Final = 0.4
 """Seconds that a batch should take: sending one costs up to some milliseconds, and a kill loses it."""
@@ -42,8 +46,63 @@ PATIENCE: Final = 60.0
 TICK: Final = 0.5
 """Seconds between two looks at the workers while nothing comes back."""
 
+CONNECT: Final = 10.0
+"""Seconds in which a scheduler must answer."""
+
 Progress = Callable[[int, int], None]
 """Called with the points just stored, and with how many of them have no whole flight."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Workers:
+    """Where batches go.
+
+    Parameters
+    ----------
+    capacity : callable - how many batches to keep in flight now; 0: nobody is there at the moment
+    died : exceptions of a future that mean that its worker died
+    """
+
+    executor: Executor
+    capacity: Callable[[], int]
+    died: tuple[type[Exception], ...]
+
+
+@contextmanager
+def local_workers(jobs: int | None) -> Iterator[Workers]:
+    """Give worker processes, one per core unless told otherwise; the sweep itself decides what a death means."""
+    with processes(jobs) as pool:
+        yield Workers(executor=pool, capacity=lambda: pool.count, died=(WorkerDiedError,))
+
+
+@contextmanager
+def dask_workers(address: str) -> Iterator[Workers]:
+    """Give the workers of the scheduler at ``address``, such as tcp://127.0.0.1:8786.
+
+    A SweepError says that Dask is not installed, or that nobody answers there.
+    """
+    try:
+        distributed: Any = import_module("distributed")
+    except ModuleNotFoundError as error:
+        raise SweepError(f"--dask needs {error.name}: install flipproof with its extra 'dask'") from None
+    # What becomes of batches is told by this program; client and event loop would tell it again, with tracebacks.
+    for talker in ("distributed", "distributed.client", "tornado", "asyncio"):
+        logging.getLogger(talker).setLevel(logging.CRITICAL)
+    try:
+        client = distributed.Client(address, timeout=CONNECT, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise SweepError(f"--dask {address}: no scheduler answers there ({error})") from None
+    executor = client.get_executor(pure=False)
+
+    def capacity() -> int:
+        # One batch is made while the next is on its way.
+        return 2 * sum(client.ncores().values()) if client.status == "running" else 0
+
+    try:
+        yield Workers(executor=executor, capacity=capacity, died=(distributed.KilledWorker,))
+    finally:
+        executor.shutdown(wait=False)
+        client.close(timeout=CONNECT)
 
 
 @dataclass(slots=True)
@@ -82,10 +141,7 @@ class Batch:
 def run_sweep(store: Store, workers: Workers, progress: Progress) -> None:
     """Make every point that has no row, and store it.
 
-    Raises
-    ------
-    SweepError
-        If rows cannot be written, workers run other code, die whatever they are given, or are gone.
+    A SweepError says that rows cannot be written, or that workers run other code, die on everything, or are gone.
     """
     design, done = store.design, store.done()
     lines = [

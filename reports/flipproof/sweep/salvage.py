@@ -18,12 +18,8 @@ from flipproof.sweep.store import Store
 def salvage(damaged: Path, out: Path, design: Plan, code: str) -> str:
     """Begin the sweep of a design in ``out`` with the rows and flights that are whole in a damaged file; say how many.
 
-    The damaged file, or the folder that holds it, is left as it is.
-
-    Raises
-    ------
-    SweepError
-        If the file cannot be read or holds no whole row of this design and code, or if ``out`` holds a sweep.
+    The damaged file, or the folder that holds it, is left as it is. A SweepError says that it cannot be read, that it
+    holds no whole row of this design and code, or that ``out`` holds a sweep.
     """
     file = damaged / FILE if (damaged / FILE).exists() else damaged
     if (out / FILE).exists():
@@ -33,7 +29,7 @@ def salvage(damaged: Path, out: Path, design: Plan, code: str) -> str:
             raise SweepError(f"{file} holds no whole row of this design made by flipproof {code}")
         with Store(out, design, code) as store:
             known = versions(file)
-            found, place = rows(file, design, code), columns(design).index("trajectory")
+            found, place = rows(file, design, code), list(columns(design)).index("trajectory")
             while chunk := list(islice(found, 1000)):  # rows in one transaction
                 for row in chunk:
                     _copy_flight(file.parent, out, row[place])

@@ -26,8 +26,6 @@ PAGE: Final = 4096
 
 FILE: Final = "sweep.sqlite"
 
-TYPES: Final = MappingProxyType({"real": "REAL", "whole": "INTEGER", "truth": "INTEGER"})
-
 SHARED: Final = """
 CREATE TABLE schema_version (version INTEGER NOT NULL);
 CREATE TABLE design (
@@ -49,7 +47,8 @@ def _points(design: Plan) -> Iterator[tuple[str, str, str, str]]:
     """Yield name, SQLite type, rules and meaning of every column of the table of points, one for each swept field."""
     yield "number", "INTEGER", " PRIMARY KEY", "place in the design, from 0"
     yield "key", "TEXT", " NOT NULL UNIQUE", "SHA-256 of parameters and code"
-    yield from ((column(axis.name), TYPES[axis.kind], " NOT NULL", "value of a swept field") for axis in design.axes)
+    for axis in design.axes:
+        yield column(axis.name), "REAL" if axis.kind == "real" else "INTEGER", " NOT NULL", "value of a swept field"
     yield "solver", "TEXT", " NOT NULL", "its name, or land"
     yield "settings", "TEXT", " NOT NULL", "JSON"
     for name, kind in design.readings.items():
@@ -79,14 +78,9 @@ CREATE INDEX points_by_solver ON points (solver, status);
 """
 
 
-def columns(design: Plan) -> tuple[str, ...]:
-    """Return the columns of the table of points, in order."""
-    return tuple(name for name, *_ in _points(design))
-
-
-def kinds(design: Plan) -> tuple[str, ...]:
-    """Return the SQLite type of every column of the table of points."""
-    return tuple(kind for _, kind, *_ in _points(design))
+def columns(design: Plan) -> dict[str, str]:
+    """Return the columns of the table of points, in order, and the SQLite type of each."""
+    return {name: kind for name, kind, *_ in _points(design)}
 
 
 # SQLite keeps a negative zero as zero, and a real number without a fraction as an integer.

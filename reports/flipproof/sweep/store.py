@@ -24,7 +24,7 @@ import json
 import os
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -34,9 +34,9 @@ from flipproof.output.ownership import MARKER, OutputError, check_own, marker_te
 from flipproof.sweep.design import Plan, key_of
 from flipproof.sweep.entries import as_json
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.files import TEMPORARY, sweep_away_parts, whole_file, write_whole
+from flipproof.sweep.files import TEMPORARY, whole_file, write_whole
 from flipproof.sweep.inspection import damage, inspect, is_damage, result_code
-from flipproof.sweep.schema import APPLICATION, FILE, PAGE, SCHEMA, SHARED, checksum, columns, kinds, points_table
+from flipproof.sweep.schema import APPLICATION, FILE, PAGE, SCHEMA, SHARED, checksum, columns, points_table
 from flipproof.sweep.work import CURVES, Outcome, Returned
 from slicemodel.trajectory import FloatArray
 
@@ -49,28 +49,28 @@ BUSY: Final = 10.0
 """Seconds to wait for somebody who holds the file."""
 
 
-class Store(AbstractContextManager["Store"]):
+class Store(ExitStack):
     """The rows of one design in a folder. Use as a context manager; the folder is locked until it ends."""
 
     def __init__(self, folder: Path, design: Plan, code: str) -> None:
         """Open or begin the store.
 
-        Raises
-        ------
-        SweepError
-            If the folder holds something else, another design, rows of other code or another schema, if its file is
-            damaged, if another program is writing to it, or if it cannot be written.
+        A SweepError refuses a folder that holds something else, another design, rows of other code or another schema,
+        whose file is damaged, to which another program is writing, or that cannot be written.
         """
         self.folder, self.design, self.code = folder, design, code
-        self._kinds = kinds(design)[:-1]
-        self._marks = ", ".join("?" * len(columns(design)))
-        self._held = ExitStack()
-        with self._plainly():
-            _check_folder(folder)
-            folder.mkdir(parents=True, exist_ok=True)
+        self._columns = columns(design)
+        self._marks = ", ".join("?" * len(self._columns))
+        super().__init__()
         try:
             with self._plainly():
-                self._held.enter_context(sole_writer(folder / LOCK, folder))
+                if folder.is_dir():
+                    parts = (entry.name for entry in folder.iterdir() if entry.name.endswith(TEMPORARY))
+                    check_own(folder, KIND, ignored=(LOCK, *parts))
+                elif folder.exists():
+                    raise SweepError(f"{folder} is a file; --out names a folder")
+                folder.mkdir(parents=True, exist_ok=True)
+                self.enter_context(sole_writer(folder / LOCK, folder))
                 if not (folder / MARKER).exists():
                     write_whole(folder / MARKER, marker_text(KIND).encode())
                 self.fresh = not os.path.lexists(self.file)
@@ -79,10 +79,11 @@ class Store(AbstractContextManager["Store"]):
                 else:
                     inspect(self.file, design, code, BUSY)
                 connection = sqlite3.connect(self.file, timeout=BUSY, isolation_level=None)
-                self.connection = self._held.enter_context(closing(connection))
+                self.connection = self.enter_context(closing(connection))
                 self.connection.execute("PRAGMA journal_mode = WAL").fetchall()
                 self.connection.execute("PRAGMA synchronous = NORMAL")
-                sweep_away_parts(folder)
+                for part in folder.rglob(f"*{TEMPORARY}"):  # what a killed program left half-written
+                    part.unlink(missing_ok=True)
         except BaseException:
             self.close()
             raise
@@ -91,13 +92,6 @@ class Store(AbstractContextManager["Store"]):
     def file(self) -> Path:
         """The SQLite file."""
         return self.folder / FILE
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the file and let go of the folder."""
-        self._held.close()
 
     def done(self) -> bytearray:
         """Return one byte for each point of the design: 1 if its row is there, and its flight if flights are kept."""
@@ -131,7 +125,7 @@ class Store(AbstractContextManager["Store"]):
 
         Their cells stand in the order of ``columns``; ``versions`` are those there by the id that rows refer to.
         """
-        place = columns(self.design).index("versions")
+        place = list(self._columns).index("versions")
         with self._plainly(), _transaction(self.connection):
             ids = {row[place]: 0 for row in rows}
             for old in ids:
@@ -161,7 +155,7 @@ class Store(AbstractContextManager["Store"]):
 
     def _row(self, outcome: Outcome | Landed, flight: str | None, versions: int) -> tuple[Any, ...]:
         point = self.design.point(outcome.number)
-        parameters = point.text()
+        parameters = as_json(point.parameters())
         curves = None if outcome.curves is None else outcome.curves.astype("<f8").tobytes()
         return self._signed((
             outcome.number, key_of(parameters, self.code), *point.values, point.solver, as_json(point.settings),
@@ -172,7 +166,7 @@ class Store(AbstractContextManager["Store"]):
     def _signed(self, cells: Sequence[Any]) -> tuple[Any, ...]:
         """Return cells with their checksum; cells that the tables refuse, and will say so, get none."""
         try:
-            return (*cells, checksum(cells, self._kinds))
+            return (*cells, checksum(cells, list(self._columns.values())[:-1]))
         except (ValueError, TypeError, OverflowError):
             return (*cells, "")
 
@@ -212,14 +206,6 @@ class Store(AbstractContextManager["Store"]):
 def read_curves(blob: bytes) -> FloatArray:
     """Return the curves of a row, shape (4, P), in the order of ``CURVES``."""
     return np.frombuffer(blob, dtype="<f8").reshape(len(CURVES), -1)
-
-
-def _check_folder(folder: Path) -> None:
-    if folder.exists() and not folder.is_dir():
-        raise SweepError(f"{folder} is a file; --out names a folder")
-    if folder.exists():
-        parts = (entry.name for entry in folder.iterdir() if entry.name.endswith(TEMPORARY))
-        check_own(folder, KIND, ignored=(LOCK, *parts))
 
 
 @contextmanager

@@ -65,8 +65,6 @@ SHARED: Final = {"times", "rest_speed", "impact_law", "energy"}
 CURVES: Final = ("omega", "theta", "r_cm", "v_cm")
 """What a row's curves show, in their order [rad/s, rad, m, m/s]."""
 
-Arrays = Mapping[str, NDArray[Any]]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
@@ -100,7 +98,7 @@ class Outcome:
     message: str = ""
     reason: str = ""
     seconds: float = 0.0
-    arrays: Arrays | None = None
+    arrays: Mapping[str, NDArray[Any]] | None = None
     curves: FloatArray | None = None
 
     @property

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from flipproof.cli import fit as command
+from flipproof.cli import film as command
 from flipproof.cli import main as cli
-from flipproof.film.fit import budget
-from flipproof.film.fit.budget import COARSE, FLIGHTS, affordable, chosen
-from flipproof.film.fit.estimate import USUAL, estimate
+from flipproof.film.fit.estimate import COARSE, FLIGHTS, USUAL, affordable, chosen, estimate
 from flipproof.film.fit.problem import Measurement, pose
 from flipproof.frame.solvers import solve
 from slicemodel import Scenario
@@ -95,7 +93,7 @@ def test_the_command_says_what_it_will_take_and_ends_with_the_fit(table, mine, c
     said = capsys.readouterr().err
     assert "s a flight; even a coarse fit makes about 400 of them" in said
     given[-1] = mine()
-    monkeypatch.setattr(budget, "FLIGHTS", {COARSE: FLIGHTS[COARSE]})
+    monkeypatch.setattr("flipproof.film.fit.estimate.FLIGHTS", {COARSE: FLIGHTS[COARSE]})
     assert cli.main([*given, "--minutes", "600"]) == 0
     out, err = capsys.readouterr()
     assert "s a flight, at most about" in err
@@ -104,7 +102,7 @@ def test_the_command_says_what_it_will_take_and_ends_with_the_fit(table, mine, c
 
 
 def test_flipproofs_own_equations_are_not_timed(table, monkeypatch, capsys):
-    monkeypatch.setattr("flipproof.film.fit.budget.affordable", None)
+    monkeypatch.setattr("flipproof.film.fit.estimate.affordable", None)
     given = ["fit", str(table / "flight.csv"), "--scenario", str(table / "throw.toml"), "--model", "midpoint"]
     assert cli.main([*given]) == 0
     assert "a flight" not in capsys.readouterr().err

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flipproof.cli.tracker import add_tracker
+from flipproof.cli.film import add_film
 from flipproof.film.tracker.bench import Request, measure
 from flipproof.film.tracker.page import COLUMNS
 from flipproof.film.tracker.reader import read_track_table
@@ -27,7 +27,7 @@ BOTH = ("--cap", "cap", "--base", "base", "--length-unit", "m")
 def run(*arguments):
     """Run a command as ``flipproof`` would; return its exit status."""
     parser = argparse.ArgumentParser(prog="flipproof")
-    add_tracker(parser.add_subparsers(required=True))
+    add_film(parser.add_subparsers(required=True))
     options = parser.parse_args([str(argument) for argument in arguments])
     return options.action(options)
 

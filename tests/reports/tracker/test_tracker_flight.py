@@ -9,10 +9,10 @@ import pytest
 
 import ode_reference
 from flipproof.film.tracker.calibration import check, check_gravity
+from flipproof.film.tracker.export import synthetic_video, with_noise
 from flipproof.film.tracker.kinematics import omega_from_tracks
 from flipproof.film.tracker.moments import NoFlightError, find_flight
 from flipproof.film.tracker.parabola import distance_from_cap, fit_axis, fit_track
-from flipproof.film.tracker.synthetic import synthetic_video, with_noise
 from flipproof.film.tracker.table import Track, TrackTable
 from slicemodel import Scenario
 

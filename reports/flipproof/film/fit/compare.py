@@ -1,24 +1,95 @@
-"""Which equation a measured flight speaks for: the fits side by side, in numbers and in plain words."""
+"""How well the data know a parameter, and which equation they speak for: in numbers and in plain words."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from itertools import combinations
+from typing import Final, Literal
 
 import numpy as np
 
 from flipproof.film.fit.estimate import Estimate
-from flipproof.film.fit.problem import package_of
+from flipproof.film.fit.problem import UNITS, package_of
 from flipproof.film.fit.region import fits
-from flipproof.film.fit.uncertainty import Interval, intervals
+from slicemodel.trajectory import FloatArray
+
+Verdict = Literal["told", "bounded above", "bounded below", "not told"]
 
 INDISTINCT: Final = 4.0
 """Difference of AIC up to which two equations are said to do equally well."""
 
 COUNTED: Final = ("eq8", "free-flight")
 """Equations of the reference whose intervals held the truth in at least 90 of 100 twins (``benchmarks/twins.py``)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Interval:
+    """One parameter, its estimate and its interval [SI].
+
+    Parameters
+    ----------
+    value : float - estimate (lowest chi^2)
+    low, high : float - ends of the interval
+    deviation : float - standard deviation of what the data allow
+    searched : (float, float) - admissible range that was searched
+    verdict : whether the interval is bounded by the data on both sides, on one, or on neither
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    deviation: float
+    searched: tuple[float, float]
+    verdict: Verdict
+
+
+def intervals(estimate: Estimate) -> tuple[Interval, ...]:
+    """Return the interval of every free parameter; those of drag and restitution are to hold together in 95 % of cases.
+
+    Counted on flights that the fitted equation had made (``benchmarks/twins.py``): "midpoint", "eq8" and "free-flight"
+    hold it.
+
+    Its ends are the farther of two: the quantiles of the cloud (1.25 % on either side, their distance from the median
+    widened for roughness), and those of the profile likelihood (``Estimate.reach``). On a smooth landscape the two are
+    one; on a rough one the first neglects small facets.
+    """
+    problem = estimate.problem
+    low, high = problem.bounds()
+    level = 0.975  # of one, so that those of drag and restitution hold together in 95 % (Bonferroni)
+    middle, *tails = np.quantile(estimate.cloud, (0.5, (1.0 - level) / 2.0, (1.0 + level) / 2.0), axis=0)
+    lower, upper = (middle + np.sqrt(estimate.roughness) * (tail - middle) for tail in tails)
+    below = np.clip(np.minimum(lower, estimate.reach[0]), low, high)
+    above = np.clip(np.maximum(upper, estimate.reach[1]), low, high)
+    # An end within 2 % of the searched range is that of the range; three quarters of it are not told.
+    at_low, at_high = below - low < 0.02 * (high - low), high - above < 0.02 * (high - low)
+    below, above = np.where(at_low, low, below), np.where(at_high, high, above)
+    not_told = (above - below >= 0.75 * (high - low)) | (at_low & at_high)
+    verdicts = np.select([not_told, at_high, at_low], ["not told", "bounded below", "bounded above"], "told").tolist()
+    x, ends, searched = (problem.parameters(np.array(p)).tolist() for p in ([estimate.x], [below, above], [low, high]))
+    deviations = [float(np.std(values)) for values in problem.parameters(estimate.cloud).T]
+    return tuple(
+        Interval(
+            name=name,
+            value=x[0][k],
+            low=ends[0][k],
+            high=ends[1][k],
+            deviation=deviations[k],
+            searched=(searched[0][k], searched[1][k]),
+            verdict=verdicts[k],
+        )
+        for k, name in enumerate(problem.free)
+    )
+
+
+def correlation(estimate: Estimate) -> FloatArray:
+    """Return the correlation of the parameters over the cloud (K, K); 0 for a parameter that does not vary there."""
+    values = estimate.problem.parameters(estimate.cloud)
+    spread = values.std(axis=0)
+    centred = np.where(spread > 0, (values - values.mean(axis=0)) / np.where(spread > 0, spread, 1.0), 0.0)
+    return np.asarray(centred.T @ centred / len(values))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,7 +191,49 @@ def told(interval: Interval) -> str:
     return f"bounded from above only: {low:.3g} is not excluded" if interval.verdict == "bounded above" else ""
 
 
-def digits(interval: Interval) -> int:
-    """Return the digits after the point that an interval is worth: two of its width."""
-    width = interval.high - interval.low
-    return min(12, max(0, 1 - math.floor(math.log10(width)))) if width > 0 else 6
+def report(contenders: Sequence[Contender], remarks: Sequence[str]) -> str:
+    """Return estimates and comparison as lines for a terminal, after ``remarks`` on how the measurement was read."""
+    problem = contenders[0].estimate.problem
+    measured = problem.measured
+    how = "given" if measured.noise is not None else "estimated from neighbouring values"
+    lines = [
+        f"{measured.label}: {len(measured.t)} values of {measured.quantity} over {measured.t[-1]:.3f} s; noise of one "
+        f"{problem.noise:.3g} {measured.unit} ({how})"
+    ]
+    if measured.quantity == "omega":
+        lines.append("neighbouring values of omega share noise; intervals are widened by the residuals' autocovariance")
+    lines += remarks
+    for one in contenders:
+        lines += ["", *_fit_lines(one)]
+    lines += ["", verdict(contenders)]
+    return "\n".join(lines)
+
+
+def _fit_lines(one: Contender) -> list[str]:
+    estimate = one.estimate
+    throw = estimate.problem.throw
+    lines = [f"{one.solver}, {throw.n_slices} slices; {promise(one.solver, fits=one.fits)}"]
+    for found in one.intervals:
+        width = found.high - found.low  # of which two digits are shown
+        places = min(12, max(0, 1 - math.floor(math.log10(width)))) if width > 0 else 6
+        numbers = f"{found.value:.{places}f} [{found.low:.{places}f}, {found.high:.{places}f}]"
+        note = told(found)
+        lines.append(f"  {found.name:12} {numbers} {UNITS[found.name]}{'  ' + note if note else ''}")
+        if found.name == "drag":
+            gamma = [value / (2 * throw.slice_mass) for value in (found.value, found.low, found.high)]
+            lines.append(f"  {'alpha/2m':12} {gamma[0]:.4g} [{gamma[1]:.4g}, {gamma[2]:.4g}] /s")
+    pairs, names = correlation(estimate), estimate.problem.free
+    words = [f"{names[i]}-{names[j]} {pairs[i, j]:+.2f}" for i, j in combinations(range(len(names)), 2)]
+    lines.append(f"  correlation  {', '.join(words)}")
+    lines.append(
+        f"  chi^2        {estimate.chi2:.0f} for {estimate.freedom} degrees of freedom; residual "
+        f"{one.root_mean_square:.3g} {estimate.problem.measured.unit} (root mean square)"
+    )
+    levels = estimate.minima[:, -1]
+    same = int((levels < levels.min() + 1.0).sum())
+    lines.append(
+        f"  search       {estimate.flights} flights; {same} of {len(levels)} descents end there; intervals "
+        f"{math.sqrt(max(1.0, estimate.temperature)):.2f} times wider for misfit or shared noise, "
+        f"{math.sqrt(estimate.roughness):.2f} for roughness"
+    )
+    return lines

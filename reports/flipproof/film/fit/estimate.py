@@ -5,19 +5,24 @@ Difference quotients therefore reach over many kinks: about half the standard er
 root of round-off. Several starts, from a grid over drag and restitution, guard against side minima. What lies between
 and beyond them is left to an even filling of all that the data allow (``region``), and the lowest point that any of the
 three has seen is descended from once more.
+
+flipproof's own equations make a flight in less than a millisecond and a usual search in seconds; a solver in a process
+of its own may take a thousand times as long, so a ``Budget`` says which search a given time allows.
 """
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 from scipy.ndimage import minimum_filter
 
-from flipproof.film.fit.landscape import Landscape, Tick, loss
 from flipproof.film.fit.problem import Problem
-from flipproof.film.fit.region import Points, explored, fits, roughness, temperature
+from flipproof.film.fit.region import Landscape, Points, Tick, explored, fits, loss, roughness, temperature
+from flipproof.frame.solvers import solve
 from slicemodel.trajectory import FloatArray
 
 LIKELY: Final = 5.024
@@ -25,9 +30,6 @@ LIKELY: Final = 5.024
 
 REACH: Final = 15.0
 """chi^2 above the lowest up to which parameters are explored at the least: 0.06 % of two lie beyond, 0.5 % of four."""
-
-DRAWN: Final = 2000
-"""Points that the posterior is drawn with."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,11 +84,11 @@ class Estimate:
     @property
     def freedom(self) -> int:
         """Values less parameters."""
-        return self.problem.points - len(self.x)
+        return len(self.problem.measured.t) - len(self.x)
 
     def residual(self) -> FloatArray:
         """Return measured minus predicted [rad or rad/s], shape (P,)."""
-        return self.problem.measured.values - self.problem.predicted(self.x)
+        return np.asarray(self.problem.measured.values - self.problem.predicted(self.x[np.newaxis])[0])
 
 
 def estimate(problem: Problem, effort: Effort = USUAL, *, tick: Tick = lambda _: None, seed: int = 0) -> Estimate:
@@ -97,7 +99,7 @@ def estimate(problem: Problem, effort: Effort = USUAL, *, tick: Tick = lambda _:
     """
     land = Landscape(problem, tick=tick)
     scanned, ends = _descents(land, effort.grid, effort.starts)
-    if effort.again and not fits(float(loss(land.residuals(ends)).min()), problem.points - len(problem.free)):
+    if effort.again and not fits(float(loss(land.residuals(ends)).min()), len(problem.measured.t) - len(problem.free)):
         # Either the equation is wrong, or every descent ended in a side minimum: look between the starts.
         drags, restitutions = effort.grid
         more = _descents(land, (2 * drags + 1, 2 * restitutions + 1), 4 * effort.starts)
@@ -117,7 +119,7 @@ def estimate(problem: Problem, effort: Effort = USUAL, *, tick: Tick = lambda _:
     for _ in range(4):
         within = needed * variance
         known = explored(land, known, within, effort.points)
-        cloud = known.x[known.drawn(variance, DRAWN)]
+        cloud = known.x[known.drawn(variance)]
         steps = np.clip(0.5 * cloud.std(axis=0), problem.coarse_steps() / 40.0, problem.coarse_steps())
         first = int(np.argmin(known.chi2))
         if known.chi2[first] < lowest:
@@ -136,7 +138,7 @@ def estimate(problem: Problem, effort: Effort = USUAL, *, tick: Tick = lambda _:
     return Estimate(
         problem=problem, x=best, chi2=float(loss(land.residual(best) * land.scale)),
         temperature=variance * land.scale**2, roughness=rough,
-        minima=np.column_stack((ends, loss(residuals)))[order], cloud=known.x[known.drawn(variance, DRAWN)],
+        minima=np.column_stack((ends, loss(residuals)))[order], cloud=known.x[known.drawn(variance)],
         reach=np.array([likely.min(axis=0), likely.max(axis=0)]), flights=land.flights,
     )  # fmt: skip
 
@@ -193,3 +195,63 @@ def _levelled(land: Landscape, points: FloatArray) -> tuple[FloatArray, FloatArr
         level = loss(residuals)
         best, lowest = np.where((level < lowest)[:, np.newaxis], points, best), np.minimum(level, lowest)
     return best, lowest
+
+
+# ---------------------------------------------------------------------- what a search costs
+
+COARSE: Final = Effort(grid=(5, 4), starts=2, points=60, again=False)
+"""A search of a quarter to a sixth of the flights: the same estimates, and ends of intervals that are less certain."""
+
+MINUTES: Final = 10.0
+"""Time that a fit with somebody else's solver may take unless another is given."""
+
+FLIGHTS: Final = MappingProxyType({USUAL: (-2400, 1800), COARSE: (-100, 250)})
+"""Search -> flights that it makes at most, about: the first number, and the second for each fitted parameter."""
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """The search that the time allows, the flights it makes at most, and the seconds that one takes."""
+
+    effort: Effort
+    flights: int
+    seconds: float
+
+    @property
+    def time(self) -> str:
+        """What the search takes at most, in words."""
+        seconds = self.flights * self.seconds
+        return f"{seconds:.0f} s" if seconds < 90.0 else f"{seconds / 60.0:.0f} min"
+
+    @property
+    def words(self) -> str:
+        """What the search will take."""
+        kind = "" if self.effort == USUAL else "; a coarse search, since --minutes allows no more"
+        return f"{self.seconds:.2g} s a flight, at most about {self.flights} flights: {self.time}{kind}"
+
+
+def affordable(problem: Problem, minutes: float = MINUTES) -> Budget:
+    """Time a flight of somebody else's solver and return the best search that ``minutes`` allow.
+
+    A solver that does not answer the throw from which the search begins raises a ForeignError, a time in which no
+    search can be made a ValueError that says how long the coarse one takes.
+    """
+    took = []
+    for _ in range(3):  # the fastest counts, since the first one loads the solver
+        began = time.perf_counter()
+        solve(problem.solver, problem.throw, times=problem.measured.t)
+        took.append(time.perf_counter() - began)
+    return chosen(problem, min(took), minutes)
+
+
+def chosen(problem: Problem, seconds: float, minutes: float) -> Budget:
+    """Return the best search that ``minutes`` allow if a flight takes so many ``seconds``; raise as ``affordable``."""
+    for effort, (once, each) in FLIGHTS.items():
+        budget = Budget(effort, once + each * len(problem.free), seconds)
+        if budget.flights * seconds <= 60.0 * minutes:
+            return budget
+    raise ValueError(
+        f"model = {problem.solver!r} takes {seconds:.2g} s a flight; even a coarse fit makes about {budget.flights} of "
+        f"them, {budget.time}, more than --minutes {minutes:g}: take fewer --slices, a longer step in the solver, "
+        f"or more --minutes; flipproof place says which of flipproof's own equations fits as well in seconds"
+    )

@@ -14,7 +14,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from flipproof.frame.solvers import FOREIGN
+from flipproof.frame.solvers import FOREIGN, catalogue, find, solve
 from slicemodel import Scenario
 from slicemodel.scenario import unknown_name
 from slicemodel.trajectory import FloatArray
@@ -26,7 +26,6 @@ Operator = Callable[[FloatArray, FloatArray], FloatArray]
 ALWAYS: Final = ("drag", "restitution")
 ALSO: Final = ("omega0", "theta0")
 UNITS: Final[Mapping[str, str]] = {"drag": "kg/s", "restitution": "", "omega0": "rad/s", "theta0": "rad"}
-SYMBOLS: Final[Mapping[str, str]] = {"drag": "α", "restitution": "e", "omega0": "ω₀", "theta0": "θ₀"}
 
 FEWEST: Final = 12
 """Frames of a flight that can be fitted at the least."""
@@ -115,26 +114,21 @@ class Problem:
     noise: float
 
     @property
-    def points(self) -> int:
-        """Number of measured values."""
-        return len(self.measured.t)
-
-    @property
-    def _damping_scale(self) -> float:
-        return abs(self.throw.omega0) / 20.0
+    def _drag_scale(self) -> float:
+        return 2.0 * self.throw.slice_mass * (abs(self.throw.omega0) / 20.0)
 
     # ------------------------------------------------------------------ coordinates
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Return lowest and highest admissible coordinates, each of shape (K,)."""
-        reach = 0.3 * abs(self.throw.omega0)
+        omega0, theta0 = self.throw.omega0, self.throw.theta0
         # At a damping rate of 5 omega0 a slice creeps less than a fifth of its distance from the centre in the time the
         # bottle turns by 2 rad.
         limits = {
-            "drag": (0.0, math.asinh(5.0 * abs(self.throw.omega0) / self._damping_scale)),
+            "drag": (0.0, math.asinh(5.0 * abs(omega0) / (abs(omega0) / 20.0))),
             "restitution": (0.0, 1.0),
-            "omega0": (self.throw.omega0 - reach, self.throw.omega0 + reach),
-            "theta0": (self.throw.theta0 - 0.5, self.throw.theta0 + 0.5),
+            "omega0": (omega0 - 0.3 * abs(omega0), omega0 + 0.3 * abs(omega0)),
+            "theta0": (theta0 - 0.5, theta0 + 0.5),
         }
         low, high = np.array([limits[name] for name in self.free]).T
         return low, high
@@ -146,15 +140,15 @@ class Problem:
 
     def value(self, name: str, coordinate: float) -> float:
         """Return a parameter [SI] from its coordinate."""
-        if name == "drag":
-            return 2.0 * self.throw.slice_mass * self._damping_scale * math.sinh(coordinate)
-        return float(coordinate)
+        return self._drag_scale * math.sinh(coordinate) if name == "drag" else float(coordinate)
+
+    def parameters(self, points: FloatArray) -> FloatArray:
+        """Return the parameters [SI] at many coordinates (M, K), of the same shape."""
+        return np.array([[self.value(name, float(c)) for name, c in zip(self.free, x, strict=True)] for x in points])
 
     def coordinate(self, name: str, value: float) -> float:
         """Return the coordinate of a parameter [SI]."""
-        if name == "drag":
-            return math.asinh(value / (2.0 * self.throw.slice_mass * self._damping_scale))
-        return float(value)
+        return math.asinh(value / self._drag_scale) if name == "drag" else float(value)
 
     def start(self) -> FloatArray:
         """Return the coordinates of the throw itself, moved inside the bounds, shape (K,)."""
@@ -164,24 +158,18 @@ class Problem:
 
     # ------------------------------------------------------------------ prediction
 
-    def throw_at(self, x: FloatArray) -> Scenario:
-        """Return the throw at the coordinates ``x``, shape (K,)."""
-        low, high = self.bounds()
-        inside = np.clip(x, low, high)
-        changed = {name: self.value(name, float(c)) for name, c in zip(self.free, inside, strict=True)}
-        return replace(self.throw, **changed)  # type: ignore[arg-type]
-
-    def predicted(self, x: FloatArray) -> FloatArray:
-        """Return what would be measured at the coordinates ``x``, shape (P,); NaN where the solver gave up."""
-        return np.asarray(predict([self.throw_at(x)], self.solver, self.measured)[0])
+    def predicted(self, points: FloatArray) -> FloatArray:
+        """Return what would be measured at many coordinates (M, K), shape (M, P); NaN where the solver gave up."""
+        inside = self.parameters(np.clip(points, *self.bounds())).tolist()
+        throws = [replace(self.throw, **dict(zip(self.free, values, strict=True))) for values in inside]
+        return predict(throws, self.solver, self.measured)
 
     def residuals(self, points: FloatArray) -> FloatArray:
         """Return (measured - predicted) / noise at many coordinates (M, K), shape (M, P).
 
         Where a solver gave up the residual counts as ``FAR``.
         """
-        predicted = predict([self.throw_at(x) for x in points], self.solver, self.measured)
-        difference = (self.measured.values - predicted) / self.noise
+        difference = (self.measured.values - self.predicted(points)) / self.noise
         return np.asarray(np.where(np.isfinite(difference), difference, FAR))
 
 
@@ -202,16 +190,6 @@ def flights(throws: Sequence[Scenario], solver: str, times: FloatArray) -> tuple
     times themselves. Where the latter gives no answer, theta and omega are NaN. Refuses solvers as ``package_of``.
     """
     package = package_of(solver)
-    if package == FOREIGN:
-        from flipproof.foreign.solving import solve
-        from flipproof.foreign.specs import ForeignError
-
-        found = np.full((2, len(throws), len(times)), np.nan)
-        for k, throw in enumerate(throws):
-            with suppress(ForeignError):
-                run = solve(throw, spec=solver, times=times)
-                found[:, k] = run.theta, run.omega
-        return found[0], found[1]
     if package == "slicemodel":
         from slicemodel.batch import solve_batch
 
@@ -219,15 +197,19 @@ def flights(throws: Sequence[Scenario], solver: str, times: FloatArray) -> tuple
         steps = math.ceil(throws[0].duration / 5e-4) + 1
         batch = solve_batch(throws, solver, steps)
         return sampled(np.linspace(0.0, throws[0].duration, steps), batch.theta, batch.omega, times)
-    from ode_reference import solve as solve_one
-    from ode_reference import solve_batch as solve_exactly
+    import ode_reference
+    from flipproof.foreign.specs import ForeignError
     from ode_reference.solver import COLUMN
 
-    if solver == COLUMN:
-        columns = [solve_one(throw, solver, times) for throw in throws]
-        return np.array([one.theta for one in columns]), np.array([one.omega for one in columns])
-    flown = solve_exactly(throws, solver, times)
-    return flown.theta, flown.omega
+    if package == "ode_reference" and solver != COLUMN:
+        flown = ode_reference.solve_batch(throws, solver, times)
+        return flown.theta, flown.omega
+    found = np.full((2, len(throws), len(times)), np.nan)
+    for k, throw in enumerate(throws):
+        with suppress(ForeignError):
+            run = solve(solver, throw, times=times)
+            found[:, k] = run.theta, run.omega
+    return found[0], found[1]
 
 
 def sampled(grid: FloatArray, theta: FloatArray, omega: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -247,7 +229,6 @@ def sampled(grid: FloatArray, theta: FloatArray, omega: FloatArray, times: Float
 def package_of(solver: str) -> str:
     """Return the package of a solver that can be fitted; an engine, a curve in a file, an unknown name are refused."""
     from flipproof.foreign.specs import check_asked
-    from flipproof.frame.solvers import catalogue, find
 
     package = find(solver).package
     if package == "engine_check":
@@ -261,18 +242,13 @@ def package_of(solver: str) -> str:
 def pose(
     measured: Measurement, throw: Scenario, solver: str, *, also: Sequence[str] = (), slices: int | None = None
 ) -> Problem:
-    """Return the problem of fitting ``solver`` to ``measured``.
+    """Return the problem of fitting ``solver`` to ``measured``; a ValueError names what cannot be fitted, and why.
 
     Parameters
     ----------
     throw : Scenario - what is known of the throw; its duration gives way to the measured one
     also : names from ``ALSO`` - fitted too; they start from the measurement's first frames
     slices : int or None - None: ``SLICES``, or the throw's if fewer
-
-    Raises
-    ------
-    ValueError
-        Naming what cannot be fitted and why.
     """
     for name in also:
         if name not in ALSO:
@@ -320,3 +296,14 @@ def first_frames(measured: Measurement) -> dict[str, float]:
     if angle:
         return {"theta0": float(found(0.0)), "omega0": float(found.deriv()(0.0))}
     return {"omega0": float(found(0.0))}
+
+
+def disagreements(problem: Problem, throw: Scenario, also: Sequence[str]) -> list[str]:
+    """Return what of the scenario the first frames contradict although it is not fitted."""
+    near = {"omega0": 0.1 * abs(throw.omega0), "theta0": 0.05}
+    return [
+        f"the first frames say {name} = {value:.3g}, the scenario {getattr(throw, name):.3g}: correct it or add "
+        f"--also {name}"
+        for name, value in sorted(first_frames(problem.measured).items())
+        if name not in also and abs(value - getattr(throw, name)) > near[name]
+    ]

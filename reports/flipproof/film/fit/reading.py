@@ -40,6 +40,8 @@ def read_flight(
 ) -> Measurement:
     """Read a CSV table with a column t [s] and theta [rad] or omega [rad/s]; other columns and empty cells are skipped.
 
+    What cannot be read raises a ValueError that names file, line and column.
+
     Parameters
     ----------
     quantity : what to fit; None: theta if the table has it
@@ -47,11 +49,6 @@ def read_flight(
     noise : standard deviation of one value, if known
     averaged : the table's omega is central differences of theta, averaged over this odd number of points; None: omega
         at the instant
-
-    Raises
-    ------
-    ValueError
-        Naming file, line and column.
     """
     names, rows = read_cells(path)
     there = [name for name in QUANTITIES if name in names]

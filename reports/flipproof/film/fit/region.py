@@ -1,4 +1,4 @@
-"""What the data leave possible: the region of parameters whose chi^2 exceeds the lowest by little, evenly filled.
+"""chi^2 over the parameters of a fit: asked for, descended, and filled evenly where it exceeds the lowest by little.
 
 Kinks and jumps of chi^2 make its curvature at the minimum a poor guide to how far the data allow a parameter to go, and
 side minima too narrow for a grid lie within that reach. So a box along the principal axes of the best points is filled
@@ -9,17 +9,76 @@ and the farthest of them below a bound of chi^2 are the ends of a profile likeli
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import toeplitz
+from scipy.optimize import least_squares
 from scipy.stats import chi2 as distribution
 from scipy.stats.qmc import Halton
 
-from flipproof.film.fit.landscape import HUBER, Landscape, loss
+from flipproof.film.fit.problem import Problem
 from slicemodel.trajectory import FloatArray
 
-Draws = NDArray[np.intp]
+HUBER: Final = 3.0
+"""Residuals beyond this many standard deviations count linearly (Huber's loss), so that a slipped marker does not
+decide; within it nothing changes."""
+
+Tick = Callable[[int], object]
+
+
+class Landscape:
+    """chi^2 of a problem, and how often it was asked for; ``tick`` is called with the number of flights made.
+
+    Residuals are divided by ``problem.noise * scale`` before the loss.
+    """
+
+    def __init__(self, problem: Problem, *, tick: Tick = lambda _: None) -> None:
+        self.problem, self.tick = problem, tick
+        self.low, self.high = problem.bounds()
+        self.scale, self.flights = 1.0, 0
+
+    def residuals(self, points: FloatArray) -> FloatArray:
+        """Return the residuals at many points (M, K) in standard deviations, shape (M, P)."""
+        rows = self.problem.residuals(points)
+        self.flights += len(points)
+        self.tick(len(points))
+        return np.asarray(rows / self.scale)
+
+    def residual(self, x: FloatArray) -> FloatArray:
+        """Return the residuals at ``x`` in standard deviations, shape (P,)."""
+        return np.asarray(self.residuals(x[np.newaxis])[0])
+
+    def jacobian(self, x: FloatArray, steps: FloatArray) -> FloatArray:
+        """Return d residual / d x by central difference quotients over ``steps``, at bounds one-sided, shape (P, K)."""
+        up = np.minimum(x + np.diag(steps), self.high)
+        down = np.maximum(x - np.diag(steps), self.low)
+        above, below = np.split(self.residuals(np.concatenate((up, down))), 2)
+        return np.asarray((above - below).T / np.diag(up - down))
+
+    def descend(self, x: FloatArray, steps: FloatArray, flights: int) -> tuple[FloatArray, float]:
+        """Minimise chi^2 from ``x``; return where it ended, and chi^2 there.
+
+        ``steps`` (K,) are those of the difference quotients, ``flights`` the trial points at the most.
+        """
+        # The solver wants its start strictly inside.
+        margin = 1e-9 * (self.high - self.low)
+        found = least_squares(
+            self.residual, np.clip(x, self.low + margin, self.high - margin), bounds=(self.low, self.high),
+            jac=partial(self.jacobian, steps=steps), x_scale=steps, loss="huber", f_scale=HUBER, ftol=1e-5,
+            xtol=1e-5, gtol=1e-8, max_nfev=flights,
+        )  # fmt: skip
+        return np.asarray(found.x), 2.0 * float(found.cost)
+
+
+def loss(residuals: FloatArray) -> FloatArray:
+    """Return the sum of Huber's loss over the last axis: squares up to ``HUBER``, straight lines beyond."""
+    size = np.abs(residuals)
+    return np.asarray(np.where(size <= HUBER, size * size, 2.0 * HUBER * size - HUBER * HUBER).sum(axis=-1))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +114,7 @@ class Points:
         low = chi2 <= max(level, np.sort(chi2)[min(fewest, len(chi2)) - 1])
         return Points(x=x[low], rows=rows[low], chi2=chi2[low])
 
-    def drawn(self, temperature: float, count: int) -> Draws:
+    def drawn(self, temperature: float, count: int = 2000) -> NDArray[np.intp]:
         """Return indices of ``count`` points, each as often as exp(-chi^2 / 2T) says (systematic resampling)."""
         weights = np.exp(-0.5 * (self.chi2 - self.chi2.min()) / temperature)
         ladder = (np.arange(count) + 0.5) / count
@@ -158,8 +217,7 @@ def autocovariance(residual: FloatArray) -> FloatArray:
     lags = np.arange(count)
     taper = np.clip(1.0 - lags / (reach + 1.0), 0.0, None)
     products = np.array([residual[: count - k] @ residual[k:] / count if taper[k] else 0.0 for k in lags])
-    row = taper * products
-    return np.asarray(row[np.abs(lags[:, np.newaxis] - lags)])
+    return np.asarray(toeplitz(taper * products))
 
 
 def roughness(region: Points, variance: float, seed: int) -> float:
@@ -182,7 +240,7 @@ def roughness(region: Points, variance: float, seed: int) -> float:
     return max(1.0, rough / even) if even > 0 else 1.0
 
 
-def _fall(rows: FloatArray, truths: Draws, noise: FloatArray) -> float:
+def _fall(rows: FloatArray, truths: NDArray[np.intp], noise: FloatArray) -> float:
     """Return by how much the lowest of all ``rows`` is below the truth's on average when noise is added to a truth."""
     true = rows[truths]
     apart = (true**2).sum(axis=1)[:, None] - 2.0 * true @ rows.T + (rows**2).sum(axis=1)

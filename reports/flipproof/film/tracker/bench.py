@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -24,12 +23,6 @@ from flipproof.film.tracker.parabola import Parabola, distance_from_cap, fit_axi
 from flipproof.film.tracker.reader import read_track_table
 from flipproof.film.tracker.table import METRES, RADIANS, SECONDS, TrackFileError, TrackTable
 from slicemodel.trajectory import FloatArray
-
-CLEARLY: Final = 4.0
-"""Standard deviations by which the film's gravity must miss the known one."""
-
-AGREES: Final = 0.1
-"""Relative difference of turning rates that passes as agreement."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,13 +73,10 @@ class Request:
             raise ValueError(f"landing = {self.landing:g} s does not follow release = {self.release:g} s")
         if self.frame_rate is not None and not 1 <= self.frame_rate <= 1e6:
             raise ValueError(f"frame_rate = {self.frame_rate:g} 1/s is outside [1, 1e6]")
-        for name, unit, known in (
-            ("length_unit", self.length_unit, ("", *METRES)),
-            ("angle_unit", self.angle_unit, ("", *RADIANS)),
-            ("time_unit", self.time_unit, tuple(SECONDS)),
-        ):
-            if unit not in known:
-                raise ValueError(f"{name} = {unit!r} is unknown; known: {', '.join(word for word in known if word)}")
+        for name, known in (("length_unit", METRES), ("angle_unit", RADIANS), ("time_unit", SECONDS)):
+            unit = getattr(self, name)
+            if unit not in known and (unit or name == "time_unit"):
+                raise ValueError(f"{name} = {unit!r} is unknown; known: {', '.join(known)}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -128,13 +118,7 @@ class Measurement:
 
 
 def measure(request: Request) -> Measurement:
-    """Read the files and analyse them.
-
-    Raises
-    ------
-    ValueError
-        In one line: a file that cannot be read, a track or a unit that is missing, no flight.
-    """
+    """Read the files and analyse them; raise ValueError if one cannot be read, or track, unit or flight are missing."""
     table = read_track_table(*request.files)
     metres = METRES[_length_unit(request, table)]
     seconds = SECONDS[request.time_unit]
@@ -179,6 +163,26 @@ def measure(request: Request) -> Measurement:
     )  # fmt: skip
 
 
+def lines(measured: Measurement) -> list[str]:
+    """Return a measurement in a few lines for a terminal."""
+    spin, flight, fit = measured.spin, measured.flight, measured.track or measured.axis
+    how = "C_M as tracked" if measured.track else "found from the axis"
+    found = [
+        f"{measured.table.source}: {len(spin.t)} frames at {1 / spin.frame_time:.4g}/s, {spin.measured.sum()} with cap "
+        f"and base, {spin.interpolated.sum()} interpolated ({'; '.join(measured.table.dialects)})",
+        f"release  t = {flight.release:.4f} s ({flight.release_how})",
+        f"landing  t = {flight.landing:.4f} s ({flight.landing_how})",
+        f"omega_0  {measured.omega0:.2f} +- {measured.omega0_deviation:.2g} rad/s; second half of the flight: "
+        f"{measured.mean:.3f} omega_0",
+        f"parabola v_0 = ({fit.v0x:.3f} +- {fit.sd_v0x:.1g}, {fit.v0y:.3f} +- {fit.sd_v0y:.1g}) m/s, "
+        f"g = {fit.g:.2f} +- {fit.sd_g:.1g} m/s^2 ({how})",
+        f"length   cap to base {measured.calibration.length * measured.metres:.4f} m, scatter "
+        f"{measured.calibration.spread * measured.metres * 1e3:.2g} mm, noise explains "
+        f"{measured.calibration.expected * measured.metres * 1e3:.2g} mm",
+    ]
+    return found + [f"WARNING  {warning}" for warning in measured.warnings]
+
+
 def _flight(request: Request, spin: MeasuredSpin, metres: float) -> Flight:
     """Return the flight, found with the gravity that the film shows if that is clearly not the known one.
 
@@ -186,16 +190,14 @@ def _flight(request: Request, spin: MeasuredSpin, metres: float) -> Flight:
     """
 
     def found(gravity: float | None) -> tuple[Flight, Parabola]:
+        height = None if request.table_height is None else request.table_height / metres
         flight = find_flight(
-            spin,
-            release=request.release,
-            landing=request.landing,
-            table_height=None if request.table_height is None else request.table_height / metres,
-            gravity=gravity,
+            spin, release=request.release, landing=request.landing, table_height=height, gravity=gravity
         )
         return flight, fit_axis(spin.t, spin.cap, spin.base, flight.inside & spin.measured, flight.release)
 
     gravity = GRAVITY / metres
+    clearly = 4.0  # standard deviations by which the film's gravity must miss the known one
     try:
         free, free_fit = found(None)
     except NoFlightError as error:
@@ -206,10 +208,10 @@ def _flight(request: Request, spin: MeasuredSpin, metres: float) -> Flight:
         flight, fit = free, free_fit
     # A flight found without knowing gravity must be much longer to be believed instead.
     longer = free.inside.sum() > 1.25 * flight.inside.sum()
-    if longer and abs(free_fit.g - gravity) > CLEARLY * free_fit.sd_g:
+    if longer and abs(free_fit.g - gravity) > clearly * free_fit.sd_g:
         flight, fit = free, free_fit
     for _ in range(3):
-        if abs(fit.g - gravity) <= max(CLEARLY * fit.sd_g, 0.005 * abs(gravity)):  # which shifts no end of a flight
+        if abs(fit.g - gravity) <= max(clearly * fit.sd_g, 0.005 * abs(gravity)):  # which shifts no end of a flight
             break
         gravity = fit.g
         try:
@@ -237,8 +239,8 @@ def _length_unit(request: Request, table: TrackTable) -> str:
 
 def _centre(request: Request, table: TrackTable, spin: MeasuredSpin, metres: float) -> FloatArray | None:
     """Return the tracked centre of mass on the frame grid, shape (P, 2) [m]; None if there is none."""
-    given = [name for name, value in (("ice top", request.ice_top), ("centre of mass", request.centre),
-                                      ("r_cm", request.r_cm)) if value is not None]  # fmt: skip
+    ways = {"ice top": request.ice_top, "centre of mass": request.centre, "r_cm": request.r_cm}
+    given = [way for way, value in ways.items() if value is not None]
     if len(given) > 1:
         raise ValueError(f"{' and '.join(given)} all say where the centre of mass is; give one of them")
     if request.r_cm is not None:
@@ -301,11 +303,8 @@ def _fitted_omega(spin: MeasuredSpin, flight: Flight, flight_time: float) -> tup
 def check_angles(table: TrackTable, spin: MeasuredSpin, track: str, unit: str) -> str:
     """Compare a track's own angle (of a tape or a vector from cap to base) with theta of Eq. 1; say how they agree.
 
-    Raises
-    ------
-    ValueError
-        If the track has no angle or its unit is not given, or if it turns at another rate than the bottle, or its omega
-        is not d theta/dt; the message says if another unit would fit.
+    A ValueError refuses a track without an angle, an angle without unit, one that turns at another rate than the
+    bottle, and an omega that is not d theta/dt; the message says if another unit would fit.
     """
     if not unit:
         raise ValueError(
@@ -341,8 +340,8 @@ def check_angles(table: TrackTable, spin: MeasuredSpin, track: str, unit: str) -
 
 def _refuse(what: str, ratios: Mapping[str, float], unit: str, against: str) -> None:
     """Refuse a ratio that is not 1 in the given unit, and name the unit in which it is."""
-    if abs(ratios[unit] - 1) <= AGREES:
+    fits = [each for each, ratio in ratios.items() if abs(ratio - 1) <= 0.1]
+    if unit in fits:
         return
-    fits = [each for each, ratio in ratios.items() if abs(ratio - 1) <= AGREES]
     advice = f"it seems to be in {fits[0]}: --angle-unit {fits[0]}" if fits else "it belongs to something else"
     raise ValueError(f"{what} in {unit} is {ratios[unit]:.3g} times {against}; {advice}")

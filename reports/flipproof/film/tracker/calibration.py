@@ -47,12 +47,9 @@ class Calibration:
 
 
 def check(spin: MeasuredSpin, flight: Flight, metres: float, length: float | None) -> Calibration:
-    """Judge the distance of cap and base over the flight.
+    """Judge the distance of cap and base over the flight, in a unit of so many ``metres``.
 
-    Parameters
-    ----------
-    metres : length of the tracks' unit [m]
-    length : of the bottle between the two tracked points [m], None if it was not measured
+    ``length`` is that of the bottle between the two tracked points [m], None if it was not measured.
     """
     inside = flight.inside & spin.measured
     apart = np.hypot(*(spin.base - spin.cap)[inside].T)

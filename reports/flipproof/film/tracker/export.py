@@ -1,106 +1,74 @@
-"""Tables that Tracker reads, and tables written the way Tracker writes them."""
+"""A simulated throw as a camera would see it, and as a table for Tracker to lay over a video.
+
+The video, for tests and examples, where the truth must be known, is of a throw with a hand before it, a table after it
+and a camera's noise on it; it is always labelled synthetic.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from types import MappingProxyType
-from typing import Final
 
 import numpy as np
 
+from flipproof.film.tracker.kinematics import direction
 from slicemodel import Scenario, Trajectory
 from slicemodel.landing import lab_motion, landing
+from slicemodel.observables import centre_of_mass_at_rest
 from slicemodel.trajectory import FloatArray
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Style:
-    """How one kind of export is written.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SyntheticVideo:
+    """True motion of a throw in the lab; arrays of shape (P,), points (P, 2) [m].
 
-    Parameters
-    ----------
-    name : of the file that shows it, without its ending
-    delimiter, decimal, newline : signs
-    multi : the first line of an export of several tracks, "" for none
-    closing : True if the rows of names end with a delimiter
-    encoding : a codec of Python
-    subscripts : True for the older ``v_{x}``, else ``vx``
-    underscores : True if names hold underscores for spaces, as a copied table does
-    comment : lines that begin with // above the table
-    digits : of a number; 0 prints every digit, as "unformatted" does
+    ``t`` counts from the first frame; ``release`` and ``landing`` are times on it [s].
     """
 
-    name: str
-    delimiter: str = "\t"
-    decimal: str = "."
-    newline: str = "\n"
-    multi: str = "#multi:"
-    closing: bool = True
-    encoding: str = "utf-8"
-    subscripts: bool = False
-    underscores: bool = False
-    comment: str = ""
-    digits: int = 0
+    t: FloatArray
+    cap: FloatArray
+    base: FloatArray
+    centre: FloatArray
+    release: float
+    landing: float
 
 
-STYLES: Final = MappingProxyType({
-    style.name: style
-    for style in (
-        Style(name="tab", digits=4),
-        Style(name="tab_unformatted"),
-        Style(name="semicolon_decimal_comma", delimiter=";", decimal=",", digits=4),
-        Style(name="comma", delimiter=",", digits=4, comment="synthetic"),
-        Style(name="space", delimiter=" ", underscores=True, digits=5),
-        Style(name="byte_order_mark", encoding="utf-8-sig", newline="\r\n", decimal=",", digits=4),
-        Style(name="utf16", encoding="utf-16", digits=4),
-        Style(name="older_headings", multi="multi:", subscripts=True, digits=4),
-        Style(name="single", multi="", digits=4),
-        Style(name="copied_table", multi="", closing=False, underscores=True, digits=4, comment="synthetic"),
+def synthetic_video(run: Trajectory) -> SyntheticVideo:
+    """Return what a camera of 240 frames/s without noise would see: 0.1 s of hand, the flight, 0.12 s of table.
+
+    In the hand the centre of mass and the angle accelerate evenly, by (-6, 24) m/s^2, far from free fall, and
+    90 rad/s^2, and meet the release in place and velocity. On the table the base stays where it is and the bottle rocks
+    to the nearest upright position in some 0.03 s.
+    """
+    scenario = run.scenario
+    length, gravity = scenario.bottle.length, scenario.gravity
+    velocity = np.array(scenario.launch_velocity)
+    flight = float(run.t[-1])
+    tau = np.arange(-24, np.floor((flight + 0.12) * 240.0) + 1) / 240.0
+    inside = np.clip(tau, 0.0, flight)
+    theta = np.interp(inside, run.t, run.theta)
+    r_cm = np.interp(inside, run.t, run.r_cm)
+    held, down = tau < 0, tau > flight
+    theta[held] += scenario.omega0 * tau[held] + 0.5 * np.sign(scenario.omega0) * 90.0 * tau[held] ** 2
+    upright = 2 * np.pi * np.rint(theta[down][0] / (2 * np.pi))
+    theta[down] = upright + (theta[down] - upright) * np.exp(-(tau[down] - flight) / 0.03)
+    origin = centre_of_mass_at_rest(scenario) * np.array([np.sin(scenario.theta0), -np.cos(scenario.theta0)])
+    acceleration = np.where(held[:, None], (-6.0, 24.0), (0.0, -gravity))
+    clock = np.where(held, tau, inside)[:, None]
+    centre = origin + velocity * clock + 0.5 * acceleration * clock**2
+    axis = direction(theta)
+    cap = centre - r_cm[:, None] * axis
+    base = cap + length * axis
+    base[down] = base[int(down.argmax()) - 1]
+    cap[down] = base[down] - length * axis[down]
+    centre[down] = cap[down] + r_cm[down, None] * axis[down]
+    return SyntheticVideo(
+        t=tau - tau[0], cap=cap, base=base, centre=centre, release=float(-tau[0]), landing=float(flight - tau[0])
     )
-})  # fmt: skip
-"""Every style in which examples and tests write."""
 
 
-def tracker_number(value: float, digits: int, decimal: str) -> str:
-    """Return a number as Tracker prints it: fixed from 0.1 to 1000, else with E, and 0.0; NaN is an empty cell.
-
-    ``digits`` significant digits, 0 for the shortest form that reads back exactly.
-    """
-    if np.isnan(value):
-        return ""
-    if value == 0:
-        return f"0{decimal}0"
-    if 0.1 <= abs(value) < 1000:
-        text = f"{value:#.{digits}g}" if digits else repr(float(value))
-    else:
-        printed = f"{value:.{digits - 1}e}" if digits else np.format_float_scientific(value, trim="0")
-        mantissa, _, exponent = printed.partition("e")
-        text = f"{mantissa}E{int(exponent)}"
-    return text.replace(".", decimal)
-
-
-def tracker_text(t: FloatArray, tracks: Mapping[str, Mapping[str, FloatArray]], style: Style) -> str:
-    """Return an export of several tracks.
-
-    Parameters
-    ----------
-    t : (P,)
-    tracks : columns by name, each (P,), NaN where missing, by track
-    """
-    end = style.delimiter if style.closing else ""
-    names, titles = style.delimiter, ["t"]
-    for k, (name, columns) in enumerate(tracks.items()):
-        shown = name.replace(" ", "_") if style.underscores else name
-        cells = len(columns) - (1 if k == len(tracks) - 1 and not style.closing else 0)
-        names += shown + style.delimiter * cells
-        titles += [f"{title[0]}_{{{title[1:]}}}" if style.subscripts and len(title) > 1 else title for title in columns]
-    lines = [f"// {style.comment}"] if style.comment else []
-    lines += [style.multi] if style.multi else []
-    lines += [names, style.delimiter.join(titles) + end]
-    values = np.column_stack((t, *(column for columns in tracks.values() for column in columns.values())))
-    lines += [style.delimiter.join(tracker_number(v, style.digits, style.decimal) for v in row) for row in values]
-    return style.newline.join(lines) + style.newline
+def with_noise(points: FloatArray, deviation: float, seed: int) -> FloatArray:
+    """Return points with independent Gaussian noise of a standard deviation in x and y."""
+    return points + np.random.default_rng(seed).normal(0.0, deviation, points.shape)
 
 
 def frame_times(scenario: Scenario, frame_rate: float) -> FloatArray:

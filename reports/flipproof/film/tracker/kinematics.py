@@ -85,8 +85,7 @@ def omega_from_tracks(
     window : odd number of frames of the Savitzky-Golay derivative
     most_gap : longest gap in frames that is interpolated
     time_unit : the file's time unit in seconds
-    cuts : times [s] of frames after which the motion may bend; the Savitzky-Golay derivative does not reach across.
-        Those of ``flipproof.film.tracker.moments.find_flight`` keep hand, flight and table apart
+    cuts : times [s] of frames after which the motion may bend, as of a ``Flight``; the derivative does not reach across
 
     Raises
     ------

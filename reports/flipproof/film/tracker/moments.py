@@ -69,20 +69,13 @@ def find_flight(
     table_height: float | None = None,
     gravity: float | None = None,
 ) -> Flight:
-    """Return the flight of a record.
+    """Return the flight of a record; raise NoFlightError if none is found.
 
     Parameters
     ----------
-    release, landing : [s] - given by the user instead of found
-    table_height : y of the table in the unit of the tracks; the landing is when the base comes down to it
+    release, landing : [s] - given by the user instead of found; outside the record or with few frames: ValueError
+    table_height : y of the table in the unit of the tracks; the landing is when the base comes down to it, if it does
     gravity : in the unit of the tracks per s^2 if that is known, which tells flight from a hand more sharply
-
-    Raises
-    ------
-    NoFlightError
-        If none is found.
-    ValueError
-        If what is given lies outside the record, leaves too few frames, or the base never comes down to the table.
     """
     for name, given in (("release", release), ("landing", landing)):
         if given is not None and not spin.t[0] - spin.frame_time <= given <= spin.t[-1] + spin.frame_time:
@@ -96,18 +89,20 @@ def find_flight(
     if release is None or landing is None:
         first, last = _stretch(spin, points, gravity)
         landed = landed or last < int(points[-1])
-    landing_how = "given"
-    if landing is None and table_height is not None:
+    if landing is not None:
+        landing_how = "given"
+    elif table_height is not None:
         last, landing_how = _at_table(spin, first, table_height)
         landed = True
-    elif landing is None and not landed:
-        landing_how = "the record ends in flight"
-    elif landing is None:
+    elif landed:
         last, landing_how = _sharpened(spin, first, last)
-    release_how = "given"
-    if release is None and first == points[0]:
+    else:
+        landing_how = "the record ends in flight"
+    if release is not None:
+        release_how = "given"
+    elif first == points[0]:
         release_how = "the record begins in flight"
-    elif release is None:
+    else:
         first, release_how = _onset(spin, first, last, gravity)
     inside = np.zeros(len(spin.t), dtype=np.bool_)
     inside[first : last + 1] = True

@@ -1,20 +1,135 @@
-"""A measurement as files: CSV, figures, summary and one page."""
+"""What a video shows, as files: figures, a table of every frame, a summary, and one page.
+
+The figures are tracks, angle, angular velocity, normalised as in Fig. 4, and what the bottle's axis tells.
+"""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from flipproof.figures.style import draw, new_figure, styled
 from flipproof.film.tracker.bench import Measurement
 from flipproof.film.tracker.parabola import Parabola
 from flipproof.output.columns import columns_csv
+from flipproof.output.folder import write_text
 from flipproof.page.templating import environment
+
+CAP, BASE, CENTRE, FIT = "#D55E00", "#00466E", "#000000", "#0072B2"
+PAPER, SMOOTH, FILLED = "#999999", "#D55E00", "#CC79A7"
+
+
+@styled
+def figure_tracks(measured: Measurement) -> Figure:
+    """Coordinates of cap and base over time with the parabola of C_M, as in Fig. 3a."""
+    figure, panels = new_figure(2, size=(8.0, 6.0), sharex=True)
+    spin, inside, fit = measured.spin, measured.flight.inside, measured.track or measured.axis
+    _shade(panels, measured)
+    for k, (axes, name) in enumerate(zip(panels, "xy", strict=True)):
+        for points, colour, label in ((spin.cap, CAP, "cap"), (spin.base, BASE, "base")):
+            axes.plot(spin.t, points[:, k] * measured.metres, ".", color=colour, markersize=3.5, label=label)
+        if measured.track is not None and measured.track_points is not None:
+            axes.plot(spin.t, measured.track_points[:, k], "*", color=CENTRE, markersize=3.5, label="C_M as tracked")
+        label = f"C_M, fit of Eq. 2{'ab'[k]}" if measured.track else "C_M, found from the axis"
+        axes.plot(spin.t[inside], fit.at(spin.t[inside])[:, k], "-", color=FIT, linewidth=1.6, label=label)
+        axes.set_ylabel(f"{name} [m]")
+    panels[0].set_title(f"v₀x = {fit.v0x:.3f} ± {fit.sd_v0x:.2g} m/s", fontsize=10, loc="left")
+    panels[1].set_title(
+        f"v₀y = {fit.v0y:.3f} ± {fit.sd_v0y:.2g} m/s, g = {fit.g:.2f} ± {fit.sd_g:.2g} m/s²", fontsize=10, loc="left"
+    )
+    panels[1].set_xlabel("time t [s]")
+    handles, labels = panels[0].get_legend_handles_labels()
+    labels = [label.replace("Eq. 2a", "Eq. 2a and 2b") for label in labels]
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    return figure
+
+
+@styled
+def figure_spin(measured: Measurement) -> Figure:
+    """Angle and angular velocity over time with noise band, as in Fig. 4a and 4b."""
+    figure, (above, below) = new_figure(2, size=(8.0, 6.4), sharex=True)
+    spin = measured.spin
+    _shade((above, below), measured)
+    above.plot(spin.t, spin.theta, ".", color=BASE, markersize=3.5, label="θ by Eq. 1")
+    if spin.interpolated.any():
+        t, theta = spin.t[spin.interpolated], spin.theta[spin.interpolated]
+        above.plot(t, theta, "o", color=FILLED, markersize=5, fillstyle="none", label="interpolated")
+    for turn in range(int(np.ceil(np.nanmin(spin.theta) / np.pi)), int(np.floor(np.nanmax(spin.theta) / np.pi)) + 1):
+        above.axhline(turn * np.pi, color="#bbbbbb", linewidth=0.7, linestyle=":")
+    above.set_ylabel("θ [rad]")
+    above.legend(loc="upper left")
+    below.plot(spin.t, spin.omega_paper, "-", color=PAPER, linewidth=0.9, label="ω, mean of 5 points (paper)")
+    below.plot(spin.t, spin.omega, "-", color=SMOOTH, linewidth=1.4, label="ω, Savitzky-Golay")
+    low, high = spin.omega - 2 * spin.band, spin.omega + 2 * spin.band
+    below.fill_between(spin.t, low, high, color=SMOOTH, alpha=0.25, linewidth=0, label="± 2 standard deviations")
+    below.set_ylabel("ω [rad/s]")
+    below.set_xlabel("time t [s]")
+    below.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3)
+    return figure
+
+
+@styled
+def figure_normalised(measured: Measurement) -> Figure:
+    """Angular velocity over its value at release, time over the time to landing, as in Fig. 4c."""
+    figure, axes = new_figure(size=(8.0, 4.2))
+    spin, inside = measured.spin, measured.flight.inside
+    time, level = measured.reduced_time[inside], spin.omega[inside] / measured.omega0
+    width = np.abs(spin.band[inside] / measured.omega0)
+    axes.plot(
+        time, spin.omega_paper[inside] / measured.omega0, "-", color=PAPER, linewidth=0.9, label="mean of 5 points"
+    )
+    axes.plot(time, level, "-", color=SMOOTH, linewidth=1.6, label="Savitzky-Golay")
+    axes.fill_between(time, level - 2 * width, level + 2 * width, color=SMOOTH, alpha=0.25, linewidth=0)
+    axes.axhline(measured.mean, xmin=0.5, color=FIT, linewidth=1.2, linestyle="--", label="mean of the second half")
+    axes.set_xlim(0, 1)
+    axes.set_ylim(min(0.0, float(np.nanmin(level - 2 * width))), None)
+    axes.set_xlabel("t / T")
+    axes.set_ylabel("ω / ω₀")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=3)
+    return figure
+
+
+@styled
+def figure_axis(measured: Measurement) -> Figure:
+    """Show what the axis tells: distance of cap and base, and where on it the parabola of C_M lies."""
+    figure, (above, below) = new_figure(2, size=(8.0, 5.6), sharex=True)
+    spin, metres = measured.spin, measured.metres
+    apart = np.hypot(*(spin.base - spin.cap).T) * metres
+    median, expected = measured.calibration.length * metres, measured.calibration.expected * metres
+    _shade((above, below), measured)
+    above.axhspan(
+        median - 2 * expected, median + 2 * expected, color=FIT, alpha=0.2, linewidth=0, label="noise, ± 2 s.d."
+    )
+    above.plot(spin.t, apart, ".", color=BASE, markersize=3.5, label="cap to base")
+    if measured.request.length is not None:
+        above.axhline(measured.request.length, color=CENTRE, linewidth=1.0, linestyle="--", label="as measured by hand")
+    above.set_ylabel("distance [m]")
+    above.legend(loc="upper center", ncols=3, fontsize=8.5)
+    above.margins(y=0.35)
+    below.plot(spin.t, measured.r_cm / median, ".", color=CENTRE, markersize=3.5)
+    below.set_ylabel("r_CM / L from the cap")
+    below.set_ylim(0, 1)
+    below.set_xlabel("time t [s]")
+    return figure
+
+
+def _shade(panels: Iterable[Axes], measured: Measurement) -> None:
+    """Grey what is not flight."""
+    spin, flight = measured.spin, measured.flight
+    for axes in panels:
+        axes.axvspan(spin.t[0], flight.release, color="#000000", alpha=0.08, linewidth=0)
+        if flight.landed:
+            axes.axvspan(flight.landing, spin.t[-1], color="#000000", alpha=0.08, linewidth=0)
+        axes.margins(x=0.01)
+
 
 COLUMNS = {
     "t": "time [s]",
@@ -32,17 +147,6 @@ COLUMNS = {
     "line": "line of the file, 0 if the frame has none",
 }
 """Columns of track.csv and what they are."""
-
-
-def csv_text(measured: Measurement) -> str:
-    """Return a measurement as CSV, one row per frame; an empty cell where there is no value."""
-    spin = measured.spin
-    columns = (
-        spin.t, spin.theta, spin.omega, spin.band, spin.omega_paper, spin.band_paper, measured.r_cm, spin.measured,
-        spin.interpolated, measured.flight.inside, measured.reduced_time, spin.omega / measured.omega0, spin.lines,
-    )  # fmt: skip
-    shown = (column if column.dtype.kind == "f" else column.astype(int) for column in columns)
-    return columns_csv(dict(zip(COLUMNS, shown, strict=True)))
 
 
 def summary(measured: Measurement) -> dict[str, Any]:
@@ -81,45 +185,28 @@ def _fit(fit: Parabola) -> dict[str, float]:
     return asdict(fit) | {"v0": math.hypot(fit.v0x, fit.v0y)}
 
 
-def lines(measured: Measurement) -> list[str]:
-    """Return the few lines that the command line prints."""
-    spin, flight, fit = measured.spin, measured.flight, measured.track or measured.axis
-    how = "C_M as tracked" if measured.track else "found from the axis"
-    found = [
-        f"{measured.table.source}: {len(spin.t)} frames at {1 / spin.frame_time:.4g}/s, {spin.measured.sum()} with cap "
-        f"and base, {spin.interpolated.sum()} interpolated ({'; '.join(measured.table.dialects)})",
-        f"release  t = {flight.release:.4f} s ({flight.release_how})",
-        f"landing  t = {flight.landing:.4f} s ({flight.landing_how})",
-        f"omega_0  {measured.omega0:.2f} +- {measured.omega0_deviation:.2g} rad/s; second half of the flight: "
-        f"{measured.mean:.3f} omega_0",
-        f"parabola v_0 = ({fit.v0x:.3f} +- {fit.sd_v0x:.1g}, {fit.v0y:.3f} +- {fit.sd_v0y:.1g}) m/s, "
-        f"g = {fit.g:.2f} +- {fit.sd_g:.1g} m/s^2 ({how})",
-        f"length   cap to base {measured.calibration.length * measured.metres:.4f} m, scatter "
-        f"{measured.calibration.spread * measured.metres * 1e3:.2g} mm, noise explains "
-        f"{measured.calibration.expected * measured.metres * 1e3:.2g} mm",
-    ]
-    return found + [f"WARNING  {warning}" for warning in measured.warnings]
-
-
 def write(measured: Measurement, folder: Path, provenance: Mapping[str, str]) -> None:
     """Write track.csv, every figure as SVG and PNG, summary.json and index.html into a folder that exists."""
-    from flipproof.figures.style import draw
-    from flipproof.film.tracker.figures import FIGURES
-
-    (folder / "track.csv").write_text(csv_text(measured), encoding="utf-8")
+    spin = measured.spin
+    columns = (
+        spin.t, spin.theta, spin.omega, spin.band, spin.omega_paper, spin.band_paper, measured.r_cm, spin.measured,
+        spin.interpolated, measured.flight.inside, measured.reduced_time, spin.omega / measured.omega0, spin.lines,
+    )  # fmt: skip
+    shown = (column if column.dtype.kind == "f" else column.astype(int) for column in columns)
+    write_text(folder / "track.csv", columns_csv(dict(zip(COLUMNS, shown, strict=True))))
     drawn = {}
-    for name, figure in FIGURES.items():
+    figures = {"tracks": figure_tracks, "spin": figure_spin, "normalised": figure_normalised, "axis": figure_axis}
+    for name, figure in figures.items():
         drawing = draw(figure(measured))
         drawn[name] = drawing.svg[drawing.svg.index("<svg") :]
-        (folder / f"{name}.svg").write_text(drawing.svg, encoding="utf-8")
+        write_text(folder / f"{name}.svg", drawing.svg)
         (folder / f"{name}.png").write_bytes(drawing.png)
     numbers = summary(measured) | {"provenance": dict(provenance)}
-    text = json.dumps(_finite(numbers), indent=2, ensure_ascii=False) + "\n"
-    (folder / "summary.json").write_text(text, encoding="utf-8")
+    write_text(folder / "summary.json", json.dumps(_finite(numbers), indent=2, ensure_ascii=False) + "\n")
     fit = measured.track or measured.axis
     page = environment().get_template("track.html.j2")
     html = page.render(measured=measured, fit=fit, summary=numbers, figures=drawn, provenance=provenance)
-    (folder / "index.html").write_text(html, encoding="utf-8")
+    write_text(folder / "index.html", html)
 
 
 def _finite(value: Any) -> Any:

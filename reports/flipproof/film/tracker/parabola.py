@@ -52,13 +52,9 @@ class Parabola:
 
 
 def fit_track(t: FloatArray, points: FloatArray, start: float) -> Parabola:
-    """Fit Eq. 2a to x and Eq. 2b to y of a tracked centre of mass by least squares.
+    """Fit Eq. 2a to x and Eq. 2b to y of a tracked centre of mass by least squares, from its release at ``start`` [s].
 
-    Parameters
-    ----------
-    t : (P,) [s]
-    points : (P, 2) - NaN where missing; fewer than ``LEAST_POINTS`` others are refused
-    start : time of the release [s]
+    ``points`` (P, 2) at times ``t`` (P,) are NaN where missing; fewer than ``LEAST_POINTS`` others are refused.
     """
     known = ~np.isnan(points).any(axis=1)
     if known.sum() < LEAST_POINTS:

@@ -25,19 +25,23 @@ from typing import Final
 
 import numpy as np
 
-from flipproof.film.tracker.dialect import (
+from flipproof.film.tracker.table import (
     EXPORT,
     MULTI,
     TIMES,
     Line,
     Rows,
+    Track,
+    TrackFileError,
+    TrackTable,
+    column_name,
     decimal_of,
     delimiter_of,
     last_digit,
     number,
+    plain,
     read_lines,
 )
-from flipproof.film.tracker.table import Track, TrackFileError, TrackTable, column_name, plain
 from slicemodel.scenario import shortened
 
 LARGEST: Final = 1e9
@@ -48,11 +52,7 @@ Heading = tuple[str, str, str]
 
 
 def read_track_table(path: Path | str, *more: Path | str) -> TrackTable:
-    """Read a Tracker export, or several of one clip whose tracks are to be used together.
-
-    Parameters
-    ----------
-    path, more : files; rows are joined by equal times
+    """Read a Tracker export, or several of one clip whose tracks are used together, their rows joined by equal times.
 
     Raises
     ------
