@@ -72,7 +72,7 @@ FAULTS = (
      "test_studies.py"),
     ("reports/flipproof/chapters/waterfall/study.py", "math.factorial(n - size - 1)", "math.factorial(n - size)",
      "test_waterfall.py"),
-    ("reports/flipproof/chapters/alignment/tube.py", "(inside[:-1] ^ inside[1:]) / 2", "(inside[:-1] ^ inside[1:])",
+    ("reports/flipproof/chapters/alignment/study.py", "(inside[:-1] ^ inside[1:]) / 2", "(inside[:-1] ^ inside[1:])",
      "test_tube.py"),
     ("reports/flipproof/chapters/model_form/study.py", "gci=float(1.25 * abs(gap))", "gci=float(3.0 * abs(gap))",
      "test_model_form.py"),

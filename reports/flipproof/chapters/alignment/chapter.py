@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -12,8 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from flipproof.chapters.alignment.study import SHIFT_BAND, Alignment, Table, end_name, study_alignment
-from flipproof.chapters.alignment.tube import Tube, study_tube
+from flipproof.chapters.alignment.study import SHIFT_BAND, Alignment, Tube, end_name, study_alignment, study_tube
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Outcome, Study, attempt, known, observed
 from flipproof.output.columns import rows_csv
@@ -34,20 +32,11 @@ IMPACTS = {
 """Colour and size of every kind of impact."""
 
 
-@dataclass(frozen=True, slots=True)
-class Events:
-    """Every pair aligned, and in its tube."""
-
-    alignments: Mapping[tuple[str, str], Outcome[Alignment]]
-    tubes: Mapping[tuple[str, str], Outcome[Tube]]
-
-    @property
-    def aligned(self) -> dict[tuple[str, str], Alignment]:
-        """The pairs that could be aligned."""
-        return known(self.alignments)
+Pairs = Mapping[tuple[str, str], tuple[Outcome[Alignment], Outcome[Tube]]]
+"""Every pair aligned, and in its tube."""
 
 
-def study(ask: Ask) -> Study[Events]:
+def study(ask: Ask) -> Study[Pairs]:
     """Align the impacts of the pairs, and hold their omega in tubes of 2 ms and a hundredth of omega_0."""
     flights = yield [ask.solvers[name] for pair in PAIRS for name in pair]
     dy = 0.01 * abs(ask.throw.omega0)
@@ -55,29 +44,32 @@ def study(ask: Ask) -> Study[Events]:
     def both(pair: tuple[str, str]) -> Any:
         return (flights[ask.solvers[name]].flight for name in pair)
 
-    return Events(
-        {pair: attempt(lambda pair: study_alignment(*both(pair)), pair) for pair in PAIRS},
-        {pair: attempt(lambda pair: study_tube(*both(pair), dt=2e-3, dy=dy), pair) for pair in PAIRS},
-    )
+    return {
+        pair: (
+            attempt(lambda pair: study_alignment(*both(pair)), pair),
+            attempt(lambda pair: study_tube(*both(pair), dt=2e-3, dy=dy), pair),
+        )
+        for pair in PAIRS
+    }
 
 
-def claims(found: Events) -> Claims:
+def claims(found: Pairs) -> Claims:
     """Yield the share of the time that each second curve spends in the tube around the first: early is no failure."""
-    for (first, second), tube in found.tubes.items():
+    for (first, second), (_, tube) in found.items():
         if tube.found is None:
             yield Absent(f"tube-{first}-{second}", f"tube of {first} and {second}", tube.reason, "observation")
         else:
             title = f"{second} in the tube around {first}: share of the time"
             yield observed(f"tube-{first}-{second}", title, tube.found.share, "", tube.found.words)
-    for (first, second), each in found.alignments.items():
-        if each.found is None:
+    for (first, second), (aligned, _) in found.items():
+        if aligned.found is None:
             title = f"alignment of {first} and {second}"
-            yield Absent(f"alignment-{first}-{second}", title, each.reason, "observation")
+            yield Absent(f"alignment-{first}-{second}", title, aligned.reason, "observation")
 
 
-def figures(found: Events) -> Iterator[Exhibit]:
+def figures(found: Pairs) -> Iterator[Exhibit]:
     """Yield contacts and impacts of every pair."""
-    for (first, second), alignment in found.aligned.items():
+    for (first, second), alignment in known({pair: aligned for pair, (aligned, _) in found.items()}).items():
         yield Exhibit(
             name=f"gantt-{first}-{second}",
             title=f"Contacts and impacts: {first} and {second}",
@@ -156,23 +148,22 @@ def _draw_impacts(axes: Axes, alignment: Alignment, rows: dict[int, int]) -> Non
         if here.slice in rows:
             heights = [rows[here.slice] + lane for lane in LANES]
             axes.plot((here.time, there.time), heights, color=IMPACTS["shifted"][0], linewidth=0.6, alpha=0.7)
-    for chosen, kind in ((~moved, "agrees"), (moved, "shifted")):
-        _mark(axes, matched[chosen], rows, LANES[0], kind)
-        _mark(axes, later[chosen], rows, LANES[1], kind)
-    for after, lane in zip(alignment.after_fork, LANES, strict=True):
-        _mark(axes, after, rows, lane, "after a fork")
-    _mark(axes, alignment.missing, rows, LANES[0], "missing")
-    _mark(axes, alignment.extra, rows, LANES[1], "extra")
-
-
-def _mark(axes: Axes, impacts: Table, rows: dict[int, int], lane: float, kind: str) -> None:
-    colour, size = IMPACTS[kind]
-    above = 3 if kind == "agrees" else 4
-    for end, marker in ((BASE, "v"), (CAP, "^")):
-        shown = impacts[(impacts.end == end) & np.isin(impacts.slice, list(rows))]
-        heights = [rows[i] + lane for i in shown.slice]
-        edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.3}
-        axes.plot(shown.time, heights, marker, color=colour, markersize=size, zorder=above, **edge)
+    for kind, which, impacts in (
+        ("agrees", 0, matched[~moved]),
+        ("agrees", 1, later[~moved]),
+        ("shifted", 0, matched[moved]),
+        ("shifted", 1, later[moved]),
+        ("after a fork", 0, alignment.after_fork[0]),
+        ("after a fork", 1, alignment.after_fork[1]),
+        ("missing", 0, alignment.missing),
+        ("extra", 1, alignment.extra),
+    ):
+        colour, size = IMPACTS[kind]
+        look: dict[str, Any] = {"color": colour, "markersize": size, "zorder": 3 if kind == "agrees" else 4}
+        for end, marker in ((BASE, "v"), (CAP, "^")):
+            shown = impacts[(impacts.end == end) & np.isin(impacts.slice, list(rows))]
+            heights = [rows[i] + LANES[which] for i in shown.slice]
+            axes.plot(shown.time, heights, marker, markeredgecolor="white", markeredgewidth=0.3, **look)
 
 
 def _gantt_handles(alignment: Alignment) -> list[Patch | Line2D]:
