@@ -12,8 +12,7 @@ import pytest
 
 from flipproof.build import ask_of
 from flipproof.chapters import chapters_named
-from flipproof.chapters.guests.chapter import claim_guests
-from flipproof.chapters.guests.figures import draw_guests
+from flipproof.chapters.guests.chapter import claim_guests, draw_guests
 from flipproof.chapters.guests.split import FREE, split, switches_made
 from flipproof.chapters.guests.study import SPARSE, Guests, energy_of, received, study_guests, visit, with_split
 from flipproof.chapters.waterfall.study import equation_run
@@ -297,7 +296,7 @@ def test_bars_that_miss_the_whole_are_no_waterfall_and_the_guest_says_why(ladder
     flown = {equation_run(THROW, start): ladder["eq8"], equation_run(THROW, FREE): ladder["free-flight"]}
     flights = Flights({run: Made(run, flight, 0.0) for run, flight in flown.items()})
     found = split(ladder["eq8-weightless"], start, flights)
-    assert found.placed + found.bars["recoil"] == pytest.approx(found.end, abs=1e-15)
+    assert found.start + found.rest + found.bars["recoil"] == pytest.approx(found.end, abs=1e-15)
     monkeypatch.setattr("flipproof.chapters.guests.split.mean", lambda changes: 0.9 * changes[0][1])
     with pytest.raises(ArithmeticError, match="rest and bars miss"):
         split(ladder["eq8-weightless"], start, flights)

@@ -7,8 +7,7 @@ import pytest
 from made_up import study_map, trajectory_of
 
 import ode_reference
-from flipproof.chapters.maps.chapter import _beyond
-from flipproof.chapters.maps.figure import figure_map
+from flipproof.chapters.maps.chapter import _beyond, figure_map
 from flipproof.chapters.maps.study import (
     COLUMN,
     EXTRA,

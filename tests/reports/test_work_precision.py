@@ -13,11 +13,11 @@ from engine_check.solver import ENGINES
 from flipproof.build import ask_of
 from flipproof.chapters import chapters_named
 from flipproof.chapters.work_precision.chapter import (
+    claim_work_precision,
     figures,
     summarise_work_precision,
     tabulate_work_precision,
 )
-from flipproof.chapters.work_precision.claims import claim_work_precision
 from flipproof.chapters.work_precision.contenders import (
     AT_REST,
     CASES,

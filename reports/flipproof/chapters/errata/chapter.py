@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Final
+from typing import Final, cast
 
 from flipproof.chapters.errata import equations, programs
-from flipproof.chapters.errata.erratum import ROUND_OFF, Erratum
-from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Study, observed
+from flipproof.chapters.errata.equations import ROUND_OFF, Erratum
+from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Study, attempt, observed
 from slicemodel import Scenario
 
 AUDIT: Final[Mapping[str, Callable[[Scenario], Erratum]]] = {
@@ -42,21 +42,13 @@ def study(ask: Ask) -> Study[Mapping[str, Erratum]]:
     """Have a worker audit the paper on the throw."""
     audit = Call(study_errata, (ask.throw,), "errata")
     flights = yield [audit]
-    errata: Mapping[str, Erratum] = flights.answer(audit)
-    return errata
+    return cast(Mapping[str, Erratum], flights.answer(audit))
 
 
 def study_errata(throw: Scenario) -> dict[str, Erratum]:
     """Return the audit; an item that cannot be computed has the value NaN and says why."""
-    return {id_: audited(item, throw) for id_, item in AUDIT.items()}
-
-
-def audited(item: Callable[[Scenario], Erratum], throw: Scenario) -> Erratum:
-    """Return an item of the audit, or why it cannot be computed."""
-    try:
-        return item(throw)
-    except (ValueError, ArithmeticError, RuntimeError) as error:
-        return Erratum(note=f"{type(error).__name__}: {error}")
+    found = {id_: attempt(item, throw) for id_, item in AUDIT.items()}
+    return {id_: each.found or Erratum(note=each.reason) for id_, each in found.items()}
 
 
 def claims(found: Mapping[str, Erratum]) -> Claims:

@@ -1,4 +1,4 @@
-"""Errata of the equations: Eq. 4, 8, 9 and 11e, and a unit.
+"""What an erratum is, and those of the equations: Eq. 4, 8, 9 and 11e, and a unit.
 
 Eq. 9c, 9d and 11e are written here once more, exactly as typeset: they are the subject of the audit and must not come
 from a scheme that has mended them.
@@ -7,15 +7,48 @@ from a scheme that has mended them.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Final, Literal
 
 import numpy as np
 
 from flipproof.chapters.differences.study import largest_change
-from flipproof.chapters.errata.erratum import ROUND_OFF, Erratum
 from flipproof.frame.solvers import solve
 from slicemodel import Scenario
 from slicemodel.observables import initial_moment_of_inertia
+
+ROUND_OFF: Final = (1.0 - 1e-6, 1.0 + 1e-6)
+"""A quotient that should be 1, with room for a finite difference."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Erratum:
+    """One item of the audit.
+
+    Parameters
+    ----------
+    place : str - equation, section or file of the paper
+    prints, follows : str - what stands there; what its own earlier equations demand
+    value : float, unit : str - the number that separates the two; NaN if it could not be computed
+    admissible : (low, high) - closed interval that holds ``value`` if the print is right
+    note : str - further numbers
+    """
+
+    place: str = ""
+    prints: str = ""
+    follows: str = ""
+    value: float = math.nan
+    unit: str = ""
+    admissible: tuple[float, float] = (0.0, 0.0)
+    note: str = ""
+
+    @property
+    def verdict(self) -> Literal["erratum", "as printed", "not evaluated"]:
+        """Return the verdict; NaN decides nothing."""
+        if not math.isfinite(self.value):
+            return "not evaluated"
+        low, high = self.admissible
+        return "as printed" if low <= self.value <= high else "erratum"
 
 
 def printed_9c(x: float, v: float, gamma: float, omega: float, t: float) -> float:

@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cache
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 
-from flipproof.chapters.errata.erratum import ROUND_OFF, SQUARE, Erratum
+from flipproof.chapters.errata.equations import ROUND_OFF, Erratum
 from flipproof.frame.solvers import solve
 from slicemodel import Scenario
 from slicemodel.observables import plateau
+
+SQUARE: Final = (1.8, 2.2)
+"""Exponents that count as a square."""
 
 
 def erratum_matlab_damping(throw: Scenario) -> Erratum:

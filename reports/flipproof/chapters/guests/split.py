@@ -28,28 +28,22 @@ FREE = MODELS["free-flight"].switches
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Split:
-    """How a guest's plateau ``start`` becomes that of its equation, ``placed``, and that of free flight, ``end``.
+    """How a guest's plateau ``start`` becomes that of free flight, ``end``; no assumption explains the ``rest``.
 
     ``bars`` maps each switch to its fair share, ``ranges`` to the least and the largest change by it in a single order.
     """
 
     equation: str
     start: float
-    placed: float
+    rest: float
     end: float
     bars: Mapping[str, float]
     ranges: Mapping[str, tuple[float, float]]
 
-    @property
-    def rest(self) -> float:
-        """What no assumption of the ladder explains."""
-        return self.placed - self.start
-
     def to_mapping(self) -> dict[str, Any]:
         """Return the split as JSON-ready data."""
-        ranges = {name: list(each) for name, each in self.ranges.items()}
-        parts = {"rest": self.rest, "bars": dict(self.bars), "ranges": ranges}
-        return {"equation": self.equation, "guest": self.start, "free-flight": self.end, **parts}
+        ends = {"equation": self.equation, "guest": self.start, "free-flight": self.end, "rest": self.rest}
+        return ends | {"bars": dict(self.bars), "ranges": {name: list(each) for name, each in self.ranges.items()}}
 
 
 def switches_made(traits: Traits | None, certificate: Certificate | None, nearest: str | None) -> Switches | None:
@@ -105,7 +99,7 @@ def split(run: Trajectory, start: Switches, flights: Flights) -> Split:
     found = Split(
         equation=name_of(start),
         start=read(run),
-        placed=value(start),
+        rest=value(start) - read(run),
         end=value(FREE),
         bars={name: mean(each) for name, each in changes.items()},
         ranges={name: (min(c for _, c in each), max(c for _, c in each)) for name, each in changes.items()},

@@ -209,34 +209,26 @@ def visit(spec: str, throw: Scenario, times: FloatArray, timeout: float | None =
             problems[name] = str(error)
             return None
 
-    content = tried("content", lambda: content_of(spec)) or ""
+    known: dict[str, Any] = {"spec": spec, "content": tried("content", lambda: content_of(spec)) or ""}
+    known["problems"] = problems
     runner = tried("solver", lambda: opened(spec, timeout, curves=True))
     if runner is None:
-        return Visit(spec=spec, content=content, problems=problems)
+        return Visit(**known)
     with closing(runner):
         traits = tried("solver", lambda: runner.traits)
         if traits is None:
-            return Visit(spec=spec, content=content, problems=problems)
-        certificate = ice = None
-        if spec.startswith(CSV):
+            return Visit(**known)
+        asked = not spec.startswith(CSV)
+        if not asked:
             problems["certificate"] = "a curve in a file cannot be asked"
-        else:
-            certificate = tried("certificate", lambda: certify(runner))
-        flight = tried("flight", lambda: _flight(runner, throw, times, LEVELS[-1]).run)
+        known["traits"] = traits
+        known["certificate"] = tried("certificate", lambda: certify(runner)) if asked else None
+        known["flight"] = tried("flight", lambda: _flight(runner, throw, times, LEVELS[-1]).run)
         levels = LEVELS if traits.refined_by is not None else ()
         efforts = [tried(f"flight at level {k}", partial(_flight, runner, throw, times[::SPARSE], k)) for k in levels]
-        if not spec.startswith(CSV):
-            ice = tried("ice", lambda: _flight(runner, replace(throw, frozen=True), times, 0).run)
-    return Visit(
-        spec=spec,
-        content=content,
-        traits=traits,
-        certificate=certificate,
-        flight=flight,
-        efforts=tuple(one for one in efforts if one is not None),
-        ice=None if ice is None else measure(traits.name, ice),
-        problems=problems,
-    )
+        ice = tried("ice", lambda: _flight(runner, replace(throw, frozen=True), times, 0).run) if asked else None
+    drift = None if ice is None else measure(traits.name, ice)
+    return Visit(**known, efforts=tuple(one for one in efforts if one is not None), ice=drift)
 
 
 def _flight(runner: Runner, throw: Scenario, times: FloatArray, level: int) -> Effort:

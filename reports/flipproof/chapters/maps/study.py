@@ -213,9 +213,9 @@ def study_readings(
     shape = (len(values), len(fills))
     level, largest = ({name: np.full(shape, np.nan) for name in SOLVERS} for _ in range(2))
     reason = np.full(shape, "", dtype="<U80")
-    free: dict[tuple[int, int], Run] = {}
+    free: list[Run] = []
     for at, runs in cells(throw, axis, fills, values, steps, points):
-        free[at] = runs[FREE]
+        free.append(runs[FREE])
         found = {name: readings.get(run, Reading(problem="not run")) for name, run in runs.items()}
         truth = found[FREE].omega
         for name, reading in found.items():
@@ -224,6 +224,8 @@ def study_readings(
                 largest[name][at] = np.abs(reading.omega - truth).max() / abs(throw.omega0)
         problems = (f"{name}: {reading.problem}" for name, reading in found.items() if reading.problem)
         reason[at] = shortened("; ".join(problems), 80)
+    levels = {run: reading.level for run, reading in readings.items()}
+    banded = all(twin in levels for run in free for twin in twins(run))
     of_sets = {switches: level[name] for switches, name in SETS.items()}
     return ValidityMap(
         axis=axis,
@@ -235,18 +237,8 @@ def study_readings(
         step_error={scheme: np.abs(level[scheme] - level[LIMITS[scheme]]) for scheme in SCHEMES},
         reason=reason,
         shares=np.array([level[LADDER[1]] - level[LADDER[0]], *(fair_share(name, of_sets) for name in NAMES)]),
-        band=_band(free, readings, shape),
+        band=np.array([band(run, levels) for run in free]).reshape(shape) if banded else None,
     )
-
-
-def _band(
-    free: Mapping[tuple[int, int], Run], readings: Mapping[Run, Reading], shape: tuple[int, int]
-) -> FloatArray | None:
-    """Return the band of free flight in every cell; None if its twins were not flown."""
-    if not all(twin in readings for run in free.values() for twin in twins(run)):
-        return None
-    levels = {run: reading.level for run, reading in readings.items()}
-    return np.array([band(run, levels) for run in free.values()]).reshape(shape)
 
 
 def read_flight(made: Made) -> Reading:

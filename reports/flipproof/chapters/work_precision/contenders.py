@@ -27,6 +27,7 @@ import numpy as np
 
 from engine_check.solver import ENGINES
 from flipproof.chapters.solvers import LIMITS
+from flipproof.frame.solvers import Run
 from flipproof.frame.twins import usual_rest_speed
 from ode_reference.models import MODELS
 from slicemodel import Bottle, Scenario
@@ -171,6 +172,17 @@ class Contender:
     def key(self) -> str:
         """Unique among the contenders of a throw: a method competes once for each equation."""
         return f"{self.name} on {self.equation}"
+
+    def runs(self, case: Case) -> list[list[Run]]:
+        """Return the runs of every level."""
+        label = f"work, {case.name}, {self.key}"
+        return [
+            [
+                Run(self.solver, case.scenario, {**self.fixed, **settings}, f"{label}, {k}, {member}")
+                for member, settings in enumerate(level)
+            ]
+            for k, level in enumerate(self.levels)
+        ]
 
 
 def contenders(case: Case, effort: Effort) -> tuple[Contender, ...]:

@@ -64,11 +64,6 @@ def _limits(study: WorkPrecision, cost: Cost) -> Limits:
     return (low, high * (high / low) ** (ROOM / (1.0 - ROOM))), (max(1e-14, min([1e-10, *floors]) / 10), 2.0)
 
 
-def _plain(value: float, _: float) -> str:
-    """Return a power of ten as plain text: typeset, the ticks of eight panels cost half a second."""
-    return f"1e{round(math.log10(value))}"
-
-
 def _beside(costs: tuple[float, float]) -> float:
     """Return the cost at which the labels begin."""
     low, high = costs
@@ -84,7 +79,8 @@ def _panel(axes: Axes, study: WorkPrecision, equation: str, cost: Cost, limits: 
     axes.yaxis.set_major_locator(LogLocator(100.0, numticks=12))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_minor_locator(NullLocator())
-        axis.set_major_formatter(_plain)
+        # Typeset, the ticks of eight panels cost half a second.
+        axis.set_major_formatter(lambda value, _: f"1e{round(math.log10(value))}")
     words = f"equation {equation}" if equation in MODELS else equation
     if math.isfinite(floor):
         axes.axhspan(limits[1][0], floor, color=FLOOR_COLOUR, linewidth=0, zorder=0)
