@@ -68,7 +68,7 @@ def command_land(options: argparse.Namespace) -> int:
     """Throw one bottle on a table and say how it lands."""
     throw = read_scenario(options.scenario, options.slices)
     from flipproof.chapters.landing.study import standing
-    from flipproof.landing.aim import aimed
+    from flipproof.landing.design import aimed
     from flipproof.landing.throw import land_throw, told
     from slicemodel import Table
 
@@ -115,8 +115,7 @@ def command_upright(options: argparse.Namespace) -> int:
     """Make the throws of the study that have no row yet, and write its tables and figures."""
     throw = read_scenario(options.scenario, options.slices)
     from flipproof.chapters.landing.study import Size
-    from flipproof.landing.aim import FAMILIES
-    from flipproof.landing.scatter import Scatter
+    from flipproof.landing.design import FAMILIES, Scatter
     from flipproof.landing.upright import make_upright
     from slicemodel import Table
     from slicemodel.scenario import unknown_name

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import ode_reference
-from flipproof.landing.aim import SPARE
+from flipproof.landing.design import SPARE
 from flipproof.landing.work import REFERENCE, landed, saddle, touch_readings
 from slicemodel import Outcome, Scenario, Table, Touch
 from slicemodel.scenario import unknown_name

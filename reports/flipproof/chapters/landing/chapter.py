@@ -8,14 +8,12 @@ from collections.abc import Generator, Iterator, Mapping, Sequence
 from itertools import accumulate, groupby
 from typing import Any, Final
 
-from flipproof.chapters.landing.figures import figures, witnesses
+from flipproof.chapters.landing.figures import figures, page, witnesses
 from flipproof.chapters.landing.study import KINDS, OPTIMAL, WATER, Cases, Cell, Found, Size, aiming, counting, read
-from flipproof.chapters.landing.tables import page
 from flipproof.frame.chapter import Ask, Call, Chapter, Flights, Study
 from flipproof.frame.findings import Finding, observed, regression
 from flipproof.frame.throws import REFERENCE
-from flipproof.landing.design import Case
-from flipproof.landing.upright import make_case
+from flipproof.landing.design import Case, make_cases
 from flipproof.landing.work import Landed
 
 
@@ -46,11 +44,6 @@ def chunks(cases: Sequence[Case]) -> list[tuple[Case, ...]]:
     starts = accumulate((case.throws for case in cases), initial=0)
     groups = groupby(zip(cases, starts, strict=False), key=lambda pair: pair[1] // 300)
     return [tuple(case for case, _ in some) for _, some in groups]
-
-
-def make_cases(cases: Sequence[Case], seed: int) -> list[list[Landed]]:
-    """Make the throws of some cases in this process."""
-    return [make_case(case, seed) for case in cases]
 
 
 def claims(found: Found) -> Iterator[Finding]:

@@ -16,9 +16,7 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.landing.aim import SPARE, Aim, aimed
-from flipproof.landing.design import Case, Throws
-from flipproof.landing.scatter import Scatter, Share, Z
+from flipproof.landing.design import SPARE, Aim, Case, Scatter, Share, Throws, Z, aimed
 from flipproof.landing.work import REFERENCE, Landed
 from ode_reference import fly
 from ode_reference.landing import path

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -28,11 +28,20 @@ FLOOR_COLOUR: Final = "#c8c8c8"
 ROOM: Final = 0.54
 """Share of a panel's width that is left for the labels."""
 
+HIGHEST: Final = 2.0
+"""Largest error on the axes [omega_0]."""
+
 LINE_HEIGHT: Final = 0.075
 """Least distance of two labels, as a share of the panel's height."""
 
-Limits = tuple[tuple[float, float], tuple[float, float]]
-"""Ends of the axes of cost and of error."""
+
+class Limits(NamedTuple):
+    """Least cost on the axes, the cost beside which labels begin, the largest cost, and the least error."""
+
+    left: float
+    beside: float
+    right: float
+    bottom: float
 
 
 @styled
@@ -57,24 +66,18 @@ def figure_work_precision(study: WorkPrecision, cost: Cost = "work") -> Figure:
 
 def _limits(study: WorkPrecision, cost: Cost) -> Limits:
     costs = [point.cost(cost) for curve in study.curves.values() for point in curve.points]
-    finite = [value for value in costs if math.isfinite(value) and value > 0.0]
-    low, high = (min(finite), max(finite)) if finite else (1.0, 10.0)
+    finite = [value for value in costs if math.isfinite(value) and value > 0.0] or [1.0, 10.0]
     floors = [reference.floor for reference in study.references.values() if math.isfinite(reference.floor)]
-    low, high = low / 1.6, 1.6 * high
-    return (low, high * (high / low) ** (ROOM / (1.0 - ROOM))), (max(1e-14, min([1e-10, *floors]) / 10), 2.0)
-
-
-def _beside(costs: tuple[float, float]) -> float:
-    """Return the cost at which the labels begin."""
-    low, high = costs
-    return math.exp(ROOM * math.log(low) + (1.0 - ROOM) * math.log(high))
+    left, beside = min(finite) / 1.6, 1.6 * max(finite)
+    right = beside * (beside / left) ** (ROOM / (1.0 - ROOM))
+    return Limits(left, beside, right, max(1e-14, min([1e-10, *floors]) / 10))
 
 
 def _panel(axes: Axes, study: WorkPrecision, equation: str, cost: Cost, limits: Limits) -> None:
     floor = study.references[equation].floor
-    axes.set(xscale="log", yscale="log", xlim=limits[0], ylim=limits[1])
+    axes.set(xscale="log", yscale="log", xlim=(limits.left, limits.right), ylim=(limits.bottom, HIGHEST))
     # No ticks under the labels.
-    decades = np.arange(math.ceil(math.log10(limits[0][0])), math.floor(math.log10(_beside(limits[0]))) + 1)
+    decades = np.arange(math.ceil(math.log10(limits.left)), math.floor(math.log10(limits.beside)) + 1)
     axes.xaxis.set_major_locator(FixedLocator((10.0**decades).tolist()))
     axes.yaxis.set_major_locator(LogLocator(100.0, numticks=12))
     for axis in (axes.xaxis, axes.yaxis):
@@ -83,10 +86,9 @@ def _panel(axes: Axes, study: WorkPrecision, equation: str, cost: Cost, limits: 
         axis.set_major_formatter(lambda value, _: f"1e{round(math.log10(value))}")
     words = f"equation {equation}" if equation in MODELS else equation
     if math.isfinite(floor):
-        axes.axhspan(limits[1][0], floor, color=FLOOR_COLOUR, linewidth=0, zorder=0)
-    axes.set_title(
-        words + (f", floor {floor:.0e}" if math.isfinite(floor) else ", no reference"), fontsize=9.5, loc="left"
-    )
+        axes.axhspan(limits.bottom, floor, color=FLOOR_COLOUR, linewidth=0, zorder=0)
+    words += f", floor {floor:.0e}" if math.isfinite(floor) else ", no reference"
+    axes.set_title(words, fontsize=9.5, loc="left")
     labels = []
     counts = dict.fromkeys(LINES, 0)
     for curve in study.of(equation):
@@ -95,7 +97,9 @@ def _panel(axes: Axes, study: WorkPrecision, equation: str, cost: Cost, limits: 
         counts[family] += 1
         at = _curve(axes, curve, floor, cost, style)
         if at is not None:
-            labels.append((at, _label(curve), style["color"]))
+            label = "" if math.isnan(curve.slope) else f"  p {curve.slope:.2f} ± {curve.slope_error:.2f}"
+            label = label if curve.whole else f": {curve.failed[0].reason.partition(':')[0]}"
+            labels.append((at, curve.contender.name + label, style["color"]))
     _write(axes, labels, limits)
 
 
@@ -138,17 +142,10 @@ def _curve(axes: Axes, curve: Curve, floor: float, cost: Cost, style: Mapping[st
     return (max(failed), 1.0) if failed else None
 
 
-def _label(curve: Curve) -> str:
-    if not curve.whole:
-        return f"{curve.contender.name}: {curve.failed[0].reason.partition(':')[0]}"
-    slope = "" if math.isnan(curve.slope) else f"  p {curve.slope:.2f} ± {curve.slope_error:.2f}"
-    return curve.contender.name + slope
-
-
 def _write(axes: Axes, labels: Sequence[tuple[tuple[float, float], str, str]], limits: Limits) -> None:
     """Write the labels beside the dearest point of all, in the order of the curves' ends and clear of each other."""
-    low, high = limits[1]
-    span = math.log(high / low)
+    low = limits.bottom
+    span = math.log(HIGHEST / low)
     placed = sorted(labels, key=lambda label: -label[0][1])
     heights = [min(math.log(at[1] / low) / span, 0.93) for at, _, _ in placed]
     for k in range(1, len(heights)):
@@ -158,9 +155,9 @@ def _write(axes: Axes, labels: Sequence[tuple[tuple[float, float], str, str]], l
         least = 0.05 if k == len(heights) - 1 else heights[k + 1] + LINE_HEIGHT
         heights[k] = max(heights[k], least)
     for (at, words, colour), height in zip(placed, heights, strict=True):
-        beside = math.exp(math.log(low) + height * span)
+        aloft = math.exp(math.log(low) + height * span)
         note = axes.annotate(
-            words, at, xytext=(_beside(limits[0]), beside), textcoords="data", ha="left", va="center", fontsize=8.0,
+            words, at, xytext=(limits.beside, aloft), textcoords="data", ha="left", va="center", fontsize=8.0,
             color=tuple(0.55 * part for part in to_rgb(colour)),  # darker: small letters on white and on the floor
             arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.5, "alpha": 0.6, "shrinkB": 4},
         )  # fmt: skip
