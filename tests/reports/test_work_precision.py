@@ -31,6 +31,7 @@ from flipproof.chapters.work_precision.contenders import (
     Asked,
     Case,
     Contender,
+    Grids,
     contenders,
     left_out,
 )
@@ -53,11 +54,9 @@ SMOOTH = replace(
     FULL,
     name="test",
     cases=("smooth",),
-    scheme_levels=4,
-    scheme_members=(4, 5),
-    engine_levels=3,
-    engine_members=(4,),
-    methods={"DOP853": Asked(rtol=(1e-3, 1e-9)), "LSODA": Asked(rtol=(1e-3, 1e-5, 1e-7), equations=("eq8",))},
+    schemes=Grids(4, (4, 5)),
+    engines=Grids(3, (4,)),
+    methods={"DOP853": Asked((1e-3, 1e-9)), "LSODA": Asked((1e-3, 1e-5, 1e-7), ("eq8",))},
 )
 
 
@@ -359,7 +358,7 @@ def test_midpoint_keeps_its_order_through_impacts_only_without_drag(drag, lowest
     scenario = CASES["impacts"].scenario
     scenario = scenario if drag else replace(scenario, drag=0.0)
     case = Case(name="drag", title="drag", scenario=scenario)
-    effort = replace(SMOOTH, scheme_levels=7, scheme_members=(4, 5, 6, 7))
+    effort = replace(SMOOTH, schemes=Grids(7, (4, 5, 6, 7)))
     runs = [r for r in plan_work_precision(case, effort) if r.label.endswith(", eq8") or "midpoint on" in r.label]
     made = timed([(planned, case.times) for planned in runs])
     nothing = {r: Made(r, None, 0.0, "not asked") for r in plan_work_precision(case, effort) if r not in made}
@@ -477,7 +476,7 @@ def test_findings_are_observations_with_numbers(quick):
     assert "steps of exact-step" in steps.note
     assert findings["work-floor"].value < 1e-3
     assert "published-matlab" in findings["work-failed"].note
-    assert findings["work-failed"].value == QUICK.scheme_levels
+    assert findings["work-failed"].value == QUICK.schemes.levels
     json.dumps([finding.to_mapping() for finding in findings.values()], allow_nan=False)
 
 

@@ -42,22 +42,28 @@ def claim_work_precision(studies: Sequence[WorkPrecision]) -> Iterator[Finding]:
     """
     by_name = {study.case.name: study for study in studies}
     for study in studies:
-        yield from _order_of_midpoint(study)
+        curve = study.curves["midpoint on eq8"]
+        title = f"observed order in cost of midpoint, {study.case.title}"
+        words = "order 2 where nothing strikes; v_CM jumps at an impact, and drag feels a mean of it for one whole step"
+        order = None if math.isnan(curve.slope) else curve.slope
+        note = curve.slope_reason or words
+        yield observed(f"work-order-midpoint-{study.case.name}", title, order, note=note, band=curve.slope_error)
     if "impacts" in by_name:
         study = by_name["impacts"]
-        for pair in (("exact-step", "midpoint"), ("exact-step", "pymunk rotating"), ("pymunk", "mujoco")):
-            first, second = map(study.named, pair)
-            if first is not None and second is not None:
-                yield _pair(study, first, second)
-        for error in (1e-3, 1e-6):
-            yield from _cheapest(study, "eq8", error)
+        yield _pair(study, "exact-step on eq8", "midpoint on eq8")
+        yield _pair(study, "exact-step on eq8", "pymunk rotating on eq8")
+        yield _pair(study, "pymunk on free-flight", "mujoco on free-flight")
+        yield _cheapest(study, 1e-3)
+        yield _cheapest(study, 1e-6)
         yield _floors(study)
         yield from _failures(study)
-    yield from _price_of_impacts(by_name)
+        if "smooth" in by_name:
+            yield from _price_of_impacts(by_name["smooth"], study)
 
 
-def _pair(study: WorkPrecision, first: Curve, second: Curve) -> Finding:
+def _pair(study: WorkPrecision, *keys: str) -> Finding:
     """Compare two contenders of one equation at the smallest error that both keep."""
+    first, second = (study.curves[key] for key in keys)
     one, other = first.contender.name, second.contender.name
     id_ = f"work-{one}-{other}".replace(" ", "-")
     title = f"steps of {one} for one of {other}, at equal error against {first.contender.equation}"
@@ -81,22 +87,12 @@ def _pair(study: WorkPrecision, first: Curve, second: Curve) -> Finding:
     return observed(id_, limit + title, steps_a.value / steps_b.value, note=note)
 
 
-def _order_of_midpoint(study: WorkPrecision) -> Iterator[Finding]:
-    curve = study.named("midpoint")
-    if curve is not None:
-        id_, title = f"work-order-midpoint-{study.case.name}", f"observed order in cost of midpoint, {study.case.title}"
-        words = "order 2 where nothing strikes; v_CM jumps at an impact, and drag feels a mean of it for one whole step"
-        order = None if math.isnan(curve.slope) else curve.slope
-        yield observed(id_, title, order, note=curve.slope_reason or words, band=curve.slope_error)
-
-
-def _cheapest(study: WorkPrecision, equation: str, error: float) -> Iterator[Finding]:
-    """Name the cheapest of an equation at an error, by updates and by time."""
-    if equation not in study.references:
-        return
+def _cheapest(study: WorkPrecision, error: float) -> Finding:
+    """Name the cheapest that solves Eq. 8 to an error, by updates and by time."""
+    curves = study.of("eq8")
 
     def ranked(cost: Cost) -> list[tuple[float, str, str]]:
-        prices = ((curve.contender.name, study.price(curve, error, cost)) for curve in study.of(equation))
+        prices = ((curve.contender.name, study.price(curve, error, cost)) for curve in curves)
         return sorted((found.value, name, found.limit) for name, found in prices if found is not None)
 
     def words(cost: Cost, unit: str) -> str:
@@ -104,12 +100,12 @@ def _cheapest(study: WorkPrecision, equation: str, error: float) -> Iterator[Fin
 
     work = ranked("work")
     keepers = {name for _, name, _ in work}
-    others = [curve.contender.name for curve in study.of(equation) if curve.contender.name not in keepers]
-    title = f"{equation} to {error:.0e} of ω₀: updates of the second cheapest over the cheapest"
+    others = [curve.contender.name for curve in curves if curve.contender.name not in keepers]
+    title = f"eq8 to {error:.0e} of ω₀: updates of the second cheapest over the cheapest"
     note = f"updates: {words('work', '')}; processor time: {words('seconds', ' s')}"
     note += f"; not reached by {', '.join(others)}" if others else ""
     ratio = work[1][0] / work[0][0] if len(work) > 1 else None
-    yield observed(f"work-cheapest-{equation}-{error:.0e}", title, ratio, note=note)
+    return observed(f"work-cheapest-eq8-{error:.0e}", title, ratio, note=note)
 
 
 def _floors(study: WorkPrecision) -> Finding:
@@ -133,21 +129,15 @@ def _failures(study: WorkPrecision) -> Iterator[Finding]:
         yield observed("work-failed", title, float(sum(map(len, failed.values()))), note=note)
 
 
-def _price_of_impacts(studies: Mapping[str, WorkPrecision]) -> Iterator[Finding]:
-    """Say what impacts cost a method: the same error, updates per second of flight, with and without."""
-    if not {"smooth", "impacts"} <= set(studies):
-        return
+def _price_of_impacts(*studies: WorkPrecision) -> Iterator[Finding]:
+    """Say what impacts cost a method: updates per second of flight to one error, before the first and through all."""
     for equation in ("eq8", "free-flight"):
-        rates = []
-        for study in (studies["smooth"], studies["impacts"]):
-            curve = study.curves.get(f"DOP853 on {equation}")
-            found = None if curve is None else study.price(curve, 3e-4)
-            rates.append(None if found is None else found.value / study.case.scenario.duration)
-        smooth, through = rates
-        if smooth is not None and through is not None:
+        prices = [study.price(study.curves[f"DOP853 on {equation}"], 3e-4) for study in studies]
+        rates = [p.value / study.case.scenario.duration for p, study in zip(prices, studies, strict=True) if p]
+        if len(rates) == 2:
             title = f"{equation}: updates of DOP853 per second of flight, through impacts over before the first"
-            note = f"error 3e-4 of ω₀; {smooth:.2g} updates per second before, {through:.2g} through all impacts"
-            yield observed(f"work-impacts-{equation}", title, through / smooth, note=note)
+            note = f"error 3e-4 of ω₀; {rates[0]:.2g} updates per second before, {rates[1]:.2g} through all impacts"
+            yield observed(f"work-impacts-{equation}", title, rates[1] / rates[0], note=note)
 
 
 def figures(studies: Sequence[WorkPrecision]) -> Iterator[Exhibit]:

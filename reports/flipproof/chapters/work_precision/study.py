@@ -133,10 +133,6 @@ class WorkPrecision:
         """Return the curves of one equation."""
         return tuple(curve for curve in self.curves.values() if curve.contender.equation == equation)
 
-    def named(self, name: str) -> Curve | None:
-        """Return the first curve of a contender, or None if it does not compete."""
-        return next((curve for curve in self.curves.values() if curve.contender.name == name), None)
-
     def price(self, curve: Curve, error: float, cost: Cost = "work") -> Price | None:
         """Return the cost from which on a contender keeps ``error``, interpolated between two levels.
 
