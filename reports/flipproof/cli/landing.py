@@ -94,15 +94,12 @@ def command_land(options: argparse.Namespace) -> int:
 
 def _film(options: argparse.Namespace, rows: Any, table: Any) -> None:
     from flipproof.animate import MOST_FRAMES, FilmError, check_pace, write_pictures
-    from flipproof.landing.film import draw_landing, film_times, shown
+    from flipproof.landing.throw import draw_landing, film_times, shown
     from flipproof.landing.work import REFERENCE
 
     check_pace(options.slow, options.fps)
     chosen = [row for row in rows if row.program == REFERENCE] or list(rows)
-    bottles = [
-        shown(row.name if row.law is None else f"{row.name}, {row.law}", row.touch, table, row.law, row.outcome)
-        for row in chosen
-    ]
+    bottles = [shown(row, table) for row in chosen]
     times = film_times(bottles, options.slow, options.fps)
     if len(times) > MOST_FRAMES:
         raise FilmError(f"--slow {options.slow:g} makes {len(times)} frames (admissible: at most {MOST_FRAMES})")

@@ -9,8 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from flipproof.chapters.guests.split import Split
-from flipproof.chapters.guests.study import Guest, Guests, study
+from flipproof.chapters.guests.study import Guest, Guests, Split, study
 from flipproof.chapters.waterfall.chapter import DOWN, UP, WHOLE
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.figures.style import ASSUMPTIONS, MARKERS, new_figure, shared_legend, solver_style, styled
@@ -302,6 +301,35 @@ def page(found: Guests) -> dict[str, Any]:
     }
 
 
+def summarise(guest: Guest) -> dict[str, Any]:
+    """Return a guest as JSON-ready data."""
+    visit, split = guest.visit, guest.split
+    waterfall: dict[str, Any] | None = None
+    if split is not None:
+        waterfall = {"equation": split.equation, "guest": split.start, "free-flight": split.end, "rest": split.rest}
+        waterfall |= {"bars": dict(split.bars), "ranges": {name: list(ends) for name, ends in split.ranges.items()}}
+    return {
+        "spec": visit.spec,
+        "content": visit.content,
+        "name": guest.label,
+        "equation": guest.equation,
+        "passport": None if visit.certificate is None else visit.certificate.to_mapping(),
+        "problems": dict(visit.problems),
+        "band": guest.band,
+        "differences": {
+            rung: {"largest": d.largest, "time": d.largest_time, "final": d.final, "band": d.band}
+            for rung, d in guest.differences.items()
+        },
+        "efforts": [
+            {"effort": one.effort, "seconds": round(one.seconds, 4), "error": error}
+            for one, error in zip(visit.efforts, guest.errors, strict=True)
+        ],
+        "waterfall": waterfall,
+        "ice_drift": None if visit.ice is None else visit.ice.largest,
+        "energy_rise": guest.rise,
+    }
+
+
 def tables(found: Guests) -> dict[str, str]:
     """Return the trajectory of every guest as CSV."""
     flown = {guest.slug: guest.run for guest in found.guests if guest.run is not None}
@@ -316,7 +344,7 @@ CHAPTER: Final = Chapter(
     kind="regression",
     figures=draw_guests,
     work={},
-    summary=lambda found: {"guests": [guest.to_mapping() for guest in found.guests]},
+    summary=lambda found: {"guests": [summarise(guest) for guest in found.guests]},
     tables=tables,
     page=page,
 )

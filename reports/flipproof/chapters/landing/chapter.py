@@ -99,16 +99,17 @@ def _static(found: Found) -> Iterator[Finding]:
     """Yield how often the static criterion says the outcome rightly (section 6, Eq. 13a)."""
     title = "Throws of which the toppling angle at the touch says rightly whether they stand: "
     for (family, kind), counts in found.static.items():
-        said = counts[True, True] + counts[True, False]
-        others = counts[False, True] + counts[False, False]
-        if said + others:
-            yield observed(
-                f"landing-static-{family}-{kind.replace(', ', '-')}",
-                f"{title}{KINDS[kind].words}, family {family}",
-                (counts[True, True] + counts[False, False]) / (said + others),
-                note=f"of those with a tilt below it {counts[True, True]} of {said} stand, of those above it "
-                f"{counts[False, True]} of {others}; {found.assumed}",
+        (stand, fall), (others_stand, others_fall) = (
+            (counts[said, True], counts[said, False]) for said in (True, False)
+        )
+        if throws := sum(counts.values()):
+            id_ = f"landing-static-{family}-{kind.replace(', ', '-')}"
+            note = (
+                f"of those with a tilt below it {stand} of {stand + fall} stand, of those above it {others_stand} of "
             )
+            note += f"{others_stand + others_fall}; {found.assumed}"
+            words = f"{title}{KINDS[kind].words}, family {family}"
+            yield observed(id_, words, (stand + others_fall) / throws, note=note)
 
 
 def _slow_rotation(found: Found, family: str) -> Finding:
@@ -170,25 +171,17 @@ def _undecided(found: Found) -> Finding:
 
 def _witnesses(stored: Mapping[str, Any]) -> Iterator[Finding]:
     """Yield in how many touches two programs of one law differ, rods and ice; soft contacts are another law."""
-    pairs = [(case, matrix) for case in stored["cases"] for matrix in case["matrices"]]
-    for case, matrix in pairs:
-        one, other = matrix["programs"]
-        if "compliant" in one + other or case["slices"] == "staggered":
+    for case, matrix in [(each, matrix) for each in stored["cases"] for matrix in each["matrices"]]:
+        (one, other), differ, both = matrix["programs"], matrix["differ"], matrix["decided by both"]
+        if "compliant" in one + other:
             continue
         kind = "ice" if case["law"] is None else f"water-{case['law']}"
         # Share of outcomes in which two programs of one law may differ: with MuJoCo's impulses, and with pymunk.
         most = 0.03 if "mujoco" in (one, other) else 0.02
-        both = matrix["decided by both"]
-        share = matrix["differ"] / both if both else math.nan
-        yield regression(
-            f"landing-witnesses-{kind}-{one}-{other}",
-            f"Outcomes in which {one} and {other} differ from one touch: {kind.replace('-', ', ')}",
-            share if both else None,
-            "",
-            (0.0, most),
-            f"{matrix['differ']} of {both} decided by both; at most {most:.0%} is asked for: "
-            f"{'reached' if share <= most else 'missed'}; stored, made by: {stored['command']}",
-        )
+        title = f"Outcomes in which {one} and {other} differ from one touch: {kind.replace('-', ', ')}"
+        note = f"{differ} of {both} decided by both; at most {most:.0%} is asked for: "
+        note += f"{'reached' if differ / both <= most else 'missed'}; stored, made by: {stored['command']}"
+        yield regression(f"landing-witnesses-{kind}-{one}-{other}", title, differ / both, "", (0.0, most), note)
 
 
 def _judged(
