@@ -98,18 +98,13 @@ def _best_filling(found: Found, family: str) -> Finding:
 def _static(found: Found) -> Iterator[Finding]:
     """Yield how often the static criterion says the outcome rightly (section 6, Eq. 13a)."""
     title = "Throws of which the toppling angle at the touch says rightly whether they stand: "
-    for (family, kind), counts in found.static.items():
-        (stand, fall), (others_stand, others_fall) = (
-            (counts[said, True], counts[said, False]) for said in (True, False)
-        )
-        if throws := sum(counts.values()):
+    for (family, kind), (said, others) in found.static.items():
+        if throws := said.throws + others.throws:
             id_ = f"landing-static-{family}-{kind.replace(', ', '-')}"
-            note = (
-                f"of those with a tilt below it {stand} of {stand + fall} stand, of those above it {others_stand} of "
-            )
-            note += f"{others_stand + others_fall}; {found.assumed}"
             words = f"{title}{KINDS[kind].words}, family {family}"
-            yield observed(id_, words, (stand + others_fall) / throws, note=note)
+            note = f"of those with a tilt below it {said.upright} of {said.throws} stand, of those above it "
+            note += f"{others.upright} of {others.throws}; {found.assumed}"
+            yield observed(id_, words, (said.upright + others.throws - others.upright) / throws, note=note)
 
 
 def _slow_rotation(found: Found, family: str) -> Finding:

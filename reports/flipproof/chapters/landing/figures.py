@@ -95,9 +95,9 @@ def figures(found: Found) -> list[Exhibit]:
             "down at rest would come upright. Each bar is the share that does end upright, of all throws that the "
             "angle calls upright and of all others, at all fillings.",
             "; ".join(
-                f"family {family}, {kind}: {counts[True, True]} of {counts[True, True] + counts[True, False]} called "
-                f"upright stand, {counts[False, True]} of {counts[False, True] + counts[False, False]} others"
-                for (family, kind), counts in found.static.items()
+                f"family {family}, {kind}: {said.upright} of {said.throws} called upright stand, {others.upright} of "
+                f"{others.throws} others"
+                for (family, kind), (said, others) in found.static.items()
             ),
             figure_static,
             static_csv(found),
@@ -155,9 +155,8 @@ def figure_shares(found: Found) -> Figure:
         for kind in LOOKS:
             _curve(axes, kind, found.curve(family, kind))
         axes.axvspan(*OPTIMAL, color="#0072B2", alpha=0.06, linewidth=0)
-        axes.set_xlabel("fill fraction M_w / M_max [1]")
         axes.set_title(f"{family}: {FAMILIES[family]}", fontsize=10, loc="left")
-        axes.set_ylim(0.0, 1.0)
+        axes.set(xlabel="fill fraction M_w / M_max [1]", ylim=(0.0, 1.0))
     panels[0, 0].set_ylabel("P(upright) [1]")
     shared_legend(figure, panels[0, -1], columns=5)
     return figure
@@ -217,17 +216,16 @@ def figure_map(found: Found) -> Figure:
 @styled
 def figure_static(found: Found) -> Figure:
     """Of the throws that the static criterion calls upright, and of those it does not, the share that stands."""
-    names = [name for name, counts in found.static.items() if sum(counts.values())]
+    names = [name for name, (said, others) in found.static.items() if said.throws + others.throws]
     figure, axes = new_figure(size=(8.6, 3.9))
     width = 0.38
-    sides = ((True, "#0072B2", "tilt below the toppling angle at touch"), (False, "#D55E00", "tilt above it"))
-    for side, (said, colour, label) in enumerate(sides):
+    looks = (("#0072B2", "tilt below the toppling angle at touch"), ("#D55E00", "tilt above it"))
+    for side, (colour, label) in enumerate(looks):
         for k, name in enumerate(names):
-            counts = found.static[name]
-            total = counts[said, True] + counts[said, False]
-            height = counts[said, True] / total if total else 0.0
+            share = found.static[name][side]
+            height = share.upright / share.throws if share.throws else 0.0
             bar = axes.bar(k + (side - 0.5) * width, height, width, color=colour, label=label if k == 0 else None)
-            axes.bar_label(bar, [f"{counts[said, True]} of {total}"], fontsize=7.5, padding=2)
+            axes.bar_label(bar, [f"{share.upright} of {share.throws}"], fontsize=7.5, padding=2)
     axes.set_xticks(range(len(names)), [f"{KINDS[kind].words}\nfamily {family}" for family, kind in names], fontsize=8)
     axes.set(ylim=(0.0, 1.1), ylabel="share that stands [1]")
     shared_legend(figure, axes, columns=2)
@@ -318,9 +316,10 @@ def map_csv(found: Found) -> str:
 def static_csv(found: Found) -> str:
     """Return how often the static criterion and the outcome agree."""
     rows = [
-        [family, KINDS[kind].words, "yes" if said else "no", "yes" if true else "no", count]
-        for (family, kind), counts in found.static.items()
-        for (said, true), count in counts.items()
+        [family, KINDS[kind].words, said, upright, count]
+        for (family, kind), shares in found.static.items()
+        for said, share in zip(("yes", "no"), shares, strict=True)
+        for upright, count in (("yes", share.upright), ("no", share.throws - share.upright))
     ]
     return rows_csv(("family", "landed", "tilt below toppling angle at touch", "upright", "throws"), rows, digits=None)
 
@@ -364,19 +363,12 @@ def share_line(found: Found, family: str) -> str:
 def page(found: Found) -> dict[str, object]:
     """Return what the chapter's template takes: a table a family, and why some throws were not made.
 
-    A table is the family in words, its fillings, and a row for every law of the impact with share and interval there.
+    A table is the family in words, its fillings, and a row for every law of the impact with its cells, None if not thrown.
     """
     shares = []
     for family in found.size.families:
         curves = {landing.words: dict(found.curve(family, kind)) for kind, landing in KINDS.items()}
         fills = sorted({fill for curve in curves.values() for fill in curve})
-        rows = []
-        for name, curve in curves.items():
-            cells = [{"value": "–", "interval": ""} for _ in fills]
-            for k, fill in enumerate(fills):
-                if fill in curve:
-                    low, high = curve[fill].share.interval
-                    cells[k] = {"value": f"{curve[fill].share.value:.2f}", "interval": f"{low:.2f} to {high:.2f}"}
-            rows += [(name, cells)] if curve else []
+        rows = [(name, [curve.get(fill) for fill in fills]) for name, curve in curves.items() if curve]
         shares.append((f"family {family}: {FAMILIES[family]}", fills, rows))
     return {"shares": shares, "unaimed": sorted(set(found.unaimed.values()))}

@@ -162,7 +162,7 @@ class Found:
     throw : Scenario, size : Size - what was asked
     cells : by key - shares over the filling and along the axes
     maps : by kind - outcomes over ``size.map_axes``
-    static : (family, kind) -> {(criterion says upright, it is): count}, of all fillings
+    static : (family, kind) -> shares upright of what the static criterion calls upright and of the others, all fillings
     slow : (family, kind) -> shares upright of the slower and the faster half of the touches, of each filling
     energies : of a few throws at the filling of the axes
     unaimed : (family, filling, frozen) -> why no aim was found
@@ -172,7 +172,7 @@ class Found:
     size: Size
     cells: Mapping[Key, Cell]
     maps: Mapping[Kind, Outcomes]
-    static: Mapping[tuple[str, Kind], Mapping[tuple[bool, bool], int]]
+    static: Mapping[tuple[str, Kind], tuple[Share, Share]]
     slow: Mapping[tuple[str, Kind], tuple[Share, Share]]
     energies: tuple[Energy, ...]
     unaimed: Mapping[Place, str]
@@ -292,8 +292,7 @@ def read(throw: Scenario, size: Size, cases: Cases, rows: Rows, unaimed: Mapping
     """Return what the rows of the second wave say."""
     fillings, omegas = size.map_axes
     cells: dict[Key, Cell] = {}
-    static: dict[tuple[str, Kind], dict[tuple[bool, bool], int]] = {}
-    halves: dict[tuple[str, Kind], tuple[list[Landed], list[Landed]]] = {}
+    sorts: dict[tuple[str, Kind], tuple[list[Landed], ...]] = {}
     shape = len(omegas), len(fillings)
     maps: dict[Kind, Outcomes] = {}
     for (key, case), some in zip(cases.items(), rows, strict=True):
@@ -305,24 +304,20 @@ def read(throw: Scenario, size: Size, cases: Cases, rows: Rows, unaimed: Mapping
             continue
         cells[key] = cell_of(case.aim, some)
         if key.axis == "filling":
-            name = key.family, key.kind
-            count = static.setdefault(name, dict.fromkeys(product((True, False), (True, False)), 0))
+            said, others, slow, fast = sorts.setdefault((key.family, key.kind), ([], [], [], []))
             decided = [row for row in some if row.outcome not in (None, "undecided")]
-            for row in decided:
-                assert row.static_margin is not None
-                count[row.static_margin > 0.0, row.outcome == "upright"] += 1
+            said += [row for row in decided if (row.static_margin or 0.0) > 0.0]
+            others += [row for row in decided if not (row.static_margin or 0.0) > 0.0]
             by_spin = sorted(decided, key=lambda row: abs(row.touch_omega or 0.0))
-            middle = len(by_spin) // 2
-            slow, fast = halves.setdefault(name, ([], []))
-            slow += by_spin[:middle]
-            fast += by_spin[len(by_spin) - middle :]
+            slow += by_spin[: len(by_spin) // 2]
+            fast += by_spin[len(by_spin) - len(by_spin) // 2 :]
     return Found(
         throw=throw,
         size=size,
         cells=cells,
         maps=maps,
-        static=static,
-        slow={name: (share_of(slow), share_of(fast)) for name, (slow, fast) in halves.items()},
+        static={name: (share_of(said), share_of(others)) for name, (said, others, _, _) in sorts.items()},
+        slow={name: (share_of(slow), share_of(fast)) for name, (_, _, slow, fast) in sorts.items()},
         energies=tuple(energy for kind in WATER_AND_ICE for energy in _energies(kind, cases, rows, size)),
         unaimed=unaimed,
     )
