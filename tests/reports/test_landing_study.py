@@ -251,8 +251,8 @@ def found():
 
 def test_the_study_counts_what_it_threw(found):
     assert found.unaimed == {}
-    assert found.cell("B", "together", 0.4).share.throws == 6
-    assert found.cell("B", "compliant", 0.4) is None
+    assert found.cell("together", 0.4).share.throws == 6
+    assert found.cell("compliant", 0.4) is None
     assert [value for value, _ in found.along("restitution", "ice")] == [0.0, 0.3]
     assert found.maps["together"].outcome.shape == (4, 3)
     assert set(found.maps) == {"together", "ice"}

@@ -153,7 +153,7 @@ def figure_shares(found: Found) -> Figure:
     figure, panels = new_figure(1, len(found.size.families), size=(8.6, 4.4), squeeze=False, sharey=True)
     for axes, family in zip(panels[0], found.size.families, strict=True):
         for kind in LOOKS:
-            _curve(axes, kind, found.curve(family, kind))
+            _curve(axes, kind, found.along("filling", kind, family))
         axes.axvspan(*OPTIMAL, color="#0072B2", alpha=0.06, linewidth=0)
         axes.set_title(f"{family}: {FAMILIES[family]}", fontsize=10, loc="left")
         axes.set(xlabel="fill fraction M_w / M_max [1]", ylim=(0.0, 1.0))
@@ -352,7 +352,7 @@ def share_line(found: Found, family: str) -> str:
     lines = [f"P(upright), family {family}, 95 % intervals:"]
     for kind, landing in KINDS.items():
         words = []
-        for fill, cell in found.curve(family, kind):
+        for fill, cell in found.along("filling", kind, family):
             low, high = cell.share.interval
             words.append(f"{fill:g}: {cell.share.value:.3f} [{low:.3f}, {high:.3f}]")
         if words:
@@ -363,11 +363,11 @@ def share_line(found: Found, family: str) -> str:
 def page(found: Found) -> dict[str, object]:
     """Return what the chapter's template takes: a table a family, and why some throws were not made.
 
-    A table is the family in words, its fillings, and a row for every law of the impact with its cells, None if not thrown.
+    A table is the family in words, its fillings, and for every law of the impact its cell at each, None if not thrown.
     """
     shares = []
     for family in found.size.families:
-        curves = {landing.words: dict(found.curve(family, kind)) for kind, landing in KINDS.items()}
+        curves = {landing.words: dict(found.along("filling", kind, family)) for kind, landing in KINDS.items()}
         fills = sorted({fill for curve in curves.values() for fill in curve})
         rows = [(name, [curve.get(fill) for fill in fills]) for name, curve in curves.items() if curve]
         shares.append((f"family {family}: {FAMILIES[family]}", fills, rows))

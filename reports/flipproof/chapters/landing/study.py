@@ -177,17 +177,14 @@ class Found:
     energies: tuple[Energy, ...]
     unaimed: Mapping[Place, str]
 
-    def curve(self, family: str, kind: Kind) -> list[tuple[float, Cell]]:
-        """Return filling and cell along the fillings that could be thrown."""
-        return [(k.value, c) for k, c in self.cells.items() if (k.axis, k.family, k.kind) == ("filling", family, kind)]
+    def along(self, axis: str, kind: Kind, family: str = "") -> list[tuple[float, Cell]]:
+        """Return value and cell along the fillings that were thrown or another axis; of the last family unless told."""
+        wanted = axis, family or self.size.families[-1], kind
+        return [(key.value, cell) for key, cell in self.cells.items() if (key.axis, key.family, key.kind) == wanted]
 
-    def along(self, axis: str, kind: Kind) -> list[tuple[float, Cell]]:
-        """Return value and cell along an axis of the table or of the thrower."""
-        return [(k.value, c) for k, c in self.cells.items() if (k.axis, k.kind) == (axis, kind)]
-
-    def cell(self, family: str, kind: Kind, filling: float) -> Cell | None:
-        """Return the cell of one filling, if it was thrown."""
-        return self.cells.get(Key("filling", filling, family, filling, kind))
+    def cell(self, kind: Kind, filling: float) -> Cell | None:
+        """Return the cell of one filling of the last family, if it was thrown."""
+        return dict(self.along("filling", kind)).get(filling)
 
     @property
     def assumed(self) -> str:
