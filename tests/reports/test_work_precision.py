@@ -255,7 +255,7 @@ def test_a_failed_run_stays_with_its_reason(monkeypatch, outcome, words):
     results = next(tabulate_work_precision([study]))
     assert any(words in cell for row in results.rows for cell in row)
     assert f"{words[:20]}" in json.dumps(summarise_work_precision([study]), allow_nan=False)
-    assert study.price(found, 8e-3) == Price(found.points[2].work, bound=True)
+    assert found.price(8e-3) == Price(found.points[2].work, bound=True)
     crosses = [line for line in figure_work_precision(study).axes[0].lines if line.get_marker() == "x"]
     assert len(crosses) == (outcome["trajectory"] is not None)  # a run that never began has no cost to stand at
 
@@ -266,7 +266,7 @@ def test_without_a_reference_nobody_has_an_error(monkeypatch):
     )
     assert math.isnan(study.references["eq8"].floor)
     assert all("no reference: ValueError: no" in point.reason for point in found.points)
-    assert study.price(found, 1e-2) is None
+    assert found.price(1e-2) is None
     figure_work_precision(study)
 
 
@@ -289,8 +289,8 @@ def test_a_run_off_the_common_times_is_refused(monkeypatch):
     ],
 )
 def test_the_price_of_an_error(monkeypatch, error, expected):
-    study, found = studied(monkeypatch, [1e-2, 1e-3, 1e-8, 5e-4, 1e-5], floor=1e-9)
-    level = study.price(found, error)
+    _, found = studied(monkeypatch, [1e-2, 1e-3, 1e-8, 5e-4, 1e-5], floor=1e-9)
+    level = found.price(error)
     assert (level is None) == (expected is None)
     if expected is not None:
         assert (level.value, level.bound) == (pytest.approx(expected.value), expected.bound)
@@ -300,13 +300,13 @@ def test_nobody_is_priced_at_the_floor(monkeypatch):
     study, found = studied(monkeypatch, [1e-2, 1e-5, 1e-10], floor=1e-9)
     floor = study.references["eq8"].floor
     assert found.points[-1].at_floor
-    assert study.price(found, floor) is None
-    assert study.price(found, 1.01 * floor).value <= found.points[-1].work
+    assert found.price(floor) is None
+    assert found.price(1.01 * floor).value <= found.points[-1].work
 
 
 def test_a_price_in_seconds_steps_and_work(monkeypatch):
-    study, found = studied(monkeypatch, [1e-2, 1e-4])
-    middle = [study.price(found, 1e-3, cost).value for cost in ("work", "steps", "seconds")]
+    _, found = studied(monkeypatch, [1e-2, 1e-4])
+    middle = [found.price(1e-3, cost).value for cost in ("work", "steps", "seconds")]
     assert middle == pytest.approx([80 * math.sqrt(2), 40 * math.sqrt(2), 0.1 * math.sqrt(2)])
 
 

@@ -271,12 +271,9 @@ class Throws:
     @property
     def lines(self) -> tuple[range, ...]:
         """Numbers of the points of each program."""
-        lines, begin = [], 0
-        for _, some in groupby(self.cases, key=lambda case: case.program):
-            end = begin + sum(case.throws for case in some)
-            lines.append(range(begin, end))
-            begin = end
-        return tuple(lines)
+        programs = groupby(self.cases, key=lambda case: case.program)
+        sizes = [sum(case.throws for case in some) for _, some in programs]
+        return tuple(range(end - size, end) for size, end in zip(sizes, accumulate(sizes), strict=True))
 
     def point(self, number: int) -> Point:
         """Return the point of that number in [0, size)."""

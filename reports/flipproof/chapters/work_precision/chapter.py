@@ -12,6 +12,7 @@ from flipproof.chapters.work_precision.figure import figure_work_precision
 from flipproof.chapters.work_precision.study import (
     Cost,
     Curve,
+    Price,
     WorkPrecision,
     plan_work_precision,
     study_work_precision,
@@ -68,7 +69,7 @@ def _pair(study: WorkPrecision, *keys: str) -> Finding:
     id_ = f"work-{one}-{other}".replace(" ", "-")
     title = f"steps of {one} for one of {other}, at equal error against {first.contender.equation}"
     for error in (10.0 ** (-k / 2) for k in range(22, 1, -1)):
-        steps_a, steps_b = study.price(first, error, "steps"), study.price(second, error, "steps")
+        steps_a, steps_b = first.price(error, "steps"), second.price(error, "steps")
         if steps_a is not None and steps_b is not None:
             break
     else:
@@ -77,7 +78,7 @@ def _pair(study: WorkPrecision, *keys: str) -> Finding:
         return observed(id=id_, title=title, value=None, note=f"the first levels of both keep {error:.1e} of ω₀")
 
     def against(cost: Cost, unit: str, scale: float = 1.0) -> str:
-        prices = (study.price(curve, error, cost) for curve in (first, second))
+        prices = (curve.price(error, cost) for curve in (first, second))
         return " against ".join("–" if found is None else f"{scale * found.value:.2g}" for found in prices) + f" {unit}"
 
     limit = {(False, True): "at least, ", (True, False): "at most, "}.get((steps_a.bound, steps_b.bound), "")
@@ -91,20 +92,20 @@ def _cheapest(study: WorkPrecision, error: float) -> Finding:
     """Name the cheapest that solves Eq. 8 to an error, by updates and by time."""
     curves = study.of("eq8")
 
-    def ranked(cost: Cost) -> list[tuple[float, str, str]]:
-        prices = ((curve.contender.name, study.price(curve, error, cost)) for curve in curves)
-        return sorted((found.value, name, found.limit) for name, found in prices if found is not None)
+    def ranked(cost: Cost) -> list[tuple[Price, str]]:
+        prices = ((curve.price(error, cost), curve.contender.name) for curve in curves)
+        return sorted((price, name) for price, name in prices if price is not None)
 
     def words(cost: Cost, unit: str) -> str:
-        return ", ".join(f"{name} {limit}{value:.2g}{unit}" for value, name, limit in ranked(cost))
+        return ", ".join(f"{name} {price.text}{unit}" for price, name in ranked(cost))
 
     work = ranked("work")
-    keepers = {name for _, name, _ in work}
+    keepers = {name for _, name in work}
     others = [curve.contender.name for curve in curves if curve.contender.name not in keepers]
     title = f"eq8 to {error:.0e} of ω₀: updates of the second cheapest over the cheapest"
     note = f"updates: {words('work', '')}; processor time: {words('seconds', ' s')}"
     note += f"; not reached by {', '.join(others)}" if others else ""
-    ratio = work[1][0] / work[0][0] if len(work) > 1 else None
+    ratio = work[1][0].value / work[0][0].value if len(work) > 1 else None
     return observed(f"work-cheapest-eq8-{error:.0e}", title, ratio, note=note)
 
 
@@ -132,7 +133,7 @@ def _failures(study: WorkPrecision) -> Iterator[Finding]:
 def _price_of_impacts(*studies: WorkPrecision) -> Iterator[Finding]:
     """Say what impacts cost a method: updates per second of flight to one error, before the first and through all."""
     for equation in ("eq8", "free-flight"):
-        prices = [study.price(study.curves[f"DOP853 on {equation}"], 3e-4) for study in studies]
+        prices = [study.curves[f"DOP853 on {equation}"].price(3e-4) for study in studies]
         rates = [p.value / study.case.scenario.duration for p, study in zip(prices, studies, strict=True) if p]
         if len(rates) == 2:
             title = f"{equation}: updates of DOP853 per second of flight, through impacts over before the first"
@@ -192,7 +193,7 @@ def _levels_csv(study: WorkPrecision) -> str:
         (
             (curve.contender.name, curve.contender.equation, point.settings, point.work, point.steps, point.seconds,
              point.error, point.lowest, point.highest, point.plateau,
-             study.references[curve.contender.equation].floor, point.at_floor, point.reason)
+             curve.reference.floor, point.at_floor, point.reason)
             for curve in study.curves.values()
             for point in curve.points
         ),
@@ -224,10 +225,6 @@ def tabulate_work_precision(studies: Sequence[WorkPrecision]) -> Iterator[Table]
 def _results(study: WorkPrecision) -> Table:
     errors = (1e-2, 1e-3, 1e-4, 1e-6)
 
-    def price(curve: Curve, error: float, cost: Cost) -> str:
-        found = study.price(curve, error, cost)
-        return "–" if found is None else f"{found.limit}{found.value:.2g}"
-
     rows = []
     for curve in study.curves.values():
         who, whole, failed = (curve.contender.name, curve.contender.equation), curve.whole, curve.failed
@@ -236,9 +233,9 @@ def _results(study: WorkPrecision) -> Table:
         flat = f"{whole[-1].plateau:.1e}" if whole else "–"
         slope = f"{curve.slope:.2f} ± {curve.slope_error:.2f}"
         order = slope if math.isfinite(curve.slope) else f"– ({curve.slope_reason})"
-        prices = [price(curve, error, "work") for error in errors]
+        prices = [*(curve.price(error) for error in errors), curve.price(1e-3, "seconds")]
         why = f"{len(failed)} of {len(curve.points)}: {failed[0].settings}: {failed[0].reason}" if failed else ""
-        rows.append((*who, reached, flat, order, *prices, price(curve, 1e-3, "seconds"), why))
+        rows.append((*who, reached, flat, order, *(price.text if price else "–" for price in prices), why))
     return Table(
         f"work-results-{study.case.name}",
         f"What an error costs: {study.case.title}",

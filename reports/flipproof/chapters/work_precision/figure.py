@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, Literal, NamedTuple
+from itertools import accumulate
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -33,6 +34,10 @@ HIGHEST: Final = 2.0
 
 LINE_HEIGHT: Final = 0.075
 """Least distance of two labels, as a share of the panel's height."""
+
+
+Label = tuple[tuple[float, float], str, str]
+"""Where a curve ends, at its last level or at the top edge above its dearest failure; its words; their colour."""
 
 
 class Limits(NamedTuple):
@@ -92,43 +97,31 @@ def _panel(axes: Axes, study: WorkPrecision, equation: str, cost: Cost, limits: 
     labels = []
     counts = dict.fromkeys(LINES, 0)
     for curve in study.of(equation):
-        family = curve.contender.family
-        style = _style(curve, counts[family])
-        counts[family] += 1
-        at = _curve(axes, curve, floor, cost, style)
-        if at is not None:
-            label = "" if math.isnan(curve.slope) else f"  p {curve.slope:.2f} ± {curve.slope_error:.2f}"
-            label = label if curve.whole else f": {curve.failed[0].reason.partition(':')[0]}"
-            labels.append((at, curve.contender.name + label, style["color"]))
-    _write(axes, labels, limits)
+        labels.append(_curve(axes, curve, counts[curve.contender.family], cost))
+        counts[curve.contender.family] += 1
+    _write(axes, [label for label in labels if label is not None], limits)
 
 
-def _style(curve: Curve, k: int) -> dict[str, Any]:
-    """Return colour, line and marker: the line tells the family, the marker who within it."""
-    contender = curve.contender
+def _curve(axes: Axes, curve: Curve, k: int, cost: Cost) -> Label | None:
+    """Draw a curve, the ``k``-th of its family; return its label if it has a point.
+
+    The line tells the family, the marker who within it.
+    """
+    contender, floor = curve.contender, curve.reference.floor
     known = STYLES.get(contender.name) or STYLES.get(contender.solver if contender.family == "engine" else "")
-    markers = MARKERS[contender.family]
-    return {
-        "color": known["color"] if known else COLOURS.get(contender.name, OTHERS[k % len(OTHERS)]),
-        "linestyle": LINES[contender.family],
-        "marker": markers[k % len(markers)],
-    }
-
-
-def _curve(axes: Axes, curve: Curve, floor: float, cost: Cost, style: Mapping[str, Any]) -> tuple[float, float] | None:
-    """Draw a curve; return where it ends: its last level, or the top edge above its dearest failure."""
-    colour = style["color"]
+    colour = known["color"] if known else COLOURS.get(contender.name, OTHERS[k % len(OTHERS)])
+    marker = MARKERS[contender.family][k % len(MARKERS[contender.family])]
     whole = [point for point in curve.whole if math.isfinite(point.cost(cost))]
     x = np.array([point.cost(cost) for point in whole])
     low, y, high = (
         np.array([max(getattr(point, name), floor) for point in whole]) for name in ("lowest", "error", "highest")
     )
-    axes.plot(x, y, color=colour, linestyle=style["linestyle"], linewidth=1.3)
+    axes.plot(x, y, color=colour, linestyle=LINES[contender.family], linewidth=1.3)
     axes.vlines(x, low, high, color=colour, linewidth=0.8, alpha=0.6)
     hollow = np.array([point.at_floor for point in whole], dtype=bool)
     for chosen, face in ((~hollow, colour), (hollow, "white")):
         axes.plot(
-            x[chosen], y[chosen], linestyle="none", marker=style["marker"], markersize=4.5, markerfacecolor=face,
+            x[chosen], y[chosen], linestyle="none", marker=marker, markersize=4.5, markerfacecolor=face,
             markeredgecolor=colour,
         )  # fmt: skip
     failed = [point.cost(cost) for point in curve.failed if math.isfinite(point.cost(cost))]
@@ -137,23 +130,24 @@ def _curve(axes: Axes, curve: Curve, floor: float, cost: Cost, style: Mapping[st
             failed, np.ones(len(failed)), "x", color=colour, markersize=6, markeredgewidth=1.5,
             transform=axes.get_xaxis_transform(), clip_on=False, zorder=5,
         )  # fmt: skip
-    if whole:
-        return float(x.max()), float(y[-1])
-    return (max(failed), 1.0) if failed else None
+    if not whole and not failed:
+        return None
+    words = "" if math.isnan(curve.slope) else f"  p {curve.slope:.2f} ± {curve.slope_error:.2f}"
+    words = words if curve.whole else f": {curve.failed[0].reason.partition(':')[0]}"
+    at = (float(x.max()), float(y[-1])) if whole else (max(failed), 1.0)
+    return at, contender.name + words, colour
 
 
-def _write(axes: Axes, labels: Sequence[tuple[tuple[float, float], str, str]], limits: Limits) -> None:
+def _write(axes: Axes, labels: Sequence[Label], limits: Limits) -> None:
     """Write the labels beside the dearest point of all, in the order of the curves' ends and clear of each other."""
     low = limits.bottom
     span = math.log(HIGHEST / low)
     placed = sorted(labels, key=lambda label: -label[0][1])
     heights = [min(math.log(at[1] / low) / span, 0.93) for at, _, _ in placed]
-    for k in range(1, len(heights)):
-        heights[k] = min(heights[k], heights[k - 1] - LINE_HEIGHT)
+    heights = list(accumulate(heights, lambda above, height: min(height, above - LINE_HEIGHT)))
     # Labels that were pushed below the panel push the others up again.
-    for k in reversed(range(len(heights))):
-        least = 0.05 if k == len(heights) - 1 else heights[k + 1] + LINE_HEIGHT
-        heights[k] = max(heights[k], least)
+    heights[-1:] = [max(height, 0.05) for height in heights[-1:]]
+    heights = list(accumulate(heights[::-1], lambda below, height: max(height, below + LINE_HEIGHT)))[::-1]
     for (at, words, colour), height in zip(placed, heights, strict=True):
         aloft = math.exp(math.log(low) + height * span)
         note = axes.annotate(

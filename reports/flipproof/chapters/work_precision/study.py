@@ -52,9 +52,9 @@ class Price(NamedTuple):
     bound: bool
 
     @property
-    def limit(self) -> str:
-        """A sign before the value that is a bound."""
-        return "≤ " if self.bound else ""
+    def text(self) -> str:
+        """The value, with a sign before one that is a bound."""
+        return f"{'≤ ' if self.bound else ''}{self.value:.2g}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,6 +103,7 @@ class Curve:
     """
 
     contender: Contender
+    reference: Reference
     points: tuple[Point, ...]
     held: Mapping[str, Any]
     slope: float
@@ -119,27 +120,13 @@ class Curve:
         """The levels that failed."""
         return tuple(point for point in self.points if not math.isfinite(point.error))
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WorkPrecision:
-    """The diagram of one throw. Every contender is in ``curves`` or, with its reason, in ``absent``."""
-
-    case: Case
-    references: Mapping[str, Reference]
-    curves: Mapping[str, Curve]
-    absent: Mapping[str, str]
-
-    def of(self, equation: str) -> tuple[Curve, ...]:
-        """Return the curves of one equation."""
-        return tuple(curve for curve in self.curves.values() if curve.contender.equation == equation)
-
-    def price(self, curve: Curve, error: float, cost: Cost = "work") -> Price | None:
+    def price(self, error: float, cost: Cost = "work") -> Price | None:
         """Return the cost from which on a contender keeps ``error``, interpolated between two levels.
 
         From which on: a level that is better than a finer one was lucky. None if no level keeps it, or if the error is
         below the floor, where nobody can tell.
         """
-        floor, points = self.references[curve.contender.equation].floor, curve.points
+        floor, points = self.reference.floor, self.points
         first = len(points)
         while first > 0 and max(points[first - 1].error, floor) <= error:
             first -= 1
@@ -153,6 +140,20 @@ class WorkPrecision:
         share = (math.log(error) - y0) / (y1 - y0)
         x0, x1 = math.log(coarse.cost(cost)), math.log(fine.cost(cost))
         return Price(math.exp(x0 + share * (x1 - x0)), bound=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkPrecision:
+    """The diagram of one throw. Every contender is in ``curves`` or, with its reason, in ``absent``."""
+
+    case: Case
+    references: Mapping[str, Reference]
+    curves: Mapping[str, Curve]
+    absent: Mapping[str, str]
+
+    def of(self, equation: str) -> tuple[Curve, ...]:
+        """Return the curves of one equation."""
+        return tuple(curve for curve in self.curves.values() if curve.contender.equation == equation)
 
 
 def plan_work_precision(case: Case, effort: Effort) -> list[Run]:
@@ -337,4 +338,5 @@ def _curve(
         if slope_error > 0.25 * max(1.0, abs(slope)):
             reason = f"errors fall by no law of cost: {slope:.1f} ± {slope_error:.1f}"
             slope = slope_error = math.nan
-    return Curve(contender=rival, points=points, held=held, slope=slope, slope_error=slope_error, slope_reason=reason)
+    slopes: dict[str, Any] = {"slope": slope, "slope_error": slope_error, "slope_reason": reason}
+    return Curve(contender=rival, reference=reference, points=points, held=held, **slopes)
