@@ -239,7 +239,7 @@ def _contours(axes: Axes, study: ValidityMap, error: FloatArray, words: str, col
 def _crosses(error: FloatArray, level: float) -> bool:
     """Return whether a map has a contour at ``level``."""
     finite = error[np.isfinite(error)]
-    return bool(finite.size and finite.min() < level < finite.max() and min(error.shape) > 1)
+    return bool(finite.size and finite.min() < level < finite.max())
 
 
 def contour_lines(study: ValidityMap, error: FloatArray, level: float) -> list[FloatArray]:
@@ -253,12 +253,9 @@ def contour_lines(study: ValidityMap, error: FloatArray, level: float) -> list[F
 def _edges(centres: FloatArray, *, logarithmic: bool) -> FloatArray:
     """Return the borders of cells around ``centres``, halfway between neighbours on the axis as it is drawn."""
     at = np.log(centres) if logarithmic else centres
-    if len(at) == 1:
-        inner = np.array([at[0] - 0.5, at[0] + 0.5])
-    else:
-        middle = 0.5 * (at[:-1] + at[1:])
-        inner = np.concatenate(([2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]))
-    return np.exp(inner) if logarithmic else np.asarray(inner)
+    middle = 0.5 * (at[:-1] + at[1:])
+    edges = np.concatenate(([2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]))
+    return np.exp(edges) if logarithmic else edges
 
 
 def _outline(inside: NDArray[np.bool_], x: FloatArray, y: FloatArray, *, logarithmic: bool) -> list[FloatArray]:
