@@ -6,7 +6,6 @@ would lie in if the print were right.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Final, cast
@@ -14,6 +13,7 @@ from typing import Final, cast
 from flipproof.chapters.errata import equations, programs
 from flipproof.chapters.errata.equations import ROUND_OFF, Erratum
 from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Study, attempt, observed
+from flipproof.frame.findings import finite_or_none
 from slicemodel import Scenario
 
 AUDIT: Final[Mapping[str, Callable[[Scenario], Erratum]]] = {
@@ -54,11 +54,11 @@ def study_errata(throw: Scenario) -> dict[str, Erratum]:
 def claims(found: Mapping[str, Erratum]) -> Claims:
     """Yield what the paper prints against what follows from its own earlier equations."""
     for id_, erratum in found.items():
-        value = erratum.value if math.isfinite(erratum.value) else None
+        value = finite_or_none(erratum.number.value)
         band = None if value is None else abs(value) * (ROUND_OFF[1] - 1.0)
         note = f"prints {erratum.prints}; follows {erratum.follows}" + (f"; {erratum.note}" if erratum.note else "")
         title = f"{erratum.place}: {erratum.verdict}"
-        yield observed(f"erratum-{id_}", title, value, erratum.unit, note, band=band)
+        yield observed(f"erratum-{id_}", title, value, erratum.number.unit, note, band=band)
 
 
 CHAPTER: Final = Chapter("errata", "Errata", study, claims, work={"check": None, "quick": None, "full": None})
