@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from flipproof.chapters.alignment.study import SHIFT_BAND, Alignment, Tube, end_name, study_alignment, study_tube
+from flipproof.chapters.alignment.study import SHIFT_BAND, Alignment, Table, Tube, end_name, study_alignment, study_tube
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Outcome, Study, attempt, known, observed
 from flipproof.output.columns import rows_csv
@@ -22,15 +22,7 @@ PAIRS: Final = (("eq8", "midpoint"), ("eq8", "free-flight"))
 
 LANES = 0.2, -0.2
 END_COLOURS = {BASE: "#0072B2", CAP: "#E69F00"}
-IMPACTS = {
-    "agrees": ("#444444", 3.5),
-    "shifted": ("#009E73", 5.0),
-    "missing": ("#D1001C", 6.5),
-    "extra": ("#A030C0", 6.5),
-    "after a fork": ("#BBBBBB", 3.5),
-}
-"""Colour and size of every kind of impact."""
-
+SHIFTED = "#009E73"
 
 Pairs = Mapping[tuple[str, str], tuple[Outcome[Alignment], Outcome[Tube]]]
 """Every pair aligned, and in its tube."""
@@ -139,43 +131,40 @@ def figure_gantt(alignment: Alignment) -> Figure:
     return figure
 
 
-def _draw_impacts(axes: Axes, alignment: Alignment, rows: dict[int, int]) -> None:
-    """Mark every impact in its lane, and join the two of a shifted pair."""
-    matched, moved = alignment.matched, alignment.shifted
+def _kinds(alignment: Alignment) -> list[tuple[str, str, float, Table, Table]]:
+    """Return every kind of impact in the order of drawing: its words, colour, size, those of either run or None."""
+    matched, moved, second = alignment.matched, alignment.shifted, alignment.second
     later = matched.copy()
     later.time += alignment.shift
-    for here, there in zip(matched[moved], later[moved], strict=True):
+    return [
+        (f"agrees within {SHIFT_BAND * 1e3:g} ms ({(~moved).sum()})", "#444444", 3.5, matched[~moved], later[~moved]),
+        (f"shifted further ({moved.sum()})", SHIFTED, 5.0, matched[moved], later[moved]),
+        ("after a fork ({} + {})".format(*map(len, alignment.after_fork)), "#BBBBBB", 3.5, *alignment.after_fork),
+        (f"missing in {second} ({len(alignment.missing)})", "#D1001C", 6.5, alignment.missing, None),
+        (f"extra in {second} ({len(alignment.extra)})", "#A030C0", 6.5, None, alignment.extra),
+    ]
+
+
+def _draw_impacts(axes: Axes, alignment: Alignment, rows: dict[int, int]) -> None:
+    """Mark every impact in its lane, and join the two of a shifted pair."""
+    kinds = _kinds(alignment)
+    for here, there in zip(*kinds[1][3:], strict=True):
         if here.slice in rows:
             heights = [rows[here.slice] + lane for lane in LANES]
-            axes.plot((here.time, there.time), heights, color=IMPACTS["shifted"][0], linewidth=0.6, alpha=0.7)
-    for kind, which, impacts in (
-        ("agrees", 0, matched[~moved]),
-        ("agrees", 1, later[~moved]),
-        ("shifted", 0, matched[moved]),
-        ("shifted", 1, later[moved]),
-        ("after a fork", 0, alignment.after_fork[0]),
-        ("after a fork", 1, alignment.after_fork[1]),
-        ("missing", 0, alignment.missing),
-        ("extra", 1, alignment.extra),
-    ):
-        colour, size = IMPACTS[kind]
-        look: dict[str, Any] = {"color": colour, "markersize": size, "zorder": 3 if kind == "agrees" else 4}
-        for end, marker in ((BASE, "v"), (CAP, "^")):
-            shown = impacts[(impacts.end == end) & np.isin(impacts.slice, list(rows))]
-            heights = [rows[i] + LANES[which] for i in shown.slice]
-            axes.plot(shown.time, heights, marker, markeredgecolor="white", markeredgewidth=0.3, **look)
+            axes.plot((here.time, there.time), heights, color=SHIFTED, linewidth=0.6, alpha=0.7)
+    for k, (_, colour, size, *both) in enumerate(kinds):
+        look: dict[str, Any] = {"color": colour, "markersize": size, "zorder": 4 if k else 3}
+        for impacts, lane in zip(both, LANES, strict=True):
+            for end, marker in ((BASE, "v"), (CAP, "^")) if impacts is not None else ():
+                shown = impacts[(impacts.end == end) & np.isin(impacts.slice, list(rows))]
+                heights = [rows[i] + lane for i in shown.slice]
+                axes.plot(shown.time, heights, marker, markeredgecolor="white", markeredgewidth=0.3, **look)
 
 
 def _gantt_handles(alignment: Alignment) -> list[Patch | Line2D]:
-    labels = (
-        f"agrees within {SHIFT_BAND * 1e3:g} ms ({int((~alignment.shifted).sum())})",
-        f"shifted further ({int(alignment.shifted.sum())})",
-        f"missing in {alignment.second} ({len(alignment.missing)})",
-        f"extra in {alignment.second} ({len(alignment.extra)})",
-        "after a fork ({} + {})".format(*map(len, alignment.after_fork)),
-    )
+    agrees, shifted, forked, missing, extra = _kinds(alignment)
     marks = [("v", "#444444", "impact on the base"), ("^", "#444444", "impact on the cap")]
-    marks += [("o", colour, words) for (colour, _), words in zip(IMPACTS.values(), labels, strict=True)]
+    marks += [("o", colour, words) for words, colour, *_ in (agrees, shifted, missing, extra, forked)]
     return [
         *(Patch(color=colour, label=f"in contact with the {end_name(end)}") for end, colour in END_COLOURS.items()),
         *(Line2D([], [], linestyle="", marker=mark, color=colour, label=words) for mark, colour, words in marks),
