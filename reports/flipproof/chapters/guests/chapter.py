@@ -58,8 +58,8 @@ def draw_guests(found: Guests) -> Iterator[Exhibit]:
         yield _draw_omega(flown, found.ladder, more)
     if apart := [guest for guest in flown if guest.differences]:
         yield _draw_differences(apart)
-    if placed := [guest for guest in flown if guest.split is not None]:
-        yield draw_waterfalls(placed)
+    if placed := [(guest, guest.split) for guest in flown if guest.split is not None]:
+        yield _draw_waterfalls(placed)
     if refined := [guest for guest in flown if len(guest.errors) > 1]:
         yield _draw_convergence(refined)
     if kept := [guest for guest in flown if guest.visit.ice is not None or guest.energy is not None]:
@@ -213,19 +213,17 @@ def figure_ice_energy(guests: Sequence[Guest]) -> Figure:
     return figure
 
 
-def draw_waterfalls(guests: Sequence[Guest]) -> Exhibit:
-    """Return the waterfalls of guests that have one, a row of panels each."""
+def _draw_waterfalls(placed: Sequence[tuple[Guest, Split]]) -> Exhibit:
     words: list[str] = []
     rows: list[tuple[Any, ...]] = []
-    for guest in guests:
-        if (split := guest.split) is not None:
-            parts = ", ".join(f"{NAMES[name]} {share:+.3f}" for name, share in split.bars.items())
-            ends = f"from {split.start:.3f} to {split.end:.3f}" + (f" by {parts}" if parts else "")
-            words.append(f"{guest.label}: {ends}, the rest {split.rest:+.2g}")
-            head = guest.slug, split.equation
-            rows += [(*head, "(the guest)", split.start, None, None), (*head, "the rest", split.rest, None, None)]
-            rows += [(*head, NAMES[name], share, *split.ranges[name]) for name, share in split.bars.items()]
-            rows.append((*head, "(free flight)", split.end, None, None))
+    for guest, split in placed:
+        parts = ", ".join(f"{NAMES[name]} {share:+.3f}" for name, share in split.bars.items())
+        ends = f"from {split.start:.3f} to {split.end:.3f}" + (f" by {parts}" if parts else "")
+        words.append(f"{guest.label}: {ends}, the rest {split.rest:+.2g}")
+        head = guest.slug, split.equation
+        rows += [(*head, "(the guest)", split.start, None, None), (*head, "the rest", split.rest, None, None)]
+        rows += [(*head, NAMES[name], share, *split.ranges[name]) for name, share in split.bars.items()]
+        rows.append((*head, "(free flight)", split.end, None, None))
     return Exhibit(
         name="guests-waterfall",
         title="Waterfall of each guest",
@@ -237,7 +235,7 @@ def draw_waterfalls(guests: Sequence[Guest]) -> Exhibit:
         "wide, assumptions interact.",
         alt=f"Waterfall of the mean of omega over omega_0 in the second half. {'; '.join(words)}.",
         maker=figure_waterfalls,
-        data=(tuple(guests),),
+        data=(placed,),
         table=rows_csv(
             ("guest", "equation", "step", "fair share [1]", "least of all orders [1]", "largest of all orders [1]"),
             rows,
@@ -246,14 +244,13 @@ def draw_waterfalls(guests: Sequence[Guest]) -> Exhibit:
 
 
 @styled
-def figure_waterfalls(guests: Sequence[Guest]) -> Figure:
+def figure_waterfalls(placed: Sequence[tuple[Guest, Split]]) -> Figure:
     """Left: rest and shares, each bar from the value before to the value after. Right: shares with their ranges."""
-    whole = [(guest, guest.split) for guest in guests if guest.split is not None]
-    counts = [len(split.bars) + 3 for _, split in whole]
+    counts = [len(split.bars) + 3 for _, split in placed]
     size = (8.0, 0.7 + sum(0.55 + 0.36 * count for count in counts))
     shape: dict[str, Any] = {"squeeze": False, "width_ratios": (1.5, 1.0), "height_ratios": counts}
-    figure, grid = new_figure(len(whole), 2, size=size, sharex="col", sharey="row", **shape)
-    for (ladder, orders), (guest, split) in zip(grid, whole, strict=True):
+    figure, grid = new_figure(len(placed), 2, size=size, sharex="col", sharey="row", **shape)
+    for (ladder, orders), (guest, split) in zip(grid, placed, strict=True):
         _panels(ladder, orders, split, guest.band)
         ladder.set_title(shortened(guest.label[::-1], 80)[::-1], fontsize=10, loc="left")
     grid[-1, 0].set_xlabel("mean of ω/ω₀ over the second half [1]")

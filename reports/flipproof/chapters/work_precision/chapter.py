@@ -19,6 +19,7 @@ from flipproof.chapters.work_precision.study import (
     words_of,
 )
 from flipproof.frame.chapter import Ask, Call, Chapter, Exhibit, Finding, Study, observed
+from flipproof.frame.findings import finite_or_none
 from flipproof.frame.timing import batches, make_timed
 from flipproof.output.columns import rows_csv
 from slicemodel.scenario import shortened
@@ -295,9 +296,7 @@ def summarise_work_precision(studies: Sequence[WorkPrecision]) -> dict[str, Any]
             "references": {name: _plain(asdict(reference)) for name, reference in study.references.items()},
             "contenders": {
                 key: {
-                    "name": curve.contender.name,
-                    "family": curve.contender.family,
-                    "equation": curve.contender.equation,
+                    **{name: getattr(curve.contender, name) for name in ("name", "family", "equation")},
                     "held": _plain(curve.held),
                     **_plain({name: getattr(curve, name) for name in ("slope", "slope_error", "slope_reason")}),
                     "points": [_plain(asdict(point)) for point in curve.points],
@@ -311,12 +310,9 @@ def summarise_work_precision(studies: Sequence[WorkPrecision]) -> dict[str, Any]
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    def plain(value: Any) -> Any:
-        if isinstance(value, float):
-            return value if math.isfinite(value) else None
-        return value if isinstance(value, (bool, int, str)) else str(value)
-
-    return {name: plain(value) for name, value in values.items()}
+    finite = {name: finite_or_none(value) if isinstance(value, float) else value for name, value in values.items()}
+    known = (bool, int, float, str, type(None))
+    return {name: value if isinstance(value, known) else str(value) for name, value in finite.items()}
 
 
 CHAPTER: Final = Chapter(
