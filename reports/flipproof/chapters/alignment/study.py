@@ -134,13 +134,7 @@ class Alignment:
 
 
 def study_alignment(first: Trajectory, second: Trajectory) -> Alignment:
-    """Align the impacts of two runs of one throw.
-
-    Raises
-    ------
-    ValueError
-        If a run has no record of impacts.
-    """
+    """Align the impacts of two runs of one throw, both of which keep a record of them."""
     n_slices = first.scenario.n_slices
     until = float(min(first.t[-1], second.t[-1]))
     (a, all_of_a), (b, all_of_b) = (_fast_impacts(run, until) for run in (first, second))
@@ -183,8 +177,7 @@ def _fast_impacts(run: Trajectory, until: float) -> tuple[Table, int]:
     place of the ``partner`` in the other table, now none, and which come ``after`` a fork, now none.
     """
     impacts = run.impacts
-    if impacts is None:
-        raise ValueError(f"{run.label} keeps no record of impacts: compare its paths in a tube instead")
+    assert impacts is not None
     early = impacts.time <= until
     order = np.lexsort((impacts.slice, impacts.time))
     at = order[(early & (impacts.speed_before >= LEAST_SPEED / 2.0))[order]]

@@ -213,14 +213,12 @@ class Table(NamedTuple):
 
 def tabulate_work_precision(studies: Sequence[WorkPrecision]) -> Iterator[Table]:
     """Yield results and settings of every throw, then who is absent and why."""
-    absent: dict[str, str] = {}
     for study in studies:
         yield _results(study)
         yield _settings(study)
         yield _references(study)
-        absent |= study.absent
-    if studies:
-        yield Table("work-absent", "Not competing", ("what", "why"), list(absent.items()))
+    # The same of every throw.
+    yield Table("work-absent", "Not competing", ("what", "why"), list(studies[0].absent.items()))
 
 
 def _results(study: WorkPrecision) -> Table:
