@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from flipproof.chapters.differences.study import claim_change, largest_change
 from flipproof.chapters.solvers import ENGINE
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged
 from flipproof.frame.findings import finite_or_none, regression
 from flipproof.frame.solvers import without_gravity
 from flipproof.output.columns import rows_csv
@@ -305,32 +305,28 @@ CHECK_DT: Final = 4e-4
 """Step of the engine where two of its runs are compared with one another [s]."""
 
 
-@dataclass(frozen=True, slots=True)
-class EngineFacts:
-    """The facts, and the engine's free flight of the paper's own throw with gravity and without."""
-
-    facts: tuple[Finding, ...]
-    usual: Made
-    weightless: Made
+EngineFacts = tuple[Finding | Absent, tuple[Finding, ...]]
+"""Whether gravity cancels in the engine's free flight of the paper's own throw, and the facts."""
 
 
 def study(ask: Ask) -> Study[EngineFacts]:
     """Measure every fact."""
     runs = plan_engine_facts(ask.reference)
-    usual, weightless = (
+    both = [
         Run(ENGINE, throw, {"dt": CHECK_DT}, f"{ENGINE}, g = {throw.gravity:g} m/s²")
         for throw in (ask.reference, without_gravity(ask.reference))
-    )
-    flights = yield [*runs.values(), usual, weightless]
+    ]
+    flights = yield [*runs.values(), *both]
     made = {words: flights[run] for words, run in runs.items()}
-    return EngineFacts(tuple(fact.found(made) for fact in FACTS), flights[usual], flights[weightless])
+    title = f"{ENGINE}: free flight is the same with g = 0"
+    gravity = judged(claim_gravity_cancels, *(flights[run] for run in both), id="engine-gravity", title=title)
+    return gravity, tuple(fact.found(made) for fact in FACTS)
 
 
 def claims(found: EngineFacts) -> Claims:
     """Yield that gravity cancels, and every fact."""
-    title = f"{ENGINE}: free flight is the same with g = 0"
-    yield judged(claim_gravity_cancels, found.usual, found.weightless, id="engine-gravity", title=title)
-    yield from found.facts
+    gravity, facts = found
+    yield from (gravity, *facts)
 
 
 def claim_gravity_cancels(with_gravity: Trajectory, without: Trajectory) -> Finding:
@@ -343,7 +339,7 @@ def claim_gravity_cancels(with_gravity: Trajectory, without: Trajectory) -> Find
 
 def figures(found: EngineFacts) -> Iterator[Exhibit]:
     """Yield the table of facts, each with its number and threshold in the unit of its row."""
-    findings = found.facts
+    _, findings = found
     words = " ".join(
         f"{finding.title}: {finding.value_text}, threshold {finding.threshold_text}, {finding.verdict}."
         for finding in findings
