@@ -91,8 +91,7 @@ def _by_height(throw: Scenario, goal: float) -> Aim:
         )
     k = int(reached[0])
     share = (goal - theta[k - 1]) / (theta[k] - theta[k - 1])
-    time = float(t[k - 1] + share * (t[k] - t[k - 1]))
-    height = float(rim[k - 1] + share * (rim[k] - rim[k - 1]))
+    time, height = (float(curve[k - 1] + share * (curve[k] - curve[k - 1])) for curve in (t, rim))
     return Aim(throw=replace(throw, duration=time + SPARE), height=height, time=time)
 
 

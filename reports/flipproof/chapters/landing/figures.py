@@ -287,7 +287,7 @@ def shares_csv(found: Found) -> str:
         [
             key.axis, key.value, key.family, key.filling, KINDS[key.kind].words, cell.share.upright,
             cell.share.undecided, cell.missed, cell.share.throws, cell.share.value, *cell.share.interval,
-            cell.aim.throw.omega0, cell.aim.height, cell.aim.time, cell.omega, cell.speed, cell.energy, cell.bounces,
+            cell.aim.throw.omega0, cell.aim.height, cell.aim.time, *cell.touch, cell.bounces,
         ]
         for key, cell in found.cells.items()
     ]  # fmt: skip

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice, product
+from itertools import product
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
@@ -121,16 +121,15 @@ class Cell:
     ----------
     share : Share - of them upright
     missed : int - how many did not come down on the table; they count as not upright
-    omega [rad/s], speed [m/s], energy [E_s], bounces : float - means at the touch, and of the landing
+    touch : (float, float, float) - means at the touch: |omega| [rad/s], speed [m/s], energy [E_s]
+    bounces : float - mean of the landing
     bounces_band : float - half width of the 95 % interval of that mean
     """
 
     aim: Aim
     share: Share
     missed: int
-    omega: float
-    speed: float
-    energy: float
+    touch: tuple[float, ...]
     bounces: float
     bounces_band: float
 
@@ -295,7 +294,7 @@ def read(throw: Scenario, size: Size, cases: Cases, rows: Rows, unaimed: Mapping
     for (key, case), some in zip(cases.items(), rows, strict=True):
         if key.axis == "map":
             found = maps.setdefault(key.kind, Outcomes(np.full(shape, "", "U9"), np.full(shape, np.nan)))
-            at = int(np.argmin(np.abs(omegas - key.value))), int(np.argmin(np.abs(fillings - key.filling)))
+            at = omegas.tolist().index(key.value), fillings.tolist().index(key.filling)
             found.outcome[at] = some[0].outcome or some[0].status
             found.theta[at] = np.nan if some[0].touch_theta is None else some[0].touch_theta
             continue
@@ -334,9 +333,7 @@ def cell_of(aim: Aim, rows: Sequence[Landed]) -> Cell:
         aim=aim,
         share=share_of(rows),
         missed=sum(row.status == "missed" for row in rows),
-        omega=mean("touch_omega"),
-        speed=mean("touch_speed"),
-        energy=mean("touch_energy"),
+        touch=tuple(map(mean, ("touch_omega", "touch_speed", "touch_energy"))),
         bounces=mean("bounces"),
         bounces_band=Z * float(np.std(bounces, ddof=1)) / math.sqrt(len(bounces)) if len(bounces) > 1 else math.nan,
     )
@@ -351,7 +348,7 @@ def _energies(kind: Kind, cases: Cases, rows: Rows, size: Size) -> list[Energy]:
     design = Throws(cases=(case,), seed=size.seed, text="")
     table = Table(height=case.aim.height, restitution=case.restitution, friction=case.friction)
     found = []
-    for place, row in enumerate(islice(some, 10)):
+    for place, row in enumerate(some[:10]):
         if row.outcome not in (None, "undecided"):
             run = path(fly(design.point(place).scenario(), table), table, case.law, duration=0.45)
             found.append(Energy(kind, run.t, run.energy / run.saddle, str(row.outcome)))
