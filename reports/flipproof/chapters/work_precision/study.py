@@ -296,8 +296,7 @@ def _point(
 
 def _geometric(values: Sequence[float]) -> float:
     """Return the geometric mean; NaN if a value is missing or no cost was measured."""
-    positive = all(value > 0.0 for value in values)
-    return float(np.exp(np.mean(np.log(values)))) if positive else math.nan
+    return float(np.exp(np.mean(np.log(values)))) if all(value > 0.0 for value in values) else math.nan
 
 
 def words_of(settings: Mapping[str, Any]) -> str:
