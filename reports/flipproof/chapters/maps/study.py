@@ -219,7 +219,7 @@ def study_readings(
         problems = (f"{name}: {reading.problem}" for name, reading in found.items() if reading.problem)
         reason[at] = shortened("; ".join(problems), 80)
     levels = {run: reading.level for run, reading in readings.items()}
-    banded = all(twin in levels for run in free for twin in twins(run))
+    banded = all(each in levels for run in free for each in (run, *twins(run)))
     of_sets = {switches: level[name] for switches, name in SETS.items()}
     return ValidityMap(
         axis=axis,
