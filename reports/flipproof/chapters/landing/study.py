@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
+from itertools import islice, product
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
@@ -348,7 +348,7 @@ def _energies(kind: Kind, cases: Cases, rows: Rows, size: Size) -> list[Energy]:
     design = Throws(cases=(case,), seed=size.seed, text="")
     table = Table(height=case.aim.height, restitution=case.restitution, friction=case.friction)
     found = []
-    for place, row in enumerate(some[:10]):
+    for place, row in enumerate(islice(some, 10)):
         if row.outcome not in (None, "undecided"):
             run = path(fly(design.point(place).scenario(), table), table, case.law, duration=0.45)
             found.append(Energy(kind, run.t, run.energy / run.saddle, str(row.outcome)))
