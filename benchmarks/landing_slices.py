@@ -16,9 +16,7 @@ from dataclasses import replace
 
 import ode_reference
 from flipproof.chapters.landing.study import Size, filled, share_of
-from flipproof.landing.aim import aimed
-from flipproof.landing.design import Case, Throws
-from flipproof.landing.upright import make_case
+from flipproof.landing.design import Case, Throws, aimed, make_cases
 from slicemodel import Scenario, Table
 
 
@@ -33,9 +31,9 @@ def main() -> int:
     first, inside = None, True
     for slices in options.slices:
         case = Case(aim=replace(aim, throw=aim.throw.with_slices(slices)), law="together", throws=options.throws)
-        make_case(replace(case, throws=1), Size().seed)  # compiles
+        make_cases([replace(case, throws=1)], Size().seed)  # compiles
         began = time.process_time()
-        share = share_of(make_case(case, Size().seed))
+        share = share_of(make_cases([case], Size().seed)[0])
         seconds = time.process_time() - began
         low, high = share.interval
         words = f"N = {slices}: P(upright) = {share.value:.4f} [{low:.4f}, {high:.4f}], {share.undecided} undecided"

@@ -19,8 +19,12 @@ from pathlib import Path
 
 from flipproof.build import ask_of, gather_report
 from flipproof.chapters import chapters_named
-from flipproof.chapters.work_precision.chapter import figures, summarise_work_precision, tabulate_work_precision
-from flipproof.chapters.work_precision.claims import claim_work_precision
+from flipproof.chapters.work_precision.chapter import (
+    claim_work_precision,
+    figures,
+    summarise_work_precision,
+    tabulate_work_precision,
+)
 from flipproof.chapters.work_precision.contenders import COMPLETE, FULL, QUICK
 from flipproof.frame.pool import workers
 from slicemodel import Scenario

@@ -18,14 +18,14 @@ from slicemodel import Impacts, Scenario, Trajectory
 BASE, CAP = 1, -1
 
 
-def flight(*events, n=3, until=0.5, r=None, t=None, method="made-up", known=True) -> Trajectory:
+def flight(*events, n=3, until=0.5, r=None, t=None) -> Trajectory:
     """Return a run whose impacts are (time, slice, end[, speed])."""
     events = sorted(((*event, 1.0)[:4] for event in events), key=lambda event: event[0])
     t = np.array([0.0, until]) if t is None else t
     columns = list(zip(*events, strict=True)) if events else [[]] * 4
-    impacts = Impacts(columns[0], columns[1], columns[2], columns[3], columns[3]) if known else None
+    impacts = Impacts(columns[0], columns[1], columns[2], columns[3], columns[3])
     told = {} if r is None else {"r": r}
-    return trajectory_of(Scenario(n_slices=n), t, method=method, impacts=impacts, **told)
+    return trajectory_of(Scenario(n_slices=n), t, impacts=impacts, **told)
 
 
 USUAL = ((0.1, 0, BASE), (0.2, 1, BASE), (0.21, 0, CAP), (0.3, 0, BASE), (0.4, 2, CAP))
@@ -129,11 +129,6 @@ def test_impacts_past_the_shorter_run_and_at_its_very_end_are_no_disagreement():
     aligned = study_alignment(longer, flight(*USUAL[:4], until=0.4))
     assert aligned.until == 0.4
     assert (aligned.undecided, len(aligned.missing), len(aligned.matched)) == (2, 0, 4)
-
-
-def test_what_cannot_be_aligned_is_refused():
-    with pytest.raises(ValueError, match="engine keeps no record of impacts"):
-        study_alignment(flight(), flight(known=False, method="engine"))
 
 
 def test_no_impacts_at_all():

@@ -6,8 +6,15 @@ from dataclasses import replace
 
 import pytest
 
-from flipproof.chapters.engine_facts import worlds
-from flipproof.chapters.engine_facts.chapter import FACTS, EngineFacts, figure_gallery, figures, plan_engine_facts
+from flipproof.chapters.engine_facts.chapter import (
+    FACTS,
+    depth_left,
+    figure_gallery,
+    figures,
+    plan_engine_facts,
+    rebound_of_two,
+    speed_through_wall,
+)
 from flipproof.frame.solvers import Made, make
 from slicemodel import Scenario
 
@@ -85,16 +92,16 @@ def test_a_number_outside_its_interval_and_nan_fail(facts):
 
 @pytest.mark.parametrize(("first", "second"), [(1.0, 1.0), (0.8, 0.25), (0.0, 0.9)])
 def test_two_discs_rebound_by_the_product(first, second):
-    assert worlds.rebound_of_two(first, second) == pytest.approx(first * second, abs=1e-9)
+    assert rebound_of_two(first, second) == pytest.approx(first * second, abs=1e-9)
 
 
 def test_a_thin_wall_is_passed_only_by_long_steps():
-    assert worlds.speed_through_wall(1e-2) == pytest.approx(1.0)
-    assert worlds.speed_through_wall(1e-3) == pytest.approx(-1.0)
+    assert speed_through_wall(1e-2) == pytest.approx(1.0)
+    assert speed_through_wall(1e-3) == pytest.approx(-1.0)
 
 
 def test_without_slop_nothing_stays_sunk():
-    (default, left), (none, without) = worlds.depth_left(None), worlds.depth_left(0.0)
+    (default, left), (none, without) = depth_left(None), depth_left(0.0)
     assert default == pytest.approx(0.1)
     assert none == 0.0
     assert left > 5e-3
@@ -107,9 +114,9 @@ def test_the_gallery_has_fact_number_threshold_and_sign(facts):
         "mujoco-limit": replace(facts["mujoco-limit"], value=None),
     }
     findings = tuple(changed[fact.id] for fact in FACTS)
-    texts = [text.get_text() for text in figure_gallery(findings, [f.engine for f in FACTS]).axes[0].texts]
+    texts = [text.get_text() for text in figure_gallery(findings).axes[0].texts]
     assert {"engine", "fact", "number", "threshold", "✓", "✗", "–", "≤ 1e-09", "-0.500 steps"} <= set(texts)
-    (exhibit,) = figures(EngineFacts(findings, None, None))
+    (exhibit,) = figures((findings[0], findings))
     assert "10 of 12" in exhibit.caption
     assert "-0.500 steps, threshold 0.49 to 0.51, fail" in exhibit.alt
     assert exhibit.drawing.svg.startswith("<?xml")

@@ -12,10 +12,19 @@ import pytest
 
 from flipproof.build import ask_of
 from flipproof.chapters import chapters_named
-from flipproof.chapters.guests.chapter import claim_guests
-from flipproof.chapters.guests.figures import draw_guests
-from flipproof.chapters.guests.split import FREE, split, switches_made
-from flipproof.chapters.guests.study import SPARSE, Guests, energy_of, received, study_guests, visit, with_split
+from flipproof.chapters.guests.chapter import claim_guests, draw_guests, summarise
+from flipproof.chapters.guests.study import (
+    FREE,
+    SPARSE,
+    Guests,
+    energy_of,
+    received,
+    split,
+    study_guests,
+    switches_made,
+    visit,
+    with_split,
+)
 from flipproof.chapters.waterfall.study import equation_run
 from flipproof.cli import main as cli
 from flipproof.foreign import certify as suite
@@ -125,7 +134,7 @@ def test_a_hostile_guest_is_named_with_its_reason(tmp_path, ladder, name):
     assert any(re.search(pattern, finding.note) for finding in failed)
     assert bad.run is None
     assert good.run is not None
-    assert json.dumps(bad.to_mapping(), allow_nan=False)
+    assert json.dumps(summarise(bad), allow_nan=False)
 
 
 def test_a_solver_that_is_late_twice_is_not_asked_again(tmp_path):
@@ -296,8 +305,8 @@ def test_bars_that_miss_the_whole_are_no_waterfall_and_the_guest_says_why(ladder
     flown = {equation_run(THROW, start): ladder["eq8"], equation_run(THROW, FREE): ladder["free-flight"]}
     flights = Flights({run: Made(run, flight, 0.0) for run, flight in flown.items()})
     found = split(ladder["eq8-weightless"], start, flights)
-    assert found.placed + found.bars["recoil"] == pytest.approx(found.end, abs=1e-15)
-    monkeypatch.setattr("flipproof.chapters.guests.split.mean", lambda changes: 0.9 * changes[0][1])
+    assert found.start + found.rest + found.bars["recoil"] == pytest.approx(found.end, abs=1e-15)
+    monkeypatch.setattr("flipproof.chapters.guests.study.mean", lambda changes: 0.9 * changes[0][1])
     with pytest.raises(ArithmeticError, match="rest and bars miss"):
         split(ladder["eq8-weightless"], start, flights)
     (guest,) = study_guests([visit(RK4, THROW, TIMES)], ladder, {}).guests

@@ -14,19 +14,27 @@ from made_up import command
 from flipproof.build import ask_of, gather_report
 from flipproof.chapters import chapters_named
 from flipproof.chapters.landing.chapter import chunks, claims
-from flipproof.chapters.landing.figures import figures, witnesses
-from flipproof.chapters.landing.study import AIMING, Key, Size, aiming, cell_of, filled, share_of, standing
-from flipproof.chapters.landing.tables import page, shares_csv
+from flipproof.chapters.landing.figures import figures, page, shares_csv, witnesses
+from flipproof.chapters.landing.study import (
+    AIMING,
+    Key,
+    Size,
+    aiming,
+    cell_of,
+    counting,
+    filled,
+    read,
+    share_of,
+    standing,
+)
 from flipproof.cli.main import main
 from flipproof.frame.exhibit import drawn
 from flipproof.frame.gather import tell
 from flipproof.frame.pool import Here
 from flipproof.frame.store import RunStore
-from flipproof.landing.aim import aimed
-from flipproof.landing.design import Case, Throws
-from flipproof.landing.scatter import Scatter, Share, scattered, wilson
+from flipproof.landing.design import Case, Scatter, Share, Throws, aimed, make_cases, scattered, wilson
 from flipproof.landing.throw import land_throw, told
-from flipproof.landing.upright import drive, make_case, make_upright
+from flipproof.landing.upright import make_upright
 from flipproof.landing.work import LANDING, Landed, flown, make_landing, saddle, touch_readings
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.run import Workers
@@ -236,18 +244,20 @@ def test_a_flight_that_was_kept_is_the_flight(design):
 
 @pytest.fixture(scope="module")
 def found():
-    return drive(THROW, SMALL, lambda _, cases: [make_case(case, SMALL.seed) for case in cases.values()])
+    aims, unaimed = aiming(THROW, SMALL)
+    throws = counting(THROW, SMALL, aims, make_cases(aims.values(), SMALL.seed))
+    return read(THROW, SMALL, throws, make_cases(throws.values(), SMALL.seed), unaimed)
 
 
 def test_the_study_counts_what_it_threw(found):
     assert found.unaimed == {}
-    assert found.cell("B", "together", 0.4).share.throws == 6
-    assert found.cell("B", "compliant", 0.4) is None
+    assert found.cell("together", 0.4).share.throws == 6
+    assert found.cell("compliant", 0.4) is None
     assert [value for value, _ in found.along("restitution", "ice")] == [0.0, 0.3]
     assert found.maps["together"].outcome.shape == (4, 3)
     assert set(found.maps) == {"together", "ice"}
-    for counts in found.static.values():
-        assert sum(counts.values()) == 12
+    for said, others in found.static.values():
+        assert said.throws + others.throws == 12
     # Without scatter every throw of an axis is one throw.
     still = found.cells[Key("scatter", 0.0, "B", 0.4, "together")].share
     assert still.upright in (0, still.throws)
@@ -257,15 +267,10 @@ def test_the_study_counts_what_it_threw(found):
 
 
 def test_throws_that_choose_an_aim_are_not_counted():
-    streams = {}
-
-    def make(wave, cases):
-        streams[wave] = {case.stream for case in cases.values()}
-        return [make_case(case, SMALL.seed) for case in cases.values()]
-
-    drive(THROW, SMALL, make)
-    assert streams["aims"] == {AIMING}
-    assert AIMING not in streams["throws"]
+    aims, _ = aiming(THROW, SMALL)
+    throws = counting(THROW, SMALL, aims, make_cases(aims.values(), SMALL.seed))
+    assert {case.stream for case in aims.values()} == {AIMING}
+    assert AIMING not in {case.stream for case in throws.values()}
 
 
 def test_every_finding_and_figure_says_what_is_assumed(found):

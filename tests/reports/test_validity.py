@@ -7,8 +7,7 @@ import pytest
 from made_up import study_map, trajectory_of
 
 import ode_reference
-from flipproof.chapters.maps.chapter import _beyond
-from flipproof.chapters.maps.figure import figure_map
+from flipproof.chapters.maps.chapter import _beyond, figure_map
 from flipproof.chapters.maps.study import (
     COLUMN,
     EXTRA,
@@ -177,6 +176,18 @@ def test_a_run_that_was_never_made_is_no_pass():
     study = study_map(THROW, "gamma", FILLS, (0.1,), {})
     assert (study.dominant == -1).all()
     assert "not run" in study.reason[0, 0]
+
+
+def test_a_lost_run_takes_the_band_with_it_and_no_map():
+    """Its twins may be there: a worker that died takes some runs of a map, and not those of one cell."""
+    runs = plan_map(THROW, "gamma", FILLS, (0.1, 0.2), banded=True)
+    made = {run: flat(run, 0.5) for run in runs}
+    assert study_map(THROW, "gamma", FILLS, (0.1, 0.2), made).band is not None
+    del made[next(run for run in runs if run.solver == "free-flight")]
+    study = study_map(THROW, "gamma", FILLS, (0.1, 0.2), made)
+    assert study.band is None
+    assert study.reason.tolist() == [["free-flight: not run", ""], ["", ""]]
+    assert draw(figure_map(study)).svg.startswith("<?xml")
 
 
 @pytest.mark.parametrize("axis", ["gamma", "step", "restitution"])

@@ -85,7 +85,7 @@ def command_land(options: argparse.Namespace) -> int:
     """Throw one bottle on a table and say how it lands."""
     throw = read_scenario(options.scenario, options.slices)
     from flipproof.chapters.landing.study import standing
-    from flipproof.landing.aim import aimed
+    from flipproof.landing.design import aimed
     from flipproof.landing.throw import land_throw, told
     from slicemodel import Table
 
@@ -111,15 +111,12 @@ def command_land(options: argparse.Namespace) -> int:
 
 def _film(options: argparse.Namespace, rows: Any, table: Any) -> None:
     from flipproof.animate import MOST_FRAMES, FilmError, check_pace, write_pictures
-    from flipproof.landing.film import draw_landing, film_times, shown
+    from flipproof.landing.throw import draw_landing, film_times, shown
     from flipproof.landing.work import REFERENCE
 
     check_pace(options.slow, options.fps)
     chosen = [row for row in rows if row.program == REFERENCE] or list(rows)
-    bottles = [
-        shown(row.name if row.law is None else f"{row.name}, {row.law}", row.touch, table, row.law, row.outcome)
-        for row in chosen
-    ]
+    bottles = [shown(row, table) for row in chosen]
     times = film_times(bottles, options.slow, options.fps)
     if len(times) > MOST_FRAMES:
         raise FilmError(f"--slow {options.slow:g} makes {len(times)} frames (admissible: at most {MOST_FRAMES})")
@@ -132,8 +129,7 @@ def command_upright(options: argparse.Namespace) -> int:
     """Make the throws of the study that have no row yet, and write its tables and figures."""
     throw = read_scenario(options.scenario, options.slices)
     from flipproof.chapters.landing.study import Size
-    from flipproof.landing.aim import FAMILIES
-    from flipproof.landing.scatter import Scatter
+    from flipproof.landing.design import FAMILIES, Scatter
     from flipproof.landing.upright import make_upright
     from flipproof.sweep.errors import refuse_unknown
     from slicemodel import Table

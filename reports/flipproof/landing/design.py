@@ -1,22 +1,214 @@
-"""Which throws a study makes, as a sweep numbers them: case by case, one row a throw."""
+"""Which throws a study makes: aimed at a landing upright, scattered each by its own seed, and numbered as a sweep does.
+
+Family A throws at the omega_0 given and solves for the height of the table; family B keeps the time of flight and
+solves for omega_0. Between release and touch nothing but its water decides how far a bottle turns: its
+flight has no table and no scatter.
+"""
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
 from itertools import accumulate, groupby
+from statistics import NormalDist
+from types import MappingProxyType
 from typing import Any, Final
 
-from flipproof.landing.aim import Aim
-from flipproof.landing.scatter import Scatter, scattered
-from flipproof.landing.work import LANDING, REFERENCE
+import numpy as np
+
+from flipproof.landing.work import LANDING, REFERENCE, Landed, make_landing
 from flipproof.sweep.axes import Axis, Choices
 from flipproof.sweep.design import Point
 from flipproof.sweep.work import LAND
+from ode_reference import turn
+from slicemodel import Scenario
+from slicemodel.scenario import MOST, _Checks
+
+FAMILIES: Final[Mapping[str, str]] = MappingProxyType({"A": "ω₀ as thrown", "B": "time of flight as thrown"})
+"""Family of throws -> what all its bottles share."""
+
+LONGEST: Final = 2.0
+"""Longest flight of family A [s]."""
+
+FASTEST: Final = 60.0
+"""Largest omega_0 of family B [rad/s]."""
+
+SPARE: Final = 1.0
+"""Time that scattered throws are given beyond the aimed flight [s]."""
+
+Z: Final = 1.959963984540054
+"""Half width of a 95 % interval of the normal distribution, in standard deviations."""
 
 AXES: Final[tuple[Axis, ...]] = (Choices("cell", "whole", ()), Choices("place", "whole", ()))
 """Columns that say which case a row belongs to, and which of its throws it is."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Aim:
+    """A throw and the height of the table [m] on which it touches down at ``time`` [s] with the angle aimed at."""
+
+    throw: Scenario
+    height: float
+    time: float
+
+
+def aimed(throw: Scenario, family: str, offset: float = 0.0) -> Aim:
+    """Return the throw whose lowest rim is at the height of the table ``offset`` [rad] beyond the next upright angle.
+
+    A bottle whose rim turns faster than the bottle falls, omega R > |v_y|, has met such a table a moment before: ice
+    of family A does.
+
+    Raises
+    ------
+    ValueError
+        If no omega_0, or no time, gives that angle; or if the bottle does not turn forwards, or nothing pulls it down.
+    """
+    if family not in FAMILIES:
+        raise ValueError(f"family = {family!r} is unknown (admissible: {', '.join(FAMILIES)})")
+    if throw.gravity <= 0.0:
+        raise ValueError(f"gravity = {throw.gravity:g} m/s^2 is outside (0, inf): nothing lands without it")
+    goal = math.tau * (math.floor(throw.theta0 / math.tau) + 1) + offset
+    if not goal > throw.theta0:
+        raise ValueError(
+            f"offset = {math.degrees(offset):g} degrees aims at {math.degrees(goal):g} degrees, which is not beyond "
+            f"theta0 = {math.degrees(throw.theta0):g} degrees"
+        )
+    return _by_height(throw, goal) if family == "A" else _by_spin(throw, goal)
+
+
+def _by_height(throw: Scenario, goal: float) -> Aim:
+    if not throw.omega0 > 0.0:
+        raise ValueError(f"omega0 = {throw.omega0:g} rad/s is outside (0, inf): the aim is a turn forwards")
+    t, theta, rim = turn(replace(throw, duration=LONGEST), 1e-3)
+    reached = np.flatnonzero(theta >= goal)
+    if not reached.size:
+        raise ValueError(
+            f"theta stays below {math.degrees(theta.max()):.0f} degrees for {LONGEST:g} s at omega0 = {throw.omega0:g} "
+            f"rad/s and fill fraction {throw.fill_fraction:g}; the aim is {math.degrees(goal):.0f} degrees"
+        )
+    k = int(reached[0])
+    share = (goal - theta[k - 1]) / (theta[k] - theta[k - 1])
+    time, height = (float(curve[k - 1] + share * (curve[k] - curve[k - 1])) for curve in (t, rim))
+    return Aim(throw=replace(throw, duration=time + SPARE), height=height, time=time)
+
+
+def _by_spin(throw: Scenario, goal: float) -> Aim:
+    """Halve 24 times the first interval, of a grid of 2 rad/s, in which a throw turns far enough."""
+    slow, farthest = 0.0, -math.inf
+    for fast in np.arange(2.0, FASTEST + 1.0, 2.0).tolist():
+        angle = _end(throw, fast)[0]
+        farthest = max(farthest, angle)
+        if angle >= goal:
+            break
+        slow = fast
+    else:
+        raise ValueError(
+            f"theta({throw.duration:g} s) stays below {math.degrees(farthest):.0f} degrees up to omega0 = {FASTEST:g} "
+            f"rad/s at fill fraction {throw.fill_fraction:g}; the aim is {math.degrees(goal):.0f} degrees"
+        )
+    for _ in range(24):
+        middle = (slow + fast) / 2
+        slow, fast = (slow, middle) if _end(throw, middle)[0] >= goal else (middle, fast)
+    spun = replace(throw, omega0=fast, duration=throw.duration + SPARE)
+    return Aim(throw=spun, height=_end(throw, fast)[1], time=throw.duration)
+
+
+@lru_cache(maxsize=256)
+def _end(throw: Scenario, omega0: float) -> tuple[float, float]:
+    """Return angle [rad] and height of the lowest rim [m] at the end of a flight; the grid's serve every offset."""
+    _, theta, rim = turn(replace(throw, omega0=omega0), throw.duration)
+    return float(theta[-1]), float(rim[-1])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scatter:
+    """Standard deviations of a thrower. None was found measured: they are assumed, and are said beside every share.
+
+    Parameters
+    ----------
+    spin : float - of omega_0, share of itself [1]
+    angle : float - of theta_0 [rad]
+    speed : float - of the upward launch velocity [m/s]
+    """
+
+    spin: float = 0.05
+    angle: float = math.radians(5.0)
+    speed: float = 0.1
+
+    def __post_init__(self) -> None:
+        checks = _Checks("scatter.")
+        for name, unit in (("spin", ""), ("angle", "rad"), ("speed", "m/s")):
+            checks.number(name, getattr(self, name), unit, least=0.0, most=MOST)
+        checks.refuse()
+
+    def times(self, factor: float) -> Scatter:
+        """Return the same, all ``factor`` times as large."""
+        return Scatter(spin=factor * self.spin, angle=factor * self.angle, speed=factor * self.speed)
+
+
+def scattered(throw: Scenario, scatter: Scatter, seed: tuple[int, ...]) -> Scenario:
+    """Return a throw about ``throw`` that depends on nothing but its seed.
+
+    It is made of the raw bits of PCG64, which NumPy promises to keep, and not of its distributions, which it does not.
+
+    Raises
+    ------
+    ScenarioError
+        If no bottle can be thrown so.
+    """
+    bits = np.random.PCG64(np.random.SeedSequence(seed)).random_raw(3) >> np.uint64(11)
+    spin, angle, speed = (NormalDist().inv_cdf((float(b) + 0.5) * 2.0**-53) for b in bits)
+    v_x, v_y = throw.launch_velocity
+    return replace(
+        throw,
+        omega0=throw.omega0 * (1.0 + scatter.spin * spin),
+        theta0=throw.theta0 + scatter.angle * angle,
+        launch_velocity=(v_x, v_y + scatter.speed * speed),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Share:
+    """How many of ``throws`` ended upright, and how many nobody can tell; the 95 % interval counts those both ways."""
+
+    upright: int
+    undecided: int
+    throws: int
+
+    @property
+    def value(self) -> float:
+        """Share of the decided throws that ended upright; NaN if none was decided."""
+        decided = self.throws - self.undecided
+        return self.upright / decided if decided else math.nan
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Wilson's interval, 95 %, with the undecided counted as fallen at its low end and as upright at its high."""
+        if not self.throws:
+            return 0.0, 1.0
+        return wilson(self.upright, self.throws)[0], wilson(self.upright + self.undecided, self.throws)[1]
+
+    def minus(self, other: Share) -> tuple[float, float, float]:
+        """Return the difference of two shares and its 95 % interval (Newcombe's, of two Wilson intervals)."""
+        difference = self.value - other.value
+        (low, high), (other_low, other_high) = self.interval, other.interval
+        return (
+            difference,
+            difference - math.hypot(self.value - low, other_high - other.value),
+            difference + math.hypot(high - self.value, other.value - other_low),
+        )
+
+
+def wilson(count: int, throws: int) -> tuple[float, float]:
+    """Return Wilson's 95 % interval of a share of ``throws``."""
+    share, z = count / throws, Z * Z
+    middle = (share + z / (2 * throws)) / (1 + z / throws)
+    half = Z * math.sqrt(share * (1 - share) / throws + z / (4 * throws * throws)) / (1 + z / throws)
+    # Rounding must not put the ends beyond what is possible.
+    return (0.0 if count == 0 else middle - half), (1.0 if count == throws else middle + half)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,12 +270,9 @@ class Throws:
     @property
     def lines(self) -> tuple[range, ...]:
         """Numbers of the points of each program."""
-        lines, begin = [], 0
-        for _, some in groupby(self.cases, key=lambda case: case.program):
-            end = begin + sum(case.throws for case in some)
-            lines.append(range(begin, end))
-            begin = end
-        return tuple(lines)
+        programs = groupby(self.cases, key=lambda case: case.program)
+        sizes = [sum(case.throws for case in some) for _, some in programs]
+        return tuple(range(end - size, end) for size, end in zip(sizes, accumulate(sizes), strict=True))
 
     def point(self, number: int) -> Point:
         """Return the point of that number in [0, size)."""
@@ -94,6 +283,16 @@ class Throws:
         throw = scattered(case.aim.throw, case.scatter, seed).to_mapping()
         return Point(number, (k, place), throw, LAND, {**case.settings(), "seed": list(seed)})
 
+    def by_case(self, rows: Sequence[Landed]) -> list[list[Landed]]:
+        """Return the rows of all points, in their order, case by case."""
+        return [list(rows[end - case.throws : end]) for case, end in zip(self.cases, self.ends, strict=True)]
+
     def facts(self) -> dict[str, Any]:
         """Return what tells this design from another."""
         return {"study": "landing", "seed": self.seed, "cases": [case.facts() for case in self.cases]}
+
+
+def make_cases(cases: Sequence[Case], seed: int) -> list[list[Landed]]:
+    """Make the throws of some cases in this process, and return their rows, case by case."""
+    design = Throws(cases=tuple(cases), seed=seed, text="")
+    return design.by_case([make_landing(design.point(number)) for number in range(design.size)])

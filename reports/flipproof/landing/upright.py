@@ -13,20 +13,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from flipproof.chapters.landing.figures import figures
-from flipproof.chapters.landing.study import Cases, Found, Rows, Size, aiming, counting, read
-from flipproof.chapters.landing.tables import map_csv, share_line, shares_csv
-from flipproof.landing.design import Case, Throws
-from flipproof.landing.work import LANDING, Landed, make_landing
+from flipproof.chapters.landing.figures import figures, map_csv, share_line, shares_csv
+from flipproof.chapters.landing.study import Cases, Rows, Size, aiming, counting, read
+from flipproof.landing.design import Throws
+from flipproof.landing.work import LANDING, Landed
 from flipproof.output.ownership import MARKER, OutputError, check_own, marker_text
 from flipproof.sweep.command import Begin, completed
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import write_whole
 from flipproof.sweep.salvage import salvage
 from flipproof.sweep.schema import FILE
-from flipproof.sweep.store import Store
 from flipproof.sweep.work import code_identity
 from slicemodel import Scenario
 
@@ -41,16 +39,15 @@ def make_upright(
     begin: Begin,
     say: Callable[[str], None],
     *,
-    jobs: int | None = None,
-    dask: str | None = None,
     export_to: Path | None = None,
     damaged: Path | None = None,
+    **how: Any,
 ) -> str:
     """Make every throw of the study that has no row in ``out``, write tables and figures; return lines that tell them.
 
     Parameters
     ----------
-    jobs, dask, export_to : as for ``flipproof.sweep.command.completed``
+    export_to, how : as for ``flipproof.sweep.command.completed``
     damaged : path or None
         Folder of a damaged study, or a file of it: ``out`` is begun with its whole rows, and only throws that choose an
         aim are made, for without the aims it is not known which throws are counted.
@@ -64,7 +61,7 @@ def make_upright(
         raise SweepError(f"--salvage begins a new study, and {out} holds one; name a new --out, or leave --salvage out")
     files = _whole_files(damaged) if damaged else {}
     _own(out)
-    summaries = []
+    told = []
 
     def designed(wave: str, cases: Cases) -> Throws:
         return Throws(cases=tuple(cases.values()), seed=size.seed, text=f"flipproof upright, {wave}")
@@ -73,16 +70,18 @@ def make_upright(
         design = designed(wave, cases)
         say(f"{wave}: {design.size} throws")
         last = export_to if wave == WAVES[-1] else None
-        with completed(design, out / wave, begin, jobs=jobs, dask=dask, export_to=last) as (store, summary):
-            summaries.append(summary)
-            return read_rows(store, design)
+        with completed(design, out / wave, begin, export_to=last, **how) as (store, summary):
+            told.append(summary)
+            columns = ("number", "status", "message", "reason", "seconds", *LANDING)
+            rows = store.connection.execute(f"SELECT {', '.join(columns)} FROM points ORDER BY number")
+            return design.by_case([Landed(**dict(zip(columns, row, strict=True))) for row in rows])
 
+    aims, unaimed = aiming(throw, size)
+    saved = _saved(files, out, "aims", designed("aims", aims)) if damaged else ""
+    throws = counting(throw, size, aims, make("aims", aims))
     if damaged:
-        aims, _ = aiming(throw, size)
-        saved = _saved(files, out, "aims", designed("aims", aims))
-        throws = counting(throw, size, aims, make("aims", aims))
         return f"{saved}\n{_saved(files, out, 'throws', designed('throws', throws))}"
-    found = drive(throw, size, make)
+    found = read(throw, size, throws, make("throws", throws), unaimed)
     say("figures")
     write_whole(out / "upright.csv", shares_csv(found).encode())
     write_whole(out / "map.csv", map_csv(found).encode())
@@ -91,7 +90,7 @@ def make_upright(
         write_whole(out / f"{exhibit.name}.svg", drawing.svg.encode())
         write_whole(out / f"{exhibit.name}.png", drawing.png)
     lines = [share_line(found, family) for family in size.families]
-    return "\n".join([*lines, f"({found.assumed})", *summaries, f"Tables and figures: {out}"])
+    return "\n".join([*lines, f"({found.assumed})", *told, f"Tables and figures: {out}"])
 
 
 def _whole_files(damaged: Path) -> dict[str, Path]:
@@ -112,27 +111,6 @@ def _saved(files: Mapping[str, Path], out: Path, wave: str, design: Throws) -> s
         return salvage(files[wave], out / wave, design, code_identity())
     except SweepError as error:
         return f"{wave}: {error}"
-
-
-def drive(throw: Scenario, size: Size, make: Callable[[str, Cases], Rows]) -> Found:
-    """Run the study, the throws of each wave made by ``make``."""
-    aims, unaimed = aiming(throw, size)
-    throws = counting(throw, size, aims, make("aims", aims))
-    return read(throw, size, throws, make("throws", throws), unaimed)
-
-
-def make_case(case: Case, seed: int) -> list[Landed]:
-    """Make the throws of one case in this process, numbered as in its own design."""
-    design = Throws(cases=(case,), seed=seed, text="")
-    return [make_landing(design.point(number)) for number in range(design.size)]
-
-
-def read_rows(store: Store, design: Throws) -> list[list[Landed]]:
-    """Return the rows of a complete store, case by case."""
-    columns = ("number", "status", "message", "reason", "seconds", *LANDING)
-    made = store.connection.execute(f"SELECT {', '.join(columns)} FROM points ORDER BY number")
-    rows = [Landed(**dict(zip(columns, row, strict=True))) for row in made]
-    return [rows[end - case.throws : end] for case, end in zip(design.cases, design.ends, strict=True)]
 
 
 def _own(out: Path) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
@@ -67,11 +66,6 @@ class Landed:
         return self.outcome not in (None, "undecided") or self.status == "missed"
 
 
-def make_landings(points: Sequence[Point]) -> list[Landed]:
-    """Make the points of one process."""
-    return [make_landing(point) for point in points]
-
-
 def make_landing(point: Point) -> Landed:
     """Throw and land one bottle; whatever goes wrong becomes its status and reason."""
     settings = point.settings
@@ -120,25 +114,16 @@ def landed(touch: Touch, table: Table, program: str, law: str | None) -> Outcome
     return engine_check.land(touch, table, program, law=law, slices=LANDERS[program].slices[0])
 
 
-def touch_readings(touch: Touch) -> dict[str, Any]:
-    """Return what a row holds of a touch."""
-    scenario = touch.scenario
-    r_cm = float(centre_of_mass(scenario, touch.r))
-    energy, speed = touch_energy(touch, r_cm)
-    margin = float(toppling_angle(scenario, r_cm)) - abs(touch.tilt)
-    numbers = (touch.time, touch.theta, touch.omega, speed, energy / saddle(scenario), margin)
-    return dict(zip(READ, numbers, strict=True))
-
-
 def saddle(scenario: Scenario) -> float:
     """Return E_s = M g sqrt(R^2 + z_rest^2) [J]."""
     rest = scenario.bottle.length - centre_of_mass_at_rest(scenario)
     return scenario.total_mass * scenario.gravity * math.hypot(scenario.bottle.radius, rest)
 
 
-def touch_energy(touch: Touch, r_cm: float) -> tuple[float, float]:
-    """Return the energy over the table of bottle and point slices [J], and how fast their centre falls [m/s]."""
+def touch_readings(touch: Touch) -> dict[str, Any]:
+    """Return what a row holds of a touch: the energy is that of bottle and point slices, over the table."""
     scenario, bottle = touch.scenario, touch.scenario.bottle
+    r_cm = float(centre_of_mass(scenario, touch.r))
     sine, cosine = math.sin(touch.theta), math.cos(touch.theta)
     (v_x, v_y), half = touch.velocity, bottle.length / 2
     middle = half * abs(cosine) + bottle.radius * abs(sine)
@@ -151,4 +136,6 @@ def touch_energy(touch: Touch, r_cm: float) -> tuple[float, float]:
     down = (bottle.mass * v_y + scenario.slice_mass * float(np.sum(water_across * sine - water_along * cosine))) / -(
         scenario.total_mass
     )
-    return kinetic + scenario.total_mass * scenario.gravity * height, down
+    energy = (kinetic + scenario.total_mass * scenario.gravity * height) / saddle(scenario)
+    margin = float(toppling_angle(scenario, r_cm)) - abs(touch.tilt)
+    return dict(zip(READ, (touch.time, touch.theta, touch.omega, down, energy, margin), strict=True))

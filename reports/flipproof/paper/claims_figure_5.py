@@ -9,8 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from flipproof.chapters.errata.erratum import SQUARE
-from flipproof.chapters.errata.programs import exponents_of_cost
+from flipproof.chapters.errata.programs import SQUARE, exponents_of_cost
 from flipproof.frame.solvers import Missing
 from flipproof.paper import observe
 from flipproof.paper.claim import FLAT_WHY, states

@@ -25,7 +25,7 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from flipproof.chapters.maps.figure import CONTOURS, contour_lines, errors, figure_map
+from flipproof.chapters.maps.chapter import CONTOURS, contour_lines, errors, figure_map
 from flipproof.chapters.maps.study import (
     CURVE,
     EXTRA,

@@ -147,9 +147,9 @@ def make_batch(code: str, points: Sequence[Point], keep: bool, curves: int = 0) 
 
 def _made(points: Sequence[Point], keep: bool, curves: int) -> Iterator[Outcome | Landed]:
     if points and points[0].solver == LAND:
-        from flipproof.landing.work import make_landings
+        from flipproof.landing.work import make_landing
 
-        yield from make_landings(points)
+        yield from map(make_landing, points)
         return
     for begin in range(0, len(points), TOGETHER):
         some = points[begin : begin + TOGETHER]

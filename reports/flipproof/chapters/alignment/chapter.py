@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -12,8 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from flipproof.chapters.alignment.study import SHIFT_BAND, Alignment, Table, end_name, study_alignment
-from flipproof.chapters.alignment.tube import Tube, study_tube
+from flipproof.chapters.alignment.study import SHIFT_BAND, Alignment, Table, Tube, end_name, study_alignment, study_tube
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Outcome, Study, attempt, known, observed
 from flipproof.output.columns import rows_csv
@@ -24,30 +22,13 @@ PAIRS: Final = (("eq8", "midpoint"), ("eq8", "free-flight"))
 
 LANES = 0.2, -0.2
 END_COLOURS = {BASE: "#0072B2", CAP: "#E69F00"}
-IMPACTS = {
-    "agrees": ("#444444", 3.5),
-    "shifted": ("#009E73", 5.0),
-    "missing": ("#D1001C", 6.5),
-    "extra": ("#A030C0", 6.5),
-    "after a fork": ("#BBBBBB", 3.5),
-}
-"""Colour and size of every kind of impact."""
+SHIFTED = "#009E73"
+
+Pairs = Mapping[tuple[str, str], tuple[Outcome[Alignment], Outcome[Tube]]]
+"""Every pair aligned, and in its tube."""
 
 
-@dataclass(frozen=True, slots=True)
-class Events:
-    """Every pair aligned, and in its tube."""
-
-    alignments: Mapping[tuple[str, str], Outcome[Alignment]]
-    tubes: Mapping[tuple[str, str], Outcome[Tube]]
-
-    @property
-    def aligned(self) -> dict[tuple[str, str], Alignment]:
-        """The pairs that could be aligned."""
-        return known(self.alignments)
-
-
-def study(ask: Ask) -> Study[Events]:
+def study(ask: Ask) -> Study[Pairs]:
     """Align the impacts of the pairs, and hold their omega in tubes of 2 ms and a hundredth of omega_0."""
     flights = yield [ask.solvers[name] for pair in PAIRS for name in pair]
     dy = 0.01 * abs(ask.throw.omega0)
@@ -55,29 +36,32 @@ def study(ask: Ask) -> Study[Events]:
     def both(pair: tuple[str, str]) -> Any:
         return (flights[ask.solvers[name]].flight for name in pair)
 
-    return Events(
-        {pair: attempt(lambda pair: study_alignment(*both(pair)), pair) for pair in PAIRS},
-        {pair: attempt(lambda pair: study_tube(*both(pair), dt=2e-3, dy=dy), pair) for pair in PAIRS},
-    )
+    return {
+        pair: (
+            attempt(lambda pair: study_alignment(*both(pair)), pair),
+            attempt(lambda pair: study_tube(*both(pair), dt=2e-3, dy=dy), pair),
+        )
+        for pair in PAIRS
+    }
 
 
-def claims(found: Events) -> Claims:
+def claims(found: Pairs) -> Claims:
     """Yield the share of the time that each second curve spends in the tube around the first: early is no failure."""
-    for (first, second), tube in found.tubes.items():
+    for (first, second), (_, tube) in found.items():
         if tube.found is None:
             yield Absent(f"tube-{first}-{second}", f"tube of {first} and {second}", tube.reason, "observation")
         else:
             title = f"{second} in the tube around {first}: share of the time"
             yield observed(f"tube-{first}-{second}", title, tube.found.share, "", tube.found.words)
-    for (first, second), each in found.alignments.items():
-        if each.found is None:
+    for (first, second), (aligned, _) in found.items():
+        if aligned.found is None:
             title = f"alignment of {first} and {second}"
-            yield Absent(f"alignment-{first}-{second}", title, each.reason, "observation")
+            yield Absent(f"alignment-{first}-{second}", title, aligned.reason, "observation")
 
 
-def figures(found: Events) -> Iterator[Exhibit]:
+def figures(found: Pairs) -> Iterator[Exhibit]:
     """Yield contacts and impacts of every pair."""
-    for (first, second), alignment in found.aligned.items():
+    for (first, second), alignment in known({pair: aligned for pair, (aligned, _) in found.items()}).items():
         yield Exhibit(
             name=f"gantt-{first}-{second}",
             title=f"Contacts and impacts: {first} and {second}",
@@ -147,44 +131,40 @@ def figure_gantt(alignment: Alignment) -> Figure:
     return figure
 
 
-def _draw_impacts(axes: Axes, alignment: Alignment, rows: dict[int, int]) -> None:
-    """Mark every impact in its lane, and join the two of a shifted pair."""
-    matched, moved = alignment.matched, alignment.shifted
+def _kinds(alignment: Alignment) -> list[tuple[str, str, float, Table, Table]]:
+    """Return every kind of impact in the order of drawing: its words, colour, size, those of either run or None."""
+    matched, moved, second = alignment.matched, alignment.shifted, alignment.second
     later = matched.copy()
     later.time += alignment.shift
-    for here, there in zip(matched[moved], later[moved], strict=True):
+    return [
+        (f"agrees within {SHIFT_BAND * 1e3:g} ms ({(~moved).sum()})", "#444444", 3.5, matched[~moved], later[~moved]),
+        (f"shifted further ({moved.sum()})", SHIFTED, 5.0, matched[moved], later[moved]),
+        ("after a fork ({} + {})".format(*map(len, alignment.after_fork)), "#BBBBBB", 3.5, *alignment.after_fork),
+        (f"missing in {second} ({len(alignment.missing)})", "#D1001C", 6.5, alignment.missing, None),
+        (f"extra in {second} ({len(alignment.extra)})", "#A030C0", 6.5, None, alignment.extra),
+    ]
+
+
+def _draw_impacts(axes: Axes, alignment: Alignment, rows: dict[int, int]) -> None:
+    """Mark every impact in its lane, and join the two of a shifted pair."""
+    kinds = _kinds(alignment)
+    for here, there in zip(*kinds[1][3:], strict=True):
         if here.slice in rows:
             heights = [rows[here.slice] + lane for lane in LANES]
-            axes.plot((here.time, there.time), heights, color=IMPACTS["shifted"][0], linewidth=0.6, alpha=0.7)
-    for chosen, kind in ((~moved, "agrees"), (moved, "shifted")):
-        _mark(axes, matched[chosen], rows, LANES[0], kind)
-        _mark(axes, later[chosen], rows, LANES[1], kind)
-    for after, lane in zip(alignment.after_fork, LANES, strict=True):
-        _mark(axes, after, rows, lane, "after a fork")
-    _mark(axes, alignment.missing, rows, LANES[0], "missing")
-    _mark(axes, alignment.extra, rows, LANES[1], "extra")
-
-
-def _mark(axes: Axes, impacts: Table, rows: dict[int, int], lane: float, kind: str) -> None:
-    colour, size = IMPACTS[kind]
-    above = 3 if kind == "agrees" else 4
-    for end, marker in ((BASE, "v"), (CAP, "^")):
-        shown = impacts[(impacts.end == end) & np.isin(impacts.slice, list(rows))]
-        heights = [rows[i] + lane for i in shown.slice]
-        edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.3}
-        axes.plot(shown.time, heights, marker, color=colour, markersize=size, zorder=above, **edge)
+            axes.plot((here.time, there.time), heights, color=SHIFTED, linewidth=0.6, alpha=0.7)
+    for k, (_, colour, size, *both) in enumerate(kinds):
+        look: dict[str, Any] = {"color": colour, "markersize": size, "zorder": 4 if k else 3}
+        for impacts, lane in zip(both, LANES, strict=True):
+            for end, marker in ((BASE, "v"), (CAP, "^")) if impacts is not None else ():
+                shown = impacts[(impacts.end == end) & np.isin(impacts.slice, list(rows))]
+                heights = [rows[i] + lane for i in shown.slice]
+                axes.plot(shown.time, heights, marker, markeredgecolor="white", markeredgewidth=0.3, **look)
 
 
 def _gantt_handles(alignment: Alignment) -> list[Patch | Line2D]:
-    labels = (
-        f"agrees within {SHIFT_BAND * 1e3:g} ms ({int((~alignment.shifted).sum())})",
-        f"shifted further ({int(alignment.shifted.sum())})",
-        f"missing in {alignment.second} ({len(alignment.missing)})",
-        f"extra in {alignment.second} ({len(alignment.extra)})",
-        "after a fork ({} + {})".format(*map(len, alignment.after_fork)),
-    )
+    agrees, shifted, forked, missing, extra = _kinds(alignment)
     marks = [("v", "#444444", "impact on the base"), ("^", "#444444", "impact on the cap")]
-    marks += [("o", colour, words) for (colour, _), words in zip(IMPACTS.values(), labels, strict=True)]
+    marks += [("o", colour, words) for words, colour, *_ in (agrees, shifted, missing, extra, forked)]
     return [
         *(Patch(color=colour, label=f"in contact with the {end_name(end)}") for end, colour in END_COLOURS.items()),
         *(Line2D([], [], linestyle="", marker=mark, color=colour, label=words) for mark, colour, words in marks),

@@ -12,17 +12,29 @@ make a plain comparison of keys say more than it knows:
 - Once a slice flies to another end its later keys mean nothing. Where the order of ends of a slice differs, its
   history forks there, and what follows is counted and not aligned. It is no fork, only a missing or an extra impact,
   if leaving that impact out brings all later ones back to within the band.
+
+Beside the impacts stands a tolerance tube in (t, omega): an early bounce stays inside, a wrong level leaves it.
+
+    omega |       ____ upper
+          |  ____/  __
+          |     ___/     lower
+          +-------------------- t
+
+At every time the tube reaches from the smallest to the largest value that the reference takes within dt of it, and
+dy further. A steep flank may so come earlier or later by dt; a level may be off by dy and no more.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections import Counter
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flipproof.chapters.differences.study import first_crossing
 from slicemodel import Impacts, Trajectory
 from slicemodel.trajectory import BASE, FloatArray
 
@@ -122,41 +134,22 @@ class Alignment:
 
 
 def study_alignment(first: Trajectory, second: Trajectory) -> Alignment:
-    """Align the impacts of two runs of one throw.
-
-    Raises
-    ------
-    ValueError
-        If a run has no record of impacts.
-    """
+    """Align the impacts of two runs of one throw, both of which keep a record of them."""
     n_slices = first.scenario.n_slices
     until = float(min(first.t[-1], second.t[-1]))
     (a, all_of_a), (b, all_of_b) = (_fast_impacts(run, until) for run in (first, second))
-    matched: list[tuple[int, int]] = []
-    kept: tuple[list[int], list[int]] = ([], [])
-    single: tuple[list[int], list[int]] = ([], [])
-    after: tuple[list[int], list[int]] = ([], [])
-    forks = []
-    for i in range(n_slices):
-        pairs, both, fork = _align_slice(a, b, i)
-        matched += pairs
-        for side in (0, 1):
-            kept[side].extend(both[side])
-            if fork is None:
-                paired = {pair[side] for pair in pairs}
-                single[side].extend(j for j in both[side] if j not in paired)
-            else:
-                after[side].extend(both[side][len(pairs) :])
-        if fork is not None:
-            forks.append(Fork(a[fork[0]], b[fork[1]]))
-    for table, chosen in zip((a, b), kept, strict=True):
-        _number(table, chosen)
-    of_a, of_b = np.array(matched, dtype=np.int64).reshape(-1, 2).T
+    forks = [fork for i in range(n_slices) if (fork := _align_slice(a, b, i)) is not None]
+    for table in (a, b):
+        seen: Counter[tuple[int, int]] = Counter()
+        for j in np.flatnonzero(table.kept):
+            seen[table.slice[j], table.end[j]] += 1
+            table.k[j] = seen[table.slice[j], table.end[j]]
+    of_a = np.flatnonzero(a.partner >= 0)
     # Simultaneous impacts have no order of their own: they take that of the second run.
-    order = np.lexsort((b.time[of_b], a.time[of_a]))
-    partners, times = a[of_a[order]], b.time[of_b[order]]
+    matched = a[of_a[np.lexsort((b.time[a.partner[of_a]], a.time[of_a]))]]
+    times = b.time[matched.partner]
     back = np.flatnonzero(times[:-1] - times[1:] > SHIFT_BAND)
-    lone = [_at(table, chosen) for table, chosen in zip((a, b), single, strict=True)]
+    lone = [table[table.kept & ~table.after & (table.partner < 0)] for table in (a, b)]
     # The partner of a later one may have been cut off.
     missing, extra = (each[each.time <= until - SHIFT_BAND] for each in lone)
     return Alignment(
@@ -164,98 +157,87 @@ def study_alignment(first: Trajectory, second: Trajectory) -> Alignment:
         second=second.label,
         n_slices=n_slices,
         until=until,
-        matched=partners,
-        shift=times - partners.time,
+        matched=matched,
+        shift=times - matched.time,
         missing=missing,
         extra=extra,
         swapped=np.stack([back, back + 1], axis=1),
         forks=tuple(sorted(forks, key=lambda fork: fork.time)),
-        after_fork=(_at(a, after[0]), _at(b, after[1])),
-        tail=(all_of_a - len(kept[0]), all_of_b - len(kept[1])),
+        after_fork=(a[a.after], b[b.after]),
+        tail=(all_of_a - int(a.kept.sum()), all_of_b - int(b.kept.sum())),
         undecided=sum(map(len, lone)) - len(missing) - len(extra),
         rests=(rest_intervals(first), rest_intervals(second)),
     )
 
 
 def _fast_impacts(run: Trajectory, until: float) -> tuple[Table, int]:
-    """Return the impacts that may be aligned, still without k, and the number of all up to the common end."""
+    """Return the impacts that may be aligned, by time and slice, and the number of all up to the common end.
+
+    Beside the columns of ``Alignment`` a table says which impacts are ``kept``, now those that are fast enough, the
+    place of the ``partner`` in the other table, now none, and which come ``after`` a fork, now none.
+    """
     impacts = run.impacts
-    if impacts is None:
-        raise ValueError(f"{run.label} keeps no record of impacts: compare its paths in a tube instead")
+    assert impacts is not None
     early = impacts.time <= until
-    chosen = early & (impacts.speed_before >= LEAST_SPEED / 2.0)
-    fast = impacts.speed_before[chosen] >= LEAST_SPEED
-    columns = [impacts.time[chosen], impacts.slice[chosen], impacts.end[chosen], np.zeros_like(fast, int), fast]
-    return np.rec.fromarrays(columns, formats="f8,i8,i8,i8,?", names="time,slice,end,k,fast"), int(early.sum())
+    order = np.lexsort((impacts.slice, impacts.time))
+    at = order[(early & (impacts.speed_before >= LEAST_SPEED / 2.0))[order]]
+    fast = impacts.speed_before[at] >= LEAST_SPEED
+    columns = np.broadcast_arrays(impacts.time[at], impacts.slice[at], impacts.end[at], 0, fast, -1, False)
+    names = "time,slice,end,k,kept,partner,after"
+    return np.rec.fromarrays(columns, formats="f8,i8,i8,i8,?,i8,?", names=names), int(early.sum())
 
 
-def _number(table: Table, kept: Sequence[int]) -> None:
-    """Give the impacts that were kept their numbers, slice by slice and end by end."""
-    seen: dict[tuple[int, int], int] = {}
-    for i in sorted(kept):
-        key = int(table.slice[i]), int(table.end[i])
-        table.k[i] = seen[key] = seen.get(key, 0) + 1
-
-
-def _at(table: Table, chosen: Sequence[int]) -> Table:
-    """Return the chosen impacts in order of time."""
-    index = np.asarray(chosen, dtype=np.int64)
-    return table[index[np.argsort(table.time[index], kind="stable")]]
-
-
-def _align_slice(
-    a: Table, b: Table, i: int
-) -> tuple[list[tuple[int, int]], tuple[list[int], list[int]], tuple[int, int] | None]:
-    """Return pairs of indices of one slice's impacts, all that are kept of each run, and the two at a fork."""
+def _align_slice(a: Table, b: Table, i: int) -> Fork | None:
+    """Mark in both tables the impacts of a slice that are kept, their partners and what follows a fork; return that."""
     mine, its = np.flatnonzero(a.slice == i), np.flatnonzero(b.slice == i)
-    pairs = []
-    for end in (BASE, -BASE):
-        pairs += _pairs(a.time, b.time, mine[a.end[mine] == end], its[b.end[its] == end])
-    pairs = [(j, k) for j, k in pairs if a.fast[j] or b.fast[k]]
-    paired: tuple[set[int], set[int]] = ({j for j, _ in pairs}, {k for _, k in pairs})
-    kept = (
-        [int(j) for j in mine if a.fast[j] or int(j) in paired[0]],
-        [int(k) for k in its if b.fast[k] or int(k) in paired[1]],
-    )
-    fork = next(((j, k) for j, k in zip(*kept, strict=False) if a.end[j] != b.end[k]), None)
-    if fork is not None:
-        since = min(a.time[fork[0]], b.time[fork[1]])
-        later = [abs(b.time[k] - a.time[j]) for j, k in pairs if max(a.time[j], b.time[k]) >= since]
-        if not later or max(later) > SHIFT_BAND:
-            place = kept[0].index(fork[0])
-            return list(zip(kept[0][:place], kept[1][:place], strict=True)), kept, fork
-    return pairs, kept, None
+    of_ends = [_pairs(a.time, b.time, mine[a.end[mine] == end], its[b.end[its] == end]) for end in (BASE, -BASE)]
+    j, k = np.concatenate(of_ends, axis=1)
+    fast = a.kept[j] | b.kept[k]
+    j, k = j[fast], k[fast]
+    a.kept[j] = b.kept[k] = True
+    mine, its = mine[a.kept[mine]], its[b.kept[its]]
+    ends = zip(a.end[mine], b.end[its], strict=False)
+    place = next((place for place, (here, there) in enumerate(ends) if here != there), None)
+    if place is not None:
+        fork = Fork(a[mine[place]], b[its[place]])
+        later = np.maximum(a.time[j], b.time[k]) >= fork.time
+        if not later.any() or np.abs(b.time[k] - a.time[j])[later].max() > SHIFT_BAND:
+            a.partner[mine[:place]], b.partner[its[:place]] = its[:place], mine[:place]
+            a.after[mine[place:]] = b.after[its[place:]] = True
+            return fork
+    a.partner[j], b.partner[k] = k, j
+    return None
 
 
-def _pairs(first: FloatArray, second: FloatArray, mine: IndexArray, its: IndexArray) -> list[tuple[int, int]]:
-    """Match k with k, or leave out other impacts if then more agree within the band; return pairs of indices."""
-    by_number = [(int(j), int(k)) for j, k in zip(mine, its, strict=False)]
+def _pairs(first: FloatArray, second: FloatArray, mine: IndexArray, its: IndexArray) -> IndexArray:
+    """Match k with k, or leave out other impacts if then more agree within the band; return indices, shape (2, K)."""
+    few = min(len(mine), len(its))
+    by_number = np.stack([mine[:few], its[:few]])
     if len(mine) == len(its):
         return by_number
     by_time = _closest(first, second, mine, its)
-    agreeing = [sum(abs(second[k] - first[j]) <= SHIFT_BAND for j, k in pairs) for pairs in (by_number, by_time)]
+    agreeing = [(np.abs(second[k] - first[j]) <= SHIFT_BAND).sum() for j, k in (by_number, by_time)]
     return by_time if agreeing[1] > agreeing[0] else by_number
 
 
-def _closest(first: FloatArray, second: FloatArray, mine: IndexArray, its: IndexArray) -> list[tuple[int, int]]:
-    """Match as many as possible in order, with the smallest sum of shifts; return pairs of indices."""
+def _closest(first: FloatArray, second: FloatArray, mine: IndexArray, its: IndexArray) -> IndexArray:
+    """Match as many as possible in order, with the smallest sum of shifts; return indices, shape (2, K)."""
     if len(mine) > len(its):
-        return [(j, k) for k, j in _closest(second, first, its, mine)]
-    few, many = len(mine), len(its)
+        return _closest(second, first, its, mine)[::-1]
     shift = np.abs(second[its][np.newaxis, :] - first[mine][:, np.newaxis])
     # best[i, j]: smallest sum for the first i of mine among the first j of its
-    best = np.full((few + 1, many + 1), np.inf)
+    best = np.full((len(mine) + 1, len(its) + 1), np.inf)
     best[0] = 0.0
-    for i in range(few):
+    for i in range(len(mine)):
         best[i + 1, 1:] = np.minimum.accumulate(best[i, :-1] + shift[i])
-    pairs = []
-    j = many
-    for i in range(few, 0, -1):
+    chosen = []
+    j = len(its)
+    for i in range(len(mine), 0, -1):
         while best[i, j - 1] <= best[i, j]:
             j -= 1
-        pairs.append((int(mine[i - 1]), int(its[j - 1])))
         j -= 1
-    return pairs[::-1]
+        chosen.append(j)
+    return np.stack([mine, its[chosen[::-1]]])
 
 
 def rest_intervals(run: Trajectory) -> Table:
@@ -276,6 +258,69 @@ def rest_intervals(run: Trajectory) -> Table:
     slices, ends, start, stop = np.concatenate(found, axis=1)
     columns = [slices, ends, run.t[start], run.t[stop]]
     return np.rec.fromarrays(columns, formats="i8,i8,f8,f8", names="slice,end,start,stop")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tube:
+    """A run held against the tube around a reference: the share of the reference's time at which it is inside.
+
+    It leaves the tube first at ``first_exit`` [s], None if it never does, and is at most ``largest`` outside [rad/s].
+    """
+
+    share: float
+    first_exit: float | None
+    largest: float
+    words: str
+
+
+def study_tube(reference: Trajectory, run: Trajectory, *, dt: float, dy: float) -> Tube:
+    """Hold the omega of a run against the tube around that of the reference, both linear between their points.
+
+    Time grids and lengths may differ; ``dt`` [s] and ``dy`` [rad/s] are not negative.
+    """
+    times = reference.t
+    marks = np.concatenate([times, run.t, times - dt, times + dt])
+    t = np.unique(marks[(marks >= times[0]) & (marks <= times[-1])])
+    lower, upper = tube_around(times, reference.omega, t, dt, dy)
+    value = np.interp(t, run.t, run.omega, left=math.nan, right=math.nan)
+    outside = np.maximum(value - upper, lower - value)
+    outside[np.isnan(outside)] = np.inf  # where the run does not exist
+    inside = outside <= 0.0
+    held = np.diff(t) * (inside[:-1] & inside[1:]) + np.diff(t) * (inside[:-1] ^ inside[1:]) / 2
+    share = float(held.sum() / (t[-1] - t[0])) if len(t) > 1 else float(inside[0])
+    first_exit = first_crossing(t, outside, 0.0)
+    largest = float(np.maximum(outside[(t >= run.t[0]) & (t <= run.t[-1])], 0.0).max(initial=0.0))
+    tube = f"the tube of ±{dt * 1e3:g} ms and ±{dy:.3g} around {reference.label} in omega"
+    if first_exit is None:
+        words = f"{run.label} stays in {tube}"
+    else:
+        words = f"{run.label} leaves {tube} at {first_exit * 1e3:.1f} ms, "
+        words += f"is inside for {share:.1%} of the time and at most {largest:.3g} outside"
+        words += f"; it ends at {run.t[-1] * 1e3:.1f} ms" if run.t[-1] < times[-1] else ""
+    return Tube(share=share, first_exit=first_exit, largest=largest, words=words)
+
+
+def tube_around(
+    times: FloatArray, values: FloatArray, at: FloatArray, dt: float, dy: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return lower and upper bound of the tube at the times ``at``.
+
+    The reference is linear between its points, so over [t - dt, t + dt] it is extreme at a point within or at an end
+    of that interval; both are taken, and the bounds are exact. Beyond its ends the reference has no values.
+    """
+    left, right = np.maximum(at - dt, times[0]), np.minimum(at + dt, times[-1])
+    edges = np.interp(np.stack([left, right]), times, values)
+    start, stop = np.searchsorted(times, left), np.searchsorted(times, right, side="right")
+    some = stop > start
+    bounds = []
+    for extreme, sign in ((np.minimum, -1.0), (np.maximum, 1.0)):
+        bound = extreme(edges[0], edges[1])
+        # One more value lets reduceat take the interval that ends with the last point.
+        windows = np.stack([start[some], stop[some]], axis=1).ravel()
+        within = extreme.reduceat(np.append(values, values[-1]), windows)[::2]
+        bound[some] = extreme(bound[some], within)
+        bounds.append(bound + sign * dy)
+    return bounds[0], bounds[1]
 
 
 def count_key(impacts: Impacts, index: int, least_speed: float = 0.0) -> int:

@@ -1,7 +1,8 @@
 """Engine behaviour that a user may not expect: each fact measured anew with every report, and where it must lie.
 
-Some facts need the bottle: they are runs. The others are measured in worlds of one or two bodies (``worlds``), because
-in the bottle other settings hide them: ``engine_check`` has chosen its knobs so that they cannot bite.
+Some facts need the bottle: they are runs. The others are measured in the smallest worlds, of one or two bodies, because
+in the bottle other settings hide them: ``engine_check`` has chosen its knobs so that they cannot bite. In these worlds
+x points to the right and y up; the engines are imported where a world is built.
 """
 
 from __future__ import annotations
@@ -10,16 +11,16 @@ import math
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from flipproof.chapters.differences.study import claim_change, largest_change
-from flipproof.chapters.engine_facts import worlds
 from flipproof.chapters.solvers import ENGINE
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged
 from flipproof.frame.findings import finite_or_none, regression
 from flipproof.frame.solvers import without_gravity
 from flipproof.output.columns import rows_csv
@@ -33,23 +34,21 @@ SHUFFLES: Final = (1, 2, 3)
 FEW, MANY = 25, 100
 """Seeds of the order of insertion, and iterations at which they are compared."""
 
-Measured = Callable[[Mapping[str, Made]], tuple[float, str]]
-"""The runs by what is said of each -> the number that shows a fact, and how it was measured."""
-
 
 @dataclass(frozen=True, slots=True)
 class EngineFact:
     """One fact about an engine; its stable ``id`` is a key of ``WORDS``.
 
-    It holds if the number that ``measure`` returns lies in the closed interval ``admissible``, in ``unit``. That raises
-    LookupError, with the reason, if a run that it needs is not whole.
+    It holds if the number that ``measure`` returns lies in the closed interval ``admissible``, in ``unit``. Of the runs
+    by what is said of each it returns that number and how it was measured, and raises LookupError, with the reason, if
+    a run that it needs is not whole.
     """
 
     engine: str
     id: str
     unit: str
     admissible: tuple[float, float]
-    measure: Measured
+    measure: Callable[[Mapping[str, Made]], tuple[float, str]]
 
     def found(self, made: Mapping[str, Made]) -> Finding:
         """Return the finding: that the number lies in its interval, or why there is none.
@@ -76,19 +75,16 @@ def plan_engine_facts(throw: Scenario) -> dict[str, Run]:
     """
     few = replace(throw.with_slices(10), duration=min(0.2, throw.duration))
     usual: dict[str, Any] = {"dt": 2e-4, "iterations": 100, "times": np.linspace(0.0, few.duration, 201)}
-    changes: dict[str, dict[str, Any]] = {"usual": {}, "no gravity": {}}
-    for dt in (LONG_DT, SHORT_DT):
-        changes[f"few iterations, dt {dt:g} s"] = {"dt": dt, "iterations": FEW_ITERATIONS}
-    for iterations in (FEW, MANY):
-        for seed in (0, *SHUFFLES):
-            changes[f"order {seed}, {iterations} iterations"] = {"iterations": iterations, "shuffle": seed}
-    # Unless told otherwise a joint removes a tenth of the error at each of 60 steps a second.
-    changes["joints corrected as by default"] = {"error_bias": (1.0 - 0.1) ** 60}
-    throws = dict.fromkeys(changes, few) | {"no gravity": without_gravity(few)}
-    return {
-        words: Run("pymunk", throws[words], usual | change, f"engine fact, {words}")
-        for words, change in changes.items()
+    changes: dict[str, dict[str, Any]] = {
+        "usual": {},
+        "no gravity": {},
+        **{f"few iterations, dt {dt:g} s": {"dt": dt, "iterations": FEW_ITERATIONS} for dt in (LONG_DT, SHORT_DT)},
+        **{f"order {k}, {n} iterations": {"iterations": n, "shuffle": k} for n in (FEW, MANY) for k in (0, *SHUFFLES)},
+        # Unless told otherwise a joint removes a tenth of the error at each of 60 steps a second.
+        "joints corrected as by default": {"error_bias": (1.0 - 0.1) ** 60},
     }
+    throws = dict.fromkeys(changes, few) | {"no gravity": without_gravity(few)}
+    return {words: Run("pymunk", throws[words], usual | changes[words], f"engine fact, {words}") for words in changes}
 
 
 def _gravity(made: Mapping[str, Made]) -> tuple[float, str]:
@@ -132,21 +128,142 @@ def _joints(made: Mapping[str, Made]) -> tuple[float, str]:
     return float(default), f"{ours:.1e} with errors removed within one step"
 
 
+def _disc(space: Any, at: tuple[float, float], velocity: tuple[float, float], radius: float, elastic: float) -> Any:
+    """Add a disc of 1 kg that does not turn to a pymunk space; return its body."""
+    pymunk = import_module("pymunk")
+    body = pymunk.Body(1.0, math.inf)
+    body.position, body.velocity = at, velocity
+    disc = pymunk.Circle(body, radius)
+    disc.elasticity = elastic
+    space.add(body, disc)
+    return body
+
+
+def rebound_of_two(first: float, second: float) -> float:
+    """Return the speed of separation over the speed of approach of two discs with these elasticities."""
+    pymunk = import_module("pymunk")
+    space = pymunk.Space()
+    left = _disc(space, (-0.2, 0.0), (1.0, 0.0), 0.1, first)
+    right = _disc(space, (0.2, 0.0), (-1.0, 0.0), 0.1, second)
+    for _ in range(200):
+        space.step(1e-3)
+    return float(right.velocity.x - left.velocity.x) / 2.0
+
+
+def groove_end(_: object) -> tuple[float, str]:
+    """Return the largest speed back, over the speed before, of a mass that runs into the end of its groove; and how."""
+    pymunk = import_module("pymunk")
+    space = pymunk.Space()
+    body = _disc(space, (0.5, 0.0), (1.0, 0.0), 0.01, 1.0)
+    space.add(pymunk.GrooveJoint(space.static_body, body, (0.0, 0.0), (1.0, 0.0), (0.0, 0.0)))
+    back = 0.0
+    for _ in range(1000):
+        space.step(1e-3)
+        back = max(back, -float(body.velocity.x))
+    if not abs(body.position.x - 1.0) < 1e-3:
+        raise LookupError(f"the mass is at {body.position.x:.3g} m, not at the groove's end")
+    note = "one mass with elasticity 1 in a groove; the set-up check refuses a groove that ends inside the bottle"
+    return back, note
+
+
+def stagger(_: object) -> tuple[float, str]:
+    """Return by how many steps the engine's velocity is ahead of its position, in free fall; and how that is measured.
+
+    The slope of the positions at t_n is (x_n+1 - x_n-1) / 2 dt, exact for a parabola; the engine's velocity is larger
+    by g times the time it is ahead.
+    """
+    pymunk = import_module("pymunk")
+    dt, weight = 1e-3, -9.81
+    space = pymunk.Space()
+    space.gravity = (0.0, weight)
+    body = _disc(space, (0.0, 0.0), (0.0, 0.0), 0.1, 0.0)
+    height, speed = [], []
+    for _ in range(11):
+        space.step(dt)
+        height.append(float(body.position.y))
+        speed.append(float(body.velocity.y))
+    slope = (height[6] - height[4]) / (2.0 * dt)
+    ahead = (speed[5] - slope) / (weight * dt)
+    return ahead, "free fall: velocity against the slope of the positions; positive is ahead"
+
+
+def depth_left(slop: float | None) -> tuple[float, float]:
+    """Return ``collision_slop`` and how deep a disc lies in the floor it was dropped on [m]; None: as by default."""
+    pymunk = import_module("pymunk")
+    space = pymunk.Space()
+    space.gravity = (0.0, -9.81)
+    if slop is not None:
+        space.collision_slop = slop
+    space.add(pymunk.Segment(space.static_body, (-1.0, -0.1), (1.0, -0.1), 0.1))
+    body = _disc(space, (0.0, 0.05), (0.0, -2.0), 0.02, 0.0)
+    for _ in range(200):
+        space.step(1e-2)
+    return float(space.collision_slop), 0.02 - float(body.position.y)
+
+
+def speed_through_wall(dt: float) -> float:
+    """Return the speed along the way over the speed before, of a disc thrown at an elastic wall 1 cm thick."""
+    pymunk = import_module("pymunk")
+    space = pymunk.Space()
+    wall = pymunk.Segment(space.static_body, (0.0, -1.0), (0.0, 1.0), 0.005)
+    wall.elasticity = 1.0
+    space.add(wall)
+    body = _disc(space, (-1.03, 0.0), (5.0, 0.0), 0.005, 1.0)
+    for _ in range(round(0.5 / dt)):
+        space.step(dt)
+    return float(body.velocity.x) / 5.0
+
+
+def soft_limit(_: object) -> tuple[float, str]:
+    """Return speed back over speed before of a mass at MuJoCo's joint limit; and how far it goes beyond, in words."""
+    xml = (
+        '<mujoco><option gravity="0 0 0" timestep="1e-4"/><worldbody><body>'
+        '<joint type="slide" axis="1 0 0" limited="true" range="-1 0.1"/>'
+        '<geom size="0.01" mass="1" contype="0" conaffinity="0"/></body></worldbody></mujoco>'
+    )
+    path = list(_mujoco_path(xml, speed=1.0, duration=0.5))
+    beyond = max(x for x, _ in path) - 0.1
+    return -min(v for _, v in path), f"hit at 1 m/s; the mass goes {beyond * 1e3:.1f} mm beyond the limit first"
+
+
+def soft_contact(_: object) -> tuple[float, str]:
+    """Return how deep a ball of 1 kg lies in MuJoCo's floor at rest [mm]; and how deep after landing, in words."""
+    xml = (
+        '<mujoco><option timestep="1e-4"/><worldbody><geom type="plane" size="1 1 0.1"/>'
+        '<body pos="0 0 0.02"><joint type="slide" axis="0 0 1"/><geom size="0.02" mass="1"/></body>'
+        "</worldbody></mujoco>"
+    )
+    path = list(_mujoco_path(xml, speed=-1.0, duration=1.0))
+    deepest = -min(x for x, _ in path)
+    return -path[-1][0] * 1e3, f"1 kg at rest under its weight; {deepest * 1e3:.1f} mm when it lands at 1 m/s"
+
+
+def _mujoco_path(xml: str, *, speed: float, duration: float) -> Iterator[tuple[float, float]]:
+    """Yield position and velocity of a model with one joint, step by step; ``speed`` is its velocity at the start."""
+    mujoco = import_module("mujoco")
+    model = mujoco.MjModel.from_xml_string(xml)
+    data = mujoco.MjData(model)
+    data.qvel[0] = speed
+    for _ in range(round(duration / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+        yield float(data.qpos[0]), float(data.qvel[0])
+
+
 def _elasticity(_: Mapping[str, Made]) -> tuple[float, str]:
-    others = ", ".join(f"{a:g} and {b:g} give {worlds.rebound_of_two(a, b):.2f}" for a, b in ((1.0, 0.5), (0.0, 1.0)))
-    return worlds.rebound_of_two(0.5, 0.5), others
+    others = ", ".join(f"{a:g} and {b:g} give {rebound_of_two(a, b):.2f}" for a, b in ((1.0, 0.5), (0.0, 1.0)))
+    return rebound_of_two(0.5, 0.5), others
 
 
 def _slop(_: Mapping[str, Made]) -> tuple[float, str]:
-    (default, left), without = worlds.depth_left(None), worlds.depth_left(0.0)[1]
+    (default, left), without = depth_left(None), depth_left(0.0)[1]
     dropped = f"a disc dropped at 2 m/s (Δt = 10 ms) stays {left * 1e3:.1f} mm deep in the floor"
     return default, f"{dropped}, {without * 1e3:.1g} mm with slop 0"
 
 
 def _tunnel(_: Mapping[str, Made]) -> tuple[float, str]:
-    back = worlds.speed_through_wall(1e-3)
+    back = speed_through_wall(1e-3)
     note = f"5 m/s and a wall of 10 mm at Δt = 10 ms; at 1 ms it comes back, {back:.3g}"
-    return worlds.speed_through_wall(1e-2), note
+    return speed_through_wall(1e-2), note
 
 
 WORDS: Final = {
@@ -174,12 +291,12 @@ FACTS: Final = (
     EngineFact("pymunk", "order-forgotten", "", (0.0, 0.1), _order_forgotten),
     EngineFact("pymunk", "joints", "of L", (1e-5, 1e-2), _joints),
     EngineFact("pymunk", "elasticity", "", (0.249, 0.251), _elasticity),
-    EngineFact("pymunk", "groove-end", "", (0.0, 1e-3), worlds.groove_end),
-    EngineFact("pymunk", "stagger", "steps", (0.49, 0.51), worlds.stagger),
+    EngineFact("pymunk", "groove-end", "", (0.0, 1e-3), groove_end),
+    EngineFact("pymunk", "stagger", "steps", (0.49, 0.51), stagger),
     EngineFact("pymunk", "slop", "m", (0.099, 0.101), _slop),
     EngineFact("pymunk", "tunnel", "", (0.99, 1.01), _tunnel),
-    EngineFact("mujoco", "mujoco-limit", "", (0.0, 0.3), worlds.soft_limit),
-    EngineFact("mujoco", "mujoco-contact", "mm", (0.01, 10.0), worlds.soft_contact),
+    EngineFact("mujoco", "mujoco-limit", "", (0.0, 0.3), soft_limit),
+    EngineFact("mujoco", "mujoco-contact", "mm", (0.01, 10.0), soft_contact),
 )
 """Every fact, in the order of the table."""
 
@@ -188,32 +305,28 @@ CHECK_DT: Final = 4e-4
 """Step of the engine where two of its runs are compared with one another [s]."""
 
 
-@dataclass(frozen=True, slots=True)
-class EngineFacts:
-    """The facts, and the engine's free flight of the paper's own throw with gravity and without."""
-
-    facts: tuple[Finding, ...]
-    usual: Made
-    weightless: Made
+EngineFacts = tuple[Finding | Absent, tuple[Finding, ...]]
+"""Whether gravity cancels in the engine's free flight of the paper's own throw, and the facts."""
 
 
 def study(ask: Ask) -> Study[EngineFacts]:
     """Measure every fact."""
     runs = plan_engine_facts(ask.reference)
-    usual, weightless = (
+    both = [
         Run(ENGINE, throw, {"dt": CHECK_DT}, f"{ENGINE}, g = {throw.gravity:g} m/s²")
         for throw in (ask.reference, without_gravity(ask.reference))
-    )
-    flights = yield [*runs.values(), usual, weightless]
+    ]
+    flights = yield [*runs.values(), *both]
     made = {words: flights[run] for words, run in runs.items()}
-    return EngineFacts(tuple(fact.found(made) for fact in FACTS), flights[usual], flights[weightless])
+    title = f"{ENGINE}: free flight is the same with g = 0"
+    gravity = judged(claim_gravity_cancels, *(flights[run] for run in both), id="engine-gravity", title=title)
+    return gravity, tuple(fact.found(made) for fact in FACTS)
 
 
 def claims(found: EngineFacts) -> Claims:
     """Yield that gravity cancels, and every fact."""
-    title = f"{ENGINE}: free flight is the same with g = 0"
-    yield judged(claim_gravity_cancels, found.usual, found.weightless, id="engine-gravity", title=title)
-    yield from found.facts
+    gravity, facts = found
+    yield from (gravity, *facts)
 
 
 def claim_gravity_cancels(with_gravity: Trajectory, without: Trajectory) -> Finding:
@@ -226,7 +339,7 @@ def claim_gravity_cancels(with_gravity: Trajectory, without: Trajectory) -> Find
 
 def figures(found: EngineFacts) -> Iterator[Exhibit]:
     """Yield the table of facts, each with its number and threshold in the unit of its row."""
-    findings, engines = found.facts, [fact.engine for fact in FACTS]
+    _, findings = found
     words = " ".join(
         f"{finding.title}: {finding.value_text}, threshold {finding.threshold_text}, {finding.verdict}."
         for finding in findings
@@ -234,8 +347,8 @@ def figures(found: EngineFacts) -> Iterator[Exhibit]:
     held = sum(finding.verdict == "pass" for finding in findings)
     unit = "[unit of the row]"
     rows = [
-        (engine, f.title, f.value, f.unit or "1", *map(finite_or_none, f.admissible), f.verdict)
-        for f, engine in zip(findings, engines, strict=True)
+        (fact.engine, f.title, f.value, f.unit or "1", *map(finite_or_none, f.admissible), f.verdict)
+        for fact, f in zip(FACTS, findings, strict=True)
     ]
     yield Exhibit(
         name="engine-facts",
@@ -245,7 +358,7 @@ def figures(found: EngineFacts) -> Iterator[Exhibit]:
         "a result unnoticed; how each was measured stands with the findings.",
         alt=f"Table of facts about the engines. {words}".replace("ω₀", "omega_0"),
         maker=figure_gallery,
-        data=(findings, engines),
+        data=(findings,),
         table=rows_csv(
             ("engine", "fact", f"number {unit}", "unit", f"at least {unit}", f"at most {unit}", "verdict"), rows
         ),
@@ -253,8 +366,8 @@ def figures(found: EngineFacts) -> Iterator[Exhibit]:
 
 
 @styled
-def figure_gallery(findings: Sequence[Finding], engines: Sequence[str]) -> Figure:
-    """Table of facts: engine, fact, number, threshold, sign; ``engines`` names the engine of each finding."""
+def figure_gallery(findings: Sequence[Finding]) -> Figure:
+    """Table of the findings of ``FACTS``: engine, fact, number, threshold, sign."""
     columns = {"engine": 0.0, "fact": 0.1, "number": 0.66, "threshold": 0.8, "": 0.955}
     signs = {"pass": ("✓", "#0B6E4F"), "fail": ("✗", "#B00020")}
     texts = [textwrap.wrap(finding.title, 66) for finding in findings]
@@ -265,10 +378,10 @@ def figure_gallery(findings: Sequence[Finding], engines: Sequence[str]) -> Figur
     for heading, x in columns.items():
         axes.text(x, 0.9, heading, fontsize=9, fontweight="bold", va="center")
     top = 1.5
-    for finding, engine, text in zip(findings, engines, texts, strict=True):
+    for fact, finding, text in zip(FACTS, findings, texts, strict=True):
         axes.axhline(top, color="#cccccc", linewidth=0.8)
         middle = top + 0.3 + len(text) / 2
-        cells = (engine, "\n".join(text), finding.value_text, finding.threshold_text)
+        cells = (fact.engine, "\n".join(text), finding.value_text, finding.threshold_text)
         for x, cell in zip(columns.values(), cells, strict=False):
             axes.text(x, middle, cell, fontsize=8.5, va="center", linespacing=1.25, color="black")
         sign, colour = signs.get(finding.verdict, ("–", "#666666"))

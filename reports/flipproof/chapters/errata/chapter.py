@@ -6,14 +6,14 @@ would lie in if the print were right.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Final
+from typing import Final, cast
 
 from flipproof.chapters.errata import equations, programs
-from flipproof.chapters.errata.erratum import ROUND_OFF, Erratum
-from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Study, observed
+from flipproof.chapters.errata.equations import ROUND_OFF, Erratum
+from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Study, attempt, observed
+from flipproof.frame.findings import finite_or_none
 from slicemodel import Scenario
 
 AUDIT: Final[Mapping[str, Callable[[Scenario], Erratum]]] = {
@@ -42,31 +42,23 @@ def study(ask: Ask) -> Study[Mapping[str, Erratum]]:
     """Have a worker audit the paper on the throw."""
     audit = Call(study_errata, (ask.throw,), "errata")
     flights = yield [audit]
-    errata: Mapping[str, Erratum] = flights.answer(audit)
-    return errata
+    return cast(Mapping[str, Erratum], flights.answer(audit))
 
 
 def study_errata(throw: Scenario) -> dict[str, Erratum]:
     """Return the audit; an item that cannot be computed has the value NaN and says why."""
-    return {id_: audited(item, throw) for id_, item in AUDIT.items()}
-
-
-def audited(item: Callable[[Scenario], Erratum], throw: Scenario) -> Erratum:
-    """Return an item of the audit, or why it cannot be computed."""
-    try:
-        return item(throw)
-    except (ValueError, ArithmeticError, RuntimeError) as error:
-        return Erratum(note=f"{type(error).__name__}: {error}")
+    found = {id_: attempt(item, throw) for id_, item in AUDIT.items()}
+    return {id_: each.found or Erratum(note=each.reason) for id_, each in found.items()}
 
 
 def claims(found: Mapping[str, Erratum]) -> Claims:
     """Yield what the paper prints against what follows from its own earlier equations."""
     for id_, erratum in found.items():
-        value = erratum.value if math.isfinite(erratum.value) else None
+        value = finite_or_none(erratum.number.value)
         band = None if value is None else abs(value) * (ROUND_OFF[1] - 1.0)
         note = f"prints {erratum.prints}; follows {erratum.follows}" + (f"; {erratum.note}" if erratum.note else "")
         title = f"{erratum.place}: {erratum.verdict}"
-        yield observed(f"erratum-{id_}", title, value, erratum.unit, note, band=band)
+        yield observed(f"erratum-{id_}", title, value, erratum.number.unit, note, band=band)
 
 
 CHAPTER: Final = Chapter("errata", "Errata", study, claims, work={"check": None, "quick": None, "full": None})

@@ -1,4 +1,4 @@
-"""Errata of the equations: Eq. 4, 8, 9 and 11e, and a unit.
+"""What an erratum is, and those of the equations: Eq. 4, 8, 9 and 11e, and a unit.
 
 Eq. 9c, 9d and 11e are written here once more, exactly as typeset: they are the subject of the audit and must not come
 from a scheme that has mended them.
@@ -7,15 +7,57 @@ from a scheme that has mended them.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from flipproof.chapters.differences.study import largest_change
-from flipproof.chapters.errata.erratum import ROUND_OFF, Erratum
 from flipproof.frame.solvers import solve
 from slicemodel import Scenario
 from slicemodel.observables import initial_moment_of_inertia
+
+ROUND_OFF: Final = (1.0 - 1e-6, 1.0 + 1e-6)
+"""A quotient that should be 1, with room for a finite difference."""
+
+
+class Number(NamedTuple):
+    """The number that separates print and truth; it lies in ``admissible``, ends included, if the print is right."""
+
+    value: float
+    unit: str
+    admissible: tuple[float, float]
+
+
+UNKNOWN: Final = Number(math.nan, "", (0.0, 0.0))
+"""The number of an item that could not be computed."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Erratum:
+    """One item of the audit.
+
+    Parameters
+    ----------
+    place : str - equation, section or file of the paper
+    prints, follows : str - what stands there; what its own earlier equations demand
+    number : Number - what separates the two
+    note : str - further numbers
+    """
+
+    place: str = ""
+    prints: str = ""
+    follows: str = ""
+    number: Number = UNKNOWN
+    note: str = ""
+
+    @property
+    def verdict(self) -> Literal["erratum", "as printed", "not evaluated"]:
+        """Return the verdict; NaN decides nothing."""
+        if not math.isfinite(self.number.value):
+            return "not evaluated"
+        low, high = self.number.admissible
+        return "as printed" if low <= self.number.value <= high else "erratum"
 
 
 def printed_9c(x: float, v: float, gamma: float, omega: float, t: float) -> float:
@@ -50,9 +92,7 @@ def erratum_roots(throw: Scenario) -> Erratum:
         place="Eq. 9a, 9b, 9c",
         prints="exponents −γ ± ω, for γ ≪ ω",
         follows="Eq. 8: exponents −γ ± √(ω² + γ²)",
-        value=residual_9a(gamma, slowest),
-        unit="of ω²X left over",
-        admissible=(0.0, 0.1**2),  # γ ≪ ω: at most a tenth
+        number=Number(residual_9a(gamma, slowest), "of ω²X left over", (0.0, 0.1**2)),  # γ ≪ ω: at most a tenth
         note=f"γ / ω = {gamma / start:.2f} at release (residual {residual_9a(gamma, start):.2g}), "
         f"{gamma / slowest:.2f} on the plateau; the residual is (γ / ω)²",
     )
@@ -64,9 +104,7 @@ def erratum_cosh_sign(throw: Scenario) -> Erratum:
         place="Eq. 9d, last term",
         prints="− v e^(−γΔt) cosh ωΔt",
         follows="derivative of Eq. 9c: + v e^(−γΔt) cosh ωΔt",
-        value=printed_9d(0.0, 1.0, throw.damping_rate, throw.omega0, 0.0),
-        unit="of v kept over Δt = 0",
-        admissible=ROUND_OFF,
+        number=Number(printed_9d(0.0, 1.0, throw.damping_rate, throw.omega0, 0.0), "of v kept over Δt = 0", ROUND_OFF),
     )
 
 
@@ -84,9 +122,7 @@ def erratum_sinh_sign(throw: Scenario) -> Erratum:
         place="Eq. 9d, term γ v sinh",
         prints="+ (γ/ω) v e^(−γΔt) sinh ωΔt",
         follows="derivative of Eq. 9c: − (γ/ω) v e^(−γΔt) sinh ωΔt",
-        value=printed / derived,
-        unit="of the derivative's term",
-        admissible=ROUND_OFF,
+        number=Number(printed / derived, "of the derivative's term", ROUND_OFF),
         note=f"coefficient {sinh:.3g} printed, {derived:.3g} by differencing Eq. 9c, at ωΔt = 0.1",
     )
 
@@ -110,9 +146,7 @@ def erratum_python_sign(throw: Scenario) -> Erratum:
         place="Supplement, kinetics.py, update_slice_positions",
         prints="+ velocities / (tau omega) in front of sinh",
         follows="its own position update, differentiated: velocity damped at 2γ",
-        value=printed * h / position,
-        unit="of the damping of its own positions",
-        admissible=(0.99, 1.01),
+        number=Number(printed * h / position, "of the damping of its own positions", (0.99, 1.01)),
         note=f"2γ = {2 * constants.gamma:g} /s is meant, {abs(printed):.1g} /s is what a step does",
     )
 
@@ -128,9 +162,7 @@ def erratum_eq4b(throw: Scenario) -> Erratum:
         place="Eq. 4b, 5",
         prints="ε = H₀ / (H₀ + h), H₀ = M_b / ρπR²",
         follows="Eq. 4a: ε = M_b / (M_b + M_w)",
-        value=eq4b / eq4a,
-        unit="of Eq. 4a",
-        admissible=(0.99, 1.01),
+        number=Number(eq4b / eq4a, "of Eq. 4a", (0.99, 1.01)),
         note=f"ε = {eq4b:.5f} and {eq4a:.5f}; the cylinder holds {area * bottle.length:.3f} kg, "
         f"M_max is {bottle.capacity:g} kg",
     )
@@ -154,9 +186,7 @@ def erratum_eq11e(throw: Scenario, fill: float) -> Erratum:
         place=f"Eq. 11e at M̃ = {fill:g}",
         prints=f"J₀ = {printed_11e(filled):.4g} kg m²",
         follows=f"Eq. 11a to 11d, 10, 3a with N = {filled.n_slices}: J₀ = {true:.4g} kg m²",
-        value=printed_11e(filled) / true,
-        unit="of the sums",
-        admissible=(0.99, 1.01),
+        number=Number(printed_11e(filled) / true, "of the sums", (0.99, 1.01)),
     )
 
 
@@ -168,9 +198,7 @@ def erratum_alpha_unit() -> Erratum:
         place="Supplement, main.py; α of Eq. 8",
         prints="alpha, unit: kg/m",
         follows="Eq. 8: α r' is a force, so that α is in kg/s",
-        value=float(np.abs(printed + velocity - force).sum()),
-        unit="exponents too many or too few",
-        admissible=(0.0, 0.0),
+        number=Number(float(np.abs(printed + velocity - force).sum()), "exponents too many or too few", (0.0, 0.0)),
         note=f"(kg, m, s) of α: {tuple((force - velocity).tolist())} needed, {tuple(printed.tolist())} printed",
     )
 
@@ -186,9 +214,7 @@ def erratum_gravity(throw: Scenario) -> Erratum:
         place="Eq. 6, 8",
         prints="m g cos θ in the frame of C_M",
         follows="C_M falls with g, so that weight and inertial force cancel",
-        value=change["eq8"],
-        unit="of ω₀ changed by g",
-        admissible=(0.0, 1e-9),
+        number=Number(change["eq8"], "of ω₀ changed by g", (0.0, 1e-9)),
         note=f"free flight: {change['free-flight']:.1g}; largest change of ω in the first {early.duration:g} s",
     )
 
@@ -203,9 +229,7 @@ def erratum_origin(throw: Scenario) -> Erratum:
         place="Eq. 7a, 8",
         prints="m r'' = … about C_M",
         follows="m (r'' − r''_CM) = … : C_M accelerates in the bottle",
-        value=float(abs(missing) / np.sqrt(np.mean(centrifugal**2))),
-        unit="of the centrifugal force",
-        admissible=(0.0, 0.01),
+        number=Number(float(abs(missing) / np.sqrt(np.mean(centrifugal**2))), "of the centrifugal force", (0.0, 0.01)),
         note=f"at release, no drag, no weight: r''_CM = {missing:.2f} m/s² by Eq. 8 itself, "
         "a force on every slice that nothing exerts",
     )
@@ -217,12 +241,11 @@ def erratum_drag_reference(throw: Scenario) -> Erratum:
     v_cm = throw.slice_mass * v.sum(axis=1) / throw.total_mass
     against_cm = float(((v - v_cm[:, np.newaxis]) * v).sum())
     against_wall = float((v * v).sum())
+    ratio = against_cm / against_wall if against_wall else math.nan
     return Erratum(
         place="Eq. 8",
         prints="− α (r' − r'_CM)",
         follows="− α r': the wall is at rest in the bottle, C_M is not",
-        value=against_cm / against_wall if against_wall else math.nan,
-        unit="of the work against the wall",
-        admissible=(0.99, 1.01),
+        number=Number(ratio, "of the work against the wall", (0.99, 1.01)),
         note=f"water that slides as one is braked by {throw.bottle.mass / throw.total_mass:.3f} of its drag",
     )

@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cache
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 
-from flipproof.chapters.errata.erratum import ROUND_OFF, SQUARE, Erratum
+from flipproof.chapters.errata.equations import ROUND_OFF, Erratum, Number
 from flipproof.frame.solvers import solve
 from slicemodel import Scenario
 from slicemodel.observables import plateau
+
+SQUARE: Final = (1.8, 2.2)
+"""Exponents that count as a square."""
 
 
 def erratum_matlab_damping(throw: Scenario) -> Erratum:
@@ -24,9 +27,7 @@ def erratum_matlab_damping(throw: Scenario) -> Erratum:
         place="Supplement, FindNewlocation.m",
         prints="alpha/2/M_W/N in the position update",
         follows="γ = αN / 2M_w, as in its other three places",
-        value=constants.gamma_position / constants.gamma,
-        unit="of γ",
-        admissible=ROUND_OFF,
+        number=Number(constants.gamma_position / constants.gamma, "of γ", ROUND_OFF),
         note="short by N²",
     )
 
@@ -43,9 +44,7 @@ def erratum_matlab_reset() -> Erratum:
         place="Supplement, CheckBoundaryConditions.m",
         prints="r_new = r: no position is reset",
         follows="[C.S.]: r(t_n) = r(t_n−1), so that 0 ≤ r ≤ L throughout",
-        value=first,
-        unit="s until a slice is outside",
-        admissible=(throw.duration, throw.duration),
+        number=Number(first, "s until a slice is outside", (throw.duration, throw.duration)),
         note=(f"5 % of L outside at {deep[0]:.3f} s; " if len(deep) else "")
         + f"{run.status} at t = {run.t[-1]:.3f} s of {throw.duration:g} s",
     )
@@ -67,9 +66,7 @@ def erratum_matlab_comment(line: str = "rho =1000; density of water") -> Erratum
         place="Supplement, Main.m",
         prints=line,
         follows="a comment starts with %, as on the lines around it",
-        value=float(len(stray)),
-        unit="statements that nothing defines",
-        admissible=(0.0, 0.0),
+        number=Number(float(len(stray)), "statements that nothing defines", (0.0, 0.0)),
         note=f"MATLAB takes “{stray[0]}” for a call and stops: the program as printed cannot run" if stray else "",
     )
 
@@ -80,9 +77,7 @@ def erratum_contact_sign(beta: float = -0.5) -> Erratum:
         place="[C.S.], section 5",
         prints="r' = −β r' with −1 ≤ β ≤ 0",
         follows="its own words, “bounces back”, and both programs: r' = β r'",
-        value=-beta,
-        unit="of the velocity before",
-        admissible=(-1.0, 0.0),
+        number=Number(-beta, "of the velocity before", (-1.0, 0.0)),
         note=f"β = {beta:g}",
     )
 
@@ -97,9 +92,7 @@ def erratum_defaults() -> Erratum:
         place="Supplement, main.py",
         prints="beta = −0.3, t_max = 0.6, water_mass = 0.1",
         follows="section 5: β = −0.5, T = 0.5 s, M_w from 0.05 to 1 kg",
-        value=abs(levels[0] - levels[1]),
-        unit="of ω₀ on the plateau",
-        admissible=(0.0, 1e-3),
+        number=Number(abs(levels[0] - levels[1]), "of ω₀ on the plateau", (0.0, 1e-3)),
         note=f"plateau {levels[0]:.4f} as supplied, {levels[1]:.4f} with the paper's β and T, both at M_w = 0.1 kg",
     )
 
@@ -160,9 +153,7 @@ def erratum_cost(program: Literal["python", "matlab"]) -> Erratum:
         follows="main.py: a step touches each of N slices a fixed number of times"
         if program == "python"
         else "Main.m: linear in N too; what grows as a square is P, since every step copies all steps before",
-        value=of_n,
-        unit="exponent of N",
-        admissible=SQUARE,
+        number=Number(of_n, "exponent of N", SQUARE),
         note=f"read as N_t, the number of time intervals, the exponent is {of_p:.2f} and the sentence "
         f"{'right' if SQUARE[0] <= of_p <= SQUARE[1] else 'wrong too'}; array elements counted, no clock",
     )

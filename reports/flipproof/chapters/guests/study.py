@@ -8,13 +8,20 @@ Each run is made in the solver's own process with a time limit; what it does wro
 The energy of a run, in the frame of the centre of mass C_M, is that of turning and of sliding (Koenig):
 
     E = J omega^2 / 2 + sum_i m (v_i - v_CM)^2 / 2 + M_b v_CM^2 / 2
+
+The difference to free flight is split over the assumptions that the guest's equation still makes:
+
+    plateau of free flight - plateau of the guest = rest + sum of fair shares
+
+The rest is the plateau of the guest's equation minus that of the guest: its own error, and what is no assumption of the
+ladder. A fair share is the mean over all orders of mending the assumptions (``foreign.explain``).
 """
 
 from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -26,21 +33,23 @@ import numpy as np
 from flipproof.chapters.agreement.chapter import Agreement, study_agreement
 from flipproof.chapters.differences.chapter import run_bands
 from flipproof.chapters.differences.study import Difference, study_difference
-from flipproof.chapters.guests.split import Split, plan_splits, split, switches_made
 from flipproof.chapters.ice.chapter import Drift, measure
+from flipproof.chapters.waterfall.study import equation_run
 from flipproof.foreign import contract
 from flipproof.foreign.answers import trajectory_of
 from flipproof.foreign.certify import Certificate, certify
 from flipproof.foreign.checking import effort_of
 from flipproof.foreign.content import content_of
 from flipproof.foreign.contract import Traits
+from flipproof.foreign.explain import changes_of, mean
+from flipproof.foreign.place import name_of, switches_of
 from flipproof.foreign.specs import CSV, Runner, opened
-from flipproof.frame.chapter import Ask, Call, Flights, Study, attempt
+from flipproof.frame.chapter import Ask, Call, Flights, Missing, Run, Study, attempt
 from flipproof.frame.twins import twins
-from ode_reference.models import LADDER
+from ode_reference.models import LADDER, MODELS
 from ode_reference.switches import Switches
 from slicemodel import Scenario, Trajectory
-from slicemodel.observables import centre_of_mass_velocity
+from slicemodel.observables import centre_of_mass_velocity, plateau
 from slicemodel.trajectory import FloatArray, output_times
 
 LEVELS: Final = (-4, -2, 0, 2)
@@ -48,6 +57,8 @@ LEVELS: Final = (-4, -2, 0, 2)
 
 SPARSE: Final = 27
 """Every so many output times are asked for at ``LEVELS``: a solver makes at least one step from each to the next."""
+
+FREE: Final = MODELS["free-flight"].switches
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +82,21 @@ class Visit:
     efforts: tuple[Effort, ...] = ()
     ice: Drift | None = None
     problems: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Split:
+    """How a guest's plateau ``start`` becomes that of free flight, ``end``; no assumption explains the ``rest``.
+
+    ``bars`` maps each switch to its fair share, ``ranges`` to the least and the largest change by it in a single order.
+    """
+
+    equation: str
+    start: float
+    rest: float
+    end: float
+    bars: Mapping[str, float]
+    ranges: Mapping[str, tuple[float, float]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,30 +134,6 @@ class Guest:
     def rise(self) -> float | None:
         """Largest rise of the energy between two output times, fraction of E(0)."""
         return None if self.energy is None else float(max(0.0, np.max(np.diff(self.energy), initial=0.0)))
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the guest as JSON-ready data."""
-        visit = self.visit
-        return {
-            "spec": visit.spec,
-            "content": visit.content,
-            "name": self.label,
-            "equation": self.equation,
-            "passport": None if visit.certificate is None else visit.certificate.to_mapping(),
-            "problems": dict(visit.problems),
-            "band": self.band,
-            "differences": {
-                rung: {"largest": d.largest, "time": d.largest_time, "final": d.final, "band": d.band}
-                for rung, d in self.differences.items()
-            },
-            "efforts": [
-                {"effort": one.effort, "seconds": round(one.seconds, 4), "error": error}
-                for one, error in zip(visit.efforts, self.errors, strict=True)
-            ],
-            "waterfall": None if self.split is None else self.split.to_mapping(),
-            "ice_drift": None if visit.ice is None else visit.ice.largest,
-            "energy_rise": self.rise,
-        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,34 +211,26 @@ def visit(spec: str, throw: Scenario, times: FloatArray, timeout: float | None =
             problems[name] = str(error)
             return None
 
-    content = tried("content", lambda: content_of(spec)) or ""
+    known: dict[str, Any] = {"spec": spec, "content": tried("content", lambda: content_of(spec)) or ""}
+    known["problems"] = problems
     runner = tried("solver", lambda: opened(spec, timeout, curves=True))
     if runner is None:
-        return Visit(spec=spec, content=content, problems=problems)
+        return Visit(**known)
     with closing(runner):
         traits = tried("solver", lambda: runner.traits)
         if traits is None:
-            return Visit(spec=spec, content=content, problems=problems)
-        certificate = ice = None
-        if spec.startswith(CSV):
+            return Visit(**known)
+        asked = not spec.startswith(CSV)
+        if not asked:
             problems["certificate"] = "a curve in a file cannot be asked"
-        else:
-            certificate = tried("certificate", lambda: certify(runner))
-        flight = tried("flight", lambda: _flight(runner, throw, times, LEVELS[-1]).run)
+        known["traits"] = traits
+        known["certificate"] = tried("certificate", lambda: certify(runner)) if asked else None
+        known["flight"] = tried("flight", lambda: _flight(runner, throw, times, LEVELS[-1]).run)
         levels = LEVELS if traits.refined_by is not None else ()
         efforts = [tried(f"flight at level {k}", partial(_flight, runner, throw, times[::SPARSE], k)) for k in levels]
-        if not spec.startswith(CSV):
-            ice = tried("ice", lambda: _flight(runner, replace(throw, frozen=True), times, 0).run)
-    return Visit(
-        spec=spec,
-        content=content,
-        traits=traits,
-        certificate=certificate,
-        flight=flight,
-        efforts=tuple(one for one in efforts if one is not None),
-        ice=None if ice is None else measure(traits.name, ice),
-        problems=problems,
-    )
+        ice = tried("ice", lambda: _flight(runner, replace(throw, frozen=True), times, 0).run) if asked else None
+    drift = None if ice is None else measure(traits.name, ice)
+    return Visit(**known, efforts=tuple(one for one in efforts if one is not None), ice=drift)
 
 
 def _flight(runner: Runner, throw: Scenario, times: FloatArray, level: int) -> Effort:
@@ -322,3 +316,67 @@ def energy_of(run: Trajectory) -> FloatArray:
     sliding = scenario.slice_mass * ((run.v - drift[:, None]) ** 2).sum(axis=1) + scenario.bottle.mass * drift**2
     energy = (run.inertia * run.omega**2 + sliding) / 2
     return np.asarray(energy / energy[0])
+
+
+def switches_made(traits: Traits | None, certificate: Certificate | None, nearest: str | None) -> Switches | None:
+    """Return the switches of the equation that a guest declares, else of its place, else of the ``nearest`` rung.
+
+    None if nothing is known of it, or if what it declares converges to no equation of the ladder.
+    """
+    if traits is not None and traits.equation is not None:
+        try:
+            return switches_of(traits.equation)
+        except ValueError:
+            return None
+    results = () if certificate is None else certificate.results
+    places = [r.found.facts["place"] for r in results if r.found is not None and "place" in r.found.facts]
+    if places:
+        return Switches.from_name(places[0]["switches"])
+    return None if nearest is None else switches_of(nearest)
+
+
+def plan_splits(starts: Iterable[Switches], throw: Scenario) -> list[Run]:
+    """Return the runs that the splits need; those of the waterfall of the same throw are among them."""
+    asked: dict[Run, None] = {}
+
+    def ask(switches: Switches) -> float:
+        asked[equation_run(throw, switches)] = None
+        return 0.0
+
+    for start in starts:
+        ask(start)
+        ask(FREE)
+        changes_of(start, FREE, ask)
+    return list(asked)
+
+
+def split(run: Trajectory, start: Switches, flights: Flights) -> Split:
+    """Split the difference between a guest's run and free flight on the same throw.
+
+    Raises
+    ------
+    Missing - if a run is not whole
+    ArithmeticError - if rest and bars miss the whole difference by more than round-off
+    """
+
+    def read(trajectory: Trajectory) -> float:
+        return plateau(trajectory.t, trajectory.omega, trajectory.scenario.omega0)
+
+    def value(switches: Switches) -> float:
+        return read(flights[equation_run(run.scenario, switches)].whole)
+
+    if len(run.t) < 2 or run.t[-1] < run.scenario.duration:
+        raise Missing("the guest's run does not reach the end of the flight")
+    changes = changes_of(start, FREE, value)
+    found = Split(
+        equation=name_of(start),
+        start=read(run),
+        rest=value(start) - read(run),
+        end=value(FREE),
+        bars={name: mean(each) for name, each in changes.items()},
+        ranges={name: (min(c for _, c in each), max(c for _, c in each)) for name, each in changes.items()},
+    )
+    missed = found.end - found.start - found.rest - sum(found.bars.values())
+    if not abs(missed) <= 1e-12 * (1.0 + abs(found.start) + sum(map(abs, found.bars.values()))):
+        raise ArithmeticError(f"rest and bars miss the difference to free flight by {missed:.3g}")
+    return found

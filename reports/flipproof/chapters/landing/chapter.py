@@ -8,14 +8,12 @@ from collections.abc import Generator, Iterator, Mapping, Sequence
 from itertools import accumulate, groupby
 from typing import Any, Final
 
-from flipproof.chapters.landing.figures import figures, witnesses
+from flipproof.chapters.landing.figures import figures, page, witnesses
 from flipproof.chapters.landing.study import KINDS, OPTIMAL, WATER, Cases, Cell, Found, Size, aiming, counting, read
-from flipproof.chapters.landing.tables import page
 from flipproof.frame.chapter import Ask, Call, Chapter, Flights, Study
 from flipproof.frame.findings import Finding, observed, regression
 from flipproof.frame.solvers import REFERENCE
-from flipproof.landing.design import Case
-from flipproof.landing.upright import make_case
+from flipproof.landing.design import Case, make_cases
 from flipproof.landing.work import Landed
 
 
@@ -48,32 +46,26 @@ def chunks(cases: Sequence[Case]) -> list[tuple[Case, ...]]:
     return [tuple(case for case, _ in some) for _, some in groups]
 
 
-def make_cases(cases: Sequence[Case], seed: int) -> list[list[Landed]]:
-    """Make the throws of some cases in this process."""
-    return [make_case(case, seed) for case in cases]
-
-
 def claims(found: Found) -> Iterator[Finding]:
     """Yield every finding of the subject."""
-    family = found.size.families[-1]
-    yield from _water_and_ice(found, family)
-    yield _best_filling(found, family)
+    yield from _water_and_ice(found)
+    yield _best_filling(found)
     yield from _static(found)
-    yield _slow_rotation(found, family)
-    yield _bounces(found, family)
-    yield _model_uncertainty(found, family)
+    yield _slow_rotation(found)
+    yield _bounces(found)
+    yield _model_uncertainty(found)
     yield _undecided(found)
     yield from _witnesses(witnesses())
 
 
-def _water_and_ice(found: Found, family: str) -> Iterator[Finding]:
+def _water_and_ice(found: Found) -> Iterator[Finding]:
     """Yield P(water) - P(ice) for every filling, as far as both were thrown."""
-    for filling, water in found.curve(family, "together"):
-        ice = found.cell(family, "ice", filling)
+    for filling, water in found.along("filling", "together"):
+        ice = found.cell("ice", filling)
         if ice is None:
             continue
         difference, low, high = water.share.minus(ice.share)
-        others = {KINDS[kind].words: found.cell(family, kind, filling) for kind in WATER[1:]}
+        others = {KINDS[kind].words: found.cell(kind, filling) for kind in WATER[1:]}
         laws = ", ".join(f"{law} {cell.share.value:.3f}" for law, cell in others.items() if cell is not None)
         verdict = _judged(low, high, ("water stands more often", "ice stands more often", "undistinguished"))
         title = f"P(upright) of water minus ice at filling {filling:g} (abstract, section 3: redistribution helps)"
@@ -81,9 +73,9 @@ def _water_and_ice(found: Found, family: str) -> Iterator[Finding]:
         yield observed(f"landing-water-minus-ice-{filling:g}", title, difference, "", note, band=(high - low) / 2)
 
 
-def _best_filling(found: Found, family: str) -> Finding:
+def _best_filling(found: Found) -> Finding:
     """Return where P(water) is largest: the paper's optimum is 0.2 to 0.5 (section 5)."""
-    curve = found.curve(family, "together")
+    curve = found.along("filling", "together")
     inside = [pair for pair in curve if OPTIMAL[0] <= pair[0] <= OPTIMAL[1]]
     outside = [pair for pair in curve if pair not in inside]
     name, title = "landing-best-filling", "Filling at which water stands most often (section 5: 0.2 to 0.5)"
@@ -105,36 +97,32 @@ def _best_filling(found: Found, family: str) -> Finding:
 def _static(found: Found) -> Iterator[Finding]:
     """Yield how often the static criterion says the outcome rightly (section 6, Eq. 13a)."""
     title = "Throws of which the toppling angle at the touch says rightly whether they stand: "
-    for (family, kind), counts in found.static.items():
-        said = counts[True, True] + counts[True, False]
-        others = counts[False, True] + counts[False, False]
-        if said + others:
-            yield observed(
-                f"landing-static-{family}-{kind.replace(', ', '-')}",
-                f"{title}{KINDS[kind].words}, family {family}",
-                (counts[True, True] + counts[False, False]) / (said + others),
-                note=f"of those with a tilt below it {counts[True, True]} of {said} stand, of those above it "
-                f"{counts[False, True]} of {others}; {found.assumed}",
-            )
+    for (family, kind), (said, others) in found.static.items():
+        if throws := said.throws + others.throws:
+            id_ = f"landing-static-{family}-{kind.replace(', ', '-')}"
+            words = f"{title}{KINDS[kind].words}, family {family}"
+            note = f"of those with a tilt below it {said.upright} of {said.throws} stand, of those above it "
+            note += f"{others.upright} of {others.throws}; {found.assumed}"
+            yield observed(id_, words, (said.upright + others.throws - others.upright) / throws, note=note)
 
 
-def _slow_rotation(found: Found, family: str) -> Finding:
+def _slow_rotation(found: Found) -> Finding:
     """Return whether bottles that turn more slowly at the touch stand more often (section 6)."""
     name = "landing-slow-rotation"
     title = "P(upright) of the slower minus the faster half of the touches, water (section 6: slow rotation helps)"
-    if (family, "together") not in found.slow:
+    if (found.size.families[-1], "together") not in found.slow:
         return observed(name, title, None, note="water was not thrown")
-    slow, fast = found.slow[family, "together"]
+    slow, fast = found.slow[found.size.families[-1], "together"]
     difference, low, high = slow.minus(fast)
     note = f"halves of |omega| at the touch within each filling; {_judged(low, high)}; {found.assumed}"
     return observed(name, title, difference, note=note, band=(high - low) / 2)
 
 
-def _bounces(found: Found, family: str) -> Finding:
+def _bounces(found: Found) -> Finding:
     """Return whether falling water dampens the bounce (section 6)."""
     name, filling = "landing-bounces", found.size.axis_filling
     title = f"Bounces of ice minus bounces of water at filling {filling:g} (section 6: falling water dampens them)"
-    water, ice = found.cell(family, "together", filling), found.cell(family, "ice", filling)
+    water, ice = found.cell("together", filling), found.cell("ice", filling)
     if water is None or ice is None:
         return observed(name, title, None, note="water or ice was not thrown at this filling")
     difference, band = ice.bounces - water.bounces, math.hypot(ice.bounces_band, water.bounces_band)
@@ -143,14 +131,14 @@ def _bounces(found: Found, family: str) -> Finding:
     return observed(name, title, difference, "bounces", note, band=band)
 
 
-def _model_uncertainty(found: Found, family: str) -> Finding:
+def _model_uncertainty(found: Found) -> Finding:
     """Return how far the laws of the impact are apart: a band of the model, not of the sample."""
     name, title = "landing-laws", "Largest distance in P(upright) between two laws of the impact, water"
     pairs = [
         (one.share.minus(other.share), f"at filling {filling:g}, {KINDS[first].words} minus {KINDS[second].words}")
         for filling in found.size.fillings
         for first, second in itertools.permutations(WATER, 2)
-        if (one := found.cell(family, first, filling)) and (other := found.cell(family, second, filling))
+        if (one := found.cell(first, filling)) and (other := found.cell(second, filling))
     ]
     if not pairs:
         return observed(name, title, None, note="one law only")
@@ -177,25 +165,17 @@ def _undecided(found: Found) -> Finding:
 
 def _witnesses(stored: Mapping[str, Any]) -> Iterator[Finding]:
     """Yield in how many touches two programs of one law differ, rods and ice; soft contacts are another law."""
-    pairs = [(case, matrix) for case in stored["cases"] for matrix in case["matrices"]]
-    for case, matrix in pairs:
-        one, other = matrix["programs"]
-        if "compliant" in one + other or case["slices"] == "staggered":
+    for case, matrix in [(each, matrix) for each in stored["cases"] for matrix in each["matrices"]]:
+        (one, other), differ, both = matrix["programs"], matrix["differ"], matrix["decided by both"]
+        if "compliant" in one + other:
             continue
         kind = "ice" if case["law"] is None else f"water-{case['law']}"
         # Share of outcomes in which two programs of one law may differ: with MuJoCo's impulses, and with pymunk.
         most = 0.03 if "mujoco" in (one, other) else 0.02
-        both = matrix["decided by both"]
-        share = matrix["differ"] / both if both else math.nan
-        yield regression(
-            f"landing-witnesses-{kind}-{one}-{other}",
-            f"Outcomes in which {one} and {other} differ from one touch: {kind.replace('-', ', ')}",
-            share if both else None,
-            "",
-            (0.0, most),
-            f"{matrix['differ']} of {both} decided by both; at most {most:.0%} is asked for: "
-            f"{'reached' if share <= most else 'missed'}; stored, made by: {stored['command']}",
-        )
+        title = f"Outcomes in which {one} and {other} differ from one touch: {kind.replace('-', ', ')}"
+        note = f"{differ} of {both} decided by both; at most {most:.0%} is asked for: "
+        note += f"{'reached' if differ / both <= most else 'missed'}; stored, made by: {stored['command']}"
+        yield regression(f"landing-witnesses-{kind}-{one}-{other}", title, differ / both, "", (0.0, most), note)
 
 
 def _judged(

@@ -1,4 +1,4 @@
-"""What was found -> figures with their words."""
+"""What was found -> figures with their words and numbers, and the tables of the page."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from flipproof.chapters.landing.study import AXIS_KINDS, KINDS, OPTIMAL, WATER_AND_ICE, Cell, Found, Kind
-from flipproof.chapters.landing.tables import energies_csv, map_csv, share_line, shares_csv, static_csv, witnesses_csv
 from flipproof.figures.style import new_figure, shared_legend, styled
 from flipproof.frame.exhibit import Exhibit
-from flipproof.landing.aim import FAMILIES
+from flipproof.landing.design import FAMILIES
+from flipproof.output.columns import rows_csv
 
 LOOKS: Final[Mapping[Kind, dict[str, Any]]] = {
     "together": {"color": "#0072B2", "marker": "o", "linestyle": "-"},
@@ -95,9 +95,9 @@ def figures(found: Found) -> list[Exhibit]:
             "down at rest would come upright. Each bar is the share that does end upright, of all throws that the "
             "angle calls upright and of all others, at all fillings.",
             "; ".join(
-                f"family {family}, {kind}: {counts[True, True]} of {counts[True, True] + counts[True, False]} called "
-                f"upright stand, {counts[False, True]} of {counts[False, True] + counts[False, False]} others"
-                for (family, kind), counts in found.static.items()
+                f"family {family}, {kind}: {said.upright} of {said.throws} called upright stand, {others.upright} of "
+                f"{others.throws} others"
+                for (family, kind), (said, others) in found.static.items()
             ),
             figure_static,
             static_csv(found),
@@ -153,11 +153,10 @@ def figure_shares(found: Found) -> Figure:
     figure, panels = new_figure(1, len(found.size.families), size=(8.6, 4.4), squeeze=False, sharey=True)
     for axes, family in zip(panels[0], found.size.families, strict=True):
         for kind in LOOKS:
-            _curve(axes, kind, found.curve(family, kind))
+            _curve(axes, kind, found.along("filling", kind, family))
         axes.axvspan(*OPTIMAL, color="#0072B2", alpha=0.06, linewidth=0)
-        axes.set_xlabel("fill fraction M_w / M_max [1]")
         axes.set_title(f"{family}: {FAMILIES[family]}", fontsize=10, loc="left")
-        axes.set_ylim(0.0, 1.0)
+        axes.set(xlabel="fill fraction M_w / M_max [1]", ylim=(0.0, 1.0))
     panels[0, 0].set_ylabel("P(upright) [1]")
     shared_legend(figure, panels[0, -1], columns=5)
     return figure
@@ -217,17 +216,16 @@ def figure_map(found: Found) -> Figure:
 @styled
 def figure_static(found: Found) -> Figure:
     """Of the throws that the static criterion calls upright, and of those it does not, the share that stands."""
-    names = [name for name, counts in found.static.items() if sum(counts.values())]
+    names = [name for name, (said, others) in found.static.items() if said.throws + others.throws]
     figure, axes = new_figure(size=(8.6, 3.9))
     width = 0.38
-    sides = ((True, "#0072B2", "tilt below the toppling angle at touch"), (False, "#D55E00", "tilt above it"))
-    for side, (said, colour, label) in enumerate(sides):
+    looks = (("#0072B2", "tilt below the toppling angle at touch"), ("#D55E00", "tilt above it"))
+    for side, (colour, label) in enumerate(looks):
         for k, name in enumerate(names):
-            counts = found.static[name]
-            total = counts[said, True] + counts[said, False]
-            height = counts[said, True] / total if total else 0.0
+            share = found.static[name][side]
+            height = share.upright / share.throws if share.throws else 0.0
             bar = axes.bar(k + (side - 0.5) * width, height, width, color=colour, label=label if k == 0 else None)
-            axes.bar_label(bar, [f"{counts[said, True]} of {total}"], fontsize=7.5, padding=2)
+            axes.bar_label(bar, [f"{share.upright} of {share.throws}"], fontsize=7.5, padding=2)
     axes.set_xticks(range(len(names)), [f"{KINDS[kind].words}\nfamily {family}" for family, kind in names], fontsize=8)
     axes.set(ylim=(0.0, 1.1), ylabel="share that stands [1]")
     shared_legend(figure, axes, columns=2)
@@ -281,3 +279,96 @@ def figure_witnesses(cases: Sequence[Mapping[str, Any]]) -> Figure:
         axes.set_ylabel(matrix["programs"][0], fontsize=8)
         axes.set_xlabel(matrix["programs"][1], fontsize=8)
     return figure
+
+
+def shares_csv(found: Found) -> str:
+    """Return one row for each share: what was thrown, the share with its 95 % interval, and means at the touch."""
+    rows = [
+        [
+            key.axis, key.value, key.family, key.filling, KINDS[key.kind].words, cell.share.upright,
+            cell.share.undecided, cell.missed, cell.share.throws, cell.share.value, *cell.share.interval,
+            cell.aim.throw.omega0, cell.aim.height, cell.aim.time, *cell.touch, cell.bounces,
+        ]
+        for key, cell in found.cells.items()
+    ]  # fmt: skip
+    names = (
+        "axis", "value", "family", "fill_fraction [1]", "landed", "upright", "undecided", "missed", "throws",
+        "P(upright) [1]", "low [1]", "high [1]", "omega0 [rad/s]", "table height [m]", "aimed time [s]",
+        "mean |omega| at touch [rad/s]", "mean speed at touch [m/s]", "mean energy at touch [E_s]", "mean bounces",
+    )  # fmt: skip
+    return rows_csv(names, rows, digits=None)
+
+
+def map_csv(found: Found) -> str:
+    """Return one row for each cell of the map."""
+    fillings, omegas = found.size.map_axes
+    rows = [
+        [fill, omega0, KINDS[kind].words, outcomes.outcome[j, i], math.degrees(outcomes.theta[j, i])]
+        for kind, outcomes in found.maps.items()
+        for j, omega0 in enumerate(omegas.tolist())
+        for i, fill in enumerate(fillings.tolist())
+    ]
+    return rows_csv(
+        ("fill_fraction [1]", "omega0 [rad/s]", "landed", "outcome", "theta at touch [degrees]"), rows, digits=None
+    )
+
+
+def static_csv(found: Found) -> str:
+    """Return how often the static criterion and the outcome agree."""
+    rows = [
+        [family, KINDS[kind].words, said, upright, count]
+        for (family, kind), shares in found.static.items()
+        for said, share in zip(("yes", "no"), shares, strict=True)
+        for upright, count in (("yes", share.upright), ("no", share.throws - share.upright))
+    ]
+    return rows_csv(("family", "landed", "tilt below toppling angle at touch", "upright", "throws"), rows, digits=None)
+
+
+def energies_csv(found: Found) -> str:
+    """Return the energies that are drawn."""
+    rows = [
+        [KINDS[run.kind].words, k, run.outcome, t, e]
+        for k, run in enumerate(found.energies)
+        for t, e in zip(run.t.tolist(), run.energy.tolist(), strict=True)
+    ]
+    return rows_csv(("landed", "throw", "outcome", "t [s]", "energy [E_s]"), rows, digits=None)
+
+
+def witnesses_csv(stored: Mapping[str, Any]) -> str:
+    """Return how many touches end in which pair of outcomes, for every pair of programs."""
+    rows = [
+        [case["slices"], case["law"], *matrix["programs"], *pair.split("/"), count]
+        for case in stored["cases"]
+        for matrix in case["matrices"]
+        for pair, count in matrix["outcomes"].items()
+    ]
+    return rows_csv(
+        ("slices", "law", "first", "second", "outcome of first", "outcome of second", "touches"), rows, digits=None
+    )
+
+
+def share_line(found: Found, family: str) -> str:
+    """Return the shares of one family as lines."""
+    lines = [f"P(upright), family {family}, 95 % intervals:"]
+    for kind, landing in KINDS.items():
+        words = []
+        for fill, cell in found.along("filling", kind, family):
+            low, high = cell.share.interval
+            words.append(f"{fill:g}: {cell.share.value:.3f} [{low:.3f}, {high:.3f}]")
+        if words:
+            lines.append(f"  {landing.words}: " + ", ".join(words))
+    return "\n".join(lines)
+
+
+def page(found: Found) -> dict[str, object]:
+    """Return what the chapter's template takes: a table a family, and why some throws were not made.
+
+    A table is the family in words, its fillings, and for every law of the impact its cell at each, None if not thrown.
+    """
+    shares = []
+    for family in found.size.families:
+        curves = {landing.words: dict(found.along("filling", kind, family)) for kind, landing in KINDS.items()}
+        fills = sorted({fill for curve in curves.values() for fill in curve})
+        rows = [(name, [curve.get(fill) for fill in fills]) for name, curve in curves.items() if curve]
+        shares.append((f"family {family}: {FAMILIES[family]}", fills, rows))
+    return {"shares": shares, "unaimed": sorted(set(found.unaimed.values()))}

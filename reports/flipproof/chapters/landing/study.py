@@ -16,9 +16,7 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.landing.aim import SPARE, Aim, aimed
-from flipproof.landing.design import Case, Throws
-from flipproof.landing.scatter import Scatter, Share, Z
+from flipproof.landing.design import SPARE, Aim, Case, Scatter, Share, Throws, Z, aimed
 from flipproof.landing.work import REFERENCE, Landed
 from ode_reference import fly
 from ode_reference.landing import path
@@ -123,16 +121,15 @@ class Cell:
     ----------
     share : Share - of them upright
     missed : int - how many did not come down on the table; they count as not upright
-    omega [rad/s], speed [m/s], energy [E_s], bounces : float - means at the touch, and of the landing
+    touch : (float, float, float) - means at the touch: |omega| [rad/s], speed [m/s], energy [E_s]
+    bounces : float - mean of the landing
     bounces_band : float - half width of the 95 % interval of that mean
     """
 
     aim: Aim
     share: Share
     missed: int
-    omega: float
-    speed: float
-    energy: float
+    touch: tuple[float, ...]
     bounces: float
     bounces_band: float
 
@@ -164,7 +161,7 @@ class Found:
     throw : Scenario, size : Size - what was asked
     cells : by key - shares over the filling and along the axes
     maps : by kind - outcomes over ``size.map_axes``
-    static : (family, kind) -> {(criterion says upright, it is): count}, of all fillings
+    static : (family, kind) -> shares upright of what the static criterion calls upright and of the others, all fillings
     slow : (family, kind) -> shares upright of the slower and the faster half of the touches, of each filling
     energies : of a few throws at the filling of the axes
     unaimed : (family, filling, frozen) -> why no aim was found
@@ -174,22 +171,19 @@ class Found:
     size: Size
     cells: Mapping[Key, Cell]
     maps: Mapping[Kind, Outcomes]
-    static: Mapping[tuple[str, Kind], Mapping[tuple[bool, bool], int]]
+    static: Mapping[tuple[str, Kind], tuple[Share, Share]]
     slow: Mapping[tuple[str, Kind], tuple[Share, Share]]
     energies: tuple[Energy, ...]
     unaimed: Mapping[Place, str]
 
-    def curve(self, family: str, kind: Kind) -> list[tuple[float, Cell]]:
-        """Return filling and cell along the fillings that could be thrown."""
-        return [(k.value, c) for k, c in self.cells.items() if (k.axis, k.family, k.kind) == ("filling", family, kind)]
+    def along(self, axis: str, kind: Kind, family: str = "") -> list[tuple[float, Cell]]:
+        """Return value and cell along the fillings that were thrown or another axis; of the last family unless told."""
+        wanted = axis, family or self.size.families[-1], kind
+        return [(key.value, cell) for key, cell in self.cells.items() if (key.axis, key.family, key.kind) == wanted]
 
-    def along(self, axis: str, kind: Kind) -> list[tuple[float, Cell]]:
-        """Return value and cell along an axis of the table or of the thrower."""
-        return [(k.value, c) for k, c in self.cells.items() if (k.axis, k.kind) == (axis, kind)]
-
-    def cell(self, family: str, kind: Kind, filling: float) -> Cell | None:
-        """Return the cell of one filling, if it was thrown."""
-        return self.cells.get(Key("filling", filling, family, filling, kind))
+    def cell(self, kind: Kind, filling: float) -> Cell | None:
+        """Return the cell of one filling of the last family, if it was thrown."""
+        return dict(self.along("filling", kind)).get(filling)
 
     @property
     def assumed(self) -> str:
@@ -294,37 +288,32 @@ def read(throw: Scenario, size: Size, cases: Cases, rows: Rows, unaimed: Mapping
     """Return what the rows of the second wave say."""
     fillings, omegas = size.map_axes
     cells: dict[Key, Cell] = {}
-    static: dict[tuple[str, Kind], dict[tuple[bool, bool], int]] = {}
-    halves: dict[tuple[str, Kind], tuple[list[Landed], list[Landed]]] = {}
+    sorts: dict[tuple[str, Kind], tuple[list[Landed], ...]] = {}
     shape = len(omegas), len(fillings)
     maps: dict[Kind, Outcomes] = {}
     for (key, case), some in zip(cases.items(), rows, strict=True):
         if key.axis == "map":
             found = maps.setdefault(key.kind, Outcomes(np.full(shape, "", "U9"), np.full(shape, np.nan)))
-            at = int(np.argmin(np.abs(omegas - key.value))), int(np.argmin(np.abs(fillings - key.filling)))
+            at = omegas.tolist().index(key.value), fillings.tolist().index(key.filling)
             found.outcome[at] = some[0].outcome or some[0].status
             found.theta[at] = np.nan if some[0].touch_theta is None else some[0].touch_theta
             continue
         cells[key] = cell_of(case.aim, some)
         if key.axis == "filling":
-            name = key.family, key.kind
-            count = static.setdefault(name, dict.fromkeys(product((True, False), (True, False)), 0))
+            said, others, slow, fast = sorts.setdefault((key.family, key.kind), ([], [], [], []))
             decided = [row for row in some if row.outcome not in (None, "undecided")]
-            for row in decided:
-                assert row.static_margin is not None
-                count[row.static_margin > 0.0, row.outcome == "upright"] += 1
+            said += [row for row in decided if (row.static_margin or 0.0) > 0.0]
+            others += [row for row in decided if not (row.static_margin or 0.0) > 0.0]
             by_spin = sorted(decided, key=lambda row: abs(row.touch_omega or 0.0))
-            middle = len(by_spin) // 2
-            slow, fast = halves.setdefault(name, ([], []))
-            slow += by_spin[:middle]
-            fast += by_spin[len(by_spin) - middle :]
+            slow += by_spin[: len(by_spin) // 2]
+            fast += by_spin[len(by_spin) - len(by_spin) // 2 :]
     return Found(
         throw=throw,
         size=size,
         cells=cells,
         maps=maps,
-        static=static,
-        slow={name: (share_of(slow), share_of(fast)) for name, (slow, fast) in halves.items()},
+        static={name: (share_of(said), share_of(others)) for name, (said, others, _, _) in sorts.items()},
+        slow={name: (share_of(slow), share_of(fast)) for name, (_, _, slow, fast) in sorts.items()},
         energies=tuple(energy for kind in WATER_AND_ICE for energy in _energies(kind, cases, rows, size)),
         unaimed=unaimed,
     )
@@ -344,9 +333,7 @@ def cell_of(aim: Aim, rows: Sequence[Landed]) -> Cell:
         aim=aim,
         share=share_of(rows),
         missed=sum(row.status == "missed" for row in rows),
-        omega=mean("touch_omega"),
-        speed=mean("touch_speed"),
-        energy=mean("touch_energy"),
+        touch=tuple(map(mean, ("touch_omega", "touch_speed", "touch_energy"))),
         bounces=mean("bounces"),
         bounces_band=Z * float(np.std(bounces, ddof=1)) / math.sqrt(len(bounces)) if len(bounces) > 1 else math.nan,
     )

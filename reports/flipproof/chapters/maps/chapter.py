@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Final
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final, Literal
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap, LogNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, PathPatch, Rectangle
+from matplotlib.path import Path
+from numpy.typing import NDArray
 
-from flipproof.chapters.maps.figure import CONTOURS, errors, figure_map
 from flipproof.chapters.maps.study import (
     EXTRA,
     LABELS,
@@ -20,9 +28,13 @@ from flipproof.chapters.maps.study import (
     plan_map,
     study_readings,
 )
-from flipproof.frame.chapter import Absent, Ask, Call, Chapter, Claims, Exhibit, Outcome, Study, attempt, known
+from flipproof.chapters.solvers import SCHEMES
+from flipproof.figures.style import new_figure, styled
+from flipproof.frame.chapter import Ask, Call, Chapter, Exhibit, Study, attempt
 from flipproof.frame.twins import BAND_WORDS
 from flipproof.output.columns import rows_csv
+from slicemodel.scenario import shortened
+from slicemodel.trajectory import FloatArray
 
 AXES: Final[Mapping[Axis, str]] = {"gamma": "damping", "step": "step size", "restitution": "restitution"}
 
@@ -31,11 +43,17 @@ SLICES: Final = 50
 CHUNK: Final = 200
 """Runs of a map that a worker makes at a time; it returns their readings alone."""
 
+COLOURS = ("#606060", "#D95F02", "#C2A500", "#7B3FB5", "#1F78B4", "#128A63", "#C2247F")
+"""One per rung, dark enough for an outline on every shade; their order follows RUNGS."""
 
-Maps = Mapping[Axis, Outcome[ValidityMap]]
+RANGE = (1e-3, 1.0)
+"""Errors of the lightest and of the darkest shade, as fractions of omega_0."""
+
+CONTOURS: tuple[tuple[float, Literal["--", "-"]], ...] = ((0.01, "--"), (0.1, "-"))
+"""Error of the approximation as a fraction of omega_0, and the line that shows it."""
 
 
-def study(ask: Ask) -> Study[Maps]:
+def study(ask: Ask) -> Study[list[ValidityMap]]:
     """Fly every set of assumptions on ``ask.work`` by ``ask.work`` cells of each map, many runs to a call."""
     cut = ask.throw.with_slices(SLICES)
     ends = {axis: map_axes(axis, ask.work, ask.work) for axis in AXES}
@@ -48,25 +66,18 @@ def study(ask: Ask) -> Study[Maps]:
     yield ()
     flights = yield [call for some in calls.values() for call in some]
 
-    def mapped(axis: Axis) -> ValidityMap:
+    maps = []
+    for axis in AXES:
         # Cells of a chunk whose worker died stay "not run".
         answers = [(call.arguments[0], attempt(flights.answer, call).found or ()) for call in calls[axis]]
         readings = {run: reading for chunk, found in answers for run, reading in zip(chunk, found, strict=False)}
-        return study_readings(cut, axis, *ends[axis], readings, steps=ask.steps)
-
-    return {axis: attempt(mapped, axis) for axis in AXES}
-
-
-def claims(found: Maps) -> Claims:
-    """Yield which map could not be made."""
-    for axis, each in found.items():
-        if each.found is None:
-            yield Absent(f"map-{axis}", f"map over {axis}", each.reason, "observation")
+        maps.append(study_readings(cut, axis, *ends[axis], readings, steps=ask.steps))
+    return maps
 
 
-def figures(found: Maps) -> Iterator[Exhibit]:
+def figures(found: list[ValidityMap]) -> Iterator[Exhibit]:
     """Yield every map."""
-    yield from map(_exhibit, known(found).values())
+    yield from map(_exhibit, found)
 
 
 def _exhibit(study: ValidityMap) -> Exhibit:
@@ -149,6 +160,127 @@ def _cells_csv(study: ValidityMap) -> str:
     )  # fmt: skip
 
 
+@styled
+def figure_map(study: ValidityMap) -> Figure:
+    """Size of an approximation's error as shade, the largest fair share as outline, failed cells hatched with reasons.
+
+    Along "step" shade and contours are those of the schemes against their own equations, since only schemes have a
+    step; the shade is the first scheme's.
+    """
+    figure, axes = new_figure(size=(8.0, 6.0))
+    logarithmic = study.axis != "restitution"
+    x, y = _edges(study.fills, logarithmic=False), _edges(study.values, logarithmic=logarithmic)
+    shown = errors(study)
+    shaded, error = shown[0]
+    greys = ListedColormap(colormaps["Greys"](np.linspace(0.0, 0.6, 256)))  # light enough for black lines on top
+    clipped = np.ma.masked_invalid(np.clip(error, *RANGE))
+    shade = axes.pcolormesh(x, y, clipped, cmap=greys, norm=LogNorm(*RANGE), rasterized=True)
+    bar = figure.colorbar(shade, ax=axes, label=f"{shaded} [of ω₀]", extend="min", ticks=[1e-3, 1e-2, 1e-1, 1.0])
+    bar.ax.set_yticklabels(["0.1%", "1%", "10%", "100%"])
+    handles: list[Artist] = []
+    for k, (colour, name) in enumerate(zip(COLOURS, RUNGS, strict=True)):
+        outline = _outline(study.dominant == k, x, y, logarithmic=logarithmic)
+        if outline:
+            border = Path.make_compound_path(*map(Path, outline))
+            axes.add_patch(PathPatch(border, fill=False, edgecolor=colour, linewidth=2.2, capstyle="projecting"))
+        handles.append(Patch(facecolor="none", edgecolor=colour, linewidth=2.2, label=name))
+    hatched: dict[str, Any] = {"facecolor": "none", "edgecolor": "#555555", "hatch": "////"}
+    for row, column in zip(*np.nonzero(study.dominant < 0), strict=True):
+        size = (x[column + 1] - x[column], y[row + 1] - y[row])
+        axes.add_patch(Rectangle((x[column], y[row]), *size, linewidth=0, **hatched))
+    for (name, error), colour in zip(shown, ("#000000", "#D00000"), strict=True):
+        handles += _contours(axes, study, error, name, colour)
+    if logarithmic:
+        axes.set_yscale("log")
+    axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel="fill fraction M_w / M_max [1]", ylabel=LABELS[study.axis])
+    axes.grid(visible=False)
+    title = f"Plateau of ω / ω₀ at N = {study.slices}: {shaded} (shade), largest fair share (outline)"
+    axes.set_title(title, fontsize=10, loc="left")
+    reasons = _reasons(study)
+    if reasons:
+        handles.append(Patch(label=f"not computed: {reasons}", **hatched))
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    return figure
+
+
+def errors(study: ValidityMap) -> Sequence[tuple[str, FloatArray]]:
+    """Return what the contours show, with its name."""
+    if study.axis == "step":
+        return [(f"step error of {scheme}", study.step_error[scheme]) for scheme in SCHEMES]
+    return [(f"error of {LADDER[0]}", study.error), ("change by overlap", np.abs(study.overlap))]
+
+
+def _contours(axes: Axes, study: ValidityMap, error: FloatArray, words: str, colour: str) -> list[Line2D]:
+    """Draw the contours that exist; return a legend entry for each, saying where the map lies if there is none."""
+    handles = []
+    for level, style in CONTOURS:
+        finite = error[np.isfinite(error)]
+        label = f"{words}: {level:.0%}"
+        if _crosses(error, level):
+            lines = axes.contour(
+                study.fills, study.values, error, levels=[level], colors=colour, linestyles=style, linewidths=1.6
+            )
+            axes.clabel(lines, fmt={level: f"{level:.0%}"}, fontsize=8)
+        elif finite.size:
+            label += " (all above)" if finite.min() >= level else " (all below)"
+        handles.append(Line2D([], [], color=colour, linestyle=style, linewidth=1.6, label=label))
+    return handles
+
+
+def _crosses(error: FloatArray, level: float) -> bool:
+    """Return whether a map has a contour at ``level``."""
+    finite = error[np.isfinite(error)]
+    return bool(finite.size and finite.min() < level < finite.max())
+
+
+def contour_lines(study: ValidityMap, error: FloatArray, level: float) -> list[FloatArray]:
+    """Return the contour of ``error`` as lines of (fill fraction, value), each of shape (K, 2)."""
+    if not _crosses(error, level):
+        return []
+    found = Figure().subplots().contour(study.fills, study.values, error, levels=[level])
+    return [np.asarray(line) for line in found.allsegs[0] if len(line)]
+
+
+def _edges(centres: FloatArray, *, logarithmic: bool) -> FloatArray:
+    """Return the borders of cells around ``centres``, halfway between neighbours on the axis as it is drawn."""
+    at = np.log(centres) if logarithmic else centres
+    middle = 0.5 * (at[:-1] + at[1:])
+    edges = np.concatenate(([2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]))
+    return np.exp(edges) if logarithmic else edges
+
+
+def _outline(inside: NDArray[np.bool_], x: FloatArray, y: FloatArray, *, logarithmic: bool) -> list[FloatArray]:
+    """Return the border of the cells ``inside`` as segments, moved inwards so that neighbours' borders stay apart."""
+    inset = 0.12  # of a cell
+    at = np.log(y) if logarithmic else y
+    around = np.pad(inside, 1)
+    segments = []
+    for row, column in zip(*np.nonzero(inside), strict=True):
+        below, above = not around[row, column + 1], not around[row + 2, column + 1]
+        before, behind = not around[row + 1, column], not around[row + 1, column + 2]
+        dx, dy = inset * (x[column + 1] - x[column]), inset * (at[row + 1] - at[row])
+        left, right = x[column] + before * dx, x[column + 1] - behind * dx
+        low, high = at[row] + below * dy, at[row + 1] - above * dy
+        sides = (
+            (before, ((left, low), (left, high))),
+            (behind, ((right, low), (right, high))),
+            (below, ((left, low), (right, low))),
+            (above, ((left, high), (right, high))),
+        )
+        segments += [np.array(side) for there, side in sides if there]
+    if logarithmic:
+        for side in segments:
+            side[:, 1] = np.exp(side[:, 1])
+    return segments
+
+
+def _reasons(study: ValidityMap) -> str:
+    """Return every reason once, with the number of cells it holds for."""
+    found, counts = np.unique(study.reason[study.reason != ""], return_counts=True)
+    words = [f"{reason} ({count})" for reason, count in zip(found, counts, strict=True)]
+    return shortened(", ".join(words[:3]), 80) + (f" and {len(words) - 3} more" if len(words) > 3 else "")
+
+
 CHAPTER: Final = Chapter(
-    "maps", "For which bottles", study, claims, figures, work={"full": 20}, page=lambda _: {"slices": SLICES}
+    "maps", "For which bottles", study, figures=figures, work={"full": 20}, page=lambda _: {"slices": SLICES}
 )

@@ -152,11 +152,18 @@ def map_axes(axis: Axis, columns: int, rows: int) -> tuple[tuple[float, ...], tu
 
 
 def cells(
-    throw: Scenario, axis: Axis, fills: Sequence[float], values: Sequence[float], steps: int, points: int | None
+    throw: Scenario,
+    axis: Axis,
+    fills: Sequence[float],
+    values: Sequence[float],
+    steps: int = 1000,
+    points: int | None = POINTS,
 ) -> Iterator[tuple[tuple[int, int], dict[str, Run]]]:
     """Yield row and column of every cell of a map, row by row, and the run that it has of every solver.
 
     A model does not know a step, nor the column the restitution: along that axis their runs of a fill fraction are one.
+    ``steps`` is the grid of a scheme where the map does not say another, ``points`` are the output times of a model;
+    None: its own.
     """
     usual = {} if points is None else {"times": np.linspace(0.0, throw.duration, points)}
     for (row, value), (column, fill) in product(enumerate(values), enumerate(fills)):
@@ -173,22 +180,11 @@ def cells(
 
 
 def plan_map(
-    throw: Scenario,
-    axis: Axis,
-    fills: Sequence[float],
-    values: Sequence[float],
-    *,
-    steps: int = 1000,
-    points: int | None = POINTS,
-    banded: bool = False,
+    throw: Scenario, axis: Axis, fills: Sequence[float], values: Sequence[float], *, banded: bool = False, **how: Any
 ) -> list[Run]:
-    """Return the runs of one map, equal ones once.
-
-    ``steps`` is the grid of a scheme where the map does not say another, ``points`` are the output times of a model;
-    None: its own. ``banded`` gives free flight its twins.
-    """
+    """Return the runs of one map, equal ones once; ``how`` as of ``cells``; ``banded`` gives free flight its twins."""
     runs: dict[Run, None] = {}
-    for _, by_name in cells(throw, axis, fills, values, steps, points):
+    for _, by_name in cells(throw, axis, fills, values, **how):
         for name, run in by_name.items():
             runs |= dict.fromkeys((run, *(twins(run) if banded and name == FREE else ())))
     return list(runs)
@@ -205,17 +201,15 @@ def study_readings(
     fills: Sequence[float],
     values: Sequence[float],
     readings: Mapping[Run, Reading],
-    *,
-    steps: int = 1000,
-    points: int | None = POINTS,
+    **how: Any,
 ) -> ValidityMap:
     """Make the map of what was read off the runs of ``plan_map``, planned with the same arguments."""
     shape = (len(values), len(fills))
     level, largest = ({name: np.full(shape, np.nan) for name in SOLVERS} for _ in range(2))
     reason = np.full(shape, "", dtype="<U80")
-    free: dict[tuple[int, int], Run] = {}
-    for at, runs in cells(throw, axis, fills, values, steps, points):
-        free[at] = runs[FREE]
+    free: list[Run] = []
+    for at, runs in cells(throw, axis, fills, values, **how):
+        free.append(runs[FREE])
         found = {name: readings.get(run, Reading(problem="not run")) for name, run in runs.items()}
         truth = found[FREE].omega
         for name, reading in found.items():
@@ -224,6 +218,8 @@ def study_readings(
                 largest[name][at] = np.abs(reading.omega - truth).max() / abs(throw.omega0)
         problems = (f"{name}: {reading.problem}" for name, reading in found.items() if reading.problem)
         reason[at] = shortened("; ".join(problems), 80)
+    levels = {run: reading.level for run, reading in readings.items()}
+    banded = all(each in levels for run in free for each in (run, *twins(run)))
     of_sets = {switches: level[name] for switches, name in SETS.items()}
     return ValidityMap(
         axis=axis,
@@ -235,18 +231,8 @@ def study_readings(
         step_error={scheme: np.abs(level[scheme] - level[LIMITS[scheme]]) for scheme in SCHEMES},
         reason=reason,
         shares=np.array([level[LADDER[1]] - level[LADDER[0]], *(fair_share(name, of_sets) for name in NAMES)]),
-        band=_band(free, readings, shape),
+        band=np.array([band(run, levels) for run in free]).reshape(shape) if banded else None,
     )
-
-
-def _band(
-    free: Mapping[tuple[int, int], Run], readings: Mapping[Run, Reading], shape: tuple[int, int]
-) -> FloatArray | None:
-    """Return the band of free flight in every cell; None if its twins were not flown."""
-    if not all(twin in readings for run in free.values() for twin in twins(run)):
-        return None
-    levels = {run: reading.level for run, reading in readings.items()}
-    return np.array([band(run, levels) for run in free.values()]).reshape(shape)
 
 
 def read_flight(made: Made) -> Reading:

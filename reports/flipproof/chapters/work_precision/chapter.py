@@ -7,20 +7,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, Final, Literal, NamedTuple
 
-from flipproof.chapters.work_precision.claims import claim_work_precision
 from flipproof.chapters.work_precision.contenders import CASES, COMMON, FULL
 from flipproof.chapters.work_precision.figure import figure_work_precision
 from flipproof.chapters.work_precision.study import (
     Cost,
     Curve,
+    Price,
     WorkPrecision,
     plan_work_precision,
     study_work_precision,
     words_of,
 )
-from flipproof.frame.chapter import Ask, Call, Chapter, Exhibit, Study
+from flipproof.frame.chapter import Ask, Call, Chapter, Exhibit, Finding, Study, observed
+from flipproof.frame.findings import finite_or_none
 from flipproof.frame.timing import batches, make_timed
 from flipproof.output.columns import rows_csv
+from slicemodel.scenario import shortened
 
 
 def study(ask: Ask) -> Study[tuple[WorkPrecision, ...]]:
@@ -33,6 +35,111 @@ def study(ask: Ask) -> Study[tuple[WorkPrecision, ...]]:
     flights = yield calls
     made = {each.run: each for call in calls for each in flights.answer(call)}
     return tuple(study_work_precision(case, ask.work, made) for case in cases)
+
+
+def claim_work_precision(studies: Sequence[WorkPrecision]) -> Iterator[Finding]:
+    """Yield what the throw through impacts says, and what impacts cost compared with the smooth one.
+
+    The other throws stand in the tables.
+    """
+    by_name = {study.case.name: study for study in studies}
+    for study in studies:
+        curve = study.curves["midpoint on eq8"]
+        title = f"observed order in cost of midpoint, {study.case.title}"
+        words = "order 2 where nothing strikes; v_CM jumps at an impact, and drag feels a mean of it for one whole step"
+        order = None if math.isnan(curve.slope) else curve.slope
+        note = curve.slope_reason or words
+        yield observed(f"work-order-midpoint-{study.case.name}", title, order, note=note, band=curve.slope_error)
+    if "impacts" in by_name:
+        study = by_name["impacts"]
+        yield _pair(study, "exact-step on eq8", "midpoint on eq8")
+        yield _pair(study, "exact-step on eq8", "pymunk rotating on eq8")
+        yield _pair(study, "pymunk on free-flight", "mujoco on free-flight")
+        yield _cheapest(study, 1e-3)
+        yield _cheapest(study, 1e-6)
+        yield _floors(study)
+        yield from _failures(study)
+        if "smooth" in by_name:
+            yield from _price_of_impacts(by_name["smooth"], study)
+
+
+def _pair(study: WorkPrecision, *keys: str) -> Finding:
+    """Compare two contenders of one equation at the smallest error that both keep."""
+    first, second = (study.curves[key] for key in keys)
+    one, other = first.contender.name, second.contender.name
+    id_ = f"work-{one}-{other}".replace(" ", "-")
+    title = f"steps of {one} for one of {other}, at equal error against {first.contender.equation}"
+    for error in (10.0 ** (-k / 2) for k in range(22, 1, -1)):
+        steps_a, steps_b = first.price(error, "steps"), second.price(error, "steps")
+        if steps_a is not None and steps_b is not None:
+            break
+    else:
+        return observed(id=id_, title=title, value=None, note="no error that both keep")
+    if steps_a.bound and steps_b.bound:
+        return observed(id=id_, title=title, value=None, note=f"the first levels of both keep {error:.1e} of ω₀")
+
+    def against(cost: Cost, unit: str, scale: float = 1.0) -> str:
+        prices = (curve.price(error, cost) for curve in (first, second))
+        return " against ".join("–" if found is None else f"{scale * found.value:.2g}" for found in prices) + f" {unit}"
+
+    limit = {(False, True): "at least, ", (True, False): "at most, "}.get((steps_a.bound, steps_b.bound), "")
+    count_a, count_b = (f"{'at most ' if steps.bound else ''}{steps.value:.0f}" for steps in (steps_a, steps_b))
+    note = f"error {error:.1e} of ω₀: {count_a} steps of {one}, {count_b} of {other}; "
+    note += f"{against('work', 'updates of one slice')}, {against('seconds', 'ms of processor time', 1e3)}"
+    return observed(id_, limit + title, steps_a.value / steps_b.value, note=note)
+
+
+def _cheapest(study: WorkPrecision, error: float) -> Finding:
+    """Name the cheapest that solves Eq. 8 to an error, by updates and by time."""
+    curves = study.of("eq8")
+
+    def ranked(cost: Cost) -> list[tuple[Price, str]]:
+        prices = ((curve.price(error, cost), curve.contender.name) for curve in curves)
+        return sorted((price, name) for price, name in prices if price is not None)
+
+    def words(cost: Cost, unit: str) -> str:
+        return ", ".join(f"{name} {price.text}{unit}" for price, name in ranked(cost))
+
+    work = ranked("work")
+    keepers = {name for _, name in work}
+    others = [curve.contender.name for curve in curves if curve.contender.name not in keepers]
+    title = f"eq8 to {error:.0e} of ω₀: updates of the second cheapest over the cheapest"
+    note = f"updates: {words('work', '')}; processor time: {words('seconds', ' s')}"
+    note += f"; not reached by {', '.join(others)}" if others else ""
+    ratio = work[1][0].value / work[0][0].value if len(work) > 1 else None
+    return observed(f"work-cheapest-eq8-{error:.0e}", title, ratio, note=note)
+
+
+def _floors(study: WorkPrecision) -> Finding:
+    floors = {name: reference.floor for name, reference in study.references.items() if math.isfinite(reference.floor)}
+    highest = max(floors, key=lambda name: floors[name])
+    at = [curve.contender.name for curve in study.of(highest) if any(point.at_floor for point in curve.points)]
+    others = ", ".join(f"{name} {floor:.0e}" for name, floor in floors.items() if name != highest)
+    note = f"{highest}; at the floor: {', '.join(at) or 'none'}; others: {others}"
+    title = "highest floor of a reference, below which no contender is ranked"
+    return observed("work-floor", title, floors[highest], "of ω₀", note)
+
+
+def _failures(study: WorkPrecision) -> Iterator[Finding]:
+    failed = {key: curve.failed for key, curve in study.curves.items() if curve.failed}
+    if failed:
+        title = f"levels that failed, of {sum(len(curve.points) for curve in study.curves.values())}"
+        note = "; ".join(
+            f"{key}: {len(points)} of {len(study.curves[key].points)}, {shortened(points[0].reason, 90)}"
+            for key, points in failed.items()
+        )
+        yield observed("work-failed", title, float(sum(map(len, failed.values()))), note=note)
+
+
+def _price_of_impacts(*studies: WorkPrecision) -> Iterator[Finding]:
+    """Say what impacts cost a method: updates per second of flight to one error, before the first and through all."""
+    for equation in ("eq8", "free-flight"):
+        prices = [study.curves[f"DOP853 on {equation}"].price(3e-4) for study in studies]
+        rates = [p.value / study.case.scenario.duration for p, study in zip(prices, studies, strict=True) if p]
+        if len(rates) == 2:
+            title = f"{equation}: updates of DOP853 per second of flight, through impacts over before the first"
+            note = f"error 3e-4 of ω₀; {rates[0]:.2g} updates per second before, {rates[1]:.2g} through all impacts"
+            yield observed(f"work-impacts-{equation}", title, rates[1] / rates[0], note=note)
 
 
 def figures(studies: Sequence[WorkPrecision]) -> Iterator[Exhibit]:
@@ -87,7 +194,7 @@ def _levels_csv(study: WorkPrecision) -> str:
         (
             (curve.contender.name, curve.contender.equation, point.settings, point.work, point.steps, point.seconds,
              point.error, point.lowest, point.highest, point.plateau,
-             study.references[curve.contender.equation].floor, point.at_floor, point.reason)
+             curve.reference.floor, point.at_floor, point.reason)
             for curve in study.curves.values()
             for point in curve.points
         ),
@@ -106,22 +213,16 @@ class Table(NamedTuple):
 
 def tabulate_work_precision(studies: Sequence[WorkPrecision]) -> Iterator[Table]:
     """Yield results and settings of every throw, then who is absent and why."""
-    absent: dict[str, str] = {}
     for study in studies:
         yield _results(study)
         yield _settings(study)
         yield _references(study)
-        absent |= study.absent
-    if studies:
-        yield Table("work-absent", "Not competing", ("what", "why"), list(absent.items()))
+    # The same of every throw.
+    yield Table("work-absent", "Not competing", ("what", "why"), list(studies[0].absent.items()))
 
 
 def _results(study: WorkPrecision) -> Table:
     errors = (1e-2, 1e-3, 1e-4, 1e-6)
-
-    def price(curve: Curve, error: float, cost: Cost) -> str:
-        found = study.price(curve, error, cost)
-        return "–" if found is None else f"{found.limit}{found.value:.2g}"
 
     rows = []
     for curve in study.curves.values():
@@ -131,9 +232,9 @@ def _results(study: WorkPrecision) -> Table:
         flat = f"{whole[-1].plateau:.1e}" if whole else "–"
         slope = f"{curve.slope:.2f} ± {curve.slope_error:.2f}"
         order = slope if math.isfinite(curve.slope) else f"– ({curve.slope_reason})"
-        prices = [price(curve, error, "work") for error in errors]
+        prices = [*(curve.price(error) for error in errors), curve.price(1e-3, "seconds")]
         why = f"{len(failed)} of {len(curve.points)}: {failed[0].settings}: {failed[0].reason}" if failed else ""
-        rows.append((*who, reached, flat, order, *prices, price(curve, 1e-3, "seconds"), why))
+        rows.append((*who, reached, flat, order, *(price.text if price else "–" for price in prices), why))
     return Table(
         f"work-results-{study.case.name}",
         f"What an error costs: {study.case.title}",
@@ -193,9 +294,7 @@ def summarise_work_precision(studies: Sequence[WorkPrecision]) -> dict[str, Any]
             "references": {name: _plain(asdict(reference)) for name, reference in study.references.items()},
             "contenders": {
                 key: {
-                    "name": curve.contender.name,
-                    "family": curve.contender.family,
-                    "equation": curve.contender.equation,
+                    **{name: getattr(curve.contender, name) for name in ("name", "family", "equation")},
                     "held": _plain(curve.held),
                     **_plain({name: getattr(curve, name) for name in ("slope", "slope_error", "slope_reason")}),
                     "points": [_plain(asdict(point)) for point in curve.points],
@@ -209,12 +308,9 @@ def summarise_work_precision(studies: Sequence[WorkPrecision]) -> dict[str, Any]
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    def plain(value: Any) -> Any:
-        if isinstance(value, float):
-            return value if math.isfinite(value) else None
-        return value if isinstance(value, (bool, int, str)) else str(value)
-
-    return {name: plain(value) for name, value in values.items()}
+    finite = {name: finite_or_none(value) if isinstance(value, float) else value for name, value in values.items()}
+    known = (bool, int, float, str, type(None))
+    return {name: value if isinstance(value, known) else str(value) for name, value in finite.items()}
 
 
 CHAPTER: Final = Chapter(

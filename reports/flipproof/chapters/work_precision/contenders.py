@@ -21,12 +21,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
 from engine_check.solver import ENGINES
 from flipproof.chapters.solvers import LIMITS
+from flipproof.frame.solvers import Run
 from flipproof.frame.twins import usual_rest_speed
 from ode_reference.models import MODELS
 from slicemodel import Bottle, Scenario
@@ -87,8 +88,18 @@ CASES: Final[Mapping[str, Case]] = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
+class Grids(NamedTuple):
+    """Number of levels, and the members of each: their steps at the first level, as multiples of COMMON."""
+
+    levels: int
+    members: tuple[int, ...]
+
+    def settings(self, of: Callable[[int], dict[str, Any]]) -> tuple[tuple[dict[str, Any], ...], ...]:
+        """Return the setting of every member of every level, from its number of steps, which doubles each time."""
+        return tuple(tuple(of(COMMON * member * 2**level) for member in self.members) for level in range(self.levels))
+
+
+class Asked(NamedTuple):
     """The relative tolerances of a method, and the equations that it is asked for; none: all that have a contender."""
 
     rtol: tuple[float, ...]
@@ -97,40 +108,34 @@ class Asked:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effort:
-    """How much is run: throws, levels, members of a level as multiples of COMMON steps, and what methods are asked."""
+    """How much is run: throws, grids of schemes and engines, and what methods are asked."""
 
     name: str
     cases: tuple[str, ...]
-    scheme_levels: int
-    scheme_members: tuple[int, ...]
-    engine_levels: int
-    engine_members: tuple[int, ...]
+    schemes: Grids
+    engines: Grids
     methods: Mapping[str, Asked]
 
 
 COMPLETE: Final = Effort(
     name="complete",
     cases=tuple(CASES),
-    scheme_levels=10,
-    scheme_members=(4, 5, 6, 7),
-    engine_levels=7,
-    engine_members=(4, 5, 6, 7),
-    methods=dict.fromkeys(METHODS, Asked(rtol=(1e-3, 1e-5, 1e-7, 1e-9, 1e-11))),
+    schemes=Grids(10, (4, 5, 6, 7)),
+    engines=Grids(7, (4, 5, 6, 7)),
+    methods=dict.fromkeys(METHODS, Asked((1e-3, 1e-5, 1e-7, 1e-9, 1e-11))),
 )
 """By command only; a few minutes."""
 
 FULL: Final = replace(
     COMPLETE,
     name="full",
-    scheme_levels=7,
-    scheme_members=(4, 5, 6),
-    engine_levels=5,
-    engine_members=(4, 6),
+    schemes=Grids(7, (4, 5, 6)),
+    engines=Grids(5, (4, 6)),
     methods={
-        "DOP853": Asked(rtol=(1e-3, 1e-6, 1e-9, 1e-11)),
+        "DOP853": Asked((1e-3, 1e-6, 1e-9, 1e-11)),
         # The implicit methods on an equation without recoil and on one with it.
-        "LSODA": Asked(rtol=(1e-3, 1e-6, 1e-9, 1e-11), equations=("eq8", "free-flight")),
-        "Radau": Asked(rtol=(1e-5, 1e-8), equations=("eq8", "free-flight")),
+        "LSODA": Asked((1e-3, 1e-6, 1e-9, 1e-11), ("eq8", "free-flight")),
+        "Radau": Asked((1e-5, 1e-8), ("eq8", "free-flight")),
     },
 )
 
@@ -138,11 +143,9 @@ QUICK: Final = replace(
     FULL,
     name="quick",
     cases=("impacts",),
-    scheme_levels=6,
-    scheme_members=(4, 6),
-    engine_levels=4,
-    engine_members=(4,),
-    methods={"DOP853": Asked(rtol=(1e-3, 1e-5, 1e-7)), "LSODA": Asked(rtol=(1e-3, 1e-5, 1e-7), equations=("eq8",))},
+    schemes=Grids(6, (4, 6)),
+    engines=Grids(4, (4,)),
+    methods={"DOP853": Asked((1e-3, 1e-5, 1e-7)), "LSODA": Asked((1e-3, 1e-5, 1e-7), ("eq8",))},
 )
 
 
@@ -172,6 +175,17 @@ class Contender:
         """Unique among the contenders of a throw: a method competes once for each equation."""
         return f"{self.name} on {self.equation}"
 
+    def runs(self, case: Case) -> list[list[Run]]:
+        """Return the runs of every level."""
+        label = f"work, {case.name}, {self.key}"
+        return [
+            [
+                Run(self.solver, case.scenario, {**self.fixed, **settings}, f"{label}, {k}, {member}")
+                for member, settings in enumerate(level)
+            ]
+            for k, level in enumerate(self.levels)
+        ]
+
 
 def contenders(case: Case, effort: Effort) -> tuple[Contender, ...]:
     """Return all who compete on a throw: schemes, engines, then methods for each equation that one of these solves."""
@@ -196,9 +210,6 @@ def left_out(effort: Effort) -> dict[str, str]:
                 f"left to benchmarks/work_precision.py for its time; the size «{effort.name}» asks where most compete"
             )
     for engine in ENGINES.values():
-        for frame in engine.frames:
-            if frame not in EQUATION_OF_FRAME:
-                reasons[f"{engine.name}, frame {frame}"] = "no model states the equation of this frame"
         for contact in engine.contacts:
             if contact != "overlap":
                 reasons[f"{engine.name}, slices = {contact}"] = (
@@ -206,13 +217,6 @@ def left_out(effort: Effort) -> dict[str, str]:
                 )
     unthrown = (name for name in CASES if name not in effort.cases)
     return reasons | {f"throw «{name}»": f"the size «{effort.name}» takes one throw" for name in unthrown}
-
-
-def _levels(
-    members: tuple[int, ...], count: int, setting: Callable[[int], dict[str, Any]]
-) -> tuple[tuple[dict[str, Any], ...], ...]:
-    """Return the setting of every member of every level, from its number of steps, which doubles with each level."""
-    return tuple(tuple(setting(COMMON * member * 2**level) for member in members) for level in range(count))
 
 
 def _schemes(effort: Effort) -> Iterator[Contender]:
@@ -224,7 +228,7 @@ def _schemes(effort: Effort) -> Iterator[Contender]:
             equation=EQUATION_OF_SCHEME.get(name, OWN_LIMIT + name),
             fixed={"store": "summary", "rebound": "in-step" if scheme.form.in_step else "grid"},
             # Points of the grid: one more than steps.
-            levels=_levels(effort.scheme_members, effort.scheme_levels, lambda steps: {"steps": steps + 1}),
+            levels=effort.schemes.settings(lambda steps: {"steps": steps + 1}),
         )
 
 
@@ -235,8 +239,6 @@ def _engines(case: Case, effort: Effort) -> Iterator[Contender]:
     duration = case.scenario.duration
     for engine in ENGINES.values():
         for frame in engine.frames:
-            if frame not in EQUATION_OF_FRAME:
-                continue
             # Iterations by rule, where the engine's world iterates; they depend on the throw, not on dt.
             iterations = ITERATIONS if frame == "rotating" else enough_iterations(case.scenario)
             yield Contender(
@@ -246,7 +248,7 @@ def _engines(case: Case, effort: Effort) -> Iterator[Contender]:
                 equation=EQUATION_OF_FRAME[frame],
                 fixed={"frame": frame, "times": case.times}
                 | ({"iterations": iterations} if engine.name == "pymunk" else {}),
-                levels=_levels(effort.engine_members, effort.engine_levels, lambda steps: {"dt": duration / steps}),
+                levels=effort.engines.settings(lambda steps: {"dt": duration / steps}),
             )
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, Literal
+from itertools import accumulate
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -28,11 +29,24 @@ FLOOR_COLOUR: Final = "#c8c8c8"
 ROOM: Final = 0.54
 """Share of a panel's width that is left for the labels."""
 
+HIGHEST: Final = 2.0
+"""Largest error on the axes [omega_0]."""
+
 LINE_HEIGHT: Final = 0.075
 """Least distance of two labels, as a share of the panel's height."""
 
-Limits = tuple[tuple[float, float], tuple[float, float]]
-"""Ends of the axes of cost and of error."""
+
+Label = tuple[tuple[float, float], str, str]
+"""Where a curve ends, at its last level or at the top edge above its dearest failure; its words; their colour."""
+
+
+class Limits(NamedTuple):
+    """Least cost on the axes, the cost beside which labels begin, the largest cost, and the least error."""
+
+    left: float
+    beside: float
+    right: float
+    bottom: float
 
 
 @styled
@@ -57,78 +71,57 @@ def figure_work_precision(study: WorkPrecision, cost: Cost = "work") -> Figure:
 
 def _limits(study: WorkPrecision, cost: Cost) -> Limits:
     costs = [point.cost(cost) for curve in study.curves.values() for point in curve.points]
-    finite = [value for value in costs if math.isfinite(value) and value > 0.0]
-    low, high = (min(finite), max(finite)) if finite else (1.0, 10.0)
+    finite = [value for value in costs if math.isfinite(value) and value > 0.0] or [1.0, 10.0]
     floors = [reference.floor for reference in study.references.values() if math.isfinite(reference.floor)]
-    low, high = low / 1.6, 1.6 * high
-    return (low, high * (high / low) ** (ROOM / (1.0 - ROOM))), (max(1e-14, min([1e-10, *floors]) / 10), 2.0)
-
-
-def _plain(value: float, _: float) -> str:
-    """Return a power of ten as plain text: typeset, the ticks of eight panels cost half a second."""
-    return f"1e{round(math.log10(value))}"
-
-
-def _beside(costs: tuple[float, float]) -> float:
-    """Return the cost at which the labels begin."""
-    low, high = costs
-    return math.exp(ROOM * math.log(low) + (1.0 - ROOM) * math.log(high))
+    left, beside = min(finite) / 1.6, 1.6 * max(finite)
+    right = beside * (beside / left) ** (ROOM / (1.0 - ROOM))
+    return Limits(left, beside, right, max(1e-14, min([1e-10, *floors]) / 10))
 
 
 def _panel(axes: Axes, study: WorkPrecision, equation: str, cost: Cost, limits: Limits) -> None:
     floor = study.references[equation].floor
-    axes.set(xscale="log", yscale="log", xlim=limits[0], ylim=limits[1])
+    axes.set(xscale="log", yscale="log", xlim=(limits.left, limits.right), ylim=(limits.bottom, HIGHEST))
     # No ticks under the labels.
-    decades = np.arange(math.ceil(math.log10(limits[0][0])), math.floor(math.log10(_beside(limits[0]))) + 1)
+    decades = np.arange(math.ceil(math.log10(limits.left)), math.floor(math.log10(limits.beside)) + 1)
     axes.xaxis.set_major_locator(FixedLocator((10.0**decades).tolist()))
     axes.yaxis.set_major_locator(LogLocator(100.0, numticks=12))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_minor_locator(NullLocator())
-        axis.set_major_formatter(_plain)
+        # Typeset, the ticks of eight panels cost half a second.
+        axis.set_major_formatter(lambda value, _: f"1e{round(math.log10(value))}")
     words = f"equation {equation}" if equation in MODELS else equation
     if math.isfinite(floor):
-        axes.axhspan(limits[1][0], floor, color=FLOOR_COLOUR, linewidth=0, zorder=0)
-    axes.set_title(
-        words + (f", floor {floor:.0e}" if math.isfinite(floor) else ", no reference"), fontsize=9.5, loc="left"
-    )
+        axes.axhspan(limits.bottom, floor, color=FLOOR_COLOUR, linewidth=0, zorder=0)
+    words += f", floor {floor:.0e}" if math.isfinite(floor) else ", no reference"
+    axes.set_title(words, fontsize=9.5, loc="left")
     labels = []
     counts = dict.fromkeys(LINES, 0)
     for curve in study.of(equation):
-        family = curve.contender.family
-        style = _style(curve, counts[family])
-        counts[family] += 1
-        at = _curve(axes, curve, floor, cost, style)
-        if at is not None:
-            labels.append((at, _label(curve), style["color"]))
-    _write(axes, labels, limits)
+        labels.append(_curve(axes, curve, counts[curve.contender.family], cost))
+        counts[curve.contender.family] += 1
+    _write(axes, [label for label in labels if label is not None], limits)
 
 
-def _style(curve: Curve, k: int) -> dict[str, Any]:
-    """Return colour, line and marker: the line tells the family, the marker who within it."""
-    contender = curve.contender
+def _curve(axes: Axes, curve: Curve, k: int, cost: Cost) -> Label | None:
+    """Draw a curve, the ``k``-th of its family; return its label if it has a point.
+
+    The line tells the family, the marker who within it.
+    """
+    contender, floor = curve.contender, curve.reference.floor
     known = STYLES.get(contender.name) or STYLES.get(contender.solver if contender.family == "engine" else "")
-    markers = MARKERS[contender.family]
-    return {
-        "color": known["color"] if known else COLOURS.get(contender.name, OTHERS[k % len(OTHERS)]),
-        "linestyle": LINES[contender.family],
-        "marker": markers[k % len(markers)],
-    }
-
-
-def _curve(axes: Axes, curve: Curve, floor: float, cost: Cost, style: Mapping[str, Any]) -> tuple[float, float] | None:
-    """Draw a curve; return where it ends: its last level, or the top edge above its dearest failure."""
-    colour = style["color"]
+    colour = known["color"] if known else COLOURS.get(contender.name, OTHERS[k % len(OTHERS)])
+    marker = MARKERS[contender.family][k % len(MARKERS[contender.family])]
     whole = [point for point in curve.whole if math.isfinite(point.cost(cost))]
     x = np.array([point.cost(cost) for point in whole])
     low, y, high = (
         np.array([max(getattr(point, name), floor) for point in whole]) for name in ("lowest", "error", "highest")
     )
-    axes.plot(x, y, color=colour, linestyle=style["linestyle"], linewidth=1.3)
+    axes.plot(x, y, color=colour, linestyle=LINES[contender.family], linewidth=1.3)
     axes.vlines(x, low, high, color=colour, linewidth=0.8, alpha=0.6)
     hollow = np.array([point.at_floor for point in whole], dtype=bool)
     for chosen, face in ((~hollow, colour), (hollow, "white")):
         axes.plot(
-            x[chosen], y[chosen], linestyle="none", marker=style["marker"], markersize=4.5, markerfacecolor=face,
+            x[chosen], y[chosen], linestyle="none", marker=marker, markersize=4.5, markerfacecolor=face,
             markeredgecolor=colour,
         )  # fmt: skip
     failed = [point.cost(cost) for point in curve.failed if math.isfinite(point.cost(cost))]
@@ -137,34 +130,28 @@ def _curve(axes: Axes, curve: Curve, floor: float, cost: Cost, style: Mapping[st
             failed, np.ones(len(failed)), "x", color=colour, markersize=6, markeredgewidth=1.5,
             transform=axes.get_xaxis_transform(), clip_on=False, zorder=5,
         )  # fmt: skip
-    if whole:
-        return float(x.max()), float(y[-1])
-    return (max(failed), 1.0) if failed else None
+    if not whole and not failed:
+        return None
+    words = "" if math.isnan(curve.slope) else f"  p {curve.slope:.2f} ± {curve.slope_error:.2f}"
+    words = words if curve.whole else f": {curve.failed[0].reason.partition(':')[0]}"
+    at = (float(x.max()), float(y[-1])) if whole else (max(failed), 1.0)
+    return at, contender.name + words, colour
 
 
-def _label(curve: Curve) -> str:
-    if not curve.whole:
-        return f"{curve.contender.name}: {curve.failed[0].reason.partition(':')[0]}"
-    slope = "" if math.isnan(curve.slope) else f"  p {curve.slope:.2f} ± {curve.slope_error:.2f}"
-    return curve.contender.name + slope
-
-
-def _write(axes: Axes, labels: Sequence[tuple[tuple[float, float], str, str]], limits: Limits) -> None:
+def _write(axes: Axes, labels: Sequence[Label], limits: Limits) -> None:
     """Write the labels beside the dearest point of all, in the order of the curves' ends and clear of each other."""
-    low, high = limits[1]
-    span = math.log(high / low)
+    low = limits.bottom
+    span = math.log(HIGHEST / low)
     placed = sorted(labels, key=lambda label: -label[0][1])
     heights = [min(math.log(at[1] / low) / span, 0.93) for at, _, _ in placed]
-    for k in range(1, len(heights)):
-        heights[k] = min(heights[k], heights[k - 1] - LINE_HEIGHT)
+    heights = list(accumulate(heights, lambda above, height: min(height, above - LINE_HEIGHT)))
     # Labels that were pushed below the panel push the others up again.
-    for k in reversed(range(len(heights))):
-        least = 0.05 if k == len(heights) - 1 else heights[k + 1] + LINE_HEIGHT
-        heights[k] = max(heights[k], least)
+    heights[-1:] = [max(height, 0.05) for height in heights[-1:]]
+    heights = list(accumulate(heights[::-1], lambda below, height: max(height, below + LINE_HEIGHT)))[::-1]
     for (at, words, colour), height in zip(placed, heights, strict=True):
-        beside = math.exp(math.log(low) + height * span)
+        aloft = math.exp(math.log(low) + height * span)
         note = axes.annotate(
-            words, at, xytext=(_beside(limits[0]), beside), textcoords="data", ha="left", va="center", fontsize=8.0,
+            words, at, xytext=(limits.beside, aloft), textcoords="data", ha="left", va="center", fontsize=8.0,
             color=tuple(0.55 * part for part in to_rgb(colour)),  # darker: small letters on white and on the floor
             arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.5, "alpha": 0.6, "shrinkB": 4},
         )  # fmt: skip

@@ -22,6 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
@@ -51,9 +52,9 @@ class Price(NamedTuple):
     bound: bool
 
     @property
-    def limit(self) -> str:
-        """A sign before the value that is a bound."""
-        return "≤ " if self.bound else ""
+    def text(self) -> str:
+        """The value, with a sign before one that is a bound."""
+        return f"{'≤ ' if self.bound else ''}{self.value:.2g}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,6 +103,7 @@ class Curve:
     """
 
     contender: Contender
+    reference: Reference
     points: tuple[Point, ...]
     held: Mapping[str, Any]
     slope: float
@@ -118,31 +120,13 @@ class Curve:
         """The levels that failed."""
         return tuple(point for point in self.points if not math.isfinite(point.error))
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WorkPrecision:
-    """The diagram of one throw. Every contender is in ``curves`` or, with its reason, in ``absent``."""
-
-    case: Case
-    references: Mapping[str, Reference]
-    curves: Mapping[str, Curve]
-    absent: Mapping[str, str]
-
-    def of(self, equation: str) -> tuple[Curve, ...]:
-        """Return the curves of one equation."""
-        return tuple(curve for curve in self.curves.values() if curve.contender.equation == equation)
-
-    def named(self, name: str) -> Curve | None:
-        """Return the first curve of a contender, or None if it does not compete."""
-        return next((curve for curve in self.curves.values() if curve.contender.name == name), None)
-
-    def price(self, curve: Curve, error: float, cost: Cost = "work") -> Price | None:
+    def price(self, error: float, cost: Cost = "work") -> Price | None:
         """Return the cost from which on a contender keeps ``error``, interpolated between two levels.
 
         From which on: a level that is better than a finer one was lucky. None if no level keeps it, or if the error is
         below the floor, where nobody can tell.
         """
-        floor, points = self.references[curve.contender.equation].floor, curve.points
+        floor, points = self.reference.floor, self.points
         first = len(points)
         while first > 0 and max(points[first - 1].error, floor) <= error:
             first -= 1
@@ -158,52 +142,52 @@ class WorkPrecision:
         return Price(math.exp(x0 + share * (x1 - x0)), bound=False)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkPrecision:
+    """The diagram of one throw. Every contender is in ``curves`` or, with its reason, in ``absent``."""
+
+    case: Case
+    references: Mapping[str, Reference]
+    curves: Mapping[str, Curve]
+    absent: Mapping[str, str]
+
+    def of(self, equation: str) -> tuple[Curve, ...]:
+        """Return the curves of one equation."""
+        return tuple(curve for curve in self.curves.values() if curve.contender.equation == equation)
+
+
 def plan_work_precision(case: Case, effort: Effort) -> list[Run]:
     """Return every run of one throw: references, witnesses, contenders."""
     rivals = contenders(case, effort)
-    runs = [run for equation in _equations(rivals) for run in _plan_reference(case, equation, rivals)]
+    levels = [*_plan_references(case, rivals).values(), *(level for rival in rivals for level in rival.runs(case))]
+    return list(chain.from_iterable(levels))
+
+
+def _plan_references(case: Case, rivals: Iterable[Contender]) -> dict[str, list[Run]]:
+    """Return the reference and the witnesses of every equation that somebody solves."""
+    runs: dict[str, list[Run]] = {}
     for rival in rivals:
-        for level, members in enumerate(rival.levels):
-            runs += [_rival_run(case, rival, settings, f"{level}, {member}") for member, settings in enumerate(members)]
-    return runs
-
-
-def _equations(rivals: Iterable[Contender]) -> list[str]:
-    return list(dict.fromkeys(rival.equation for rival in rivals))
-
-
-def _rival_run(case: Case, rival: Contender, settings: Mapping[str, Any], words: str = "") -> Run:
-    label = f"work, {case.name}, {rival.key}, {words}"
-    return Run(rival.solver, case.scenario, {**rival.fixed, **settings}, label)
-
-
-def _plan_reference(case: Case, equation: str, rivals: Iterable[Contender]) -> list[Run]:
-    """Return the reference of an equation and its witnesses."""
-    scenario, solver = case.scenario, equation
-    if equation in (*MODELS, AT_REST):
-        if equation == AT_REST:
-            scenario, solver = replace(scenario, frozen=True), "eq8"
-        usual, omega0 = usual_rest_speed(solver), abs(scenario.omega0)
-
-        def witness(method: str, rtol: float, radians: float) -> dict[str, Any]:
-            longest = min(radians, scenario.duration * omega0) / omega0
-            tolerances = {"rtol": rtol, "atol": 1e-3 * rtol, "rest_speed": usual, "max_step": longest}
-            return {"method": method, **tolerances, "times": case.times}
-
-        asked = [
-            {"method": "taylor", "rest_speed": usual / 10, "times": case.times},
-            witness("LSODA", 1e-10, 0.02),
-            witness("DOP853", 1e-11, 0.04),
+        equation, solver, scenario = rival.equation, rival.equation, case.scenario
+        if equation in runs:
+            continue
+        if equation in (*MODELS, AT_REST):
+            if equation == AT_REST:
+                scenario, solver = replace(scenario, frozen=True), "eq8"
+            usual, omega0 = usual_rest_speed(solver), abs(scenario.omega0)
+            asked: list[dict[str, Any]] = [{"method": "taylor", "rest_speed": usual / 10, "times": case.times}]
+            for method, rtol, radians in (("LSODA", 1e-10, 0.02), ("DOP853", 1e-11, 0.04)):
+                longest = min(radians, scenario.duration * omega0) / omega0
+                tolerances = {"rtol": rtol, "atol": 1e-3 * rtol, "rest_speed": usual, "max_step": longest}
+                asked.append({"method": method, **tolerances, "times": case.times})
+        else:
+            # The scheme's own limit: the scheme on a grid eight times finer than its last level, and on half of that.
+            solver, finest = rival.solver, 8 * (rival.levels[-1][0]["steps"] - 1)
+            asked = [{**rival.fixed, "steps": finest // coarser + 1} for coarser in (1, 2)]
+        runs[equation] = [
+            Run(solver, scenario, settings, f"work, {case.name}, {f'witness {k}' if k else 'reference'}, {equation}")
+            for k, settings in enumerate(asked)
         ]
-    else:
-        # The scheme's own limit: the scheme on a grid eight times finer than its last level, and on half of that.
-        rival = next(rival for rival in rivals if rival.equation == equation)
-        solver, finest = rival.solver, 8 * (rival.levels[-1][0]["steps"] - 1)
-        asked = [{**rival.fixed, "steps": finest // coarser + 1} for coarser in (1, 2)]
-    return [
-        Run(solver, scenario, settings, f"work, {case.name}, {f'witness {k}' if k else 'reference'}, {equation}")
-        for k, settings in enumerate(asked)
-    ]
+    return runs
 
 
 def study_work_precision(case: Case, effort: Effort, made: Mapping[Run, Made]) -> WorkPrecision:
@@ -216,17 +200,15 @@ def study_work_precision(case: Case, effort: Effort, made: Mapping[Run, Made]) -
     """
     rivals = contenders(case, effort)
     truths = {
-        equation: _reference(case, equation, [made[run] for run in _plan_reference(case, equation, rivals)])
-        for equation in _equations(rivals)
+        equation: _reference(case, equation, [made[run] for run in runs])
+        for equation, runs in _plan_references(case, rivals).items()
     }
-    curves = {}
-    for rival in rivals:
-        reference, truth = truths[rival.equation]
-        runs = [[made[_rival_run(case, rival, settings)] for settings in level] for level in rival.levels]
-        points = tuple(
-            _point(case, members, level, reference, truth) for members, level in zip(runs, rival.levels, strict=True)
+    curves = {
+        rival.key: _curve(
+            case, rival, [[made[run] for run in level] for level in rival.runs(case)], *truths[rival.equation]
         )
-        curves[rival.key] = _curve(rival, points, _held(rival, runs), reference)
+        for rival in rivals
+    }
     references = {equation: reference for equation, (reference, _) in truths.items()}
     return WorkPrecision(case=case, references=references, curves=curves, absent=left_out(effort))
 
@@ -234,32 +216,34 @@ def study_work_precision(case: Case, effort: Effort, made: Mapping[Run, Made]) -
 def _reference(case: Case, equation: str, runs: Sequence[Made]) -> tuple[Reference, FloatArray | None]:
     """Return an equation's reference and its omega at the common times; None if there is none."""
     words = "; ".join(words_of(run.run.settings) for run in runs)
-    problem = next(filter(None, map(_why_failed, runs)), "")
-    if problem:
+    if problem := _why_failed(runs):
         return Reference(equation=equation, words=words, reason=problem), None
-    truth, *witnesses = [_omega(run, case) for run in runs]
-    errors = [_errors(case, witness, truth) for witness in witnesses]
+    truth = _omega(case, runs[0])
+    errors = [_errors(case, witness, truth) for witness in runs[1:]]
     floor, plateau_floor = (max(ROUND_OFF, *column) for column in zip(*errors, strict=True))
     return Reference(equation=equation, floor=floor, plateau_floor=plateau_floor, words=words), truth
 
 
-def _omega(made: Made, case: Case) -> FloatArray:
+def _omega(case: Case, made: Made) -> FloatArray:
     return np.asarray(made.flight.omega[at_times(made.flight.t, case.times)])
 
 
-def _errors(case: Case, omega: FloatArray, truth: FloatArray) -> tuple[float, float]:
+def _errors(case: Case, made: Made, truth: FloatArray) -> tuple[float, float]:
     """Return the largest error and that of the plateau, as fractions of omega_0."""
-    omega0 = case.scenario.omega0
+    omega, omega0 = _omega(case, made), case.scenario.omega0
     largest = float(np.abs(omega - truth).max() / abs(omega0))
     return largest, abs(plateau(case.times, omega, omega0) - plateau(case.times, truth, omega0))
 
 
-def _why_failed(made: Made) -> str:
-    """Return why a run cannot be used, or nothing."""
-    if made.trajectory is None:
-        return made.reason or "it returned nothing"
-    run = made.trajectory
-    return "" if run.ok else f"{run.status}: {run.message.removeprefix(f'{run.status} ')}"
+def _why_failed(runs: Iterable[Made]) -> str:
+    """Return why the first run that failed cannot be used, or nothing."""
+    for made in runs:
+        if made.trajectory is None:
+            return made.reason or "it returned nothing"
+        if not made.trajectory.ok:
+            status = made.trajectory.status
+            return f"{status}: {made.trajectory.message.removeprefix(f'{status} ')}"
+    return ""
 
 
 def _steps(trajectory: Trajectory) -> float:
@@ -294,10 +278,10 @@ def _point(
         "steps": _geometric([math.nan if flight is None else _steps(flight) for flight in flights]),
         "seconds": _geometric([made.seconds for made in members]),
     }
-    reason = next(filter(None, map(_why_failed, members)), "")
+    reason = _why_failed(members)
     if reason or truth is None:
         return Point(**costs, reason=reason or f"no reference: {reference.reason}")
-    errors = [_errors(case, _omega(made, case), truth) for made in members]
+    errors = [_errors(case, made, truth) for made in members]
     largest, flat = (np.array(column) for column in zip(*errors, strict=True))
     error = float(np.sqrt(np.mean(largest**2)))
     return Point(
@@ -312,8 +296,7 @@ def _point(
 
 def _geometric(values: Sequence[float]) -> float:
     """Return the geometric mean; NaN if a value is missing or no cost was measured."""
-    positive = all(value > 0.0 for value in values)
-    return float(np.exp(np.mean(np.log(values)))) if positive else math.nan
+    return float(np.exp(np.mean(np.log(values)))) if all(value > 0.0 for value in values) else math.nan
 
 
 def words_of(settings: Mapping[str, Any]) -> str:
@@ -325,14 +308,20 @@ def words_of(settings: Mapping[str, Any]) -> str:
     )
 
 
-def _held(rival: Contender, runs: Sequence[Sequence[Made]]) -> dict[str, Any]:
-    """Return what the first run that began reports of its settings, without what is refined or follows from it."""
+def _curve(
+    case: Case,
+    rival: Contender,
+    runs: Sequence[Sequence[Made]],
+    reference: Reference,
+    truth: FloatArray | None,
+) -> Curve:
+    """Return the curve of a contender; what it held is what the first run that began reports of its settings."""
+    points = tuple(
+        _point(case, members, level, reference, truth) for members, level in zip(runs, rival.levels, strict=True)
+    )
     reported = next((m.trajectory.settings for level in runs for m in level if m.trajectory is not None), rival.fixed)
-    refined = {*rival.levels[0][0], "dt", "step", "step_least", "points", "times"}
-    return {name: value for name, value in reported.items() if name not in refined and value is not None}
-
-
-def _curve(rival: Contender, points: tuple[Point, ...], held: Mapping[str, Any], reference: Reference) -> Curve:
+    refined = {*rival.levels[0][0], "dt", "step", "step_least", "points", "times"}  # or follows from what is
+    held = {name: value for name, value in reported.items() if name not in refined and value is not None}
     # Below three floors the reference's own error bends a slope.
     used = [
         point for point in points if math.isfinite(point.error) and 3.0 * reference.floor <= point.error <= SATURATED
@@ -348,4 +337,5 @@ def _curve(rival: Contender, points: tuple[Point, ...], held: Mapping[str, Any],
         if slope_error > 0.25 * max(1.0, abs(slope)):
             reason = f"errors fall by no law of cost: {slope:.1f} ± {slope_error:.1f}"
             slope = slope_error = math.nan
-    return Curve(contender=rival, points=points, held=held, slope=slope, slope_error=slope_error, slope_reason=reason)
+    slopes: dict[str, Any] = {"slope": slope, "slope_error": slope_error, "slope_reason": reason}
+    return Curve(contender=rival, reference=reference, points=points, held=held, **slopes)
