@@ -77,7 +77,7 @@ def fly(form, constants, frame, y, t, record, rebounds) -> Run:
     fade_minus_1, fade = math.expm1(-constants.gamma * dt), math.exp(-constants.gamma * dt)
     water_share = (1.0 - constants.bottle_share) / n
     watched = Watched(np.empty(n, np.int64), np.empty(n), np.empty(n), np.empty(n), np.empty(n))
-    # All slices at first, for their sums.
+    # A flock of all slices, for their sums; the first step gathers another.
     flock, many = gathered(NO_STEP, y, v, 0, watched, -math.inf, math.inf, 0.0)
     first, second, speed, offset = flock.y, flock.y_y, 0.0, water_share * flock.y
     spin, angle, moment = frame.omega0, frame.theta0, inertia_about(frame, n, first, second, offset)
@@ -87,9 +87,12 @@ def fly(form, constants, frame, y, t, record, rebounds) -> Run:
     since, gather_at = NO_STEP, 1
 
     for k in range(1, len(t)):
-        w, weighed = spin, (first, second, offset)
+        w = spin
+        # A lagged program weighs the slices of the step before, about the centre of mass it knew then.
+        weighed = first, second, offset
         if not frame.frozen:
             centre = centre_of_repulsion(form, constants, offset, water_share * speed, angle, w)
+            # ``midpoint`` tries a step, and then makes it with what is known of its middle.
             for trial in (True, False):
                 if trial and not form.midpoint:
                     continue
@@ -127,7 +130,6 @@ def fly(form, constants, frame, y, t, record, rebounds) -> Run:
             # At the cap r is r_min, of which L/2 - (r_max - L/2) may miss a digit.
             for i in range(n):
                 r[i] = frame.r_min if r[i] == -frame.reach else r[i] + frame.middle
-        # A lagged program weighs the slices of the step before, about the centre of mass it knew then.
         if not form.lagged:
             weighed = first, second, water_share * first
         offset, moment = water_share * weighed[0], inertia_about(frame, n, *weighed)

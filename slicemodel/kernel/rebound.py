@@ -55,16 +55,18 @@ def step(form, constants, one, watched, many, trial, log, count):
     i, y, v, y_new, v_new = watched
     # The greatest distance from the middle at which a slice does not rebound: strict compares with >, else with >=.
     limit = one.reach if form.strict else np.nextafter(one.reach, 0.0)
-    met = 0
+    past = 0
     for j in range(many):
         y_new[j], v_new[j] = moved(one.way, y[j], v[j])
-        met += may_rebound(form, limit, v[j], y_new[j], v_new[j])
-    for j in range(many if met > 0 else 0):
-        if may_rebound(form, limit, v[j], y_new[j], v_new[j]):
+        past += abs(y_new[j]) > limit
+    for j in range(many if past > 0 or form.in_step else 0):
+        # A slice that passes an end and comes back within the step leaves no other trace than its reversed velocity.
+        # (Written with | and &, because ``or`` and ``and`` would branch at every slice.)
+        if (abs(y_new[j]) > limit) | (form.in_step & (v[j] * v_new[j] < 0.0)):
             if trial and form.in_step and not at_rest(one, y[j], v[j]):
-                # A rebound in the step throws the slice back e-fold the way that it would get past the end.
-                past = max(abs(y_new[j]) - one.reach, 0.0)
-                y_new[j] -= math.copysign((1.0 + constants.restitution) * past, y_new[j])
+                # A rebound in the step throws it back e-fold the way that it would get past the end.
+                excess = max(abs(y_new[j]) - one.reach, 0.0)
+                y_new[j] -= math.copysign((1.0 + constants.restitution) * excess, y_new[j])
             elif trial:
                 y_new[j] = y[j]
             elif form.in_step:
@@ -83,15 +85,6 @@ def step(form, constants, one, watched, many, trial, log, count):
         if not trial:
             y[j], v[j] = y_j, v_j
     return first, second, speed, count
-
-
-@merged
-def may_rebound(form, limit, v, y_new, v_new):
-    """Return whether a slice is past an end after a step, or may have rebounded inside the step.
-
-    A slice that passes an end and comes back within the step leaves no other trace than its reversed velocity.
-    """
-    return (abs(y_new) > limit) | (form.in_step & (v * v_new < 0.0))
 
 
 @merged
@@ -131,7 +124,7 @@ def bounced(form, constants, one, watched, j, log, count):
         if v * v_end < 0.0:
             # A path turns at most once: an end beyond which the slice turns is hit before.
             turn = turning_time(constants.gamma, one.omega, x, v)
-            farthest, _ = moved(step_map(form, constants, one.omega, one.centre, turn), y, v)
+            farthest = one.centre + moved(step_map(form, constants, one.omega, 0.0, turn), x, v)[0]
             if abs(farthest) > one.reach and farthest * v > 0.0:
                 end, high = int(math.copysign(1.0, v)), turn
         if end == 0:
