@@ -125,7 +125,8 @@ def fly(form, constants, frame, y, t, record, rebounds) -> Run:
                         break
         if len(record.r) > 0:
             r, r_dot = record.r[k], record.v[k]
-            r[:], r_dot[:] = y, v
+            for i in range(n):
+                r[i], r_dot[i] = y[i], v[i]
             brought_up_to_date(since, r, r_dot, many, watched)
             # At the cap r is r_min, of which L/2 - (r_max - L/2) may miss a digit.
             for i in range(n):
