@@ -22,6 +22,9 @@ MOST_LISTED = 1 << 22
 """Rebounds there is room for at first: one for every fourth slice and step, as memory that is not touched costs
 nothing; a run with more of them is repeated with room for all."""
 
+ON_THE_CAP = 1e-15
+"""Distance, in units of L, within which a slice is put on the cap: four times the rounding of its place."""
+
 Store = Literal["full", "summary"]
 Rebound = Literal["grid", "in-step"]
 
@@ -132,11 +135,17 @@ def advance(
     """Run the compiled loop on one scenario; it writes to ``record`` and as many ``rebounds`` as there are rows."""
     from slicemodel import kernel
 
-    bottle = scenario.bottle
+    bottle, middle, r = scenario.bottle, scenario.bottle.length / 2, scenario.initial_positions()
+    reach = scenario.r_max - middle
+    record.r[:1], record.v[:1] = r, 0.0
+    y = r - middle
+    # The last slice of a full bottle lies on the cap, but for the rounding of where it is put.
+    if abs(y[-1] + reach) <= ON_THE_CAP * bottle.length:
+        y[-1] = -reach
     frame = kernel.Frame(
-        length=bottle.length,
+        middle=middle,
+        reach=reach,
         r_min=scenario.r_min,
-        r_max=scenario.r_max,
         slice_mass=scenario.slice_mass,
         bottle_mass=bottle.mass,
         bottle_inertia=bottle.mass * (bottle.radius * bottle.radius / 2 + bottle.length * bottle.length / 12),
@@ -144,8 +153,7 @@ def advance(
         theta0=scenario.theta0,
         frozen=scenario.frozen,
     )
-    dt = scenario.duration / (len(t) - 1)
-    run: Run = kernel.fly(form, constants, frame, scenario.initial_positions(), t, dt, record, rebounds)
+    run: Run = kernel.fly(form, constants, frame, y, t, record, rebounds)
     return run
 
 

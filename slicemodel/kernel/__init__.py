@@ -6,7 +6,7 @@ flock.py         slices that meet no end: one map moves them, their moments weig
 flight.py        the loop over the grid, omega from the conservation of angular momentum
 """
 
-from slicemodel.kernel.closed_form import path, step_coefficients
+from slicemodel.kernel.closed_form import moved, step_map
 from slicemodel.kernel.flight import Frame, Record, Run, fly
 
-__all__ = ["Frame", "Record", "Run", "fly", "path", "step_coefficients"]
+__all__ = ["Frame", "Record", "Run", "fly", "moved", "step_map"]

@@ -58,13 +58,21 @@ def hyperbolic(y):
 
 
 @merged
-def coefficients(form, constants, k_squared, fade_minus_1, fade, dt):
-    """Return a - 1, b, c, d of the closed-form step (module docstring of ``schemes.form``; Eq. 9c, 9d).
+def step_map(form, constants, omega, centre, t):
+    """Return the map of the closed-form step of any length t about a centre of repulsion."""
+    fade_minus_1, fade = math.expm1(-constants.gamma * t), math.exp(-constants.gamma * t)
+    return faded_map(form, constants, omega, centre, t, fade_minus_1, fade)
 
-    ``fade`` is E = exp(-gamma dt). a is close to 1 for a short step: a - 1 is formed without the subtraction, which
-    would lose the digits that move the slice (E C - 1 = expm1(-gamma dt) + E (C - 1)).
+
+@merged
+def faded_map(form, constants, omega, centre, dt, fade_minus_1, fade):
+    """Return the map of a step (module docstring of ``schemes.form``; Eq. 9c, 9d), given E - 1 and E = exp(-gamma dt).
+
+    a is close to 1 for a short step: a - 1 is formed without the subtraction, which would lose the digits that move the
+    slice (E C - 1 = expm1(-gamma dt) + E (C - 1)).
     """
     gamma = constants.gamma
+    k_squared = growth_rate_squared(form, constants, omega)
     y = k_squared * (dt * dt)
     odd, even = hyperbolic(y)
     cosh_minus_1 = y * even
@@ -73,26 +81,7 @@ def coefficients(form, constants, k_squared, fade_minus_1, fade, dt):
     c = (k_squared - gamma * gamma) * b
     signed = form.cosh_sign * fade
     d = signed + (form.sinh_sign * gamma * b + signed * cosh_minus_1)
-    return a_minus_1, b, c, d
-
-
-@merged
-def coefficients_at(form, constants, k_squared, t):
-    """Return a - 1, b, c, d of a step of any length t."""
-    return coefficients(form, constants, k_squared, math.expm1(-constants.gamma * t), math.exp(-constants.gamma * t), t)
-
-
-@compiled
-def step_coefficients(form, constants, omega, dt):
-    """Return a - 1, b, c, d of the closed-form step of any omega and dt."""
-    return coefficients_at(form, constants, growth_rate_squared(form, constants, omega), dt)
-
-
-@compiled
-def path(form, constants, omega, x, v, t):
-    """Return distance from the centre and velocity after time t, from distance x and velocity v."""
-    a_minus_1, b, c, d = step_coefficients(form, constants, omega, t)
-    return x + (a_minus_1 * x + b * v), c * x + d * v
+    return Map(a_minus_1, b, c, d, -a_minus_1 * centre, -c * centre)
 
 
 @compiled
@@ -120,7 +109,7 @@ def first_guess(gamma, omega, x, v, way, end):
 
 
 @merged
-def hit(form, constants, omega, k_squared, x, v, way, end, high):
+def hit(form, constants, omega, x, v, way, end, high):
     """Return when the path has made ``way`` and goes on towards ``end``, before ``high``, and the velocity then.
 
     Newton's method on the closed form, kept inside the bracket. The way, not the place, is compared: it keeps its
@@ -131,10 +120,10 @@ def hit(form, constants, omega, k_squared, x, v, way, end, high):
     if not low < t < high:
         t = high
     for _ in range(100):
-        a_minus_1, b, c, d = coefficients_at(form, constants, k_squared, t)
-        pushed, flown = a_minus_1 * x, b * v
+        path = step_map(form, constants, omega, 0.0, t)
+        pushed, flown = path.a_minus_1 * x, path.b * v
         gap = (pushed + flown) - way
-        speed = c * x + d * v
+        speed = path.c * x + path.d * v
         if gap * end > 0.0:
             high = t
         else:
@@ -146,9 +135,8 @@ def hit(form, constants, omega, k_squared, x, v, way, end, high):
             continue
         force = omega * omega * (x + pushed + flown) - 2.0 * constants.gamma * speed
         # What Newton leaves is shift^2 force / (2 speed); what the gap cannot tell is the rounding of its terms.
-        if shift * shift * abs(force) <= ROUNDING * abs(speed) * better or abs(gap) <= ROUNDING * (
-            abs(pushed) + abs(flown)
-        ):
+        rounding = ROUNDING * (abs(pushed) + abs(flown))
+        if shift * shift * abs(force) <= ROUNDING * abs(speed) * better or abs(gap) <= rounding:
             return better, speed + force * shift
         t = better
     return t, speed

@@ -50,10 +50,6 @@ class Flock(NamedTuple):
     horizon: float
 
 
-NOTHING = math.inf
-"""Between this and its negative lies no slice: so a flock is dissolved."""
-
-
 @merged
 def followed(first, then):
     """Return the map that does ``first`` and ``then``."""
@@ -95,58 +91,61 @@ def clear_of_ends(flock, way, reach, margin):
 
 
 @merged
-def room_to_turn(way, reach, centre, dt):
+def room_to_turn(one):
     """Return how far a slice that turns inside a step may go beyond where it was before, at most v dt.
 
     It turns if v and v' = c (y - y*) + d v differ in sign: then abs(v) is at most c abs(y - y*) / d, with d > 0. That
     holds of exact roots in the short steps of a flock; ``clear_of_ends`` refuses anything else.
     """
-    return dt * way.c / way.d * (reach + abs(centre))
+    return one.dt * one.way.c / one.way.d * (one.reach + abs(one.centre))
 
 
 @merged
 def foreseen(form, flock, since, one):
-    """Return the map of the flock after a step, and whether surely none of it meets an end in that step."""
-    after, clear = since, True
-    if flock.n > 0.0:
-        after = followed(since, one.way)
-        clear = clear_of_ends(flock, after, one.reach, 0.0)
-        if form.in_step:
-            # A slice that does not turn is between its two places; one that turns goes beyond the first.
-            room = room_to_turn(one.way, one.reach, one.centre, one.dt)
-            clear = clear and clear_of_ends(flock, since, one.reach, room)
-    return after, clear
+    """Return the map of the flock after a step, and whether surely none of it meets an end in that step.
+
+    A slice that does not turn in the step is between its two places; one that turns goes beyond the first.
+    """
+    if flock.n == 0.0:
+        return since, True
+    after = followed(since, one.way)
+    turning = not form.in_step or clear_of_ends(flock, since, one.reach, room_to_turn(one))
+    return after, turning and clear_of_ends(flock, after, one.reach, 0.0)
 
 
 @merged
-def room_for(form, constants, reach, omega, centre, dt, margin):
+def room_for(form, constants, one):
     """Return for how many steps to gather a flock, and ``low``, ``high`` and ``horizon`` of what it may hold.
 
     Where slices will be is only estimated here; ``clear_of_ends`` looks after it at every step.
     """
-    k_squared = growth_rate_squared(form, constants, omega)
-    force = k_squared * (reach + abs(centre))
-    lasting = math.sqrt(2.0 * PUSHED * reach / force)
-    steps = int(lasting / dt) if lasting < MOST_STEPS * dt else MOST_STEPS
+    k_squared = growth_rate_squared(form, constants, one.omega)
+    force = k_squared * (one.reach + abs(one.centre))
+    steps = int(min(math.sqrt(2.0 * PUSHED * one.reach / force) / one.dt, MOST_STEPS))
     if steps < FEWEST_STEPS or form.cosh_sign < 0.0:
-        return MOST_STEPS, NOTHING, -NOTHING, 0.0
-    horizon = steps * dt * (1.0 + CLEAR)
+        return MOST_STEPS, math.inf, -math.inf, 0.0
+    horizon = steps * one.dt * (1.0 + CLEAR)
     # What cosh(k horizon) is at most, and a tenth more; the centre of repulsion and omega change on the way, for which
     # some room is left. A slice at ``high`` is then carried from the centre to ``room``.
     growth = 1.0 + 0.55 * k_squared * horizon * horizon
-    room = (1.0 - SPARE) * reach - margin
-    low, high = max(-room, centre - (room + centre) / growth), min(room, centre + (room - centre) / growth)
-    return steps, low, high, horizon
+    room = (1.0 - SPARE) * one.reach - (room_to_turn(one) if form.in_step else 0.0)
+    low, high = one.centre - (room + one.centre) / growth, one.centre + (room - one.centre) / growth
+    return steps, max(-room, low), min(room, high), horizon
+
+
+@merged
+def brought_up_to_date(since, y, v, many, watched):
+    """Write y and v of all slices as they are now over those of the last gathering: of the flock, of those watched."""
+    for k in range(len(y) if many < len(y) else 0):
+        y[k], v[k] = moved(since, y[k], v[k])
+    for j in range(many):
+        y[watched.i[j]], v[watched.i[j]] = watched.y[j], watched.v[j]
 
 
 @compiled
 def gathered(since, y, v, many, watched, low, high, horizon):
     """Bring all slices up to date; return a flock of those between ``low`` and ``high``, and how many are watched."""
-    i, near_y, near_v, _, _ = watched
-    for k in range(len(y) if many < len(y) else 0):
-        y[k], v[k] = moved(since, y[k], v[k])
-    for j in range(many):
-        y[i[j]], v[i[j]] = near_y[j], near_v[j]
+    brought_up_to_date(since, y, v, many, watched)
     many = 0
     s_y = s_v = s_y_y = s_y_v = s_v_v = 0.0
     for k in range(len(y)):
@@ -159,6 +158,6 @@ def gathered(since, y, v, many, watched, low, high, horizon):
             s_y_v += y_k * v_k
             s_v_v += v_k * v_k
         else:
-            i[many], near_y[many], near_v[many] = k, y_k, v_k
+            watched.i[many], watched.y[many], watched.v[many] = k, y_k, v_k
             many += 1
     return Flock(float(len(y) - many), s_y, s_v, s_y_y, s_y_v, s_v_v, low, high, horizon), many

@@ -100,7 +100,7 @@ moved = numba.njit(lambda way, y, v: closed_form.moved(way, y, v))
 followed = numba.njit(lambda first, then: flock.followed(first, then))
 sums_of = numba.njit(lambda some, way: flock.sums_of(some, way))
 clear_of_ends = numba.njit(lambda some, way, reach, margin: flock.clear_of_ends(some, way, reach, margin))
-room_to_turn = numba.njit(lambda way, reach, centre, dt: flock.room_to_turn(way, reach, centre, dt))
+room_to_turn = numba.njit(lambda one: flock.room_to_turn(one))
 foreseen = numba.njit(lambda form, some, since, one: flock.foreseen(form, some, since, one))
 
 
@@ -170,7 +170,7 @@ def test_in_step_a_flock_needs_room_to_turn_where_it_was_before_the_step():
     on_grid, dt, reach = SCHEMES["exact-step"].form, 0.001, 0.1
     in_step = on_grid._replace(in_step=True)
     way = Map(0.0002, dt, 0.4, 1.0, 0.0, 0.0)
-    room = room_to_turn(way, reach, 0.0, dt)
+    room = room_to_turn(Step(way, reach, 10.0, 0.0, dt, dt))
     some = Flock(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.05, reach - 0.5 * room, 0.01)
 
     def clear(form, some, push):
@@ -197,15 +197,13 @@ def test_no_slice_turns_farther_out_than_said(gamma):
     for _ in range(400):
         omega, centre = random.uniform(1.0, 40.0), random.uniform(-0.5, 0.5)
         y = random.uniform(-reach, reach)
-        a_minus_1, b, c, d = kernel.step_coefficients(form, constants, omega, dt)
-        deepest = room_to_turn(Map(a_minus_1, b, c, d, -a_minus_1 * centre, -c * centre), reach, centre, dt)
-        v = -random.uniform(0.0, 1.5) * c * (y - centre) / d
+        way = kernel.step_map(form, constants, omega, centre, dt)
+        deepest = room_to_turn(Step(way, reach, omega, centre, dt, dt))
+        v = -random.uniform(0.0, 1.5) * way.c * (y - centre) / way.d
         times = np.linspace(0.0, dt, 101)
-        places = y + np.array(
-            [closed_form.path(form, constants, omega, y - centre, v, t)[0] - (y - centre) for t in times]
-        )
+        places = np.array([kernel.moved(kernel.step_map(form, constants, omega, centre, t), y, v)[0] for t in times])
         beyond = np.abs(places - y).max()
-        if v * (c * (y - centre) + d * v) < 0.0:
+        if v * kernel.moved(way, y, v)[1] < 0.0:
             turned += 1
             worst = max(worst, beyond / deepest)
             assert beyond <= deepest

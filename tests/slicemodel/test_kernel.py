@@ -9,7 +9,7 @@ import slicemodel
 from slicemodel import Scenario
 from slicemodel.kernel import closed_form
 from slicemodel.kernel.flock import NO_STEP
-from slicemodel.kernel.rebound import Step, Watched, step_on_grid
+from slicemodel.kernel.rebound import Step, Watched, step
 from slicemodel.schemes import SCHEMES
 
 
@@ -78,11 +78,12 @@ def test_short_steps_use_a_series(x):
 def test_a_slice_at_an_end_rebounds_unless_the_scheme_compares_strictly():
     """[C.S.] says <= and >=, the published programs < and >; a step that moves nothing tells them apart."""
     form, reach = SCHEMES["exact-step"].form, 0.1
+    constants = SCHEMES["exact-step"].constants(Scenario())
     one = Step(NO_STEP, reach, 10.0, 0.0, 0.001, 0.001)
 
     def rebounds(y, strict):
         watched = Watched(np.array([0]), np.array([y]), np.array([0.0]), np.empty(1), np.empty(1))
-        return step_on_grid(form._replace(strict=strict), 0.5, one, watched, 1, np.empty((2, 4)), 0)[3]
+        return step(form._replace(strict=strict), constants, one, watched, 1, False, np.empty((2, 4)), 0)[3]
 
     for end in (-reach, reach):
         assert (rebounds(end, False), rebounds(end, True)) == (1, 0)

@@ -2,23 +2,14 @@
 
 import math
 
-import numba
 import numpy as np
 import pytest
 
 import slicemodel
 from slicemodel import Bottle, Scenario
-from slicemodel.kernel import closed_form
-from slicemodel.kernel.rebound import Step, Watched, predicted, step_in_step
+from slicemodel.kernel import closed_form, moved, step_map
+from slicemodel.kernel.rebound import Step, Watched, step
 from slicemodel.schemes import SCHEMES
-
-step = numba.njit(
-    lambda form, constants, one, watched, many, log, count: step_in_step(
-        form, constants, one, watched, many, log, count
-    )
-)
-
-predict = numba.njit(lambda form, restitution, one, watched, many: predicted(form, restitution, one, watched, many))
 
 IN_STEP = ["roots-corrected", "exact-step", "midpoint"]
 
@@ -77,7 +68,7 @@ def test_a_slice_turns_where_its_velocity_vanishes(gamma):
     constants = SCHEMES["exact-step"].constants(Scenario())._replace(gamma=gamma, gamma_position=gamma)
     turn = closed_form.turning_time(gamma, 10.0, -0.25, 0.9)
     assert 0.0 < turn < 0.1
-    assert closed_form.path(form, constants, 10.0, -0.25, 0.9, turn)[1] == pytest.approx(0.0, abs=1e-13)
+    assert moved(step_map(form, constants, 10.0, 0.0, turn), -0.25, 0.9)[1] == pytest.approx(0.0, abs=1e-13)
     assert closed_form.turning_time(gamma, 10.0, 0.25, 0.9) == math.inf
 
 
@@ -90,14 +81,13 @@ def test_a_dip_through_the_end_and_back_within_one_step_is_found():
     x = y - centre
     v = math.sqrt(omega**2 * (x**2 - (reach + 0.002 - centre) ** 2))
     turn = closed_form.turning_time(constants.gamma, omega, x, v)
-    assert centre + closed_form.path(form, constants, omega, x, v, turn)[0] > reach
-    assert centre + closed_form.path(form, constants, omega, x, v, 2 * turn)[0] < reach
+    way = step_map(form, constants, omega, centre, 2 * turn)
+    assert moved(step_map(form, constants, omega, centre, turn), y, v)[0] > reach
+    assert moved(way, y, v)[0] < reach
     log = np.empty((4, 4))
     watched = Watched(np.array([5]), np.array([y]), np.array([v]), np.empty(1), np.empty(1))
-    a_minus_1, b, c, d = closed_form.step_coefficients(form, constants, omega, 2 * turn)
-    way = closed_form.Map(a_minus_1, b, c, d, -a_minus_1 * centre, -c * centre)
     one = Step(way, reach, omega, centre, 2 * turn, 1.0 + 2 * turn)
-    *_, count = step(form, constants, one, watched, 1, log, 0)
+    *_, count = step(form, constants, one, watched, 1, False, log, 0)
     new, speed = watched.y[0], watched.v[0]
     assert count == 1
     assert tuple(log[0, 1:3]) == (5.0, 1.0)
@@ -129,14 +119,12 @@ def test_a_predicted_step_knows_its_rebounds_to_second_order_and_moves_nothing(r
     for dt in (1e-3, 5e-4):
         # It hits the base in the middle of the step.
         watched = Watched(np.array([0]), np.array([reach - 0.25 * dt]), np.array([0.5]), np.empty(1), np.empty(1))
-        a_minus_1, b, c, d = closed_form.step_coefficients(form, constants, omega, dt)
-        way = closed_form.Map(a_minus_1, b, c, d, -a_minus_1 * centre, -c * centre)
-        one = Step(way, reach, omega, centre, dt, dt)
+        one = Step(step_map(form, constants, omega, centre, dt), reach, omega, centre, dt, dt)
         before = watched.y[0], watched.v[0]
-        first, second = predict(form, restitution, one, watched, 1)
+        first, second, _, count = step(form, constants, one, watched, 1, True, np.empty((4, 4)), 0)
         assert (watched.y[0], watched.v[0]) == before
-        assert second == first * first
-        made = step(form, constants, one, watched, 1, np.empty((4, 4)), 0)
+        assert (second, count) == (first * first, 0)
+        made = step(form, constants, one, watched, 1, False, np.empty((4, 4)), 0)
         assert made[3] == 1
         errors.append(abs(first - made[0]))
     assert errors[0] < 1e-5

@@ -138,7 +138,7 @@ def erratum_python_sign(throw: Scenario) -> Erratum:
     h = 1e-6 / max(constants.gamma, abs(throw.omega0))
 
     def coefficient(k: int, t: float) -> float:
-        return float(kernel.step_coefficients(scheme.form, constants, throw.omega0, t)[k])
+        return float(kernel.step_map(scheme.form, constants, throw.omega0, 0.0, t)[k])
 
     printed = (1.0 - coefficient(3, h)) / h
     position = 1.0 - (coefficient(1, 1.5 * h) - coefficient(1, 0.5 * h)) / h
