@@ -15,10 +15,8 @@ from flipproof.frame.solvers import Made, Missing, Run, make
 from flipproof.page.templating import environment
 from flipproof.paper import claims_figures_6_7, observe
 from flipproof.paper import claims_figures_8_9 as landing
-from flipproof.paper.cases import FAMILIES, all_cases, family
-from flipproof.paper.claim import judge
+from flipproof.paper.cases import FAMILIES, all_cases, family, numbers, paper_throw
 from flipproof.paper.observe import Flights
-from flipproof.paper.parameters import numbers, paper_throw
 from flipproof.paper.runs import (
     BANDS,
     HALVES,
@@ -35,7 +33,7 @@ from flipproof.paper.runs import (
     plan_published,
     same_steps_key,
 )
-from flipproof.paper.statements import Reading, Statement
+from flipproof.paper.statements import Reading, Statement, judge
 from flipproof.paper.verdicts import CLAIMS, STEADY, claim_weight_slows_the_tenth, judge_all, judge_paper
 from slicemodel.observables import centre_of_mass, plateau
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flipproof.output.ownership import MARKER, marker_text
+from flipproof.output.folder import MARKER, marker_text
 from flipproof.sweep import export as exporting
 from flipproof.sweep.design import design_of
 from flipproof.sweep.errors import SweepError

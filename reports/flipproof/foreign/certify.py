@@ -9,10 +9,11 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any, Final
 
-from flipproof.foreign import checks_basic, checks_equation, checks_impacts, checks_order
+from flipproof.foreign import checks_basic, checks_impacts, checks_order
 from flipproof.foreign.checking import Check, Found, NotApplicableError, drive
 from flipproof.foreign.contract import Traits
 from flipproof.foreign.specs import ForeignError, Runner, WaitingError
+from flipproof.frame.findings import Finding, observed, regression
 from flipproof.output.columns import json_ready
 from flipproof.output.provenance import version_of
 
@@ -36,8 +37,8 @@ CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
         "order-before-impacts": checks_order.check_order_before,
         "order-across-impacts": checks_order.check_order_across,
         "precision-floor": checks_order.check_floor,
-        "published-vectors": checks_equation.check_vectors,
-        "equation": checks_equation.check_equation,
+        "published-vectors": checks_basic.check_vectors,
+        "equation": checks_basic.check_equation,
     }
 )
 """Every check by name, in the order in which they are made. A new check is one generator and one line here."""
@@ -159,3 +160,19 @@ def _result(name: str, traits: Traits, runner: Runner) -> Result:
         unexpected = f"declared as a failure ({known}), but holds" if known else ""
         return result(verdict=PASSED, found=found, reason=unexpected)
     return result(verdict=EXPECTED if known else FAILED, found=found, reason=known or "")
+
+
+def findings_of(certificate: Certificate, id_: str = "certify-", title: str = "") -> tuple[Finding, ...]:
+    """Return one finding a check, with ``id_`` and ``title`` before its own.
+
+    The value is 1 if it holds, 0 if not; expected failures and idle checks are observations.
+    """
+    found = []
+    for result in certificate.results:
+        about = f"{id_}{result.check}", f"{title}{result.title.rstrip('.')}"
+        value = None if result.verdict == IDLE else float(result.verdict != FAILED)
+        if result.verdict in (IDLE, EXPECTED):
+            found.append(observed(*about, value, note=result.words))
+        else:
+            found.append(regression(*about, value, "", (1.0, 1.0), result.words))
+    return tuple(found)

@@ -8,9 +8,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from flipproof.foreign.answers import Answer
 from flipproof.foreign.checking import Found, Making, NotApplicableError, ask_of
-from flipproof.foreign.contract import Ask, Traits
+from flipproof.foreign.contract import Answer, Ask, Traits
 from slicemodel import Scenario
 
 ASKED: Final = 0.5

@@ -8,9 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from flipproof.foreign.answers import Answer
 from flipproof.foreign.checking import SMOOTH, THROW, Found, Making, NotApplicableError, ask_of, shift
-from flipproof.foreign.contract import Traits
+from flipproof.foreign.contract import Answer, Traits
 
 LEVELS: Final = (0, 1, 2, 3)
 WIDTH: Final = 0.3

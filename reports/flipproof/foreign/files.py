@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from flipproof.foreign.answers import PER_SLICE, Answer, AnswerError, answer_of
-from flipproof.foreign.contract import Ask, Traits
+from flipproof.foreign.contract import PER_SLICE, Answer, AnswerError, Ask, Traits, answer_of
 from flipproof.foreign.isolated import PATIENCE, end_group, last_line
 from flipproof.foreign.specs import CSV, ForeignError, Runner, words_of
 

@@ -17,9 +17,8 @@ from typing import Final
 
 import numpy as np
 
-from flipproof.foreign.answers import Answer
 from flipproof.foreign.certify import CHECKS, Certificate, certify
-from flipproof.foreign.contract import Ask, Traits
+from flipproof.foreign.contract import Answer, Ask, Traits
 from flipproof.foreign.files import answer_in, write_ask
 from flipproof.foreign.specs import Runner, WaitingError
 

@@ -1,16 +1,20 @@
-"""The verb ``solve`` for anybody's solver, with the signature of the three packages', so that a run of it is a run."""
+"""Anybody's solver behind the verb of flipproof's own, so that a run of it is a run, and these behind its contract."""
 
 from __future__ import annotations
 
 import atexit
+import math
 from functools import cache
 from typing import Any
 
-from flipproof.foreign.answers import trajectory_of
+import numpy as np
+
 from flipproof.foreign.checking import effort_of
 from flipproof.foreign.content import content_of
-from flipproof.foreign.contract import Ask
+from flipproof.foreign.contract import Answer, AnswerError, Ask, Traits, answer_of, trajectory_of
 from flipproof.foreign.specs import ForeignError, Runner, opened
+from flipproof.frame import solvers
+from ode_reference.solver import COLUMN
 from slicemodel import Scenario, Trajectory
 from slicemodel.trajectory import FloatArray, output_times
 
@@ -49,3 +53,60 @@ def _runner(spec: str, content: str) -> Runner:
     runner = opened(spec, curves=True)
     atexit.register(runner.close)
     return runner
+
+
+class Own(Runner):
+    """A scheme, model or engine of flipproof as a runner."""
+
+    def __init__(self, solver: solvers.Solver) -> None:
+        self.solver = solver
+        equation: str | None = solver.name
+        if solver.package == "engine_check":
+            equation = "free-flight"
+        elif solver.name == COLUMN:  # no equation of slices: it stands on no rung and declares none
+            equation = None
+        order = None if solver.package != "slicemodel" else 2.0 if solver.name == "midpoint" else 1.0
+        self.traits = Traits(
+            name=solver.name,
+            equation=equation,
+            refined_by={"slicemodel": "steps", "ode_reference": None, "engine_check": "dt"}[solver.package],
+            order=order,
+            distribution="flipproof",
+            timeout=600.0,
+        )
+
+    def __call__(self, ask: Ask) -> Answer:
+        """Return the checked answer; the slice model computes on a uniform grid that holds the asked times."""
+        settings: dict[str, Any] = dict(ask.options)
+        stride = 1
+        if self.solver.package == "slicemodel":
+            stride, settings["steps"] = _grid_of(ask)
+        else:
+            settings["times"] = ask.times
+            if self.solver.package == "engine_check" and ask.effort is not None:
+                settings["dt"] = ask.effort
+        try:
+            found = solvers.solve(self.solver.name, ask.scenario, **settings)
+            if not found.ok:
+                raise ForeignError(f"status = {found.status!r}: {found.message}")
+            if stride == 1:
+                return answer_of(ask, found)
+            names = ("t", "theta", "omega", "r", "v", "r_cm", "inertia")
+            return answer_of(ask, {n: getattr(found, n)[::stride] for n in names} | {"impacts": found.impacts})
+        except ForeignError:
+            raise
+        except (ValueError, ArithmeticError, MemoryError, RuntimeError) as error:
+            raise ForeignError(f"{type(error).__name__}: {error}") from None
+
+
+def _grid_of(ask: Ask) -> tuple[int, int]:
+    """Return how many steps lie between asked times, and the points of the grid, for at least ``effort`` steps.
+
+    Times that are not uniform over [0, duration], to 1e-9 of it, raise an AnswerError.
+    """
+    points, duration = len(ask.times), ask.scenario.duration
+    uniform = np.linspace(0.0, duration, points)
+    if points < 2 or float(np.max(np.abs(ask.times - uniform))) > 1e-9 * duration:
+        raise AnswerError(f"times are not a uniform grid over [0, {duration:g}] s, which the slice model computes on")
+    stride = max(1, math.ceil((ask.effort or 1000.0) / (points - 1) - 1e-9))
+    return stride, stride * (points - 1) + 1

@@ -25,8 +25,7 @@ from flipproof.frame.solvers import catalogue, find
 from slicemodel.scenario import unknown_name
 
 if TYPE_CHECKING:
-    from flipproof.foreign.answers import Answer
-    from flipproof.foreign.contract import Ask, Traits
+    from flipproof.foreign.contract import Answer, Ask, Traits
 
 CSV: Final = "csv:"
 COMMAND: Final = "cmd:"
@@ -96,7 +95,7 @@ def opened(spec: str, timeout: float | None = None, *, curves: bool = False) -> 
         If the spec names nothing; the message says how specs are written.
     """
     if not is_foreign(spec):
-        from flipproof.foreign.own import Own
+        from flipproof.foreign.solving import Own
 
         return Own(find(spec))
     if spec.startswith(CSV):

@@ -20,7 +20,7 @@ from flipproof.chapters.landing.study import Cases, Found, Rows, Size, aiming, c
 from flipproof.chapters.landing.tables import map_csv, share_line, shares_csv
 from flipproof.landing.design import Case, Throws
 from flipproof.landing.work import LANDING, Landed, make_landing
-from flipproof.output.ownership import MARKER, OutputError, check_own, marker_text
+from flipproof.output.folder import MARKER, OutputError, check_own, marker_text
 from flipproof.sweep.command import Begin, completed
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import write_whole

@@ -12,10 +12,9 @@ from typing import Final
 from flipproof.frame.findings import Finding, regression
 from flipproof.frame.solvers import Missing
 from flipproof.paper import observe
-from flipproof.paper.claim import FLAT_WHY, SUPERIMPOSED_WHY, states
+from flipproof.paper.cases import number, numbers, paper_steps, paper_throw
 from flipproof.paper.observe import FLAT, SUPERIMPOSED, Flights
-from flipproof.paper.parameters import number, numbers, paper_steps, paper_throw
-from flipproof.paper.statements import OMEGA, Reading, at_least, at_most
+from flipproof.paper.statements import FLAT_WHY, OMEGA, SUPERIMPOSED_WHY, Reading, at_least, at_most, states
 from slicemodel import Bottle, Trajectory
 from slicemodel.landing import Moment, moment_at, next_upright
 from slicemodel.observables import centre_of_mass_at_rest, static_toppling_angle

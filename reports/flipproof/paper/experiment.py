@@ -13,13 +13,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from flipproof.paper.cases import ICE
-from flipproof.paper.claim import judge_sense
+from flipproof.paper.cases import ICE, paper_throw
 from flipproof.paper.claims_figures_6_7 import CLEAR, filling_of_slow_down
 from flipproof.paper.observe import FLAT, Flights, climb, normalised, steady_level
-from flipproof.paper.parameters import paper_throw
 from flipproof.paper.runs import SOLVERS
-from flipproof.paper.statements import OMEGA, Reading
+from flipproof.paper.statements import OMEGA, Reading, judge_sense
 from slicemodel.observables import static_toppling_angle
 
 CAVEAT: Final = (

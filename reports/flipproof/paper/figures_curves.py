@@ -12,10 +12,9 @@ import numpy as np
 
 from flipproof.frame.exhibit import Exhibit
 from flipproof.paper import figures_panels as panels
-from flipproof.paper.cases import Case, family
+from flipproof.paper.cases import Case, family, number, numbers
 from flipproof.paper.figures_panels import Axis, Grid, Line
 from flipproof.paper.observe import normalised, steady_level
-from flipproof.paper.parameters import number, numbers
 from flipproof.paper.runs import PUBLISHED, PaperRuns
 from slicemodel import Trajectory
 from slicemodel.trajectory import FloatArray

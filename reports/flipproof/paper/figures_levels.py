@@ -13,9 +13,9 @@ import numpy as np
 from flipproof.figures.style import solver_style
 from flipproof.frame.exhibit import Exhibit
 from flipproof.paper import figures_panels as panels
+from flipproof.paper.cases import paper_throw
 from flipproof.paper.figures_panels import Axis, Grid, Line
 from flipproof.paper.observe import level_by_points, steady_level
-from flipproof.paper.parameters import paper_throw
 from flipproof.paper.runs import PUBLISHED, SOLVERS, PaperRuns
 from slicemodel import Trajectory
 from slicemodel.landing import Moment, moment_at, next_upright

@@ -10,12 +10,11 @@ from typing import Any, ClassVar, Final
 
 from flipproof.frame.findings import Finding, regression
 from flipproof.paper import claims_figure_5, claims_figures_6_7, claims_figures_8_9
-from flipproof.paper.claim import judge
 from flipproof.paper.claims_figures_8_9 import claim_filling_of_change
 from flipproof.paper.experiment import CAVEAT, Observation, closest_overall, compare_all, standing
 from flipproof.paper.observe import Flights, steady_level
 from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS, STEADY_FILLING, WEIGHTLESS, WEIGHTLESS_KEY, PaperRuns
-from flipproof.paper.statements import OMEGA, Judgement, Statement
+from flipproof.paper.statements import OMEGA, Judgement, Statement, judge
 
 NAMES: Final[Mapping[str, str]] = MappingProxyType(
     {"published-python": "published program", "eq8": "Eq. 8 as printed", "free-flight": "free flight"}

@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 
 from flipproof.foreign import checks_order
-from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, certify
+from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, certify, findings_of
 from flipproof.foreign.contract import Ask
-from flipproof.foreign.mistakes import MISTAKES
-from flipproof.foreign.power import CLEAN, Caught, InProcess, claim_power, matrix_csv
+from flipproof.foreign.power import CLEAN, MISTAKES, Caught, InProcess, claim_power, matrix_csv
 from flipproof.foreign.specs import load, opened
 from flipproof.foreign.subject import Subject
-from flipproof.foreign.verdicts import findings_of
 from flipproof.frame.solvers import solve
 from flipproof.output.junit import junit_text
 from slicemodel import Scenario

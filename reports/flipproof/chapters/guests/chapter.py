@@ -8,7 +8,7 @@ from typing import Any, Final
 from flipproof.chapters.guests.figures import draw_guests
 from flipproof.chapters.guests.study import Guest, Guests, study
 from flipproof.chapters.waterfall.study import NAMES
-from flipproof.foreign.verdicts import findings_of
+from flipproof.foreign.certify import findings_of
 from flipproof.frame.chapter import Absent, Chapter, Finding, Kind, observed
 from flipproof.output.tables import trajectory_csv
 

@@ -15,8 +15,7 @@ from typing import Any
 from flipproof.chapters.waterfall.study import equation_run
 from flipproof.foreign.certify import Certificate
 from flipproof.foreign.contract import Traits
-from flipproof.foreign.explain import changes_of, mean
-from flipproof.foreign.place import name_of, switches_of
+from flipproof.foreign.place import changes_of, mean, name_of, switches_of
 from flipproof.frame.chapter import Flights, Missing, Run
 from ode_reference.models import MODELS
 from ode_reference.switches import Switches

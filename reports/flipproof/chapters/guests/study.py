@@ -29,11 +29,10 @@ from flipproof.chapters.differences.study import Difference, study_difference
 from flipproof.chapters.guests.split import Split, plan_splits, split, switches_made
 from flipproof.chapters.ice.chapter import Drift, measure
 from flipproof.foreign import contract
-from flipproof.foreign.answers import trajectory_of
 from flipproof.foreign.certify import Certificate, certify
 from flipproof.foreign.checking import effort_of
 from flipproof.foreign.content import content_of
-from flipproof.foreign.contract import Traits
+from flipproof.foreign.contract import Traits, trajectory_of
 from flipproof.foreign.specs import CSV, Runner, opened
 from flipproof.frame.chapter import Ask, Call, Flights, Study, attempt
 from flipproof.frame.twins import twins
