@@ -78,10 +78,7 @@ class Comparison:
 def compare(first: Curve, second: Curve) -> Comparison:
     """Compare two curves; omega is taken relative to the first curve's initial value.
 
-    Raises
-    ------
-    ValueError
-        If the two have no quantity or no times in common, or the first starts without spin.
+    Raises ValueError if the two have no quantity or no times in common, or the first starts without spin.
     """
     both = [name for name in QUANTITIES if name in first.series and name in second.series]
     if not both:

@@ -106,10 +106,7 @@ class Comparison:
 def read_summary(path: Path) -> dict[str, Any]:
     """Return the summary of a report: of a folder, or of its ``summary.json`` itself.
 
-    Raises
-    ------
-    ValueError
-        Naming the file and what is wrong with it.
+    Raises ValueError, naming the file and what is wrong with it.
     """
     file = path / "summary.json" if path.is_dir() else path
     try:

@@ -69,7 +69,7 @@ def check(
     guests: Sequence[str] = (),
     timeout: float | None = None,
 ) -> Checked:
-    """Check a throw.
+    """Check a throw; raises ValueError if the baseline cannot be read or is of another throw.
 
     Parameters
     ----------
@@ -83,11 +83,6 @@ def check(
         Specs of foreign solvers: their certificates are among the claims, and what a report of them found in the
         baseline is found again.
     timeout : float or None - seconds one of their runs may take; None: as each declares
-
-    Raises
-    ------
-    ValueError
-        If the baseline cannot be read or is of another throw.
     """
     summary = None if baseline is None else read_summary(baseline)
     known = {} if summary is None else {finding["id"]: finding for finding in summary["findings"]}

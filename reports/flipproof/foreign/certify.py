@@ -120,7 +120,7 @@ def certify(
     equation: str | None = None,
     say: Callable[[Result], object] = lambda _: None,
 ) -> Certificate:
-    """Make the checks of a solver, one after the other.
+    """Make the checks of a solver, one after the other; raises ForeignError if the solver cannot be loaded.
 
     Parameters
     ----------
@@ -128,11 +128,6 @@ def certify(
     checks : iterable of str - names in ``CHECKS``
     equation : str, optional - the equation to hold it to, instead of the one that it declares
     say : callable - is given each result as it comes
-
-    Raises
-    ------
-    ForeignError
-        If the solver cannot be loaded.
     """
     traits = runner.traits if equation is None else replace(runner.traits, equation=equation)
     results = []

@@ -21,10 +21,7 @@ from flipproof.frame.sources import files_in
 def content_of(spec: str) -> str:
     """Return the SHA-256 of the files that a spec stands for; nothing is imported. Empty for flipproof's own solvers.
 
-    Raises
-    ------
-    ValueError
-        If the spec names nothing, or a file cannot be read.
+    Raises ValueError if the spec names nothing, or a file cannot be read.
     """
     if not is_foreign(spec):
         return ""

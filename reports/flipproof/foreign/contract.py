@@ -61,6 +61,8 @@ class Ask:
 class Traits:
     """What a solver says of itself.
 
+    Raises ValueError, naming the attribute, its value and the admissible values.
+
     Parameters
     ----------
     name : str - printed on every page; without line breaks
@@ -73,11 +75,6 @@ class Traits:
     distribution : str - the installed package it comes from, for the record
     timeout : float - seconds one run may take, in (0, 86400]
     expected_failures : mapping - check -> reason, for failures that its author knows of
-
-    Raises
-    ------
-    ValueError
-        Naming the attribute, its value and the admissible values.
     """
 
     name: str
@@ -189,16 +186,13 @@ class Answer:
 def answer_of(ask: Ask, given: object, *, own_times: bool = False) -> Answer:
     """Return what a solver gave as a checked answer.
 
+    Raises AnswerError, naming the field, what came and what is needed.
+
     Parameters
     ----------
     ask : Ask
     given : mapping, Trajectory or any object with the fields of ``Answer`` as attributes
     own_times : bool - True for what was made before it was asked, such as a file: its times need only increase
-
-    Raises
-    ------
-    AnswerError
-        Naming the field, what came and what is needed.
     """
     if isinstance(given, Trajectory) and not given.ok:
         raise AnswerError(f"status = {given.status!r}: {given.message}")

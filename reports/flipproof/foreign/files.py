@@ -18,10 +18,7 @@ from flipproof.foreign.specs import CSV, ForeignError, Runner, words_of
 def read_answer(path: Path, n_slices: int) -> dict[str, Any]:
     """Read an answer: a header with t, theta, omega and, if known, r_cm, inertia, r_0 ... and v_0 ...; then numbers.
 
-    Raises
-    ------
-    AnswerError
-        Naming file, line and column.
+    Raises AnswerError, naming file, line and column.
     """
     most = 1 << 30
     try:

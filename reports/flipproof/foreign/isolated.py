@@ -80,10 +80,7 @@ class Isolated(Runner):
     def __call__(self, ask: Ask) -> Answer:
         """Return the checked answer.
 
-        Raises
-        ------
-        ForeignError
-            One line: what the solver raised or returned, how its process ended, or that its time was up.
+        Raises ForeignError, in one line: what the solver raised or returned, how its process ended, or that it was late.
         """
         traits = self.traits
         if self._late >= PATIENCE:

@@ -26,16 +26,11 @@ INDEX: Final = "kit.json"
 
 
 class Kit(Runner):
-    """A folder of asks and answers as a runner.
+    """A folder of asks and answers as a runner; a folder that is no kit raises a ValueError.
 
     Parameters
     ----------
     folder : Path - holds an ``INDEX``; asks that are not there yet are added
-
-    Raises
-    ------
-    ValueError
-        If the folder is no kit.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -56,10 +51,7 @@ class Kit(Runner):
     def made(cls, folder: Path, traits: Traits) -> Kit:
         """Return a new kit in an empty or new folder, with every ask that needs no earlier answer.
 
-        Raises
-        ------
-        ValueError
-            If the folder holds something.
+        Raises ValueError if the folder holds something.
         """
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise ValueError(f"{folder} is not empty; name a new folder")

@@ -24,6 +24,8 @@ def solve(
 ) -> Trajectory:
     """Run the solver that a spec names, in a process of its own that serves the next run, too.
 
+    Raises ForeignError if it gives no answer.
+
     Parameters
     ----------
     scenario : Scenario
@@ -31,11 +33,6 @@ def solve(
     times : array, optional - output times [s]; 1000 uniform ones by default
     effort : float, optional - the number that the solver's ``refined_by`` names; a thousandth of the flight by default
     options : passed to the solver by name
-
-    Raises
-    ------
-    ForeignError
-        If it gives no answer.
     """
     runner = _runner(spec, content_of(spec))
     given = effort_of(runner.traits, scenario, 0) if effort is None else effort

@@ -83,16 +83,13 @@ def check_asked(spec: str) -> None:
 def opened(spec: str, timeout: float | None = None, *, curves: bool = False) -> Runner:
     """Return the solver that a spec names, ready to be asked.
 
+    Raises ValueError if the spec names nothing; the message says how specs are written.
+
     Parameters
     ----------
     spec : str
     timeout : float, optional - seconds one run may take, instead of what the solver says
     curves : bool - whether a curve in a file will do, which answers one throw at its own times and nothing else
-
-    Raises
-    ------
-    ValueError
-        If the spec names nothing; the message says how specs are written.
     """
     if not is_foreign(spec):
         from flipproof.foreign.solving import Own

@@ -40,14 +40,11 @@ def marker_text(kind: str, files: Iterable[str] | None = None) -> str:
 def check_own(folder: Path, kind: str, ignored: Iterable[str] = ()) -> None:
     """Refuse a folder that holds anything but what flipproof wrote there as this ``kind``; an empty one is fine.
 
+    Raises OutputError, naming the folder and what stands in it.
+
     Parameters
     ----------
     ignored : iterable of str - names that do not count, such as that of a lock
-
-    Raises
-    ------
-    OutputError
-        Naming the folder and what stands in it.
     """
     others = sorted({entry.name for entry in folder.iterdir()} - {*LEFT_BY_DESKTOPS, *ignored})
     if not others:
@@ -100,10 +97,8 @@ def _some(names: list[str]) -> str:
 def sole_writer(lock: Path, folder: Path) -> Iterator[None]:
     """Hold the file ``lock`` for as long as the block lasts; the kernel lets go of it when this program dies.
 
-    Raises
-    ------
-    OutputError
-        If another program holds it, naming its process number and the ``folder``, or if it cannot be locked.
+    Raises OutputError if another program holds it, naming its process number and the ``folder``, or if it cannot be
+    locked.
     """
     handle = _hold(lock, folder)
     try:
@@ -166,12 +161,7 @@ OLD: Final = "old"
 
 
 def check_replaceable(target: Path, kind: str) -> None:
-    """Refuse a target that is a file, or a folder with anything in it but what flipproof wrote there as this ``kind``.
-
-    Raises
-    ------
-    OutputError
-    """
+    """Refuse by an OutputError a file, and a folder that holds anything but what flipproof wrote there as this ``kind``."""
     standing = next((place for place in target.absolute().parents if place.exists()), None)
     if standing is not None and not standing.is_dir():
         raise OutputError(f"{target} cannot be written: {standing} is a file")
@@ -193,13 +183,9 @@ def replaced_folder(target: Path, kind: str) -> Iterator[Path]:
 
     The new folder stands in a folder beside ``target`` whose name says that it is flipproof's and unfinished; a lock in
     it keeps a second program out. If the block raises or is interrupted, that folder is removed and ``target`` is as it
-    was. The exchange itself is two renames; a program that is killed, between them too, is cleared up after by the
-    next one.
-
-    Raises
-    ------
-    OutputError
-        If ``target`` is not flipproof's own, cannot be written, or is being written by another program.
+    was. The exchange itself is two renames; a program that is killed, between them too, is cleared up after by the next
+    one. Raises OutputError if ``target`` is not flipproof's own, cannot be written, or is being written by another
+    program.
     """
     target = target.resolve()
     beside = target.with_name(f"{target.name}{UNFINISHED}")
@@ -275,12 +261,7 @@ def _clear(beside: Path, target: Path) -> None:
 def write_text(path: Path, text: str) -> None:
     """Write one file so that a reader sees the old or the new content, never half of it.
 
-    Links are followed; a device or a pipe is written to as it is.
-
-    Raises
-    ------
-    OutputError
-        If the file cannot be written.
+    Links are followed; a device or a pipe is written to as it is. Raises OutputError if the file cannot be written.
     """
     path = path.resolve()
     with _plainly(path):

@@ -165,10 +165,7 @@ def parameter_rows() -> list[tuple[str, ...]]:
 def number(name: str) -> float:
     """Return the value of a parameter that has one.
 
-    Raises
-    ------
-    ValueError
-        If no parameter has that name, or it has several values.
+    Raises ValueError if no parameter has that name, or it has several values.
     """
     values = numbers(name)
     if len(values) > 1:
@@ -177,13 +174,7 @@ def number(name: str) -> float:
 
 
 def numbers(name: str) -> tuple[float, ...]:
-    """Return all values of a parameter.
-
-    Raises
-    ------
-    ValueError
-        If no parameter has that name.
-    """
+    """Return all values of a parameter; raises ValueError if no parameter has that name."""
     if name not in PARAMETERS:
         raise ValueError(unknown_name("parameter", name, PARAMETERS))
     return PARAMETERS[name].values
@@ -192,14 +183,11 @@ def numbers(name: str) -> tuple[float, ...]:
 def paper_throw(filling: float = 0.5) -> Scenario:
     """Return the throw of Fig. 7 at one filling: slices of 1 g, settled drag and rebound.
 
+    Raises ScenarioError if no bottle can have that filling.
+
     Parameters
     ----------
     filling : float - M_tilde = M_w / M_max, in (0, 1]
-
-    Raises
-    ------
-    ScenarioError
-        If no bottle can have that filling.
     """
     bottle = Bottle(
         length=number("length"), radius=number("radius"), mass=number("bottle-mass"), capacity=number("capacity")
@@ -341,13 +329,7 @@ FAMILIES: Final[Mapping[str, tuple[Case, ...]]] = MappingProxyType(_families())
 
 
 def family(name: str) -> tuple[Case, ...]:
-    """Return the cases of one family.
-
-    Raises
-    ------
-    ValueError
-        If there is no such family.
-    """
+    """Return the cases of one family; raises ValueError if there is no such family."""
     if name not in FAMILIES:
         raise ValueError(unknown_name("family", name, FAMILIES))
     return FAMILIES[name]

@@ -132,13 +132,7 @@ When = Callable[[Trajectory], Moment]
 
 
 def upright(run: Trajectory) -> Moment:
-    """Return the flight where it stands upright, theta = 2 pi.
-
-    Raises
-    ------
-    Missing
-        If it does not turn that far.
-    """
+    """Return the flight where it stands upright, theta = 2 pi; raises Missing if it does not turn that far."""
     moment = next_upright(run)
     if moment is None:
         filling, duration = run.scenario.fill_fraction, run.scenario.duration

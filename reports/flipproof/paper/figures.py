@@ -34,10 +34,7 @@ TIMED: Final = ("S1b", "S1c")
 def check_figures(names: Iterable[str]) -> tuple[str, ...]:
     """Return the names as the paper writes them, once each, in its order.
 
-    Raises
-    ------
-    ValueError
-        Naming what is no figure, and those that are.
+    Raises ValueError, naming what is no figure, and those that are.
     """
     by_lower_case = {name.lower(): name for name in ORDER}
     wanted = set()
@@ -77,6 +74,8 @@ def make_gallery(
 ) -> str:
     """Make the figures and write them to ``out``; return one line that tells what is there.
 
+    Raises ValueError if a name is no figure of the paper, or the folder holds something else.
+
     Parameters
     ----------
     names : sequence of str - figures such as "7b"; none: all
@@ -85,11 +84,6 @@ def make_gallery(
     provenance : mapping
     jobs : int or None - worker processes; None: one per core
     store : RunStore - where runs are looked for and kept, as those of a report are
-
-    Raises
-    ------
-    ValueError
-        If a name is no figure of the paper, or the folder holds something else.
     """
     began = time.perf_counter()
     wanted = check_figures(names) or ORDER

@@ -42,13 +42,7 @@ class Flights:
     seen: dict[str, Trajectory] = field(default_factory=dict)
 
     def run(self, key: str) -> Trajectory:
-        """Return one flight.
-
-        Raises
-        ------
-        Missing
-            If it was not made, or did not reach its end.
-        """
+        """Return one flight; raises Missing if it was not made, or did not reach its end."""
         if key not in self.made:
             raise Missing(f"{key!r} was not flown by {self.solver}")
         run = self.seen[key] = self.made[key].whole
@@ -57,10 +51,7 @@ class Flights:
     def at(self, name: str, value: float) -> Trajectory:
         """Return the flight of a family where what varies has this value.
 
-        Raises
-        ------
-        Missing
-            If the family has no such case, or its flight is not there.
+        Raises Missing if the family has no such case, or its flight is not there.
         """
         for case in family(name):
             if abs(case.value - value) <= 1e-9 * max(1.0, abs(value)):
@@ -72,10 +63,7 @@ class Flights:
     ) -> dict[float, float]:
         """Return a number of every flight of a family with ``low`` <= value <= ``high``, in the order of the family.
 
-        Raises
-        ------
-        Missing
-            If any flight is not there, but for those whose number of slices is too large for this solver.
+        Raises Missing if any flight is not there, but for those whose number of slices is too large for this solver.
         """
         cases = [case for case in family(name) if not case.slices_vary or case.key in self.made]
         flown = [(case.value, self.run(case.key)) for case in cases]

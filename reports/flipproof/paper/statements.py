@@ -370,10 +370,7 @@ def judge_sense(read: Read, flights: Flights) -> Judgement:
 def banded(read: Read, flights: Flights) -> tuple[Reading, ...]:
     """Return the readings with their bands: tolerances, what half the slices and what half the steps change.
 
-    Raises
-    ------
-    Missing
-        If a flight is not there.
+    Raises Missing if a flight is not there.
     """
     readings = tuple(read(flights))
     coarser = [tuple(read(each)) for each in (flights.halved, flights.half_steps) if each is not None]

@@ -3,7 +3,7 @@
     plateau of free flight - plateau of the guest = rest + sum of fair shares
 
 The rest is the plateau of the guest's equation minus that of the guest: its own error, and what is no assumption of the
-ladder. A fair share is the mean over all orders of mending the assumptions (``foreign.explain``).
+ladder. A fair share is the mean over all orders of mending the assumptions (``foreign.place``).
 """
 
 from __future__ import annotations
