@@ -18,13 +18,7 @@ from flipproof.page.templating import environment
 
 
 def diff_page(old: Path, new: Path, before: Mapping[str, Any], after: Mapping[str, Any], found: Comparison) -> str:
-    """Return the page as HTML that needs no other file and no network.
-
-    Parameters
-    ----------
-    old, new : the reports' folders, or their ``summary.json``
-    before, after : their summaries
-    """
+    """Return the page of two reports' folders, or ``summary.json``, as HTML that needs no other file and no network."""
     curves, missing = [], []
     for which, place in (("old", old), ("new", new)):
         file = (place if place.is_dir() else place.parent) / "figures" / "omega.csv"

@@ -154,7 +154,7 @@ def command_explain(options: argparse.Namespace) -> int:
 def command_kit(options: argparse.Namespace) -> int:
     """Write the asks into a new folder."""
     from flipproof.foreign.contract import Traits
-    from flipproof.foreign.kit import Kit
+    from flipproof.foreign.files import Kit
 
     traits = {name: getattr(options, name) for name in ("name", "equation", "refined_by", "precision", "order")}
     kit = Kit.made(options.out, Traits(**traits))
@@ -166,7 +166,7 @@ def command_kit(options: argparse.Namespace) -> int:
 
 def command_grade(options: argparse.Namespace) -> int:
     """Print one line a check; return 1 if one failed or answers are missing."""
-    from flipproof.foreign.kit import Kit
+    from flipproof.foreign.files import Kit
 
     found, waiting = Kit(options.folder).grade()
     for result in found.results:

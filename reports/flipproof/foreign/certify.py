@@ -9,7 +9,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any, Final
 
-from flipproof.foreign import checks_basic, checks_impacts, checks_order
+from flipproof.foreign import checks_basic, checks_measured
 from flipproof.foreign.checking import Check, Found, NotApplicableError, drive
 from flipproof.foreign.contract import Traits
 from flipproof.foreign.specs import ForeignError, Runner, WaitingError
@@ -30,13 +30,13 @@ CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
         "ice": checks_basic.check_ice,
         "angle": checks_basic.check_angle,
         "angular-momentum": checks_basic.check_momentum,
-        "restitution": checks_impacts.check_restitution,
+        "restitution": checks_measured.check_restitution,
         "gravity": checks_basic.check_gravity,
         "mirror": checks_basic.check_mirror,
         "moving-frame": checks_basic.check_moving_frame,
-        "order-before-impacts": checks_order.check_order_before,
-        "order-across-impacts": checks_order.check_order_across,
-        "precision-floor": checks_order.check_floor,
+        "order-before-impacts": checks_measured.check_order_before,
+        "order-across-impacts": checks_measured.check_order_across,
+        "precision-floor": checks_measured.check_floor,
         "published-vectors": checks_basic.check_vectors,
         "equation": checks_basic.check_equation,
     }
@@ -122,12 +122,7 @@ def certify(
 ) -> Certificate:
     """Make the checks of a solver, one after the other; raises ForeignError if the solver cannot be loaded.
 
-    Parameters
-    ----------
-    runner : Runner
-    checks : iterable of str - names in ``CHECKS``
-    equation : str, optional - the equation to hold it to, instead of the one that it declares
-    say : callable - is given each result as it comes
+    It is held to ``equation``, if given, instead of the one that it declares; ``say`` is given each result as it comes.
     """
     traits = runner.traits if equation is None else replace(runner.traits, equation=equation)
     results = []

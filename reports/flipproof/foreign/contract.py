@@ -184,15 +184,10 @@ class Answer:
 
 
 def answer_of(ask: Ask, given: object, *, own_times: bool = False) -> Answer:
-    """Return what a solver gave as a checked answer.
+    """Return a mapping, a Trajectory or any object with the attributes of ``Answer`` as a checked answer.
 
-    Raises AnswerError, naming the field, what came and what is needed.
-
-    Parameters
-    ----------
-    ask : Ask
-    given : mapping, Trajectory or any object with the fields of ``Answer`` as attributes
-    own_times : bool - True for what was made before it was asked, such as a file: its times need only increase
+    With ``own_times`` it was made before it was asked, as a file is: its times need only increase. Raises AnswerError,
+    naming the field, what came and what is needed.
     """
     if isinstance(given, Trajectory) and not given.ok:
         raise AnswerError(f"status = {given.status!r}: {given.message}")

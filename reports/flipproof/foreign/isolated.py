@@ -61,10 +61,7 @@ def last_line(printed: bytes) -> str:
 class Isolated(Runner):
     """The solver that a spec names, in a process that is started when it is first needed and again after a crash.
 
-    Parameters
-    ----------
-    spec : str
-    timeout : float, optional - seconds one run may take, instead of what the solver says
+    A run may take ``timeout`` seconds, or what the solver says.
     """
 
     def __init__(self, spec: str, timeout: float | None = None) -> None:
@@ -80,7 +77,7 @@ class Isolated(Runner):
     def __call__(self, ask: Ask) -> Answer:
         """Return the checked answer.
 
-        Raises ForeignError, in one line: what the solver raised or returned, how its process ended, or that it was late.
+        Raises ForeignError: what the solver raised or returned, how its process ended, or that its time was up.
         """
         traits = self.traits
         if self._late >= PATIENCE:

@@ -268,9 +268,7 @@ def mean(changes: Sequence[tuple[float, float]]) -> float:
 def changes_of(start: Switches, end: Switches, of: Callable[[Switches], float]) -> dict[str, list[tuple[float, float]]]:
     """Return for every differing switch the changes of a number in single orders, each with its share of all orders.
 
-    Parameters
-    ----------
-    of : callable (switches) -> float - the number by the equation of a set of switches; asked for once each
+    ``of`` returns the number by the equation of a set of switches; it is asked once for each.
     """
     differing = [f.name for f in fields(Switches) if getattr(start, f.name) != getattr(end, f.name)]
     once = cache(of)

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from flipproof.foreign.checking import effort_of
-from flipproof.foreign.content import content_of
 from flipproof.foreign.contract import Answer, AnswerError, Ask, Traits, answer_of, trajectory_of
-from flipproof.foreign.specs import ForeignError, Runner, opened
+from flipproof.foreign.specs import ForeignError, Runner, content_of, opened
 from flipproof.frame import solvers
 from ode_reference.solver import COLUMN
 from slicemodel import Scenario, Trajectory
@@ -28,8 +27,6 @@ def solve(
 
     Parameters
     ----------
-    scenario : Scenario
-    spec : str - see ``flipproof.foreign.specs``
     times : array, optional - output times [s]; 1000 uniform ones by default
     effort : float, optional - the number that the solver's ``refined_by`` names; a thousandth of the flight by default
     options : passed to the solver by name

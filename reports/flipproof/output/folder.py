@@ -40,11 +40,7 @@ def marker_text(kind: str, files: Iterable[str] | None = None) -> str:
 def check_own(folder: Path, kind: str, ignored: Iterable[str] = ()) -> None:
     """Refuse a folder that holds anything but what flipproof wrote there as this ``kind``; an empty one is fine.
 
-    Raises OutputError, naming the folder and what stands in it.
-
-    Parameters
-    ----------
-    ignored : iterable of str - names that do not count, such as that of a lock
+    The OutputError names the folder and what stands in it; ``ignored`` names, such as that of a lock, do not count.
     """
     others = sorted({entry.name for entry in folder.iterdir()} - {*LEFT_BY_DESKTOPS, *ignored})
     if not others:
@@ -161,7 +157,7 @@ OLD: Final = "old"
 
 
 def check_replaceable(target: Path, kind: str) -> None:
-    """Refuse by an OutputError a file, and a folder that holds anything but what flipproof wrote there as this ``kind``."""
+    """Refuse by an OutputError a file, and a folder with anything but what flipproof wrote there as this ``kind``."""
     standing = next((place for place in target.absolute().parents if place.exists()), None)
     if standing is not None and not standing.is_dir():
         raise OutputError(f"{target} cannot be written: {standing} is a file")

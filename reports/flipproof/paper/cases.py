@@ -163,10 +163,7 @@ def parameter_rows() -> list[tuple[str, ...]]:
 
 
 def number(name: str) -> float:
-    """Return the value of a parameter that has one.
-
-    Raises ValueError if no parameter has that name, or it has several values.
-    """
+    """Return the value of a parameter that has one; raises ValueError if it has several, or none has that name."""
     values = numbers(name)
     if len(values) > 1:
         raise ValueError(f"parameter {name!r} has {len(values)} values; ask for numbers({name!r})")
@@ -181,14 +178,7 @@ def numbers(name: str) -> tuple[float, ...]:
 
 
 def paper_throw(filling: float = 0.5) -> Scenario:
-    """Return the throw of Fig. 7 at one filling: slices of 1 g, settled drag and rebound.
-
-    Raises ScenarioError if no bottle can have that filling.
-
-    Parameters
-    ----------
-    filling : float - M_tilde = M_w / M_max, in (0, 1]
-    """
+    """Return the throw of Fig. 7 at a filling M_w / M_max in (0, 1], else a ScenarioError: 1 g slices, settled drag."""
     bottle = Bottle(
         length=number("length"), radius=number("radius"), mass=number("bottle-mass"), capacity=number("capacity")
     )
@@ -244,16 +234,9 @@ ICE: Final = "ice"
 LONG_THIN: Final = 3
 """Every how many points of a long flight are kept: every slice at every step would take hundreds of megabytes."""
 
-Entry = tuple[str, float, Scenario]
-
 
 def bottle_of_aspect(aspect: float) -> Bottle:
-    """Return the paper's bottle with L / 2R changed and pi R^2 L kept, capacity and mass too.
-
-    Parameters
-    ----------
-    aspect : float - L / 2R, positive
-    """
+    """Return the paper's bottle with L / 2R = ``aspect`` > 0 and pi R^2 L kept, capacity and mass too."""
     bottle = paper_throw().bottle
     own = bottle.length / (2 * bottle.radius)
     if aspect == own:
@@ -262,66 +245,54 @@ def bottle_of_aspect(aspect: float) -> Bottle:
     return replace(bottle, length=bottle.length * stretch**2, radius=bottle.radius / stretch)
 
 
-def _entries() -> dict[str, list[Entry]]:
-    """Return family -> key, value and throw of each of its members; the key counts unless the throw has one already."""
+def _families() -> dict[str, tuple[Case, ...]]:
     throw, long = paper_throw(), number("figure-9-duration")
     ten = replace(throw, n_slices=round(number("figure-5-slices")))
     caption, later = (replace(ten, drag=number(f"figure-5-drag{of}")) for of in ("", "-at-5-per-second"))
     drags = replace(throw, n_slices=round(number("figure-6-slices")))
-
-    def of(parameter: str, key: str, thrown: Callable[[float], Scenario]) -> list[Entry]:
-        return [(key.format(value), value, thrown(value)) for value in numbers(parameter)]
-
-    def steps(filling: float) -> list[Entry]:
-        return of("figure-S1-steps", f"filling {filling:g}, P {{:g}}", lambda _: paper_throw(filling))
-
-    beta, slices = "figure-5-rebound", "figure-5d-slices"
-    angles = of("figure-8b-angle", "", lambda angle: replace(throw, theta0=angle))
-    return {
-        "filling": of("figure-7-filling", "filling {:g}", paper_throw),
-        "long": of("figure-7-filling", "filling {:g}, long", lambda fill: replace(paper_throw(fill), duration=long)),
-        "flight": [(ICE, 0.0, replace(throw, frozen=True)), *of("figure-3b-filling", "filling {:g}", paper_throw)],
-        "beta": of(beta, "beta {:g}", lambda value: replace(caption, restitution=abs(value))),
-        "beta at 5 /s": of(beta, "beta {:g}, 5 /s", lambda value: replace(later, restitution=abs(value))),
-        "slices": of(slices, "slices {:g}", lambda count: caption.with_slices(round(count))),
-        "slices at 5 /s": of(slices, "slices {:g}, 5 /s", lambda count: later.with_slices(round(count))),
-        "slices at alpha 1": of(slices, "slices {:g}, alpha 1", lambda count: replace(caption, n_slices=round(count))),
-        "drag": of("figure-6-drag", "drag {:g}", lambda drag: replace(drags, drag=drag)),
-        "spin": of("figure-8a-spin", "spin {:g}", lambda spin: replace(throw, omega0=spin)),
-        "angle": [(f"angle {math.degrees(angle):.0f}", angle, scenario) for _, angle, scenario in angles],
-        "aspect": of("figure-8c-aspect", "aspect {:g}", lambda ratio: replace(throw, bottle=bottle_of_aspect(ratio))),
-        **{f"steps {filling:g}": steps(filling) for filling in numbers("figure-S1-filling")},
-    }
-
-
-SLICES_VARY: Final = ("beta", "beta at 5 /s", "slices", "slices at 5 /s", "slices at alpha 1")
-"""Families whose subject is the number of slices."""
-
-WHOLE: Final = ("filling", "long", "flight", "beta", "beta at 5 /s", "drag")
-"""Families whose slices are looked at."""
-
-
-def _families() -> dict[str, tuple[Case, ...]]:
-    keys: dict[tuple[Scenario, int, bool], str] = {}
     # A long flight has the step of the short one to 0.1 %.
-    intervals = (paper_steps() - 1) * number("figure-9-duration") / number("duration")
-    long_steps = 1 + LONG_THIN * round(intervals / LONG_THIN)
-    steps_vary = {f"steps {filling:g}" for filling in numbers("figure-S1-filling")}
+    long_steps = 1 + LONG_THIN * round((paper_steps() - 1) * long / throw.duration / LONG_THIN)
+    keys: dict[tuple[Scenario, int, bool], str] = {}
 
-    def case(name: str, key: str, value: float, scenario: Scenario) -> Case:
-        steps = long_steps if name == "long" else round(value) if name in steps_vary else paper_steps()
-        slices_vary = name in SLICES_VARY
-        return Case(
-            key=keys.setdefault((scenario, steps, slices_vary), key),
-            value=value,
-            scenario=scenario,
-            steps=steps,
-            slices_vary=slices_vary,
-            whole=name in WHOLE,
-            thin=LONG_THIN if name == "long" else 1,
-        )
+    def case(key: str, value: float, scenario: Scenario, *, steps: int = paper_steps(), **about: Any) -> Case:
+        """Return a case; its key counts unless the throw has one already."""
+        key = keys.setdefault((scenario, steps, about.get("slices_vary", False)), key)
+        return Case(key=key, value=value, scenario=scenario, steps=steps, **about)
 
-    return {name: tuple(case(name, *entry) for entry in entries) for name, entries in _entries().items()}
+    def of(parameter: str, key: str, thrown: Callable[[float], Scenario], **about: Any) -> tuple[Case, ...]:
+        """Return a case for each value; its key is written from the value, and from the value in degrees."""
+        return tuple(case(key.format(v, math.degrees(v)), v, thrown(v), **about) for v in numbers(parameter))
+
+    def of_beta(key: str, thrown: Scenario) -> tuple[Case, ...]:
+        beta, about = "figure-5-rebound", {"slices_vary": True, "whole": True}
+        return of(beta, key, lambda value: replace(thrown, restitution=abs(value)), **about)
+
+    def of_slices(key: str, cut: Callable[[int], Scenario]) -> tuple[Case, ...]:
+        return of("figure-5d-slices", key, lambda count: cut(round(count)), slices_vary=True)
+
+    def of_steps(filling: float) -> tuple[Case, ...]:
+        every, thrown = numbers("figure-S1-steps"), paper_throw(filling)
+        return tuple(case(f"filling {filling:g}, P {steps:g}", steps, thrown, steps=round(steps)) for steps in every)
+
+    def flown_on(filling: float) -> Scenario:
+        return replace(paper_throw(filling), duration=long)
+
+    ice = case(ICE, 0.0, replace(throw, frozen=True), whole=True)
+    return {
+        "filling": of("figure-7-filling", "filling {:g}", paper_throw, whole=True),
+        "long": of("figure-7-filling", "filling {:g}, long", flown_on, steps=long_steps, whole=True, thin=LONG_THIN),
+        "flight": (ice, *of("figure-3b-filling", "filling {:g}", paper_throw, whole=True)),
+        "beta": of_beta("beta {:g}", caption),
+        "beta at 5 /s": of_beta("beta {:g}, 5 /s", later),
+        "slices": of_slices("slices {:g}", caption.with_slices),
+        "slices at 5 /s": of_slices("slices {:g}, 5 /s", later.with_slices),
+        "slices at alpha 1": of_slices("slices {:g}, alpha 1", lambda count: replace(caption, n_slices=count)),
+        "drag": of("figure-6-drag", "drag {:g}", lambda drag: replace(drags, drag=drag), whole=True),
+        "spin": of("figure-8a-spin", "spin {:g}", lambda spin: replace(throw, omega0=spin)),
+        "angle": of("figure-8b-angle", "angle {1:.0f}", lambda angle: replace(throw, theta0=angle)),
+        "aspect": of("figure-8c-aspect", "aspect {:g}", lambda ratio: replace(throw, bottle=bottle_of_aspect(ratio))),
+        **{f"steps {filling:g}": of_steps(filling) for filling in numbers("figure-S1-filling")},
+    }
 
 
 FAMILIES: Final[Mapping[str, tuple[Case, ...]]] = MappingProxyType(_families())
@@ -337,9 +308,5 @@ def family(name: str) -> tuple[Case, ...]:
 
 def all_cases() -> dict[str, Case]:
     """Return every case by its key, once each; one that any family looks into slice by slice is ``whole``."""
-    found: dict[str, Case] = {}
-    for members in FAMILIES.values():
-        for case in members:
-            if case.key not in found or (case.whole and not found[case.key].whole):
-                found[case.key] = case
-    return found
+    every = [case for members in FAMILIES.values() for case in members]
+    return {case.key: case for case in (*every, *(case for case in every if case.whole))}

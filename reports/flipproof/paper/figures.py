@@ -32,10 +32,7 @@ TIMED: Final = ("S1b", "S1c")
 
 
 def check_figures(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the names as the paper writes them, once each, in its order.
-
-    Raises ValueError, naming what is no figure, and those that are.
-    """
+    """Return the names as the paper writes them, once each, in its order; one that is no figure raises a ValueError."""
     by_lower_case = {name.lower(): name for name in ORDER}
     wanted = set()
     for name in names:
@@ -72,18 +69,10 @@ def make_gallery(
     jobs: int | None,
     store: RunStore,
 ) -> str:
-    """Make the figures and write them to ``out``; return one line that tells what is there.
+    """Make the figures with these names, or all, and write them to a folder; return one line that tells what is there.
 
-    Raises ValueError if a name is no figure of the paper, or the folder holds something else.
-
-    Parameters
-    ----------
-    names : sequence of str - figures such as "7b"; none: all
-    out : path - folder; an older gallery in it is replaced when the new one is complete
-    progress : callable (made, planned, label)
-    provenance : mapping
-    jobs : int or None - worker processes; None: one per core
-    store : RunStore - where runs are looked for and kept, as those of a report are
+    An older gallery in the folder is replaced when the new one is complete. Raises ValueError if a name is no figure of
+    the paper, or the folder holds something else.
     """
     began = time.perf_counter()
     wanted = check_figures(names) or ORDER

@@ -25,15 +25,10 @@ SHARE: Final = Axis("t / T [1]", "t/T [1]", 0.0, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """What is drawn over time.
+    """What is drawn over time; ``curve`` reads abscissa and ordinate off a flight.
 
-    Parameters
-    ----------
-    x, y : Axis
-    curve : flight -> abscissa and ordinate
-    plotted : str - what is drawn against what, for the alternative text
-    said : str - the number that stands for a curve there
-    number, digits : how it is read off a flight, and its digits after the point
+    In the alternative text ``plotted`` says what is drawn against what, and ``said`` which ``number``, with how many
+    ``digits`` after the point, stands for a curve.
     """
 
     x: Axis

@@ -36,13 +36,9 @@ DASHED: Final = {"color": "black", "linestyle": "--", "linewidth": 1.6, "zorder"
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One curve or row of points.
+    """One curve or row of points (P,); the same throw has the same label in every panel.
 
-    Parameters
-    ----------
-    label : str - the same in every panel for the same throw
-    x, y : arrays of equal shape (P,)
-    look : mapping - keywords of matplotlib's ``plot``: ``ranked``, ``dots`` and ``DASHED`` make them
+    ``look`` holds keywords of matplotlib's ``plot``, which ``ranked``, ``dots`` and ``DASHED`` make.
     """
 
     label: str

@@ -24,15 +24,10 @@ SUPERIMPOSED: Final = 0.05
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Flights:
-    """The flights of one equation by the key of their case.
+    """The flights of one equation by the key of their case; ``seen`` are those that were looked at.
 
-    Parameters
-    ----------
-    solver : str
-    made : key -> Made
-    halved : the same flights with half the slices wherever their number is not the subject; None if there are none
-    half_steps : the same flights with half the time steps; None if the equation chooses its own
-    seen : those that were looked at
+    ``halved`` are the same flights with half the slices wherever their number is not the subject, ``half_steps`` those
+    with half the time steps; None if there are none, or the equation chooses its own steps.
     """
 
     solver: str

@@ -65,13 +65,7 @@ class Planned:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperRuns:
-    """Every run of the paper's figures, and those that statements need beside them.
-
-    Parameters
-    ----------
-    made : name -> Made, of the runs that are planned
-    costs : of every solver over numbers of slices and steps; empty if they were not asked for
-    """
+    """Every planned run of the paper's figures and statements by its name, and costs if they were asked for."""
 
     made: Mapping[Name, Made]
     costs: tuple[Cost, ...] = ()
@@ -261,14 +255,10 @@ def plan_published(half: Half) -> Iterator[Planned]:
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """One timed run.
+    """One run of N slices, timed: ``seconds`` of processor time, compiled.
 
-    Parameters
-    ----------
-    solver : str
-    slices, steps : int - N, and P: steps of the published program, output times of an event-driven solver
-    work : int - slice steps N P of the published program; slices times Taylor series otherwise
-    seconds : float - processor time, compiled
+    ``steps`` are P, the steps of the published program or the output times of an event-driven solver; ``work`` counts
+    slice steps N P of the published program, slices times Taylor series otherwise.
     """
 
     solver: str

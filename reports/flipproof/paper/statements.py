@@ -332,10 +332,7 @@ def states(
 ) -> Callable[[Read], Statement]:
     """Return a decorator that makes a statement of what reads its numbers.
 
-    Parameters
-    ----------
-    otherwise : words -> another sense of the text: options of the same function, or another one
-    about : as in ``Statement``
+    ``otherwise`` maps words to another sense of the text: options of the same function, or another one.
     """
 
     def stated(read: Read) -> Statement:
@@ -368,10 +365,7 @@ def judge_sense(read: Read, flights: Flights) -> Judgement:
 
 
 def banded(read: Read, flights: Flights) -> tuple[Reading, ...]:
-    """Return the readings with their bands: tolerances, what half the slices and what half the steps change.
-
-    Raises Missing if a flight is not there.
-    """
+    """Return readings with their bands: tolerances, and what half the slices or steps change; or raise Missing."""
     readings = tuple(read(flights))
     coarser = [tuple(read(each)) for each in (flights.halved, flights.half_steps) if each is not None]
     return tuple(

@@ -31,9 +31,8 @@ from flipproof.chapters.ice.chapter import Drift, measure
 from flipproof.foreign import contract
 from flipproof.foreign.certify import Certificate, certify
 from flipproof.foreign.checking import effort_of
-from flipproof.foreign.content import content_of
 from flipproof.foreign.contract import Traits, trajectory_of
-from flipproof.foreign.specs import CSV, Runner, opened
+from flipproof.foreign.specs import CSV, Runner, content_of, opened
 from flipproof.frame.chapter import Ask, Call, Flights, Study, attempt
 from flipproof.frame.twins import twins
 from ode_reference.models import LADDER
