@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from types import MappingProxyType
 from typing import Any, Final
@@ -77,7 +77,6 @@ class Certificate:
 
     traits: Traits
     results: tuple[Result, ...]
-    versions: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def failed(self) -> tuple[Result, ...]:
@@ -102,7 +101,10 @@ class Certificate:
         return {
             "passport": 1,
             "solver": asdict(self.traits),
-            "versions": dict(self.versions),
+            "versions": {
+                "python": platform.python_version(),
+                **{name: version_of(name) for name in ("flipproof", "numpy", "scipy", "numba")},
+            },
             "checks": [
                 {name: getattr(r, name) for name in ("check", "verdict", "title", "reason")}
                 | {name: getattr(r.found, name) for name in ("expected", "came", "where", "advice") if r.found}
@@ -129,10 +131,7 @@ def certify(
     for name in checks:
         results.append(_result(name, traits, runner))
         say(results[-1])
-    versions = {name: version_of(name) for name in ("flipproof", "numpy", "scipy", "numba")}
-    return Certificate(
-        traits=traits, results=tuple(results), versions={"python": platform.python_version(), **versions}
-    )
+    return Certificate(traits=traits, results=tuple(results))
 
 
 def _result(name: str, traits: Traits, runner: Runner) -> Result:

@@ -22,18 +22,8 @@ from typing import Any, BinaryIO, Final
 
 import numpy as np
 
-from flipproof.foreign.contract import (
-    IMPACT,
-    PER_TIME,
-    REQUIRED,
-    Answer,
-    AnswerError,
-    Ask,
-    Traits,
-    answer_of,
-    solve_of,
-    traits_of,
-)
+from flipproof.foreign import contract
+from flipproof.foreign.contract import IMPACT, Answer, AnswerError, Ask, Traits, answer_of
 from flipproof.foreign.specs import ForeignError, Runner, distribution_of, load
 from slicemodel import Scenario
 from slicemodel.scenario import shortened
@@ -87,7 +77,10 @@ class Isolated(Runner):
         header = {"scenario": ask.scenario.to_mapping(), "effort": ask.effort, "options": dict(ask.options)}
         limit = self.timeout or traits.timeout
         most_impacts = 10_000_000
-        most = 8 * (len(ask.times) * (len(REQUIRED) + len(PER_TIME) + 2 * ask.scenario.n_slices) + 5 * most_impacts)
+        most = 8 * (
+            len(ask.times) * (len(contract.REQUIRED) + len(contract.PER_TIME) + 2 * ask.scenario.n_slices)
+            + 5 * most_impacts
+        )
         header, arrays = self._exchange(header, {"times": ask.times, "start": ask.start}, limit, most)
         self._late = 0
         if "reason" in header:
@@ -198,8 +191,8 @@ def serve() -> None:
     spec = receive(inbox, 0)[0]["spec"]
     try:
         solver = load(spec)
-        traits = traits_of(solver, spec)
-        solve = solve_of(solver)
+        traits = contract.traits_of(solver, spec)
+        solve = contract.solve_of(solver)
         said = {name: getattr(traits, name) for name in traits.__slots__}
         said["distribution"] = traits.distribution or distribution_of(spec)
         send(outbox, {"traits": said}, {})

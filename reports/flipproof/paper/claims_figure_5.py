@@ -238,8 +238,7 @@ def _of_programs(id_: str, place: str, says: str, means: str, why: str) -> Calla
     SQUARE_WHY,
 )
 def _cost_of_slices(_: Flights, program: str = "MATLAB") -> Iterator[Reading]:
-    of_n, _p = _exponents(program)
-    yield Reading("exponent of N in the work", of_n, "", SQUARE, note=_counted(program))
+    yield Reading("exponent of N in the work", _exponents(program)[0], "", SQUARE, note=_counted(program))
 
 
 @_of_programs(
@@ -251,8 +250,7 @@ def _cost_of_slices(_: Flights, program: str = "MATLAB") -> Iterator[Reading]:
     SQUARE_WHY,
 )
 def _cost_of_intervals(_: Flights, program: str = "MATLAB") -> Iterator[Reading]:
-    _n, of_p = _exponents(program)
-    yield Reading("exponent of P in the work", of_p, "", SQUARE, note=_counted(program))
+    yield Reading("exponent of P in the work", _exponents(program)[1], "", SQUARE, note=_counted(program))
 
 
 def _exponents(program: str) -> tuple[float, float]:

@@ -260,13 +260,11 @@ def claim_filling_of_change() -> Finding:
     closed = filling_of_change(paper_throw().bottle)
     surface = float(brentq(surface_over_centre, 1e-3, 1.0, xtol=1e-12))
     peak, _ = toppling_peak()
-    return regression(
-        id="paper-filling-of-change",
-        title=f"Water at rest reaches up to the centre of mass at M̃ = {closed:.4f}, where Eq. 13b has its maximum",
-        value=max(abs(surface - closed), abs(peak - closed)),
-        unit="",
-        admissible=(0.0, 1e-6),
-        note=f"h/L = ε/(1 + ε): {closed:.7f} in closed form, {surface:.7f} where r_CM(0) = L − h, {peak:.7f} by "
+    title = f"Water at rest reaches up to the centre of mass at M̃ = {closed:.4f}, where Eq. 13b has its maximum"
+    note = (
+        f"h/L = ε/(1 + ε): {closed:.7f} in closed form, {surface:.7f} where r_CM(0) = L − h, {peak:.7f} by "
         "maximising Eq. 13b. Water that lies higher is thrown towards the cap. Slices may overlap and sink towards the "
-        "base first: in free flight the first of them goes over to the cap at 0.13 to 0.14",
+        "base first: in free flight the first of them goes over to the cap at 0.13 to 0.14"
     )
+    off = max(abs(surface - closed), abs(peak - closed))
+    return regression("paper-filling-of-change", title, off, "", (0.0, 1e-6), note)

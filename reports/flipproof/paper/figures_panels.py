@@ -153,14 +153,10 @@ def _set_range(axes: Axes, x: Axis, row: Row) -> None:
     if x.low is not None and x.high is not None:
         axes.set_xlim(x.low, x.high)
     if y.low is not None and y.high is not None:
-        high = stretched(y.high, row)
+        tops = (float(line.y.max()) for lines in row.lines.values() for line in lines if len(line.y))
+        highest = max(tops, default=0.0)
+        high = y.high if highest <= y.high else 1.05 * highest
         axes.set_ylim(*((high, y.low) if y.upside_down else (y.low, high)))
-
-
-def stretched(high: float, row: Row) -> float:
-    """Return the upper end of an axis, moved up if any curve of its row needs it."""
-    highest = max((float(line.y.max()) for lines in row.lines.values() for line in lines if len(line.y)), default=0.0)
-    return high if highest <= high else 1.05 * highest
 
 
 def legend_below(figure: Figure, panels: Iterable[Axes], columns: int) -> None:

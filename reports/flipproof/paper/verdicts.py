@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
 from types import MappingProxyType
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar, Final, get_args
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from flipproof.paper.claims_figures_6_7 import CLEAR, filling_of_slow_down
 from flipproof.paper.claims_figures_8_9 import claim_filling_of_change
 from flipproof.paper.observe import FLAT, Flights, climb, normalised, steady_level
 from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS, STEADY_FILLING, WEIGHTLESS, WEIGHTLESS_KEY, PaperRuns
-from flipproof.paper.statements import OMEGA, Judgement, Reading, Statement, judge, judge_sense
+from flipproof.paper.statements import OMEGA, Kind, Reading, Statement, judge, judge_sense
 from slicemodel.observables import static_toppling_angle
 
 CAVEAT: Final = (
@@ -87,11 +87,6 @@ class Observation:
             "closest": list(self.closest),
             "equations": {solver: reading.to_mapping() for solver, reading in self.readings.items()},
         }
-
-
-def _levels(flights: Flights) -> dict[float, float]:
-    """Return the average of Fig. 4d by filling."""
-    return flights.measured("filling", steady_level)
 
 
 def _landing_angles(flights: Flights) -> dict[float, float]:
@@ -160,7 +155,7 @@ OBSERVATIONS: Final = (
         place="section 3, Fig. 4d",
         says="ω/ω₀ is lowest between M̃ = 0.25 and 0.50.",
         means="filling with the lowest mean ω over the second half of the flight",
-        read=lambda flights: min(_levels(flights).items(), key=itemgetter(1))[0],
+        read=lambda flights: min(flights.measured("filling", steady_level).items(), key=itemgetter(1))[0],
         unit="",
         measured=(0.25, 0.5),
         why="The range is the paper's.",
@@ -180,7 +175,7 @@ OBSERVATIONS: Final = (
         place="section 6",
         says="ω becomes up to five times lower than that of a rigid filling.",
         means="lowest mean ω over the second half of the flight, of all fillings",
-        read=lambda flights: min(_levels(flights).values()),
+        read=lambda flights: min(flights.measured("filling", steady_level).values()),
         unit=OMEGA,
         measured=(0.2, 0.2),
         slack=0.05,
@@ -290,14 +285,10 @@ STEADY: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperVerdicts:
-    """The statements of the paper and what becomes of them.
+    """Statements about the model, judged by each equation, and about the experiment, beside each equation's number.
 
-    Parameters
-    ----------
-    statements : every statement about the model, judged by each equation
-    comparisons : every statement about the experiment, beside the number of each equation
-    weights : findings of what the weight does to the bottle filled to 0.1, and from which filling on water leaves the
-        base; these must hold
+    ``weights`` are findings of what the weight does to the bottle filled to 0.1, and from which filling on water leaves
+    the base; these must hold.
     """
 
     statements: tuple[Statement, ...]
@@ -307,22 +298,14 @@ class PaperVerdicts:
     names: ClassVar = NAMES
     caveat: ClassVar = CAVEAT
 
-    def judgements(self, solver: str, *, limits: bool = False) -> list[Judgement]:
-        """Return what an equation has judged: the claims, or the limits that the paper admits."""
-        return [
-            judgement
-            for statement in self.statements
-            for judgement in statement.judgements
-            if judgement.solver == solver and (statement.kind == "admitted limit") is limits
-        ]
-
     @property
     def lead(self) -> str:
         """In two sentences for each equation how many claims survive, and how many admitted limits it has."""
-        return " ".join(self._lead_of(solver) for solver in SOLVERS)
+        return " ".join(map(self._lead_of, SOLVERS))
 
     def _lead_of(self, solver: str) -> str:
-        claims, limits = self.judgements(solver), self.judgements(solver, limits=True)
+        judged = [(each.kind, by) for each in self.statements for by in each.judgements if by.solver == solver]
+        claims, limits = ([by for kind, by in judged if kind == wanted] for wanted in get_args(Kind))
         of = Counter(judgement.verdict for judgement in claims)
         marginal = sum(judgement.marginal for judgement in claims)
         has = sum(judgement.verdict == "holds" for judgement in limits)
@@ -360,11 +343,8 @@ class PaperVerdicts:
 def judge_paper(runs: PaperRuns) -> PaperVerdicts:
     """Return what becomes of the paper's statements by the runs that were made for them."""
     flights = [runs.flights(solver) for solver in SOLVERS]
-    return PaperVerdicts(
-        statements=judge_all(flights),
-        comparisons=compare_all(flights),
-        weights=(*(claim_weight_slows_the_tenth(runs, solver) for solver in STEADY), claim_filling_of_change()),
-    )
+    weights = (*(claim_weight_slows_the_tenth(runs, solver) for solver in STEADY), claim_filling_of_change())
+    return PaperVerdicts(statements=judge_all(flights), comparisons=compare_all(flights), weights=weights)
 
 
 def judge_all(flights: list[Flights]) -> tuple[Statement, ...]:
@@ -380,13 +360,9 @@ def claim_weight_slows_the_tenth(runs: PaperRuns, solver: str) -> Finding:
     """At a filling of 0.1 the bottle keeps 0.88 of its spin where no weight acts on its water, 0.63 in the program."""
     run = runs.trajectory(solver, WEIGHTLESS_KEY)
     low, high = STEADY[solver]
-    return regression(
-        id=f"paper-weight-{solver}",
-        title=f"{solver}: filled to {STEADY_FILLING:g} the bottle keeps {(low + high) / 2:.2f} of its spin",
-        value=None if run is None else steady_level(run),
-        unit=OMEGA,
-        admissible=(low, high),
-        band=BANDS.get(solver),
-        note="mean over the second half of the flight"
-        + ("" if run is None else f"; N = {run.scenario.n_slices}, γ = {run.scenario.damping_rate:.3g} /s"),
-    )
+    title = f"{solver}: filled to {STEADY_FILLING:g} the bottle keeps {(low + high) / 2:.2f} of its spin"
+    value, note = None, "mean over the second half of the flight"
+    if run is not None:
+        value = steady_level(run)
+        note += f"; N = {run.scenario.n_slices}, γ = {run.scenario.damping_rate:.3g} /s"
+    return regression(f"paper-weight-{solver}", title, value, OMEGA, (low, high), note, band=BANDS.get(solver))
