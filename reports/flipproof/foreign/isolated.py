@@ -76,11 +76,8 @@ class Isolated(Runner):
             self.traits = self._start()
         header = {"scenario": ask.scenario.to_mapping(), "effort": ask.effort, "options": dict(ask.options)}
         limit = self.timeout or traits.timeout
-        most_impacts = 10_000_000
-        most = 8 * (
-            len(ask.times) * (len(contract.REQUIRED) + len(contract.PER_TIME) + 2 * ask.scenario.n_slices)
-            + 5 * most_impacts
-        )
+        # Bytes of t, theta, omega, r_cm and inertia, of r and v of every slice, and of ten million impacts.
+        most = 8 * (len(ask.times) * (5 + 2 * ask.scenario.n_slices) + 5 * 10_000_000)
         header, arrays = self._exchange(header, {"times": ask.times, "start": ask.start}, limit, most)
         self._late = 0
         if "reason" in header:

@@ -14,9 +14,9 @@ from flipproof.chapters.errata.programs import exponents_of_cost
 from flipproof.frame.solvers import Missing
 from flipproof.paper import observe
 from flipproof.paper.cases import number, numbers, paper_steps, paper_throw
-from flipproof.paper.observe import FLAT, SUPERIMPOSED, Flights
+from flipproof.paper.observe import FLAT, FLAT_WHY, SUPERIMPOSED, Flights
 from flipproof.paper.runs import MANY_SLICES, MANY_STEPS, PUBLISHED, finest_key, many_steps_key, same_steps_key
-from flipproof.paper.statements import FLAT_WHY, OMEGA, Read, Reading, Statement, at_least, at_most, states
+from flipproof.paper.statements import OMEGA, Read, Reading, Statement, at_least, at_most, states
 from slicemodel import Trajectory
 from slicemodel.observables import release_angular_velocity
 

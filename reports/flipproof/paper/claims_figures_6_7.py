@@ -12,18 +12,8 @@ from typing import Final
 from flipproof.paper import observe
 from flipproof.paper.cases import numbers
 from flipproof.paper.claims_figure_5 import flat_plateau
-from flipproof.paper.observe import FLAT, SUPERIMPOSED, Flights, level, level_by_points
-from flipproof.paper.statements import (
-    FLAT_WHY,
-    OMEGA,
-    SUPERIMPOSED_WHY,
-    Read,
-    Reading,
-    Statement,
-    at_least,
-    at_most,
-    states,
-)
+from flipproof.paper.observe import FLAT, FLAT_WHY, SUPERIMPOSED, SUPERIMPOSED_WHY, Flights, level, level_by_points
+from flipproof.paper.statements import OMEGA, Read, Reading, Statement, at_least, at_most, states
 
 # ---------------------------------------------------------------------- drag (Fig. 6)
 

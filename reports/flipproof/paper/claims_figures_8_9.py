@@ -13,8 +13,8 @@ from flipproof.frame.findings import Finding, regression
 from flipproof.frame.solvers import Missing
 from flipproof.paper import observe
 from flipproof.paper.cases import number, numbers, paper_steps, paper_throw
-from flipproof.paper.observe import FLAT, SUPERIMPOSED, Flights
-from flipproof.paper.statements import FLAT_WHY, OMEGA, SUPERIMPOSED_WHY, Reading, at_least, at_most, states
+from flipproof.paper.observe import FLAT, FLAT_WHY, SUPERIMPOSED, SUPERIMPOSED_WHY, Flights
+from flipproof.paper.statements import OMEGA, Reading, at_least, at_most, states
 from slicemodel import Bottle, Trajectory
 from slicemodel.landing import Moment, moment_at, next_upright
 from slicemodel.observables import centre_of_mass_at_rest, static_toppling_angle

@@ -16,9 +16,13 @@ from slicemodel.observables import PLATEAU_SHARE, plateau, plateau_of_points, pl
 from slicemodel.trajectory import BASE, CAP, FloatArray
 
 FLAT: Final = 0.1
-"""Share of omega_0 by which a flat omega may rise again; 2 rad/s of the paper's 20."""
+FLAT_WHY: Final = "“Flat” is a word of ours for a rise of at most 0.1 ω₀: 2 rad/s of the 20 on the axis."
+"""Share of omega_0 by which a flat omega may rise again."""
 
 SUPERIMPOSED: Final = 0.05
+SUPERIMPOSED_WHY: Final = (
+    "“Superimposed” is a word of ours for at most 0.05 ω₀ apart: 1 rad/s of 20, about the width of a drawn line."
+)
 """Root-mean-square difference, as a share of omega_0, up to which two curves count as one."""
 
 

@@ -106,16 +106,6 @@ class Reading:
         return 0.0 < reach < math.inf and abs(self.margin) <= reach
 
     @property
-    def sign(self) -> str:
-        """The verdict as a sign."""
-        return SIGNS[self.verdict]
-
-    @property
-    def colour(self) -> str:
-        """The verdict as the class of a page's style sheet."""
-        return CLASSES[self.verdict]
-
-    @property
     def margin_number(self) -> str:
         """The margin with its sign and without its unit; a dash if there is none."""
         if not math.isfinite(self.margin):
@@ -314,17 +304,11 @@ class Statement:
     def findings(self) -> Iterator[Finding]:
         """Yield one finding for each judgement; observations, since what fails is the paper's and not this project."""
         for judgement in self.judgements:
-            number, title = judgement.deciding, f"{self.place}: {self.says} By {judgement.solver}"
+            number, id_ = judgement.deciding, f"paper-{self.id}-{judgement.solver}"
+            title = f"{self.place}: {self.says} By {judgement.solver}: {self.word(judgement)}"
             value = None if number is None or math.isnan(number.value) else number.value
             band = None if number is None or math.isnan(number.band) else number.band
-            title, unit = f"{title}: {self.word(judgement)}", number.unit if number else ""
-            yield observed(f"paper-{self.id}-{judgement.solver}", title, value, unit, judgement.words, band=band)
-
-
-FLAT_WHY: Final = "“Flat” is a word of ours for a rise of at most 0.1 ω₀: 2 rad/s of the 20 on the axis."
-SUPERIMPOSED_WHY: Final = (
-    "“Superimposed” is a word of ours for at most 0.05 ω₀ apart: 1 rad/s of 20, about the width of a drawn line."
-)
+            yield observed(id_, title, value, number.unit if number else "", judgement.words, band=band)
 
 
 def states(
@@ -356,24 +340,19 @@ def judge(statement: Statement, flights: Flights) -> Judgement:
 
 
 def judge_sense(read: Read, flights: Flights) -> Judgement:
-    """Return the judgement of one equation in one sense of the text."""
+    """Return the judgement of one equation in one sense of the text.
+
+    The band of a number is that of its tolerances, and what half the slices and what half the steps change.
+    """
     flights = replace(flights, seen={})
+    own = BANDS.get(flights.solver, 0.0)
+    readings = []
     try:
-        return Judgement(solver=flights.solver, readings=banded(read, flights), flown=flights.flown)
+        found = tuple(read(flights))
+        coarser = [tuple(read(each)) for each in (flights.halved, flights.half_steps) if each is not None]
     except Missing as reason:
         return Judgement(solver=flights.solver, aside=str(reason))
-
-
-def banded(read: Read, flights: Flights) -> tuple[Reading, ...]:
-    """Return readings with their bands: tolerances, and what half the slices or steps change; or raise Missing."""
-    readings = tuple(read(flights))
-    coarser = [tuple(read(each)) for each in (flights.halved, flights.half_steps) if each is not None]
-    return tuple(
-        replace(
-            reading,
-            band=reading.band
-            + (BANDS.get(flights.solver, 0.0) if reading.unit == OMEGA else 0.0)
-            + sum(abs(reading.value - others[k].value) for others in coarser),
-        )
-        for k, reading in enumerate(readings)
-    )
+    for k, reading in enumerate(found):
+        moved = sum(abs(reading.value - others[k].value) for others in coarser)
+        readings.append(replace(reading, band=reading.band + (own if reading.unit == OMEGA else 0.0) + moved))
+    return Judgement(solver=flights.solver, readings=tuple(readings), flown=flights.flown)

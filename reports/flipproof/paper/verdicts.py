@@ -22,7 +22,7 @@ from flipproof.paper.claims_figures_6_7 import CLEAR, filling_of_slow_down
 from flipproof.paper.claims_figures_8_9 import claim_filling_of_change
 from flipproof.paper.observe import FLAT, Flights, climb, normalised, steady_level
 from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS, STEADY_FILLING, WEIGHTLESS, WEIGHTLESS_KEY, PaperRuns
-from flipproof.paper.statements import OMEGA, Kind, Reading, Statement, judge, judge_sense
+from flipproof.paper.statements import CLASSES, OMEGA, SIGNS, Kind, Reading, Statement, judge, judge_sense
 from slicemodel.observables import static_toppling_angle
 
 CAVEAT: Final = (
@@ -297,6 +297,7 @@ class PaperVerdicts:
     solvers: ClassVar = SOLVERS
     names: ClassVar = NAMES
     caveat: ClassVar = CAVEAT
+    marks: ClassVar = {verdict: (CLASSES[verdict], SIGNS[verdict]) for verdict in SIGNS}
 
     @property
     def lead(self) -> str:
