@@ -234,10 +234,7 @@ class Explanation:
 
 
 def explain(one: Runner, other: Runner, throw: Scenario) -> Explanation:
-    """Place two solvers, throw the bottle with both, and split their difference.
-
-    Raises ForeignError if one of them gives no answer.
-    """
+    """Place two solvers, throw the bottle with both, and split their difference; no answer raises ForeignError."""
     first, second = place(one), place(other)
     a, b = (runner(ask_of(runner.traits, throw, 3, 1000)) for runner in (one, other))
     values = plateau(a.t, a.omega, throw.omega0), plateau(b.t, b.omega, throw.omega0)

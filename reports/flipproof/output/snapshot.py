@@ -75,10 +75,7 @@ def _plain(text: str) -> str:
 
 
 def write_front_page(summary: Mapping[str, Any], readme: Path) -> None:
-    """Write what was found between the two marks of the README.
-
-    Raises ValueError if the README cannot be read or lacks the marks.
-    """
+    """Write what was found between the two marks of the README; raises ValueError if it has none or is unreadable."""
     try:
         text = readme.read_text(encoding="utf-8")
     except OSError as error:

@@ -139,10 +139,7 @@ def read_cells(path: Path) -> tuple[list[str], Rows]:
 
 
 def number_of(path: Path, line: int, column: str, cell: str) -> float:
-    """Return a cell's number.
-
-    Raises ValueError if it is none, or not finite; the message names file, line and column.
-    """
+    """Return a cell's number; if it is none, or not finite, raises ValueError, naming file, line and column."""
     try:
         value = float(cell)
     except ValueError:

@@ -118,10 +118,7 @@ def climb(run: Trajectory) -> float:
 
 
 def drop_time(run: Trajectory) -> float:
-    """Return when omega is half way from omega_0 down to its plateau, as a share of the flight.
-
-    NaN where it drops by less than FLAT.
-    """
+    """Return at which share of the flight omega is half way down to its plateau; NaN if it drops by less than FLAT."""
     curve, low = normalised(run), level(run)
     if 1.0 - low < FLAT:
         return float("nan")

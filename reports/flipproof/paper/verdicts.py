@@ -65,10 +65,7 @@ class Observation:
 
     @property
     def closest(self) -> tuple[str, ...]:
-        """Return the equations that come closest: several where bands do not tell them apart.
-
-        None if none flew, or if misses are no measure.
-        """
+        """Return the equations that come closest, all that bands do not tell apart; none if misses are no measure."""
         low, high = self.measured
         misses = {
             solver: (max(0.0, low - reading.value, reading.value - high), reading.band)
