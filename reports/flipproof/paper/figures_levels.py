@@ -45,12 +45,9 @@ class Points:
 
 def _points(runs: PaperRuns, label: str, family: str, of: Callable[[Trajectory], float], *, filled: bool) -> Points:
     """Return the points where there is a number, which is finite."""
-    found = {solver: {case.value: of(run) for case, run in runs.members(solver, family)} for solver in SOLVERS}
-    return Points(
-        label,
-        filled,
-        {solver: {at: value for at, value in by.items() if math.isfinite(value)} for solver, by in found.items()},
-    )
+    found = {solver: [(case.value, of(run)) for case, run in runs.members(solver, family)] for solver in SOLVERS}
+    finite = {solver: {at: value for at, value in own if math.isfinite(value)} for solver, own in found.items()}
+    return Points(label, filled, finite)
 
 
 def _row(y: Axis, points: Sequence[Points], *extra: Line) -> panels.Row:

@@ -24,11 +24,13 @@ Kind = Literal["claim", "admitted limit"]
 OMEGA: Final = "of ω₀"
 """Unit of a number that is a share of omega_0."""
 
-SIGNS: Final[Mapping[Verdict, str]] = {"holds": "✓", "fails": "✗", "cannot be decided": "?", "not judged": "–"}
-CLASSES: Final[Mapping[Verdict, str]] = {
-    "holds": "pass", "fails": "fail", "cannot be decided": "soft", "not judged": "soft"
-}  # fmt: skip
-"""How a page marks a verdict: sign and colour class beside the word."""
+MARKS: Final[Mapping[Verdict, tuple[str, str]]] = {
+    "holds": ("✓", "pass"),
+    "fails": ("✗", "fail"),
+    "cannot be decided": ("?", "soft"),
+    "not judged": ("–", "soft"),
+}
+"""How a page marks a verdict: sign, and class of the style sheet, beside the word."""
 
 NEAR: Final = 0.1
 """Share of a threshold within which a number is marginal. Thresholds chosen here have one significant digit: another
@@ -288,11 +290,11 @@ class Statement:
 
     def sign(self, judgement: Judgement) -> str:
         """Return a verdict as a sign; one on an admitted limit is neither success nor failure."""
-        return "•" if self.kind == "admitted limit" and judgement.readings else SIGNS[judgement.verdict]
+        return "•" if self.kind == "admitted limit" and judgement.readings else MARKS[judgement.verdict][0]
 
     def colour(self, judgement: Judgement) -> str:
         """Return a verdict as the class of a page's style sheet."""
-        return "soft" if self.kind == "admitted limit" else CLASSES[judgement.verdict]
+        return "soft" if self.kind == "admitted limit" else MARKS[judgement.verdict][1]
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the statement as JSON-ready data."""

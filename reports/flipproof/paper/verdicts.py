@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
-from types import MappingProxyType
 from typing import Any, ClassVar, Final, get_args
 
 import numpy as np
@@ -22,7 +21,7 @@ from flipproof.paper.claims_figures_6_7 import CLEAR, filling_of_slow_down
 from flipproof.paper.claims_figures_8_9 import claim_filling_of_change
 from flipproof.paper.observe import FLAT, Flights, climb, normalised, steady_level
 from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS, STEADY_FILLING, WEIGHTLESS, WEIGHTLESS_KEY, PaperRuns
-from flipproof.paper.statements import CLASSES, OMEGA, SIGNS, Kind, Reading, Statement, judge, judge_sense
+from flipproof.paper.statements import MARKS, OMEGA, Kind, Reading, Statement, judge, judge_sense
 from slicemodel.observables import static_toppling_angle
 
 CAVEAT: Final = (
@@ -261,9 +260,7 @@ def closest_overall(observations: Sequence[Observation]) -> tuple[str, ...]:
 
 # ---------------------------------------------------------------------- both together
 
-NAMES: Final[Mapping[str, str]] = MappingProxyType(
-    {"published-python": "published program", "eq8": "Eq. 8 as printed", "free-flight": "free flight"}
-)
+NAMES: Final = {"published-python": "published program", "eq8": "Eq. 8 as printed", "free-flight": "free flight"}
 """Equation -> its name over a column."""
 
 CLAIMS: Final = tuple(
@@ -274,9 +271,7 @@ CLAIMS: Final = tuple(
 )
 """All statements, in the order of the paper: that in which they are written down."""
 
-STEADY: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
-    {WEIGHTLESS: (0.87, 0.89), "free-flight": (0.87, 0.89), PUBLISHED: (0.62, 0.64)}
-)
+STEADY: Final = {WEIGHTLESS: (0.87, 0.89), "free-flight": (0.87, 0.89), PUBLISHED: (0.62, 0.64)}
 """Mean of omega / omega_0 over the second half of the flight of a bottle filled to 0.1: without weight, and with."""
 
 
@@ -294,7 +289,7 @@ class PaperVerdicts:
     solvers: ClassVar = SOLVERS
     names: ClassVar = NAMES
     caveat: ClassVar = CAVEAT
-    marks: ClassVar = {verdict: (CLASSES[verdict], SIGNS[verdict]) for verdict in SIGNS}
+    marks: ClassVar = MARKS
 
     @property
     def lead(self) -> str:
