@@ -99,16 +99,12 @@ def opened(spec: str, timeout: float | None = None, *, curves: bool = False) -> 
         from flipproof.foreign.solving import Own
 
         return Own(find(spec))
-    if spec.startswith(CSV):
+    if spec.startswith((CSV, COMMAND)):
+        from flipproof.foreign.files import Command, File
+
         if not curves:
             check_asked(spec)
-        from flipproof.foreign.files import File
-
-        return File(spec)
-    if spec.startswith(COMMAND):
-        from flipproof.foreign.files import Command
-
-        return Command(spec, timeout)
+        return File(spec) if spec.startswith(CSV) else Command(spec, timeout)
     locate(spec)
     from flipproof.foreign.isolated import Isolated
 

@@ -318,4 +318,3 @@ RECIPES: Final[dict[str, panels.Recipe]] = {
     "6a": (("drag",), _exhibits_6a),
     "S1a": (tuple(f"steps {filling:g}" for filling in numbers("figure-S1-filling")), _exhibits_s1a),
 }
-"""Figure -> the families it needs, and how it is made."""

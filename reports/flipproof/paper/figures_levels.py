@@ -170,4 +170,3 @@ RECIPES: Final[dict[str, panels.Recipe]] = {
     "S1b": ((), partial(_exhibits_cost, "slices")),
     "S1c": ((), partial(_exhibits_cost, "steps")),
 }
-"""Figure -> the families it needs, and how it is made."""

@@ -27,8 +27,6 @@ event-driven solver; with recoil the order of the impacts decides it."""
 
 MANY_STEPS: Final = 10_000
 MANY_SLICES: Final = 100.0
-FINEST: Final = 200
-"""Slices of an event-driven flight that the others are held against."""
 
 HALVED: Final = ("filling", "long", "drag", "spin", "angle", "aspect")
 """Families flown with half the slices too; in the others their number is the subject."""
@@ -185,7 +183,7 @@ def same_steps_key(filling: float) -> str:
 
 
 def finest_key(damping: str) -> str:
-    """Return the key of the flight with the most slices at one of ``DAMPINGS``."""
+    """Return the key of the event-driven flight with the most slices, 200, at one of ``DAMPINGS``."""
     return f"slices finest{damping}"
 
 
@@ -216,7 +214,7 @@ def plan_further() -> Iterator[Planned]:
     for damping in DAMPINGS:
         many = next(case for case in family(f"slices{damping}") if case.value == MANY_SLICES)
         for solver in SOLVERS[1:]:
-            yield _planned(solver, finest_key(damping), many.scenario.with_slices(FINEST))
+            yield _planned(solver, finest_key(damping), many.scenario.with_slices(200))
     for filling in numbers("figure-S1-filling"):
         key = many_steps_key(filling)
         yield _planned(PUBLISHED, key, paper_throw(filling), steps=MANY_STEPS, store="summary")
