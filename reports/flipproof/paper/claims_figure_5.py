@@ -15,7 +15,7 @@ from flipproof.frame.solvers import Missing
 from flipproof.paper import observe
 from flipproof.paper.cases import number, numbers, paper_steps, paper_throw
 from flipproof.paper.observe import FLAT, FLAT_WHY, SUPERIMPOSED, Flights
-from flipproof.paper.runs import MANY_SLICES, MANY_STEPS, PUBLISHED, finest_key, many_steps_key, same_steps_key
+from flipproof.paper.runs import FINEST_KEY, MANY_SLICES, MANY_STEPS, MANY_STEPS_KEY, PUBLISHED, SAME_STEPS_KEY
 from flipproof.paper.statements import OMEGA, Read, Reading, Statement, at_least, at_most, states
 from slicemodel import Trajectory
 from slicemodel.observables import release_angular_velocity
@@ -207,7 +207,7 @@ def _finest(flights: Flights, damping: str) -> Trajectory:
     """Return the flight with the most slices: the paper's 500, fewer where the equation is solved through events."""
     if flights.solver == PUBLISHED:
         return flights.at("slices" + damping, max(numbers("figure-5d-slices")))
-    return flights.run(finest_key(damping))
+    return flights.run(FINEST_KEY.format(damping))
 
 
 # ---------------------------------------------------------------------- cost (Supp. Fig. 1)
@@ -291,9 +291,9 @@ def _steps_are_enough(flights: Flights) -> Iterator[Reading]:
     for filling in numbers("figure-S1-filling"):
         own = flights.at("filling", filling)
         if flights.solver == PUBLISHED:
-            off[filling] = observe.distance(own, flights.run(many_steps_key(filling)))
+            off[filling] = observe.distance(own, flights.run(MANY_STEPS_KEY.format(filling)))
         else:
-            off[filling] = observe.distance(flights.run(same_steps_key(filling)), own)
+            off[filling] = observe.distance(flights.run(SAME_STEPS_KEY.format(filling)), own)
     if flights.solver == PUBLISHED:
         against, fewer = f"P = {MANY_STEPS}", _fewer_steps(flights)
     worst, most = max(off.items(), key=itemgetter(1))

@@ -172,19 +172,11 @@ def _kept(made: Made, planned: Planned) -> Made:
 # ---------------------------------------------------------------------- what statements need beside the figures
 
 
-def many_steps_key(filling: float) -> str:
-    """Return the key of the flight with ``MANY_STEPS`` steps."""
-    return f"filling {filling:g}, P {MANY_STEPS}"
-
-
-def same_steps_key(filling: float) -> str:
-    """Return the key of the flight by the exact step of Eq. 8 at the paper's number of time steps."""
-    return f"filling {filling:g}, exact-step"
-
-
-def finest_key(damping: str) -> str:
-    """Return the key of the event-driven flight with the most slices, 200, at one of ``DAMPINGS``."""
-    return f"slices finest{damping}"
+MANY_STEPS_KEY: Final = f"filling {{:g}}, P {MANY_STEPS}"
+SAME_STEPS_KEY: Final = "filling {:g}, exact-step"
+FINEST_KEY: Final = "slices finest{}"
+"""Keys, at a filling or one of ``DAMPINGS``, of the flights with ``MANY_STEPS`` steps, by the exact step of Eq. 8 at
+the paper's number of time steps, and event by event with the most slices, 200."""
 
 
 def plan_claims() -> list[Planned]:
@@ -205,7 +197,7 @@ def _halved(scenario: Scenario) -> Scenario:
 def _same_steps(filling: float, half: Half = "") -> Planned:
     """Return the run of the scheme that solves Eq. 8 as printed at the paper's number of time steps."""
     throw = _halved(paper_throw(filling)) if half else paper_throw(filling)
-    key = same_steps_key(filling)
+    key = SAME_STEPS_KEY.format(filling)
     return _planned("eq8", key, throw, half, by="exact-step", steps=paper_steps(), store="summary")
 
 
@@ -214,9 +206,9 @@ def plan_further() -> Iterator[Planned]:
     for damping in DAMPINGS:
         many = next(case for case in family(f"slices{damping}") if case.value == MANY_SLICES)
         for solver in SOLVERS[1:]:
-            yield _planned(solver, finest_key(damping), many.scenario.with_slices(200))
+            yield _planned(solver, FINEST_KEY.format(damping), many.scenario.with_slices(200))
     for filling in numbers("figure-S1-filling"):
-        key = many_steps_key(filling)
+        key = MANY_STEPS_KEY.format(filling)
         yield _planned(PUBLISHED, key, paper_throw(filling), steps=MANY_STEPS, store="summary")
         yield _same_steps(filling)
     yield _planned(WEIGHTLESS, WEIGHTLESS_KEY, paper_throw(STEADY_FILLING))

@@ -210,11 +210,6 @@ class Judgement:
         return next((reading for reading in found if reading.marginal == wanted), found[0] if found else None)
 
     @property
-    def value(self) -> float:
-        """The deciding number; NaN if there is none."""
-        return self.deciding.value if self.deciding else math.nan
-
-    @property
     def words(self) -> str:
         """All readings, the flights and the other senses of the text, as one line."""
         parts = [reading.words for reading in self.readings]
