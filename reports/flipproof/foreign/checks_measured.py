@@ -153,6 +153,8 @@ def _singles(answer: Answer) -> list[str]:
     return found
 
 
+# ---------------------------------------------------------------------- restitution
+
 ASKED: Final = 0.5
 ADMISSIBLE: Final = 0.02
 """The restitution asked for, and how far a measured one may be from it."""

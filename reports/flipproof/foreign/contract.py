@@ -1,4 +1,4 @@
-"""The contract of a foreign solver: what it is asked, and what it says of itself. ``answers`` has what it answers.
+"""The contract of a foreign solver: what it is asked, what it says of itself, and what it answers.
 
 def solve(ask):                                       # or an object with this method and the attributes of Traits
     t = ask.times                                     # answer at exactly these times
@@ -149,6 +149,8 @@ def _inside(value: object, above: float, most: float) -> bool:
     number = isinstance(value, numbers.Real) and not isinstance(value, bool)
     return number and math.isfinite(float(value)) and above < float(value) <= most  # type: ignore[arg-type]
 
+
+# ---------------------------------------------------------------------- the answer
 
 REQUIRED: Final = ("t", "theta", "omega")
 PER_TIME: Final = ("r_cm", "inertia")

@@ -173,6 +173,9 @@ class Isolated(Runner):
         return f"the process {how} before it answered{f'; last line printed: {said}' if said else ''}"
 
 
+# ---------------------------------------------------------------------- in the process of the solver
+
+
 def serve() -> None:
     """Call one solver for the asks that come in, and send its checked answers, until the other side goes away."""
     inbox = os.fdopen(os.dup(0), "rb")
@@ -239,6 +242,9 @@ def _watch(parent: int) -> None:
     while os.getppid() == parent:
         time.sleep(0.5)
     os._exit(1)
+
+
+# ---------------------------------------------------------------------- frames
 
 
 class BrokenFrameError(EOFError):

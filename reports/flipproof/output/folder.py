@@ -148,6 +148,8 @@ def _lock(handle: int) -> None:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
+# ---------------------------------------------------------------------- one folder in the place of another
+
 UNFINISHED: Final = ".flipproof-unfinished"
 """Ends the name of the folder, beside the one that is written, that holds the new one and the old one for a moment."""
 

@@ -58,9 +58,6 @@ def exhibits_paper(runs: PaperRuns, names: Iterable[str] = ORDER) -> Iterator[Ex
             yield from RECIPES[name][1](runs)
 
 
-PAGE = "index.html"
-
-
 def make_gallery(
     names: Sequence[str],
     out: Path,
@@ -87,7 +84,7 @@ def make_gallery(
             (folder / f"{exhibit.name}.csv").write_text(exhibit.table or "", encoding="utf-8")
         (folder / "parameters.csv").write_text(rows_csv(HEADER, parameter_rows()), encoding="utf-8")
         facts = {**provenance, **store.facts()}
-        (folder / PAGE).write_text(render_gallery(exhibits, runs, facts), encoding="utf-8")
+        (folder / "index.html").write_text(render_gallery(exhibits, runs, facts), encoding="utf-8")
         summary = {
             "figures": {exhibit.name: exhibit.title for exhibit in exhibits},
             "flights": len(runs.made),
@@ -98,7 +95,7 @@ def make_gallery(
     failed = f", {len(runs.failures())} flights failed" if runs.failures() else ""
     figures = f"{len(exhibits)} figure{'' if len(exhibits) == 1 else 's'}"
     seconds = time.perf_counter() - began
-    return f"{figures} from {len(runs.made)} flights{failed}: {out / PAGE} ({seconds:.0f} s)"
+    return f"{figures} from {len(runs.made)} flights{failed}: {out / 'index.html'} ({seconds:.0f} s)"
 
 
 def gather_figures(
