@@ -54,20 +54,15 @@ class Own(Runner):
 
     def __init__(self, solver: solvers.Solver) -> None:
         self.solver = solver
-        equation: str | None = solver.name
-        if solver.package == "engine_check":
-            equation = "free-flight"
-        elif solver.name == COLUMN:  # no equation of slices: it stands on no rung and declares none
-            equation = None
-        order = None if solver.package != "slicemodel" else 2.0 if solver.name == "midpoint" else 1.0
-        self.traits = Traits(
-            name=solver.name,
-            equation=equation,
-            refined_by={"slicemodel": "steps", "ode_reference": None, "engine_check": "dt"}[solver.package],
-            order=order,
-            distribution="flipproof",
-            timeout=600.0,
-        )
+        # The column is no equation of slices: it stands on no rung and declares none.
+        equation = None if solver.name == COLUMN else solver.name
+        order = 2.0 if solver.name == "midpoint" else 1.0
+        declared: dict[str, dict[str, Any]] = {
+            "slicemodel": {"equation": equation, "refined_by": "steps", "order": order},
+            "ode_reference": {"equation": equation},
+            "engine_check": {"equation": "free-flight", "refined_by": "dt"},
+        }
+        self.traits = Traits(name=solver.name, distribution="flipproof", timeout=600.0, **declared[solver.package])
 
     def __call__(self, ask: Ask) -> Answer:
         """Return the checked answer; the slice model computes on a uniform grid that holds the asked times."""
