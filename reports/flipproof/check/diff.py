@@ -99,10 +99,7 @@ class Comparison:
 
 
 def read_summary(path: Path) -> dict[str, Any]:
-    """Return the summary of a report: of a folder, or of its ``summary.json`` itself.
-
-    Raises ValueError, naming the file and what is wrong with it.
-    """
+    """Return the summary in a report's folder, or in its file; raises ValueError, naming the file and what is wrong."""
     file = path / "summary.json" if path.is_dir() else path
     try:
         summary = json.loads(read_text(file, 2**28).removeprefix("\ufeff"))

@@ -123,10 +123,7 @@ def check_equation(name: object) -> None:
 
 
 def traits_of(solver: object, name: str) -> Traits:
-    """Return what ``solver`` says of itself; ``name`` serves where it has none.
-
-    Raises ValueError if it cannot be called, has no ``solve``, or an attribute is not admissible.
-    """
+    """Return what ``solver`` says of itself, or raise ValueError; ``name`` serves where it has none."""
     solve_of(solver)
     given = {
         f: value

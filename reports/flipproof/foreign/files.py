@@ -31,10 +31,7 @@ if TYPE_CHECKING:
 
 
 def read_answer(path: Path, n_slices: int) -> dict[str, Any]:
-    """Read an answer: a header with t, theta, omega and, if known, r_cm, inertia, r_0 ... and v_0 ...; then numbers.
-
-    Raises AnswerError, naming file, line and column.
-    """
+    """Read t, theta, omega and, if known, r_cm, inertia, r_0 ... and v_0 ... below a header, or raise AnswerError."""
     most = 1 << 30
     try:
         if path.stat().st_size > most:

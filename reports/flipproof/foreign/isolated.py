@@ -49,10 +49,7 @@ def last_line(printed: bytes) -> str:
 
 
 class Isolated(Runner):
-    """The solver that a spec names, in a process that is started when it is first needed and again after a crash.
-
-    A run may take ``timeout`` seconds, or what the solver says.
-    """
+    """The solver that a spec names, in a process that is started when it is first needed and again after a crash."""
 
     def __init__(self, spec: str, timeout: float | None = None) -> None:
         self.spec, self.timeout = spec, timeout

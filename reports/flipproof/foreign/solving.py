@@ -89,10 +89,7 @@ class Own(Runner):
 
 
 def _grid_of(ask: Ask) -> tuple[int, int]:
-    """Return how many steps lie between asked times, and the points of the grid, for at least ``effort`` steps.
-
-    Times that are not uniform over [0, duration], to 1e-9 of it, raise an AnswerError.
-    """
+    """Return steps between asked times, and points of the grid, for ``effort`` steps or more; times must be uniform."""
     points, duration = len(ask.times), ask.scenario.duration
     uniform = np.linspace(0.0, duration, points)
     if points < 2 or float(np.max(np.abs(ask.times - uniform))) > 1e-9 * duration:

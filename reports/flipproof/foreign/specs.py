@@ -173,10 +173,7 @@ def distribution_of(spec: str) -> str:
 
 
 def content_of(spec: str) -> str:
-    """Return the SHA-256 of the files that a spec stands for; nothing is imported. Empty for flipproof's own solvers.
-
-    Raises ValueError if the spec names nothing, or a file cannot be read.
-    """
+    """Return the SHA-256 of the files that a spec stands for, empty for flipproof's own; nothing is imported."""
     if not is_foreign(spec):
         return ""
     found = hashlib.sha256()

@@ -216,10 +216,7 @@ def _plainly(place: Path) -> Iterator[None]:
 
 @contextmanager
 def _held(beside: Path, target: Path) -> Iterator[None]:
-    """Make the unfinished folder and hold its lock; remove both at the end.
-
-    A folder that others remove as they end is made again up to a thousand times.
-    """
+    """Make the unfinished folder, again if others remove it as they end, and hold its lock; remove both at the end."""
     with ExitStack() as held:
         for left in reversed(range(1000)):
             beside.parent.mkdir(parents=True, exist_ok=True)

@@ -49,10 +49,7 @@ def keys_of(names: Iterable[str]) -> set[str]:
 
 
 def exhibits_paper(runs: PaperRuns, names: Iterable[str] = ORDER) -> Iterator[Exhibit]:
-    """Yield the exhibits of the figures, in the paper's order; a figure may have several.
-
-    Figures of cost are left out where costs were not measured.
-    """
+    """Yield the exhibits of the figures, in the paper's order; those of cost only where costs were measured."""
     for name in check_figures(names):
         if runs.costs or name not in TIMED:
             yield from RECIPES[name][1](runs)

@@ -48,10 +48,7 @@ class Flights:
         return run
 
     def at(self, name: str, value: float) -> Trajectory:
-        """Return the flight of a family where what varies has this value.
-
-        Raises Missing if the family has no such case, or its flight is not there.
-        """
+        """Return the flight of a family where what varies has this value; raises Missing if it is not there."""
         for case in family(name):
             if abs(case.value - value) <= 1e-9 * max(1.0, abs(value)):
                 return self.run(case.key)

@@ -226,10 +226,7 @@ def plan_halved() -> Iterator[Planned]:
 
 
 def plan_published(half: Half) -> Iterator[Planned]:
-    """Yield the flights of the published program with half its "slices" or "steps".
-
-    Slices are kept where statements read more than omega and theta.
-    """
+    """Yield the published program's flights with half its "slices" or "steps", with slices only where they are read."""
     rebounds, slices = ([f"{name}{damping}" for damping in DAMPINGS] for name in ("beta", "slices"))
     whole = {case.key for name in ("long", "drag", *rebounds) for case in family(name)}
     families = HALVED if half == "slices" else (*HALVED, *rebounds, *slices)
