@@ -67,6 +67,18 @@ def test_the_table_of_words_is_whole():
     assert angles[2:4] == ("0, 0.5236, 1.0472, 1.5708, 2.0944", "rad")
 
 
+def test_a_case_is_one_throw_that_is_kept_as_every_family_needs_it():
+    every = [case for members in FAMILIES.values() for case in members]
+    throws = {(case.scenario, case.steps, case.slices_vary) for case in every}
+    assert {(case.scenario, case.steps, case.slices_vary) for case in all_cases().values()} == throws
+    assert len(all_cases()) == len(throws)
+    for key, case in all_cases().items():
+        assert case.whole == any(each.whole for each in every if each.key == key)
+        assert (case.steps - 1) % case.thin == 0
+    assert {case.thin for case in every} == {1, 3}
+    assert all((case.thin == 3) == (case.scenario.duration > 1.0) for case in every)
+
+
 @pytest.mark.parametrize(("ask", "words"), [
     (lambda: number("lenght"), "did you mean 'length'"),
     (lambda: number("figure-7-filling"), "has 17 values"),
