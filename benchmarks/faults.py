@@ -86,7 +86,7 @@ FAULTS = (
      "test_sweep_run.py"),
     ("reports/flipproof/check/diff.py", "return sum(abs(band) for band in",
      "return max(abs(band) for band in", "test_diff.py"),
-    ("reports/flipproof/foreign/checks_order.py", "holds=abs(order - declared) <= WIDTH",
+    ("reports/flipproof/foreign/checks_measured.py", "holds=abs(order - declared) <= WIDTH",
      "holds=order - declared <= WIDTH", "foreign/test_certify.py"),
     ("reports/flipproof/frame/keys.py", '"settings": dict(run.settings)}', '"settings": {}}', "test_run_store.py"),
 )  # fmt: skip

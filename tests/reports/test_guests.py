@@ -28,9 +28,8 @@ from flipproof.chapters.guests.study import (
 from flipproof.chapters.waterfall.study import equation_run
 from flipproof.cli import main as cli
 from flipproof.foreign import certify as suite
-from flipproof.foreign.content import content_of
 from flipproof.foreign.contract import Traits
-from flipproof.foreign.specs import load
+from flipproof.foreign.specs import content_of, load
 from flipproof.frame.exhibit import drawn
 from flipproof.frame.gather import gather, tell
 from flipproof.frame.pool import Here, make_all, workers

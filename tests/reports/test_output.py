@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from flipproof.output.folder import UNFINISHED, check_replaceable, replaced_folder, write_text
-from flipproof.output.ownership import MARKER, OutputError
+from flipproof.output.folder import MARKER, UNFINISHED, OutputError, check_replaceable, replaced_folder, write_text
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -14,27 +14,25 @@ from flipproof.frame.solvers import Made, Missing, Outcome, Run, make
 from flipproof.page.templating import environment
 from flipproof.paper import claims_figures_6_7, observe
 from flipproof.paper import claims_figures_8_9 as landing
-from flipproof.paper.cases import FAMILIES, all_cases, family
-from flipproof.paper.claim import judge
+from flipproof.paper.cases import FAMILIES, all_cases, family, numbers, paper_throw
 from flipproof.paper.observe import Flights
-from flipproof.paper.parameters import numbers, paper_throw
 from flipproof.paper.runs import (
     BANDS,
+    FINEST_KEY,
     HALVES,
+    MANY_STEPS_KEY,
     PUBLISHED,
+    SAME_STEPS_KEY,
     SOLVERS,
     PaperRuns,
     Planned,
-    finest_key,
     group_calls,
-    many_steps_key,
     plan_figures,
     plan_further,
     plan_halved,
     plan_published,
-    same_steps_key,
 )
-from flipproof.paper.statements import Reading, Statement
+from flipproof.paper.statements import Reading, Statement, judge
 from flipproof.paper.verdicts import CLAIMS, STEADY, claim_weight_slows_the_tenth, judge_all, judge_paper
 from slicemodel.observables import centre_of_mass, plateau
 
@@ -343,8 +341,8 @@ def test_landing_claims_read_the_moment_the_bottle_is_upright():
         others = dict(judgement.others)
         assert judgement.verdict == towards_base
         assert others["as negative dr_CM/dt, towards the cap, at θ = 2π"].verdict == towards_cap
-        assert {math.copysign(1.0, each.value) for each in (judgement, *others.values())} == {
-            math.copysign(1.0, judgement.value)
+        assert {math.copysign(1.0, each.deciding.value) for each in (judgement, *others.values())} == {
+            math.copysign(1.0, judgement.deciding.value)
         }
 
 
@@ -357,7 +355,9 @@ def test_a_bottle_that_never_stands_upright_leaves_the_landing_undecided():
 
 def test_more_steps_must_not_move_the_curve():
     def flights(low):
-        finer = {many_steps_key(filling): flight(THROW, falls_to(low)) for filling in numbers("figure-S1-filling")}
+        finer = {
+            MANY_STEPS_KEY.format(filling): flight(THROW, falls_to(low)) for filling in numbers("figure-S1-filling")
+        }
         return flights_of(["filling", "steps 0.5"], always(FLAT), **finer)
 
     assert verdict_of("steps-enough", flights(0.301)) == "holds"
@@ -416,7 +416,7 @@ def test_free_flight_throws_water_to_the_cap_from_that_filling_on(filling, over)
 def test_launch_speed_and_spin_of_the_paper_agree_in_order_of_magnitude_only():
     judgement = judge(BY_ID["release-spin"], flown({}, "geometry"))
     assert judgement.verdict == "holds"
-    assert judgement.value == pytest.approx(9.7, abs=0.05)
+    assert judgement.deciding.value == pytest.approx(9.7, abs=0.05)
     assert judgement.readings[0].admissible == pytest.approx((20.0 / math.sqrt(10.0), 20.0 * math.sqrt(10.0)))
     ((_, strict),) = judgement.others
     assert strict.verdict == "fails"
@@ -426,7 +426,7 @@ def test_launch_speed_and_spin_of_the_paper_agree_in_order_of_magnitude_only():
 def test_the_scale_of_spin_is_that_of_gravity_over_half_a_bottle():
     judgement = judge(BY_ID["spin-scale"], flown({}, "geometry"))
     assert judgement.verdict == "holds"
-    assert judgement.value == pytest.approx(math.sqrt(9.81 / 0.14))
+    assert judgement.deciding.value == pytest.approx(math.sqrt(9.81 / 0.14))
 
 
 def test_work_of_the_programs_is_linear_in_slices_and_square_in_intervals_only_where_history_is_copied():
@@ -437,8 +437,8 @@ def test_work_of_the_programs_is_linear_in_slices_and_square_in_intervals_only_w
         "cost-slices": "fails", "cost-intervals": "holds", "cost-steps": "holds"
     }  # fmt: skip
     assert {each.verdict for each in python.values()} == {"fails"}
-    assert round(found["cost-slices"].value, 1) == 1.0
-    assert found["cost-intervals"].value == pytest.approx(2.0, abs=0.05)
+    assert round(found["cost-slices"].deciding.value, 1) == 1.0
+    assert found["cost-intervals"].deciding.value == pytest.approx(2.0, abs=0.05)
     for name in found:
         silent = judge(BY_ID[name], replace(flights, solver="eq8"))
         assert (silent.verdict, silent.readings) == ("not judged", ())
@@ -542,9 +542,9 @@ def test_further_runs_repeat_none_of_the_figures():
             assert run.scenario.n_slices == usual.n_slices // 2
             assert run.scenario.damping_rate == pytest.approx(usual.damping_rate)
     for damping in ("", " at 5 /s"):
-        assert ("eq8", finest_key(damping)) in further
-    assert further["eq8", same_steps_key(0.5)].solver == "exact-step"
-    assert ("eq8", same_steps_key(0.5)) in halved
+        assert ("eq8", FINEST_KEY.format(damping)) in further
+    assert further["eq8", SAME_STEPS_KEY.format(0.5)].solver == "exact-step"
+    assert ("eq8", SAME_STEPS_KEY.format(0.5)) in halved
 
 
 def test_the_published_program_is_flown_with_half_its_slices_and_with_half_its_steps():
@@ -657,13 +657,14 @@ def test_what_the_published_program_says_of_the_paper(statements):
     ],
 )
 def test_numbers_behind_those_verdicts(statements, id_, value, within):
-    assert by_program(statements[id_]).value == pytest.approx(value, abs=within)
+    assert by_program(statements[id_]).deciding.value == pytest.approx(value, abs=within)
 
 
 def test_the_delay_of_the_release_angle_in_three_senses(statements):
     """A stretch of time takes out more of the delay than a shift: the decrease itself takes longer."""
     judgement = by_program(statements["release-angle"])
-    assert [(each.verdict, round(each.value, 4)) for each in (judgement, *dict(judgement.others).values())] == [
+    senses = (judgement, *dict(judgement.others).values())
+    assert [(each.verdict, round(each.deciding.value, 4)) for each in senses] == [
         ("holds", 0.0432), ("fails", 0.0551), ("fails", 0.0651)
     ]  # fmt: skip
 
@@ -693,8 +694,8 @@ def test_free_flight_does_not_know_where_down_is():
     flights = PaperRuns(made=made).flights("free-flight")
     angle, drop = judge(BY_ID["release-angle"], flights), judge(BY_ID["drop-later"], flights)
     assert (angle.verdict, drop.verdict) == ("holds", "fails")
-    assert angle.value < 1e-9
-    assert abs(drop.value) < 1e-9
+    assert angle.deciding.value < 1e-9
+    assert abs(drop.deciding.value) < 1e-9
 
 
 # ---------------------------------------------------------------------- the page

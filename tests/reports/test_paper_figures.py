@@ -14,13 +14,12 @@ import pytest
 from flipproof.cli import paper as cli_paper
 from flipproof.frame.pool import Here
 from flipproof.output.folder import OutputError
-from flipproof.paper import gallery
+from flipproof.paper import figures as gallery
 from flipproof.paper.cases import HALF_FULL, family
-from flipproof.paper.costs import Cost
 from flipproof.paper.figures import ORDER, TIMED, check_figures, exhibits_paper, keys_of
 from flipproof.paper.figures_bottle import Pose, cap_of_tipping
 from flipproof.paper.figures_panels import Axis, Grid, Line, Row, figure_grid, ranked, table_grid
-from flipproof.paper.runs import PUBLISHED, SOLVERS
+from flipproof.paper.runs import PUBLISHED, SOLVERS, Cost
 from slicemodel.observables import plateau_of_points, static_toppling_angle, toppling_angle
 
 COSTS = tuple(

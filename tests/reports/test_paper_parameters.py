@@ -9,9 +9,19 @@ import pytest
 
 import slicemodel
 from flipproof.chapters.vectors import published as vectors
-from flipproof.paper import cases, parameters, runs
-from flipproof.paper.cases import FAMILIES, HALF_FULL, all_cases, bottle_of_aspect, family
-from flipproof.paper.parameters import CHOSEN, PARAMETERS, number, numbers, paper_throw
+from flipproof.paper import cases, runs
+from flipproof.paper.cases import (
+    CHOSEN,
+    FAMILIES,
+    HALF_FULL,
+    PARAMETERS,
+    all_cases,
+    bottle_of_aspect,
+    family,
+    number,
+    numbers,
+    paper_throw,
+)
 from flipproof.paper.runs import PUBLISHED, SOLVERS, Planned, plan_figures
 from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass_at_rest
@@ -41,7 +51,7 @@ def test_the_table_has_what_the_paper_states():
 
 
 def test_every_entry_says_where_it_comes_from():
-    assert len(PARAMETERS) == len(parameters._ROWS)  # no name stands twice
+    assert len(PARAMETERS) == len(cases._ROWS)  # no name stands twice
     for entry in PARAMETERS.values():
         assert entry.source
         assert entry.words.endswith(".")
@@ -50,11 +60,23 @@ def test_every_entry_says_where_it_comes_from():
 
 
 def test_the_table_of_words_is_whole():
-    rows = parameters.parameter_rows()
+    rows = cases.parameter_rows()
     assert len(rows) == len(PARAMETERS)
-    assert {len(row) for row in rows} == {len(parameters.HEADER)}
+    assert {len(row) for row in rows} == {len(cases.HEADER)}
     (angles,) = (row for row in rows if row[0] == "figure-8b-angle")
     assert angles[2:4] == ("0, 0.5236, 1.0472, 1.5708, 2.0944", "rad")
+
+
+def test_a_case_is_one_throw_that_is_kept_as_every_family_needs_it():
+    every = [case for members in FAMILIES.values() for case in members]
+    throws = {(case.scenario, case.steps, case.slices_vary) for case in every}
+    assert {(case.scenario, case.steps, case.slices_vary) for case in all_cases().values()} == throws
+    assert len(all_cases()) == len(throws)
+    for key, case in all_cases().items():
+        assert case.whole == any(each.whole for each in every if each.key == key)
+        assert (case.steps - 1) % case.thin == 0
+    assert {case.thin for case in every} == {1, 3}
+    assert all((case.thin == 3) == (case.scenario.duration > 1.0) for case in every)
 
 
 @pytest.mark.parametrize(("ask", "words"), [
@@ -217,4 +239,4 @@ def test_the_examples_are_the_papers_throws():
 
 def test_parameters_cannot_be_changed():
     with pytest.raises(TypeError):
-        parameters.PARAMETERS["drag"] = PARAMETERS["length"]
+        cases.PARAMETERS["drag"] = PARAMETERS["length"]

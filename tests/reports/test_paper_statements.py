@@ -67,11 +67,11 @@ def test_a_judgement_fails_with_its_first_failing_reading_and_holds_with_all():
     assert Judgement(solver="s", readings=(good, open_)).verdict == "cannot be decided"
     assert Judgement(solver="s", readings=(good, open_)).deciding is open_
     judgement = Judgement(solver="s", readings=(good, open_, bad))
-    assert (judgement.verdict, judgement.deciding, judgement.value) == ("fails", bad, 2.0)
+    assert (judgement.verdict, judgement.deciding) == ("fails", bad)
     assert bad.threshold_text == "0 to 1"
     nothing = Judgement(solver="s", aside="no flight")
     assert nothing.verdict == "cannot be decided"
-    assert math.isnan(nothing.value)
+    assert nothing.deciding is None
     assert nothing.words == "no flight"
 
 

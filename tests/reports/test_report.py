@@ -31,7 +31,7 @@ from flipproof.frame.exhibit import drawn
 from flipproof.frame.gather import tell
 from flipproof.frame.pool import make_all, workers
 from flipproof.frame.solvers import Run, make
-from flipproof.output.ownership import MARKER, marker_text
+from flipproof.output.folder import MARKER, marker_text
 from flipproof.page.equations import typeset
 from slicemodel import Scenario
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flipproof.output.ownership import MARKER, marker_text
+from flipproof.output.folder import MARKER, marker_text
 from flipproof.sweep.command import LEFT_OUT, check_export, export
 from flipproof.sweep.design import design_of
 from flipproof.sweep.errors import SweepError

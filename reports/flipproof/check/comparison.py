@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flipproof.chapters.differences.study import PARTING_BAND, first_crossing
-from flipproof.frame.findings import Finding
+from flipproof.frame.findings import Finding, observed, regression
 from flipproof.output.tables import QUANTITIES, Curve
 from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray
@@ -20,12 +20,8 @@ UNITS = {"omega": "rad/s", "theta": "rad", "r_cm": "m"}
 class Apart:
     """How far two curves are apart in one quantity, at the first one's times up to where the shorter one ends.
 
-    Parameters
-    ----------
-    t : (P,) [s]
-    first, second : (P,) - both curves
-    scale : what differences are divided by: omega at the first time, 1 for other quantities
-    interpolated : times at which the second curve has no value of its own
+    Differences are divided by ``scale``, omega at the first time or 1 for other quantities; the second curve is
+    ``interpolated`` at so many times, at which it has no value of its own.
     """
 
     quantity: str
@@ -78,10 +74,7 @@ class Comparison:
 def compare(first: Curve, second: Curve) -> Comparison:
     """Compare two curves; omega is taken relative to the first curve's initial value.
 
-    Raises
-    ------
-    ValueError
-        If the two have no quantity or no times in common, or the first starts without spin.
+    Raises ValueError if the two have no quantity or no times in common, or the first starts without spin.
     """
     both = [name for name in QUANTITIES if name in first.series and name in second.series]
     if not both:
@@ -92,12 +85,8 @@ def compare(first: Curve, second: Curve) -> Comparison:
         without = [curve.label for curve in (first, second) if name not in curve.series]
         if without:
             notes.append(f"{SYMBOLS[name]} is not compared: {' and '.join(without)} has no values of it")
-    return Comparison(
-        first=first.label,
-        second=second.label,
-        apart=tuple(_apart(name, first, second) for name in both),
-        notes=tuple(notes),
-    )
+    apart = tuple(_apart(name, first, second) for name in both)
+    return Comparison(first=first.label, second=second.label, apart=apart, notes=tuple(notes))
 
 
 def _apart(quantity: str, first: Curve, second: Curve) -> Apart:
@@ -159,15 +148,12 @@ def _times(found: Comparison) -> str:
 
 def claims(found: Comparison, tolerance: float) -> tuple[Finding, ...]:
     """Return the largest differences as findings; the first quantity is held to the tolerance, others are observed."""
-    return tuple(
-        Finding(
-            id=f"compare-{one.quantity.replace('_', '-')}",
-            title=f"largest difference in {SYMBOLS[one.quantity]} between {found.first} and {found.second}",
-            value=one.largest[0],
-            unit="of omega_0" if one.quantity == "omega" else UNITS[one.quantity],
-            kind="observation" if k else "regression",
-            admissible=(-np.inf, np.inf) if k else (0.0, tolerance),
-            note=f"at t = {one.largest[1]:.6g} s",
-        )
-        for k, one in enumerate(found.apart)
-    )
+    held: list[Finding] = []
+    for one in found.apart:
+        largest, time = one.largest
+        title = f"largest difference in {SYMBOLS[one.quantity]} between {found.first} and {found.second}"
+        unit = "of omega_0" if one.quantity == "omega" else UNITS[one.quantity]
+        about = f"compare-{one.quantity.replace('_', '-')}", title, largest, unit
+        note = f"at t = {time:.6g} s"
+        held.append(observed(*about, note) if held else regression(*about, (0.0, tolerance), note))
+    return tuple(held)

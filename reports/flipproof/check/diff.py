@@ -53,15 +53,10 @@ class Change:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """Two reports.
+    """Two reports with so many findings ``compared`` that both have.
 
-    Parameters
-    ----------
-    premises : tuple of str
-        In what the two were made differently and cannot be expected to agree: throw, slices, size of the report.
-    circumstances : tuple of str - in what else they differ: versions and machine
-    changes : tuple of Change
-    compared : int - findings that both have
+    ``premises`` say in what they were made differently and cannot be expected to agree: throw, slices, size of the
+    report; ``circumstances`` in what else: versions and machine.
     """
 
     premises: tuple[str, ...]
@@ -104,13 +99,7 @@ class Comparison:
 
 
 def read_summary(path: Path) -> dict[str, Any]:
-    """Return the summary of a report: of a folder, or of its ``summary.json`` itself.
-
-    Raises
-    ------
-    ValueError
-        Naming the file and what is wrong with it.
-    """
+    """Return the summary in a report's folder, or in its file; raises ValueError, naming the file and what is wrong."""
     file = path / "summary.json" if path.is_dir() else path
     try:
         summary = json.loads(read_text(file, 2**28).removeprefix("\ufeff"))
@@ -266,12 +255,9 @@ def _circumstances(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[s
     """Yield in what two reports differ, but for what differs between any two."""
     if old["version"] != new["version"]:
         yield f"version of the format: {old['version']} → {new['version']}"
-    before, after = ({"flipproof": s.get("flipproof"), **_mapping(s.get("provenance"))} for s in (old, new))
+    made = [s["provenance"] if isinstance(s.get("provenance"), Mapping) else {} for s in (old, new)]
+    before, after = ({"flipproof": s.get("flipproof"), **facts} for s, facts in zip((old, new), made, strict=True))
     for name in dict.fromkeys((*before, *after)):
         one, other = before.get(name), after.get(name)
         if name not in ("command", "made", "from the store") and None not in (one, other) and one != other:
             yield f"{name}: {one} → {other}"
-
-
-def _mapping(value: Any) -> Mapping[str, Any]:
-    return value if isinstance(value, Mapping) else {}

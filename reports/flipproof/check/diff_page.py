@@ -18,13 +18,7 @@ from flipproof.page.templating import environment
 
 
 def diff_page(old: Path, new: Path, before: Mapping[str, Any], after: Mapping[str, Any], found: Comparison) -> str:
-    """Return the page as HTML that needs no other file and no network.
-
-    Parameters
-    ----------
-    old, new : the reports' folders, or their ``summary.json``
-    before, after : their summaries
-    """
+    """Return the page of two reports' folders, or ``summary.json``, as HTML that needs no other file and no network."""
     curves, missing = [], []
     for which, place in (("old", old), ("new", new)):
         file = (place if place.is_dir() else place.parent) / "figures" / "omega.csv"
@@ -54,10 +48,7 @@ def diff_page(old: Path, new: Path, before: Mapping[str, Any], after: Mapping[st
 
 
 def read_curves(path: Path) -> Curves:
-    """Return the curves of a report's table by solver; a column of values follows the column of its times.
-
-    Raises OSError or ValueError if the table cannot be read.
-    """
+    """Return the curves of a report's table by solver; raises OSError or ValueError if the table cannot be read."""
     with path.open(encoding="utf-8", newline="") as file:
         header, *lines = list(csv.reader(file)) or [[]]
     if not header or not header[0].startswith("t "):

@@ -69,25 +69,17 @@ def check(
     guests: Sequence[str] = (),
     timeout: float | None = None,
 ) -> Checked:
-    """Check a throw.
+    """Check a throw; raises ValueError if the baseline cannot be read or is of another throw.
 
     Parameters
     ----------
-    scenario : Scenario
     groups : sequence of str - of ``groups()``; "thresholds" needs a baseline
     baseline : Path or None - a report's folder or ``summary.json``, of the same throw
     tolerance : float - what a finding may move beyond its bands, in its own unit
     say : callable (line) - called with a line for each claim, as soon as it is known
     store : RunStore or None - slow runs are looked for and kept there
-    guests : sequence of str
-        Specs of foreign solvers: their certificates are among the claims, and what a report of them found in the
-        baseline is found again.
+    guests : specs of foreign solvers - they are certified, and what the baseline's report found of them is found again
     timeout : float or None - seconds one of their runs may take; None: as each declares
-
-    Raises
-    ------
-    ValueError
-        If the baseline cannot be read or is of another throw.
     """
     summary = None if baseline is None else read_summary(baseline)
     known = {} if summary is None else {finding["id"]: finding for finding in summary["findings"]}

@@ -110,10 +110,9 @@ def _add_spec(command: argparse.ArgumentParser) -> None:
 
 def command_certify(options: argparse.Namespace) -> int:
     """Print one line a check; return 1 if one failed."""
-    from flipproof.foreign.certify import certify
+    from flipproof.foreign.certify import certify, findings_of
     from flipproof.foreign.contract import check_equation
     from flipproof.foreign.specs import opened
-    from flipproof.foreign.verdicts import findings_of
 
     if options.equation is not None:
         check_equation(options.equation)
@@ -143,7 +142,7 @@ def command_place(options: argparse.Namespace) -> int:
 
 def command_explain(options: argparse.Namespace) -> int:
     """Print why two solvers differ."""
-    from flipproof.foreign.explain import explain
+    from flipproof.foreign.place import explain
     from flipproof.foreign.specs import opened
 
     throw = read_scenario(options.scenario, options.slices)
@@ -155,7 +154,7 @@ def command_explain(options: argparse.Namespace) -> int:
 def command_kit(options: argparse.Namespace) -> int:
     """Write the asks into a new folder."""
     from flipproof.foreign.contract import Traits
-    from flipproof.foreign.kit import Kit
+    from flipproof.foreign.files import Kit
 
     traits = {name: getattr(options, name) for name in ("name", "equation", "refined_by", "precision", "order")}
     kit = Kit.made(options.out, Traits(**traits))
@@ -167,7 +166,7 @@ def command_kit(options: argparse.Namespace) -> int:
 
 def command_grade(options: argparse.Namespace) -> int:
     """Print one line a check; return 1 if one failed or answers are missing."""
-    from flipproof.foreign.kit import Kit
+    from flipproof.foreign.files import Kit
 
     found, waiting = Kit(options.folder).grade()
     for result in found.results:
@@ -181,8 +180,7 @@ def command_grade(options: argparse.Namespace) -> int:
 
 def command_power(options: argparse.Namespace) -> int:
     """Print a line a mistake; return 1 if one is caught by no check, or the clean solver by any."""
-    from flipproof.foreign.mistakes import MISTAKES
-    from flipproof.foreign.power import CLEAN, claim_power, detect, matrix_csv
+    from flipproof.foreign.power import CLEAN, MISTAKES, claim_power, detect, matrix_csv
     from flipproof.frame.pool import workers
     from flipproof.output.folder import write_text
 

@@ -28,7 +28,7 @@ def command_paper(options: argparse.Namespace) -> int:
     names = check_figures(options.figure)
 
     from flipproof.output.provenance import provenance
-    from flipproof.paper.gallery import make_gallery
+    from flipproof.paper.figures import make_gallery
 
     with store_of(options) as store, progress_bar("groups of flights", "group") as progress:
         words = make_gallery(names, options.out, progress, provenance(command_line()), jobs=options.jobs, store=store)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
-from types import MappingProxyType
 from typing import Any, Final
 
-from flipproof.foreign import checks_basic, checks_equation, checks_impacts, checks_order
+from flipproof.foreign import checks_basic, checks_measured
 from flipproof.foreign.checking import Check, Found, NotApplicableError, drive
 from flipproof.foreign.contract import Traits
 from flipproof.foreign.specs import ForeignError, Runner, WaitingError
+from flipproof.frame.findings import Finding, observed, regression
 from flipproof.output.columns import json_ready
 from flipproof.output.provenance import version_of
 
@@ -21,25 +21,23 @@ FAILED: Final = "failed"
 EXPECTED: Final = "expected failure"
 IDLE: Final = "not applicable"
 
-CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
-    {
-        "shape": checks_basic.check_shape,
-        "start": checks_basic.check_start,
-        "determinism": checks_basic.check_determinism,
-        "ice": checks_basic.check_ice,
-        "angle": checks_basic.check_angle,
-        "angular-momentum": checks_basic.check_momentum,
-        "restitution": checks_impacts.check_restitution,
-        "gravity": checks_basic.check_gravity,
-        "mirror": checks_basic.check_mirror,
-        "moving-frame": checks_basic.check_moving_frame,
-        "order-before-impacts": checks_order.check_order_before,
-        "order-across-impacts": checks_order.check_order_across,
-        "precision-floor": checks_order.check_floor,
-        "published-vectors": checks_equation.check_vectors,
-        "equation": checks_equation.check_equation,
-    }
-)
+CHECKS: Final[Mapping[str, Check]] = {
+    "shape": checks_basic.check_shape,
+    "start": checks_basic.check_start,
+    "determinism": checks_basic.check_determinism,
+    "ice": checks_basic.check_ice,
+    "angle": checks_basic.check_angle,
+    "angular-momentum": checks_basic.check_momentum,
+    "restitution": checks_measured.check_restitution,
+    "gravity": checks_basic.check_gravity,
+    "mirror": checks_basic.check_mirror,
+    "moving-frame": checks_basic.check_moving_frame,
+    "order-before-impacts": checks_measured.check_order_before,
+    "order-across-impacts": checks_measured.check_order_across,
+    "precision-floor": checks_measured.check_floor,
+    "published-vectors": checks_basic.check_vectors,
+    "equation": checks_basic.check_equation,
+}
 """Every check by name, in the order in which they are made. A new check is one generator and one line here."""
 
 
@@ -76,7 +74,6 @@ class Certificate:
 
     traits: Traits
     results: tuple[Result, ...]
-    versions: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def failed(self) -> tuple[Result, ...]:
@@ -101,7 +98,10 @@ class Certificate:
         return {
             "passport": 1,
             "solver": asdict(self.traits),
-            "versions": dict(self.versions),
+            "versions": {
+                "python": platform.python_version(),
+                **{name: version_of(name) for name in ("flipproof", "numpy", "scipy", "numba")},
+            },
             "checks": [
                 {name: getattr(r, name) for name in ("check", "verdict", "title", "reason")}
                 | {name: getattr(r.found, name) for name in ("expected", "came", "where", "advice") if r.found}
@@ -119,29 +119,16 @@ def certify(
     equation: str | None = None,
     say: Callable[[Result], object] = lambda _: None,
 ) -> Certificate:
-    """Make the checks of a solver, one after the other.
+    """Make the checks of a solver, one after the other; raises ForeignError if the solver cannot be loaded.
 
-    Parameters
-    ----------
-    runner : Runner
-    checks : iterable of str - names in ``CHECKS``
-    equation : str, optional - the equation to hold it to, instead of the one that it declares
-    say : callable - is given each result as it comes
-
-    Raises
-    ------
-    ForeignError
-        If the solver cannot be loaded.
+    It is held to ``equation``, if given, instead of the one that it declares; ``say`` is given each result as it comes.
     """
     traits = runner.traits if equation is None else replace(runner.traits, equation=equation)
     results = []
     for name in checks:
         results.append(_result(name, traits, runner))
         say(results[-1])
-    versions = {name: version_of(name) for name in ("flipproof", "numpy", "scipy", "numba")}
-    return Certificate(
-        traits=traits, results=tuple(results), versions={"python": platform.python_version(), **versions}
-    )
+    return Certificate(traits=traits, results=tuple(results))
 
 
 def _result(name: str, traits: Traits, runner: Runner) -> Result:
@@ -159,3 +146,19 @@ def _result(name: str, traits: Traits, runner: Runner) -> Result:
         unexpected = f"declared as a failure ({known}), but holds" if known else ""
         return result(verdict=PASSED, found=found, reason=unexpected)
     return result(verdict=EXPECTED if known else FAILED, found=found, reason=known or "")
+
+
+def findings_of(certificate: Certificate, id_: str = "certify-", title: str = "") -> tuple[Finding, ...]:
+    """Return one finding a check, with ``id_`` and ``title`` before its own.
+
+    The value is 1 if it holds, 0 if not; expected failures and idle checks are observations.
+    """
+    found = []
+    for result in certificate.results:
+        about = f"{id_}{result.check}", f"{title}{result.title.rstrip('.')}"
+        value = None if result.verdict == IDLE else float(result.verdict != FAILED)
+        if result.verdict in (IDLE, EXPECTED):
+            found.append(observed(*about, value, note=result.words))
+        else:
+            found.append(regression(*about, value, "", (1.0, 1.0), result.words))
+    return tuple(found)

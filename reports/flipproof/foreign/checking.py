@@ -1,7 +1,7 @@
 """What a check is: a generator that yields asks, is sent the answers, and returns what it found.
 
 Checks are written this way so that whoever drives them decides where the answers come from: a solver that is asked one
-ask after the other (``certify``), or a folder of answers that somebody made elsewhere (``kit``).
+ask after the other (``certify``), or a folder of answers that somebody made elsewhere (``files.Kit``).
 """
 
 from __future__ import annotations
@@ -12,8 +12,7 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from flipproof.foreign.answers import Answer
-from flipproof.foreign.contract import Ask, Traits
+from flipproof.foreign.contract import Answer, Ask, Traits
 from flipproof.foreign.specs import WaitingError
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray

@@ -1,15 +1,16 @@
-"""Checks that need no equation: shape, start, repetition, ice, angle, angular momentum, mirror, moving frame."""
+"""Checks of single answers and symmetries, and of what a solver says it is: a published program, an equation."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from flipproof.chapters.vectors.published import Vector, load_all
 from flipproof.foreign.checking import THROW, Found, Making, NotApplicableError, ask_of, shift, when
 from flipproof.foreign.contract import Ask, Traits
+from flipproof.foreign.place import THROWS, curve, name_of, placing, switches_of
 from slicemodel.observables import moment_of_inertia
 
 
@@ -167,16 +168,65 @@ def check_gravity(traits: Traits) -> Making:
     measured = shift(one, other, THROW.omega0)
     if traits.equation is None:
         raise NotApplicableError(f"no equation is declared; omega changes by {measured:.2g} of omega_0 with g")
-    from flipproof.foreign.place import curve
-
     with_g, without_g = (curve(traits.equation, throw, one.t) for throw in (THROW, without))
     expected = shift(with_g, without_g, THROW.omega0)
     room = max(1e-6, 1024 * traits.epsilon, 4 * shift(one, refined, THROW.omega0))
     return Found(
-        holds=abs(measured - expected) <= room and not math.isnan(measured),
+        holds=abs(measured - expected) <= room,
         expected=f"omega changes by {expected:.2g} of omega_0, as in {traits.equation}, within {room:.1g}",
         came=f"{measured:.2g}",
         where="g = 9.81 and 0 m/s^2",
         advice="free flight does not feel gravity; Eq. 8 does: compare the weight term with the declared equation",
         facts={"gravity": measured},
+    )
+
+
+def check_vectors(traits: Traits) -> Making:
+    """A solver that claims to be a published program prints its numbers."""
+    vectors = [vector for vector in load_all() if vector.scheme == traits.equation]
+    if not vectors:
+        raise NotApplicableError("no published program is claimed")
+    answers = yield [_ask(vector, traits) for vector in vectors]
+    worst, where = 0.0, ""
+    for vector, answer in zip(vectors, answers, strict=True):
+        for column in ("theta", "omega"):
+            printed = vector.columns[column][: len(answer.t)]
+            rows = np.isfinite(printed)
+            off = np.abs(getattr(answer, column) - printed)[rows] / np.maximum(np.abs(printed[rows]), 1e-300)
+            if not off.max() <= worst:
+                worst, where = float(off.max()), f"{vector.name}, column {column}"
+    return Found(
+        holds=worst <= 1e-8,  # flipproof's own schemes keep to 1e-10
+        expected=f"{len(vectors)} printed runs within 1e-08",
+        came=f"{worst:.2g} off",
+        where=where,
+        advice="compare step by step with the published program's first rows",
+        facts={"vectors": worst},
+    )
+
+
+def _ask(vector: Vector, traits: Traits) -> Ask:
+    """Return the ask for a published run, up to where its numbers are held to; the program takes its own steps."""
+    times = np.linspace(0.0, vector.scenario.duration, vector.steps)
+    times = times[times <= vector.until]
+    effort = {"steps": float(len(times) - 1), "dt": float(times[1])}.get(traits.refined_by or "")
+    return Ask.of(replace(vector.scenario, duration=float(times[-1])), times, effort)
+
+
+def check_equation(traits: Traits) -> Making:
+    """The solver is nearest to the equation it declares, and no farther from it than its own error explains."""
+    found = yield from placing(traits)
+    if traits.equation is None:
+        raise NotApplicableError(f"none is declared; {found.text}")
+    try:
+        declared = name_of(switches_of(traits.equation))
+    except ValueError as error:
+        raise NotApplicableError(str(error)) from None
+    return Found(
+        holds=found.equation == declared and found.on_lattice,
+        expected=declared,
+        came=found.text,
+        where=f"{len(THROWS)} throws of {THROWS[0].duration:g} to {THROWS[-1].duration:g} s",
+        advice="flipproof explain compares it with the declared equation, switch by switch",
+        facts={"place": found.to_mapping()},
     )

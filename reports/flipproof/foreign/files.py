@@ -1,29 +1,37 @@
-"""Solvers that answer by files: a curve that is there already, and any program that reads and writes CSV."""
+"""Solvers that answer by files: a curve that is there already, any program that reads and writes CSV, and a kit.
+
+A kit is the suite as a folder, for solvers in any language:
+
+    DIR/kit.json             what the solver says of itself, and the list of asks
+    DIR/asks/0001/           scenario.toml, scenario.json, times.csv, start.csv, effort.txt
+    DIR/asks/0001/answer.csv is written by the solver: columns t, theta, omega and, if known, r_0 ..., v_0 ..., r_cm
+
+Some asks depend on earlier answers: ``grade`` adds them, and says how many wait.
+"""
 
 from __future__ import annotations
 
 import csv
+import hashlib
+import json
 import subprocess
 import tempfile
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from flipproof.foreign.answers import PER_SLICE, Answer, AnswerError, answer_of
-from flipproof.foreign.contract import Ask, Traits
+from flipproof.foreign.contract import PER_SLICE, Answer, AnswerError, Ask, Traits, answer_of
 from flipproof.foreign.isolated import PATIENCE, end_group, last_line
-from flipproof.foreign.specs import CSV, ForeignError, Runner, words_of
+from flipproof.foreign.specs import CSV, ForeignError, Runner, WaitingError, words_of
+
+if TYPE_CHECKING:
+    from flipproof.foreign.certify import Certificate
 
 
 def read_answer(path: Path, n_slices: int) -> dict[str, Any]:
-    """Read an answer: a header with t, theta, omega and, if known, r_cm, inertia, r_0 ... and v_0 ...; then numbers.
-
-    Raises
-    ------
-    AnswerError
-        Naming file, line and column.
-    """
+    """Read t, theta, omega and, if known, r_cm, inertia, r_0 ... and v_0 ... below a header, or raise AnswerError."""
     most = 1 << 30
     try:
         if path.stat().st_size > most:
@@ -136,3 +144,70 @@ class Command(Runner):
                 said.seek(max(0, said.seek(0, 2) - 4096))
                 last = last_line(said.read())
                 raise ForeignError(f"{words[0]} ended with status {status}{f': {last}' if last else ''}")
+
+
+INDEX: Final = "kit.json"
+
+
+class Kit(Runner):
+    """A folder with an ``INDEX`` of asks and answers as a runner, which adds asks; no kit raises a ValueError."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        try:
+            index = json.loads((folder / INDEX).read_text(encoding="utf-8"))
+            self.traits = Traits(**index["solver"])
+            self.asks: list[str] = [str(key) for key in index["asks"]]
+            if index["kit"] != 1:
+                raise ValueError(f"format {index['kit']!r}, must be 1")
+        except OSError as error:
+            raise ValueError(f"{folder}: is no kit ({INDEX}: {error.strerror or error})") from None
+        except (ValueError, TypeError, KeyError) as error:
+            raise ValueError(f"{folder / INDEX}: is not readable ({error})") from None
+        self.waiting = 0
+
+    @classmethod
+    def made(cls, folder: Path, traits: Traits) -> Kit:
+        """Return a new kit with every ask that needs no earlier answer; the folder must be new or empty."""
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise ValueError(f"{folder} is not empty; name a new folder")
+        (folder / "asks").mkdir(parents=True)
+        _write_index(folder, traits, [])
+        kit = cls(folder)
+        kit.grade()
+        return kit
+
+    def grade(self) -> tuple[Certificate, int]:
+        """Return the certificate by the answers that are there, and how many asks wait for one."""
+        from flipproof.foreign.certify import certify
+
+        self.waiting = 0
+        return certify(self), self.waiting
+
+    def __call__(self, ask: Ask) -> Answer:
+        """Return the answer that lies in the folder of an ask; add the folder if there is none."""
+        path = self._place(ask) / "answer.csv"
+        if not path.is_file():
+            self.waiting += 1
+            raise WaitingError(f"{path.relative_to(self.folder)} is not there yet")
+        return answer_in(path, ask, str(path.relative_to(self.folder)))
+
+    def _place(self, ask: Ask) -> Path:
+        """Return the folder of an ask, which equal asks share."""
+        text = json.dumps([ask.scenario.to_mapping(), ask.effort, dict(ask.options)], sort_keys=True)
+        key = hashlib.sha256(text.encode() + np.ascontiguousarray(ask.times).tobytes()).hexdigest()[:16]
+        if key in self.asks:
+            return self.folder / "asks" / f"{self.asks.index(key) + 1:04d}"
+        self.asks.append(key)
+        place = self.folder / "asks" / f"{len(self.asks):04d}"
+        place.mkdir()
+        write_ask(ask, place)
+        (place / "scenario.json").write_text(json.dumps(ask.scenario.to_mapping(), indent=1) + "\n", encoding="utf-8")
+        (place / "effort.txt").write_text("" if ask.effort is None else f"{ask.effort!r}\n", encoding="utf-8")
+        _write_index(self.folder, self.traits, self.asks)
+        return place
+
+
+def _write_index(folder: Path, traits: Traits, asks: list[str]) -> None:
+    index = {"kit": 1, "solver": asdict(traits), "asks": asks}
+    (folder / INDEX).write_text(json.dumps(index, indent=1) + "\n", encoding="utf-8")

@@ -1,21 +1,33 @@
-"""A foreign solver in a process of its own: a crash, a hang or a flood of text costs one run and nothing else."""
+"""A foreign solver in a process of its own: a crash, a hang or a flood of text costs one run and nothing else.
+
+The two talk in frames, a JSON header and raw float64 numbers: no pickles, so that what comes back from foreign code is
+numbers and short texts. The solver sees an empty standard input; what it prints goes to standard error, of which
+flipproof keeps the end.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import functools
+import json
 import os
 import queue
 import signal
 import subprocess
 import sys
 import threading
-from typing import Any, Final
+import time
+from collections.abc import Mapping
+from typing import Any, BinaryIO, Final
 
-from flipproof.foreign.answers import IMPACT, PER_TIME, REQUIRED, Answer, AnswerError, answer_of
-from flipproof.foreign.contract import Ask, Traits
-from flipproof.foreign.specs import ForeignError, Runner
-from flipproof.foreign.wire import BrokenFrameError, receive, send
+import numpy as np
+
+from flipproof.foreign import contract
+from flipproof.foreign.contract import IMPACT, Answer, AnswerError, Ask, Traits, answer_of
+from flipproof.foreign.specs import ForeignError, Runner, distribution_of, load
+from slicemodel import Scenario
+from slicemodel.scenario import shortened
+from slicemodel.trajectory import FloatArray
 
 PATIENCE: Final = 2
 """Runs in a row without an answer in time after which a solver is not asked again."""
@@ -37,13 +49,7 @@ def last_line(printed: bytes) -> str:
 
 
 class Isolated(Runner):
-    """The solver that a spec names, in a process that is started when it is first needed and again after a crash.
-
-    Parameters
-    ----------
-    spec : str
-    timeout : float, optional - seconds one run may take, instead of what the solver says
-    """
+    """The solver that a spec names, in a process that is started when it is first needed and again after a crash."""
 
     def __init__(self, spec: str, timeout: float | None = None) -> None:
         self.spec, self.timeout = spec, timeout
@@ -56,13 +62,7 @@ class Isolated(Runner):
         return self._start()
 
     def __call__(self, ask: Ask) -> Answer:
-        """Return the checked answer.
-
-        Raises
-        ------
-        ForeignError
-            One line: what the solver raised or returned, how its process ended, or that its time was up.
-        """
+        """Return the checked answer, or raise ForeignError: what it raised or returned, how it ended, or its delay."""
         traits = self.traits
         if self._late >= PATIENCE:
             raise ForeignError(f"not asked: {PATIENCE} runs in a row gave no answer in time")
@@ -70,8 +70,8 @@ class Isolated(Runner):
             self.traits = self._start()
         header = {"scenario": ask.scenario.to_mapping(), "effort": ask.effort, "options": dict(ask.options)}
         limit = self.timeout or traits.timeout
-        most_impacts = 10_000_000
-        most = 8 * (len(ask.times) * (len(REQUIRED) + len(PER_TIME) + 2 * ask.scenario.n_slices) + 5 * most_impacts)
+        # Bytes of t, theta, omega, r_cm and inertia, of r and v of every slice, and of ten million impacts.
+        most = 8 * (len(ask.times) * (5 + 2 * ask.scenario.n_slices) + 5 * 10_000_000)
         header, arrays = self._exchange(header, {"times": ask.times, "start": ask.start}, limit, most)
         self._late = 0
         if "reason" in header:
@@ -98,7 +98,7 @@ class Isolated(Runner):
     def _start(self) -> Traits:
         """Start the process and return what the solver says of itself, loaded within a minute."""
         # Threads that the solver left behind keep nothing alive.
-        code = "from flipproof.foreign import child; child.main(); import os; os._exit(0)"
+        code = "from flipproof.foreign import isolated; isolated.serve(); import os; os._exit(0)"
         self._process = subprocess.Popen(
             [sys.executable, "-c", code],
             stdin=subprocess.PIPE,
@@ -168,3 +168,122 @@ class Isolated(Runner):
             known = [each.name for each in signal.Signals if each == -status]
             how = f"was ended by {known[0] if known else f'signal {-status}'}"
         return f"the process {how} before it answered{f'; last line printed: {said}' if said else ''}"
+
+
+# ---------------------------------------------------------------------- in the process of the solver
+
+
+def serve() -> None:
+    """Call one solver for the asks that come in, and send its checked answers, until the other side goes away."""
+    inbox = os.fdopen(os.dup(0), "rb")
+    outbox = os.fdopen(os.dup(1), "wb")
+    empty = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(empty, 0)
+    os.dup2(2, 1)
+    _limit_memory()
+    threading.Thread(target=_watch, args=(os.getppid(),), daemon=True).start()
+    spec = receive(inbox, 0)[0]["spec"]
+    try:
+        solver = load(spec)
+        traits = contract.traits_of(solver, spec)
+        solve = contract.solve_of(solver)
+        said = {name: getattr(traits, name) for name in traits.__slots__}
+        said["distribution"] = traits.distribution or distribution_of(spec)
+        send(outbox, {"traits": said}, {})
+    except BaseException as error:
+        send(outbox, {"reason": _reason(error)}, {})
+        return
+    while True:
+        try:
+            header, arrays = receive(inbox, 1 << 30)
+        except BrokenFrameError:
+            return
+        scenario = Scenario.from_mapping(header["scenario"])
+        ask = Ask(scenario=scenario, effort=header["effort"], options=header["options"], **arrays)
+        _answer(outbox, solve, ask)
+
+
+def _answer(outbox: Any, solve: Any, ask: Ask) -> None:
+    """Send what the solver answers, or why there is no answer."""
+    try:
+        answer = answer_of(ask, solve(ask))
+        fields = {name: getattr(answer, name) for name in answer.given if name != "impacts"}
+        if answer.impacts is not None:
+            fields |= {f"impacts.{name}": getattr(answer.impacts, name) for name in IMPACT}
+        send(outbox, {}, fields)
+    except BaseException as error:
+        send(outbox, {"reason": _reason(error)}, {})
+
+
+def _reason(error: BaseException) -> str:
+    """Return an exception on one line: its kind, and at most 300 characters of what it says."""
+    try:
+        words = shortened(str(error), 300) or "no message"
+    except Exception:
+        words = "a message that cannot be shown"
+    return f"answer: {words}" if isinstance(error, AnswerError) else f"{type(error).__name__}: {words}"
+
+
+def _limit_memory() -> None:
+    """Take at most 8 GiB of address space, where the system can limit it, and leave no core behind."""
+    try:
+        import resource
+    except ImportError:  # not on this system
+        return
+    resource.setrlimit(resource.RLIMIT_AS, (8 * 2**30, resource.getrlimit(resource.RLIMIT_AS)[1]))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _watch(parent: int) -> None:
+    """End this process when flipproof's has ended; a solver that never returns must not outlive it."""
+    while os.getppid() == parent:
+        time.sleep(0.5)
+    os._exit(1)
+
+
+# ---------------------------------------------------------------------- frames
+
+
+class BrokenFrameError(EOFError):
+    """The other side went away, or sent what is no frame; the message says which."""
+
+
+def send(stream: BinaryIO, header: Mapping[str, Any], arrays: Mapping[str, FloatArray]) -> None:
+    """Write one frame."""
+    shapes = {name: list(array.shape) for name, array in arrays.items()}
+    text = json.dumps({**header, "arrays": shapes}).encode()
+    stream.write(len(text).to_bytes(8, "little"))
+    stream.write(text)
+    for array in arrays.values():
+        stream.write(np.ascontiguousarray(array, dtype="<f8").tobytes())
+    stream.flush()
+
+
+def receive(stream: BinaryIO, most: int) -> tuple[dict[str, Any], dict[str, FloatArray]]:
+    """Read one frame of at most ``most`` bytes of numbers; raises BrokenFrameError."""
+    size = int.from_bytes(_exactly(stream, 8), "little")
+    if size > 1 << 20:
+        raise BrokenFrameError("what came is no frame")
+    try:
+        header = json.loads(_exactly(stream, size))
+        shapes = {str(name): tuple(int(k) for k in shape) for name, shape in header.pop("arrays").items()}
+    except (ValueError, KeyError, AttributeError, TypeError):
+        raise BrokenFrameError("what came is no frame") from None
+    sizes = {name: 8 * int(np.prod(shape, dtype=np.int64)) for name, shape in shapes.items()}
+    if min(sizes.values(), default=0) < 0 or sum(sizes.values()) > most:
+        raise BrokenFrameError(f"the answer is larger than {most} bytes")
+    arrays = {
+        name: np.frombuffer(_exactly(stream, sizes[name]), dtype="<f8").reshape(shape) for name, shape in shapes.items()
+    }
+    return header, arrays
+
+
+def _exactly(stream: BinaryIO, count: int) -> bytes:
+    parts = []
+    while count:
+        part = stream.read(min(count, 1 << 24))
+        if not part:
+            raise BrokenFrameError("the stream ended")
+        parts.append(part)
+        count -= len(part)
+    return b"".join(parts)

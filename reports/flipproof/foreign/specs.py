@@ -9,24 +9,32 @@
 
 An object is a callable, an object with ``solve(ask)``, or a class of such objects without arguments. Specs are
 strings, so that they can be sent to other processes; each process resolves them for itself.
+
+The same spec may name other code tomorrow, so what it stands for has a fingerprint: a file counts with the modules
+beside it that it imports, a module of a package with the whole package, a program with the files that its command
+names, a curve with its file. What code reads or imports from elsewhere is not seen.
 """
 
 from __future__ import annotations
 
+import ast
+import hashlib
 import importlib
-import importlib.util
 import shlex
 import sys
+from collections.abc import Iterator
+from importlib.machinery import PathFinder
 from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from flipproof.frame.keys import files_in
 from flipproof.frame.solvers import catalogue, find
 from slicemodel.scenario import unknown_name
 
 if TYPE_CHECKING:
-    from flipproof.foreign.answers import Answer
-    from flipproof.foreign.contract import Ask, Traits
+    from flipproof.foreign.contract import Answer, Ask, Traits
 
 CSV: Final = "csv:"
 COMMAND: Final = "cmd:"
@@ -82,33 +90,21 @@ def check_asked(spec: str) -> None:
 
 
 def opened(spec: str, timeout: float | None = None, *, curves: bool = False) -> Runner:
-    """Return the solver that a spec names, ready to be asked.
+    """Return the solver that a spec names, ready to be asked; raises ValueError if it names nothing.
 
-    Parameters
-    ----------
-    spec : str
-    timeout : float, optional - seconds one run may take, instead of what the solver says
-    curves : bool - whether a curve in a file will do, which answers one throw at its own times and nothing else
-
-    Raises
-    ------
-    ValueError
-        If the spec names nothing; the message says how specs are written.
+    A run may take ``timeout`` seconds, or what the solver says. With ``curves`` a curve in a file will do, which
+    answers one throw at its own times and nothing else.
     """
     if not is_foreign(spec):
-        from flipproof.foreign.own import Own
+        from flipproof.foreign.solving import Own
 
         return Own(find(spec))
-    if spec.startswith(CSV):
+    if spec.startswith((CSV, COMMAND)):
+        from flipproof.foreign.files import Command, File
+
         if not curves:
             check_asked(spec)
-        from flipproof.foreign.files import File
-
-        return File(spec)
-    if spec.startswith(COMMAND):
-        from flipproof.foreign.files import Command
-
-        return Command(spec, timeout)
+        return File(spec) if spec.startswith(CSV) else Command(spec, timeout)
     locate(spec)
     from flipproof.foreign.isolated import Isolated
 
@@ -161,10 +157,10 @@ def _module(place: str) -> object:
         return importlib.import_module(place)
     path = Path(place).resolve()
     sys.path.insert(0, str(path.parent))  # a file may import its neighbours
-    spec = importlib.util.spec_from_file_location(path.stem, path)
+    spec = spec_from_file_location(path.stem, path)
     if spec is None or spec.loader is None:
         raise ImportError(f"{place} cannot be imported")
-    module = importlib.util.module_from_spec(spec)
+    module = module_from_spec(spec)
     sys.modules[path.stem] = module
     spec.loader.exec_module(module)
     return module
@@ -174,3 +170,81 @@ def distribution_of(spec: str) -> str:
     """Return name and version of the package that an entry point comes from, or an empty string."""
     point = offered().get(spec)
     return "" if point is None or point.dist is None else f"{point.dist.name} {point.dist.version}"
+
+
+def content_of(spec: str) -> str:
+    """Return the SHA-256 of the files that a spec stands for, empty for flipproof's own; nothing is imported."""
+    if not is_foreign(spec):
+        return ""
+    found = hashlib.sha256()
+    try:
+        for name, file in sorted(_files(spec)):
+            found.update(f"{name}\0".encode())
+            found.update(hashlib.sha256(file.read_bytes()).digest())
+    except OSError as error:
+        raise ValueError(f"solver {spec!r}: {error.filename} cannot be read ({error.strerror or error})") from None
+    return found.hexdigest()
+
+
+def _files(spec: str) -> Iterator[tuple[str, Path]]:
+    """Yield every file that a spec stands for, with the name by which it counts."""
+    if spec.startswith(CSV):
+        yield "", Path(spec.removeprefix(CSV))
+        return
+    if spec.startswith(COMMAND):
+        for k, word in enumerate(words_of(spec)):
+            file = Path(word.rpartition("=")[2])
+            if file.is_file():
+                yield str(k), file
+        return
+    found = locate(spec)
+    place = found.module if isinstance(found, EntryPoint) else found[0]
+    if place.endswith(".py"):
+        yield from _with_neighbours(Path(place))
+    else:
+        yield from _of_module(place.partition(".")[0])
+
+
+def _of_module(name: str) -> Iterator[tuple[str, Path]]:
+    """Yield the files of a module or package, which the working folder may hold; none if there is none."""
+    try:
+        spec = PathFinder.find_spec(name, [str(Path.cwd())]) or find_spec(name)
+    except (ImportError, ValueError):
+        return
+    if spec is None:
+        return
+    for folder in map(Path, spec.submodule_search_locations or ()):
+        yield from ((file.relative_to(folder).as_posix(), file) for file in files_in(folder))
+    if not spec.submodule_search_locations and spec.origin is not None and Path(spec.origin).is_file():
+        yield from _with_neighbours(Path(spec.origin))
+
+
+def _with_neighbours(file: Path) -> Iterator[tuple[str, Path]]:
+    """Yield a file, and the modules and packages in its folder that it imports, and those that they import."""
+    waiting, seen = [file], {file}
+    while waiting:
+        file = waiting.pop()
+        yield file.name, file
+        for name in _imported(file):
+            module, package = file.with_name(f"{name}.py"), file.with_name(name)
+            if package.is_dir() and package not in seen:
+                seen.add(package)
+                yield from ((f"{name}/{each.relative_to(package).as_posix()}", each) for each in files_in(package))
+            elif module.is_file() and module not in seen:
+                seen.add(module)
+                waiting.append(module)
+
+
+def _imported(file: Path) -> set[str]:
+    """Return the first parts of the names of all modules that a file imports; none if it is no Python."""
+    try:
+        tree = ast.parse(file.read_bytes())
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return set()
+    names = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.partition(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names.add(node.module.partition(".")[0])
+    return names

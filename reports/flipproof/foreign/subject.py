@@ -89,9 +89,8 @@ class Subject:
         """Return the acceleration of the slices against the body by what drags on it [m/s^2]."""
         return float(-(self.drag / mass) * ((self.side == 0) @ v))
 
-    def weight(self, y: FloatArray, omega: float) -> float:
+    def weight(self, _y: FloatArray, _omega: float) -> float:
         """Return the acceleration by weight in the bottle's frame; in free flight there is none [m/s^2]."""
-        del y, omega
         return 0.0
 
     def acceleration(self, y: FloatArray, omega: float) -> FloatArray:
@@ -118,9 +117,8 @@ class Subject:
         k4 = self.slope(y + h * k3)
         return np.asarray(y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4), dtype=self.kind)
 
-    def restitution(self, speed: float, side: int) -> float:
-        """Return e of an impact at ``speed`` [m/s] on one end."""
-        del speed, side
+    def restitution(self, _speed: float, _side: int) -> float:
+        """Return e of an impact at a speed [m/s] on one end."""
         return self.e
 
     def recoil(self) -> float:
@@ -160,15 +158,10 @@ class Subject:
         slow = touching[np.abs(v[touching]) < self.rest_speed]
         self.side = np.zeros(self.n, dtype=np.int64)
         self.side[slow] = contact[slow]
-        y[self.n + 1 :] = self.stuck(v, slow)
-        return self.let_go(y)
-
-    def stuck(self, v: FloatArray, slow: IntArray) -> FloatArray:
-        """Return the velocities after the slow slices have stopped against the tube."""
         ratio = self.m * self.recoil()
-        v = v - ratio * float(v[slow].sum()) / (1 + ratio * len(slow))
-        v[slow] = 0.0
-        return v
+        y[self.n + 1 :] = v - ratio * float(v[slow].sum()) / (1 + ratio * len(slow))  # they stop against the tube
+        y[self.n + 1 + slow] = 0.0
+        return self.let_go(y)
 
     def let_go(self, y: FloatArray) -> FloatArray:
         """Release the slices that their end no longer presses, unless it would press them again as soon as they go."""

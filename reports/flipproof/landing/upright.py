@@ -19,7 +19,7 @@ from flipproof.chapters.landing.figures import figures, map_csv, share_line, sha
 from flipproof.chapters.landing.study import Cases, Rows, Size, aiming, counting, read
 from flipproof.landing.design import Throws
 from flipproof.landing.work import LANDING, Landed
-from flipproof.output.ownership import MARKER, OutputError, check_own, marker_text
+from flipproof.output.folder import MARKER, OutputError, check_own, marker_text
 from flipproof.sweep.command import Begin, completed
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import write_whole

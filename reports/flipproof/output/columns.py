@@ -20,15 +20,9 @@ Curves = Mapping[str, tuple[FloatArray, FloatArray]]
 
 
 def rows_csv(header: Sequence[str], rows: Iterable[Sequence[Any]], digits: int | None = 9) -> str:
-    """Return rows as CSV; what is None or not a number is an empty cell.
+    """Return rows as CSV, of numbers so many significant ``digits``, or all; None and NaN are empty cells.
 
-    Parameters
-    ----------
-    header : sequence of str
-        One per cell; a column of numbers ends in its unit, as in "dt [s]".
-    rows : iterable of sequences
-    digits : int or None
-        Significant digits of a number; None: all that it has.
+    The header of a column of numbers ends in its unit, as in "dt [s]".
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

@@ -1,16 +1,154 @@
-"""A report folder that is either the old one or the new one, never a mixture."""
+"""Folders that are flipproof's own: who may write to one now, and how one is either the old or the new, no mixture.
+
+A folder that flipproof wrote holds the file ``.flipproof``: its kind, the version of this file, and, where the folder
+is written as a whole, the name of every file in it. Nothing else is ever replaced or deleted.
+"""
 
 from __future__ import annotations
 
+import errno
+import json
 import os
 import shutil
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from flipproof.output.ownership import MARKER, OutputError, check_own, files_of, marker_text, sole_writer
 from flipproof.sweep.files import whole_file
+
+MARKER: Final = ".flipproof"
+VERSION: Final = 1
+
+LEFT_BY_DESKTOPS: Final = (".DS_Store", "Thumbs.db", "desktop.ini")
+"""Files that a desktop leaves in folders that were only looked at."""
+
+
+class OutputError(ValueError):
+    """The output folder cannot be used; the message says why and what to do."""
+
+
+def marker_text(kind: str, files: Iterable[str] | None = None) -> str:
+    """Return the content of a marker; ``files`` are those of a folder that is replaced as a whole."""
+    facts: dict[str, Any] = {"kind": kind, "version": VERSION}
+    if files is not None:
+        facts["files"] = sorted(files)
+    return json.dumps(facts, indent=1) + "\n"
+
+
+def check_own(folder: Path, kind: str, ignored: Iterable[str] = ()) -> None:
+    """Refuse a folder that holds anything but what flipproof wrote there as this ``kind``; an empty one is fine.
+
+    The OutputError names the folder and what stands in it; ``ignored`` names, such as that of a lock, do not count.
+    """
+    others = sorted({entry.name for entry in folder.iterdir()} - {*LEFT_BY_DESKTOPS, *ignored})
+    if not others:
+        return
+    if MARKER not in others:
+        words = f"{folder} holds {_some(others)} and not flipproof's own marker {MARKER}; name an empty or a new folder"
+        if "summary.json" in others or "sweep.sqlite" in others:
+            words += ", or move this one away if an older flipproof wrote it"
+        raise OutputError(words)
+    facts = _read_marker(folder)
+    if facts["kind"] != kind:
+        raise OutputError(f"{folder} holds a flipproof {facts['kind']}, not a {kind}; name another folder")
+    if "files" in facts:
+        strangers = sorted(files_of(folder) - {MARKER, *facts["files"]})
+        if strangers:
+            raise OutputError(
+                f"{folder} holds {_some(strangers)}, which flipproof did not write; move it away or name another folder"
+            )
+
+
+def _read_marker(folder: Path) -> dict[str, Any]:
+    file = folder / MARKER
+    try:
+        if file.is_symlink() or not file.is_file() or file.stat().st_size > 16 * 2**20:
+            raise ValueError  # a report has some hundred files
+        facts = json.loads(file.read_text(encoding="utf-8"))
+        if not isinstance(facts["kind"], str) or not all(isinstance(name, str) for name in facts.get("files", [])):
+            raise ValueError
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        raise OutputError(f"{folder} holds a {MARKER} that flipproof did not write; name another folder") from None
+    if facts.get("version") != VERSION:
+        raise OutputError(f"{folder} was written by another flipproof; move it away or name another folder")
+    return dict(facts)
+
+
+def files_of(folder: Path) -> set[str]:
+    """Return the name of every file in a folder and below, from the folder, with forward slashes."""
+    return {
+        entry.relative_to(folder).as_posix()
+        for entry in folder.rglob("*")
+        if (entry.is_symlink() or not entry.is_dir()) and entry.name not in LEFT_BY_DESKTOPS
+    }
+
+
+def _some(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
+
+
+@contextmanager
+def sole_writer(lock: Path, folder: Path) -> Iterator[None]:
+    """Hold the file ``lock`` for as long as the block lasts; the kernel lets go of it when this program dies.
+
+    Raises OutputError if another program holds it, naming its process number and the ``folder``, or if it cannot be
+    locked.
+    """
+    handle = _hold(lock, folder)
+    try:
+        os.truncate(handle, 0)
+        os.write(handle, f"{os.getpid()}\n".encode())
+        yield
+    finally:
+        # Removed while it is held, where the system allows: nobody can hold a file that is gone and think it counts.
+        if sys.platform != "win32":
+            lock.unlink(missing_ok=True)
+        os.close(handle)
+        if sys.platform == "win32":
+            with suppress(OSError):
+                lock.unlink(missing_ok=True)
+
+
+def _hold(lock: Path, folder: Path) -> int:
+    while True:
+        handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            _lock(handle)
+            if os.path.samestat(os.fstat(handle), os.stat(lock)):
+                return handle
+        except FileNotFoundError:
+            pass  # the one before has removed it just now
+        except OSError as error:
+            number = os.read(handle, 20).decode(errors="replace").strip()
+            os.close(handle)
+            if error.errno not in (errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK):
+                raise OutputError(f"{folder} cannot be locked ({error.strerror})") from None
+            who = f"process {number}" if number.isdecimal() else "another process"
+            raise OutputError(
+                f"{folder} is being written by another flipproof ({who}); wait for it or name another folder"
+            ) from None
+        os.close(handle)
+
+
+def _lock(handle: int) -> None:
+    """Lock an open file for this program, or raise OSError at once."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        os.lseek(handle, 2**30, os.SEEK_SET)  # the process number before that byte must stay readable
+        try:
+            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+        finally:
+            os.lseek(handle, 0, os.SEEK_SET)
+    else:
+        import fcntl
+
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+# ---------------------------------------------------------------------- one folder in the place of another
 
 UNFINISHED: Final = ".flipproof-unfinished"
 """Ends the name of the folder, beside the one that is written, that holds the new one and the old one for a moment."""
@@ -21,12 +159,7 @@ OLD: Final = "old"
 
 
 def check_replaceable(target: Path, kind: str) -> None:
-    """Refuse a target that is a file, or a folder with anything in it but what flipproof wrote there as this ``kind``.
-
-    Raises
-    ------
-    OutputError
-    """
+    """Refuse by an OutputError a file, and a folder with anything but what flipproof wrote there as this ``kind``."""
     standing = next((place for place in target.absolute().parents if place.exists()), None)
     if standing is not None and not standing.is_dir():
         raise OutputError(f"{target} cannot be written: {standing} is a file")
@@ -48,13 +181,9 @@ def replaced_folder(target: Path, kind: str) -> Iterator[Path]:
 
     The new folder stands in a folder beside ``target`` whose name says that it is flipproof's and unfinished; a lock in
     it keeps a second program out. If the block raises or is interrupted, that folder is removed and ``target`` is as it
-    was. The exchange itself is two renames; a program that is killed, between them too, is cleared up after by the
-    next one.
-
-    Raises
-    ------
-    OutputError
-        If ``target`` is not flipproof's own, cannot be written, or is being written by another program.
+    was. The exchange itself is two renames; a program that is killed, between them too, is cleared up after by the next
+    one. Raises OutputError if ``target`` is not flipproof's own, cannot be written, or is being written by another
+    program.
     """
     target = target.resolve()
     beside = target.with_name(f"{target.name}{UNFINISHED}")
@@ -87,10 +216,7 @@ def _plainly(place: Path) -> Iterator[None]:
 
 @contextmanager
 def _held(beside: Path, target: Path) -> Iterator[None]:
-    """Make the unfinished folder and hold its lock; remove both at the end.
-
-    A folder that others remove as they end is made again up to a thousand times.
-    """
+    """Make the unfinished folder, again if others remove it as they end, and hold its lock; remove both at the end."""
     with ExitStack() as held:
         for left in reversed(range(1000)):
             beside.parent.mkdir(parents=True, exist_ok=True)
@@ -130,12 +256,7 @@ def _clear(beside: Path, target: Path) -> None:
 def write_text(path: Path, text: str) -> None:
     """Write one file so that a reader sees the old or the new content, never half of it.
 
-    Links are followed; a device or a pipe is written to as it is.
-
-    Raises
-    ------
-    OutputError
-        If the file cannot be written.
+    Links are followed; a device or a pipe is written to as it is. Raises OutputError if the file cannot be written.
     """
     path = path.resolve()
     with _plainly(path):

@@ -28,12 +28,8 @@ def junit_text(
 ) -> str:
     """Return the findings as one test suite.
 
-    Parameters
-    ----------
-    findings : sequence of Finding
-    suite : str - its name
-    seconds : id of a finding -> wall time of its evaluation [s]; zero for one that is missing
-    whole : float or None - wall time of everything [s]; None: the sum of ``seconds``
+    ``seconds`` maps the id of a finding to the wall time of its evaluation, zero if missing; ``whole`` is that of
+    everything, their sum if None.
     """
     seconds = seconds or {}
     cases = [finding for finding in findings if finding.kind == "regression"]

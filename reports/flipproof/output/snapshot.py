@@ -37,10 +37,8 @@ END: Final = "<!-- end of findings -->"
 def take(report: Path, place: Path = PLACE) -> None:
     """Keep the summary and the key pictures of a report; ``place`` is replaced as a whole, or left as it was.
 
-    Raises
-    ------
-    ValueError
-        If the folder is no report, of another format, not a full one, has a failed claim, or lacks a picture.
+    Raises ValueError if the folder is no report, of another format, not a full one, has a failed claim, or lacks a
+    picture.
     """
     summary = read_summary(report)
     if summary["version"] != SUMMARY_VERSION:
@@ -77,13 +75,7 @@ def _plain(text: str) -> str:
 
 
 def write_front_page(summary: Mapping[str, Any], readme: Path) -> None:
-    """Write what was found between the two marks of the README.
-
-    Raises
-    ------
-    ValueError
-        If the README cannot be read or lacks the marks.
-    """
+    """Write what was found between the two marks of the README; raises ValueError if it has none or is unreadable."""
     try:
         text = readme.read_text(encoding="utf-8")
     except OSError as error:

@@ -30,12 +30,7 @@ def summarise(gathered: Gathered, told: Mapping[str, Told], provenance: Mapping[
     """Return everything that a report found as JSON-ready data.
 
     A number that is not finite is one of the words "nan", "inf", "-inf": JSON has no such numbers, and to leave it out
-    would hide that something was computed and came to nothing.
-
-    Raises
-    ------
-    ValueError
-        If two findings share an id.
+    would hide that something was computed and came to nothing. Raises ValueError if two findings share an id.
     """
     findings = [finding for each in told.values() for finding in each.findings]
     ids = Counter(finding.id for finding in findings)

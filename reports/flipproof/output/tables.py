@@ -63,12 +63,8 @@ def read_curve(path: Path) -> Curve:
     """Read a CSV file with a column t and at least one of omega, theta and r_cm; empty cells are left out.
 
     Of a measured track (the columns ``in_flight`` and ``t_over_T`` of ``flipproof track``) the rows in flight are
-    taken, and the times are counted from the release, as those of a solver are.
-
-    Raises
-    ------
-    ValueError
-        Naming file, line and column of what is missing, not a number, not finite, or goes back in time.
+    taken, and the times are counted from the release, as those of a solver are. Raises ValueError, naming file, line
+    and column of what is missing, not a number, not finite, or goes back in time.
     """
     names, rows = read_cells(path)
     there = [name for name in QUANTITIES if name in names]
@@ -119,10 +115,7 @@ def _release(path: Path, names: list[str], rows: Rows) -> float:
 def read_cells(path: Path) -> tuple[list[str], Rows]:
     """Return the names of a table's columns, and line number and cells of every row that is not blank.
 
-    Raises
-    ------
-    ValueError
-        If the file cannot be read, is empty, names a column twice, or has a row of another length.
+    Raises ValueError if the file cannot be read, is empty, names a column twice, or has a row of another length.
     """
     try:
         lines = read_text(path, 2**26).removeprefix("\ufeff").splitlines()
@@ -146,13 +139,7 @@ def read_cells(path: Path) -> tuple[list[str], Rows]:
 
 
 def number_of(path: Path, line: int, column: str, cell: str) -> float:
-    """Return a cell's number.
-
-    Raises
-    ------
-    ValueError
-        If it is none, or not finite; the message names file, line and column.
-    """
+    """Return a cell's number; if it is none, or not finite, raises ValueError, naming file, line and column."""
     try:
         value = float(cell)
     except ValueError:

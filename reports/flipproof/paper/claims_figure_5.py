@@ -12,11 +12,10 @@ import numpy as np
 from flipproof.chapters.errata.programs import SQUARE, exponents_of_cost
 from flipproof.frame.solvers import Missing
 from flipproof.paper import observe
-from flipproof.paper.claim import FLAT_WHY, states
-from flipproof.paper.observe import FLAT, SUPERIMPOSED, Flights
-from flipproof.paper.parameters import number, numbers, paper_steps, paper_throw
-from flipproof.paper.runs import MANY_SLICES, MANY_STEPS, PUBLISHED, finest_key, many_steps_key, same_steps_key
-from flipproof.paper.statements import OMEGA, Read, Reading, Statement, at_least, at_most
+from flipproof.paper.cases import number, numbers, paper_steps, paper_throw
+from flipproof.paper.observe import FLAT, FLAT_WHY, SUPERIMPOSED, Flights
+from flipproof.paper.runs import FINEST_KEY, MANY_SLICES, MANY_STEPS, MANY_STEPS_KEY, PUBLISHED, SAME_STEPS_KEY
+from flipproof.paper.statements import OMEGA, Read, Reading, Statement, at_least, at_most, states
 from slicemodel import Trajectory
 from slicemodel.observables import release_angular_velocity
 
@@ -207,7 +206,7 @@ def _finest(flights: Flights, damping: str) -> Trajectory:
     """Return the flight with the most slices: the paper's 500, fewer where the equation is solved through events."""
     if flights.solver == PUBLISHED:
         return flights.at("slices" + damping, max(numbers("figure-5d-slices")))
-    return flights.run(finest_key(damping))
+    return flights.run(FINEST_KEY.format(damping))
 
 
 # ---------------------------------------------------------------------- cost (Supp. Fig. 1)
@@ -238,8 +237,7 @@ def _of_programs(id_: str, place: str, says: str, means: str, why: str) -> Calla
     SQUARE_WHY,
 )
 def _cost_of_slices(_: Flights, program: str = "MATLAB") -> Iterator[Reading]:
-    of_n, _p = _exponents(program)
-    yield Reading("exponent of N in the work", of_n, "", SQUARE, note=_counted(program))
+    yield Reading("exponent of N in the work", _exponents(program)[0], "", SQUARE, note=_counted(program))
 
 
 @_of_programs(
@@ -251,8 +249,7 @@ def _cost_of_slices(_: Flights, program: str = "MATLAB") -> Iterator[Reading]:
     SQUARE_WHY,
 )
 def _cost_of_intervals(_: Flights, program: str = "MATLAB") -> Iterator[Reading]:
-    _n, of_p = _exponents(program)
-    yield Reading("exponent of P in the work", of_p, "", SQUARE, note=_counted(program))
+    yield Reading("exponent of P in the work", _exponents(program)[1], "", SQUARE, note=_counted(program))
 
 
 def _exponents(program: str) -> tuple[float, float]:
@@ -293,9 +290,9 @@ def _steps_are_enough(flights: Flights) -> Iterator[Reading]:
     for filling in numbers("figure-S1-filling"):
         own = flights.at("filling", filling)
         if flights.solver == PUBLISHED:
-            off[filling] = observe.distance(own, flights.run(many_steps_key(filling)))
+            off[filling] = observe.distance(own, flights.run(MANY_STEPS_KEY.format(filling)))
         else:
-            off[filling] = observe.distance(flights.run(same_steps_key(filling)), own)
+            off[filling] = observe.distance(flights.run(SAME_STEPS_KEY.format(filling)), own)
     if flights.solver == PUBLISHED:
         against, fewer = f"P = {MANY_STEPS}", _fewer_steps(flights)
     worst, most = max(off.items(), key=itemgetter(1))

@@ -10,11 +10,10 @@ from operator import itemgetter
 from typing import Final
 
 from flipproof.paper import observe
-from flipproof.paper.claim import FLAT_WHY, SUPERIMPOSED_WHY, states
+from flipproof.paper.cases import numbers
 from flipproof.paper.claims_figure_5 import flat_plateau
-from flipproof.paper.observe import FLAT, SUPERIMPOSED, Flights, level, level_by_points
-from flipproof.paper.parameters import numbers
-from flipproof.paper.statements import OMEGA, Read, Reading, Statement, at_least, at_most
+from flipproof.paper.observe import FLAT, FLAT_WHY, SUPERIMPOSED, SUPERIMPOSED_WHY, Flights, level, level_by_points
+from flipproof.paper.statements import OMEGA, Read, Reading, Statement, at_least, at_most, states
 
 # ---------------------------------------------------------------------- drag (Fig. 6)
 
@@ -110,34 +109,30 @@ def _no_drag_rises_late(flights: Flights) -> Iterator[Reading]:
     yield Reading("late rise over the plateau for α = 0", rise, OMEGA, at_least(FLAT))
 
 
-def _moderate_drag_is_flat(flights: Flights, drag: float) -> Iterator[Reading]:
-    run = flights.at("drag", drag)
-    yield from flat_plateau(run)
-    yield Reading("time to half the drop", observe.drop_time(run), "of T", at_most(0.25))
-
-
 def _moderate_drag(drag: float) -> Statement:
-    return _of_drag(
+    @_of_drag(
         f"moderate-drag-flat-{drag:g}",
         place="section 5, Fig. 6c",
         says=f"For α from 0.0075 to 0.01 ω drops suddenly to a flat plateau: at α = {drag:g}.",
         means="Half the drop is done by T/4, the last tenth of the flight lies at most 0.1 ω₀ over the plateau, "
         "and ω never climbs by more than 0.1 ω₀ over its lowest value until then.",
         why=f"A quarter of the flight is a choice of ours for “sudden”. {FLAT_WHY}",
-    )(partial(_moderate_drag_is_flat, drag=drag))
+    )
+    def is_flat(flights: Flights) -> Iterator[Reading]:
+        run = flights.at("drag", drag)
+        yield from flat_plateau(run)
+        yield Reading("time to half the drop", observe.drop_time(run), "of T", at_most(0.25))
+
+    return is_flat
 
 
-_lower_moderate_drag: Final = _moderate_drag(0.0075)
-_upper_moderate_drag: Final = _moderate_drag(0.01)
+_lower_moderate_drag, _upper_moderate_drag = map(_moderate_drag, (0.0075, 0.01))
 
 
 # ---------------------------------------------------------------------- filling (Fig. 7)
 
 OPTIMUM: Final = (0.2, 0.5)
 """Fillings that the paper finds best, and its range of omega_f / omega_0 there: the same two numbers."""
-
-INTERMEDIATE: Final = (0.2, 0.75)
-"""Fillings that count as intermediate: those of the experiment but for 0.1, rounded outwards to the optimum."""
 
 CLEAR: Final = 0.8
 """omega / omega_0 below which a bottle is clearly slower."""
@@ -154,7 +149,7 @@ SLOW_WHY: Final = "“Slower” is a word of ours for ω below 0.8 ω₀, “not
     why="“Most” is more than half; the range is the paper's, the choice of fillings ours.",
 )
 def _plateau_range(flights: Flights) -> Iterator[Reading]:
-    low, high = INTERMEDIATE
+    low, high = 0.2, 0.75  # those of the experiment but for 0.1, rounded outwards to the optimum
     found = flights.measured("filling", level, low, high).values()
     share = sum(OPTIMUM[0] <= value <= OPTIMUM[1] for value in found) / len(found)
     name = f"share of the {len(found)} fillings from {low:g} to {high:g} with ω_f/ω₀ in 0.2 to 0.5"

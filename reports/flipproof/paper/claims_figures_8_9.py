@@ -12,10 +12,9 @@ from typing import Final
 from flipproof.frame.findings import Finding, regression
 from flipproof.frame.solvers import Missing
 from flipproof.paper import observe
-from flipproof.paper.claim import FLAT_WHY, SUPERIMPOSED_WHY, states
-from flipproof.paper.observe import FLAT, SUPERIMPOSED, Flights
-from flipproof.paper.parameters import number, numbers, paper_steps, paper_throw
-from flipproof.paper.statements import OMEGA, Reading, at_least, at_most
+from flipproof.paper.cases import number, numbers, paper_steps, paper_throw
+from flipproof.paper.observe import FLAT, FLAT_WHY, SUPERIMPOSED, SUPERIMPOSED_WHY, Flights
+from flipproof.paper.statements import OMEGA, Reading, at_least, at_most, states
 from slicemodel import Bottle, Trajectory
 from slicemodel.landing import Moment, moment_at, next_upright
 from slicemodel.observables import centre_of_mass_at_rest, static_toppling_angle
@@ -133,13 +132,7 @@ When = Callable[[Trajectory], Moment]
 
 
 def upright(run: Trajectory) -> Moment:
-    """Return the flight where it stands upright, theta = 2 pi.
-
-    Raises
-    ------
-    Missing
-        If it does not turn that far.
-    """
+    """Return the flight where it stands upright, theta = 2 pi; raises Missing if it does not turn that far."""
     moment = next_upright(run)
     if moment is None:
         filling, duration = run.scenario.fill_fraction, run.scenario.duration
@@ -267,13 +260,11 @@ def claim_filling_of_change() -> Finding:
     closed = filling_of_change(paper_throw().bottle)
     surface = float(brentq(surface_over_centre, 1e-3, 1.0, xtol=1e-12))
     peak, _ = toppling_peak()
-    return regression(
-        id="paper-filling-of-change",
-        title=f"Water at rest reaches up to the centre of mass at M̃ = {closed:.4f}, where Eq. 13b has its maximum",
-        value=max(abs(surface - closed), abs(peak - closed)),
-        unit="",
-        admissible=(0.0, 1e-6),
-        note=f"h/L = ε/(1 + ε): {closed:.7f} in closed form, {surface:.7f} where r_CM(0) = L − h, {peak:.7f} by "
+    title = f"Water at rest reaches up to the centre of mass at M̃ = {closed:.4f}, where Eq. 13b has its maximum"
+    note = (
+        f"h/L = ε/(1 + ε): {closed:.7f} in closed form, {surface:.7f} where r_CM(0) = L − h, {peak:.7f} by "
         "maximising Eq. 13b. Water that lies higher is thrown towards the cap. Slices may overlap and sink towards the "
-        "base first: in free flight the first of them goes over to the cap at 0.13 to 0.14",
+        "base first: in free flight the first of them goes over to the cap at 0.13 to 0.14"
     )
+    off = max(abs(surface - closed), abs(peak - closed))
+    return regression("paper-filling-of-change", title, off, "", (0.0, 1e-6), note)

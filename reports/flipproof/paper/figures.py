@@ -1,14 +1,25 @@
-"""Every figure of the paper that has numbers in it: its name, the families of throws it needs, and how it is made."""
+"""Every figure of the paper that has numbers in it, and the folder of them: SVG, PNG and CSV of each, and one page."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import json
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from pathlib import Path
 from typing import Final
 
-from flipproof.frame.exhibit import Exhibit
+from flipproof.frame.chapter import Ask, Chapter, Part, Study
+from flipproof.frame.exhibit import Exhibit, drawn
+from flipproof.frame.gather import gather
+from flipproof.frame.pool import Progress, workers
+from flipproof.frame.store import RunStore
+from flipproof.output.columns import rows_csv
+from flipproof.output.folder import check_replaceable, replaced_folder
+from flipproof.page.templating import environment
 from flipproof.paper import figures_bottle, figures_curves, figures_levels
-from flipproof.paper.cases import family
-from flipproof.paper.runs import PaperRuns
+from flipproof.paper.cases import HEADER, family, paper_throw, parameter_rows
+from flipproof.paper.runs import PaperRuns, cost_calls, group_calls, plan_figures
 
 RECIPES: Final = dict(sorted((figures_bottle.RECIPES | figures_curves.RECIPES | figures_levels.RECIPES).items()))
 """Figure -> the families of throws that it shows, and what makes its exhibits."""
@@ -21,13 +32,7 @@ TIMED: Final = ("S1b", "S1c")
 
 
 def check_figures(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the names as the paper writes them, once each, in its order.
-
-    Raises
-    ------
-    ValueError
-        Naming what is no figure, and those that are.
-    """
+    """Return the names as the paper writes them, once each, in its order; one that is no figure raises a ValueError."""
     by_lower_case = {name.lower(): name for name in ORDER}
     wanted = set()
     for name in names:
@@ -44,10 +49,75 @@ def keys_of(names: Iterable[str]) -> set[str]:
 
 
 def exhibits_paper(runs: PaperRuns, names: Iterable[str] = ORDER) -> Iterator[Exhibit]:
-    """Yield the exhibits of the figures, in the paper's order; a figure may have several.
-
-    Figures of cost are left out where costs were not measured.
-    """
+    """Yield the exhibits of the figures, in the paper's order; those of cost only where costs were measured."""
     for name in check_figures(names):
         if runs.costs or name not in TIMED:
             yield from RECIPES[name][1](runs)
+
+
+def make_gallery(
+    names: Sequence[str],
+    out: Path,
+    progress: Progress,
+    provenance: Mapping[str, str],
+    jobs: int | None,
+    store: RunStore,
+) -> str:
+    """Make the figures with these names, or all, and write them to a folder; return one line that tells what is there.
+
+    An older gallery in the folder is replaced when the new one is complete. Raises ValueError if a name is no figure of
+    the paper, or the folder holds something else.
+    """
+    began = time.perf_counter()
+    wanted = check_figures(names) or ORDER
+    check_replaceable(out, "paper")
+    with replaced_folder(out, "paper") as folder:
+        with workers(jobs) as pool:
+            runs = gather_figures(wanted, pool, progress, store)
+            exhibits = drawn(list(exhibits_paper(runs, wanted)), pool=store.remembering(pool))
+        for exhibit in exhibits:
+            (folder / f"{exhibit.name}.svg").write_text(exhibit.drawing.svg, encoding="utf-8")
+            (folder / f"{exhibit.name}.png").write_bytes(exhibit.drawing.png)
+            (folder / f"{exhibit.name}.csv").write_text(exhibit.table or "", encoding="utf-8")
+        (folder / "parameters.csv").write_text(rows_csv(HEADER, parameter_rows()), encoding="utf-8")
+        facts = {**provenance, **store.facts()}
+        (folder / "index.html").write_text(render_gallery(exhibits, runs, facts), encoding="utf-8")
+        summary = {
+            "figures": {exhibit.name: exhibit.title for exhibit in exhibits},
+            "flights": len(runs.made),
+            "failed": runs.failures(),
+            "provenance": facts,
+        }
+        (folder / "summary.json").write_text(json.dumps(summary, indent=1), encoding="utf-8")
+    failed = f", {len(runs.failures())} flights failed" if runs.failures() else ""
+    figures = f"{len(exhibits)} figure{'' if len(exhibits) == 1 else 's'}"
+    seconds = time.perf_counter() - began
+    return f"{figures} from {len(runs.made)} flights{failed}: {out / 'index.html'} ({seconds:.0f} s)"
+
+
+def gather_figures(
+    wanted: Sequence[str], pool: Executor, progress: Progress = lambda *_: None, store: RunStore | None = None
+) -> PaperRuns:
+    """Return the runs of some figures: a chapter of their own, driven as those of a report are."""
+
+    def study(_: Ask) -> Study[PaperRuns]:
+        figures = group_calls(plan_figures(keys_of(wanted)), "the paper's figures")
+        costs = cost_calls() if set(wanted) & set(TIMED) else []
+        flights = yield figures
+        flights = (yield costs) if costs else flights  # alone, so that no other run takes their time
+        return PaperRuns.of(flights, figures, costs=costs)
+
+    chapter = Chapter(name="figures", title="The paper's figures", study=study)
+    part = Part(chapter.name, chapter.title, "", (chapter,))
+    throw = paper_throw()
+    gathered = gather((part,), Ask(scenario=throw, throw=throw, size="full"), pool, progress, store=store)
+    runs: PaperRuns = gathered.outcomes[chapter.name].value
+    return runs
+
+
+def render_gallery(exhibits: Sequence[Exhibit], runs: PaperRuns, provenance: Mapping[str, str]) -> str:
+    """Return the page."""
+    template = environment().get_template("paper_figures.html.j2")
+    return template.render(
+        exhibits=exhibits, problems=runs.failures(), header=HEADER, rows=parameter_rows(), provenance=provenance
+    )

@@ -254,4 +254,3 @@ RECIPES: Final[dict[str, Recipe]] = {
     "3b": (("flight",), _exhibits_3b),
     "9a": (("filling",), _exhibits_9a),
 }
-"""Figure -> the families it needs, and how it is made."""

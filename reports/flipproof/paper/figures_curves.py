@@ -12,10 +12,9 @@ import numpy as np
 
 from flipproof.frame.exhibit import Exhibit
 from flipproof.paper import figures_panels as panels
-from flipproof.paper.cases import Case, family
+from flipproof.paper.cases import Case, family, number, numbers
 from flipproof.paper.figures_panels import Axis, Grid, Line
 from flipproof.paper.observe import normalised, steady_level
-from flipproof.paper.parameters import number, numbers
 from flipproof.paper.runs import PUBLISHED, PaperRuns
 from slicemodel import Trajectory
 from slicemodel.trajectory import FloatArray
@@ -26,15 +25,10 @@ SHARE: Final = Axis("t / T [1]", "t/T [1]", 0.0, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """What is drawn over time.
+    """What is drawn over time; ``curve`` reads abscissa and ordinate off a flight.
 
-    Parameters
-    ----------
-    x, y : Axis
-    curve : flight -> abscissa and ordinate
-    plotted : str - what is drawn against what, for the alternative text
-    said : str - the number that stands for a curve there
-    number, digits : how it is read off a flight, and its digits after the point
+    In the alternative text ``plotted`` says what is drawn against what, and ``said`` which ``number``, with how many
+    ``digits`` after the point, stands for a curve.
     """
 
     x: Axis
@@ -324,4 +318,3 @@ RECIPES: Final[dict[str, panels.Recipe]] = {
     "6a": (("drag",), _exhibits_6a),
     "S1a": (tuple(f"steps {filling:g}" for filling in numbers("figure-S1-filling")), _exhibits_s1a),
 }
-"""Figure -> the families it needs, and how it is made."""

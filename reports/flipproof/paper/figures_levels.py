@@ -13,9 +13,9 @@ import numpy as np
 from flipproof.figures.style import solver_style
 from flipproof.frame.exhibit import Exhibit
 from flipproof.paper import figures_panels as panels
+from flipproof.paper.cases import paper_throw
 from flipproof.paper.figures_panels import Axis, Grid, Line
 from flipproof.paper.observe import level_by_points, steady_level
-from flipproof.paper.parameters import paper_throw
 from flipproof.paper.runs import PUBLISHED, SOLVERS, PaperRuns
 from slicemodel import Trajectory
 from slicemodel.landing import Moment, moment_at, next_upright
@@ -45,12 +45,9 @@ class Points:
 
 def _points(runs: PaperRuns, label: str, family: str, of: Callable[[Trajectory], float], *, filled: bool) -> Points:
     """Return the points where there is a number, which is finite."""
-    found = {solver: {case.value: of(run) for case, run in runs.members(solver, family)} for solver in SOLVERS}
-    return Points(
-        label,
-        filled,
-        {solver: {at: value for at, value in by.items() if math.isfinite(value)} for solver, by in found.items()},
-    )
+    found = {solver: [(case.value, of(run)) for case, run in runs.members(solver, family)] for solver in SOLVERS}
+    finite = {solver: {at: value for at, value in own if math.isfinite(value)} for solver, own in found.items()}
+    return Points(label, filled, finite)
 
 
 def _row(y: Axis, points: Sequence[Points], *extra: Line) -> panels.Row:
@@ -173,4 +170,3 @@ RECIPES: Final[dict[str, panels.Recipe]] = {
     "S1b": ((), partial(_exhibits_cost, "slices")),
     "S1c": ((), partial(_exhibits_cost, "steps")),
 }
-"""Figure -> the families it needs, and how it is made."""

@@ -36,13 +36,9 @@ DASHED: Final = {"color": "black", "linestyle": "--", "linewidth": 1.6, "zorder"
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One curve or row of points.
+    """One curve or row of points (P,); the same throw has the same label in every panel.
 
-    Parameters
-    ----------
-    label : str - the same in every panel for the same throw
-    x, y : arrays of equal shape (P,)
-    look : mapping - keywords of matplotlib's ``plot``: ``ranked``, ``dots`` and ``DASHED`` make them
+    ``look`` holds keywords of matplotlib's ``plot``, which ``ranked``, ``dots`` and ``DASHED`` make.
     """
 
     label: str
@@ -157,14 +153,10 @@ def _set_range(axes: Axes, x: Axis, row: Row) -> None:
     if x.low is not None and x.high is not None:
         axes.set_xlim(x.low, x.high)
     if y.low is not None and y.high is not None:
-        high = stretched(y.high, row)
+        tops = (float(line.y.max()) for lines in row.lines.values() for line in lines if len(line.y))
+        highest = max(tops, default=0.0)
+        high = y.high if highest <= y.high else 1.05 * highest
         axes.set_ylim(*((high, y.low) if y.upside_down else (y.low, high)))
-
-
-def stretched(high: float, row: Row) -> float:
-    """Return the upper end of an axis, moved up if any curve of its row needs it."""
-    highest = max((float(line.y.max()) for lines in row.lines.values() for line in lines if len(line.y)), default=0.0)
-    return high if highest <= high else 1.05 * highest
 
 
 def legend_below(figure: Figure, panels: Iterable[Axes], columns: int) -> None:

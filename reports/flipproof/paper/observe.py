@@ -16,23 +16,22 @@ from slicemodel.observables import PLATEAU_SHARE, plateau, plateau_of_points, pl
 from slicemodel.trajectory import BASE, CAP, FloatArray
 
 FLAT: Final = 0.1
-"""Share of omega_0 by which a flat omega may rise again; 2 rad/s of the paper's 20."""
+FLAT_WHY: Final = "“Flat” is a word of ours for a rise of at most 0.1 ω₀: 2 rad/s of the 20 on the axis."
+"""Share of omega_0 by which a flat omega may rise again."""
 
 SUPERIMPOSED: Final = 0.05
+SUPERIMPOSED_WHY: Final = (
+    "“Superimposed” is a word of ours for at most 0.05 ω₀ apart: 1 rad/s of 20, about the width of a drawn line."
+)
 """Root-mean-square difference, as a share of omega_0, up to which two curves count as one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Flights:
-    """The flights of one equation by the key of their case.
+    """The flights of one equation by the key of their case; ``seen`` are those that were looked at.
 
-    Parameters
-    ----------
-    solver : str
-    made : key -> Made
-    halved : the same flights with half the slices wherever their number is not the subject; None if there are none
-    half_steps : the same flights with half the time steps; None if the equation chooses its own
-    seen : those that were looked at
+    ``halved`` are the same flights with half the slices wherever their number is not the subject, ``half_steps`` those
+    with half the time steps; None if there are none, or the equation chooses its own steps.
     """
 
     solver: str
@@ -42,26 +41,14 @@ class Flights:
     seen: dict[str, Trajectory] = field(default_factory=dict)
 
     def run(self, key: str) -> Trajectory:
-        """Return one flight.
-
-        Raises
-        ------
-        Missing
-            If it was not made, or did not reach its end.
-        """
+        """Return one flight; raises Missing if it was not made, or did not reach its end."""
         if key not in self.made:
             raise Missing(f"{key!r} was not flown by {self.solver}")
         run = self.seen[key] = self.made[key].whole
         return run
 
     def at(self, name: str, value: float) -> Trajectory:
-        """Return the flight of a family where what varies has this value.
-
-        Raises
-        ------
-        Missing
-            If the family has no such case, or its flight is not there.
-        """
+        """Return the flight of a family where what varies has this value; raises Missing if it is not there."""
         for case in family(name):
             if abs(case.value - value) <= 1e-9 * max(1.0, abs(value)):
                 return self.run(case.key)
@@ -72,10 +59,7 @@ class Flights:
     ) -> dict[float, float]:
         """Return a number of every flight of a family with ``low`` <= value <= ``high``, in the order of the family.
 
-        Raises
-        ------
-        Missing
-            If any flight is not there, but for those whose number of slices is too large for this solver.
+        Raises Missing if any flight is not there, but for those whose number of slices is too large for this solver.
         """
         cases = [case for case in family(name) if not case.slices_vary or case.key in self.made]
         flown = [(case.value, self.run(case.key)) for case in cases]
@@ -131,10 +115,7 @@ def climb(run: Trajectory) -> float:
 
 
 def drop_time(run: Trajectory) -> float:
-    """Return when omega is half way from omega_0 down to its plateau, as a share of the flight.
-
-    NaN where it drops by less than FLAT.
-    """
+    """Return at which share of the flight omega is half way down to its plateau; NaN if it drops by less than FLAT."""
     curve, low = normalised(run), level(run)
     if 1.0 - low < FLAT:
         return float("nan")

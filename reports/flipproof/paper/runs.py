@@ -1,19 +1,20 @@
-"""The runs behind the paper's figures and statements: planned without repeats, made in a pool, looked up by name."""
+"""The runs behind the paper's figures and statements, looked up by name, and what they cost on this machine."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
 from types import MappingProxyType
 from typing import Any, Final, Literal
 
 import numpy as np
 
-from flipproof.frame.solvers import Call, Flights, Made, Run, make
+from flipproof.frame.solvers import Call, Flights, Made, Run, make, solve
 from flipproof.paper import observe
-from flipproof.paper.cases import Case, all_cases, family
-from flipproof.paper.costs import Cost, measure_event_driven, measure_published
-from flipproof.paper.parameters import numbers, paper_steps, paper_throw
+from flipproof.paper.cases import Case, all_cases, family, numbers, paper_steps, paper_throw
 from slicemodel import Scenario, Trajectory
 
 PUBLISHED: Final = "published-python"
@@ -25,8 +26,6 @@ event-driven solver; with recoil the order of the impacts decides it."""
 
 MANY_STEPS: Final = 10_000
 MANY_SLICES: Final = 100.0
-FINEST: Final = 200
-"""Slices of an event-driven flight that the others are held against."""
 
 HALVED: Final = ("filling", "long", "drag", "spin", "angle", "aspect")
 """Families flown with half the slices too; in the others their number is the subject."""
@@ -63,13 +62,7 @@ class Planned:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperRuns:
-    """Every run of the paper's figures, and those that statements need beside them.
-
-    Parameters
-    ----------
-    made : name -> Made, of the runs that are planned
-    costs : of every solver over numbers of slices and steps; empty if they were not asked for
-    """
+    """Every planned run of the paper's figures and statements by its name, and costs if they were asked for."""
 
     made: Mapping[Name, Made]
     costs: tuple[Cost, ...] = ()
@@ -178,19 +171,11 @@ def _kept(made: Made, planned: Planned) -> Made:
 # ---------------------------------------------------------------------- what statements need beside the figures
 
 
-def many_steps_key(filling: float) -> str:
-    """Return the key of the flight with ``MANY_STEPS`` steps."""
-    return f"filling {filling:g}, P {MANY_STEPS}"
-
-
-def same_steps_key(filling: float) -> str:
-    """Return the key of the flight by the exact step of Eq. 8 at the paper's number of time steps."""
-    return f"filling {filling:g}, exact-step"
-
-
-def finest_key(damping: str) -> str:
-    """Return the key of the flight with the most slices at one of ``DAMPINGS``."""
-    return f"slices finest{damping}"
+MANY_STEPS_KEY: Final = f"filling {{:g}}, P {MANY_STEPS}"
+SAME_STEPS_KEY: Final = "filling {:g}, exact-step"
+FINEST_KEY: Final = "slices finest{}"
+"""Keys, at a filling or one of ``DAMPINGS``, of the flights with ``MANY_STEPS`` steps, by the exact step of Eq. 8 at
+the paper's number of time steps, and event by event with the most slices, 200."""
 
 
 def plan_claims() -> list[Planned]:
@@ -211,7 +196,7 @@ def _halved(scenario: Scenario) -> Scenario:
 def _same_steps(filling: float, half: Half = "") -> Planned:
     """Return the run of the scheme that solves Eq. 8 as printed at the paper's number of time steps."""
     throw = _halved(paper_throw(filling)) if half else paper_throw(filling)
-    key = same_steps_key(filling)
+    key = SAME_STEPS_KEY.format(filling)
     return _planned("eq8", key, throw, half, by="exact-step", steps=paper_steps(), store="summary")
 
 
@@ -220,9 +205,9 @@ def plan_further() -> Iterator[Planned]:
     for damping in DAMPINGS:
         many = next(case for case in family(f"slices{damping}") if case.value == MANY_SLICES)
         for solver in SOLVERS[1:]:
-            yield _planned(solver, finest_key(damping), many.scenario.with_slices(FINEST))
+            yield _planned(solver, FINEST_KEY.format(damping), many.scenario.with_slices(200))
     for filling in numbers("figure-S1-filling"):
-        key = many_steps_key(filling)
+        key = MANY_STEPS_KEY.format(filling)
         yield _planned(PUBLISHED, key, paper_throw(filling), steps=MANY_STEPS, store="summary")
         yield _same_steps(filling)
     yield _planned(WEIGHTLESS, WEIGHTLESS_KEY, paper_throw(STEADY_FILLING))
@@ -240,10 +225,7 @@ def plan_halved() -> Iterator[Planned]:
 
 
 def plan_published(half: Half) -> Iterator[Planned]:
-    """Yield the flights of the published program with half its "slices" or "steps".
-
-    Slices are kept where statements read more than omega and theta.
-    """
+    """Yield the published program's flights with half its "slices" or "steps", with slices only where they are read."""
     rebounds, slices = ([f"{name}{damping}" for damping in DAMPINGS] for name in ("beta", "slices"))
     whole = {case.key for name in ("long", "drag", *rebounds) for case in family(name)}
     families = HALVED if half == "slices" else (*HALVED, *rebounds, *slices)
@@ -255,3 +237,53 @@ def plan_published(half: Half) -> Iterator[Planned]:
         store = "full" if key in whole else "summary"
         planned = _planned(PUBLISHED, key, scenario, half, steps=steps, store=store)
         yield replace(planned, thin=thin, grouped=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """One run of N slices, timed: ``seconds`` of processor time, compiled.
+
+    ``steps`` are P, the steps of the published program or the output times of an event-driven solver; ``work`` counts
+    slice steps N P of the published program, slices times Taylor series otherwise.
+    """
+
+    solver: str
+    slices: int
+    steps: int
+    work: int
+    seconds: float
+
+
+def _numbers(of: str) -> list[int]:
+    return [round(value) for value in numbers(f"figure-S1-{of}")]
+
+
+def measure_published(solver: str) -> tuple[Cost, ...]:
+    """Time the published program over the slices and steps of Supp. Fig. 1; the least of five runs."""
+    throw = paper_throw()
+    _seconds(solver, throw, steps=2, store="summary")  # compiles
+    costs = []
+    for slices, steps in product(_numbers("slices"), _numbers("steps")):
+        run = partial(_seconds, solver, throw.with_slices(slices), steps=steps, store="summary")
+        costs.append(Cost(solver, slices, steps, slices * steps, min(run()[0] for _ in range(5))))
+    return tuple(costs)
+
+
+def measure_event_driven(solver: str) -> tuple[Cost, ...]:
+    """Time an event-driven solver over slices, and over the number of output times that stands for P there."""
+    throw = paper_throw()
+    _seconds(solver, throw.with_slices(1), times=[throw.duration / 100])  # loads the compiled flow
+    costs = []
+    for slices, steps in product((10, 100, 500), _numbers("steps")):
+        # Output times do not change the steps of these solvers: one number of slices shows that.
+        if steps >= paper_steps() or slices == 100:
+            times = np.linspace(0.0, throw.duration, steps)
+            seconds, run = _seconds(solver, throw.with_slices(slices), times=times)
+            costs.append(Cost(solver, slices, steps, slices * int(run.diagnostics["evaluations"]), seconds))
+    return tuple(costs)
+
+
+def _seconds(solver: str, scenario: Scenario, **settings: Any) -> tuple[float, Trajectory]:
+    began = time.process_time()
+    run = solve(solver, scenario, **settings)
+    return time.process_time() - began, run

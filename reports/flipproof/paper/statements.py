@@ -1,13 +1,22 @@
-"""A statement of the paper, and how each equation judges it: a number, its band, a threshold, a margin, a verdict."""
+"""A statement of the paper, and how each equation judges it: a number, its band, a threshold, a margin, a verdict.
+
+The number of slices is cut in half for a second reading, and so is the number of time steps where an equation does not
+choose its own; what that changes, and what tolerances change in omega, is the band of a number.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
+from types import MappingProxyType
 from typing import Any, Final, Literal
 
 from flipproof.frame.findings import Finding, finite_or_none, observed
+from flipproof.frame.solvers import Missing
+from flipproof.paper.observe import Flights
+from flipproof.paper.runs import BANDS
 
 Verdict = Literal["holds", "fails", "cannot be decided", "not judged"]
 Kind = Literal["claim", "admitted limit"]
@@ -15,11 +24,13 @@ Kind = Literal["claim", "admitted limit"]
 OMEGA: Final = "of ω₀"
 """Unit of a number that is a share of omega_0."""
 
-SIGNS: Final[Mapping[Verdict, str]] = {"holds": "✓", "fails": "✗", "cannot be decided": "?", "not judged": "–"}
-CLASSES: Final[Mapping[Verdict, str]] = {
-    "holds": "pass", "fails": "fail", "cannot be decided": "soft", "not judged": "soft"
-}  # fmt: skip
-"""How a page marks a verdict: sign and colour class beside the word."""
+MARKS: Final[Mapping[Verdict, tuple[str, str]]] = {
+    "holds": ("✓", "pass"),
+    "fails": ("✗", "fail"),
+    "cannot be decided": ("?", "soft"),
+    "not judged": ("–", "soft"),
+}
+"""How a page marks a verdict: sign, and class of the style sheet, beside the word."""
 
 NEAR: Final = 0.1
 """Share of a threshold within which a number is marginal. Thresholds chosen here have one significant digit: another
@@ -95,16 +106,6 @@ class Reading:
         size = (high - low) / 2 if math.isfinite(high - low) else abs(high if math.isinf(low) else low)
         reach = self.band + NEAR * size
         return 0.0 < reach < math.inf and abs(self.margin) <= reach
-
-    @property
-    def sign(self) -> str:
-        """The verdict as a sign."""
-        return SIGNS[self.verdict]
-
-    @property
-    def colour(self) -> str:
-        """The verdict as the class of a page's style sheet."""
-        return CLASSES[self.verdict]
 
     @property
     def margin_number(self) -> str:
@@ -209,11 +210,6 @@ class Judgement:
         return next((reading for reading in found if reading.marginal == wanted), found[0] if found else None)
 
     @property
-    def value(self) -> float:
-        """The deciding number; NaN if there is none."""
-        return self.deciding.value if self.deciding else math.nan
-
-    @property
     def words(self) -> str:
         """All readings, the flights and the other senses of the text, as one line."""
         parts = [reading.words for reading in self.readings]
@@ -289,11 +285,11 @@ class Statement:
 
     def sign(self, judgement: Judgement) -> str:
         """Return a verdict as a sign; one on an admitted limit is neither success nor failure."""
-        return "•" if self.kind == "admitted limit" and judgement.readings else SIGNS[judgement.verdict]
+        return "•" if self.kind == "admitted limit" and judgement.readings else MARKS[judgement.verdict][0]
 
     def colour(self, judgement: Judgement) -> str:
         """Return a verdict as the class of a page's style sheet."""
-        return "soft" if self.kind == "admitted limit" else CLASSES[judgement.verdict]
+        return "soft" if self.kind == "admitted limit" else MARKS[judgement.verdict][1]
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the statement as JSON-ready data."""
@@ -305,8 +301,55 @@ class Statement:
     def findings(self) -> Iterator[Finding]:
         """Yield one finding for each judgement; observations, since what fails is the paper's and not this project."""
         for judgement in self.judgements:
-            number, title = judgement.deciding, f"{self.place}: {self.says} By {judgement.solver}"
+            number, id_ = judgement.deciding, f"paper-{self.id}-{judgement.solver}"
+            title = f"{self.place}: {self.says} By {judgement.solver}: {self.word(judgement)}"
             value = None if number is None or math.isnan(number.value) else number.value
             band = None if number is None or math.isnan(number.band) else number.band
-            title, unit = f"{title}: {self.word(judgement)}", number.unit if number else ""
-            yield observed(f"paper-{self.id}-{judgement.solver}", title, value, unit, judgement.words, band=band)
+            yield observed(id_, title, value, number.unit if number else "", judgement.words, band=band)
+
+
+def states(
+    id_: str, *, otherwise: Mapping[str, Mapping[str, Any] | Read] = MappingProxyType({}), **about: Any
+) -> Callable[[Read], Statement]:
+    """Return a decorator that makes a statement of what reads its numbers.
+
+    ``otherwise`` maps words to another sense of the text: options of the same function, or another one.
+    """
+
+    def stated(read: Read) -> Statement:
+        senses = (
+            (words, partial(read, **sense) if isinstance(sense, Mapping) else sense)
+            for words, sense in otherwise.items()
+        )
+        return Statement(id=id_, read=read, otherwise=tuple(senses), **about)
+
+    return stated
+
+
+def judge(statement: Statement, flights: Flights) -> Judgement:
+    """Return the judgement of one equation; a flight that is missing leaves it undecided and says why."""
+    if statement.judges and flights.solver not in statement.judges:
+        return Judgement(solver=flights.solver, silent=statement.silent)
+    if statement.of_steps:
+        flights = replace(flights, half_steps=None)
+    others = tuple((words, judge_sense(read, flights)) for words, read in statement.otherwise)
+    return replace(judge_sense(statement.read, flights), others=others)
+
+
+def judge_sense(read: Read, flights: Flights) -> Judgement:
+    """Return the judgement of one equation in one sense of the text.
+
+    The band of a number is that of its tolerances, and what half the slices and what half the steps change.
+    """
+    flights = replace(flights, seen={})
+    own = BANDS.get(flights.solver, 0.0)
+    readings = []
+    try:
+        found = tuple(read(flights))
+        coarser = [tuple(read(each)) for each in (flights.halved, flights.half_steps) if each is not None]
+    except Missing as reason:
+        return Judgement(solver=flights.solver, aside=str(reason))
+    for k, reading in enumerate(found):
+        moved = sum(abs(reading.value - others[k].value) for others in coarser)
+        readings.append(replace(reading, band=reading.band + (own if reading.unit == OMEGA else 0.0) + moved))
+    return Judgement(solver=flights.solver, readings=tuple(readings), flown=flights.flown)

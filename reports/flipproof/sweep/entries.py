@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from flipproof.foreign.content import content_of
-from flipproof.foreign.specs import check_asked
+from flipproof.foreign.specs import check_asked, content_of
 from flipproof.frame.solvers import Solver, find, solve
 from flipproof.sweep.errors import SweepError, refuse_unknown
 from slicemodel.scenario import Scenario

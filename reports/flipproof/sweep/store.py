@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from flipproof.output.ownership import MARKER, OutputError, check_own, marker_text, sole_writer
+from flipproof.output.folder import MARKER, OutputError, check_own, marker_text, sole_writer
 from flipproof.sweep.design import Plan, key_of
 from flipproof.sweep.entries import as_json
 from flipproof.sweep.errors import SweepError

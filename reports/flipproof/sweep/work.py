@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.foreign.content import content_of
+from flipproof.foreign.specs import content_of
 from flipproof.frame.keys import fingerprint
 from flipproof.frame.solvers import Run, find, make
 from flipproof.output.provenance import provenance, version_of

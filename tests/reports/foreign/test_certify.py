@@ -7,14 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flipproof.foreign import checks_order
-from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, certify
+from flipproof.foreign import checks_measured
+from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, certify, findings_of
 from flipproof.foreign.contract import Ask
-from flipproof.foreign.mistakes import MISTAKES
-from flipproof.foreign.power import CLEAN, Caught, InProcess, claim_power, matrix_csv
+from flipproof.foreign.power import CLEAN, MISTAKES, Caught, InProcess, claim_power, matrix_csv
 from flipproof.foreign.specs import load, opened
 from flipproof.foreign.subject import Subject
-from flipproof.foreign.verdicts import findings_of
 from flipproof.frame.solvers import solve
 from flipproof.output.junit import junit_text
 from slicemodel import Scenario
@@ -87,7 +85,7 @@ def test_errors_that_do_not_fall_across_impacts_are_seen():
 
 @pytest.mark.parametrize(("slices", "shorter"), [(4, 1.0), (4, 1.19), (4, 0.71), (5, 1.0), (6, 0.84), (6, 1.25)])
 def test_rebounds_on_the_grid_are_seen_at_other_steps_and_slices(monkeypatch, slices, shorter):
-    monkeypatch.setattr(checks_order, "THROW", checks_order.THROW.with_slices(slices))
+    monkeypatch.setattr(checks_measured, "THROW", checks_measured.THROW.with_slices(slices))
     kind = MISTAKES["GridRebounds"]
 
     class AtOtherSteps(kind):
@@ -148,8 +146,8 @@ def test_a_floor_is_found_within_two_levels_where_noise_passes_for_a_falling_err
     assert result.verdict == FAILED
     assert len(facts["changes"]) == 2
     # By the changes alone it still falls; steps shorter by a sixteenth say that it does not.
-    assert facts["changes"][1] < checks_order.STILL * facts["changes"][0]
-    assert facts["noises"][0] > checks_order.NOISE * facts["changes"][1]
+    assert facts["changes"][1] < checks_measured.STILL * facts["changes"][0]
+    assert facts["noises"][0] > checks_measured.NOISE * facts["changes"][1]
     (result,) = certify(opened("exact-step"), ["precision-floor"]).results  # of order 1, too, in float64
     facts = result.found.facts
     assert not facts["floor_reached"]

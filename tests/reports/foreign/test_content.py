@@ -6,7 +6,7 @@ from contextlib import closing
 
 import pytest
 
-from flipproof.foreign.content import content_of
+from flipproof.foreign.specs import content_of
 from flipproof.frame.solvers import solve
 from flipproof.sweep.command import sweep
 from flipproof.sweep.design import read_design

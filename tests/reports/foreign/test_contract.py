@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from flipproof.foreign.answers import AnswerError, answer_of, trajectory_of
 from flipproof.foreign.checking import THROW, effort_of, times_of
-from flipproof.foreign.contract import Ask, Traits, solve_of, traits_of
+from flipproof.foreign.contract import AnswerError, Ask, Traits, answer_of, solve_of, traits_of, trajectory_of
 from flipproof.output.tables import Curve, trajectory_csv
 from slicemodel import Scenario, Trajectory, solve
 from slicemodel.observables import centre_of_mass, moment_of_inertia

@@ -11,9 +11,9 @@ import pytest
 
 from flipproof.chapters.vectors.published import load_all
 from flipproof.foreign.certify import FAILED, IDLE, PASSED, certify
-from flipproof.foreign.checks_equation import _ask
+from flipproof.foreign.checks_basic import _ask
 from flipproof.foreign.contract import Ask, Traits
-from flipproof.foreign.kit import Kit
+from flipproof.foreign.files import Kit
 from flipproof.foreign.specs import opened
 from slicemodel import Scenario
 

@@ -10,8 +10,8 @@ import pytest
 from flipproof.foreign import specs
 from flipproof.foreign.checking import THROW, times_of
 from flipproof.foreign.contract import Ask
+from flipproof.foreign.isolated import BrokenFrameError, receive, send
 from flipproof.foreign.specs import ForeignError, is_foreign, is_spec, load, locate, opened
-from flipproof.foreign.wire import BrokenFrameError, receive, send
 from flipproof.frame.solvers import FOREIGN, Run, find, make, solve
 
 ASK = Ask.of(THROW, times_of(THROW, 5), 0.25)

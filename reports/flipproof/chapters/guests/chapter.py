@@ -13,7 +13,7 @@ from flipproof.chapters.guests.study import Guest, Guests, Split, study
 from flipproof.chapters.waterfall.chapter import DOWN, UP, WHOLE
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.figures.style import ASSUMPTIONS, MARKERS, new_figure, shared_legend, solver_style, styled
-from flipproof.foreign.verdicts import findings_of
+from flipproof.foreign.certify import findings_of
 from flipproof.frame.chapter import Absent, Chapter, Exhibit, Finding, Kind, observed
 from flipproof.output.columns import curves_csv, rows_csv
 from flipproof.output.tables import trajectory_csv

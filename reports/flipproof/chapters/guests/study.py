@@ -14,7 +14,7 @@ The difference to free flight is split over the assumptions that the guest's equ
     plateau of free flight - plateau of the guest = rest + sum of fair shares
 
 The rest is the plateau of the guest's equation minus that of the guest: its own error, and what is no assumption of the
-ladder. A fair share is the mean over all orders of mending the assumptions (``foreign.explain``).
+ladder. A fair share is the mean over all orders of mending the assumptions (``foreign.place``).
 """
 
 from __future__ import annotations
@@ -36,14 +36,11 @@ from flipproof.chapters.differences.study import Difference, study_difference
 from flipproof.chapters.ice.chapter import Drift, measure
 from flipproof.chapters.waterfall.study import equation_run
 from flipproof.foreign import contract
-from flipproof.foreign.answers import trajectory_of
 from flipproof.foreign.certify import Certificate, certify
 from flipproof.foreign.checking import effort_of
-from flipproof.foreign.content import content_of
-from flipproof.foreign.contract import Traits
-from flipproof.foreign.explain import changes_of, mean
-from flipproof.foreign.place import name_of, switches_of
-from flipproof.foreign.specs import CSV, Runner, opened
+from flipproof.foreign.contract import Traits, trajectory_of
+from flipproof.foreign.place import changes_of, mean, name_of, switches_of
+from flipproof.foreign.specs import CSV, Runner, content_of, opened
 from flipproof.frame.chapter import Ask, Call, Flights, Missing, Run, Study, attempt
 from flipproof.frame.twins import twins
 from ode_reference.models import LADDER, MODELS
