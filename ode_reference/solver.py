@@ -13,7 +13,7 @@ from ode_reference.combinations import model_of
 from ode_reference.impacts import LAWS
 from ode_reference.models import MODELS
 from ode_reference.motion import Model
-from ode_reference.switches import PREFIX, Switches
+from ode_reference.switches import Switches, are_switches
 from slicemodel.scenario import Scenario, not_whole
 from slicemodel.trajectory import Trajectory, output_times, times_given
 
@@ -231,6 +231,6 @@ def _model(model: str | Switches) -> Model:
     """Return the model of that name or of those switches."""
     if isinstance(model, Switches):
         return model_of(model)
-    if isinstance(model, str) and model.startswith(PREFIX):
+    if are_switches(model):
         return model_of(Switches.from_name(model))
     return MODELS[known_name("model", model, MODELS)]

@@ -13,9 +13,14 @@ from __future__ import annotations
 
 from dataclasses import astuple, dataclass
 from itertools import product
-from typing import Final
+from typing import Final, TypeGuard
 
 PREFIX: Final = "switches:"
+
+
+def are_switches(name: object) -> TypeGuard[str]:
+    """Return whether a name is written as a set of switches."""
+    return isinstance(name, str) and name.startswith(PREFIX)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +61,7 @@ class Switches:
             If ``name`` is not "switches:" and six digits 0 or 1.
         """
         digits = name.removeprefix(PREFIX)
-        if not name.startswith(PREFIX) or len(digits) != len(cls.__slots__) or set(digits) - {"0", "1"}:
+        if not are_switches(name) or len(digits) != len(cls.__slots__) or set(digits) - {"0", "1"}:
             raise ValueError(
                 f"model = {name!r} is no set of switches: write {PREFIX!r} and one digit 0 or 1 for each of "
                 f"{', '.join(cls.__slots__)}, such as {cls(True, True).name!r}"

@@ -113,10 +113,10 @@ class Traits:
 def check_equation(name: object) -> None:
     """Refuse by a ValueError what is neither a model of the reference, nor a set of switches, nor a scheme."""
     from ode_reference.models import MODELS
-    from ode_reference.switches import PREFIX, Switches
+    from ode_reference.switches import Switches, are_switches
     from slicemodel.schemes import SCHEMES
 
-    if isinstance(name, str) and name.startswith(PREFIX):
+    if are_switches(name):
         Switches.from_name(name)
     elif name not in MODELS and name not in SCHEMES:
         raise ValueError(unknown_name("equation =", name, [*MODELS, *SCHEMES]))

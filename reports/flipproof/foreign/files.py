@@ -24,7 +24,7 @@ import numpy as np
 
 from flipproof.foreign.contract import PER_SLICE, Answer, AnswerError, Ask, Traits, answer_of
 from flipproof.foreign.isolated import PATIENCE, end_group, last_line
-from flipproof.foreign.specs import CSV, ForeignError, Runner, WaitingError, words_of
+from flipproof.foreign.specs import ForeignError, Runner, WaitingError, words_of, written
 
 if TYPE_CHECKING:
     from flipproof.foreign.certify import Certificate
@@ -85,7 +85,7 @@ class File(Runner):
     """A curve in a CSV file. It answers at its own times, for whatever throw it is taken to be of."""
 
     def __init__(self, spec: str) -> None:
-        self.path = Path(spec.removeprefix(CSV))
+        self.path = Path(written(spec)[1])
         if not self.path.is_file():
             raise ValueError(f"solver {spec!r}: there is no file {self.path}")
         self.traits = Traits(name=self.path.name)

@@ -24,7 +24,7 @@ from flipproof.foreign.contract import Answer, Ask, Traits
 from flipproof.foreign.specs import Runner
 from flipproof.frame.solvers import solve
 from ode_reference.models import MODELS
-from ode_reference.switches import PREFIX, Switches
+from ode_reference.switches import Switches, are_switches
 from slicemodel import Scenario
 from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray
@@ -121,7 +121,7 @@ def name_of(switches: Switches) -> str:
 def switches_of(equation: str) -> Switches:
     """Return the switches of an equation, or of the one a scheme converges to; if that is none, raises ValueError."""
     equation = LIMITS.get(equation, equation)
-    if equation.startswith(PREFIX):
+    if are_switches(equation):
         return Switches.from_name(equation)
     if equation not in MODELS:
         raise ValueError(f"{equation} converges to no equation of the ladder")

@@ -31,13 +31,15 @@ from typing import TYPE_CHECKING, Final
 
 from flipproof.frame.keys import files_in
 from flipproof.frame.solvers import catalogue, find
+from ode_reference.switches import are_switches
 from slicemodel.scenario import unknown_name
 
 if TYPE_CHECKING:
     from flipproof.foreign.contract import Answer, Ask, Traits
 
-CSV: Final = "csv:"
-COMMAND: Final = "cmd:"
+CSV: Final = "csv"
+COMMAND: Final = "cmd"
+OBJECT: Final = "object"
 
 
 class ForeignError(ValueError):
@@ -67,9 +69,15 @@ def offered() -> dict[str, EntryPoint]:
     return {point.name: point for group in groups for point in entry_points(group=group)}
 
 
+def written(spec: str) -> tuple[str, str]:
+    """Return how the spec of a foreign solver is written, and what it holds: a file, a command or an object's name."""
+    how, colon, held = spec.partition(":")
+    return (how, held) if colon and how in (CSV, COMMAND) else (OBJECT, spec)
+
+
 def is_foreign(spec: str) -> bool:
     """Return whether a spec names another solver than flipproof's own."""
-    return not spec.startswith("switches:") and spec not in catalogue()
+    return not are_switches(spec) and spec not in catalogue()
 
 
 def is_spec(name: str) -> bool:
@@ -79,13 +87,13 @@ def is_spec(name: str) -> bool:
 
 def check_spec(spec: str) -> None:
     """Refuse by a ValueError a spec that names nothing; no foreign code runs."""
-    if not spec.startswith((CSV, COMMAND)):
+    if written(spec)[0] == OBJECT:
         locate(spec)
 
 
 def check_asked(spec: str) -> None:
     """Refuse by a ValueError a curve in a file, which cannot be asked for another throw."""
-    if spec.startswith(CSV):
+    if written(spec)[0] == CSV:
         raise ValueError(f"solver {spec!r}: a curve cannot be asked; flipproof compare holds it against a solver")
 
 
@@ -99,12 +107,13 @@ def opened(spec: str, timeout: float | None = None, *, curves: bool = False) -> 
         from flipproof.foreign.solving import Own
 
         return Own(find(spec))
-    if spec.startswith((CSV, COMMAND)):
+    how, _ = written(spec)
+    if how != OBJECT:
         from flipproof.foreign.files import Command, File
 
         if not curves:
             check_asked(spec)
-        return File(spec) if spec.startswith(CSV) else Command(spec, timeout)
+        return File(spec) if how == CSV else Command(spec, timeout)
     locate(spec)
     from flipproof.foreign.isolated import Isolated
 
@@ -138,7 +147,7 @@ def locate(spec: str) -> EntryPoint | tuple[str, str]:
 def words_of(spec: str) -> list[str]:
     """Return the words of a command; raises ValueError if a quotation is not closed."""
     try:
-        return shlex.split(spec.removeprefix(COMMAND))
+        return shlex.split(written(spec)[1])
     except ValueError as error:
         raise ValueError(f"solver {spec!r}: {error}") from None
 
@@ -188,10 +197,11 @@ def content_of(spec: str) -> str:
 
 def _files(spec: str) -> Iterator[tuple[str, Path]]:
     """Yield every file that a spec stands for, with the name by which it counts."""
-    if spec.startswith(CSV):
-        yield "", Path(spec.removeprefix(CSV))
+    how, held = written(spec)
+    if how == CSV:
+        yield "", Path(held)
         return
-    if spec.startswith(COMMAND):
+    if how == COMMAND:
         for k, word in enumerate(words_of(spec)):
             file = Path(word.rpartition("=")[2])
             if file.is_file():

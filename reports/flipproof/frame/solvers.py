@@ -10,6 +10,7 @@ from typing import Any, Final, Generic, TypeVar
 
 import numpy as np
 
+from ode_reference.switches import Switches, are_switches
 from slicemodel import Scenario, Trajectory
 from slicemodel.scenario import unknown_name
 
@@ -57,9 +58,8 @@ def find(name: str) -> Solver:
     Other names with a colon, and entry points, are specs of somebody else's solver (``flipproof.foreign.specs``).
     Without any of that name a ValueError names the nearest.
     """
-    if name.startswith("switches:"):
+    if are_switches(name):
         from ode_reference.combinations import model_of
-        from ode_reference.switches import Switches
 
         model = model_of(Switches.from_name(name))
         return Solver(name, "ode_reference", "model", model.equation, model.reason)

@@ -31,8 +31,7 @@ def claim_guests(found: Guests) -> Iterator[Finding]:
         if visit.certificate is not None:
             yield from findings_of(visit.certificate, f"{head}-certify-", f"{label}: ")
         for name, reason in visit.problems.items():
-            fails = name in ("solver", "ice") or name.startswith("flight")
-            kind: Kind = "regression" if fails else "observation"
+            kind: Kind = "observation" if name in ("content", "certificate", "waterfall") else "regression"
             yield Absent(f"{head}-{name.replace(' ', '-')}-missing", f"{label}: {name}", reason, kind).finding
         for rung, difference in guest.differences.items():
             title, note = f"{label} and {rung}: largest difference in ω", f"at t = {difference.largest_time:.4g} s"

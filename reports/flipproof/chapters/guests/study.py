@@ -40,7 +40,7 @@ from flipproof.foreign.certify import Certificate, certify
 from flipproof.foreign.checking import effort_of
 from flipproof.foreign.contract import Traits, trajectory_of
 from flipproof.foreign.place import changes_of, mean, name_of, switches_of
-from flipproof.foreign.specs import CSV, Runner, content_of, opened
+from flipproof.foreign.specs import CSV, Runner, content_of, opened, written
 from flipproof.frame.chapter import Ask, Call, Flights, Missing, Run, Study, attempt
 from flipproof.frame.twins import twins
 from ode_reference.models import LADDER, MODELS
@@ -217,7 +217,7 @@ def visit(spec: str, throw: Scenario, times: FloatArray, timeout: float | None =
         traits = tried("solver", lambda: runner.traits)
         if traits is None:
             return Visit(**known)
-        asked = not spec.startswith(CSV)
+        asked = written(spec)[0] != CSV
         if not asked:
             problems["certificate"] = "a curve in a file cannot be asked"
         known["traits"] = traits
