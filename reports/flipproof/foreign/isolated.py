@@ -97,11 +97,10 @@ class Isolated(Runner):
 
     def _start(self) -> Traits:
         """Start the process and return what the solver says of itself, loaded within a minute."""
-        # Threads that the solver left behind keep nothing alive. Python would take a file of the same length and second
-        # for what it compiled before: -B keeps no compiled copies, and leaves none in the user's folder.
+        # Threads that the solver left behind keep nothing alive.
         code = "from flipproof.foreign import isolated; isolated.serve(); import os; os._exit(0)"
         self._process = subprocess.Popen(
-            [sys.executable, "-B", "-c", code],
+            [sys.executable, "-c", code],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

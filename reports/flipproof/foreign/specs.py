@@ -23,10 +23,20 @@ import importlib
 import shlex
 import sys
 from collections.abc import Iterator
-from importlib.machinery import PathFinder
+from functools import cache
+from importlib.abc import PathEntryFinder
+from importlib.machinery import (
+    EXTENSION_SUFFIXES,
+    SOURCE_SUFFIXES,
+    ExtensionFileLoader,
+    FileFinder,
+    PathFinder,
+    SourceFileLoader,
+)
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import CodeType
 from typing import TYPE_CHECKING, Final
 
 from flipproof.frame.keys import files_in
@@ -159,14 +169,43 @@ def load(spec: str) -> object:
     return solver() if isinstance(solver, type) else solver
 
 
+class _FromSource(SourceFileLoader):
+    """Compiles what a file holds now, and keeps nothing.
+
+    Python would take a compiled copy for that of its file if the file is of the same length and second as it was then.
+    """
+
+    def get_code(self, fullname: str) -> CodeType:
+        path = self.get_filename(fullname)
+        return self.source_to_code(self.get_data(path), path)
+
+
+@cache
+def _compile_anew(folder: Path) -> None:
+    """Let modules in a folder, and in packages there, be compiled from what their files hold now."""
+    find_in = FileFinder.path_hook((ExtensionFileLoader, EXTENSION_SUFFIXES), (_FromSource, SOURCE_SUFFIXES))
+
+    def hook(path: str) -> PathEntryFinder:
+        place = Path(path).resolve()
+        installed = "site-packages" in place.parts or place.is_relative_to(sys.base_prefix)
+        if installed or not place.is_relative_to(folder):
+            raise ImportError(f"{path} is not in {folder}")
+        return find_in(path)
+
+    sys.path_hooks.insert(0, hook)
+    sys.path_importer_cache.clear()
+
+
 def _module(place: str) -> object:
     if not place.endswith(".py"):
+        _compile_anew(Path.cwd())
         if "" not in sys.path:
             sys.path.insert(0, "")
         return importlib.import_module(place)
     path = Path(place).resolve()
     sys.path.insert(0, str(path.parent))  # a file may import its neighbours
-    spec = spec_from_file_location(path.stem, path)
+    _compile_anew(path.parent)
+    spec = spec_from_file_location(path.stem, path, loader=_FromSource(path.stem, str(path)))
     if spec is None or spec.loader is None:
         raise ImportError(f"{place} cannot be imported")
     module = module_from_spec(spec)

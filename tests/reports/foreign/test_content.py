@@ -1,5 +1,7 @@
 """The content of a foreign solver: rows of a sweep by its old files are never mixed with rows by its new ones."""
 
+import os
+import py_compile
 import sqlite3
 import sys
 from contextlib import closing
@@ -117,13 +119,16 @@ def test_a_file_that_changes_during_a_sweep_ends_it_in_one_line(mine):
 
 
 def test_a_changed_file_is_loaded_again_in_a_program_that_goes_on(mine, monkeypatch):
-    """Also one of the same length and second, which Python would take for what it compiled before."""
+    """Also one of the same length and time, which Python would take for what it compiled before."""
     monkeypatch.delenv("PYTHONDONTWRITEBYTECODE", raising=False)
     throw, spec = Scenario(n_slices=3, duration=0.02), f"{mine / 'mine.py'}:solve"
     assert solve(spec, throw).omega[-1] == 7.0
-    (mine / "spins.py").write_text("SPIN = 8.5\n")
-    assert solve(spec, throw).omega[-1] == 8.5
     assert not (mine / "__pycache__").exists()
+    py_compile.compile(str(mine / "spins.py"))
+    written = (mine / "spins.py").stat().st_mtime
+    (mine / "spins.py").write_text("SPIN = 8.5\n")
+    os.utime(mine / "spins.py", (written, written))
+    assert solve(spec, throw).omega[-1] == 8.5
 
 
 def test_what_counts_as_the_content_of_each_kind_of_spec(tmp_path, monkeypatch):
