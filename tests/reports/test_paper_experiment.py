@@ -8,12 +8,12 @@ import pytest
 from made_up import trajectory_of
 
 from flipproof.frame.solvers import Made, Run
-from flipproof.paper import verdicts as experiment
+from flipproof.paper import experiment
 from flipproof.paper.cases import ICE, family, paper_throw
+from flipproof.paper.experiment import OBSERVATIONS, Observation, closest_overall, compare, standing
 from flipproof.paper.observe import Flights
 from flipproof.paper.runs import PUBLISHED, SOLVERS
 from flipproof.paper.statements import Reading
-from flipproof.paper.verdicts import OBSERVATIONS, Observation, closest_overall, compare, standing
 
 BY_ID = {observation.id: observation for observation in OBSERVATIONS}
 

@@ -14,7 +14,7 @@ import pytest
 from flipproof.cli import paper as cli_paper
 from flipproof.frame.pool import Here
 from flipproof.output.folder import OutputError
-from flipproof.paper import figures as gallery
+from flipproof.paper import figures as paper_figures
 from flipproof.paper.cases import HALF_FULL, family
 from flipproof.paper.figures import ORDER, TIMED, check_figures, exhibits_paper, keys_of
 from flipproof.paper.figures_bottle import Pose, cap_of_tipping
@@ -32,7 +32,7 @@ COSTS = tuple(
 
 @pytest.fixture(scope="module")
 def runs():
-    return replace(gallery.gather_figures([name for name in ORDER if name not in TIMED], Here()), costs=COSTS)
+    return replace(paper_figures.gather_figures([name for name in ORDER if name not in TIMED], Here()), costs=COSTS)
 
 
 @pytest.fixture(scope="module")
@@ -231,5 +231,5 @@ def test_the_command_writes_figures_numbers_and_a_page(tmp_path, capsys, read_pa
 def test_a_failed_flight_is_on_the_page(runs):
     lost = ("eq8", "filling 0.25", "")
     made = {**runs.made, lost: replace(runs.made[lost], trajectory=None, reason="ValueError: <no>")}
-    page = gallery.render_gallery([], replace(runs, made=made), {})
+    page = paper_figures.render_gallery([], replace(runs, made=made), {})
     assert "eq8, filling 0.25: ValueError: &lt;no&gt;" in page

@@ -148,12 +148,12 @@ def _times(found: Comparison) -> str:
 
 def claims(found: Comparison, tolerance: float) -> tuple[Finding, ...]:
     """Return the largest differences as findings; the first quantity is held to the tolerance, others are observed."""
-    held: list[Finding] = []
-    for one in found.apart:
+    findings: list[Finding] = []
+    for k, one in enumerate(found.apart):
         largest, time = one.largest
         title = f"largest difference in {SYMBOLS[one.quantity]} between {found.first} and {found.second}"
         unit = "of omega_0" if one.quantity == "omega" else UNITS[one.quantity]
         about = f"compare-{one.quantity.replace('_', '-')}", title, largest, unit
         note = f"at t = {time:.6g} s"
-        held.append(observed(*about, note) if held else regression(*about, (0.0, tolerance), note))
-    return tuple(held)
+        findings.append(observed(*about, note) if k else regression(*about, (0.0, tolerance), note))
+    return tuple(findings)

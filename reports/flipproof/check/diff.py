@@ -53,7 +53,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """Two reports with so many findings ``compared`` that both have.
+    """What two reports differ in; ``compared`` counts the findings that both have.
 
     ``premises`` say in what they were made differently and cannot be expected to agree: throw, slices, size of the
     report; ``circumstances`` in what else: versions and machine.

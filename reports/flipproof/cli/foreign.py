@@ -180,7 +180,8 @@ def command_grade(options: argparse.Namespace) -> int:
 
 def command_power(options: argparse.Namespace) -> int:
     """Print a line a mistake; return 1 if one is caught by no check, or the clean solver by any."""
-    from flipproof.foreign.power import CLEAN, MISTAKES, claim_power, detect, matrix_csv
+    from flipproof.foreign.mistakes import MISTAKES
+    from flipproof.foreign.power import CLEAN, claim_power, detect, matrix_csv
     from flipproof.frame.pool import workers
     from flipproof.output.folder import write_text
 

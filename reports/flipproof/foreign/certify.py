@@ -6,6 +6,7 @@ import platform
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from types import MappingProxyType
 from typing import Any, Final
 
 from flipproof.foreign import checks_basic, checks_measured
@@ -21,23 +22,25 @@ FAILED: Final = "failed"
 EXPECTED: Final = "expected failure"
 IDLE: Final = "not applicable"
 
-CHECKS: Final[Mapping[str, Check]] = {
-    "shape": checks_basic.check_shape,
-    "start": checks_basic.check_start,
-    "determinism": checks_basic.check_determinism,
-    "ice": checks_basic.check_ice,
-    "angle": checks_basic.check_angle,
-    "angular-momentum": checks_basic.check_momentum,
-    "restitution": checks_measured.check_restitution,
-    "gravity": checks_basic.check_gravity,
-    "mirror": checks_basic.check_mirror,
-    "moving-frame": checks_basic.check_moving_frame,
-    "order-before-impacts": checks_measured.check_order_before,
-    "order-across-impacts": checks_measured.check_order_across,
-    "precision-floor": checks_measured.check_floor,
-    "published-vectors": checks_basic.check_vectors,
-    "equation": checks_basic.check_equation,
-}
+CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
+    {
+        "shape": checks_basic.check_shape,
+        "start": checks_basic.check_start,
+        "determinism": checks_basic.check_determinism,
+        "ice": checks_basic.check_ice,
+        "angle": checks_basic.check_angle,
+        "angular-momentum": checks_basic.check_momentum,
+        "restitution": checks_measured.check_restitution,
+        "gravity": checks_basic.check_gravity,
+        "mirror": checks_basic.check_mirror,
+        "moving-frame": checks_basic.check_moving_frame,
+        "order-before-impacts": checks_measured.check_order_before,
+        "order-across-impacts": checks_measured.check_order_across,
+        "precision-floor": checks_measured.check_floor,
+        "published-vectors": checks_basic.check_vectors,
+        "equation": checks_basic.check_equation,
+    }
+)
 """Every check by name, in the order in which they are made. A new check is one generator and one line here."""
 
 

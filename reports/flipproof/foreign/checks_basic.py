@@ -186,7 +186,7 @@ def check_vectors(traits: Traits) -> Making:
     vectors = [vector for vector in load_all() if vector.scheme == traits.equation]
     if not vectors:
         raise NotApplicableError("no published program is claimed")
-    answers = yield [_ask(vector, traits) for vector in vectors]
+    answers = yield [ask_of_vector(vector, traits) for vector in vectors]
     worst, where = 0.0, ""
     for vector, answer in zip(vectors, answers, strict=True):
         for column in ("theta", "omega"):
@@ -205,7 +205,7 @@ def check_vectors(traits: Traits) -> Making:
     )
 
 
-def _ask(vector: Vector, traits: Traits) -> Ask:
+def ask_of_vector(vector: Vector, traits: Traits) -> Ask:
     """Return the ask for a published run, up to where its numbers are held to; the program takes its own steps."""
     times = np.linspace(0.0, vector.scenario.duration, vector.steps)
     times = times[times <= vector.until]

@@ -15,7 +15,7 @@ from flipproof.foreign.contract import Answer, Ask, Traits
 from slicemodel import Scenario
 
 LEVELS: Final = (0, 1, 2, 3)
-WIDTH: Final = 0.3
+ORDER_ROOM: Final = 0.3
 """How far an observed order before impacts may be from the declared one."""
 
 STILL: Final = 0.7
@@ -49,8 +49,8 @@ def check_order_before(traits: Traits) -> Making:
         raise NotApplicableError(f"changes under refinement are round-off, {changes[0]:.2g} of omega_0")
     order = math.log2(clear[-2] / clear[-1])
     return Found(
-        holds=abs(order - declared) <= WIDTH,
-        expected=f"order {declared:g} +- {WIDTH}",
+        holds=abs(order - declared) <= ORDER_ROOM,
+        expected=f"order {declared:g} +- {ORDER_ROOM}",
         came=f"{order:.2f}",
         where=f"0.05 s before any impact, steps of {'13' if declared > 2 else '0.8'} ms and its halves",
         advice="a coefficient of the step, or the instant at which omega, r_CM or J are taken, costs the order",
@@ -155,8 +155,8 @@ def _singles(answer: Answer) -> list[str]:
 
 # ---------------------------------------------------------------------- restitution
 
-ASKED: Final = 0.5
-ADMISSIBLE: Final = 0.02
+RESTITUTION: Final = 0.5
+RESTITUTION_ROOM: Final = 0.02
 """The restitution asked for, and how far a measured one may be from it."""
 
 
@@ -176,7 +176,9 @@ def throw_of(spin: float) -> Scenario:
 
     With omega_0 T = 5 the last slice reaches the cap in every one of them.
     """
-    return replace(Scenario(), n_slices=4, drag=0.0, gravity=0.0, restitution=ASKED, omega0=spin, duration=5.0 / spin)
+    return replace(
+        Scenario(), n_slices=4, drag=0.0, gravity=0.0, restitution=RESTITUTION, omega0=spin, duration=5.0 / spin
+    )
 
 
 def measure(answer: Answer, scenario: Scenario, end: str) -> Rebound | None:
@@ -212,7 +214,7 @@ def measure(answer: Answer, scenario: Scenario, end: str) -> Rebound | None:
 def check_restitution(traits: Traits) -> Making:
     """A slice leaves an end with e times the speed at which it struck, at both ends and at every speed."""
     spins = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # with them first impacts come at 0.05 to 4 m/s
-    answers = yield [_ask(traits, spin) for spin in spins]
+    answers = yield [_ask_of_rebounds(traits, spin) for spin in spins]
     if answers[0].r is None:
         raise NotApplicableError("no r is given")
     curve = [
@@ -223,10 +225,10 @@ def check_restitution(traits: Traits) -> Making:
     ]
     if not curve:
         raise NotApplicableError("no slice reaches an end")
-    facts: dict[str, Any] = {"restitution": [(r.end, r.speed, r.restitution) for r in curve], "asked": ASKED}
-    wrong = [r for r in curve if not abs(r.restitution - ASKED) <= ADMISSIBLE]
-    worst = max(wrong or curve, key=lambda r: abs(r.restitution - ASKED))
-    expected, came, advice = f"e = {ASKED} within {ADMISSIBLE}", f"e = {worst.restitution:.4f}", ""
+    facts: dict[str, Any] = {"restitution": [(r.end, r.speed, r.restitution) for r in curve], "asked": RESTITUTION}
+    wrong = [r for r in curve if not abs(r.restitution - RESTITUTION) <= RESTITUTION_ROOM]
+    worst = max(wrong or curve, key=lambda r: abs(r.restitution - RESTITUTION))
+    expected, came, advice = f"e = {RESTITUTION} within {RESTITUTION_ROOM}", f"e = {worst.restitution:.4f}", ""
     if not wrong:
         speeds = [r.speed for r in curve]
         came += f" where it is farthest off, at {min(speeds):.2g} to {max(speeds):.2g} m/s"
@@ -244,7 +246,7 @@ def check_restitution(traits: Traits) -> Making:
     return Found(holds=not wrong, expected=expected, came=came, where=where, advice=advice, facts=facts)
 
 
-def _ask(traits: Traits, spin: float) -> Ask:
+def _ask_of_rebounds(traits: Traits, spin: float) -> Ask:
     return ask_of(traits, throw_of(spin), 2, 2401)
 
 
@@ -254,17 +256,17 @@ def _threshold(
     """Return speeds [m/s] between which rebounds begin, if slow impacts have none and fast ones the right one."""
     for end in ("cap", "base"):
         here = sorted((r for r in curve if r.end == end), key=lambda r: r.speed)
-        dead = [r for r in here if abs(r.restitution) < ASKED / 4]
-        live = [r for r in here if abs(r.restitution - ASKED) <= 4 * ADMISSIBLE]
+        dead = [r for r in here if abs(r.restitution) < RESTITUTION / 4]
+        live = [r for r in here if abs(r.restitution - RESTITUTION) <= 4 * RESTITUTION_ROOM]
         if not dead or not live or dead[-1].speed > live[0].speed or len(dead) + len(live) < len(here):
             continue
         low, high = dead[-1], live[0]
         for _ in range(5):
             spin = float(np.sqrt(low.spin * high.spin))
-            (answer,) = yield [_ask(traits, spin)]
+            (answer,) = yield [_ask_of_rebounds(traits, spin)]
             found = measure(answer, throw_of(spin), end)
             if found is None:
                 break
-            low, high = (found, high) if abs(found.restitution) < ASKED / 4 else (low, found)
+            low, high = (found, high) if abs(found.restitution) < RESTITUTION / 4 else (low, found)
         return low.speed, high.speed
     return None

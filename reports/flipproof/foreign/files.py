@@ -150,7 +150,10 @@ INDEX: Final = "kit.json"
 
 
 class Kit(Runner):
-    """A folder with an ``INDEX`` of asks and answers as a runner, which adds asks; no kit raises a ValueError."""
+    """A folder of asks and answers as a runner, which adds asks that are not there yet.
+
+    A folder that is no kit raises a ValueError.
+    """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

@@ -62,7 +62,10 @@ class Isolated(Runner):
         return self._start()
 
     def __call__(self, ask: Ask) -> Answer:
-        """Return the checked answer, or raise ForeignError: what it raised or returned, how it ended, or its delay."""
+        """Return the checked answer.
+
+        ForeignError says what the solver raised or returned instead, how its process ended, or that its time was up.
+        """
         traits = self.traits
         if self._late >= PATIENCE:
             raise ForeignError(f"not asked: {PATIENCE} runs in a row gave no answer in time")

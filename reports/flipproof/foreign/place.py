@@ -1,9 +1,13 @@
-"""Which equation a solver solves: the nearest of the 64 of the ladder, how near, and what else it might be.
+"""Which equation a solver solves, the nearest of the 64 of the ladder, and why two solvers differ.
 
 Three short throws are asked for, chosen so that all equations that differ at all differ by 0.029 of omega_0 or more in
 omega(t) on at least one of them; each is judged by what the solver's own answers still change there. Of the 64 sets of
 switches 40 are different equations: without signs nothing drags, and where the tube moves the drag acts on it, so that
 "drag_on_centre" has no effect there.
+
+The difference of two solvers is split over the switches in which their equations differ: each switch gets the mean of
+what it changes over all orders of turning these switches (the Shapley value). What no switch explains is the rest: the
+solvers' own errors, and what is no choice of the ladder.
 """
 
 from __future__ import annotations
@@ -197,6 +201,9 @@ def _room(change: float | None, following: float, epsilon: float) -> float:
     return max(2e-4, 64 * epsilon) + (following / 5 if change is None else SURE * change)
 
 
+# ---------------------------------------------------------------------- why two solvers differ
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Explanation:
     """The difference of two solvers in the plateau, mean of omega/omega_0 over the second half of the flight.
@@ -234,7 +241,10 @@ class Explanation:
 
 
 def explain(one: Runner, other: Runner, throw: Scenario) -> Explanation:
-    """Place two solvers, throw the bottle with both, and split their difference; no answer raises ForeignError."""
+    """Place two solvers, throw the bottle with both, and split their difference.
+
+    Raises ForeignError if one of them gives no answer.
+    """
     first, second = place(one), place(other)
     a, b = (runner(ask_of(runner.traits, throw, 3, 1000)) for runner in (one, other))
     values = plateau(a.t, a.omega, throw.omega0), plateau(b.t, b.omega, throw.omega0)

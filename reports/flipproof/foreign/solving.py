@@ -1,4 +1,4 @@
-"""Anybody's solver behind the verb of flipproof's own, so that a run of it is a run, and these behind its contract."""
+"""Anybody's solver behind the verb ``solve``, and flipproof's own solvers behind the contract of a foreign one."""
 
 from __future__ import annotations
 
@@ -89,7 +89,10 @@ class Own(Runner):
 
 
 def _grid_of(ask: Ask) -> tuple[int, int]:
-    """Return steps between asked times, and points of the grid, for ``effort`` steps or more; times must be uniform."""
+    """Return steps between asked times, and points of the grid, for ``effort`` steps or more.
+
+    Times that are off a uniform grid by more than 1e-9 of the duration raise AnswerError.
+    """
     points, duration = len(ask.times), ask.scenario.duration
     uniform = np.linspace(0.0, duration, points)
     if points < 2 or float(np.max(np.abs(ask.times - uniform))) > 1e-9 * duration:

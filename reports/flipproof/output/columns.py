@@ -20,7 +20,7 @@ Curves = Mapping[str, tuple[FloatArray, FloatArray]]
 
 
 def rows_csv(header: Sequence[str], rows: Iterable[Sequence[Any]], digits: int | None = 9) -> str:
-    """Return rows as CSV, of numbers so many significant ``digits``, or all; None and NaN are empty cells.
+    """Return rows as CSV, numbers with ``digits`` significant digits (None: all); None and NaN are empty cells.
 
     The header of a column of numbers ends in its unit, as in "dt [s]".
     """

@@ -178,7 +178,10 @@ def numbers(name: str) -> tuple[float, ...]:
 
 
 def paper_throw(filling: float = 0.5) -> Scenario:
-    """Return the throw of Fig. 7 at a filling M_w / M_max in (0, 1], else a ScenarioError: 1 g slices, settled drag."""
+    """Return the throw of Fig. 7 at a filling M_w / M_max in (0, 1]: slices of 1 g, settled drag and rebound.
+
+    A filling that no bottle can have raises ScenarioError.
+    """
     bottle = Bottle(
         length=number("length"), radius=number("radius"), mass=number("bottle-mass"), capacity=number("capacity")
     )

@@ -171,11 +171,15 @@ def _kept(made: Made, planned: Planned) -> Made:
 # ---------------------------------------------------------------------- what statements need beside the figures
 
 
-MANY_STEPS_KEY: Final = f"filling {{:g}}, P {MANY_STEPS}"
+MANY_STEPS_KEY: Final = "filling {:g}, P " + str(MANY_STEPS)
+"""Key of the published program's flight with ``MANY_STEPS`` steps, at a filling."""
+
 SAME_STEPS_KEY: Final = "filling {:g}, exact-step"
+"""Key of the flight by the exact step of Eq. 8 with as many steps as the paper makes, at a filling."""
+
+FINEST: Final = 200
 FINEST_KEY: Final = "slices finest{}"
-"""Keys, at a filling or one of ``DAMPINGS``, of the flights with ``MANY_STEPS`` steps, by the exact step of Eq. 8 at
-the paper's number of time steps, and event by event with the most slices, 200."""
+"""Most slices that are flown event by event, and the key of that flight, at one of ``DAMPINGS``."""
 
 
 def plan_claims() -> list[Planned]:
@@ -205,7 +209,7 @@ def plan_further() -> Iterator[Planned]:
     for damping in DAMPINGS:
         many = next(case for case in family(f"slices{damping}") if case.value == MANY_SLICES)
         for solver in SOLVERS[1:]:
-            yield _planned(solver, FINEST_KEY.format(damping), many.scenario.with_slices(200))
+            yield _planned(solver, FINEST_KEY.format(damping), many.scenario.with_slices(FINEST))
     for filling in numbers("figure-S1-filling"):
         key = MANY_STEPS_KEY.format(filling)
         yield _planned(PUBLISHED, key, paper_throw(filling), steps=MANY_STEPS, store="summary")
@@ -225,7 +229,10 @@ def plan_halved() -> Iterator[Planned]:
 
 
 def plan_published(half: Half) -> Iterator[Planned]:
-    """Yield the published program's flights with half its "slices" or "steps", with slices only where they are read."""
+    """Yield the published program's flights with half its "slices" or "steps".
+
+    Places of slices are stored only where a statement reads them.
+    """
     rebounds, slices = ([f"{name}{damping}" for damping in DAMPINGS] for name in ("beta", "slices"))
     whole = {case.key for name in ("long", "drag", *rebounds) for case in family(name)}
     families = HALVED if half == "slices" else (*HALVED, *rebounds, *slices)
@@ -237,6 +244,9 @@ def plan_published(half: Half) -> Iterator[Planned]:
         store = "full" if key in whole else "summary"
         planned = _planned(PUBLISHED, key, scenario, half, steps=steps, store=store)
         yield replace(planned, thin=thin, grouped=True)
+
+
+# ---------------------------------------------------------------------- what runs cost on this machine at this moment
 
 
 @dataclass(frozen=True, slots=True)

@@ -339,7 +339,8 @@ def judge(statement: Statement, flights: Flights) -> Judgement:
 def judge_sense(read: Read, flights: Flights) -> Judgement:
     """Return the judgement of one equation in one sense of the text.
 
-    The band of a number is that of its tolerances, and what half the slices and what half the steps change.
+    The band of a number is that of its reading, of a share of omega_0 that of its tolerances besides, and what half the
+    slices and what half the steps change.
     """
     flights = replace(flights, seen={})
     own = BANDS.get(flights.solver, 0.0)

@@ -10,7 +10,8 @@ import pytest
 from flipproof.foreign import checks_measured
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, certify, findings_of
 from flipproof.foreign.contract import Ask
-from flipproof.foreign.power import CLEAN, MISTAKES, Caught, InProcess, claim_power, matrix_csv
+from flipproof.foreign.mistakes import MISTAKES
+from flipproof.foreign.power import CLEAN, Caught, InProcess, claim_power, matrix_csv
 from flipproof.foreign.specs import load, opened
 from flipproof.foreign.subject import Subject
 from flipproof.frame.solvers import solve

@@ -11,7 +11,7 @@ import pytest
 
 from flipproof.chapters.vectors.published import load_all
 from flipproof.foreign.certify import FAILED, IDLE, PASSED, certify
-from flipproof.foreign.checks_basic import _ask
+from flipproof.foreign.checks_basic import ask_of_vector
 from flipproof.foreign.contract import Ask, Traits
 from flipproof.foreign.files import Kit
 from flipproof.foreign.specs import opened
@@ -122,6 +122,6 @@ def test_published_vectors_are_asked_for_as_far_as_they_are_held_to():
     vector = next(vector for vector in load_all() if vector.name == "matlab_default")
     assert vector.until < vector.scenario.duration
     for refined_by, effort in (("dt", vector.columns["t"][1]), ("steps", 199.0)):
-        ask = _ask(vector, Traits(name="x", refined_by=refined_by))
+        ask = ask_of_vector(vector, Traits(name="x", refined_by=refined_by))
         assert ask.times[-1] == ask.scenario.duration <= vector.until < ask.times[-1] + ask.times[1]
         assert ask.effort == pytest.approx(effort, rel=1e-12, abs=0.0)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from flipproof.chapters.solvers import LIMITS
+from flipproof.foreign.mistakes import MISTAKES
 from flipproof.foreign.place import explain, lattice, name_of, place, shares, switches_of
-from flipproof.foreign.power import MISTAKES, InProcess
+from flipproof.foreign.power import InProcess
 from flipproof.foreign.specs import ForeignError, opened
 from flipproof.frame.solvers import catalogue
 from ode_reference.switches import Switches
