@@ -10,9 +10,10 @@ from flipproof.chapters import chapters_named
 from flipproof.chapters.maps.study import read_flight, study_readings
 from flipproof.cli import main as cli
 from flipproof.figures.style import Drawing
+from flipproof.frame.flights import Flights
 from flipproof.frame.gather import Gathered, gather, tell
 from flipproof.frame.pool import Here, make_each
-from flipproof.frame.solvers import Flights, Made, Run
+from flipproof.frame.solvers import Made, Run
 from flipproof.output.provenance import provenance
 from flipproof.output.summary import summarise
 from flipproof.page.render import render

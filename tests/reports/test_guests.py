@@ -31,9 +31,10 @@ from flipproof.foreign import certify as suite
 from flipproof.foreign.contract import Traits
 from flipproof.foreign.specs import content_of, load
 from flipproof.frame.exhibit import drawn
+from flipproof.frame.flights import Call, Flights
 from flipproof.frame.gather import gather, tell
 from flipproof.frame.pool import Here, make_all, workers
-from flipproof.frame.solvers import Call, Flights, Made, Missing, solve
+from flipproof.frame.solvers import Made, Missing, solve
 from flipproof.frame.store import RunStore
 from flipproof.output.summary import summary_text
 from ode_reference.models import MODELS

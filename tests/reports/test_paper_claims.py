@@ -9,8 +9,9 @@ import pytest
 from made_up import trajectory_of
 
 from flipproof.chapters import chapters_named
-from flipproof.frame.solvers import Flights as Answers
-from flipproof.frame.solvers import Made, Missing, Outcome, Run, make
+from flipproof.frame.flights import Flights as Answers
+from flipproof.frame.flights import Outcome
+from flipproof.frame.solvers import Made, Missing, Run, make
 from flipproof.page.templating import environment
 from flipproof.paper import claims_figures_6_7, observe
 from flipproof.paper import claims_figures_8_9 as landing

@@ -24,7 +24,8 @@ from flipproof.chapters.step_size.chapter import (
     study_step_size,
 )
 from flipproof.frame.findings import Finding
-from flipproof.frame.solvers import Flights, Made, Missing, Run
+from flipproof.frame.flights import Flights
+from flipproof.frame.solvers import Made, Missing, Run
 from flipproof.frame.twins import twins
 from slicemodel import Impacts, Scenario, Trajectory
 

@@ -7,7 +7,7 @@ import pytest
 from made_up import study_map, trajectory_of
 
 import ode_reference
-from flipproof.chapters.maps.chapter import _beyond, figure_map
+from flipproof.chapters.maps.chapter import _beyond, claims, figure_map, figures
 from flipproof.chapters.maps.study import (
     COLUMN,
     EXTRA,
@@ -24,6 +24,7 @@ from flipproof.chapters.maps.study import (
 )
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.figures.style import draw
+from flipproof.frame.flights import Outcome
 from flipproof.frame.solvers import Made, Run, make
 from slicemodel import Scenario
 from slicemodel.observables import plateau
@@ -188,6 +189,15 @@ def test_a_lost_run_takes_the_band_with_it_and_no_map():
     assert study.band is None
     assert study.reason.tolist() == [["free-flight: not run", ""], ["", ""]]
     assert draw(figure_map(study)).svg.startswith("<?xml")
+
+
+def test_a_map_that_cannot_be_made_costs_no_other():
+    runs = plan_map(THROW, "gamma", FILLS, (0.1, 0.2))
+    there = study_map(THROW, "gamma", FILLS, (0.1, 0.2), {run: flat(run, 0.5) for run in runs})
+    found = {"gamma": Outcome(there), "step": Outcome(None, "no memory")}
+    (absent,) = claims(found)
+    assert (absent.id, absent.reason) == ("map-step", "no memory")
+    assert [exhibit.name for exhibit in figures(found)] == ["map-gamma"]
 
 
 @pytest.mark.parametrize("axis", ["gamma", "step", "restitution"])

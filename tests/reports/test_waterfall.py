@@ -20,7 +20,8 @@ from flipproof.chapters.waterfall.study import (
     split_all,
 )
 from flipproof.frame import twins
-from flipproof.frame.solvers import Flights, Made, Missing, make
+from flipproof.frame.flights import Flights
+from flipproof.frame.solvers import Made, Missing, make
 from ode_reference.switches import Switches
 from slicemodel import Scenario, Trajectory
 

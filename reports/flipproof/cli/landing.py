@@ -111,7 +111,7 @@ def command_land(options: argparse.Namespace) -> int:
 
 def _film(options: argparse.Namespace, rows: Any, table: Any) -> None:
     from flipproof.animate import MOST_FRAMES, FilmError, check_pace, write_pictures
-    from flipproof.landing.throw import draw_landing, film_times, shown
+    from flipproof.landing.film import draw_landing, film_times, shown
     from flipproof.landing.work import REFERENCE
 
     check_pace(options.slow, options.fps)

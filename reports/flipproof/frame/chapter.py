@@ -17,7 +17,8 @@ from typing import Any, Generic, Literal, TypeVar
 
 from flipproof.frame.exhibit import Exhibit, Touch
 from flipproof.frame.findings import Finding, Kind, observed, regression
-from flipproof.frame.solvers import REFERENCE, Call, Flights, Made, Missing, Outcome, Run, attempt, known
+from flipproof.frame.flights import Call, Flights, Outcome, attempt, known
+from flipproof.frame.solvers import REFERENCE, Made, Missing, Run
 from slicemodel import Scenario
 
 __all__ = [

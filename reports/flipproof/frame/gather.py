@@ -12,8 +12,9 @@ from typing import Any
 from flipproof.frame.chapter import Absent, Ask, Chapter, Part
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding
+from flipproof.frame.flights import Call, Flights, Outcome, attempt
 from flipproof.frame.pool import Progress, make_all
-from flipproof.frame.solvers import Call, Flights, Outcome, Run, attempt
+from flipproof.frame.solvers import Run
 from flipproof.frame.store import RunStore
 
 

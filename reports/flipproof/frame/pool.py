@@ -7,8 +7,9 @@ from concurrent.futures import Executor, Future, as_completed, wait
 from contextlib import AbstractContextManager
 from typing import Any
 
+from flipproof.frame.flights import Call, Outcome, attempt
 from flipproof.frame.processes import WorkerDiedError, processes
-from flipproof.frame.solvers import Call, Made, Outcome, Run, attempt, find, make
+from flipproof.frame.solvers import Made, Run, find, make
 from flipproof.frame.store import RunStore
 from slicemodel import Scenario
 

@@ -1,5 +1,7 @@
 """Which throws a study makes: aimed at a landing upright, scattered each by its own seed, and numbered as a sweep does.
 
+Of the throws of a case a share ends upright; the interval of that share is Wilson's.
+
 Family A throws at the omega_0 given and solves for the height of the table; family B keeps the time of flight and
 solves for omega_0. Between release and touch nothing but its water decides how far a bottle turns: its
 flight has no table and no scatter.

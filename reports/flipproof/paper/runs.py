@@ -12,7 +12,8 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from flipproof.frame.solvers import Call, Flights, Made, Run, make, solve
+from flipproof.frame.flights import Call, Flights
+from flipproof.frame.solvers import Made, Run, make, solve
 from flipproof.paper import observe
 from flipproof.paper.cases import Case, all_cases, family, numbers, paper_steps, paper_throw
 from slicemodel import Scenario, Trajectory

@@ -9,8 +9,9 @@ from made_up import Answers
 from flipproof.build import ask_of
 from flipproof.frame.chapter import Chapter, Part, judged
 from flipproof.frame.findings import Finding
+from flipproof.frame.flights import Call, attempt
 from flipproof.frame.gather import gather, tell
-from flipproof.frame.solvers import Call, Made, Missing, Run, attempt
+from flipproof.frame.solvers import Made, Missing, Run
 from slicemodel import Scenario, Trajectory
 
 THROW = Scenario(n_slices=2)

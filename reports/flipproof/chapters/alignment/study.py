@@ -35,6 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipproof.chapters.differences.study import first_crossing
+from flipproof.frame.solvers import Missing
 from slicemodel import Impacts, Trajectory
 from slicemodel.trajectory import BASE, FloatArray
 
@@ -177,7 +178,8 @@ def _fast_impacts(run: Trajectory, until: float) -> tuple[Table, int]:
     place of the ``partner`` in the other table, now none, and which come ``after`` a fork, now none.
     """
     impacts = run.impacts
-    assert impacts is not None
+    if impacts is None:
+        raise Missing(f"{run.label} keeps no record of impacts")
     early = impacts.time <= until
     order = np.lexsort((impacts.slice, impacts.time))
     at = order[(early & (impacts.speed_before >= LEAST_SPEED / 2.0))[order]]

@@ -16,7 +16,8 @@ from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, WITNESSES
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Run, Study, Touch, observed
-from flipproof.frame.solvers import Flights, attempt, find, finer, known
+from flipproof.frame.flights import Flights, attempt, known
+from flipproof.frame.solvers import find, finer
 from flipproof.frame.twins import BAND_WORDS, twins
 from flipproof.output.columns import curves_csv
 from ode_reference.models import LADDER

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Finding, Study, judged, regression
-from flipproof.frame.solvers import Made, Outcome, Run, attempt, known
+from flipproof.frame.flights import Outcome, attempt, known
+from flipproof.frame.solvers import Made, Run
 from ode_reference.models import LADDER
 from slicemodel import Trajectory
 

@@ -34,7 +34,8 @@ from flipproof.chapters.predictability.chapter import (
 )
 from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, observed, regression
-from flipproof.frame.solvers import Made, Run, attempt, find
+from flipproof.frame.flights import attempt
+from flipproof.frame.solvers import Made, Run, find
 from flipproof.output.columns import curves_csv
 from slicemodel import Scenario, Trajectory
 from slicemodel.trajectory import FloatArray

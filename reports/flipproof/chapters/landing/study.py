@@ -176,9 +176,9 @@ class Found:
     energies: tuple[Energy, ...]
     unaimed: Mapping[Place, str]
 
-    def along(self, axis: str, kind: Kind, family: str = "") -> list[tuple[float, Cell]]:
-        """Return value and cell along the fillings that were thrown or another axis; of the last family unless told."""
-        wanted = axis, family or self.size.families[-1], kind
+    def along(self, axis: str, kind: Kind, family: str | None = None) -> list[tuple[float, Cell]]:
+        """Return value and cell of every key of an axis, "filling" or one of ``AXES``, of the last family if None."""
+        wanted = axis, self.size.families[-1] if family is None else family, kind
         return [(key.value, cell) for key, cell in self.cells.items() if (key.axis, key.family, key.kind) == wanted]
 
     def cell(self, kind: Kind, filling: float) -> Cell | None:

@@ -30,7 +30,7 @@ from flipproof.chapters.maps.study import (
 )
 from flipproof.chapters.solvers import SCHEMES
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import Ask, Call, Chapter, Exhibit, Study, attempt
+from flipproof.frame.chapter import Absent, Ask, Call, Chapter, Claims, Exhibit, Outcome, Study, attempt, known
 from flipproof.frame.twins import BAND_WORDS
 from flipproof.output.columns import rows_csv
 from slicemodel.scenario import shortened
@@ -53,7 +53,10 @@ CONTOURS: tuple[tuple[float, Literal["--", "-"]], ...] = ((0.01, "--"), (0.1, "-
 """Error of the approximation as a fraction of omega_0, and the line that shows it."""
 
 
-def study(ask: Ask) -> Study[list[ValidityMap]]:
+Maps = Mapping[Axis, Outcome[ValidityMap]]
+
+
+def study(ask: Ask) -> Study[Maps]:
     """Fly every set of assumptions on ``ask.work`` by ``ask.work`` cells of each map, many runs to a call."""
     cut = ask.throw.with_slices(SLICES)
     ends = {axis: map_axes(axis, ask.work, ask.work) for axis in AXES}
@@ -66,18 +69,25 @@ def study(ask: Ask) -> Study[list[ValidityMap]]:
     yield ()
     flights = yield [call for some in calls.values() for call in some]
 
-    maps = []
-    for axis in AXES:
+    def mapped(axis: Axis) -> ValidityMap:
         # Cells of a chunk whose worker died stay "not run".
         answers = [(call.arguments[0], attempt(flights.answer, call).found or ()) for call in calls[axis]]
         readings = {run: reading for chunk, found in answers for run, reading in zip(chunk, found, strict=False)}
-        maps.append(study_readings(cut, axis, *ends[axis], readings, steps=ask.steps))
-    return maps
+        return study_readings(cut, axis, *ends[axis], readings, steps=ask.steps)
+
+    return {axis: attempt(mapped, axis) for axis in AXES}
 
 
-def figures(found: list[ValidityMap]) -> Iterator[Exhibit]:
+def claims(found: Maps) -> Claims:
+    """Yield which map could not be made."""
+    for axis, each in found.items():
+        if each.found is None:
+            yield Absent(f"map-{axis}", f"map over {axis}", each.reason, "observation")
+
+
+def figures(found: Maps) -> Iterator[Exhibit]:
     """Yield every map."""
-    yield from map(_exhibit, found)
+    yield from map(_exhibit, known(found).values())
 
 
 def _exhibit(study: ValidityMap) -> Exhibit:
@@ -282,5 +292,5 @@ def _reasons(study: ValidityMap) -> str:
 
 
 CHAPTER: Final = Chapter(
-    "maps", "For which bottles", study, figures=figures, work={"full": 20}, page=lambda _: {"slices": SLICES}
+    "maps", "For which bottles", study, claims, figures, work={"full": 20}, page=lambda _: {"slices": SLICES}
 )

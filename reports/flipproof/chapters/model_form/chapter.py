@@ -22,7 +22,8 @@ from scipy.stats import f as f_distribution
 
 from flipproof.chapters.step_size.chapter import ROUND_OFF, errors_of, plan_step_size
 from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Study, judged, observed
-from flipproof.frame.solvers import Call, Outcome, Run, attempt, known
+from flipproof.frame.flights import Call, Outcome, attempt, known
+from flipproof.frame.solvers import Run
 from slicemodel.trajectory import FloatArray
 
 Verdict = Literal["step size", "model form", "undecided", "failure"]

@@ -37,7 +37,8 @@ class Overlap:
 
     Parameters
     ----------
-    fills, throw : fill fractions M_w / M_max, and the bottle of the first; restitution is also that between slices
+    fills, throw : fill fractions M_w / M_max, and the throw of the first; its slices and its restitution, also that
+        between slices, are those of all
     level : name -> mean of omega / omega_0 over the second half, for PASS, EXCLUDE, CHECK and COLUMN, which is water as
         one stretching column (``ode_reference.column``); NaN where the run failed
     reason : name -> F strings, "" or why the run cannot be used

@@ -23,7 +23,8 @@ from flipproof.chapters.alignment.study import LEAST_SPEED, count_key, ordinal
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, first_crossing, percent
 from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, judged, observed
-from flipproof.frame.solvers import Outcome, Run, attempt, known
+from flipproof.frame.flights import Outcome, attempt, known
+from flipproof.frame.solvers import Run
 from flipproof.output.columns import curves_csv
 from slicemodel import Impacts, Scenario, Trajectory
 from slicemodel.trajectory import FloatArray

@@ -16,7 +16,8 @@ import numpy as np
 
 from flipproof.chapters.differences.study import largest_change
 from flipproof.chapters.maps.study import vary
-from flipproof.frame.solvers import Made, Run, attempt
+from flipproof.frame.flights import attempt
+from flipproof.frame.solvers import Made, Run
 from flipproof.frame.twins import twins
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import plateau

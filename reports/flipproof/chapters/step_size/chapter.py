@@ -21,7 +21,8 @@ from matplotlib.ticker import NullFormatter
 from flipproof.chapters.solvers import LIMITS, SCHEMES
 from flipproof.figures.style import MARKERS, STYLES, new_figure, shared_legend, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Kind, Study, judged, observed, regression
-from flipproof.frame.solvers import Flights, Missing, Outcome, Run, attempt, known
+from flipproof.frame.flights import Flights, Outcome, attempt, known
+from flipproof.frame.solvers import Missing, Run
 from flipproof.output.columns import rows_csv
 from slicemodel import Scenario, Trajectory
 from slicemodel.trajectory import FloatArray

@@ -63,9 +63,9 @@ def claim_work_precision(studies: Sequence[WorkPrecision]) -> Iterator[Finding]:
             yield from _price_of_impacts(by_name["smooth"], study)
 
 
-def _pair(study: WorkPrecision, *keys: str) -> Finding:
+def _pair(study: WorkPrecision, first_key: str, second_key: str) -> Finding:
     """Compare two contenders of one equation at the smallest error that both keep."""
-    first, second = (study.curves[key] for key in keys)
+    first, second = study.curves[first_key], study.curves[second_key]
     one, other = first.contender.name, second.contender.name
     id_ = f"work-{one}-{other}".replace(" ", "-")
     title = f"steps of {one} for one of {other}, at equal error against {first.contender.equation}"
@@ -131,9 +131,10 @@ def _failures(study: WorkPrecision) -> Iterator[Finding]:
         yield observed("work-failed", title, float(sum(map(len, failed.values()))), note=note)
 
 
-def _price_of_impacts(*studies: WorkPrecision) -> Iterator[Finding]:
+def _price_of_impacts(smooth: WorkPrecision, through: WorkPrecision) -> Iterator[Finding]:
     """Say what impacts cost a method: updates per second of flight to one error, before the first and through all."""
     for equation in ("eq8", "free-flight"):
+        studies = smooth, through
         prices = [study.curves[f"DOP853 on {equation}"].price(3e-4) for study in studies]
         rates = [p.value / study.case.scenario.duration for p, study in zip(prices, studies, strict=True) if p]
         if len(rates) == 2:

@@ -210,6 +210,9 @@ def left_out(effort: Effort) -> dict[str, str]:
                 f"left to benchmarks/work_precision.py for its time; the size «{effort.name}» asks where most compete"
             )
     for engine in ENGINES.values():
+        for frame in engine.frames:
+            if frame not in EQUATION_OF_FRAME:
+                reasons[f"{engine.name}, frame {frame}"] = "no model states the equation of this frame"
         for contact in engine.contacts:
             if contact != "overlap":
                 reasons[f"{engine.name}, slices = {contact}"] = (
@@ -239,6 +242,8 @@ def _engines(case: Case, effort: Effort) -> Iterator[Contender]:
     duration = case.scenario.duration
     for engine in ENGINES.values():
         for frame in engine.frames:
+            if frame not in EQUATION_OF_FRAME:
+                continue
             # Iterations by rule, where the engine's world iterates; they depend on the throw, not on dt.
             iterations = ITERATIONS if frame == "rotating" else enough_iterations(case.scenario)
             yield Contender(

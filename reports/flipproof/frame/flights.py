@@ -1,0 +1,88 @@
+"""What became of runs and calls, and studies that may find nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from flipproof.frame.solvers import Made, Missing, Run
+from slicemodel import Trajectory
+
+T = TypeVar("T")
+Key = TypeVar("Key", bound=Hashable)
+
+
+@dataclass(frozen=True, eq=False)
+class Call:
+    """A call that a worker makes for a study: a function of a module, and what it is called with.
+
+    ``timed`` says that it measures time: then its answer is of this report alone.
+    """
+
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...] = ()
+    label: str = ""
+    timed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome(Generic[T]):
+    """What was found, or the reason why nothing was."""
+
+    found: T | None
+    reason: str = ""
+
+    @property
+    def value(self) -> T:
+        """What was found; raises Missing with the reason if nothing was."""
+        if self.reason or self.found is None:
+            raise Missing(self.reason or "nothing was found")
+        return self.found
+
+
+class Flights(dict[Run, Made]):
+    """What became of runs and calls, by the run or call itself. ``flights[run]`` raises Missing if it was not made."""
+
+    def __init__(self, made: Mapping[Run, Made], called: Mapping[Call, Outcome[Any]] | None = None) -> None:
+        super().__init__(made)
+        self._called = dict(called or {})
+
+    def __missing__(self, run: Run) -> Made:
+        raise Missing(f"{run.name}: it was not run")
+
+    def answer(self, call: Call) -> Any:
+        """Return what a call returned; raises Missing if it failed."""
+        return self._called[call].value
+
+    def trajectory(self, run: Run) -> Trajectory | None:
+        """Return the trajectory of a run, or None if there is none."""
+        return self[run].trajectory if run in self else None
+
+    def trajectories(self, runs: Mapping[Key, Run]) -> dict[Key, Trajectory]:
+        """Return the trajectories of those of some runs that have one."""
+        return {key: flown for key, run in runs.items() if (flown := self.trajectory(run)) is not None}
+
+    def levels(self, runs: Iterable[Iterable[Run]]) -> list[list[Trajectory]]:
+        """Return the flights of levels of runs; raises Missing if one was not made."""
+        return [[self[run].flight for run in level] for level in runs]
+
+    def add(self, made: Mapping[Run, Made], called: Mapping[Call, Outcome[Any]]) -> None:
+        """Add what became of another wave."""
+        self.update(made)
+        self._called.update(called)
+
+
+def known(outcomes: Mapping[Key, Outcome[T]]) -> dict[Key, T]:
+    """Return what was found, without those for whom nothing was."""
+    return {key: each.found for key, each in outcomes.items() if each.found is not None}
+
+
+def attempt(study: Callable[..., T], *about: Any) -> Outcome[T]:
+    """Return what a study of these arguments found, or the reason why it found nothing."""
+    try:
+        return Outcome(study(*about))
+    except Missing as why:
+        return Outcome(None, str(why))
+    except (ArithmeticError, ValueError, LookupError) as error:
+        return Outcome(None, f"{type(error).__name__}: {error}")
