@@ -68,8 +68,9 @@ def inertia_about(frame, n, first, second, offset):
 
 @kept_on_disk(Path(schemes_form.__file__))
 def fly(form, constants, frame, y, t, record, rebounds) -> Run:
-    """Advance the slices, at rest at ``y`` from the middle, over the uniform grid ``t``; write to ``record``.
+    """Advance the slices, at rest at ``y`` from the middle, over the uniform grid ``t`` from 0; write to ``record``.
 
+    ``y`` is overwritten. The first row of r and v is the caller's to write.
     All rebounds are counted. ``rebounds``, shape (K, 4) with K >= 1, lists them if they are K at most.
     """
     theta, omega, r_cm, inertia = record.rows[0], record.rows[1], record.rows[2], record.rows[3]

@@ -50,11 +50,11 @@ class Step(NamedTuple):
 def step(form, constants, one, watched, many, trial, log, count):
     """Move the watched slices by one step; return sums of y, y^2 and v, and the count of rebounds with those listed.
 
-    A trial only predicts what the sums would be, right to second order: it moves and lists nothing.
+    A trial only predicts what the sums would be, inside the step to second order: it moves and lists nothing.
     """
     i, y, v, y_new, v_new = watched
     # The greatest distance from the middle at which a slice does not rebound: strict compares with >, else with >=.
-    limit = one.reach if form.strict else np.nextafter(one.reach, 0.0)
+    limit = one.reach if form.strict and not form.in_step else np.nextafter(one.reach, 0.0)
     past = 0
     for j in range(many):
         y_new[j], v_new[j] = moved(one.way, y[j], v[j])
@@ -68,7 +68,8 @@ def step(form, constants, one, watched, many, trial, log, count):
                 excess = max(abs(y_new[j]) - one.reach, 0.0)
                 y_new[j] -= math.copysign((1.0 + constants.restitution) * excess, y_new[j])
             elif trial:
-                y_new[j] = y[j]
+                if form.in_step or form.keeps_position:
+                    y_new[j] = y[j]
             elif form.in_step:
                 y_new[j], v_new[j], count = bounced(form, constants, one, watched, j, log, count)
             else:

@@ -13,6 +13,7 @@ import slicemodel
 from flipproof.chapters.alignment.chapter import even_rows, figure_gantt
 from flipproof.chapters.alignment.study import count_key, ordinal, rest_intervals, study_alignment
 from flipproof.figures.style import draw
+from flipproof.frame.solvers import Missing
 from slicemodel import Impacts, Scenario, Trajectory
 
 BASE, CAP = 1, -1
@@ -129,6 +130,12 @@ def test_impacts_past_the_shorter_run_and_at_its_very_end_are_no_disagreement():
     aligned = study_alignment(longer, flight(*USUAL[:4], until=0.4))
     assert aligned.until == 0.4
     assert (aligned.undecided, len(aligned.missing), len(aligned.matched)) == (2, 0, 4)
+
+
+def test_what_cannot_be_aligned_is_missing():
+    unrecorded = replace(flight(), impacts=None)
+    with pytest.raises(Missing, match="keeps no record of impacts"):
+        study_alignment(flight(), unrecorded)
 
 
 def test_no_impacts_at_all():

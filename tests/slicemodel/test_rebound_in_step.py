@@ -131,6 +131,22 @@ def test_a_predicted_step_knows_its_rebounds_to_second_order_and_moves_nothing(r
     assert errors[1] < 0.3 * errors[0]
 
 
+@pytest.mark.parametrize("keeps_position", [True, False])
+def test_a_step_that_is_predicted_on_the_grid_moves_and_lists_nothing(keeps_position):
+    """It says where the step would leave a slice that is past the base: where it was, or outside."""
+    form = SCHEMES["midpoint"].form._replace(in_step=False, keeps_position=keeps_position)
+    constants = SCHEMES["midpoint"].constants(Scenario())
+    watched = Watched(np.array([0]), np.array([0.0999]), np.array([0.5]), np.empty(1), np.empty(1))
+    one = Step(step_map(form, constants, 10.0, 0.02, 1e-3), 0.1, 10.0, 0.02, 1e-3, 1e-3)
+    log = np.zeros((4, 4))
+    first, second, _, count = step(form, constants, one, watched, 1, True, log, 0)
+    assert (watched.y[0], watched.v[0], count, log.any()) == (0.0999, 0.5, 0, False)
+    made = step(form, constants, one, watched, 1, False, log, 0)
+    assert made[3] == 1
+    assert (first, second) == made[:2]
+    assert (first == 0.0999) == keeps_position
+
+
 @pytest.mark.parametrize("scheme", IN_STEP)
 @pytest.mark.parametrize("slices", [5, 6, 8, 10, 50])
 def test_a_slice_that_is_put_on_the_cap_does_not_strike_it(scheme, slices):

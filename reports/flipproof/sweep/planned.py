@@ -160,7 +160,8 @@ def map_csv(study: ValidityMap) -> str:
         "largest fair share": np.array([*RUNGS, ""])[study.dominant],  # -1 where there is none
         "reason": study.reason,
     }
-    return rows_csv(list(columns), zip(*(cells.flat for cells in columns.values()), strict=True), digits=None)
+    known = [np.where(np.isfinite(c), c, np.nan) if c.dtype.kind == "f" else c for c in columns.values()]
+    return rows_csv(list(columns), zip(*(cells.flat for cells in known), strict=True), digits=None)
 
 
 def map_facts(study: ValidityMap, throw: Scenario) -> dict[str, Any]:

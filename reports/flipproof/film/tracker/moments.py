@@ -74,7 +74,8 @@ def find_flight(
     Parameters
     ----------
     release, landing : [s] - given by the user instead of found; outside the record or with few frames: ValueError
-    table_height : y of the table in the unit of the tracks; the landing is when the base comes down to it, if it does
+    table_height : y of the table in the unit of the tracks; the landing is when the base comes down to it, and a base
+        that never does is a ValueError
     gravity : in the unit of the tracks per s^2 if that is known, which tells flight from a hand more sharply
     """
     for name, given in (("release", release), ("landing", landing)):
