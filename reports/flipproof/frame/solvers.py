@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib import import_module
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 import numpy as np
 
 from slicemodel import Scenario, Trajectory
 from slicemodel.scenario import unknown_name
-
-T = TypeVar("T")
-Key = TypeVar("Key", bound=Hashable)
 
 FOREIGN = "flipproof.foreign.solving"
 """The module whose ``solve`` takes the spec of somebody else's solver."""
@@ -55,7 +52,7 @@ def find(name: str) -> Solver:
     """Return the solver of that name; "switches:110000" and its like are combinations of the ladder's rungs.
 
     Other names with a colon, and entry points, are specs of somebody else's solver (``flipproof.foreign.specs``).
-    Without any of that name a ValueError names the nearest.
+    A name that no solver has raises a ValueError, which names the nearest.
     """
     from ode_reference.switches import Switches, are_switches
 
