@@ -15,6 +15,7 @@ from typing import Any, TypeVar, cast
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, LogFormatterMathtext
@@ -107,7 +108,7 @@ def draw(figure: Figure, png: bool = True) -> Drawing:
     for text in figure.findobj(Text):
         text.set_text(_written(text.get_text()))
     lines, points = BytesIO(), BytesIO()
-    figure.savefig(lines, format="svg", metadata={"Date": None})
+    FigureCanvasSVG(figure).print_svg(lines, metadata={"Date": None})  # savefig would draw twice, once for the layout
     figure.set_layout_engine("none")  # laid out by now; to do it again for the second format costs as much as drawing
     if png:
         figure.savefig(points, format="png", dpi=100)

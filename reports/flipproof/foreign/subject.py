@@ -46,8 +46,16 @@ class Subject:
         self.frozen = s.frozen
         self.ask = ask
         self.impacts = 0
-        self.side: IntArray = np.zeros(self.n, dtype=np.int64)
+        self.hold(np.zeros(self.n, dtype=np.int64))
         self.momentum = self.inertia(np.array(ask.start)) * s.omega0
+
+    def hold(self, side: IntArray) -> None:
+        """Let slices rest: side 1 on the base, -1 on the cap, 0 free. Masks are made here, not once a slope."""
+        self.side = side
+        self.held = (side != 0).astype(self.kind)
+        self.free = 1 - self.held
+        self.moving = self.free * (not self.frozen)
+        self.body_mass = self.mb + self.m * int(np.count_nonzero(side))
 
     def slice_mass(self, ask: Ask) -> float:
         """Return m [kg]."""
@@ -77,9 +85,7 @@ class Subject:
 
     def body(self, r: FloatArray) -> tuple[float, float]:
         """Return mass [kg] and centre [m] of the tube and what rests in it."""
-        held = self.side != 0
-        mass = self.mb + self.m * int(np.count_nonzero(held))
-        return mass, float((self.mb * self.length / 2 + self.m * (held @ r)) / mass)
+        return self.body_mass, float((self.mb * self.length / 2 + self.m * (self.held @ r)) / self.body_mass)
 
     def drag_on(self, v: FloatArray) -> FloatArray:
         """Return the acceleration of each slice by its own drag [m/s^2]."""
@@ -87,7 +93,7 @@ class Subject:
 
     def drag_of_body(self, v: FloatArray, mass: float) -> float:
         """Return the acceleration of the slices against the body by what drags on it [m/s^2]."""
-        return float(-(self.drag / mass) * ((self.side == 0) @ v))
+        return float(-(self.drag / mass) * (self.free @ v))
 
     def weight(self, _y: FloatArray, _omega: float) -> float:
         """Return the acceleration by weight in the bottle's frame; in free flight there is none [m/s^2]."""
@@ -101,12 +107,11 @@ class Subject:
 
     def slope(self, y: FloatArray) -> FloatArray:
         """Return y'."""
-        free = (self.side == 0) & (not self.frozen)
         omega = self.spin(y)
         rates: FloatArray = np.empty(len(y), self.kind)
         rates[0] = self.turning(omega)
-        rates[1 : self.n + 1] = free * y[self.n + 1 :]
-        rates[self.n + 1 :] = free * self.acceleration(y, omega)
+        rates[1 : self.n + 1] = self.moving * y[self.n + 1 :]
+        rates[self.n + 1 :] = self.moving * self.acceleration(y, omega)
         return rates
 
     def advance(self, y: FloatArray, h: float) -> FloatArray:
@@ -156,8 +161,9 @@ class Subject:
         y[1 + touching] = np.where(sides > 0, self.high, self.low)
         v = self.impulses(y[self.n + 1 :].astype(float), touching, sides)
         slow = touching[np.abs(v[touching]) < self.rest_speed]
-        self.side = np.zeros(self.n, dtype=np.int64)
-        self.side[slow] = contact[slow]
+        side = np.zeros(self.n, dtype=np.int64)
+        side[slow] = contact[slow]
+        self.hold(side)
         ratio = self.m * self.recoil()
         y[self.n + 1 :] = v - ratio * float(v[slow].sum()) / (1 + ratio * len(slow))  # they stop against the tube
         y[self.n + 1 + slow] = 0.0
@@ -165,13 +171,14 @@ class Subject:
 
     def let_go(self, y: FloatArray) -> FloatArray:
         """Release the slices that their end no longer presses, unless it would press them again as soon as they go."""
-        held = self.side.copy()
+        held = self.side
         if held.any():
             omega = self.spin(y)
             going = held * self.acceleration(y, omega) < 0
-            self.side[going] = 0
-            back = going & (held * self.acceleration(y, omega) >= 0)
-            self.side[back] = held[back]
+            if going.any():
+                self.hold(np.where(going, 0, held))
+                back = going & (held * self.acceleration(y, omega) >= 0)
+                self.hold(np.where(going & ~back, 0, held))
         return y
 
     def struck(self, y: FloatArray) -> IntArray:
@@ -205,7 +212,7 @@ class Subject:
         y = self.start(ask)
         if not self.frozen:
             r = y[1 : self.n + 1]
-            self.side = np.where(r >= self.high - 1e-12, 1, np.where(r <= self.low + 1e-12, -1, 0))
+            self.hold(np.where(r >= self.high - 1e-12, 1, np.where(r <= self.low + 1e-12, -1, 0)))
             y = self.let_go(y)
         t, rows, spins = 0.0, [], []
         for when in ask.times:
