@@ -2,19 +2,18 @@
 
 import pytest
 
-
 WIDE, PHONE = (1440, 900), (390, 844)
 
 
 @pytest.mark.parametrize(
     ("size", "scheme", "unfolded"),
-    [(WIDE, "light", False), (WIDE, "light", True), (WIDE, "dark", True), (PHONE, "light", True), (PHONE, "dark", True)],
+    [(WIDE, "light", "false"), *((size, scheme, "true") for size in (WIDE, PHONE) for scheme in ("light", "dark"))],
     ids=["as-it-opens", "wide-light", "wide-dark", "phone-light", "phone-dark"],
 )
 def test_axe_reports_nothing_serious(axe, visit, size, scheme, unfolded):
     """As the page opens, and with everything unfolded; what is seen folded is seen unfolded, too."""
     with visit(size, scheme) as visited:
-        visited.page.evaluate(f"document.querySelectorAll('details').forEach(fold => {{ fold.open ||= {unfolded:d}; }})")
+        visited.page.evaluate(f"document.querySelectorAll('details').forEach(fold => {{ fold.open ||= {unfolded}; }})")
         visited.page.evaluate(axe)
         result = visited.page.evaluate("axe.run(document, {resultTypes: ['violations', 'incomplete']})")
         assert result["passes"]

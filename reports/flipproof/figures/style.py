@@ -108,7 +108,8 @@ def draw(figure: Figure, png: bool = True) -> Drawing:
     for text in figure.findobj(Text):
         text.set_text(_written(text.get_text()))
     lines, points = BytesIO(), BytesIO()
-    FigureCanvasSVG(figure).print_svg(lines, metadata={"Date": None})  # savefig would draw twice, once for the layout
+    canvas: Any = FigureCanvasSVG(figure)  # matplotlib gives its method no types
+    canvas.print_svg(lines, metadata={"Date": None})  # savefig would draw twice, once for the layout
     figure.set_layout_engine("none")  # laid out by now; to do it again for the second format costs as much as drawing
     if png:
         figure.savefig(points, format="png", dpi=100)
