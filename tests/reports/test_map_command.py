@@ -24,7 +24,7 @@ from flipproof.sweep.design import design_of
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.planned import (
     ENDS,
-    Plan,
+    MapPlan,
     design_of_runs,
     map_csv,
     map_facts,
@@ -78,7 +78,7 @@ def same(one, other):
 
 @pytest.mark.parametrize("axis", AXES)
 def test_a_map_from_rows_is_that_of_direct_runs_to_the_last_bit(axis, tmp_path):
-    plan = Plan.of_size(THROW, axis, 3, 2)
+    plan = MapPlan.of_size(THROW, axis, 3, 2)
     made = {r: make(r) for r in plan.runs()}
     direct = study_map(THROW, axis, plan.fills, plan.values, made, points=None)
     assert direct.dominant.shape == (2, 3)
@@ -89,18 +89,18 @@ def test_a_map_from_rows_is_that_of_direct_runs_to_the_last_bit(axis, tmp_path):
 
 def test_a_throw_of_its_own_keeps_all_its_fields(tmp_path):
     throw = Scenario(omega0=-15.0, theta0=0.7, drag=0.3, gravity=3.0, duration=0.2, restitution=0.8).with_slices(2)
-    plan = Plan.of_size(throw, "gamma", 2, 2)
+    plan = MapPlan.of_size(throw, "gamma", 2, 2)
     made = {r: make(r) for r in plan.runs()}
     same(by_hand(plan, tmp_path / "out"), study_map(throw, "gamma", plan.fills, plan.values, made, points=None))
 
 
 def test_a_step_map_runs_every_model_once_per_fill_and_joins_equal_grids():
-    plan = Plan.of_size(THROW, "step", 2, 3)
+    plan = MapPlan.of_size(THROW, "step", 2, 3)
     design = design_of_runs(plan.runs(), plan.varied(), CURVE, "test")
     names = [entry.name for entry in design.entries]
     assert [names.count(model) for model in LADDER[1:]] == [1] * len(RUNGS)
     assert names.count("exact-step") == 3
-    crowded = Plan(throw=THROW, axis="step", fills=(0.5, 1.0), values=(0.1, 0.1000001))
+    crowded = MapPlan(throw=THROW, axis="step", fills=(0.5, 1.0), values=(0.1, 0.1000001))
     design = design_of_runs(crowded.runs(), crowded.varied(), CURVE, "test")
     assert [entry.name for entry in design.entries].count("exact-step") == 1
 
@@ -159,7 +159,7 @@ def test_a_finished_map_is_only_drawn_again(tmp_path, capsys, monkeypatch):
 
 
 def test_table_and_contours_say_what_the_map_holds(tmp_path):
-    plan = Plan.of_size(THROW, "gamma", 3, 3)
+    plan = MapPlan.of_size(THROW, "gamma", 3, 3)
     study = by_hand(plan, tmp_path / "out")
     rows = list(csv.DictReader(map_csv(study).splitlines()))
     assert len(rows) == 9
@@ -188,7 +188,7 @@ def test_table_and_contours_say_what_the_map_holds(tmp_path):
 
 
 def test_a_run_that_is_not_whole_leaves_a_reason_in_its_cell(tmp_path):
-    plan = Plan.of_size(THROW, "gamma", 2, 2)
+    plan = MapPlan.of_size(THROW, "gamma", 2, 2)
     runs = plan.runs()
     design = design_of_runs(runs, plan.varied(), CURVE, "test")
     with Store(tmp_path / "out", design, code_identity()) as store:
@@ -207,8 +207,8 @@ def test_a_run_that_is_not_whole_leaves_a_reason_in_its_cell(tmp_path):
 
 
 def test_a_plan_that_the_design_misses_is_noticed(tmp_path):
-    plan = Plan.of_size(THROW, "gamma", 2, 2)
-    other = Plan.of_size(THROW, "gamma", 2, 3)
+    plan = MapPlan.of_size(THROW, "gamma", 2, 2)
+    other = MapPlan.of_size(THROW, "gamma", 2, 3)
     design = design_of_runs(plan.runs(), plan.varied(), CURVE, "test")
     with Store(tmp_path / "out", design, code_identity()) as store, pytest.raises(KeyError):
         read_runs(store, other.runs())

@@ -55,9 +55,9 @@ def command_sweep(options: argparse.Namespace) -> int:
 def command_map(options: argparse.Namespace) -> int:
     """Make the runs of a map that have no row yet, and draw it."""
     throw = read_scenario(options.scenario, options.slices)
-    from flipproof.sweep.planned import Plan, make_map
+    from flipproof.sweep.planned import MapPlan, make_map
 
-    plan = Plan.of_size(throw, options.axis, *options.size)
+    plan = MapPlan.of_size(throw, options.axis, *options.size)
     return fill(options, lambda begin, where: make_map(plan, options.out, begin, **where))
 
 

@@ -100,7 +100,7 @@ VALUES: Final[Mapping[Axis, str]] = {"gamma": "gamma/omega0", "step": "omega0*dt
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
+class MapPlan:
     """The cells of a map: the throw that they vary, and the values of both axes."""
 
     throw: Scenario
@@ -109,7 +109,7 @@ class Plan:
     values: tuple[float, ...]
 
     @classmethod
-    def of_size(cls, throw: Scenario, axis: Axis, columns: int, rows: int) -> Plan:
+    def of_size(cls, throw: Scenario, axis: Axis, columns: int, rows: int) -> MapPlan:
         """Return the map of that many cells over the whole of its axes."""
         fills, values = map_axes(axis, columns, rows)
         return cls(throw=throw, axis=axis, fills=fills, values=values)
@@ -131,7 +131,7 @@ class Plan:
         return study_readings(self.throw, self.axis, self.fills, self.values, readings, steps=STEPS, points=None)
 
 
-def make_map(plan: Plan, out: Path, begin: Begin, **how: Any) -> str:
+def make_map(plan: MapPlan, out: Path, begin: Begin, **how: Any) -> str:
     """Make every run of the map that has no row in ``out``, as ``fill`` does, and draw it; return its lines."""
     runs = plan.runs()
 
