@@ -19,7 +19,6 @@ from flipproof.paper.cases import FAMILIES, all_cases, family, numbers, paper_th
 from flipproof.paper.observe import Flights
 from flipproof.paper.runs import (
     BANDS,
-    FINEST_KEY,
     HALVES,
     MANY_STEPS_KEY,
     PUBLISHED,
@@ -542,8 +541,6 @@ def test_further_runs_repeat_none_of_the_figures():
             usual = all_cases()[key].scenario
             assert run.scenario.n_slices == usual.n_slices // 2
             assert run.scenario.damping_rate == pytest.approx(usual.damping_rate)
-    for damping in ("", " at 5 /s"):
-        assert ("eq8", FINEST_KEY.format(damping)) in further
     assert further["eq8", SAME_STEPS_KEY.format(0.5)].solver == "exact-step"
     assert ("eq8", SAME_STEPS_KEY.format(0.5)) in halved
 

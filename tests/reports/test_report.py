@@ -225,7 +225,7 @@ def test_a_failed_regression_sets_status_1_and_says_which(monkeypatch, capsys, t
     folder = tmp_path / "latest"
     assert run_report(monkeypatch, gathered, folder) == 1
     out = capsys.readouterr().out
-    assert "FAIL  published-python reproduces the published run python_default" in out
+    assert "FAIL  published-python reproduces the output of the paper's program, python_default" in out
     assert "regression claims fail" in (folder / "index.html").read_text(encoding="utf-8")
 
 

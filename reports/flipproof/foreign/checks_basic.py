@@ -197,7 +197,7 @@ def check_vectors(traits: Traits) -> Making:
                 worst, where = float(off.max()), f"{vector.name}, column {column}"
     return Found(
         holds=worst <= 1e-8,  # flipproof's own schemes keep to 1e-10
-        expected=f"{len(vectors)} printed runs within 1e-08",
+        expected=f"{len(vectors)} runs of the paper's programs within 1e-08",
         came=f"{worst:.2g} off",
         where=where,
         advice="compare step by step with the published program's first rows",

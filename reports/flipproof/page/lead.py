@@ -155,8 +155,9 @@ def _shares(found: Mapping[str, Headline]) -> Iterator[str]:
     shares = [found[id_] for id_ in ("share", "share-2", "share-3") if id_ in found]
     if shares:
         listed = ", ".join(f"“{share.what}” {amount(share)}" for share in shares)
-        low = min(share.low for share in shares if share.low is not None)
-        high = max(share.high for share in shares if share.high is not None)
+        every = [one for one in found.values() if one.measure == "share"]
+        low = min(share.low for share in every if share.low is not None)
+        high = max(share.high for share in every if share.high is not None)
         yield (
             "Six changes lead from the program's equation to free flight. These have the largest fair shares in the "
             f"change of the mean ω of the second half, as the mean over all orders of making them: {listed}."

@@ -162,7 +162,7 @@ def _shares(summary: Summary) -> list[SimpleNamespace]:
 
 
 def _experiment(summary: Summary, id_: str) -> SimpleNamespace | None:
-    shown = degrees if id_ == "landing-angle" else rounded
+    shown = {"landing-angle": degrees, "change-of-behaviour": _shown("{:.3f}")}.get(id_, rounded)
     place = f"paper/experiment/{id_}/equations"
     if summary.at(f"paper/experiment/{id_}") is None:
         return None

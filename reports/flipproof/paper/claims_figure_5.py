@@ -14,7 +14,7 @@ from flipproof.frame.solvers import Missing
 from flipproof.paper import observe
 from flipproof.paper.cases import number, numbers, paper_steps, paper_throw
 from flipproof.paper.observe import FLAT, FLAT_WHY, SUPERIMPOSED, Flights
-from flipproof.paper.runs import FINEST_KEY, MANY_SLICES, MANY_STEPS, MANY_STEPS_KEY, PUBLISHED, SAME_STEPS_KEY
+from flipproof.paper.runs import MANY_SLICES, MANY_STEPS, MANY_STEPS_KEY, PUBLISHED, SAME_STEPS_KEY
 from flipproof.paper.statements import OMEGA, Read, Reading, Statement, at_least, at_most, states
 from slicemodel import Trajectory
 from slicemodel.observables import release_angular_velocity
@@ -203,10 +203,8 @@ def _minimum_shifts(flights: Flights, damping: str = "") -> Iterator[Reading]:
 
 
 def _finest(flights: Flights, damping: str) -> Trajectory:
-    """Return the flight with the most slices: the paper's 500, fewer where the equation is solved through events."""
-    if flights.solver == PUBLISHED:
-        return flights.at("slices" + damping, max(numbers("figure-5d-slices")))
-    return flights.run(FINEST_KEY.format(damping))
+    """Return the flight with the most slices, the paper's 500."""
+    return flights.at("slices" + damping, max(numbers("figure-5d-slices")))
 
 
 # ---------------------------------------------------------------------- cost (Supp. Fig. 1)

@@ -155,9 +155,9 @@ CURVES: Final = {
         RELATIVE,
         ("spin",),
         "what the spin at release ω₀ does",
-        "Without the gravity that Eq. 8 keeps, the spin only sets the pace: in free flight the curves fall one after "
-        "the other, and none rises again. At 5 rad/s the published program's water does not move at all: its α takes "
-        "(α/2m)² off ω², and here the two are equal.",
+        "Without the gravity that Eq. 8 keeps, the spin sets the pace, and γ/ω₀: in free flight the curves fall one "
+        "after the other, and none rises again. At 5 rad/s the published program's water does not move at all: its α "
+        "takes (α/2m)² off ω², and here the two are equal.",
     ),
     "8b": Curves(
         RELATIVE,
@@ -261,8 +261,9 @@ def _exhibits_5a(runs: PaperRuns) -> Iterator[Exhibit]:
             runs, f"5a{suffix}", of, numbers("figure-5-rebound"), slices, "beta",
             f"what the rebound β does to ten slices ({words})",
             "Slice 1 starts on the base, slice 10 on top of the water. Look at the ends: with β = 0 slices stay "
-            "where they hit until something pulls them off. In free flight nothing does; in the other two it is "
-            "gravity, which Eq. 8 keeps.",
+            "where they hit until something pulls them off: in free flight the tube, which the drag of the other "
+            "slices speeds up; in Eq. 8 weight and the drag against the moving centre of mass; in the published "
+            "program weight, or its spring, which turns round where ω falls below α/2m.",
         )  # fmt: skip
 
 

@@ -178,10 +178,6 @@ MANY_STEPS_KEY: Final = "filling {:g}, P " + str(MANY_STEPS)
 SAME_STEPS_KEY: Final = "filling {:g}, exact-step"
 """Key of the flight by the exact step of Eq. 8 with as many steps as the paper makes, at a filling."""
 
-FINEST: Final = 200
-FINEST_KEY: Final = "slices finest{}"
-"""Most slices that are flown event by event, and the key of that flight, at one of ``DAMPINGS``."""
-
 
 def plan_claims() -> list[Planned]:
     """Return the runs of all statements: those that are not grouped, and those of the published program."""
@@ -206,11 +202,7 @@ def _same_steps(filling: float, half: Half = "") -> Planned:
 
 
 def plan_further() -> Iterator[Planned]:
-    """Yield the runs that no figure needs: finer in slices and in time, and without weight."""
-    for damping in DAMPINGS:
-        many = next(case for case in family(f"slices{damping}") if case.value == MANY_SLICES)
-        for solver in SOLVERS[1:]:
-            yield _planned(solver, FINEST_KEY.format(damping), many.scenario.with_slices(FINEST))
+    """Yield the runs that no figure needs: finer in time, and without weight."""
     for filling in numbers("figure-S1-filling"):
         key = MANY_STEPS_KEY.format(filling)
         yield _planned(PUBLISHED, key, paper_throw(filling), steps=MANY_STEPS, store="summary")

@@ -71,7 +71,7 @@ class Ensemble:
     Parameters
     ----------
     size : of the change [rad], and of omega_0 as a fraction; NaN for another order, which has none
-    members : how many flights, the unchanged one included
+    members, slices : how many flights, the unchanged one included, and of how many slices
     t, width : (P,) - times [s] and (largest - smallest omega) / |omega_0|; infinite where a member has ended
     horizon : first time the width exceeds HORIZON_BAND [s]; None: never
     growth : of the width, up to the horizon
@@ -81,6 +81,7 @@ class Ensemble:
     kind: Kind
     size: float
     members: int
+    slices: int
     t: FloatArray
     width: FloatArray
     horizon: float | None
@@ -106,7 +107,7 @@ class Ensemble:
         ended = "" if self.ended is None else f"; a member ends at {self.ended * 1e3:.1f} ms"
         when = f"never beyond {HORIZON_BAND:g}" if left is None else f"beyond {HORIZON_BAND:g} from {left * 1e3:.1f} ms"
         widths = f"width at most {self.largest:.1e} of ω₀, {self.width[-1]:.1e} at the end"
-        return f"{self.what}: {widths}, {when}; {self.growth.words}{ended}"
+        return f"N = {self.slices}, {self.what}: {widths}, {when}; {self.growth.words}{ended}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -202,6 +203,7 @@ def study_ensemble(kind: Kind, size: float, members: Sequence[Trajectory]) -> En
         kind=kind,
         size=size,
         members=len(members),
+        slices=members[0].scenario.n_slices,
         t=t,
         width=width,
         horizon=horizon,
@@ -255,6 +257,7 @@ def figures(found: tuple[Horizon, ...]) -> Iterator[Exhibit]:
     """Yield the widths of the ensembles over time."""
     if not any(study.ensembles for study in found):
         return
+    cuts = " or ".join(sorted({f"N = {each.slices}" for study in found for each in study.ensembles}))
     words = " ".join(study.words for study in found).replace("ω₀", "omega_0").replace("θ₀", "theta_0")
     numbers = []
     for study in found:
@@ -264,9 +267,9 @@ def figures(found: tuple[Horizon, ...]) -> Iterator[Exhibit]:
     yield Exhibit(
         name="horizon",
         title="Up to when an engine's ω(t) means anything",
-        caption="Each curve is the width of an ensemble: how far the ω of flights that should be one flight come "
-        "apart. Top: the flights differ in their arithmetic alone, by the angle of release, which free flight does not "
-        "feel, or by the order in which bodies entered the engine. Bottom: their release differs. Where curves of "
+        caption=f"Each curve is the width of an ensemble at {cuts}: how far the ω of flights that should be one flight "
+        "come apart. Top: the flights differ in their arithmetic alone, by the angle of release, which free flight does "
+        "not feel, or by the order in which bodies entered the engine. Bottom: their release differs. Where curves of "
         "different changes jump to one level, an impact happens in some of the flights and not in the others; "
         "differences in ω below that level mean nothing. "
         f"Widest ensemble: {'; '.join(numbers)}.",

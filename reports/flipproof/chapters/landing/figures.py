@@ -79,7 +79,7 @@ def figures(found: Found) -> list[Exhibit]:
             "landing-axes",
             "What the share depends on",
             f"Share of throws that end upright at filling {size.axis_filling:g}, along each assumption, with the "
-            f"others as they are; {size.axis_throws} throws a point, the same for all points.",
+            f"others as they are; {size.axis_throws} throws a point, the same along an axis. Each axis has its own.",
             "; ".join(
                 f"P(upright) of water along {axis}: "
                 + ", ".join(f"{value:g}: {cell.share.value:.2f}" for value, cell in found.along(axis, "together"))

@@ -161,7 +161,7 @@ class Predictability:
         )
         words = f"{self.solver}: the flight amplifies {each}"
         if self.horizon is None:
-            words += f"; none of these moves ω by {HORIZON_BAND:g} of ω₀, so that the flight is predictable to its end"
+            words += f"; none of these changes moves ω by {HORIZON_BAND:g} of ω₀ up to the end of the flight"
         for size, time in zip(self.sizes, self.horizons, strict=True):
             if time is not None:
                 words += f"; a change by {size:.0e} moves ω by {HORIZON_BAND:g} of ω₀ at {time * 1e3:.1f} ms"

@@ -22,7 +22,7 @@ def study(ask: Ask) -> Study[list[tuple[Vector, Made]]]:
 def claims(found: list[tuple[Vector, Made]]) -> Claims:
     """Yield the largest deviation of each run from what was printed."""
     for vector, made in found:
-        yield judged(claim_vectors, vector, made, id=f"vectors-{vector.name}", title=f"published run {vector.name}")
+        yield judged(claim_vectors, vector, made, id=f"vectors-{vector.name}", title=f"output of the paper's program, {vector.name}")
 
 
 def claim_vectors(vector: Vector, flight: Trajectory) -> Finding:
@@ -31,7 +31,7 @@ def claim_vectors(vector: Vector, flight: Trajectory) -> Finding:
     # The two sides differ by the order of additions and, for MATLAB, by amplified round-off.
     admissible = {"published-python": (0.0, 1e-10), "published-matlab": (0.0, 1e-8)}
     worst = max(off, key=lambda column: math.inf if math.isnan(off[column]) else off[column])
-    title = f"{vector.scheme} reproduces the published run {vector.name}"
+    title = f"{vector.scheme} reproduces the output of the paper's program, {vector.name}"
     note = f"largest in column {worst}, over {len(off)} columns"
     return regression(f"vectors-{vector.name}", title, float(off[worst]), "relative", admissible[vector.scheme], note)
 
