@@ -114,16 +114,17 @@ def solve(
     rests when decides the order of all later impacts. Status "ok" says nothing of that band. With recoil,
     drag and e above 0.9 slices hop on an end and hardly ever rest: there a change of omega0 by 3e-11 of itself moved
     omega by more than 1e-4 omega_0 in 56 of 117 flights, by 5e-2 at the most; a tenth of the rest speed showed it in 11
-    of these. Ask for the band of a flight by a twin, ``solve_batch([throw, twin], model)`` with that change
-    (docs/theory.md, "Rests, and the band they cost"). Where gamma = |omega0| exactly and ``roots`` are off, nothing
-    pushes the water and it stays where it is. A full bottle that no weight pulls along its axis is its own mirror image
-    for ever, by the simultaneous law: all methods hold it to that, since rounding would part the two halves as
-    exp(theta) grows, and the hits of a pair with them. Water a hair short of full does part, after some turns.
-    The other methods add the error of their steps: at their default tolerances they agree with "taylor" to the same
-    band over half a second. An error grows as slices fly apart, and rests end it: with e = 1 and without drag none
-    comes to rest, and Eq. 8 at N = 20 is off by 1e-9 omega_0 after half a second and by 1e-4 omega_0 after three;
-    rtol = 1e-13 leaves 1e-8 omega_0 there. "Radau" has a dense output of order 3 only: at rtol above 1e-8 its
-    rebounds need max_step = 0.02 / |omega0|.
+    of these. Ask for the band of a flight by a twin, ``solve_batch([throw, twin], model)``, with that change of omega0
+    and of bottle.mass: without drag and weight omega0 alone is a unit of time, and the twin follows the same orbit
+    whatever the rounding does to it (docs/theory.md, "Rests, and the band they cost"). Where gamma = |omega0| exactly
+    and ``roots`` are off, nothing pushes the water and it stays where it is. A full bottle that no weight pulls along
+    its axis is its own mirror image for ever, by the simultaneous law: all methods hold it to that, since rounding
+    would part the two halves as exp(theta) grows, and the hits of a pair with them. Water a hair short of full does
+    part, after some turns. The other methods add the error of their steps: at their default tolerances they agree with
+    "taylor" to the same band over half a second. An error grows as slices fly apart, and rests end it: with e = 1 and
+    without drag none comes to rest, and Eq. 8 at N = 20 is off by 1e-9 omega_0 after half a second and by 1e-4 omega_0
+    after three; rtol = 1e-13 leaves 1e-8 omega_0 there. "Radau" has a dense output of order 3 only: at rtol above 1e-8
+    its rebounds need max_step = 0.02 / |omega0|.
     """
     if not isinstance(scenario, Scenario):
         raise ValueError(f"scenario = {scenario!r} is not a slicemodel.Scenario")

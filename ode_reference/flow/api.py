@@ -39,7 +39,7 @@ def fly(
     with np.errstate(all="ignore"):
         flight, places, marks = layout.prepare(scenario, switches, settings)
         now = flight[0]
-        if scenario.frozen or 2 * (scenario.r_max - half) <= layout.TOLERANCE:
+        if scenario.frozen or 2 * (scenario.r_max - half) <= now.tolerance:
             hits = _hold(now, places[layout.PLACE], moments, rows)
             y[:], v[:] = places[layout.PLACE], 0.0
         else:

@@ -86,7 +86,7 @@ def rebase(now, points, marks):
         now.status = WRONSKIAN
     elif not error < ADMISSIBLE:
         now.status = INERTIA
-    elif outermost > now.wall * (1.0 + ADMISSIBLE):
+    elif outermost > now.wall * (1.0 + ADMISSIBLE) + now.tolerance:
         now.status = ESCAPED
 
 

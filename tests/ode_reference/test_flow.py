@@ -170,6 +170,25 @@ def test_where_nothing_pushes_nothing_moves(model, gravity):
     assert np.ptp(found.r, axis=0).max() < 1e-13
 
 
+@pytest.mark.parametrize("missing", [1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12])
+@pytest.mark.parametrize("model", ["eq8", "free-flight"])
+def test_one_slice_in_a_bottle_a_hair_short_of_full_is_inside(model, missing):
+    """Rounding of the bottle's length is more than a billionth of the way that the slice has."""
+    found = solve(Scenario(water_mass=1.0 - missing, n_slices=1, drag=0.0), model)
+    assert found.ok, found.message
+    assert found.omega == pytest.approx(20.0, rel=1e-4, abs=0.0)
+
+
+@pytest.mark.parametrize("length", [1.0, 1e-13, 1e-14])
+def test_a_bottle_of_any_size_flies_alike(length):
+    """Without drag and weight the length is no more than a unit: a tiny bottle is not ice."""
+    bottle = Bottle(length=length, radius=length / 7)
+    scenario = Scenario(bottle=bottle, n_slices=3, drag=0.0, gravity=0.0, omega0=2e12, duration=5e-12)
+    found = solve(scenario, "free-flight", rest_speed=1e-8)
+    assert found.ok, found.message
+    assert found.omega[-1] / 2e12 == pytest.approx(0.20375010, rel=1e-6, abs=0.0)
+
+
 def test_a_release_is_not_undone_by_rounding():
     """k^2 < 0 and a push that passes through zero slowly, on dozens of slices at once."""
     scenario = Scenario(

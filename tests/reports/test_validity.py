@@ -232,9 +232,10 @@ def test_a_real_map_agrees_with_the_reference_and_has_a_band():
 
 
 def twin_levels(fill, damping):
-    """Plateaus of free flight in a cell, released a little faster and with a tenth of the rest speed."""
+    """Plateaus of free flight in a cell, with a little more spin and bottle, and with a tenth of the rest speed."""
     throw, times = vary(THROW, fill=fill, damping=damping), np.linspace(0.0, THROW.duration, POINTS)
-    faster = replace(throw, omega0=throw.omega0 * (1 + 3e-11))
+    bottle = replace(throw.bottle, mass=throw.bottle.mass * (1 + 3e-11))
+    faster = replace(throw, omega0=throw.omega0 * (1 + 3e-11), bottle=bottle)
     for scenario, how in ((faster, {}), (throw, {"rest_speed": 1e-4})):
         run = ode_reference.solve(scenario, "free-flight", times=times, **how)
         yield plateau(run.t, run.omega, scenario.omega0)

@@ -21,9 +21,9 @@ from flipproof.chapters.waterfall.study import (
 )
 from flipproof.frame import twins
 from flipproof.frame.flights import Flights
-from flipproof.frame.solvers import Made, Missing, make
+from flipproof.frame.solvers import Made, Missing, Run, make
 from ode_reference.switches import Switches
-from slicemodel import Scenario, Trajectory
+from slicemodel import Bottle, Scenario, Trajectory
 
 THROW = Scenario(n_slices=1)
 FREE = "free-flight"
@@ -62,10 +62,23 @@ def test_the_plan_names_every_equation_once_and_gives_it_two_twins():
         assert (release, rest) == twins.twins(usual)
         assert usual.settings == release.settings == {}
         assert usual.scenario == rest.scenario
-        assert release.scenario.omega0 / THROW.omega0 - 1 == pytest.approx(twins.CHANGE, rel=1e-4, abs=0.0)
+        for grown, own in ((release.scenario.omega0, THROW.omega0), (release.scenario.bottle.mass, THROW.bottle.mass)):
+            assert grown / own - 1 == pytest.approx(twins.CHANGE, rel=1e-4, abs=0.0)
         own = ode_reference.solve(THROW, usual.solver).settings["rest_speed"]
         assert rest.settings == {"rest_speed": pytest.approx(own / twins.CUT)}
     assert all(canonical(Switches.from_name(run.solver)).name == run.solver for run in runs[1:-1])
+
+
+def test_a_twin_sees_what_the_last_digits_decide_without_drag_too():
+    """Without drag and weight a change of omega_0 alone is one of the unit of time, which no impact feels."""
+    moved = []
+    for n in range(12, 22):
+        throw = Scenario(bottle=Bottle(mass=0.0515), water_mass=0.1488, n_slices=n, drag=0.0, restitution=0.95)
+        release, _ = twins.twins(Run("free-flight", throw))
+        runs = ode_reference.solve_batch([throw, release.scenario], "free-flight", np.linspace(0.0, 0.5, 101))
+        assert runs.status == ("ok", "ok")
+        moved.append(np.abs(runs.omega[1] - runs.omega[0]).max() / throw.omega0)
+    assert min(moved) > 1e-4  # omega_0 alone: 5e-9 to 7e-6
 
 
 def test_independent_assumptions_split_alike_in_every_order():

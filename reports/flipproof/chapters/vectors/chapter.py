@@ -22,7 +22,8 @@ def study(ask: Ask) -> Study[list[tuple[Vector, Made]]]:
 def claims(found: list[tuple[Vector, Made]]) -> Claims:
     """Yield the largest deviation of each run from what was printed."""
     for vector, made in found:
-        yield judged(claim_vectors, vector, made, id=f"vectors-{vector.name}", title=f"output of the paper's program, {vector.name}")
+        title = f"output of the paper's program, {vector.name}"
+        yield judged(claim_vectors, vector, made, id=f"vectors-{vector.name}", title=title)
 
 
 def claim_vectors(vector: Vector, flight: Trajectory) -> Finding:
