@@ -15,7 +15,7 @@ from slicemodel.trajectory import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Vector:
-    """One run of a published program: the throw, the scheme that must reproduce it, what was printed (column -> values)."""
+    """A run of a published program: throw, the scheme that must reproduce it, what was printed (column -> values)."""
 
     name: str
     scenario: Scenario
