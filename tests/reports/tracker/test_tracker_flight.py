@@ -129,6 +129,23 @@ def test_the_table_says_when_the_base_is_there(films):
         find_flight(spin, table_height=-9.0, gravity=G)
 
 
+@pytest.mark.parametrize("above", [0.0, 0.001, 0.02])
+@pytest.mark.parametrize("rise", [0.0, 0.004, 0.025])
+@pytest.mark.parametrize("name", THROWS)
+def test_neither_noise_at_rest_nor_a_bounce_is_the_landing(films, name, rise, above):
+    """The bottle rebounds by ``rise`` and lies still after it, at the height that is given or a little below."""
+    film = films[name]
+    height = float(film.base[-1, 1]) + above
+    expected = film.t[np.flatnonzero(film.base[:, 1] > height + 1e-9)[-1]]
+    since = np.maximum(film.t - film.landing, 0.0)
+    lift = np.zeros_like(film.base)
+    lift[:, 1] = np.maximum((np.sqrt(2.0 * G * rise) - 0.5 * G * since) * since, 0.0)
+    bounced = replace(film, cap=film.cap + lift, base=film.base + lift, centre=film.centre + lift)
+    for seed in range(4):
+        flight = find_flight(spin_of(bounced, 5e-4, seed), table_height=height, gravity=G)
+        assert abs(flight.landing - expected) * 240 <= 1.01, seed
+
+
 def test_a_record_of_flight_alone(films):
     film = films["ice"]
     inside = (film.t >= film.release) & (film.t <= film.landing)

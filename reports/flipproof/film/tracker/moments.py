@@ -93,7 +93,7 @@ def find_flight(
     if landing is not None:
         landing_how = "given"
     elif table_height is not None:
-        last, landing_how = _at_table(spin, first, table_height)
+        last, landing_how = _at_table(spin, first, last, table_height)
         landed = True
     elif landed:
         last, landing_how = _sharpened(spin, first, last)
@@ -276,14 +276,17 @@ def _rate(spin: MeasuredSpin, index: Index) -> float:
     return float(np.polyfit(spin.t[index] - spin.t[index[0]], spin.theta[index], 1)[0])
 
 
-def _at_table(spin: MeasuredSpin, first: int, height: float) -> tuple[int, str]:
-    """Return the last frame before the base comes down to the table."""
+def _at_table(spin: MeasuredSpin, first: int, last: int, height: float) -> tuple[int, str]:
+    """Return the last frame before the base comes down to the table, within noise, nearest to the frame ``last``."""
     y = spin.base[:, 1]
+    _, noise = _noise(spin)
     later = np.flatnonzero(~np.isnan(y) & (np.arange(len(y)) >= first))
-    coming = [k for k, j in pairwise(later) if y[k] > height >= y[j]]
+    level = height + DEVIATIONS * noise
+    coming = [int(k) for k, j in pairwise(later) if y[k] > level >= y[j]]
     if not coming:
         raise ValueError(
             f"table_height = {height:g}: the base never comes down to it; after the release its y is in "
             f"[{np.nanmin(y[later]):.4g}, {np.nanmax(y[later]):.4g}]"
         )
-    return int(coming[-1]), f"the base comes down to the table at y = {height:g}"
+    nearest = min(coming, key=lambda k: abs(k - last))
+    return nearest, f"the base comes down to the table at y = {height:g}"
