@@ -79,6 +79,26 @@ def test_errors_fall_with_effort_on_times_that_all_efforts_share(studied):
     assert 0.0 < guest.band < guest.errors[0]
 
 
+def test_times_printed_with_nine_digits_change_no_error(tmp_path, ladder):
+    shutil.copy(RK4.rpartition(":")[0], tmp_path)
+    (tmp_path / "printed.py").write_text(
+        "import rk4\n\n\nclass Eq8(rk4.Eq8):\n    def solve(self, ask):\n        found = super().solve(ask)\n"
+        "        return {**found, 't': [float(f'{t:.9f}') for t in ask.times]}\n"
+    )
+    visits = [visit(f"{tmp_path / name}:Eq8", THROW, TIMES) for name in ("rk4.py", "printed.py")]
+    exact, printed = study_guests(visits, ladder, {}).guests
+    assert len(exact.errors) == 4
+    assert printed.errors == exact.errors
+    assert printed.band == exact.band
+
+
+def test_a_ladder_that_lacks_a_time_of_a_guest_is_refused(ladder):
+    one = visit(RK4, THROW, TIMES)
+    sparse = {rung: solve(rung, THROW, times=TIMES[:: 2 * SPARSE]) for rung in ladder}
+    with pytest.raises(ValueError, match=r"has 19 of the 38 times of naive RK4; all are needed"):
+        study_guests([replace(one, flight=None, traits=replace(one.traits, equation="eq8"))], sparse, {})
+
+
 def test_findings_have_ids_of_their_own_and_visits_travel(studied):
     twice = replace(studied, guests=(*studied.guests, *studied.guests))
     assert isinstance(twice, Guests)
@@ -119,6 +139,15 @@ def test_a_curve_in_a_file_is_compared_and_not_certified(tmp_path, ladder):
     assert guest.differences["eq8"].largest < 1e-12
     assert guest.visit.problems == {"certificate": "a curve in a file cannot be asked"}
     assert not any(finding.failed for finding in claim_guests(Guests(guests=(guest,))))
+
+
+def test_a_curve_printed_with_fifteen_decimals_agrees_with_its_equation(tmp_path, ladder):
+    file = tmp_path / "curve.csv"
+    run = ladder["eq8"]
+    rows = np.column_stack([run.t, run.theta, run.omega])
+    np.savetxt(file, rows, delimiter=",", header="t,theta,omega", comments="", fmt="%.15f")
+    found = study_guests([visit(f"csv:{file}", THROW, TIMES)], ladder, {})
+    assert found.agreement.pair("curve.csv", "eq8").largest < 1e-12
 
 
 @pytest.mark.parametrize("name", ["raises", "segfaults", "not_a_number", "hangs", "returns_none", "not_a_solver"])

@@ -185,7 +185,8 @@ class Answer:
 def answer_of(ask: Ask, given: object, *, own_times: bool = False) -> Answer:
     """Return a mapping, a Trajectory or any object with the attributes of ``Answer`` as a checked answer.
 
-    With ``own_times`` it was made before it was asked, as a file is: its times need only increase. Raises AnswerError,
+    Times within 1e-6 of the duration of those asked, as a program prints them, are taken for those asked. With
+    ``own_times`` it was made before it was asked, as a file is: its times need only increase. Raises AnswerError,
     naming the field, what came and what is needed.
     """
     if isinstance(given, Trajectory) and not given.ok:
@@ -209,6 +210,8 @@ def answer_of(ask: Ask, given: object, *, own_times: bool = False) -> Answer:
     elif points and float(np.max(np.abs(t - ask.times))) > 1e-6 * ask.scenario.duration:
         k = int(np.argmax(np.abs(t - ask.times)))
         raise AnswerError(f"t[{k}] = {t[k]:.9g} s, asked was {ask.times[k]:.9g} s; answer at the times asked")
+    else:
+        arrays["t"] = ask.times
     if "r" in arrays:
         arrays.setdefault("r_cm", centre_of_mass(ask.scenario, arrays["r"]))
         arrays.setdefault("inertia", moment_of_inertia(ask.scenario, arrays["r"]))

@@ -125,6 +125,18 @@ def test_a_run_that_broke_off_is_no_answer():
         answer_of(Ask.of(Scenario(), broken.t), broken)
 
 
+def test_times_that_are_taken_for_those_asked_are_those_asked():
+    """A program that prints nine digits answers at the times asked; one that answers elsewhere is refused."""
+    ask = Ask.of(THROW, THROW.duration * np.sqrt(np.linspace(0.0, 1.0, 50)))
+    printed = np.array([float(f"{t:.9f}") for t in ask.times])
+    assert (printed != ask.times).sum() > 40
+    curve = {"t": printed, "theta": ask.times, "omega": 1.0 + ask.times}
+    np.testing.assert_array_equal(answer_of(ask, curve).t, ask.times)
+    np.testing.assert_array_equal(answer_of(ask, curve, own_times=True).t, printed)
+    with pytest.raises(AnswerError, match="answer at the times asked"):
+        answer_of(ask, curve | {"t": ask.times + 1.1e-6 * THROW.duration})
+
+
 def test_own_times_must_increase():
     own = {"t": [0.0, 0.1, 0.1], "theta": [0.0] * 3, "omega": [1.0] * 3}
     with pytest.raises(AnswerError, match="t does not increase"):

@@ -268,7 +268,7 @@ def study_guests(
     flown = {guest.label: (guest.run, guest.band) for guest in guests}
     for name, (run, band) in ({name: (run, bands.get(name)) for name, run in others.items()} | flown).items():
         if run is not None and first is not None and _same_times(run, first):
-            runs[name], known[name] = run, band or 0.0
+            runs[name], known[name] = replace(run, t=first.t), band or 0.0
     agreement = study_agreement(runs, known) if guests and len(runs) > 1 else None
     return Guests(guests=tuple(guests), ladder=dict(ladder), agreement=agreement)
 
@@ -302,8 +302,10 @@ def _guest(one: Visit, label: str, slug: str, ladder: Mapping[str, Trajectory], 
 
 
 def _apart(one: Trajectory, other: Trajectory) -> float:
-    """Return the largest difference of omega at the times of both, fraction of omega_0."""
+    """Return the largest difference of omega at the times of ``other``, which ``one`` has too, fraction of omega_0."""
     _, here, there = np.intersect1d(one.t, other.t, assume_unique=True, return_indices=True)
+    if len(there) != len(other.t):
+        raise ValueError(f"{one.label} has {len(there)} of the {len(other.t)} times of {other.label}; all are needed")
     return float(np.max(np.abs(one.omega[here] - other.omega[there])) / abs(one.scenario.omega0))
 
 
