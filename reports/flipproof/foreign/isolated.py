@@ -228,12 +228,15 @@ def _reason(error: BaseException) -> str:
 
 
 def _limit_memory() -> None:
-    """Take at most 8 GiB of address space, where the system can limit it, and leave no core behind."""
+    """Take at most 8 GiB of address space, or less as the user has set; leave no core behind."""
     try:
         import resource
     except ImportError:  # not on this system
         return
-    resource.setrlimit(resource.RLIMIT_AS, (8 * 2**30, resource.getrlimit(resource.RLIMIT_AS)[1]))
+    most = 8 * 2**30
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    if soft == resource.RLIM_INFINITY or soft > most:  # then the hard limit is not below ``most`` either
+        resource.setrlimit(resource.RLIMIT_AS, (most, hard))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 

@@ -3,6 +3,8 @@
 import os
 import re
 import shutil
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -108,6 +110,40 @@ def test_nothing_outlives_a_closed_solver(tmp_path):
             return
         time.sleep(0.05)
     pytest.fail("what the solver started still runs")
+
+
+LIMITED = """
+import resource, sys
+soft, hard = (resource.RLIM_INFINITY if size == "unlimited" else int(size) * 2**20 for size in sys.argv[2:])
+resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+from flipproof.foreign.checking import THROW, times_of
+from flipproof.foreign.contract import Ask
+from flipproof.foreign.isolated import Isolated
+solver = Isolated(sys.argv[1])
+print(int(solver(Ask.of(THROW, times_of(THROW))).omega[0]))
+solver.close()
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no limits on this system")
+@pytest.mark.parametrize(
+    ("soft", "hard", "left"),
+    [(6000, 6000, 6000), (6000, "unlimited", 6000), (9000, 9000, 8192), ("unlimited", "unlimited", 8192)],
+)
+def test_a_lower_limit_of_memory_is_kept(tmp_path, soft, hard, left):
+    """The solver answers with the limit that it runs under [MiB]."""
+    file = tmp_path / "limit.py"
+    file.write_text(
+        "import resource\nfrom numpy import full\n"
+        "def solve(ask):\n"
+        "    limit = resource.getrlimit(resource.RLIMIT_AS)[0] / 2**20\n"
+        "    return {'t': ask.times, 'theta': ask.times, 'omega': full(len(ask.times), limit)}\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED, f"{file}:solve", str(soft), str(hard)],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.stdout.strip() == str(left), done.stderr
 
 
 def _runs(number):
