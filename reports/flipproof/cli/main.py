@@ -258,7 +258,7 @@ def command_report(options: argparse.Namespace) -> int:
     """Write a report; return 1 if a regression claim failed."""
     scenario = read_scenario(options.scenario)
     from flipproof.output.folder import check_replaceable, replaced_folder
-    from flipproof.page.pdf import print_page, require_browser
+    from flipproof.page.pdf import PrintError, print_page, require_browser
 
     check_replaceable(options.out, "report")
     check_guests(options.guests)
@@ -285,6 +285,7 @@ def command_report(options: argparse.Namespace) -> int:
             print(f"flipproof: {time.perf_counter() - began:.0f} s: {stage}", file=sys.stderr, flush=True)
 
     ask = ask_of(scenario, "quick" if options.quick else "full", options.slices)
+    unprinted = ""
     with replaced_folder(options.out, "report") as folder:
         with store_of(options) as store, workers(options.jobs) as pool, progress_bar("runs", "run") as progress:
             contents = parts() if measurement is None else (part_measured(measurement), *parts())
@@ -295,11 +296,17 @@ def command_report(options: argparse.Namespace) -> int:
             report = build(gathered, facts, store.remembering(pool), png=options.png)
         write(report, folder)
         if options.pdf:
-            print_page(folder / "index.html", folder / "report.pdf")
+            try:
+                print_page(folder / "index.html", folder / "report.pdf")
+            except (PrintError, OSError) as error:
+                unprinted = f"the report is complete but for report.pdf: {error}"
+                (folder / "report.pdf").unlink(missing_ok=True)
     for guest in guests.guests if guests is not None else ():
         found = guest.visit.certificate
         print(f"{guest.label}: {found.conclusion if found else '; '.join(guest.visit.problems.values())}")
     _print_report(report, options.out, time.perf_counter() - began)
+    if unprinted:
+        return _complain(unprinted, BAD_INPUT)
     return 1 if report.failed else 0
 
 

@@ -62,7 +62,10 @@ def print_page(page: Path, target: Path) -> None:
         if hasattr(os, "geteuid") and os.geteuid() == 0:
             command.insert(1, "--no-sandbox")  # the sandbox refuses to run as root, as containers do
         try:
-            result = subprocess.run(command, capture_output=True, text=True, timeout=120.0, check=False)
+            # Whatever the locale: paths in a browser's messages need not be in its encoding.
+            result = subprocess.run(
+                command, capture_output=True, encoding="utf-8", errors="replace", timeout=120.0, check=False
+            )
         except (OSError, subprocess.TimeoutExpired) as error:
             raise PrintError(f"{browser} could not print {page} ({error})") from None
         if not made.is_file() or not made.stat().st_size:
