@@ -107,4 +107,4 @@ def test_a_report_that_cannot_be_printed_is_kept(monkeypatch, capsys, tmp_path, 
     assert said.count("\n") == 1
     assert (folder / "index.html").read_text() == "<p>whole</p>"
     assert not (folder / "report.pdf").exists()
-    assert command(capsys, "report", "--no-cache", "--jobs", 1, "--out", folder)[0] == 0  # every file is flipproof's own
+    assert command(capsys, "report", "--no-cache", "--jobs", 1, "--out", folder)[0] == 0

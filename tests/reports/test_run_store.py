@@ -157,10 +157,35 @@ def test_a_changed_source_makes_runs_again(place, tmp_path, monkeypatch):
     kept(place, RUN)
     assert found(place) is not None
     (room / "motion.py").write_text("G = 9.82\n")
-    keys.fingerprint.cache_clear()
     assert found(place) is None
     (room / "motion.py").write_text("G = 9.81\n")
-    keys.fingerprint.cache_clear()
+    assert found(place) is not None
+
+
+@pytest.mark.parametrize(
+    "texts", [["G = 4.9\n"], ["G = 4.9\n", "G = 9.81\n"], []], ids=["edited", "edited and set back", "removed"]
+)
+def test_nothing_is_kept_after_a_source_was_changed(place, tmp_path, monkeypatch, texts):
+    """A worker may have read the edited program, and the key is that of the one before."""
+    source = tmp_path / "room_of_sources" / "motion.py"
+    source.parent.mkdir()
+    source.with_name("__init__.py").write_text("")
+    source.write_text("G = 9.81\n")
+    os.utime(source, (0, 0))
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(keys, "SOURCES", {"ode_reference": ("room_of_sources",), "room_of_sources": ()})
+    with RunStore(place, slow=0.0) as kept_here, workers(1) as pool:
+        key = key_of_call(abs, (-1,), {})
+        source.unlink()
+        for text in texts:
+            source.write_text(text)
+        made_by(kept_here, RUN)
+        assert kept_here.remembering(pool).submit(abs, -1).result(timeout=60) == 1
+        assert (kept_here.find(RUN), kept_here.find_call(key)) == (None, None)
+    with sqlite3.connect(place) as rows:
+        assert rows.execute("SELECT count(*) FROM kept").fetchone() == (0,)
+    source.write_text("G = 9.81\n")
+    kept(place, RUN)
     assert found(place) is not None
 
 

@@ -8,7 +8,7 @@ import io
 import json
 import pickle
 import platform
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
@@ -76,6 +76,23 @@ def fingerprint(*names: str) -> str:
     Two checkouts have one version and different sources, so the sources count.
     """
     sources = hashlib.sha256()
+    for name, file in _sources(names):
+        sources.update(f"{name}\0".encode())
+        sources.update(file.read_bytes())
+    return sources.hexdigest()
+
+
+def sources_written() -> list[tuple[str, int, int]]:
+    """Return every file that a key may depend on, with the times [ns] when its content and its entry were last changed.
+
+    The fingerprint of a file that was edited and set back is the same; its times are not.
+    """
+    facts = ((name, file.stat()) for name, file in _sources((*SOURCES, "flipproof")))
+    return [(name, fact.st_mtime_ns, fact.st_ctime_ns) for name, fact in facts]
+
+
+def _sources(names: Iterable[str]) -> Iterator[tuple[str, Path]]:
+    """Yield the files of modules and packages, each with its name."""
     for name in names:
         spec = find_spec(name)
         assert spec is not None
@@ -83,9 +100,7 @@ def fingerprint(*names: str) -> str:
         origin = Path(spec.origin)
         package = spec.submodule_search_locations is not None
         for file in sorted(files_in(origin.parent)) if package else [origin]:
-            sources.update(f"{name}/{file.relative_to(origin.parent).as_posix()}\0".encode())
-            sources.update(file.read_bytes())
-    return sources.hexdigest()
+            yield f"{name}/{file.relative_to(origin.parent).as_posix()}", file
 
 
 def files_in(folder: Path) -> Iterator[Path]:

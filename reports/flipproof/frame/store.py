@@ -4,7 +4,8 @@ A run is looked up by all that decides its numbers: solver, scenario and setting
 packages that compute, and the sources of the package that makes it and of what that imports. A call of a worker, such
 as the flights of a map or the drawing of a figure, is looked up by function, arguments, versions and all sources.
 Whatever of these changes, it is made again. The processor is not among them: another one changes last digits, which no
-verdict rests on.
+verdict rests on. After a source was changed while the store is open, nothing is kept: a worker may have read the
+changed program, and the keys are those of the one before.
 
 An entry carries a checksum over key and content; one that does not agree with it is made again and replaced. Several
 programs may read and write at once. Where the file cannot be used, runs are made as if there were none.
@@ -26,7 +27,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.frame.keys import key_of, key_of_call
+from flipproof.frame.keys import fingerprint, key_of, key_of_call, sources_written
 from flipproof.frame.solvers import Made, Run
 
 WORDS: Final = "from the store"
@@ -71,6 +72,8 @@ class RunStore(AbstractContextManager["RunStore"]):
         self._writable = True
         self._problem = "not asked for"
         if place is not None:
+            self._sources = sources_written()
+            fingerprint.cache_clear()  # a source may have been changed since the store before this one
             self._open(place)
 
     def __exit__(self, *_: object) -> None:
@@ -151,11 +154,17 @@ class RunStore(AbstractContextManager["RunStore"]):
         except Exception:  # whatever a class raises that cannot be pickled
             return
         worth = self.slow == 0.0 or len(content) <= 3e7 * seconds
-        if worth and len(content) <= self.limit:
+        if worth and len(content) <= self.limit and self._same_program():
             with self._lock:
                 row = (key, _checksum(key, content), _now(), len(content), content)
                 self._write("INSERT OR REPLACE INTO kept VALUES (?, ?, ?, ?, ?)", row)
                 self._write(EVICT, (self.limit,))
+
+    def _same_program(self) -> bool:
+        """Return whether no source has been changed since the store was opened."""
+        with suppress(OSError):  # a file that goes away meanwhile
+            return sources_written() == self._sources
+        return False
 
     def _write(self, statement: str, values: tuple[Any, ...]) -> None:
         """Change the file; after a change that it does not take, such as on a full disk, it is only read."""
