@@ -11,10 +11,13 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
 import xml.etree.ElementTree as ElementTree
 from concurrent.futures import Executor, Future
 from pathlib import Path
 
+import matplotlib
+import numpy as np
 import pytest
 from jsonschema import validate
 from made_up import spoiled
@@ -22,10 +25,11 @@ from made_up import spoiled
 from flipproof import build as build_module
 from flipproof.chapters.differences.chapter import PAIRS
 from flipproof.chapters.engine_facts.chapter import CHECK_DT
+from flipproof.chapters.ice import chapter as ice
 from flipproof.chapters.solvers import ENGINE, FLIGHTS, OTHER_SCHEMES
 from flipproof.chapters.vectors import chapter as vectors
 from flipproof.cli import main as cli
-from flipproof.figures.style import Drawing
+from flipproof.figures.style import Drawing, draw
 from flipproof.frame import pool
 from flipproof.frame.exhibit import drawn
 from flipproof.frame.gather import tell
@@ -169,11 +173,21 @@ def test_axes_carry_units(gathered):
 
 def test_the_same_data_draw_the_same_bytes(gathered):
     from flipproof.chapters.flights.chapter import figure_over_time
-    from flipproof.figures.style import draw
 
     flights = flights_of(gathered)
     first, second = (draw(figure_over_time(flights, "omega")) for _ in range(2))
     assert first.svg == second.svg
+
+
+def test_a_users_settings_of_matplotlib_change_no_figure():
+    drifts = [ice.Drift("eq8", np.linspace(0.0, 1.0, 9), np.full(9, 1e-9))]
+    users = {"font.family": ["monospace"], "lines.linewidth": 5.0, "xtick.labelsize": 20.0, "savefig.dpi": 30.0}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        own = draw(ice.draw(drifts))
+        with matplotlib.rc_context(users):
+            assert draw(ice.draw(drifts)) == own
+            assert {name: matplotlib.rcParams[name] for name in users} == users
 
 
 def with_a_stand_in(exhibits, _pool, *, png=False):

@@ -12,7 +12,7 @@ from functools import wraps
 from io import BytesIO
 from typing import Any, TypeVar, cast
 
-import matplotlib as mpl
+import matplotlib.style
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -85,11 +85,11 @@ Maker = TypeVar("Maker", bound=Callable[..., Any])
 
 
 def styled(function: Maker) -> Maker:
-    """Run a function under the report's style without touching matplotlib's global settings."""
+    """Run a function under the report's style, whatever matplotlib's settings are, and leave these as they are."""
 
     @wraps(function)
     def run(*arguments: Any, **options: Any) -> Any:
-        with mpl.rc_context(STYLE):
+        with matplotlib.style.context(["default", STYLE]):
             return function(*arguments, **options)
 
     return cast(Maker, run)
