@@ -254,6 +254,14 @@ def test_the_current_folder_is_not_a_report(tmp_path, monkeypatch):
         check_replaceable(Path(), "report")
 
 
+def test_a_mount_point_is_refused_before_the_work(tmp_path):
+    root = tmp_path / "root"
+    root.symlink_to("/")
+    for place in (Path("/"), root):
+        with pytest.raises(OutputError, match=r"is a mount point, .* name a folder in it: /.*report"):
+            check_replaceable(place, "report")
+
+
 def test_text_files_are_written_whole(tmp_path):
     file = tmp_path / "table.csv"
     write_text(file, "one")

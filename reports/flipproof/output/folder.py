@@ -159,7 +159,10 @@ OLD: Final = "old"
 
 
 def check_replaceable(target: Path, kind: str) -> None:
-    """Refuse by an OutputError a file, and a folder with anything but what flipproof wrote there as this ``kind``."""
+    """Refuse a file, a mount point, and a folder with anything but what flipproof wrote there as this ``kind``.
+
+    The OutputError says why.
+    """
     standing = next((place for place in target.absolute().parents if place.exists()), None)
     if standing is not None and not standing.is_dir():
         raise OutputError(f"{target} cannot be written: {standing} is a file")
@@ -169,6 +172,8 @@ def check_replaceable(target: Path, kind: str) -> None:
         raise OutputError(f"'{target}' is the current folder; name another")
     if not target.is_dir():
         raise OutputError(f"{target} is a file; --out names a folder")
+    if os.path.ismount(target.resolve()):
+        raise OutputError(f"{target} is a mount point, which cannot be replaced; name a folder in it: {target / kind}")
     try:
         check_own(target, kind)
     except OSError as error:
