@@ -174,7 +174,8 @@ def command_grade(options: argparse.Namespace) -> int:
     write_json(options.json, found.to_mapping())
     print(found.conclusion)
     if waiting:
-        print(f"{waiting} checks wait for answers in {options.folder / 'asks'}; grade again when they are there")
+        asks = "1 ask waits" if waiting == 1 else f"{waiting} asks wait"
+        print(f"{asks} for answers in {options.folder / 'asks'}; grade again when they are there")
     return 1 if found.failed or waiting else 0
 
 

@@ -25,6 +25,7 @@ import numpy as np
 from flipproof.foreign.contract import PER_SLICE, Answer, AnswerError, Ask, Traits, answer_of
 from flipproof.foreign.isolated import PATIENCE, end_group, last_line
 from flipproof.foreign.specs import ForeignError, Runner, WaitingError, words_of, written
+from flipproof.sweep.files import write_whole
 
 if TYPE_CHECKING:
     from flipproof.foreign.certify import Certificate
@@ -167,7 +168,7 @@ class Kit(Runner):
             raise ValueError(f"{folder}: is no kit ({INDEX}: {error.strerror or error})") from None
         except (ValueError, TypeError, KeyError) as error:
             raise ValueError(f"{folder / INDEX}: is not readable ({error})") from None
-        self.waiting = 0
+        self.waiting: set[Path] = set()
 
     @classmethod
     def made(cls, folder: Path, traits: Traits) -> Kit:
@@ -181,17 +182,17 @@ class Kit(Runner):
         return kit
 
     def grade(self) -> tuple[Certificate, int]:
-        """Return the certificate by the answers that are there, and how many asks wait for one."""
+        """Return the certificate by the answers that are there, and how many different asks wait for one."""
         from flipproof.foreign.certify import certify
 
-        self.waiting = 0
-        return certify(self), self.waiting
+        self.waiting.clear()
+        return certify(self), len(self.waiting)
 
     def __call__(self, ask: Ask) -> Answer:
         """Return the answer that lies in the folder of an ask; add the folder if there is none."""
         path = self._place(ask) / "answer.csv"
         if not path.is_file():
-            self.waiting += 1
+            self.waiting.add(path)
             raise WaitingError(f"{path.relative_to(self.folder)} is not there yet")
         return answer_in(path, ask, str(path.relative_to(self.folder)))
 
@@ -203,7 +204,9 @@ class Kit(Runner):
             return self.folder / "asks" / f"{self.asks.index(key) + 1:04d}"
         self.asks.append(key)
         place = self.folder / "asks" / f"{len(self.asks):04d}"
-        place.mkdir()
+        # A folder that the index does not have is of a run that was interrupted; its ask may have been another one.
+        place.mkdir(exist_ok=True)
+        (place / "answer.csv").unlink(missing_ok=True)
         write_ask(ask, place)
         (place / "scenario.json").write_text(json.dumps(ask.scenario.to_mapping(), indent=1) + "\n", encoding="utf-8")
         (place / "effort.txt").write_text("" if ask.effort is None else f"{ask.effort!r}\n", encoding="utf-8")
@@ -213,4 +216,4 @@ class Kit(Runner):
 
 def _write_index(folder: Path, traits: Traits, asks: list[str]) -> None:
     index = {"kit": 1, "solver": asdict(traits), "asks": asks}
-    (folder / INDEX).write_text(json.dumps(index, indent=1) + "\n", encoding="utf-8")
+    write_whole(folder / INDEX, (json.dumps(index, indent=1) + "\n").encode())

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from flipproof.chapters.vectors.published import load_all
+from flipproof.foreign import files
 from flipproof.foreign.certify import FAILED, IDLE, PASSED, certify
 from flipproof.foreign.checks_basic import ask_of_vector
 from flipproof.foreign.contract import Ask, Traits
@@ -56,6 +57,34 @@ def test_answers_by_files_get_the_same_verdicts(tmp_path):
     assert len(list((kit.folder / "asks").iterdir())) - asked <= 5
     assert not found.failed
     assert {r.verdict for r in found.results} == {PASSED, IDLE}
+
+
+@pytest.mark.parametrize("broken", ["write_ask", "write_whole"])
+def test_a_kit_that_was_interrupted_goes_on(tmp_path, monkeypatch, broken):
+    """Killed while an ask or the index is written: the next run writes both, and keeps no answer to another ask."""
+    whole, made = getattr(files, broken), []
+
+    def dies_in_the_middle(*arguments):
+        made.append(arguments)
+        if len(made) == 4:
+            raise KeyboardInterrupt
+        return whole(*arguments)
+
+    monkeypatch.setattr(files, broken, dies_in_the_middle)
+    with pytest.raises(KeyboardInterrupt):
+        Kit.made(tmp_path / "kit", GOOD)
+    monkeypatch.undo()
+    kit = Kit(tmp_path / "kit")
+    last = sorted((kit.folder / "asks").iterdir())[-1]
+    assert last.name == f"{len(kit.asks) + 1:04d}"
+    (last / "answer.csv").write_text("t,theta,omega\n")
+    _, waiting = kit.grade()
+    expected = Kit.made(tmp_path / "other", GOOD)
+    assert kit.asks == Kit(kit.folder).asks == expected.asks
+    assert waiting == len(kit.asks)
+    for place in (expected.folder / "asks").iterdir():
+        other = kit.folder / "asks" / place.name
+        assert {p.name: p.read_text() for p in place.iterdir()} == {p.name: p.read_text() for p in other.iterdir()}
 
 
 def test_a_wrong_answer_names_its_file(tmp_path):

@@ -102,9 +102,11 @@ def test_kit_and_grade(capsys, tmp_path):
     status, out, _ = run(capsys, "kit", "--out", tmp_path / "kit", "--refined-by", "dt", "--equation", "eq8")
     assert status == 0
     assert "then run: flipproof grade" in out
+    asks = int(out.split()[0])
+    assert asks == len(list((tmp_path / "kit" / "asks").iterdir()))
     status, out, _ = run(capsys, "grade", tmp_path / "kit")
     assert status == 1
-    assert "wait for answers" in out
+    assert f"\n{asks} asks wait for answers in " in out
 
 
 def test_help_names_the_commands(capsys):
