@@ -272,18 +272,44 @@ def test_two_programs_write_at_once(place):
             assert runs_kept.find(Run("eq8", Scenario(n_slices=2, duration=0.05, omega0=5.0 + k))) is not None
 
 
-def test_a_program_that_holds_the_file_does_not_end_the_other(place, monkeypatch):
+def test_while_another_program_holds_the_file_it_is_read_and_what_is_made_is_not_kept(place, monkeypatch):
     kept(place, RUN)
     monkeypatch.setattr(store, "BUSY", 0.05)
-    other = replace(RUN, scenario=replace(RUN.scenario, omega0=11.0))
+    other, later = (replace(RUN, scenario=replace(RUN.scenario, omega0=omega0)) for omega0 in (11.0, 13.0))
     with sqlite3.connect(place, isolation_level=None) as rows:
         rows.execute("BEGIN IMMEDIATE")
         with RunStore(place, slow=0.0) as runs_kept:
             assert made_by(runs_kept, other).trajectory is not None
             assert runs_kept.find(RUN) is not None
-        rows.execute("ROLLBACK")
-    assert found(place, other) is None
-    assert found(place) is not None
+            assert runs_kept._rows.execute("PRAGMA busy_timeout").fetchone() == (0,)  # waited for once, not each time
+            rows.execute("ROLLBACK")
+            made_by(runs_kept, later)
+    assert [found(place, run) is not None for run in (RUN, other, later)] == [True, False, True]
+
+
+@pytest.mark.parametrize(("code", "found_later"), [(sqlite3.SQLITE_BUSY, True), (sqlite3.SQLITE_IOERR, False)])
+def test_a_file_that_is_busy_when_it_is_read_is_read_again_later(place, code, found_later):
+    kept(place, RUN)
+    with RunStore(place) as runs_kept:
+        rows, runs_kept._rows = runs_kept._rows, Refusing(1, code)
+        assert runs_kept.find(RUN) is None
+        if runs_kept._rows is not None:
+            runs_kept._rows = rows
+        assert (runs_kept.find(RUN) is not None) == found_later
+        rows.close()
+
+
+def test_a_full_disk_ends_the_keeping(place):
+    kept(place, RUN)
+    other, later = (replace(RUN, scenario=replace(RUN.scenario, omega0=omega0)) for omega0 in (11.0, 13.0))
+    with RunStore(place, slow=0.0) as runs_kept:
+        (pages,) = runs_kept._rows.execute("PRAGMA page_count").fetchone()
+        runs_kept._rows.execute(f"PRAGMA max_page_count = {pages}")
+        made_by(runs_kept, replace(other, scenario=other.scenario.with_slices(40)))
+        runs_kept._rows.execute(f"PRAGMA max_page_count = {2**30}")
+        made_by(runs_kept, later)
+        assert runs_kept.find(RUN) is not None
+    assert found(place, later) is None
 
 
 def test_the_entries_stay_within_the_limit_and_the_last_used_stay(place):
@@ -428,7 +454,7 @@ class Refusing:
     def __init__(self, times, code=sqlite3.SQLITE_BUSY):
         self.times, self.code = times, code
 
-    def execute(self, _):
+    def execute(self, *_):
         if not self.times:
             return self
         self.times -= 1
@@ -438,6 +464,9 @@ class Refusing:
 
     def fetchall(self):
         return []
+
+    def close(self):
+        """Let go of nothing."""
 
 
 def test_two_programs_that_begin_the_store_at_once_both_keep_it(monkeypatch):

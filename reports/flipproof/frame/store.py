@@ -129,7 +129,8 @@ class RunStore(AbstractContextManager["RunStore"]):
             try:
                 row = self._rows.execute("SELECT checksum, content FROM kept WHERE key = ?", (key,)).fetchone()
             except sqlite3.Error as error:
-                self._give_up(error)
+                if not _is(error, sqlite3.SQLITE_BUSY):
+                    self._give_up(error)
                 return None
             if row is None:
                 return None
@@ -167,12 +168,18 @@ class RunStore(AbstractContextManager["RunStore"]):
         return False
 
     def _write(self, statement: str, values: tuple[Any, ...]) -> None:
-        """Change the file; after a change that it does not take, such as on a full disk, it is only read."""
+        """Change the file; after a change that it does not take, such as on a full disk, it is only read.
+
+        A change that another program keeps waiting is given up alone.
+        """
         if self._rows is None or not self._writable:
             return
         try:
             self._rows.execute(statement, values)
         except sqlite3.Error as error:
+            if _is(error, sqlite3.SQLITE_BUSY):
+                self._rows.execute("PRAGMA busy_timeout = 0")  # it was waited for once, which is long
+                return
             self._writable = False
             if _is_damage(error):
                 self._give_up(error)
@@ -294,4 +301,9 @@ def _now(form: str = "%Y-%m-%d %H:%M:%S.%f") -> str:
 
 
 def _is_damage(error: Exception) -> bool:
-    return int(getattr(error, "sqlite_errorcode", 0)) & 0xFF in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
+    return _is(error, sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
+
+
+def _is(error: Exception, *codes: int) -> bool:
+    """Return whether an error is one of SQLite's primary codes, whatever its extended code adds."""
+    return int(getattr(error, "sqlite_errorcode", 0)) & 0xFF in codes
