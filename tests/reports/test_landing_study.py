@@ -516,6 +516,8 @@ def test_an_outcome_that_no_program_certifies_is_told_with_its_reason():
         (["upright", "--out", "x", "--fillings", "0.2,1.2"], "1.2 is outside (0, 1]"),
         (["upright", "--out", "x", "--families", "C"], "--families 'C' is unknown"),
         (["upright", "--out", "x", "--scatter", "1,2"], "is not SPIN,DEGREES,SPEED"),
+        (["upright", "--out", "x", "--scatter", "0,0,0"], "without scatter all throws of a point are the same throw"),
+        (["upright", "--out", "x", "--scatter", "1e-18,0,0"], "the largest at least 1e-6"),
         (["upright", "--out", "x", "--restitution", "2"], "table.restitution = 2.0 is outside [0, 1]"),
         (["upright", "--out", "x", "--map", "1x5"], "is not COLUMNSxROWS"),
         (["upright", "--out", "x", "--dask", "nonsense"], "is not tcp://HOST:PORT"),

@@ -28,7 +28,10 @@ SLICES: Final = 20
 seed = reader("a whole number in [0, 2^63)", digits, lambda value: value < 2**63)
 cells = reader("COLUMNSxROWS, each in [2, 200], such as 24x24", sides, lambda each: min(each) >= 2 and max(each) <= 200)
 scatter = reader(
-    "SPIN,DEGREES,SPEED, three numbers in [0, inf)", numbers, lambda values: len(values) == 3 and min(values) >= 0.0
+    "SPIN,DEGREES,SPEED, three numbers in [0, inf), the largest at least 1e-6: without scatter all throws of a point "
+    "are the same throw",
+    numbers,
+    lambda values: len(values) == 3 and min(values) >= 0.0 and max(values) >= 1e-6,
 )
 
 
@@ -65,8 +68,10 @@ def add_landing(commands: Any) -> None:
         "--families", default="A,B", metavar="A,B", help="A: omega_0 as thrown, height of the table solved for; B: "
         "time of flight as thrown, omega_0 solved for (%(default)s)",
     )  # fmt: skip
-    upright.add_argument("--scatter", type=scatter, metavar="SPIN,DEGREES,SPEED", help="standard deviations: share of "
-                         "omega_0, of theta_0 [degrees], of the launch velocity [m/s] (0.05,5,0.1)")  # fmt: skip
+    upright.add_argument(
+        "--scatter", type=scatter, metavar="SPIN,DEGREES,SPEED", help="standard deviations, not all 0: share of "
+        "omega_0, of theta_0 [degrees], of the launch velocity [m/s] (0.05,5,0.1)",
+    )  # fmt: skip
     upright.add_argument("--seed", type=seed, default=1, metavar="N", help="seed of all throws (%(default)s)")
     upright.add_argument("--map", type=cells, default=(24, 24), metavar="CxR", help="cells of the map (24x24)")
     upright.add_argument(
