@@ -10,11 +10,12 @@ from dataclasses import replace
 import pytest
 from distributed import LocalCluster
 from made_up import command
+from matplotlib.collections import QuadMesh
 
 from flipproof.build import ask_of, gather_report
 from flipproof.chapters import chapters_named
 from flipproof.chapters.landing.chapter import chunks, claims
-from flipproof.chapters.landing.figures import figures, page, shares_csv, witnesses
+from flipproof.chapters.landing.figures import figure_map, figures, map_csv, page, shares_csv, witnesses
 from flipproof.chapters.landing.study import (
     AIMING,
     Key,
@@ -242,11 +243,15 @@ def test_a_flight_that_was_kept_is_the_flight(design):
 # ---------------------------------------------------------------------- the study
 
 
+def found_of(size):
+    aims, unaimed = aiming(THROW, size)
+    throws = counting(THROW, size, aims, make_cases(aims.values(), size.seed))
+    return read(THROW, size, throws, make_cases(throws.values(), size.seed), unaimed)
+
+
 @pytest.fixture(scope="module")
 def found():
-    aims, unaimed = aiming(THROW, SMALL)
-    throws = counting(THROW, SMALL, aims, make_cases(aims.values(), SMALL.seed))
-    return read(THROW, SMALL, throws, make_cases(throws.values(), SMALL.seed), unaimed)
+    return found_of(SMALL)
 
 
 def test_the_study_counts_what_it_threw(found):
@@ -264,6 +269,25 @@ def test_the_study_counts_what_it_threw(found):
     assert {run.kind for run in found.energies} == {"together", "ice"}
     for run in found.energies:
         assert (run.energy[-1] < 1.0) or run.outcome
+
+
+@pytest.fixture(scope="module")
+def found_of_one():
+    """Return a study of one filling, on a table whose restitution is no value of the axis."""
+    return found_of(replace(SMALL, fillings=(0.4,), throws=4, restitution=0.25))
+
+
+def test_the_map_of_one_filling_is_one_column(found_of_one):
+    fillings, omegas = found_of_one.size.map_axes
+    assert (fillings.tolist(), len(omegas)) == ([0.4], 4)
+    for outcomes in found_of_one.maps.values():
+        assert outcomes.outcome.shape == outcomes.theta.shape == (4, 1)
+        assert "" not in outcomes.outcome
+    assert map_csv(found_of_one).count("\n") == 1 + 2 * 4
+    for axes in figure_map(found_of_one).axes:
+        (cells,) = (part for part in axes.collections if isinstance(part, QuadMesh))
+        across = cells.get_coordinates()[..., 0]
+        assert across.min() < 0.4 < across.max()
 
 
 def test_throws_that_choose_an_aim_are_not_counted():

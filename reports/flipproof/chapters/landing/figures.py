@@ -192,17 +192,22 @@ def figure_map(found: Found) -> Figure:
     """Outcome of one throw without scatter over filling and omega_0; lines where the bottle touches upright."""
     figure, panels = new_figure(1, max(len(found.maps), 1), size=(8.6, 4.6), squeeze=False, sharey=True)
     names, colours = list(SHADES), ListedColormap(list(SHADES.values()))
-    grid = found.size.map_axes
+    fills, omegas = found.size.map_axes
+    # One filling is drawn as two columns alike: a single one has no width.
+    columns = 2 if len(fills) == 1 else 1
+    grid = (fills[0] + np.array([-0.02, 0.02]) if columns == 2 else fills), omegas
     for axes, (kind, outcomes) in zip(panels[0], found.maps.items(), strict=False):
         codes = np.vectorize(lambda name: names.index(name) if name in names else len(names) - 1)(outcomes.outcome)
+        codes, turns = np.repeat(codes, columns, axis=1), np.repeat(outcomes.theta / math.tau, columns, axis=1)
         ends = {"vmin": -0.5, "vmax": len(names) - 0.5}
         axes.pcolormesh(*grid, codes, cmap=colours, **ends, shading="nearest", rasterized=True)
-        turns = outcomes.theta / math.tau
         for level, style in ((1.0, "-"), (2.0, "--")):
             if np.isfinite(turns).any() and np.nanmin(turns) < level < np.nanmax(turns):
                 axes.contour(*grid, turns, levels=[level], colors="black", linestyles=style, linewidths=1.3)
         axes.set_title(KINDS[kind].words, fontsize=10, loc="left")
         axes.set_xlabel("fill fraction M_w / M_max [1]")
+        if columns == 2:
+            axes.set_xticks(fills)
         axes.grid(visible=False)
     panels[0, 0].set_ylabel("ω₀ [rad/s]")
     shown = {str(name) for outcomes in found.maps.values() for name in outcomes.outcome.ravel()}

@@ -87,9 +87,9 @@ class Size:
 
     @property
     def map_axes(self) -> tuple[FloatArray, FloatArray]:
-        """Fillings and omega_0 [rad/s] of the map."""
+        """Fillings, of which there is one if the study has one, and omega_0 [rad/s] of the map."""
         columns, rows = self.map_cells
-        return np.linspace(self.fillings[0], self.fillings[-1], columns), np.linspace(4.0, 44.0, rows)
+        return np.unique(np.linspace(self.fillings[0], self.fillings[-1], columns)), np.linspace(4.0, 44.0, rows)
 
 
 class Key(NamedTuple):
