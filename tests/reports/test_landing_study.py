@@ -290,6 +290,16 @@ def test_the_map_of_one_filling_is_one_column(found_of_one):
         assert across.min() < 0.4 < across.max()
 
 
+def test_the_energies_are_those_of_the_throws_over_the_filling(found, found_of_one):
+    """They are there whether or not the table asked for is one of the axis."""
+    for each in (found, found_of_one):
+        for kind in ("together", "ice"):
+            runs = [run for run in each.energies if run.kind == kind]
+            share = each.cell(kind, 0.4).share
+            assert len(runs) == share.throws - share.undecided > 0
+            assert sum(run.outcome == "upright" for run in runs) == share.upright
+
+
 def test_throws_that_choose_an_aim_are_not_counted():
     aims, _ = aiming(THROW, SMALL)
     throws = counting(THROW, SMALL, aims, make_cases(aims.values(), SMALL.seed))

@@ -340,8 +340,8 @@ def cell_of(aim: Aim, rows: Sequence[Landed]) -> Cell:
 
 
 def _energies(kind: Kind, cases: Cases, rows: Rows, size: Size) -> list[Energy]:
-    """Follow the energy of the first ten throws at the filling of the axes."""
-    wanted = Key("restitution", size.restitution, size.families[-1], size.axis_filling, kind)
+    """Follow the energy of the first ten throws counted at the filling of the axes."""
+    wanted = Key("filling", size.axis_filling, size.families[-1], size.axis_filling, kind)
     if wanted not in cases:
         return []
     case, some = cases[wanted], rows[list(cases).index(wanted)]
