@@ -12,8 +12,7 @@ generalised coordinates.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -33,6 +32,7 @@ except ModuleNotFoundError as missing:
 
 from engine_check.mujoco_hits import first_zero
 from engine_check.mujoco_impacts import FREE, Contacts, IntArray
+from engine_check.mujoco_log import no_log
 from engine_check.mujoco_setup import verify
 from engine_check.mujoco_world import TUBE_DOFS, World, build
 
@@ -96,19 +96,8 @@ def run(scenario: Scenario, order: Order) -> Trajectory:
     if scenario.frozen and order.ice != "rigid":
         raise ValueError(f"engine = 'mujoco' has no ice = {order.ice!r} (it has: rigid)")
     # A velocity whose square overflows is beyond MuJoCo's largest and ends the run with a status.
-    with _no_log(), np.errstate(over="ignore"):
+    with no_log(), np.errstate(over="ignore"):
         return _fly(scenario, order, settings)
-
-
-@contextmanager
-def _no_log() -> Iterator[None]:
-    """Keep MuJoCo from writing its warnings to MUJOCO_LOG.TXT in the working directory: a run says so by its status."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda _: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 def _fly(scenario: Scenario, order: Order, settings: MujocoKnobs) -> Trajectory:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from engine_check import SetupError, solve
+from engine_check.mujoco_log import no_log
 from engine_check.mujoco_settings import DISABLED, PLACEHOLDER_INERTIA
 from engine_check.mujoco_setup import verify
 from engine_check.mujoco_world import TUBE, TUBE_DOFS, build
@@ -211,6 +212,18 @@ def test_no_log_is_left_in_the_working_directory(tmp_path, monkeypatch):
     run = solve(replace(THROW, bottle=Bottle(length=1e12)), engine="mujoco", dt=DT)
     assert run.status == "diverged"
     assert list(tmp_path.iterdir()) == []
+    assert mujoco.get_mju_user_warning() is before
+
+
+def test_runs_that_overlap_in_time_put_the_handler_of_warnings_back():
+    """Two threads: the second begins before the first ends, and ends after it."""
+    before = mujoco.get_mju_user_warning()
+    first, second = no_log(), no_log()
+    first.__enter__()
+    second.__enter__()
+    first.__exit__(None, None, None)
+    assert mujoco.get_mju_user_warning() is not before
+    second.__exit__(None, None, None)
     assert mujoco.get_mju_user_warning() is before
 
 
