@@ -29,6 +29,12 @@ STIFFNESS: Final = 6000.0
 IMPEDANCE: Final = "0.9999 0.9999 0.001 0.5 2"
 """``solimp``: nearly all of the constraint's force at any depth, so that the spring is linear."""
 
+HIGHEST_RATIO: Final = 3.0
+"""Largest damping ratio of a contact: it rebounds with 0.02, and leaves the table within some milliseconds."""
+
+MISSED: Final = 1e-3
+"""Largest difference between the restitution asked for and that of a drop."""
+
 TUBE: Final = 1
 TUBE_DOFS: Final = 3
 HEAD: Final = (
@@ -45,13 +51,35 @@ def _solref(zeta: float) -> str:
 
 @lru_cache
 def damping_ratio(restitution: float, dt: float, contact: bool) -> float:
-    """Return the damping ratio at which a drop in the engine, with the step ``dt``, rebounds with ``restitution``."""
-    if restitution >= 1.0:
-        return 0.0
-    low, high = 0.0, 3.0
+    """Return the damping ratio at which a drop in the engine, with the step ``dt``, rebounds with ``restitution``.
+
+    The rebound falls with the damping ratio until the damping of one step alone turns the velocity back; beyond, it
+    rises. The ratio returned lies where it falls.
+
+    Raises
+    ------
+    ValueError
+        If no drop with that step rebounds with ``restitution``, to within ``MISSED``.
+    """
+    zeta = _on_falling_branch(restitution, dt, contact)
+    if not abs(_rebound(zeta, dt, contact) - restitution) <= MISSED:
+        least, most = (_rebound(end, dt, contact) for end in (_on_falling_branch(0.0, dt, contact), 0.0))
+        raise ValueError(
+            f"{'table' if contact else 'scenario'}.restitution = {restitution!r} is outside [{least:.3g}, {most:.3g}], "
+            f"with which soft contacts rebound at dt = {dt:g} s"
+        )
+    return zeta
+
+
+@lru_cache
+def _on_falling_branch(restitution: float, dt: float, contact: bool) -> float:
+    """Return the damping ratio of ``restitution``; without one, the end of the branch that comes nearest."""
+    low, high = 0.0, HIGHEST_RATIO
     for _ in range(40):
         middle = (low + high) / 2
-        low, high = (middle, high) if _rebound(middle, dt, contact) > restitution else (low, middle)
+        rebound = _rebound(middle, dt, contact)
+        more = rebound > restitution and _rebound(middle + 1e-3, dt, contact) < rebound
+        low, high = (middle, high) if more else (low, middle)
     return (low + high) / 2
 
 
@@ -94,7 +122,8 @@ class World:
         if not self.rigid:
             refuse_misplaced(touch, "staggered")
         on_table = damping_ratio(table.restitution, dt, True)
-        in_water = damping_ratio(scenario.restitution, dt, False)
+        # Water that cannot move has no limits to strike.
+        in_water = 0.0 if self.rigid else damping_ratio(scenario.restitution, dt, False)
         self.model = mujoco.MjModel.from_xml_string(self._text(touch, table, dt, on_table, in_water))
         self.data = mujoco.MjData(self.model)
         height = bottle.length / 2 * abs(math.cos(touch.theta)) + bottle.radius * abs(math.sin(touch.theta))
@@ -106,7 +135,7 @@ class World:
             "mujoco_version": mujoco.__version__,
             "stiffness": STIFFNESS,
             "damping_ratio_table": on_table,
-            "damping_ratio_water": in_water,
+            "damping_ratio_water": None if self.rigid else in_water,
         }
         self.setup = self._read_back(touch, table, dt)
 

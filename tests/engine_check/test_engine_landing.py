@@ -80,6 +80,34 @@ def test_soft_contacts_are_calibrated_by_a_drop(contact):
     assert landing_compliant._rebound(textbook, 2e-5, contact) == pytest.approx(0.4, abs=0.02)
 
 
+@pytest.mark.parametrize("contact", [True, False])
+@pytest.mark.parametrize(("dt", "restitution"), [(4e-5, 0.05), (4e-5, 0.065), (2e-5, 0.03), (8e-5, 0.3), (4e-5, 1.0)])
+def test_soft_contacts_rebound_with_the_restitution_asked_for(dt, restitution, contact):
+    """Damping so large that one step of it throws the mass back rebounds more, not less."""
+    zeta = landing_compliant.damping_ratio(restitution, dt, contact)
+    assert landing_compliant._rebound(zeta, dt, contact) == pytest.approx(restitution, abs=1e-6)
+    assert landing_compliant._rebound(zeta + 0.01, dt, contact) < restitution
+
+
+@pytest.mark.parametrize(
+    ("restitution", "dt", "least"), [(0.0, 4e-5, 0.041), (0.03, 4e-5, 0.041), (0.0, 2e-5, 0.0206), (0.05, 1e-4, 0.208)]
+)
+def test_a_restitution_that_soft_contacts_do_not_reach_is_refused_with_their_range(restitution, dt, least):
+    words = (
+        rf"restitution = {restitution} is outside \[{least}, 1.*\], with which soft contacts rebound at dt = {dt:g} s"
+    )
+    with pytest.raises(ValueError, match=rf"table\.{words}"):
+        engine_check.land(at_rest(WATER), replace(FLAT, restitution=restitution), "mujoco-compliant", dt)
+    with pytest.raises(ValueError, match=rf"scenario\.{words}"):
+        landing_compliant.damping_ratio(restitution, dt, False)
+
+
+def test_ice_asks_no_restitution_of_its_water():
+    ice = replace(ICE, restitution=0.0)
+    world = landing_compliant.build(at_rest(ice), FLAT, 4e-5, None, "staggered")
+    assert world.settings["damping_ratio_water"] is None
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("scenario", [WATER, ICE])
 def test_the_watch_has_the_saddle_of_water_at_rest(engine, scenario):
