@@ -270,8 +270,8 @@ def figures(found: tuple[Horizon, ...]) -> Iterator[Exhibit]:
         caption=f"Each curve is the width of an ensemble at {cuts}: how far the ω of flights that should be one flight "
         "come apart. Top: the flights differ in their arithmetic alone, by the angle of release, which free flight "
         "does not feel, or by the order in which bodies entered the engine. Bottom: their release differs. Where "
-        "curves of different changes jump to one level, an impact happens in some of the flights and not in the others; "
-        "differences in ω below that level mean nothing. "
+        "curves of different changes jump to one level, an impact happens in some of the flights and not in the "
+        "others; differences in ω below that level mean nothing. "
         f"Widest ensemble: {'; '.join(numbers)}.",
         alt=f"Logarithmic plots of the width of ensembles over time. {words}",
         maker=figure_horizon,
