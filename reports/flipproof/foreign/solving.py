@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import atexit
 import math
-from functools import cache
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -40,13 +39,23 @@ def solve(
         raise type(error)(f"{spec}: {error}") from None
 
 
-@cache
+_RUNNERS: Final[dict[str, tuple[str, Runner]]] = {}
+"""The process of every solver that has been run, by spec, with the content of its files."""
+
+
 def _runner(spec: str, content: str) -> Runner:
-    """Return the process of a solver; one whose files have changed gets another, so that its old code runs no more."""
-    del content
-    runner = opened(spec, curves=True)
-    atexit.register(runner.close)
-    return runner
+    """Return the process of a solver; one whose files have changed gets another, and its old process ends."""
+    if spec in _RUNNERS and _RUNNERS[spec][0] != content:
+        _RUNNERS.pop(spec)[1].close()
+    if spec not in _RUNNERS:
+        _RUNNERS[spec] = content, opened(spec, curves=True)
+    return _RUNNERS[spec][1]
+
+
+@atexit.register
+def _close() -> None:
+    for _, runner in _RUNNERS.values():
+        runner.close()
 
 
 class Own(Runner):

@@ -16,6 +16,7 @@ from flipproof.foreign.checking import THROW, times_of
 from flipproof.foreign.contract import Ask
 from flipproof.foreign.isolated import Isolated
 from flipproof.foreign.specs import ForeignError, load
+from flipproof.frame.solvers import solve
 
 HERE = Path(__file__).resolve().parent
 WRONG = load(f"{HERE / 'hostile.py'}:WRONG")
@@ -110,6 +111,24 @@ def test_nothing_outlives_a_closed_solver(tmp_path):
             return
         time.sleep(0.05)
     pytest.fail("what the solver started still runs")
+
+
+def test_a_file_that_changes_ends_the_process_of_its_old_code(tmp_path):
+    file = tmp_path / "edited.py"
+    processes = []
+    for omega in (2.0, 2.0, 3.0):
+        file.write_text(
+            "import os\nfrom numpy import full\n"
+            "def solve(ask):\n"
+            f"    return {{'t': ask.times, 'theta': full(len(ask.times), os.getpid()), 'omega': ask.times + {omega}}}\n"
+        )
+        run = solve(f"{file}:solve", THROW, times=times_of(THROW))
+        assert run.omega[0] == omega
+        processes.append(int(run.theta[0]))
+    first, again, other = processes
+    assert first == again != other
+    assert not _runs(first)
+    assert _runs(other)
 
 
 LIMITED = """
