@@ -233,7 +233,7 @@ def pictures(canvas: Any, show: Callable[[Any], None], frames: Iterable[Any]) ->
     """
     for frame in frames:
         show(frame)
-        canvas.draw()
+        styled(canvas.draw)()
         picture = np.asarray(canvas.buffer_rgba())
         height, width = (side - side % 2 for side in picture.shape[:2])
         yield np.ascontiguousarray(picture[:height, :width, :3])

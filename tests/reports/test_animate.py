@@ -3,6 +3,7 @@
 import argparse
 import sys
 
+import matplotlib
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -119,6 +120,13 @@ def test_frames_move_where_the_bottle_turns_and_have_even_sides():
     upper = slice(30, first.shape[0] // 2)
     assert (first[upper] != second[upper]).any()
     assert (second[upper] != third[upper]).any()
+
+
+def test_a_users_settings_of_matplotlib_change_no_frame():
+    (own,) = draw_frames(film(1))
+    with matplotlib.rc_context({"font.family": "monospace", "text.hinting": "none", "xtick.labelsize": 20.0}):
+        (again,) = draw_frames(film(1))
+    assert np.array_equal(own, again)
 
 
 def test_a_gif_holds_every_frame_and_its_background_is_white(tmp_path):
