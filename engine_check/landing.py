@@ -20,6 +20,7 @@ class Lander:
 
     Parameters
     ----------
+    module : str - has ``build``, which returns a ``Body``, and ``quiet``, within which the engine writes no file
     dt, ice_dt : float - default steps for water and for ice [s]
     halvings : int - of the step, after which an outcome that still changes is left undecided
     rise : float - rise of the energy in an impact beyond which a landing is not certified [E_s]
@@ -177,12 +178,13 @@ def landed(body: Body, scenario: Scenario, dt: float) -> Run:
     before, outcome, reason = body.energy(), None, ""
     for k in range(1, count + 1):
         reason = body.advance()
-        x, y, theta = body.pose()
-        watch.note(y, theta)
-        if not reason and not math.isfinite(y + theta):
-            reason = "the motion left the floating-point range"
+        pose = body.pose()
+        if not reason and not math.isfinite(sum(pose)):
+            reason = "the motion diverged: it left the floating-point range; reduce dt"
         if reason:
             break
+        x, y, theta = pose
+        watch.note(y, theta)
         if k % every == 0:
             energy = body.energy()
             watch.rise = max(watch.rise, (energy - before) / watch.saddle)
@@ -264,10 +266,11 @@ def land(
         raise ValueError(f"law = {law!r} has no meaning for ice (scenario.frozen): leave it out")
     default = lander.ice_dt if immovable(touch.scenario) else lander.dt
     step = default if dt is None else checked_number("dt", dt, 0.0, 1e-3 * (1 + 1e-12), " s")
-    build = import_module(lander.module).build
+    module = import_module(lander.module)
 
     def run(step: float) -> Run:
-        return landed(build(touch, table, step, chosen, slices), touch.scenario, step)
+        with module.quiet():
+            return landed(module.build(touch, table, step, chosen, slices), touch.scenario, step)
 
     fine, reason = run(step), ""
     outcomes = [fine.outcome]

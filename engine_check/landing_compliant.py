@@ -20,6 +20,7 @@ import mujoco
 import numpy as np
 
 from engine_check.landing import immovable, refuse_misplaced, stops
+from engine_check.mujoco_log import no_log
 from engine_check.readback import differences, matched
 from slicemodel.table import Table, Touch
 
@@ -35,13 +36,15 @@ HIGHEST_RATIO: Final = 3.0
 MISSED: Final = 1e-3
 """Largest difference between the restitution asked for and that of a drop."""
 
+quiet: Final = no_log
+
 TUBE: Final = 1
 TUBE_DOFS: Final = 3
 HEAD: Final = (
     '<mujoco><compiler boundmass="0" boundinertia="0" balanceinertia="true" inertiafromgeom="false" '
     'autolimits="false"/>'
     '<option timestep="{dt!r}" gravity="0 {down!r} 0" integrator="implicitfast" cone="elliptic" impratio="10" '
-    'iterations="100" tolerance="1e-12"/>'
+    'iterations="100" tolerance="1e-12"><flag autoreset="disable"/></option>'
 )
 
 

@@ -25,6 +25,7 @@ import numpy as np
 
 from engine_check.landing import Watch, immovable, refuse_misplaced, stops
 from engine_check.landing_impulses import impulses
+from engine_check.mujoco_log import no_log
 from engine_check.mujoco_setup import verify
 from engine_check.mujoco_world import TUBE, TUBE_DOFS
 from engine_check.mujoco_world import build as release
@@ -37,6 +38,8 @@ CLOSED: Final = 1e-9
 
 SLOWEST_IMPACT: Final = 0.05
 """Speed at which a corner comes down [m/s] from which on the law "in-turn" takes it for an impact."""
+
+quiet: Final = no_log
 
 
 def build(touch: Touch, table: Table, dt: float, law: str | None, slices: str) -> World:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import nullcontext
 from typing import Final
 
 import numpy as np
@@ -59,6 +60,10 @@ def enough_iterations(n_slices: int, mass_ratio: float, slices: str) -> int:
     if slices == "exclude":
         return max(200, math.ceil(8 * n_slices * mass_ratio))
     return max(120, math.ceil(mass_ratio * math.sqrt(n_slices)))
+
+
+quiet: Final = nullcontext
+"""pymunk writes no file."""
 
 
 def build(touch: Touch, table: Table, dt: float, law: str | None, slices: str) -> World:

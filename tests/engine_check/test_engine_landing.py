@@ -211,6 +211,38 @@ def test_the_step_is_halved_until_half_of_it_ends_alike_and_gives_no_energy(monk
     assert certified(monkeypatch, [up, down, down], engine="mujoco-compliant")[:2] == ("undecided", 2)
 
 
+def test_soft_contacts_that_overflow_are_undecided_and_write_no_log(tmp_path, monkeypatch):
+    """Left to itself MuJoCo would set the bottle back to the origin, land that, and write MUJOCO_LOG.TXT."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(landing_compliant, "damping_ratio", lambda *_: 30.0)
+    outcome = engine_check.land(flown(1), FLAT, "mujoco-compliant", dt=1e-4)
+    assert outcome.outcome == "undecided"
+    assert outcome.diagnostics["outcomes"] == ["undecided", "undecided"]
+    assert outcome.reason == "the motion diverged: it left the floating-point range; reduce dt"
+    assert outcome.margin is None
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("place", [math.inf, -math.inf, math.nan])
+def test_a_body_that_leaves_the_floating_point_range_ends_undecided(place):
+    class Lost:
+        setup, settings, ledger, steps = {}, {}, 0.0, 0
+
+        def advance(self):
+            self.steps += 1
+            return ""
+
+        def pose(self):
+            return (0.0, 1.0, 0.1) if self.steps < 3 else (0.0, 1.0, place)
+
+        def energy(self):
+            return 1.0
+
+    run = landed(Lost(), WATER, 1e-4)
+    assert (run.outcome, run.time) == ("undecided", pytest.approx(3e-4))
+    assert "diverged" in run.reason
+
+
 # ---------------------------------------------------------------------- set-up and input
 
 
