@@ -33,7 +33,7 @@ from flipproof.frame.exhibit import drawn
 from flipproof.frame.gather import tell
 from flipproof.frame.pool import Here
 from flipproof.frame.store import RunStore
-from flipproof.landing.design import Case, Scatter, Share, Throws, aimed, make_cases, scattered, wilson
+from flipproof.landing.design import Case, Scatter, Share, Throws, aimed, correlation, make_cases, scattered, wilson
 from flipproof.landing.throw import land_throw, told
 from flipproof.landing.upright import make_upright
 from flipproof.landing.work import LANDING, Landed, flown, make_landing, saddle, touch_readings
@@ -159,6 +159,35 @@ def test_undecided_throws_count_both_ways():
     assert math.isnan(Share(upright=0, undecided=2, throws=2).value)
 
 
+def pairs(both, one, other, neither):
+    """Return the outcomes of paired throws, of which so many stood in both, in one, in the other, in neither."""
+    counts = {(True, True): both, (True, False): one, (False, True): other, (False, False): neither}
+    return tuple(zip(*(pair for pair, count in counts.items() for _ in range(count)), strict=True))
+
+
+@pytest.mark.parametrize(
+    ("table", "phi", "interval"),
+    [
+        ((36, 12, 2, 0), -0.1147, (0.0569, 0.3404)),  # negative: uncorrected
+        ((20, 12, 2, 16), 0.4550, (0.0562, 0.3292)),  # positive: corrected for continuity
+        ((13, 12, 12, 13), 0.0, (-0.1889, 0.1889)),  # no more than the correction
+        ((7, 3, 0, 0), 0.0, (-0.0376, 0.6032)),  # all stood in one: nothing to be correlated with
+    ],
+)
+def test_newcombes_interval_of_paired_throws(table, phi, interval):
+    """Newcombe (1998), method 10."""
+    one, other = pairs(*table)
+    shares = [Share(upright=sum(each), undecided=0, throws=len(each)) for each in (one, other)]
+    assert correlation(one, other) == correlation(other, one) == pytest.approx(phi, abs=1e-4)
+    assert shares[0].minus(shares[1], correlation(one, other))[1:] == pytest.approx(interval, abs=1e-4)
+
+
+def test_throws_that_are_no_pairs_are_independent_samples():
+    one, other = pairs(20, 2, 2, 20)
+    assert correlation(one, other) > 0.7
+    assert correlation(one, other[:-1]) == correlation((None, *one[1:]), other) == correlation((), ()) == 0.0
+
+
 # ---------------------------------------------------------------------- rows
 
 
@@ -261,6 +290,9 @@ def test_the_study_counts_what_it_threw(found):
     assert [value for value, _ in found.along("restitution", "ice")] == [0.0, 0.3]
     assert found.maps["together"].outcome.shape == (4, 3)
     assert set(found.maps) == {"together", "ice"}
+    for cell in found.cells.values():
+        assert len(cell.stood) == cell.share.throws
+        assert (cell.stood.count(True), cell.stood.count(None)) == (cell.share.upright, cell.share.undecided)
     for said, others in found.static.values():
         assert said.throws + others.throws == 12
     # Without scatter every throw of an axis is one throw.
@@ -329,6 +361,11 @@ def test_every_finding_and_figure_says_what_is_assumed(found):
     assert all(len(cells) == len(fills) for _, cells in rows)
 
 
+def test_the_best_filling_is_said_to_be_chosen_by_its_own_throws(found):
+    (finding,) = (each for each in claims(found) if each.id == "landing-best-filling")
+    assert "these two were chosen by the throws it is made of" in finding.note
+
+
 @pytest.mark.parametrize(("of_ice", "verdict"), [(2.0, "holds"), (1.4, "cannot be decided"), (0.0, "fails")])
 def test_the_claim_of_the_bounces_is_judged_by_its_interval(found, of_ice, verdict):
     changed = dict(found.cells)
@@ -346,19 +383,20 @@ def test_the_interval_of_the_mean_bounces_is_that_of_a_mean():
     rows = [Landed(number=k, status="ok", outcome="lying", bounces=k) for k in (1, 2, 3)]
     missed = Landed(number=4, status="missed")
     cell = cell_of(aim, [*rows, missed])
-    assert (cell.bounces, cell.missed) == (2.0, 1)
+    assert (cell.bounces, cell.missed, cell.stood) == (2.0, 1, (False,) * 4)
     assert cell.bounces_band == pytest.approx(1.96 / math.sqrt(3), rel=1e-4, abs=0)
     assert math.isnan(cell_of(aim, rows[:1]).bounces_band)
 
 
 def test_the_distance_between_the_laws_has_an_interval_and_says_which(found):
     changed = dict(found.cells)
-    for kind, upright in (("together", 10), ("in-turn", 30)):
+    for kind, stood in zip(("together", "in-turn"), pairs(10, 0, 20, 10), strict=True):
         key = Key("filling", 0.4, "B", 0.4, kind)
-        changed[key] = replace(changed[key], share=Share(upright=upright, undecided=0, throws=40))
+        share = Share(upright=sum(stood), undecided=0, throws=40)
+        changed[key] = replace(changed[key], share=share, stood=stood)
     (finding,) = (each for each in claims(replace(found, cells=changed)) if each.id == "landing-laws")
-    difference, low, high = Share(upright=30, undecided=0, throws=40).minus(Share(upright=10, undecided=0, throws=40))
-    assert (finding.value, finding.band) == (difference, (high - low) / 2)
+    # Of the same 40 throwers; the interval of independent samples has a half width of 0.1839.
+    assert (finding.value, finding.band) == pytest.approx((0.5, 0.1575), abs=1e-4)
     assert "at filling 0.4, water, in turn minus water, together" in finding.note
 
 

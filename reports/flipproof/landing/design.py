@@ -193,15 +193,38 @@ class Share:
             return 0.0, 1.0
         return wilson(self.upright, self.throws)[0], wilson(self.upright + self.undecided, self.throws)[1]
 
-    def minus(self, other: Share) -> tuple[float, float, float]:
-        """Return the difference of two shares and its 95 % interval (Newcombe's, of two Wilson intervals)."""
+    def minus(self, other: Share, phi: float = 0.0) -> tuple[float, float, float]:
+        """Return the difference of two shares and its 95 % interval: Newcombe's (1998), of two Wilson intervals.
+
+        Without ``phi``, the correlation of paired throws, it is that of independent samples.
+        """
         difference = self.value - other.value
         (low, high), (other_low, other_high) = self.interval, other.interval
+
+        def distance(one: float, another: float) -> float:
+            return math.sqrt(max(one**2 - 2.0 * phi * one * another + another**2, 0.0))
+
         return (
             difference,
-            difference - math.hypot(self.value - low, other_high - other.value),
-            difference + math.hypot(high - self.value, other.value - other_low),
+            difference - distance(self.value - low, other_high - other.value),
+            difference + distance(high - self.value, other.value - other_low),
         )
+
+
+def correlation(one: Sequence[bool | None], other: Sequence[bool | None]) -> float:
+    """Return phi of paired throws that stood or did not, with Newcombe's correction for continuity (1998, method 10).
+
+    It is 0, that of independent samples, if the counts differ, if a throw is undecided (None), or if all end alike.
+    """
+    if len(one) != len(other) or None in one or None in other:
+        return 0.0
+    throws, first, second = len(one), sum(map(bool, one)), sum(map(bool, other))
+    spread = first * (throws - first) * second * (throws - second)
+    both = sum(bool(a and b) for a, b in zip(one, other, strict=True))
+    excess = float(throws * both - first * second)
+    if excess > 0:
+        excess = max(excess - throws / 2, 0.0)
+    return excess / math.sqrt(spread) if spread else 0.0
 
 
 def wilson(count: int, throws: int) -> tuple[float, float]:

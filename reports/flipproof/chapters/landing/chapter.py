@@ -64,7 +64,7 @@ def _water_and_ice(found: Found) -> Iterator[Finding]:
         ice = found.cell("ice", filling)
         if ice is None:
             continue
-        difference, low, high = water.share.minus(ice.share)
+        difference, low, high = water.minus(ice)
         others = {KINDS[kind].words: found.cell(kind, filling) for kind in WATER[1:]}
         laws = ", ".join(f"{law} {cell.share.value:.3f}" for law, cell in others.items() if cell is not None)
         verdict = _judged(low, high, ("water stands more often", "ice stands more often", "undistinguished"))
@@ -86,10 +86,11 @@ def _best_filling(found: Found) -> Finding:
         return pair[1].share.value
 
     best, other = max(inside, key=share), max(outside, key=share)
-    difference, low, high = best[1].share.minus(other[1].share)
+    difference, low, high = best[1].minus(other[1])
     note = (
         f"best inside: {best[0]:g} with {share(best):.3f}, outside: {other[0]:g} with {share(other):.3f}; "
-        f"difference {difference:+.3f}, {_judged(low, high, ('decided', 'decided', 'not decided'))}; {found.assumed}"
+        f"difference {difference:+.3f}, {_judged(low, high, ('decided', 'decided', 'not decided'))}; the interval "
+        f"holds for fillings named beforehand, and these two were chosen by the throws it is made of; {found.assumed}"
     )
     return observed(name, title, max(curve, key=share)[0], note=note)
 
@@ -135,7 +136,7 @@ def _model_uncertainty(found: Found) -> Finding:
     """Return how far the laws of the impact are apart: a band of the model, not of the sample."""
     name, title = "landing-laws", "Largest distance in P(upright) between two laws of the impact, water"
     pairs = [
-        (one.share.minus(other.share), f"at filling {filling:g}, {KINDS[first].words} minus {KINDS[second].words}")
+        (one.minus(other), f"at filling {filling:g}, {KINDS[first].words} minus {KINDS[second].words}")
         for filling in found.size.fillings
         for first, second in itertools.permutations(WATER, 2)
         if (one := found.cell(first, filling)) and (other := found.cell(second, filling))

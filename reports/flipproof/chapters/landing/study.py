@@ -16,7 +16,7 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.landing.design import SPARE, Aim, Case, Scatter, Share, Throws, Z, aimed
+from flipproof.landing.design import SPARE, Aim, Case, Scatter, Share, Throws, Z, aimed, correlation
 from flipproof.landing.work import REFERENCE, Landed
 from ode_reference import fly
 from ode_reference.landing import path
@@ -120,6 +120,7 @@ class Cell:
     Parameters
     ----------
     share : Share - of them upright
+    stood : (bool or None, ...) - whether each of them did, in their order; None if it is undecided
     missed : int - how many did not come down on the table; they count as not upright
     touch : (float, float, float) - means at the touch: |omega| [rad/s], speed [m/s], energy [E_s]
     bounces : float - mean of the landing
@@ -128,10 +129,15 @@ class Cell:
 
     aim: Aim
     share: Share
+    stood: tuple[bool | None, ...]
     missed: int
     touch: tuple[float, ...]
     bounces: float
     bounces_band: float
+
+    def minus(self, other: Cell) -> tuple[float, float, float]:
+        """Return the difference of two shares of the same throwers and its 95 % interval, that of paired throws."""
+        return self.share.minus(other.share, correlation(self.stood, other.stood))
 
 
 @dataclass(frozen=True, slots=True)
@@ -332,6 +338,7 @@ def cell_of(aim: Aim, rows: Sequence[Landed]) -> Cell:
     return Cell(
         aim=aim,
         share=share_of(rows),
+        stood=tuple(row.outcome == "upright" if row.whole else None for row in rows),
         missed=sum(row.status == "missed" for row in rows),
         touch=tuple(map(mean, ("touch_omega", "touch_speed", "touch_energy"))),
         bounces=mean("bounces"),
