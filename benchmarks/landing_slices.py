@@ -4,7 +4,8 @@
     python benchmarks/landing_slices.py --slices 10 20 40     others
 
 Family B, law together, one aim (that of the first number of slices) and the same throwers for all. Prints P(upright),
-the difference from the first with its 95 % interval, and landings and throws per second of process time.
+the difference from the first with its 95 % interval, that of paired throws, and landings and throws per second of
+process time.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import time
 from dataclasses import replace
 
 import ode_reference
-from flipproof.chapters.landing.study import Size, filled, share_of
+from flipproof.chapters.landing.study import Size, cell_of, filled
 from flipproof.landing.design import Case, Throws, aimed, make_cases
 from slicemodel import Scenario, Table
 
@@ -33,14 +34,15 @@ def main() -> int:
         case = Case(aim=replace(aim, throw=aim.throw.with_slices(slices)), law="together", throws=options.throws)
         make_cases([replace(case, throws=1)], Size().seed)  # compiles
         began = time.process_time()
-        share = share_of(make_cases([case], Size().seed)[0])
+        cell = cell_of(case.aim, make_cases([case], Size().seed)[0])
         seconds = time.process_time() - began
+        share = cell.share
         low, high = share.interval
         words = f"N = {slices}: P(upright) = {share.value:.4f} [{low:.4f}, {high:.4f}], {share.undecided} undecided"
         if first is None:
-            first = share
+            first = cell
         else:
-            difference, least, most = share.minus(first)
+            difference, least, most = cell.minus(first)
             inside = inside and least <= 0.0 <= most
             words += f"; difference {difference:+.4f} [{least:+.4f}, {most:+.4f}]"
         print(f"{words}; {options.throws / seconds:.0f} throws/s", flush=True)
