@@ -17,6 +17,7 @@ from flipproof.film.fit.estimate import Effort, estimate, scan
 from flipproof.film.fit.problem import ALWAYS, FAR, Measurement, Problem, first_frames, noise_of, pose, predict
 from flipproof.film.fit.reading import averaged_omega, read_flight
 from flipproof.film.fit.region import HUBER, Landscape, Points, autocovariance, explored, loss, roughness, temperature
+from flipproof.film.measured import read_measured
 from flipproof.film.tracker.kinematics import angle
 from slicemodel import Scenario
 
@@ -350,11 +351,33 @@ def test_a_table_is_cut_from_release_to_landing_and_empty_cells_are_left_out(tmp
     lines = spin(start=1.0)
     lines[10] = lines[10].partition(",")[0] + ","
     path.write_text(rows("# synthetic", *lines))
-    found = read_flight(path, release=1.008333, landing=1.125)
+    found, remarks = read_flight(path, release=1.008333, landing=1.125)
+    assert remarks == []
     assert len(found.t) == 28
     assert found.t[0] == pytest.approx(0.0, abs=1e-6)
     assert found.t[-1] == pytest.approx(28 / 240, abs=2e-6)
     assert found.quantity == "theta"
+
+
+def test_of_a_track_the_flight_alone_is_fitted_unless_its_ends_are_given(tmp_path):
+    path = tmp_path / "track.csv"
+    lines = spin("t,theta,in_flight,t_over_T", start=1.0)
+    for k in range(40):  # 10 rows before the release, 20 in flight from a third of a frame after it, 10 after landing
+        lines[k + 1] += f",{int(10 <= k < 30)},{(k - 10 + 1 / 3) / 20:.9f}"
+    path.write_text(rows(*lines))
+    release, frames = 1.0 + (10 - 1 / 3) / 240, 1.0 + np.arange(40) / 240
+    for asked, began, kept, words in (
+        ({}, release, slice(10, 30), ["rows in flight, times from the release at 1.04028 s"]),
+        ({"landing": 1.1}, release, slice(10, 25), ["release at 1.04028 s, by its columns in_flight and t_over_T"]),
+        ({"release": 1.0}, 1.0, slice(0, 30), ["landing at 1.12083 s, by its column in_flight"]),
+        ({"release": 1.0, "landing": 1.2}, 1.0, slice(0, 40), []),
+    ):
+        found, remarks = read_flight(path, **asked)
+        assert found.t == pytest.approx(frames[kept] - began, abs=1e-5)
+        assert remarks == [f"{path}: {each}" for each in words]
+    own = read_measured(path)
+    assert read_flight(path)[0].t.tolist() == own.t.tolist()
+    assert read_flight(path)[0].values.tolist() == own.values.tolist()
 
 
 def run(*arguments):

@@ -88,8 +88,8 @@ def add_film(commands: Any) -> None:
 
     fit = add_command(commands, "fit", "Estimate drag and restitution from a measured flight.", command_fit)
     fit.add_argument(
-        "file", type=Path, metavar="FILE", help="CSV with columns t [s] and theta [rad] or omega [rad/s], or, with "
-        "--cap and --base, an export of the Tracker video tool",
+        "file", type=Path, metavar="FILE", help="CSV with columns t [s] and theta [rad] or omega [rad/s], of which a "
+        "track.csv gives its flight, or, with --cap and --base, an export of the Tracker video tool",
     )  # fmt: skip
     fit.add_argument("--scenario", metavar="THROW.toml", help=f"what is known: bottle, water, release; {SCENARIO_HELP}")
     fit.add_argument(
@@ -243,7 +243,7 @@ def _read(options: argparse.Namespace) -> tuple[Any, list[str]]:
 
     known = {name: getattr(options, name) for name in ("release", "landing", "noise")}
     if options.cap is None:
-        return read_flight(options.file, quantity=options.quantity, averaged=options.averaged, **known), []
+        return read_flight(options.file, quantity=options.quantity, averaged=options.averaged, **known)
     if options.quantity == "omega" or options.averaged is not None:
         raise ValueError(
             "a Tracker export is fitted by its theta (Eq. 1); --quantity omega and --averaged are for tables"

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.film.fit.problem import Measurement, Quantity
-from flipproof.output.tables import number_of, read_cells
+from flipproof.output.tables import IN_FLIGHT, flight_in, number_of, read_cells
 from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
 
@@ -37,15 +37,16 @@ def read_flight(
     landing: float | None = None,
     noise: float | None = None,
     averaged: int | None = None,
-) -> Measurement:
-    """Read a CSV table with a column t [s] and theta [rad] or omega [rad/s]; other columns and empty cells are skipped.
+) -> tuple[Measurement, list[str]]:
+    """Read a CSV table with a column t [s] and theta [rad] or omega [rad/s]; return it, and remarks on how it was read.
 
-    What cannot be read raises a ValueError that names file, line and column.
+    Other columns and empty cells are skipped. What cannot be read raises a ValueError that names file, line and column.
 
     Parameters
     ----------
     quantity : what to fit; None: theta if the table has it
-    release, landing : [s] by the table's clock; None: its first and last row
+    release, landing : [s] by the table's clock; None: those of the flight in a track of ``flipproof track``, the first
+        and last row of any other table
     noise : standard deviation of one value, if known
     averaged : the table's omega is central differences of theta, averaged over this odd number of points; None: omega
         at the instant
@@ -60,6 +61,17 @@ def read_flight(
     if quantity and quantity not in there:
         raise ValueError(f"{path}: the header has no column {quantity}{has}")
     chosen = quantity or there[0]
+    remarks: list[str] = []
+    if (release is None or landing is None) and (flight := flight_in(path, names, rows)):
+        if release is None and landing is None:
+            rows, release, landing = flight.rows, flight.release, flight.last
+            remarks.append(flight.words)
+        elif release is None:
+            release = flight.release
+            remarks.append(f"{path}: release at {release:.6g} s, by its columns {' and '.join(IN_FLIGHT)}")
+        else:
+            landing = flight.last
+            remarks.append(f"{path}: landing at {landing:.6g} s, by its column {IN_FLIGHT[0]}")
     places = names.index("t"), names.index(chosen)
     table = np.array(
         [[number_of(path, line, names[place], cells[place]) for place in places] for line, cells in rows
@@ -80,7 +92,7 @@ def read_flight(
         raise ValueError(f"{path.name}: landing = {ended:g} s does not follow release = {began:g} s")
     # A frame at the very release may be a rounding before it.
     inside = (t >= began - 1e-9) & (t <= ended + 1e-9)
-    return Measurement(
+    measured = Measurement(
         label=path.name,
         t=np.maximum(t[inside] - began, 0.0),
         values=values[inside],
@@ -88,6 +100,7 @@ def read_flight(
         noise=noise,
         operator=None if averaged is None else partial(averaged_omega, points=averaged),
     )
+    return measured, remarks
 
 
 def read_tracker(path: Path, *, noise: float | None = None, **asked: Any) -> tuple[Measurement, str]:
