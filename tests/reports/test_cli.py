@@ -1,5 +1,6 @@
 """The command line as people meet it: help, results, and one line for every mistake."""
 
+import os
 import re
 import shlex
 import subprocess
@@ -124,6 +125,40 @@ def test_no_command_writes_over_what_it_reads(capsys, tmp_path):
         assert status == 2
         assert re.fullmatch(rf"flipproof: error: {option} .* is a file that this command reads; name another\n", err)
     assert (throw.read_text(), curve.read_text()) == before
+
+
+@pytest.mark.parametrize(
+    ("spec", "files"),
+    [
+        ("mine.py:solve", ["mine.py", "helper.py"]),
+        ("mine:solve", ["mine.py", "helper.py"]),
+        ("parts.mine:solve", ["parts/__init__.py", "parts/mine.py"]),
+        ("cmd:node mine.py --table=helper.py {out}", ["mine.py", "helper.py"]),
+        (f"cmd:node {300 * 'x'} mine.py {{out}}", ["mine.py"]),
+    ],
+)
+@pytest.mark.parametrize("command", [["certify", "SPEC", "--json"], ["simulate", "--solver", "SPEC", "--out"]])
+def test_no_command_writes_over_a_solver_however_it_is_named(capsys, monkeypatch, tmp_path, spec, files, command):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "parts").mkdir()
+    for name in ("mine.py", "helper.py", "parts/__init__.py", "parts/mine.py"):
+        Path(name).write_text("import helper\n")
+    for file in files:
+        status, _, err = run(capsys, *[spec if word == "SPEC" else word for word in command], file)
+        assert (status, Path(file).read_text()) == (2, "import helper\n")
+        assert err == f"flipproof: error: {command[-1]} {file} is a file that this command reads; name another\n"
+
+
+def test_two_options_do_not_write_one_file(capsys, tmp_path):
+    file, link = tmp_path / "both", tmp_path / "link"
+    link.symlink_to(file)
+    compared = ["compare", "eq8", "free-flight", "--slices", "3", "--tolerance", "1"]
+    for other in (file, link, tmp_path / "." / "both"):
+        status, out, err = run(capsys, *compared, "--json", str(file), "--junit", str(other))
+        assert (status, out) == (2, "")
+        assert err == f"flipproof: error: --json {file} is the file of --junit, too; name another\n"
+        assert not file.exists()
+    assert run(capsys, *compared, "--json", os.devnull, "--junit", os.devnull)[0] == 0
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a shell that closes and feeds descriptors")

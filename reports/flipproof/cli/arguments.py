@@ -115,13 +115,21 @@ number = reader("a number in (-1e6, 1e6)", float, lambda value: abs(value) < 1e6
 
 
 def check_outputs(options: argparse.Namespace, *names: str) -> None:
-    """Refuse by a ValueError, before the work begins, files of options that could not be written after it."""
+    """Refuse by a ValueError, before the work begins, files of options that could not be written after it.
+
+    Two options must not name one file; a device or a pipe takes both.
+    """
+    taken: dict[Path, str] = {}
     for name in names:
         path = getattr(options, name)
         if path and path.is_dir():
             raise ValueError(f"--{name} {path} is a folder; name a file")
         if path and not path.parent.is_dir():
             raise ValueError(f"--{name} {path}: the folder {path.parent} does not exist")
+        if path and (path.is_file() or not path.exists()):
+            other = taken.setdefault(path.resolve(), name)
+            if other != name:
+                raise ValueError(f"--{name} {path} is the file of --{other}, too; name another")
 
 
 def refuse_overwriting(options: argparse.Namespace) -> None:
@@ -130,12 +138,22 @@ def refuse_overwriting(options: argparse.Namespace) -> None:
     written = ("out", "json", "junit", "html", "export", "film")
     values = [value if isinstance(value, list) else [value] for name, value in given.items() if name not in written]
     texts = [str(each) for value in values for each in value if isinstance(each, str | Path)]
-    # A spec such as mine.py:solve or csv:file.csv names a file, too.
-    read = [part for text in texts for part in (text, *text.split(":")) if os.path.isfile(part)]
     for name in written:
         path = given.get(name)
-        if isinstance(path, Path) and path.is_file() and any(path.samefile(part) for part in read):
+        if isinstance(path, Path) and path.is_file() and any(path.samefile(file) for file in _read_by(texts)):
             raise ValueError(f"--{name} {path} is a file that this command reads; name another")
+
+
+def _read_by(texts: Sequence[str]) -> Iterator[Path]:
+    """Yield the files that arguments name, themselves or as the spec of a solver."""
+    from flipproof.foreign.specs import files_of, is_spec
+
+    for text in texts:
+        if os.path.isfile(text):
+            yield Path(text)
+        with suppress(ValueError):  # what is no spec is told by the command itself
+            if is_spec(text):
+                yield from (file for _, file in files_of(text) if file.is_file())
 
 
 def add_json(command: argparse.ArgumentParser, what: str) -> None:

@@ -20,6 +20,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import importlib
+import os
 import shlex
 import sys
 from collections.abc import Iterator
@@ -226,7 +227,7 @@ def content_of(spec: str) -> str:
         return ""
     found = hashlib.sha256()
     try:
-        for name, file in sorted(_files(spec)):
+        for name, file in sorted(files_of(spec)):
             found.update(f"{name}\0".encode())
             found.update(hashlib.sha256(file.read_bytes()).digest())
     except OSError as error:
@@ -234,17 +235,17 @@ def content_of(spec: str) -> str:
     return found.hexdigest()
 
 
-def _files(spec: str) -> Iterator[tuple[str, Path]]:
-    """Yield every file that a spec stands for, with the name by which it counts."""
+def files_of(spec: str) -> Iterator[tuple[str, Path]]:
+    """Yield every file that the spec of a foreign solver stands for, with the name by which it counts."""
     how, held = written(spec)
     if how == CSV:
         yield "", Path(held)
         return
     if how == COMMAND:
         for k, word in enumerate(words_of(spec)):
-            file = Path(word.rpartition("=")[2])
-            if file.is_file():
-                yield str(k), file
+            file = word.rpartition("=")[2]
+            if os.path.isfile(file):  # which takes a word that is too long for a name, too
+                yield str(k), Path(file)
         return
     found = locate(spec)
     place = found.module if isinstance(found, EntryPoint) else found[0]
