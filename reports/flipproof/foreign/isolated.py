@@ -103,7 +103,7 @@ class Isolated(Runner):
         # Threads that the solver left behind keep nothing alive.
         code = "from flipproof.foreign import isolated; isolated.serve(); import os; os._exit(0)"
         self._process = subprocess.Popen(
-            [sys.executable, "-c", code],
+            [sys.executable, "-P", "-c", code],  # -P: the working folder is no place of modules
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

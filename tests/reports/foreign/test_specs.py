@@ -3,6 +3,7 @@
 import io
 import shutil
 import sys
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -74,6 +75,23 @@ def test_objects_functions_and_classes_load(tmp_path):
     assert load(f"{file}:Mine").solve(None) == 7
     assert load(f"{file}:solve")(None) == 8
     assert load("math:sqrt")(9.0) == 3.0
+
+
+@pytest.mark.parametrize("spec", ["mine.py:solve", "mine:solve", "parts.mine:solve", "parts/mine.py:solve"])
+def test_of_the_working_folder_a_solver_gets_what_it_imports_and_nothing_else(monkeypatch, tmp_path, spec):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "parts").mkdir()
+    for name in ("queue", "json", "numpy", "flipproof", "slicemodel"):
+        (tmp_path / f"{name}.py").write_text(f"open('{name}.imported', 'w').close()\nraise SystemExit('{name}')\n")
+    body = "import {}\nimport numpy as np\ndef solve(ask):\n    omega = np.full(len(ask.times), {}.SPIN)\n"
+    body += "    return {{'t': ask.times, 'theta': omega * ask.times, 'omega': omega}}\n"
+    for folder in (tmp_path, tmp_path / "parts"):
+        neighbour = "parts.spins" if spec.startswith("parts.") else "spins"
+        (folder / "mine.py").write_text(body.format(neighbour, neighbour))
+        (folder / "spins.py").write_text("SPIN = 7.0\n")
+    with closing(opened(spec)) as runner:
+        assert set(runner(ASK).omega) == {7.0}
+    assert list(tmp_path.glob("*.imported")) == []
 
 
 def test_a_program_answers_by_files(tmp_path):
