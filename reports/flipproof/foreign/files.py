@@ -14,6 +14,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
+import re
 import subprocess
 import tempfile
 from dataclasses import asdict
@@ -40,24 +41,34 @@ def read_answer(path: Path, n_slices: int) -> dict[str, Any]:
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = csv.reader(file)
             header = [name.strip() for name in next(rows, [])]
-            body = [row for row in rows if row]
+            body = [(rows.line_num, row) for row in rows if row]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise AnswerError(f"{path} cannot be read ({error})") from None
     if not header or not body:
         raise AnswerError(f"{path} has no {'rows' if header else 'header'}; columns t, theta, omega are needed")
-    for k, row in enumerate(body):
+    if len(set(header)) < len(header):
+        twice = next(name for name in header if header.count(name) > 1)
+        raise AnswerError(f"{path} names the column {twice!r} twice")
+    cells: dict[str, list[float]] = {name: [] for name in header}
+    for line, row in body:
         if len(row) != len(header):
-            raise AnswerError(f"{path}: line {k + 2} has {len(row)} cells, the header {len(header)}")
-    columns: dict[str, Any] = {}
-    for j, name in enumerate(header):
-        try:
-            columns[name] = np.array([float(row[j]) for row in body])
-        except ValueError as error:
-            raise AnswerError(f"{path}: column {name}: {error}") from None
+            raise AnswerError(f"{path}: line {line} has {len(row)} cells, the header {len(header)}")
+        for name, cell in zip(header, row, strict=True):
+            try:
+                cells[name].append(float(cell))
+            except ValueError as error:
+                raise AnswerError(f"{path}: line {line}, column {name}: {error}") from None
+    columns: dict[str, Any] = {name: np.array(values) for name, values in cells.items()}
     for name in PER_SLICE:
-        parts = [columns.get(f"{name}_{i}") for i in range(n_slices)]
-        if parts[0] is not None and all(part is not None for part in parts):
-            columns[name] = np.column_stack(parts)  # type: ignore[arg-type]
+        needed = [f"{name}_{i}" for i in range(n_slices)]
+        there = [column for column in header if re.fullmatch(rf"{name}_\d+", column)]
+        if there and set(there) != set(needed):
+            raise AnswerError(
+                f"{path} has {len(there)} columns from {there[0]} to {there[-1]}; a throw of {n_slices} slices needs "
+                f"{needed[0]} to {needed[-1]}, or none of them"
+            )
+        if there:
+            columns[name] = np.column_stack([columns[column] for column in needed])
     return columns
 
 

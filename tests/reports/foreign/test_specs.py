@@ -142,6 +142,37 @@ def test_a_curve_answers_at_its_own_times(tmp_path):
     assert list(run.omega) == [20.0, 15.0]
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            "t,theta,omega,r_0,r_1,r_2,r_3\n0,1,2,3,4,5,6\n",
+            "4 columns from r_0 to r_3; a throw of 3 slices needs r_0 to r_2",
+        ),
+        ("t,theta,omega,v_0,v_1\n0,1,2,3,4\n", "2 columns from v_0 to v_1; a throw of 3 slices needs v_0 to v_2"),
+        ("t,theta,omega,r_1,r_2,r_3\n0,1,2,3,4,5\n", "3 columns from r_1 to r_3; a throw of 3 slices needs r_0 to r_2"),
+        ("t,theta,omega,theta\n0,1,2,3\n", "names the column 'theta' twice"),
+        ("t,theta,omega\n0,1,2\n\n\n0.1,1,x\n", "line 5, column omega: could not convert string to float: 'x'"),
+        ("t,theta,omega\n\n0,1,2\n\n0.1,1\n", "line 5 has 2 cells, the header 3"),
+    ],
+)
+def test_a_curve_that_could_be_misread_is_refused(tmp_path, text, said):
+    file = tmp_path / "curve.csv"
+    file.write_text(text)
+    with pytest.raises(ForeignError) as caught:
+        opened(f"csv:{file}", curves=True)(Ask.of(THROW.with_slices(3), np.array([0.0])))
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_slices_of_a_curve_are_read_in_any_order_of_columns(tmp_path):
+    file = tmp_path / "curve.csv"
+    file.write_text("r_1,t,v_2,theta,r_0,omega,v_0,r_2,v_1\n.2,0,6,1,.1,2,4,.3,5\n")
+    answer = opened(f"csv:{file}", curves=True)(Ask.of(THROW.with_slices(3), np.array([0.0])))
+    assert answer.r.tolist() == [[0.1, 0.2, 0.3]]
+    assert answer.v.tolist() == [[4.0, 5.0, 6.0]]
+
+
 def test_a_run_of_a_foreign_solver_is_a_run(tmp_path):
     file = tmp_path / "mine.py"
     file.write_text("def solve(ask):\n    raise ValueError('not today')\n")
