@@ -103,7 +103,7 @@ def add_film(commands: Any) -> None:
     fit.add_argument("--starts", type=count, metavar="K", help="descents from different starts (default 4)")
     fit.add_argument(
         "--minutes", type=_positive, metavar="M", help="time that a fit with another solver, such as mine.py:solve, "
-        "may take: it decides between the usual search, a coarse one and none (default 10)",
+        "may take: it decides between the usual search, a coarse one and none, and ends the search (default 10)",
     )  # fmt: skip
     fit.add_argument("--slices", type=count, metavar="N", help="slices of every throw, alpha/2m unchanged (50)")
     fit.add_argument("--quantity", choices=("theta", "omega"), help="column to fit (theta if there is one)")
@@ -260,33 +260,33 @@ def _estimates(problems: Sequence[Any], starts: int | None, minutes: float | Non
 
     searches = []
     for problem in problems:
-        effort, planned = USUAL, None
+        effort, seconds = USUAL, math.inf
         if is_foreign(problem.solver):
             budget = affordable(problem, minutes or MINUTES)
             print(f"flipproof: {problem.solver}: {budget.words}", file=sys.stderr, flush=True)
-            effort, planned = budget.effort, budget.flights
-        searches.append((problem, replace(effort, starts=starts) if starts else effort, planned))
+            effort, seconds = budget.effort, 60.0 * budget.minutes
+        searches.append((problem, replace(effort, starts=starts) if starts else effort, seconds))
     estimates = []
-    for problem, effort, planned in searches:
+    for problem, effort, seconds in searches:
         with progress_bar(problem.solver, "flight") as step:
-            estimates.append(estimate(problem, effort, tick=_ticker(step, problem.solver, planned)))
+            tick = _ticker(step, problem.solver, is_foreign(problem.solver))
+            estimates.append(estimate(problem, effort, seconds=seconds, tick=tick))
     return estimates
 
 
-def _ticker(step: Callable[..., None], solver: str, planned: int | None) -> Callable[[int], object]:
-    """Return what counts flights: the bar of a terminal, and lines in a log of a search that was estimated."""
+def _ticker(step: Callable[..., None], solver: str, slow: bool) -> Callable[[int], object]:
+    """Return what counts flights: the bar of a terminal, and lines in a log of a search that may be ``slow``."""
     began = time.perf_counter()
     made, due = 0, began + LINE
 
     def tick(count: int) -> None:
         nonlocal made, due
         made += count
-        step(made, planned)
+        step(made, None)
         now = time.perf_counter()
-        if planned and now >= due and not sys.stderr.isatty():
+        if slow and now >= due and not sys.stderr.isatty():
             due = now + LINE
-            words = f"flipproof: {solver}: {made} of at most about {planned} flights in {now - began:.0f} s"
-            print(words, file=sys.stderr, flush=True)
+            print(f"flipproof: {solver}: {made} flights in {now - began:.0f} s", file=sys.stderr, flush=True)
 
     return tick
 

@@ -236,4 +236,9 @@ def _fit_lines(one: Contender) -> list[str]:
         f"{math.sqrt(max(1.0, estimate.temperature)):.2f} times wider for misfit or shared noise, "
         f"{math.sqrt(estimate.roughness):.2f} for roughness"
     )
+    if not estimate.complete:
+        lines.append(
+            "  time         did not suffice for the whole search: a lower chi^2 may have been missed, and intervals "
+            "are less certain; give more --minutes"
+        )
     return lines

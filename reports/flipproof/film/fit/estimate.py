@@ -7,11 +7,13 @@ and beyond them is left to an even filling of all that the data allow (``region`
 three has seen is descended from once more.
 
 flipproof's own equations make a flight in less than a millisecond and a usual search in seconds; a solver in a process
-of its own may take a thousand times as long, so a ``Budget`` says which search a given time allows.
+of its own may take a thousand times as long, so a ``Budget`` says which search a given time allows, and the search
+leaves out what there is no time for.
 """
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -50,6 +52,9 @@ class Effort:
     again: bool = True
 
 
+DESCENT: Final = 12
+"""Trial points of a descent from the scan, at the most; each may take difference quotients, too."""
+
 USUAL: Final = Effort()
 """The search that is made unless another is asked for."""
 
@@ -69,6 +74,7 @@ class Estimate:
     reach : (2, K) - lowest and highest of each coordinate at which chi^2, all others fitted, exceeds the lowest by no
         more than ``LIKELY * temperature * roughness``
     flights : int - runs of the solver
+    complete : bool - whether the time sufficed for the whole search
     """
 
     problem: Problem
@@ -80,6 +86,7 @@ class Estimate:
     cloud: FloatArray
     reach: FloatArray
     flights: int
+    complete: bool
 
     @property
     def freedom(self) -> int:
@@ -91,19 +98,28 @@ class Estimate:
         return np.asarray(self.problem.measured.values - self.problem.predicted(self.x[np.newaxis])[0])
 
 
-def estimate(problem: Problem, effort: Effort = USUAL, *, tick: Tick = lambda _: None, seed: int = 0) -> Estimate:
+def estimate(
+    problem: Problem,
+    effort: Effort = USUAL,
+    *,
+    seconds: float = math.inf,
+    tick: Tick = lambda _: None,
+    seed: int = 0,
+) -> Estimate:
     """Return the least-squares estimate and what else the data allow.
 
-    ``tick`` is called with the number of flights made; ``seed`` is that of the noise that is simulated to correct
-    intervals for roughness.
+    What ``seconds`` do not suffice for is left out. ``tick`` is called with the number of flights made; ``seed`` is
+    that of the noise that is simulated to correct intervals for roughness.
     """
-    land = Landscape(problem, tick=tick)
+    land = Landscape(problem, tick=tick, seconds=seconds)
     scanned, ends = _descents(land, effort.grid, effort.starts)
     if effort.again and not fits(float(loss(land.residuals(ends)).min()), len(problem.measured.t) - len(problem.free)):
         # Either the equation is wrong, or every descent ended in a side minimum: look between the starts.
         drags, restitutions = effort.grid
-        more = _descents(land, (2 * drags + 1, 2 * restitutions + 1), 4 * effort.starts)
-        scanned, ends = (np.concatenate(pair) for pair in zip((scanned, ends), more, strict=True))
+        finer, many = (2 * drags + 1, 2 * restitutions + 1), 4 * effort.starts
+        if land.affords(_most(land, finer, many) + effort.points):
+            more = _descents(land, finer, many)
+            scanned, ends = (np.concatenate(pair) for pair in zip((scanned, ends), more, strict=True))
 
     # What no parameter explains must not be weighed as if it were noise: it would all be outliers.
     residuals = land.residuals(ends)
@@ -112,7 +128,10 @@ def estimate(problem: Problem, effort: Effort = USUAL, *, tick: Tick = lambda _:
     land.scale = typical if typical > 2.0 else 1.0
     levels = loss(residuals / land.scale)
     order = np.argsort(levels)
-    around = _around(land, ends[levels <= levels.min() + 30.0])
+    near = ends[levels <= levels.min() + 30.0]
+    if not land.affords(len(scanned) + len(ends) + 18 * near.size + effort.points):
+        near = ends[order[:1]]
+    around = _around(land, near)
     known = Points.flown(land, np.concatenate((scanned, ends, around)))
     best, lowest = ends[order[0]], float(levels[order[0]])
     variance, rough, needed = temperature(land, best, steps), 1.0, REACH
@@ -130,7 +149,7 @@ def estimate(problem: Problem, effort: Effort = USUAL, *, tick: Tick = lambda _:
         variance = temperature(land, best, steps)
         rough = roughness(known, variance, seed)
         needed = max(REACH, 1.2 * LIKELY * rough)
-        if 0.8 * needed * variance <= within <= 1.25 * needed * variance:
+        if 0.8 * needed * variance <= within <= 1.25 * needed * variance or not land.affords(effort.points):
             break
     likely = known.x[known.chi2 <= lowest + LIKELY * variance * rough]
     if not len(likely):
@@ -140,14 +159,27 @@ def estimate(problem: Problem, effort: Effort = USUAL, *, tick: Tick = lambda _:
         temperature=variance * land.scale**2, roughness=rough,
         minima=np.column_stack((ends, loss(residuals)))[order], cloud=known.x[known.drawn(variance)],
         reach=np.array([likely.min(axis=0), likely.max(axis=0)]), flights=land.flights,
+        complete=land.complete,
     )  # fmt: skip
 
 
 def _descents(land: Landscape, counts: tuple[int, int], starts: int) -> tuple[FloatArray, FloatArray]:
-    """Return the points of a scan, and where the descents from its best ended."""
+    """Return the points of a scan, and where the descents from its best ended, one at the least."""
     scanned = scan(land, counts)
     coarse = land.problem.coarse_steps()
-    return scanned, np.array([land.descend(x, coarse, 12)[0] for x in scanned[:starts]])
+    ends: list[FloatArray] = []
+    for x in scanned[:starts]:
+        if ends and not land.affords(_most(land, (0, 0), 1)):
+            break
+        ends.append(land.descend(x, coarse, DESCENT)[0])
+    return scanned, np.array(ends)
+
+
+def _most(land: Landscape, counts: tuple[int, int], starts: int) -> int:
+    """Return how many flights ``_descents`` makes at most, with those at its points and around its ends after it."""
+    free = len(land.low)
+    a_point = 2 if free == 2 else 2 + free
+    return math.prod(counts) * a_point + starts * (DESCENT * (1 + 2 * free) + 1 + 18 * free)
 
 
 def _around(land: Landscape, ends: FloatArray) -> FloatArray:
@@ -200,34 +232,42 @@ def _levelled(land: Landscape, points: FloatArray) -> tuple[FloatArray, FloatArr
 # ---------------------------------------------------------------------- what a search costs
 
 COARSE: Final = Effort(grid=(5, 4), starts=2, points=60, again=False)
-"""A search of a quarter to a sixth of the flights: the same estimates, and ends of intervals that are less certain."""
+"""A search of about a quarter of the flights: mostly the same estimates, ends of intervals that are less certain."""
 
 MINUTES: Final = 10.0
 """Time that a fit with somebody else's solver may take unless another is given."""
 
-FLIGHTS: Final = MappingProxyType({USUAL: (-2400, 1800), COARSE: (-100, 250)})
-"""Search -> flights that it makes at most, about: the first number, and the second for each fitted parameter."""
+FLIGHTS: Final = MappingProxyType({USUAL: (1100, 1800, 3000), COARSE: (300, 450, 700)})
+"""Search -> flights that it makes at least, about, if two, three or four parameters are fitted; three times as many are
+common, and a rough landscape or an equation that does not fit takes up to eight times as many."""
+
+ROOM: Final = 3.0
+"""Times the flights that it makes at least for which the usual search must have time."""
 
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """The search that the time allows, the flights it makes at most, and the seconds that one takes."""
+    """The search that the time allows, the flights it makes at least, the seconds that one takes, and the minutes."""
 
     effort: Effort
     flights: int
     seconds: float
-
-    @property
-    def time(self) -> str:
-        """What the search takes at most, in words."""
-        seconds = self.flights * self.seconds
-        return f"{seconds:.0f} s" if seconds < 90.0 else f"{seconds / 60.0:.0f} min"
+    minutes: float
 
     @property
     def words(self) -> str:
         """What the search will take."""
         kind = "" if self.effort == USUAL else "; a coarse search, since --minutes allows no more"
-        return f"{self.seconds:.2g} s a flight, at most about {self.flights} flights: {self.time}{kind}"
+        least = in_words(self.flights * self.seconds)
+        return (
+            f"{self.seconds:.2g} s a flight, about {self.flights} flights or more: {least} or more; it leaves out what "
+            f"--minutes {self.minutes:g} do not suffice for{kind}"
+        )
+
+
+def in_words(seconds: float) -> str:
+    """Return a time in seconds or minutes."""
+    return f"{seconds:.2g} s" if seconds < 90.0 else f"{seconds / 60.0:.0f} min"
 
 
 def affordable(problem: Problem, minutes: float = MINUTES) -> Budget:
@@ -246,12 +286,13 @@ def affordable(problem: Problem, minutes: float = MINUTES) -> Budget:
 
 def chosen(problem: Problem, seconds: float, minutes: float) -> Budget:
     """Return the best search that ``minutes`` allow if a flight takes so many ``seconds``; raise as ``affordable``."""
-    for effort, (once, each) in FLIGHTS.items():
-        budget = Budget(effort, once + each * len(problem.free), seconds)
-        if budget.flights * seconds <= 60.0 * minutes:
+    for effort, least in FLIGHTS.items():
+        budget = Budget(effort, least[len(problem.free) - 2], seconds, minutes)
+        if budget.flights * seconds * (ROOM if effort == USUAL else 1.0) <= 60.0 * minutes:
             return budget
     raise ValueError(
         f"model = {problem.solver!r} takes {seconds:.2g} s a flight; even a coarse fit makes about {budget.flights} of "
-        f"them, {budget.time}, more than --minutes {minutes:g}: take fewer --slices, a longer step in the solver, "
-        f"or more --minutes; flipproof place says which of flipproof's own equations fits as well in seconds"
+        f"them or more, {in_words(budget.flights * seconds)}, more than --minutes {minutes:g}: take fewer --slices, a "
+        f"longer step in the solver, or more --minutes; flipproof place says which of flipproof's own equations fits "
+        f"as well in seconds"
     )

@@ -124,4 +124,5 @@ def _fit(one: Contender) -> dict[str, Any]:
         "roughness": estimate.roughness,
         "descents": estimate.minima.tolist(),
         "flights": estimate.flights,
+        "complete": estimate.complete,
     }

@@ -9,9 +9,11 @@ and the farthest of them below a bound of chi^2 are the ends of a profile likeli
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from time import perf_counter
 from typing import Final
 
 import numpy as np
@@ -34,13 +36,28 @@ Tick = Callable[[int], object]
 class Landscape:
     """chi^2 of a problem, and how often it was asked for; ``tick`` is called with the number of flights made.
 
-    Residuals are divided by ``problem.noise * scale`` before the loss.
+    Residuals are divided by ``problem.noise * scale`` before the loss. ``seconds`` are those that a search may take;
+    ``complete`` is True until something was left out for want of them.
     """
 
-    def __init__(self, problem: Problem, *, tick: Tick = lambda _: None) -> None:
+    def __init__(self, problem: Problem, *, tick: Tick = lambda _: None, seconds: float = math.inf) -> None:
         self.problem, self.tick = problem, tick
         self.low, self.high = problem.bounds()
         self.scale, self.flights = 1.0, 0
+        self.seconds, self.began, self.complete = seconds, perf_counter(), True
+
+    def affords(self, flights: int) -> bool:
+        """Return whether there is time for so many more flights and a last descent; if not, the search is incomplete.
+
+        They are taken to last as long as those that were made.
+        """
+        if math.isinf(self.seconds):
+            return True
+        took = perf_counter() - self.began
+        more = flights + 12 * (1 + 2 * len(self.low))
+        enough = took + took / max(1, self.flights) * more <= self.seconds
+        self.complete = self.complete and enough
+        return enough
 
     def residuals(self, points: FloatArray) -> FloatArray:
         """Return the residuals at many points (M, K) in standard deviations, shape (M, P)."""
@@ -162,7 +179,8 @@ def _extent(centre: FloatArray, axes: FloatArray, x: FloatArray) -> tuple[FloatA
 def explored(land: Landscape, seeds: Points, within: float, count: int) -> Points:
     """Return ``count`` points or more, spread evenly over where chi^2 exceeds its lowest value by at most ``within``.
 
-    ``seeds`` are the points to begin with; at least 12 for each parameter tell where a box lies.
+    They are fewer, and less even, if there is no time for more. ``seeds`` are the points to begin with; at least 12 for
+    each parameter tell where a box lies.
     """
     dimensions = len(land.low)
     sequence, least = Halton(dimensions, scramble=False), 1e-12 * (land.high - land.low)
@@ -177,6 +195,8 @@ def explored(land: Landscape, seeds: Points, within: float, count: int) -> Point
             break
         x = box.at(sequence.random(count))
         pool = pool.with_more(Points.flown(land, x[((x >= land.low) & (x <= land.high)).all(axis=1)]))
+        if len(pool.x) > first and not land.affords(count):
+            break
     return pool.below(float(pool.chi2.min()) + within, fewest, first)
 
 
