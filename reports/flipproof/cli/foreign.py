@@ -184,27 +184,29 @@ def command_power(options: argparse.Namespace) -> int:
     from flipproof.foreign.mistakes import MISTAKES
     from flipproof.foreign.power import CLEAN, claim_power, detect, matrix_csv
     from flipproof.frame.pool import workers
-    from flipproof.output.folder import write_text
+    from flipproof.output.folder import check_replaceable, replaced_folder, write_text
 
+    if options.out is not None:
+        check_replaceable(options.out, "power")
     found = []
     with workers(options.jobs) as pool:
         for caught in pool.map(detect, [CLEAN, *MISTAKES]):
             seen = ", ".join(caught.checks) or "no check"
             print(f"{caught.mistake:22} {caught.words} Seen by: {seen}", flush=True)
             found.append(caught)
+    claims = claim_power(found)
     if options.out is not None:
         from flipproof.figures.power import figure_power
         from flipproof.figures.style import draw
 
-        options.out.mkdir(parents=True, exist_ok=True)
         drawing = draw(figure_power(found))
-        write_text(options.out / "power.csv", matrix_csv(found))
-        write_text(options.out / "power.svg", drawing.svg)
-        (options.out / "power.png").write_bytes(drawing.png)
-    claims = claim_power(found)
+        with replaced_folder(options.out, "power") as folder:
+            write_text(folder / "power.csv", matrix_csv(found))
+            write_text(folder / "power.svg", drawing.svg)
+            (folder / "power.png").write_bytes(drawing.png)
+            write_junit(folder / "junit.xml", claims, "flipproof power")
     for claim in claims:
         verdict = "FAIL" if claim.failed else "PASS"
         print(f"{verdict}  {claim.title}: {claim.value:g} {claim.unit} {claim.note}".rstrip())
-    write_junit(options.out and options.out / "junit.xml", claims, "flipproof power")
     sys.stdout.flush()
     return 1 if any(claim.failed for claim in claims) else 0

@@ -4,7 +4,9 @@ import json
 import re
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from made_up import command as run
@@ -161,3 +163,32 @@ def test_box2d_has_the_threshold_and_the_floor_its_passport_names():
     for _, floor in found.values():
         assert floor.found.facts["arithmetic"] == "float32"
         assert len(floor.found.facts["changes"]) <= 2
+
+
+def test_power_replaces_only_what_it_wrote_and_refuses_the_rest_before_the_work(tmp_path, monkeypatch, capsys):
+    from flipproof.foreign.power import CLEAN, Caught
+
+    def detect(mistake):
+        asked.append(mistake)
+        return Caught(mistake, "words.", () if mistake == CLEAN else ("ice",))
+
+    @contextmanager
+    def workers(jobs):
+        yield SimpleNamespace(map=map)
+
+    asked = []
+    monkeypatch.setattr("flipproof.foreign.power.detect", detect)
+    monkeypatch.setattr("flipproof.frame.pool.workers", workers)
+    theirs, file, out = tmp_path / "theirs", tmp_path / "file", tmp_path / "out"
+    theirs.mkdir()
+    (theirs / "junit.xml").write_text("theirs")
+    file.write_text("theirs")
+    for place, words in ((theirs, "holds junit.xml"), (file, "is a file; --out names a folder")):
+        status, _, err = run(capsys, "power", "--out", str(place))
+        assert status == 2
+        assert words in err
+    assert not asked
+    assert (theirs / "junit.xml").read_text() == file.read_text() == "theirs"
+    for _ in range(2):
+        assert run(capsys, "power", "--out", str(out))[0] == 0
+    assert {entry.name for entry in out.iterdir()} == {".flipproof", "power.csv", "power.svg", "power.png", "junit.xml"}
