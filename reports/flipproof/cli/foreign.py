@@ -131,6 +131,7 @@ def command_place(options: argparse.Namespace) -> int:
     from flipproof.foreign.specs import ForeignError, opened
 
     with closing(opened(options.spec, options.timeout)) as runner, patience():
+        _ = runner.traits  # loads the solver: one that cannot be loaded is an error, not off the lattice
         try:
             found = place(runner)
         except ForeignError as error:

@@ -192,3 +192,12 @@ def test_power_replaces_only_what_it_wrote_and_refuses_the_rest_before_the_work(
     for _ in range(2):
         assert run(capsys, "power", "--out", str(out))[0] == 0
     assert {entry.name for entry in out.iterdir()} == {".flipproof", "power.csv", "power.svg", "power.png", "junit.xml"}
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_solver_that_cannot_be_loaded_is_no_solver_off_the_lattice(capsys):
+    for command in ("place", "certify"):
+        status, out, err = run(capsys, command, "mine.py:nope")
+        assert (status, out) == (2, "")
+        assert "mine.py:nope cannot be loaded" in err
+        assert "throws" not in err
