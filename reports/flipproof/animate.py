@@ -94,20 +94,20 @@ def film_of(runs: Sequence[Trajectory], t: FloatArray, *, fps: int, slow: float)
     return Film(throw=runs[0].scenario, t=t, flights=tuple(flight_of(run, t) for run in runs), fps=fps, slow=slow)
 
 
-def check_target(path: Path) -> None:
-    """Refuse by a FilmError a file that could not be written after all the work.
+def check_target(path: Path, option: str = "--out") -> None:
+    """Refuse by a FilmError that names the ``option`` a file that could not be written after all the work.
 
     Its name has another ending, its folder is not there, it is a folder, or ffmpeg is needed and missing.
     """
     if path.suffix.lower() not in (".gif", ".mp4"):
-        raise FilmError(f"--out {path}: the name ends in {path.suffix or 'nothing'} (admissible: .gif, .mp4)")
+        raise FilmError(f"{option} {path}: the name ends in {path.suffix or 'nothing'} (admissible: .gif, .mp4)")
     if path.is_dir():
-        raise FilmError(f"--out {path} is a folder; name a file")
+        raise FilmError(f"{option} {path} is a folder; name a file")
     if not path.parent.is_dir():
-        raise FilmError(f"--out {path}: the folder {path.parent} does not exist")
+        raise FilmError(f"{option} {path}: the folder {path.parent} does not exist")
     if path.suffix.lower() == ".mp4" and shutil.which(ENCODER) is None:
         raise FilmError(
-            f"--out {path}: MP4 needs the program {ENCODER}, which is not on the PATH; install it, or name a .gif"
+            f"{option} {path}: MP4 needs the program {ENCODER}, which is not on the PATH; install it, or name a .gif"
         )
 
 

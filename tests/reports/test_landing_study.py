@@ -583,7 +583,7 @@ def test_an_outcome_that_no_program_certifies_is_told_with_its_reason():
         (["land", "--programs", "box2d"], "program = 'box2d' is unknown"),
         (["land", "--slices", "0"], "'0' is not a whole number of at least 1"),
         (["land", "--slow", "0", "--film", "x.gif"], "--slow 0 is outside (0, inf)"),
-        (["land", "--film", "x.txt"], "admissible: .gif, .mp4"),
+        (["land", "--film", "x.txt"], "--film x.txt: the name ends in .txt (admissible: .gif, .mp4)"),
         (["upright", "--out", "x", "--throws", "0"], "'0' is not a whole number of at least 1"),
         (["upright", "--out", "x", "--fillings", "0.2,1.2"], "1.2 is outside (0, 1]"),
         (["upright", "--out", "x", "--families", "C"], "--families 'C' is unknown"),

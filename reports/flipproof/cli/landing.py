@@ -97,7 +97,7 @@ def command_land(options: argparse.Namespace) -> int:
     if options.film:
         from flipproof.animate import check_target
 
-        check_target(options.film)
+        check_target(options.film, "--film")
     Table(height=0.0, restitution=options.restitution, friction=options.friction)
     height = options.height
     if options.aim:
