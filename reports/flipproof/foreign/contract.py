@@ -16,6 +16,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass, moment_of_inertia
@@ -238,11 +239,19 @@ def numbers_of(name: str, value: object, shape: tuple[int, ...]) -> FloatArray:
         words = {"c": "complex numbers", "U": "text", "S": "text", "O": "objects", "b": "truth values"}
         kind = words.get(array.dtype.kind, str(array.dtype))
         raise AnswerError(f"{name} holds {kind}; real numbers are needed")
+    masked = np.ma.getmaskarray(value) if isinstance(value, np.ma.MaskedArray) else np.zeros(shape, dtype=bool)
+    if masked.any():
+        raise AnswerError(f"{name}{_first(masked)} is masked; a number is needed")
     array = np.ascontiguousarray(array, dtype=np.float64)
     if not np.isfinite(array).all():
-        where = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
-        raise AnswerError(f"{name}[{', '.join(map(str, where))}] = {array[where]} is not finite")
+        wrong = ~np.isfinite(array)
+        raise AnswerError(f"{name}{_first(wrong)} = {array[wrong][0]} is not finite")
     return array
+
+
+def _first(wrong: NDArray[np.bool_]) -> str:
+    """Return the index of the first True, in brackets."""
+    return f"[{', '.join(str(k) for k in np.argwhere(wrong)[0])}]"
 
 
 def _length(name: str, value: object, needed: int | None = None) -> int:
@@ -278,6 +287,11 @@ def _impacts_of(given: object, n_slices: int) -> Impacts:
         raise AnswerError("impacts.end holds other numbers than 1 (base) and -1 (cap)")
     if count and not (arrays["slice"].min() >= 0 and arrays["slice"].max() < n_slices):
         raise AnswerError(f"impacts.slice leaves [0, {n_slices - 1}]")
+    broken = arrays["slice"] % 1.0 != 0.0
+    if broken.any():
+        raise AnswerError(
+            f"impacts.slice{_first(broken)} = {arrays['slice'][broken][0]:g} is no whole number in [0, {n_slices - 1}]"
+        )
     return Impacts(**arrays)  # type: ignore[arg-type]
 
 

@@ -111,12 +111,23 @@ def test_impacts_come_as_rows_columns_or_mappings():
         ([(0.1, 0, 1)], "impacts are no rows"),
         ([(0.1, 0, 2, 1.0, 0.5)], "impacts.end holds other numbers"),
         ([(0.1, -1, 1, 1.0, 0.5)], "impacts.slice leaves"),
+        ([(0.1, 0, 1, 1.0, 0.5), (0.2, 0.5, 1, 1.0, 0.5)], r"impacts.slice\[1\] = 0.5 is no whole number in \[0, "),
         ([(math.nan, 0, 1, 1.0, 0.5)], r"impacts.time\[0\] = nan is not finite"),
     ],
 )
 def test_impacts_that_are_none_are_refused(impacts, said):
     with pytest.raises(AnswerError, match=said):
         answer_of(ASK, CURVE | {"impacts": impacts})
+
+
+@pytest.mark.parametrize("name", ["t", "omega", "r"])
+def test_masked_values_are_no_numbers(name):
+    given = CURVE | {"r": np.tile(ASK.start, (len(ASK.times), 1))}
+    masked = np.ma.array(given[name], mask=False)
+    assert np.array_equal(getattr(answer_of(ASK, given | {name: masked}), name), given[name])
+    masked[1] = np.ma.masked
+    with pytest.raises(AnswerError, match=rf"{name}\[1(, 0)?\] is masked; a number is needed"):
+        answer_of(ASK, given | {name: masked})
 
 
 def test_a_run_that_broke_off_is_no_answer():
