@@ -173,7 +173,7 @@ def test_power_replaces_only_what_it_wrote_and_refuses_the_rest_before_the_work(
         return Caught(mistake, "words.", () if mistake == CLEAN else ("ice",))
 
     @contextmanager
-    def workers(jobs):
+    def workers(_jobs):
         yield SimpleNamespace(map=map)
 
     asked = []
