@@ -378,7 +378,11 @@ class Scenario:
         problem = not_whole("n_slices", n_slices, 1, MOST_SLICES)
         if problem:
             raise ScenarioError(problem)
-        return replace(self, n_slices=int(n_slices), drag=self.drag * self.n_slices / int(n_slices))
+        try:
+            return replace(self, n_slices=int(n_slices), drag=self.drag * self.n_slices / int(n_slices))
+        except ScenarioError as error:
+            given = f"drag = {self.drag:g} kg/s of {self.n_slices} slices was given and is cut to {n_slices}"
+            raise ScenarioError(f"{error}; {given}, alpha/2m unchanged") from None
 
     # ------------------------------------------------------------------ files
 
