@@ -158,7 +158,10 @@ def command_kit(options: argparse.Namespace) -> int:
     from flipproof.foreign.files import Kit
 
     traits = {name: getattr(options, name) for name in ("name", "equation", "refined_by", "precision", "order")}
-    kit = Kit.made(options.out, Traits(**traits))
+    try:
+        kit = Kit.made(options.out, Traits(**traits))
+    except OSError as error:
+        raise ValueError(f"--out {options.out} cannot be written ({error.strerror or error})") from None
     asks = f"{len(kit.asks)} asks in {options.out / 'asks'}"
     print(f"{asks}: write answer.csv beside each scenario.toml (columns t, theta,")
     print(f"omega; r_0 to r_(N-1) if you have them), then run: flipproof grade {options.out}")

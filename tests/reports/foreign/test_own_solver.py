@@ -201,3 +201,22 @@ def test_a_solver_that_cannot_be_loaded_is_no_solver_off_the_lattice(capsys):
         assert (status, out) == (2, "")
         assert "mine.py:nope cannot be loaded" in err
         assert "throws" not in err
+
+
+def test_a_kit_where_no_folder_can_be_made_is_refused_in_words(tmp_path, capsys):
+    (tmp_path / "file").write_text("theirs")
+    status, _, err = run(capsys, "kit", "--out", str(tmp_path / "file" / "kit"))
+    assert status == 2
+    assert "file/kit cannot be written (Not a directory)" in err
+    assert "Errno" not in err
+
+
+def test_a_drag_that_other_slices_make_too_large_is_said_as_it_was_given(tmp_path, capsys):
+    from slicemodel import Scenario
+
+    (tmp_path / "big.toml").write_text(Scenario(n_slices=5, drag=1e15).to_toml())
+    given = ["simulate", str(tmp_path / "big.toml"), "--slices", "3", "--out", str(tmp_path / "x.csv")]
+    status, _, err = run(capsys, *given)
+    assert status == 2
+    assert "drag = 1666666666666666.8 kg/s is outside [0, 1e+15]" in err
+    assert "drag = 1e+15 kg/s of 5 slices was given" in err
