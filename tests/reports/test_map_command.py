@@ -255,7 +255,7 @@ def test_the_waterfall_command_draws_every_observable(capsys, tmp_path, monkeypa
     status, out, err = run(capsys, *options, "--quiet")
     assert (status, err) == (0, "")
     assert "published program" in out
-    assert "164 points" in out
+    assert "328 points" in out
     for observable in OBSERVABLES:
         assert (tmp_path / "out" / f"waterfall-{observable.name}.png").stat().st_size > 10_000
     drawn = Drawing("<svg/>", b"anew")

@@ -211,8 +211,10 @@ def plan_split(throw: Scenario) -> list[Run]:
 
 
 def releases(runs: list[Run]) -> dict[str, list[Value]]:
-    """Return the fields of a scenario in which the runs differ: twins are released a little faster."""
-    return {"omega0": list(dict.fromkeys(run.scenario.omega0 for run in runs))}
+    """Return the fields in which the throws differ: those of twins have a little more spin and a heavier bottle."""
+    throws = [run.scenario for run in runs]
+    fields = {"omega0": [throw.omega0 for throw in throws], "bottle.mass": [throw.bottle.mass for throw in throws]}
+    return {name: list(dict.fromkeys(values)) for name, values in fields.items()}
 
 
 def make_split(throw: Scenario, out: Path, begin: Begin, **how: Any) -> str:
