@@ -261,7 +261,7 @@ def test_the_waterfall_command_draws_every_observable(capsys, tmp_path, monkeypa
     drawn = Drawing("<svg/>", b"anew")
     monkeypatch.setattr("flipproof.sweep.planned.draw", lambda _: drawn)
     status, out, _ = run(capsys, *options)
-    assert "; 164 were there" in out
+    assert "; 328 were there" in out
     for observable in OBSERVABLES:
         assert (tmp_path / "out" / f"waterfall-{observable.name}.png").read_bytes() == b"anew"
 
