@@ -31,7 +31,7 @@ IMPEDANCE: Final = "0.9999 0.9999 0.001 0.5 2"
 """``solimp``: nearly all of the constraint's force at any depth, so that the spring is linear."""
 
 HIGHEST_RATIO: Final = 3.0
-"""Largest damping ratio of a contact: it rebounds with 0.02, and leaves the table within some milliseconds."""
+"""Largest damping ratio of a contact: with steps of 2e-5 s and less it rebounds with 0.02, the least there."""
 
 MISSED: Final = 1e-3
 """Largest difference between the restitution asked for and that of a drop."""

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.ndimage import minimum_filter
 
 from flipproof.film.fit.problem import Problem
-from flipproof.film.fit.region import Landscape, Points, Tick, explored, fits, loss, roughness, temperature
+from flipproof.film.fit.region import DESCENT, Landscape, Points, Tick, explored, fits, loss, roughness, temperature
 from flipproof.frame.solvers import solve
 from slicemodel.trajectory import FloatArray
 
@@ -51,9 +51,6 @@ class Effort:
     points: int = 400
     again: bool = True
 
-
-DESCENT: Final = 12
-"""Trial points of a descent from the scan, at the most; each may take difference quotients, too."""
 
 USUAL: Final = Effort()
 """The search that is made unless another is asked for."""

@@ -30,6 +30,9 @@ HUBER: Final = 3.0
 """Residuals beyond this many standard deviations count linearly (Huber's loss), so that a slipped marker does not
 decide; within it nothing changes."""
 
+DESCENT: Final = 12
+"""Trial points of a descent from the scan, at the most; each may take difference quotients, too."""
+
 Tick = Callable[[int], object]
 
 
@@ -54,7 +57,7 @@ class Landscape:
         if math.isinf(self.seconds):
             return True
         took = perf_counter() - self.began
-        more = flights + 12 * (1 + 2 * len(self.low))
+        more = flights + DESCENT * (1 + 2 * len(self.low))
         enough = took + took / max(1, self.flights) * more <= self.seconds
         self.complete = self.complete and enough
         return enough
