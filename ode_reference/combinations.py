@@ -27,12 +27,20 @@ the velocity that the tube gains, between impacts nobody knows of the tube.
 from __future__ import annotations
 
 from dataclasses import fields
+from functools import lru_cache
 
 import numpy as np
 
 from ode_reference.motion import Acceleration, Model, Throw
 from ode_reference.switches import Switches
+from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray
+
+SAMPLE = Scenario(n_slices=6, water_mass=0.37, drag=0.9, omega0=-13.0, theta0=0.7)
+"""A throw in which no term of any equation vanishes: a model and its switches are compared in it."""
+
+SAME = 1e-9
+"""Largest difference of two accelerations that are the same equation, as a share of the largest acceleration."""
 
 
 def model_of(switches: Switches) -> Model:
@@ -69,6 +77,35 @@ def acceleration_of(switches: Switches) -> Acceleration:
         return found
 
     return acceleration
+
+
+@lru_cache
+def require_own_switches(model: Model) -> None:
+    """Check that a model's acceleration is the one that its switches make: the reduced flow knows only the switches.
+
+    The two are compared in six states of ``SAMPLE``, with all, some and none of the slices at rest.
+
+    Raises
+    ------
+    ValueError
+        If they differ by more than ``SAME``.
+    """
+    throw, wanted = Throw.of(SAMPLE), acceleration_of(model.switches)
+    # Sines of whole numbers: places, speeds and angles without a pattern, the same on every machine.
+    numbers = np.sin(np.arange(1.0, 1.0 + 6 * 13)).reshape(6, 13)
+    for state, row in enumerate(numbers):
+        free = np.where(np.arange(6) < 6 - state, 1.0, 0.0)
+        r = throw.half_length * (1.0 + 0.9 * row[:6])
+        v = 2.0 * row[6:12] * free
+        _, s, inertia = throw.about_centre_of_mass(r)
+        place = throw, 4.0 * float(row[12]), throw.angular_momentum / inertia
+        own, by_switches = (f(*place, s.copy(), v.copy(), free.copy()) for f in (model.acceleration, wanted))
+        if not np.shape(own) == (6,) or not np.abs(own - by_switches).max() <= SAME * np.abs(by_switches).max():
+            raise ValueError(
+                f"model = {model.name!r}: its acceleration is not that of its switches, {model.switches.name!r}, which "
+                "method 'taylor' solves: register the model with the switches that make its equation "
+                "(ode_reference/combinations.py), or, if none do, choose another method, such as 'DOP853'"
+            )
 
 
 def _origin(

@@ -3,12 +3,13 @@ r"""The ladder: how a slice accelerates along the axis, one equation each, from 
 Geometry, signs and the meaning of s, J and omega stand in ``ode_reference.motion``. Gravity, where an equation has it,
 acts along the axis with +g cos(theta): toward the base of a bottle that stands upright. Each rung mends one thing of
 the rung before it, and ``LADDER`` names them in that order. To add an equation, write one function and register it
-in ``MODELS``.
+in ``MODELS`` with the switches that make the same equation.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import astuple
 from types import MappingProxyType
 from typing import Final
 
@@ -202,7 +203,13 @@ MODELS: Final[Mapping[str, Model]] = MappingProxyType(
         )
     }
 )
-"""Every equation that has a name, in the order of the ladder."""
+"""Every equation that has a name."""
 
-LADDER: Final = tuple(MODELS)
+
+def ladder_of(models: Mapping[str, Model]) -> tuple[str, ...]:
+    """Return the names of models by how much they get right, the number of their switches that are on."""
+    return tuple(sorted(models, key=lambda name: sum(astuple(models[name].switches))))
+
+
+LADDER: Final = ladder_of(MODELS)
 """The names of the rungs, from what the published program solves to free flight."""

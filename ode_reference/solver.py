@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ode_reference.arguments import known_name, number_within, true_or_false
-from ode_reference.combinations import model_of
+from ode_reference.combinations import model_of, require_own_switches
 from ode_reference.impacts import LAWS
 from ode_reference.models import MODELS
 from ode_reference.motion import Model
@@ -103,7 +103,8 @@ def solve(
     Raises
     ------
     ValueError
-        Naming the argument, its value and the admissible values.
+        Naming the argument, its value and the admissible values; by "taylor" also if the model's acceleration is not
+        the one that its switches make.
 
     Accuracy
     --------
@@ -151,6 +152,7 @@ def solve(
                 f"{name} = {value!r} cannot be asked of method 'taylor', whose series are exact to rounding: "
                 f"leave it out, or choose a method that has it: {', '.join(INTEGRATORS)}"
             )
+    require_own_switches(chosen)
     from ode_reference.flow import api
 
     return api.fly(scenario, moments, chosen.switches, _settings(chosen, speed, impact_law, energy))
@@ -198,6 +200,7 @@ def solve_batch(
         if not isinstance(throw, Scenario):
             raise ValueError(f"throws[{k}] = {throw!r} is not a slicemodel.Scenario")
     chosen = _model(model)
+    require_own_switches(chosen)
     known_name("impact_law", impact_law, LAWS)
     energy, states = true_or_false("energy", energy), true_or_false("states", states)
     given = None if times is None else times_given(times)

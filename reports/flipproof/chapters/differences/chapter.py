@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any, Final, NamedTuple
@@ -20,17 +21,35 @@ from flipproof.frame.flights import Flights, attempt, known
 from flipproof.frame.solvers import find, finer
 from flipproof.frame.twins import BAND_WORDS, twins
 from flipproof.output.columns import curves_csv
-from ode_reference.models import LADDER
+from ode_reference.models import LADDER, MODELS, ladder_of
+from ode_reference.motion import Model
 
 TOTAL: Final = "published program to free flight"
 BY_ENGINE: Final = "free flight, event-driven and by an engine"
 PROGRAM_EQ8: Final = "published program to Eq. 8"
 EQ8_FREE: Final = "Eq. 8 to free flight"
 
+
+def ladder_pairs(models: Mapping[str, Model]) -> tuple[tuple[str, str, str], ...]:
+    """Return (assumption, first, second) for every two models of which the second mends that one assumption more."""
+    ladder, found = ladder_of(models), []
+    for first in ladder:
+        before = models[first].switches
+        for switch, assumption in NAMES.items():
+            if not getattr(before, switch):
+                after = replace(before, **{switch: True})
+                found += [(assumption, first, second) for second in ladder if models[second].switches == after]
+    often = Counter(assumption for assumption, *_ in found)
+    return tuple(
+        (assumption if often[assumption] == 1 else f"{assumption} ({first} to {second})", first, second)
+        for assumption, first, second in found
+    )
+
+
 PAIRS: Final = (
     ("finite step of the published program", "published-python", "published-limit"),
     ("finite step of the exact step", "exact-step", "eq8"),
-    *((NAMES[switch], first, second) for switch, first, second in zip(NAMES, LADDER, LADDER[1:], strict=False)),
+    *ladder_pairs(MODELS),
     (BY_ENGINE, FREE, ENGINE),
     ("Eq. 8, event-driven and by an engine with our forces", "eq8", "pymunk rotating"),
     (PROGRAM_EQ8, "published-python", "eq8"),

@@ -1,0 +1,86 @@
+"""The rung of ``docs/howto.md``, added as the document says: it flies as its right-hand side does, or is refused."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+import ode_reference
+from flipproof.chapters.differences.chapter import ladder_pairs
+from flipproof.chapters.waterfall.study import NAMES
+from ode_reference import MODELS, Switches
+from ode_reference.models import ladder_of
+from slicemodel import Scenario
+
+HOWTO = Path(__file__).resolve().parents[2] / "docs" / "howto.md"
+THROW = Scenario(n_slices=8)
+TIMES = np.linspace(0.0, 0.5, 201)
+
+
+@pytest.fixture
+def rung():
+    section = HOWTO.read_text(encoding="utf-8").partition("## A rung of the ladder")[2]
+    names = {}
+    exec(re.search(r"```python\n(.*?)```", section, re.DOTALL)[1], names)
+    return names["RUNG"]
+
+
+@pytest.fixture
+def register(monkeypatch):
+    def add(model):
+        monkeypatch.setattr("ode_reference.solver.MODELS", MappingProxyType({**MODELS, model.name: model}))
+        return model.name
+
+    return add
+
+
+def test_the_rung_flies_by_default_as_its_own_right_hand_side_is_integrated(rung, register):
+    name = register(rung)
+    found, own = (ode_reference.solve(THROW, name, TIMES, method=method) for method in ("taylor", "DOP853"))
+    assert found.ok
+    assert own.ok
+    assert len(found.impacts) > 10
+    np.testing.assert_allclose(found.omega, own.omega, rtol=0, atol=1e-6 * THROW.omega0)
+    drags = ode_reference.solve(THROW, "eq8-wall", TIMES)
+    assert np.abs(found.omega - drags.omega).max() > 0.01 * THROW.omega0
+
+
+OTHERS = [s for s in Switches.every() if replace(s, drag_on_centre=False, recoil=False) != Switches(roots=True)]
+"""Without drag nothing hangs on where it is measured; recoil is the law of impacts, which no acceleration shows."""
+
+
+@pytest.mark.parametrize("switches", OTHERS, ids=lambda s: s.name)
+def test_switches_of_another_equation_are_refused(rung, register, switches):
+    name = register(replace(rung, switches=switches))
+    for solve, throw in ((ode_reference.solve, THROW), (ode_reference.solve_batch, [THROW])):
+        with pytest.raises(ValueError, match=f"model = 'undamped'.*{switches.name}"):
+            solve(throw, name)
+    assert ode_reference.solve(THROW, name, TIMES[:20], method="DOP853").ok
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [lambda *given: given[3] * np.nan, lambda *_: 0.0],
+    ids=["not a number", "another shape"],
+)
+def test_a_right_hand_side_that_returns_no_accelerations_is_refused(rung, register, broken):
+    name = register(replace(rung, acceleration=broken))
+    with pytest.raises(ValueError, match="undamped"):
+        ode_reference.solve(THROW, name)
+
+
+@pytest.mark.parametrize("place", range(len(MODELS) + 1))
+def test_wherever_the_rung_is_registered_each_pair_of_the_ladder_differs_by_the_switch_it_is_named_after(rung, place):
+    names = list(MODELS)
+    models = {name: MODELS.get(name, rung) for name in (*names[:place], rung.name, *names[place:])}
+    pairs = ladder_pairs(models)
+    assert ladder_of(models)[-1] == "free-flight"
+    assert len({assumption for assumption, *_ in pairs}) == len(pairs) == len(MODELS) + 1
+    for assumption, first, second in pairs:
+        (switch,) = (name for name, words in NAMES.items() if assumption.startswith(words))
+        assert replace(models[first].switches, **{switch: True}) == models[second].switches
