@@ -117,8 +117,11 @@ def draw(figure: Figure, png: bool = True) -> Drawing:
 
 
 def _written(text: str) -> str:
-    """Return a text of a figure with solvers under their spoken names and indices set lower."""
-    return INDEXED.sub(r"$\1_{\\mathrm{\2}}$", spoken(text))
+    """Return a text of a figure with solvers under their spoken names and indices set lower.
+
+    A dollar sign is a dollar sign: names of other people's solvers are no formulas.
+    """
+    return INDEXED.sub(r"$\1_{\\mathrm{\2}}$", spoken(text).replace("$", r"\$"))
 
 
 def solver_style(label: str, k: int = 0) -> dict[str, Any]:

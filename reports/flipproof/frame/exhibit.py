@@ -10,6 +10,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from flipproof.figures.style import Drawing, draw
+from flipproof.frame.flights import chapter_errors
 from flipproof.output.columns import Curves
 
 
@@ -65,12 +66,17 @@ class Exhibit:
 def drawn(exhibits: Sequence[Exhibit], pool: Executor, *, png: bool = True) -> tuple[Exhibit, ...]:
     """Return the exhibits with their figures, in the order given, drawn by the workers of a pool.
 
-    The bytes are the same whoever draws; ``png`` says whether the figures are wanted as PNG, too.
+    The bytes are the same whoever draws; ``png`` says whether the figures are wanted as PNG, too. A ChapterError names
+    a figure that cannot be drawn.
     """
     # The figures with most to draw first, so that no worker is left with a long one at the end.
     order = sorted(exhibits, key=lambda exhibit: -len(exhibit.table or ""))
     pending = {exhibit.name: pool.submit(_draw, exhibit.maker, exhibit.data, png) for exhibit in order}
-    return tuple(replace(exhibit, drawn=pending[exhibit.name].result()) for exhibit in exhibits)
+    finished = []
+    for exhibit in exhibits:
+        with chapter_errors(f"figure {exhibit.name!r}"):
+            finished.append(replace(exhibit, drawn=pending[exhibit.name].result()))
+    return tuple(finished)
 
 
 def _draw(maker: Callable[..., Figure], data: tuple[Any, ...], png: bool) -> Drawing:

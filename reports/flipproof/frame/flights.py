@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
+from flipproof.frame.processes import WorkerDiedError
 from flipproof.frame.solvers import Made, Missing, Run
 from slicemodel import Trajectory
 
@@ -79,10 +81,26 @@ def known(outcomes: Mapping[Key, Outcome[T]]) -> dict[Key, T]:
 
 
 def attempt(study: Callable[..., T], *about: Any) -> Outcome[T]:
-    """Return what a study of these arguments found, or the reason why it found nothing."""
+    """Return what a study of these arguments found, or the reason why its evidence is missing.
+
+    ``Missing`` alone says that evidence is absent. Every other exception is a mistake in the program and passes.
+    """
     try:
         return Outcome(study(*about))
     except Missing as why:
         return Outcome(None, str(why))
-    except (ArithmeticError, ValueError, LookupError) as error:
-        return Outcome(None, f"{type(error).__name__}: {error}")
+
+
+class ChapterError(RuntimeError):
+    """A chapter failed by a mistake of the program, not for want of evidence; the message names chapter and step."""
+
+
+@contextmanager
+def chapter_errors(place: str) -> Iterator[None]:
+    """Raise a ChapterError that names the ``place`` for any exception but ``Missing``."""
+    try:
+        yield
+    except (Missing, ChapterError, WorkerDiedError):
+        raise
+    except Exception as error:
+        raise ChapterError(f"{place}: {type(error).__name__}: {error}") from error

@@ -12,7 +12,7 @@ from typing import Any
 from flipproof.frame.chapter import Absent, Ask, Chapter, Part
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding
-from flipproof.frame.flights import Call, Flights, Outcome, attempt
+from flipproof.frame.flights import Call, Flights, Outcome, attempt, chapter_errors
 from flipproof.frame.pool import Progress, make_all
 from flipproof.frame.solvers import Run
 from flipproof.frame.store import RunStore
@@ -109,16 +109,24 @@ def gather(
 
 
 def _advance(name: str, study: Any, flights: Flights | None, waiting: dict[str, Any], outcomes: dict[str, Any]) -> None:
-    """Resume a study with what it asked for; note what it asks next, what it found, or why it ended."""
-    try:
-        asked = attempt(lambda: tuple(study.send(flights)))
-    except StopIteration as end:
-        outcomes[name] = Outcome(end.value)
+    """Resume a study with what it asked for; note what it asks next, what it found, or what evidence is missing."""
+
+    def resume() -> tuple[bool, Any]:
+        try:
+            return False, tuple(study.send(flights))
+        except StopIteration as end:
+            return True, end.value
+
+    with chapter_errors(f"chapter {name!r}, study"):
+        outcome = attempt(resume)
+    if outcome.reason:
+        outcomes[name] = Outcome(None, outcome.reason)
         return
-    if asked.reason:
-        outcomes[name] = asked
+    ended, value = outcome.value
+    if ended:
+        outcomes[name] = Outcome(value)
     else:
-        waiting[name] = (study, asked.value)
+        waiting[name] = (study, value)
 
 
 def tell(gathered: Gathered) -> dict[str, Told]:
@@ -139,7 +147,10 @@ def _told(chapter: Chapter[Any], outcome: Outcome[Any]) -> Told:
             said.append(each)
             began = time.perf_counter()
 
-    claims, figures = attempt(claim), attempt(lambda: drawn.extend(chapter.figures(outcome.value)))
+    with chapter_errors(f"chapter {chapter.name!r}, claims"):
+        claims = attempt(claim)
+    with chapter_errors(f"chapter {chapter.name!r}, figures"):
+        figures = attempt(lambda: drawn.extend(chapter.figures(outcome.value)))
     if reason := claims.reason or figures.reason:
         said.append(Absent(f"chapter-{chapter.name}", chapter.title, reason, chapter.kind))
     return Told(

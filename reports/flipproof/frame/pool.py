@@ -7,7 +7,7 @@ from concurrent.futures import Executor, Future, as_completed, wait
 from contextlib import AbstractContextManager
 from typing import Any
 
-from flipproof.frame.flights import Call, Outcome, attempt
+from flipproof.frame.flights import Call, Outcome, attempt, chapter_errors
 from flipproof.frame.processes import WorkerDiedError, processes
 from flipproof.frame.solvers import Made, Run, find, make
 from flipproof.frame.store import RunStore
@@ -62,7 +62,8 @@ def make_all(
     called: dict[Call, Outcome[Any]] = {}
     for call, answer in pending_calls.items():
         try:
-            called[call] = attempt(answer.result)
+            with chapter_errors(f"call {call.label or call.function.__name__!r}"):
+                called[call] = attempt(answer.result)
         except WorkerDiedError as error:
             called[call] = Outcome(None, f"{call.label}: {died} call ({error})")
         progress(len(made) + len(called), len(runs) + len(pending_calls), call.label)

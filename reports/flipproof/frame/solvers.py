@@ -72,11 +72,8 @@ def find(name: str) -> Solver:
     return solvers[name]
 
 
-class Missing(KeyError):  # noqa: N818
+class Missing(Exception):  # noqa: N818
     """A flight, or what is made of flights, is not there; the message says why."""
-
-    def __str__(self) -> str:
-        return str(self.args[0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

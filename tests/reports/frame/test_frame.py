@@ -8,9 +8,11 @@ from made_up import Answers
 
 from flipproof.build import ask_of
 from flipproof.frame.chapter import Chapter, Part, judged
+from flipproof.frame.exhibit import Exhibit, drawn
 from flipproof.frame.findings import Finding
-from flipproof.frame.flights import Call, attempt
+from flipproof.frame.flights import Call, ChapterError, attempt
 from flipproof.frame.gather import gather, tell
+from flipproof.frame.pool import Here
 from flipproof.frame.solvers import Made, Missing, Run
 from slicemodel import Scenario, Trajectory
 
@@ -54,7 +56,7 @@ def lost(_):
 
 def broken(_):
     yield [LOST]
-    raise ValueError("no sense in it")
+    raise Missing("no sense in it")
 
 
 def claims_of_lost(found):
@@ -109,7 +111,7 @@ def test_a_study_that_breaks_is_a_note_and_an_observation_and_stops_no_other(gat
     told = tell(gathered[1])
     (finding,) = told["broken"].findings
     assert (finding.id, finding.verdict, finding.failed) == ("chapter-broken", "not evaluated", False)
-    assert told["broken"].notes == (("broken", "ValueError: no sense in it"),)
+    assert told["broken"].notes == (("broken", "no sense in it"),)
     assert [finding.value for finding in told["waves"].findings] == [10.0, 7.0]
 
 
@@ -132,16 +134,55 @@ def test_what_was_not_asked_for_is_missing(gathered):
     assert flights.trajectory(LOST) is None
 
 
-def test_a_call_that_fails_or_finds_nothing_says_so():
+def test_a_call_whose_evidence_is_missing_says_so():
     def study(_):
-        call = Call(int, ("x",), "a call")
+        call = Call(no_evidence, (), "a call")
         flights = yield [call]
         return flights.answer(call)
 
     found = gather((Part("one", "One", "", (chapter("call", study),)),), ASK, Answers(fly))
-    assert "invalid literal" in found.outcomes["call"].reason
-    with pytest.raises(Missing, match="invalid literal"):
-        _ = found.outcomes["call"].value
+    assert found.outcomes["call"].reason == "nothing was filmed"
+
+
+def no_evidence():
+    raise Missing("nothing was filmed")
+
+
+def mistaken(*_):
+    return {}["OMEGA"]
+
+
+def mistaken_study(_):
+    yield [FIRST]
+    mistaken()
+
+
+def fine_study(_):
+    return 1
+    yield
+
+
+def calling_study(_):
+    yield [Call(mistaken, (), "a call")]
+
+
+def exhibit(_):
+    yield Exhibit(name="drawn", title="", caption="", alt="", maker=mistaken, data=(), table=None)
+
+
+@pytest.mark.parametrize(
+    ("part", "place"),
+    [
+        (chapter("bad", mistaken_study), "chapter 'bad', study"),
+        (chapter("bad", fine_study, claims=mistaken), "chapter 'bad', claims"),
+        (chapter("bad", fine_study, figures=mistaken), "chapter 'bad', figures"),
+        (chapter("bad", calling_study), "call 'a call'"),
+        (chapter("bad", fine_study, figures=exhibit), "figure 'drawn'"),
+    ],
+)
+def test_a_mistake_of_the_program_is_no_evidence_that_is_missing(part, place):
+    with pytest.raises(ChapterError, match=f"^{place}: KeyError: 'OMEGA'$"):
+        drawn(next(iter(tell(gather((Part("one", "One", "", (part,)),), ASK, Answers(fly))).values())).figures, Here())
 
 
 def test_figures_or_claims_that_break_are_noted():
