@@ -147,6 +147,24 @@ def test_on_a_plane_estimate_and_intervals_are_those_of_the_textbook(seed):
     assert pairs[0, 1] == pytest.approx(covariance[0, 1] / math.sqrt(covariance[0, 0] * covariance[1, 1]), abs=0.1)
 
 
+@pytest.mark.parametrize(("intercept", "verdict"), [(-39.0, "told"), (-40.0, "bounded above")])
+def test_an_interval_ends_with_the_range_only_where_the_data_allow_its_end(intercept, verdict):
+    problem = plane()
+    found = estimate(
+        replace(problem, measured=replace(problem.measured, values=problem.measured.values + intercept - 2))
+    )
+    first = intervals(found)[0]
+    assert first.verdict == verdict
+    assert (first.low == -40.0) == (verdict != "told")
+    assert first.low <= first.value <= first.high
+
+
+def test_an_interval_holds_its_own_estimate():
+    found = estimate(plane(), LIGHT)
+    apart = replace(found, x=found.x - 1.0)  # as where a rough landscape's lowest point stands alone
+    assert all(each.low <= each.value <= each.high for each in intervals(apart))
+
+
 def test_an_interval_is_wider_by_the_root_of_the_roughness():
     found = estimate(plane(), LIGHT)
     smooth = replace(found, roughness=1.0, reach=np.array([found.x, found.x]))

@@ -9,10 +9,11 @@ from itertools import combinations
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from flipproof.film.fit.estimate import Estimate
+from flipproof.film.fit.estimate import LIKELY, Estimate
 from flipproof.film.fit.problem import UNITS, package_of
-from flipproof.film.fit.region import fits
+from flipproof.film.fit.region import fits, loss
 from slicemodel.trajectory import FloatArray
 
 Verdict = Literal["told", "bounded above", "bounded below", "not told"]
@@ -61,10 +62,12 @@ def intervals(estimate: Estimate) -> tuple[Interval, ...]:
     level = 0.975  # of one, so that those of drag and restitution hold together in 95 % (Bonferroni)
     middle, *tails = np.quantile(estimate.cloud, (0.5, (1.0 - level) / 2.0, (1.0 + level) / 2.0), axis=0)
     lower, upper = (middle + np.sqrt(estimate.roughness) * (tail - middle) for tail in tails)
-    below = np.clip(np.minimum(lower, estimate.reach[0]), low, high)
-    above = np.clip(np.maximum(upper, estimate.reach[1]), low, high)
-    # An end within 2 % of the searched range is that of the range; three quarters of it are not told.
-    at_low, at_high = below - low < 0.02 * (high - low), high - above < 0.02 * (high - low)
+    # An interval holds its own estimate, whatever the cloud says.
+    below = np.clip(np.minimum(np.minimum(lower, estimate.reach[0]), estimate.x), low, high)
+    above = np.clip(np.maximum(np.maximum(upper, estimate.reach[1]), estimate.x), low, high)
+    # An end within 2 % of the searched range is that of the range if the data allow it; three quarters are not told.
+    at_low = (below - low < 0.02 * (high - low)) & _allowed(estimate, low)
+    at_high = (high - above < 0.02 * (high - low)) & _allowed(estimate, high)
     below, above = np.where(at_low, low, below), np.where(at_high, high, above)
     not_told = (above - below >= 0.75 * (high - low)) | (at_low & at_high)
     verdicts = np.select([not_told, at_high, at_low], ["not told", "bounded below", "bounded above"], "told").tolist()
@@ -82,6 +85,21 @@ def intervals(estimate: Estimate) -> tuple[Interval, ...]:
         )
         for k, name in enumerate(problem.free)
     )
+
+
+def _allowed(estimate: Estimate, ends: FloatArray) -> NDArray[np.bool_]:
+    """Return for each coordinate whether the data allow its end of the searched range (K,).
+
+    The other coordinates stay where the estimate has them, or where the point of the cloud nearest to that end has
+    them: the better of the two bounds the profile likelihood of the end from above.
+    """
+    limit = estimate.chi2 + LIKELY * estimate.temperature * estimate.roughness
+    allowed = []
+    for k, end in enumerate(ends):
+        trial = np.array([estimate.x, estimate.cloud[np.abs(estimate.cloud[:, k] - end).argmin()]])
+        trial[:, k] = end
+        allowed.append(loss(estimate.problem.residuals(trial)).min() <= limit)
+    return np.array(allowed)
 
 
 def correlation(estimate: Estimate) -> FloatArray:
