@@ -60,6 +60,9 @@ floating point."""
 MOST_ANGLE = 1e6
 """Largest angle at release [rad]; angles near it are known to 1e-10 rad."""
 
+MOST_FILE_ANGLE = 4 * math.pi
+"""Largest angle at release that a file may state [rad]: what is larger was meant in degrees."""
+
 MOST_FILE = 2**18
 """Bytes of a scenario file at the most."""
 
@@ -394,10 +397,16 @@ class Scenario:
         ------
         ScenarioError
             Naming file, table and key: unreadable file, bad TOML, unknown table or key
-            (with the nearest known name), impossible value.
+            (with the nearest known name), impossible value, an angle at release beyond two turns, which are degrees.
         """
         document, _ = read_toml(path, MOST_FILE)
-        return cls.from_mapping(document, source=str(path))
+        scenario = cls.from_mapping(document, source=str(path))
+        if abs(scenario.theta0) > MOST_FILE_ANGLE:
+            raise ScenarioError(
+                f"{path}: [scenario] theta0 = {scenario.theta0!r} rad is outside [-4 pi, 4 pi] rad; radians? "
+                f"{scenario.theta0:g} degrees are {math.radians(scenario.theta0):.6g} rad"
+            )
+        return scenario
 
     @classmethod
     def from_mapping(cls, document: Mapping[str, Any], *, source: str = "scenario") -> Scenario:

@@ -208,6 +208,17 @@ def test_absurd_numbers_are_refused_by_name_or_harmless(value):
                 Scenario(**{name: value})
 
 
+@pytest.mark.parametrize(("theta0", "degrees"), [(85.0, True), (-360.0, True), (7.0, False), (-4 * math.pi, False)])
+def test_a_file_states_the_angle_at_release_in_radians(tmp_path, theta0, degrees):
+    file = tmp_path / "throw.toml"
+    file.write_text(f"[scenario]\ntheta0 = {theta0!r}\n", encoding="utf-8")
+    if degrees:
+        with pytest.raises(ScenarioError, match=f"theta0 = {theta0!r} rad.*{math.radians(theta0):.6g} rad"):
+            Scenario.from_toml(file)
+    else:
+        assert Scenario.from_toml(file).theta0 == theta0
+
+
 def test_pickles():
     assert pickle.loads(pickle.dumps(Scenario(drag=0.3))) == Scenario(drag=0.3)
 
