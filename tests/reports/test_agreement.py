@@ -5,6 +5,7 @@ import pytest
 from made_up import trajectory_of
 
 from flipproof.chapters.agreement.chapter import study_agreement
+from flipproof.frame.solvers import Missing
 from slicemodel import Scenario
 
 SCENARIO = Scenario(n_slices=1)
@@ -60,8 +61,8 @@ def test_a_band_may_vary_in_time_and_one_time_in_twenty_may_lie_outside():
 
 
 def test_runs_of_different_throws_or_times_are_refused():
-    with pytest.raises(ValueError, match="at least two"):
+    with pytest.raises(Missing, match="at least two"):
         study_agreement({"a": curve(0.0)}, {"a": 0.0})
     for other in (curve(0.0, t=T[:50]), curve(0.0, scenario=Scenario(n_slices=1, omega0=10.0))):
-        with pytest.raises(ValueError, match="b and a are not runs of one throw"):
+        with pytest.raises(Missing, match="b and a are not runs of one throw"):
             study_agreement({"a": curve(0.0), "b": other}, {"a": 0.0, "b": 0.0})

@@ -95,7 +95,7 @@ def test_times_printed_with_nine_digits_change_no_error(tmp_path, ladder):
 def test_a_ladder_that_lacks_a_time_of_a_guest_is_refused(ladder):
     one = visit(RK4, THROW, TIMES)
     sparse = {rung: solve(rung, THROW, times=TIMES[:: 2 * SPARSE]) for rung in ladder}
-    with pytest.raises(ValueError, match=r"has 19 of the 38 times of naive RK4; all are needed"):
+    with pytest.raises(Missing, match=r"has 19 of the 38 times of naive RK4; all are needed"):
         study_guests([replace(one, flight=None, traits=replace(one.traits, equation="eq8"))], sparse, {})
 
 
@@ -336,7 +336,7 @@ def test_bars_that_miss_the_whole_are_no_waterfall_and_the_guest_says_why(ladder
     found = split(ladder["eq8-weightless"], start, flights)
     assert found.start + found.rest + found.bars["recoil"] == pytest.approx(found.end, abs=1e-15)
     monkeypatch.setattr("flipproof.chapters.guests.study.mean", lambda changes: 0.9 * changes[0][1])
-    with pytest.raises(ArithmeticError, match="rest and bars miss"):
+    with pytest.raises(Missing, match="rest and bars miss"):
         split(ladder["eq8-weightless"], start, flights)
     (guest,) = study_guests([visit(RK4, THROW, TIMES)], ladder, {}).guests
     told = with_split(guest, start, flights)

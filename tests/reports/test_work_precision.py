@@ -44,7 +44,7 @@ from flipproof.chapters.work_precision.study import (
 )
 from flipproof.frame.gather import gather
 from flipproof.frame.pool import Here
-from flipproof.frame.solvers import Made, Run, make
+from flipproof.frame.solvers import Made, Missing, Run, make
 from flipproof.frame.timing import at_times, batches, make_timed, sampled
 from ode_reference.models import MODELS
 from slicemodel import Scenario, Trajectory
@@ -273,7 +273,7 @@ def test_without_a_reference_nobody_has_an_error(monkeypatch):
 def test_a_run_off_the_common_times_is_refused(monkeypatch):
     short = replace(CASE.scenario, duration=0.4)
     other = curve(Case(name="x", title="x", scenario=short), 0.0, steps=41)
-    with pytest.raises(ValueError, match="holds no point at t = "):
+    with pytest.raises(Missing, match="holds no point at t = "):
         studied(monkeypatch, [1e-2], spoiled={"exact-step on eq8, 0, 0": {"trajectory": other}})
 
 

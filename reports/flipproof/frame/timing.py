@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.frame.solvers import Made, Run, find, make
+from flipproof.frame.solvers import Made, Missing, Run, find, make
 from slicemodel import Trajectory
 from slicemodel.trajectory import FloatArray
 
@@ -34,13 +34,13 @@ def make_timed(runs: Sequence[tuple[Run, FloatArray]]) -> list[Made]:
 def at_times(t: FloatArray, times: FloatArray) -> NDArray[np.int64]:
     """Return the indices at which ``t`` holds ``times``.
 
-    One that is not there raises a ValueError: an interpolation would have an error of its own.
+    One that is not there raises Missing: an interpolation would have an error of its own.
     """
     slack = SAME_TIME * times[-1]
     at: NDArray[np.int64] = np.minimum(np.searchsorted(t, times - slack), len(t) - 1)
     missing = times[~(np.abs(t[at] - times) <= slack)]
     if len(missing):
-        raise ValueError(f"the run holds no point at t = {missing[0]:.9g} s; its grid does not share the common times")
+        raise Missing(f"the run holds no point at t = {missing[0]:.9g} s; its grid does not share the common times")
     return at
 
 

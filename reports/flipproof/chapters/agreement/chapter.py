@@ -60,7 +60,7 @@ def study_agreement(
 ) -> Agreement:
     """Compare every solver with every other, on the times of the first run.
 
-    Fewer than two runs, or runs of other throws or at other output times, raise a ValueError.
+    Fewer than two runs, or runs of other throws or at other output times, raise Missing.
 
     Parameters
     ----------
@@ -70,11 +70,11 @@ def study_agreement(
     """
     names = tuple(runs)
     if len(names) < 2:
-        raise ValueError(f"runs = {list(names)}: an agreement takes at least two")
+        raise Missing(f"runs = {list(names)}: an agreement takes at least two")
     first = runs[names[0]]
     for name, run in runs.items():
         if run.scenario != first.scenario or not np.array_equal(run.t, first.t):
-            raise ValueError(f"{name} and {names[0]} are not runs of one throw at the same times")
+            raise Missing(f"{name} and {names[0]} are not runs of one throw at the same times")
     seen = first.t <= until
     pairs = []
     for a, b in combinations(names, 2):

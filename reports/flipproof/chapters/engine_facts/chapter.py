@@ -22,7 +22,7 @@ from flipproof.chapters.solvers import ENGINE
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged
 from flipproof.frame.findings import finite_or_none, regression
-from flipproof.frame.solvers import without_gravity
+from flipproof.frame.solvers import Missing, without_gravity
 from flipproof.output.columns import rows_csv
 from slicemodel import Scenario, Trajectory
 
@@ -40,7 +40,7 @@ class EngineFact:
     """One fact about an engine; its stable ``id`` is a key of ``WORDS``.
 
     It holds if the number that ``measure`` returns lies in the closed interval ``admissible``, in ``unit``. Of the runs
-    by what is said of each it returns that number and how it was measured, and raises LookupError, with the reason, if
+    by what is said of each it returns that number and how it was measured, and raises Missing, with the reason, if
     a run that it needs is not whole.
     """
 
@@ -61,7 +61,7 @@ class EngineFact:
         except ModuleNotFoundError as missing:
             note = f"{self.engine} is not installed ({missing})"
             absent = self.engine != "pymunk"
-        except LookupError as missing:
+        except Missing as missing:
             note = str(missing.args[0])
         fact = regression(f"engine-fact-{self.id}", WORDS[self.id], value, self.unit, self.admissible, note)
         return replace(fact, kind="observation") if absent else fact
@@ -98,7 +98,7 @@ def _smaller_step(made: Mapping[str, Made]) -> tuple[float, str]:
     for dt in (LONG_DT, SHORT_DT):
         run = made[f"few iterations, dt {dt:g} s"].flight
         if run.ok:
-            raise LookupError(f"with {FEW_ITERATIONS} iterations and dt = {dt:g} s nothing explodes")
+            raise Missing(f"with {FEW_ITERATIONS} iterations and dt = {dt:g} s nothing explodes")
         held.append(float(run.t[-1]))
     long, short = held
     note = f"holds for {long * 1e3:g} ms at Δt = {LONG_DT:g} s, for {short * 1e3:g} ms at {SHORT_DT:g} s"
@@ -161,7 +161,7 @@ def groove_end(_: object) -> tuple[float, str]:
         space.step(1e-3)
         back = max(back, -float(body.velocity.x))
     if not abs(body.position.x - 1.0) < 1e-3:
-        raise LookupError(f"the mass is at {body.position.x:.3g} m, not at the groove's end")
+        raise Missing(f"the mass is at {body.position.x:.3g} m, not at the groove's end")
     note = "one mass with elasticity 1 in a groove; the set-up check refuses a groove that ends inside the bottle"
     return back, note
 

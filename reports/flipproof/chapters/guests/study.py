@@ -305,7 +305,7 @@ def _apart(one: Trajectory, other: Trajectory) -> float:
     """Return the largest difference of omega at the times of ``other``, which ``one`` has too, fraction of omega_0."""
     _, here, there = np.intersect1d(one.t, other.t, assume_unique=True, return_indices=True)
     if len(there) != len(other.t):
-        raise ValueError(f"{one.label} has {len(there)} of the {len(other.t)} times of {other.label}; all are needed")
+        raise Missing(f"{one.label} has {len(there)} of the {len(other.t)} times of {other.label}; all are needed")
     return float(np.max(np.abs(one.omega[here] - other.omega[there])) / abs(one.scenario.omega0))
 
 
@@ -377,5 +377,5 @@ def split(run: Trajectory, start: Switches, flights: Flights) -> Split:
     )
     missed = found.end - found.start - found.rest - sum(found.bars.values())
     if not abs(missed) <= 1e-12 * (1.0 + abs(found.start) + sum(map(abs, found.bars.values()))):
-        raise ArithmeticError(f"rest and bars miss the difference to free flight by {missed:.3g}")
+        raise Missing(f"rest and bars miss the difference to free flight by {missed:.3g}")
     return found
