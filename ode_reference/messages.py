@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,36 @@ def overflow(model: str, scenario: Scenario, t: float) -> str:
         f"{model}: a number exceeded the floating-point range after t = {t:.9g} s; "
         f"omega0 = {scenario.omega0:g} rad/s, drag = {scenario.drag:g} kg/s and "
         f"gravity = {scenario.gravity:g} m/s^2 cannot be computed together"
+    )
+
+
+STIFF: Final = "stiff"
+"""Reason code of a run that stalled because a rate of its equations is too fast for the duration."""
+
+
+def stiff(model: str, scenario: Scenario, t: float, rate: float) -> str:
+    """Return that a ``rate`` [1/s] of the equations is too fast for the duration, and which fields make it."""
+    turns = abs(scenario.omega0) >= rate
+    fields = (
+        f"omega0 = {scenario.omega0:g} rad/s"
+        if turns
+        else (
+            f"drag = {scenario.drag:g} kg/s on slices of {scenario.slice_mass:g} kg in a bottle of "
+            f"{scenario.bottle.mass:g} kg"
+        )
+    )
+    advice = "omega0 or duration" if turns else "drag or duration, or raise bottle.mass"
+    return (
+        f"{model}: stiff: stopped at t = {t:.9g} s, for {fields} makes a rate of {rate:.3g} /s, too fast to be "
+        f"followed over duration = {scenario.duration:g} s; lower {advice}"
+    )
+
+
+def exhausted(model: str, impacts: int, t: float) -> str:
+    """Return that the run has had as many impacts as a run may have."""
+    return (
+        f"{model}: stopped at t = {t:.9g} s after {impacts} impacts, the greatest number of one run; "
+        "lower duration or restitution"
     )
 
 

@@ -98,7 +98,10 @@ def solve(
         ``opposite_hits``, how often both ends were struck within 1e-9 s: only in a symmetric bottle is that more than
         chance. By "taylor" also the largest relative errors of its two checks, ``wronskian_error`` and
         ``inertia_error``.
-        Status "overflow", "stalled" or "diverged" returns the output times reached and says where it stopped.
+        Status "overflow", "stalled", "exhausted" or "diverged" returns the output times reached and says where it
+        stopped: "stalled" with the reason "stiff" if the drag on a slice or on a light tube is too fast for the
+        duration, "exhausted" after ``ode_reference.motion.max_impacts`` impacts. These grow exponentially in
+        "accelerating-origin" with drag and e near 1, which gains energy in impacts without recoil.
 
     Raises
     ------

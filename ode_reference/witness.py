@@ -32,7 +32,7 @@ from ode_reference.arguments import known_name, number_above, number_within
 from ode_reference.contact import FREE, TOUCH, Ends, SideArray, resolve
 from ode_reference.energy import Ledger, nodes
 from ode_reference.impacts import LAWS, immovable
-from ode_reference.motion import Model, Motion, Throw
+from ode_reference.motion import Model, Motion, Throw, max_impacts
 from slicemodel.observables import grazes, opposite_hits
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import BASE, CAP, FloatArray, Impacts, Trajectory
@@ -139,7 +139,7 @@ class _Flight:
         self.largest_snap = 0.0
         self.ledger = Ledger(self.motion, self.y) if settings["energy"] else None
         self.watched = (0, 0.0)
-        self.status, self.message = "ok", ""
+        self.status, self.message, self.reason = "ok", "", ""
 
     # ------------------------------------------------------------------ the loop
 
@@ -351,6 +351,9 @@ class _Flight:
         self.counts["impacts"] += int(real.sum())
         self.counts["rests"] += int(np.count_nonzero((outcome.resting != FREE) & (self.resting == FREE)))
         self.counts["releases"] += int(np.count_nonzero((outcome.resting == FREE) & (self.resting != FREE)))
+        if self.counts["impacts"] >= max_impacts(self.n):
+            self.status = "exhausted"
+            self.message = messages.exhausted(self.motion.model.name, self.counts["impacts"], self.t)
         if self.ledger is not None:
             self.ledger.jump("impacts", self.y, outcome.rebounded)
             self.ledger.jump("rests", outcome.rebounded, outcome.y)
@@ -374,6 +377,17 @@ class _Flight:
         recent = np.concatenate([np.zeros(0, dtype=np.int64), *(slices for _, slices, *_ in self.impacts[-20:])])
         name, rest_speed = self.motion.model.name, self.settings["rest_speed"]
         self.status, self.message = "stalled", messages.stalled(name, why, self.t, recent, rest_speed)
+        rate, strikes = self._fastest_rate(), any((times >= self.watched[1]).any() for times, *_ in self.impacts)
+        if rate * self.scenario.duration > STEP_LIMIT and not strikes:
+            self.reason, self.message = messages.STIFF, messages.stiff(name, self.scenario, self.t, rate)
+
+    def _fastest_rate(self) -> float:
+        """Return the fastest rate of the equations: of the rotation, or of the drag on the slices and on the tube."""
+        throw, free = self.motion.throw, float(self.motion.free.sum())
+        switches = self.motion.model.switches
+        tube = throw.total_mass / (throw.total_mass - throw.slice_mass * free) if switches.origin else 1.0
+        _, _, inertia = throw.about_centre_of_mass(self.y[1 : self.n + 1])
+        return max(throw.drag_rate * tube, abs(float(throw.angular_momentum / inertia)))
 
     def trajectory(self) -> Trajectory:
         """Return what has been recorded, with omega, r_CM and J of each recorded state."""
@@ -397,6 +411,7 @@ class _Flight:
             impacts=impacts,
             status=self.status,
             message=self.message,
+            reason=self.reason,
             settings=self.settings,
             diagnostics={
                 **self.counts,

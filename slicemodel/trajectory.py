@@ -25,7 +25,8 @@ STATUSES: Final = MappingProxyType(
         "escaped": "a slice left the bottle; the run goes on as its scheme says",
         "overflow": "a number exceeded the floating-point range; returned up to the last finite point",
         "diverged": "an invariant of the solver broke; returned up to the last point it held",
-        "stalled": "events accumulate without time passing; returned up to the last point reached",
+        "stalled": "time hardly passes; returned up to the last point reached",
+        "exhausted": "the greatest number of impacts was reached; returned up to the last point before",
     }
 )
 """Reason codes of a trajectory."""
@@ -114,7 +115,8 @@ class Trajectory:
     message : str
         What happened, where and when, in words.
     reason : str
-        Code of what ended the run, such as the residual that left its band; "" where the status says it all.
+        Code of what ended the run, such as the residual that left its band, or "stiff" for a time that hardly passes
+        because a rate of the equations is too fast for the duration; "" where the status says it all.
     settings : mapping
         The exact settings that made this run; enough to repeat it.
     diagnostics : mapping

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -12,13 +13,13 @@ import numpy as np
 
 from ode_reference import messages
 from ode_reference.flow import layout
-from ode_reference.flow.layout import ESCAPED, INERTIA, OK, OVERFLOW, STALLED, WRONSKIAN
+from ode_reference.flow.layout import ESCAPED, EXHAUSTED, INERTIA, OK, OVERFLOW, STALLED, TURN, WRONSKIAN
 from ode_reference.switches import Switches
 from slicemodel.observables import grazes, opposite_hits
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray, Impacts, Trajectory
 
-STATUSES: Final = {OK: "ok", OVERFLOW: "overflow", STALLED: "stalled"}
+STATUSES: Final = {OK: "ok", OVERFLOW: "overflow", STALLED: "stalled", EXHAUSTED: "exhausted"}
 """Names of how a flight ended; any other is "diverged"."""
 
 
@@ -77,6 +78,7 @@ def fly(
         impacts=impacts,
         status=STATUSES.get(int(now.status), "diverged"),
         message=message(now, scenario, settings["model"], impacts),
+        reason=messages.STIFF if now.status == STALLED and is_stiff(now, scenario, impacts) else "",
         settings=settings,
         diagnostics=found,
     )
@@ -100,6 +102,10 @@ def message(now: Any, scenario: Scenario, model: str, impacts: Impacts) -> str:
         return ""
     if now.status == OVERFLOW:
         return messages.overflow(model, scenario, now.t)
+    if now.status == EXHAUSTED:
+        return messages.exhausted(model, int(now.impacts), now.t)
+    if now.status == STALLED and is_stiff(now, scenario, impacts):
+        return messages.stiff(model, scenario, now.t, fastest_rate(now))
     if now.status == STALLED:
         why = f"time hardly passes after {now.steps} steps"
         return messages.stalled(model, why, now.t, impacts.slice[-20:], now.rest_speed)
@@ -109,6 +115,21 @@ def message(now: Any, scenario: Scenario, model: str, impacts: Impacts) -> str:
         ESCAPED: "a slice is outside the bottle",
     }[int(now.status)]
     return f"{model}: {broken} at t = {now.t:.9g} s; the run is given up, report it with its scenario"
+
+
+def fastest_rate(now: Any) -> float:
+    """Return the fastest rate of the equations when the flight stopped [1/s]."""
+    return max(float(now.rate), float(now.damping))
+
+
+def is_stiff(now: Any, scenario: Scenario, impacts: Impacts) -> bool:
+    """Return whether the fastest rate leaves too few steps for the duration, and impacts end few of the last.
+
+    A step is at most ``TURN`` / rate / sqrt(1 + N / 100) long (``search.gather``), and there are ``step_limit``.
+    """
+    needed = fastest_rate(now) * scenario.duration * math.sqrt(1.0 + scenario.n_slices / 100.0) / TURN
+    recent = np.count_nonzero(impacts.time >= now.watched_from)
+    return bool(needed > now.step_limit and 2 * recent < now.watch)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ode_reference import motion
 from ode_reference.motion import Throw
 from ode_reference.switches import Switches
 from slicemodel.scenario import Scenario
@@ -21,12 +22,15 @@ rest speed of 1e-5 m/s crosses this distance in 2e-9 s.
 """
 
 STEP_LIMIT: Final = 20_000_000
-"""Most steps of one flight; every event ends a step, so this bounds the events too."""
+"""Greatest number of steps of one flight."""
+
+TURN: Final = 0.2
+"""Longest span in units of 1/|omega|, 1/d and 1/gamma: the map starts anew before B/A has grown much."""
 
 WATCH: Final = 10_000
 """Steps in which the time must advance by a ten-millionth of the duration."""
 
-OK, OVERFLOW, STALLED, WRONSKIAN, INERTIA, ESCAPED = range(6)
+OK, OVERFLOW, STALLED, WRONSKIAN, INERTIA, ESCAPED, EXHAUSTED = range(7)
 """How a flight ended."""
 
 WORKS: Final = ("drag", "weight", "negative_spring", "missing_origin", "impacts", "rests", "missing_recoil")
@@ -41,7 +45,7 @@ _REAL = (
 )
 _WHOLE = (
     "origin drag_on_centre recoil sequential mirrored ledger free on_base on_cap near order struck released hits "
-    "steps impacts rests releases recorded status step_limit watch"
+    "steps impacts rests releases recorded status step_limit watch impact_limit"
 )
 
 RECORD: Final = np.dtype(
@@ -90,6 +94,7 @@ def prepare(
     # Nothing tells the ends of a full bottle apart if no weight pulls along it and impacts do not come one by one.
     now.mirrored = scenario.fill_fraction == 1.0 and now.gravity == 0.0 and not now.sequential
     now.ledger, now.step_limit, now.watch = settings["energy"], STEP_LIMIT, WATCH
+    now.impact_limit = motion.max_impacts(n)
     now.theta, now.A, now.dB = scenario.theta0, 1.0, 1.0
     points, marks = np.zeros((6, n)), np.zeros((3, n), dtype=np.int64)
     # A full bottle is mirror symmetric to the last digit: its stack is as high as the tube is long.

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ode_reference.flow.contacts import meet, touch
-from ode_reference.flow.layout import OVERFLOW, PLACE, SIDE, SPEED, STALLED
+from ode_reference.flow.layout import EXHAUSTED, OVERFLOW, PLACE, SIDE, SPEED, STALLED
 from ode_reference.flow.ledger import book_step, energy_of
 from ode_reference.flow.points import enter, inertia_at, inertia_of, rebase, set_body, set_scales
 from ode_reference.flow.search import find, flock_is_clear, gather
@@ -49,6 +49,9 @@ def fly(flight, points, marks, moments, rows, r, v):
             if len(impacts) < now.impacts + now.hits:
                 impacts = np.concatenate((impacts, np.empty((2 * now.impacts + now.hits, 6))))
             meet(now, points, marks, impacts)
+            if now.impacts >= now.impact_limit:
+                now.status = EXHAUSTED
+                break
         if now.duration - now.t <= 4.0 * 2.3e-16 * now.duration:
             break
         step(now, points, marks, table, moments, rows, r, v)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from ode_reference.flow.layout import NEAR, PLACE, SIDE, SPEED, STALLED
+from ode_reference.flow.layout import NEAR, PLACE, SIDE, SPEED, STALLED, TURN
 from ode_reference.flow.points import rebase, set_scales
 from ode_reference.flow.series import FORCE, PULL, ROWS, SQUARE, A, B, Z, value
 from slicemodel.compiled import inner
@@ -26,9 +26,6 @@ NONE = 2.0
 
 MOST_PARABOLAS = 1000
 """Parabolas of one search, of which some ten are needed; a flight that needs more is stalled."""
-
-TURN = 0.2
-"""Longest span in units of 1/|omega|, 1/d and 1/gamma: the map starts anew before B/A has grown much."""
 
 MARGIN = 1e-13
 """Room that the bound leaves for rounding, in units of the wall's distance."""

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ode_reference import LADDER, LAWS, MODELS, Switches, solve, solve_batch
+from ode_reference import LADDER, LAWS, MODELS, Switches, motion, solve, solve_batch, witness
 from ode_reference.combinations import acceleration_of
 from ode_reference.flow import api, layout
 from ode_reference.motion import Throw
@@ -253,6 +253,49 @@ def test_a_flight_in_which_time_stops_passing_is_stalled(monkeypatch):
     assert "60 steps" in found.message
     assert "slices of the last impacts: " in found.message
     assert 0 < len(found.t) < 1000
+
+
+@pytest.mark.parametrize("mass", [6e-9, 3e-10])
+def test_a_light_bottle_with_strong_drag_is_stiff_and_does_not_chatter(mass, monkeypatch):
+    monkeypatch.setattr(layout, "STEP_LIMIT", 50_000)
+    scenario = Scenario(bottle=Bottle(mass=mass), water_mass=0.44, n_slices=8, drag=0.034, omega0=28.0)
+    found = solve(scenario, "free-flight")
+    assert (found.status, found.reason) == ("stalled", "stiff")
+    assert "bottle.mass" in found.message
+    assert "rest_speed" not in found.message
+    assert 0.0 < found.t[-1] < scenario.duration
+
+
+@pytest.mark.parametrize("method", ["taylor", "DOP853"])
+def test_drag_too_fast_for_the_duration_is_stiff_by_every_method(method, monkeypatch):
+    monkeypatch.setattr(layout, "STEP_LIMIT", 50_000)
+    monkeypatch.setattr(witness, "WATCH", 2_000)
+    found = solve(Scenario(n_slices=5, drag=1e13), method=method)
+    assert (found.status, found.reason) == ("stalled", "stiff")
+    assert "drag = 1e+13 kg/s" in found.message
+
+
+def test_a_flight_that_chatters_is_not_called_stiff():
+    """Its tube is light, too, but nearly every step ends by an impact."""
+    scenario = Scenario(
+        bottle=Bottle(mass=1.7e-12), water_mass=0.84, n_slices=10, drag=23.3, omega0=59.0, restitution=1
+    )
+    found = solve(scenario, "free-flight")
+    assert (found.status, found.reason) == ("stalled", "")
+    assert "rest_speed" in found.message
+
+
+@pytest.mark.parametrize("method", ["taylor", "DOP853"])
+def test_a_flight_ends_after_the_greatest_number_of_impacts(method, monkeypatch):
+    monkeypatch.setattr(motion, "MAX_IMPACTS", 50)
+    monkeypatch.setattr(motion, "IMPACTS_A_SLICE", 0)
+    scenario = Scenario(n_slices=20, restitution=1.0, drag=0.5)
+    found = solve(scenario, "accelerating-origin", method=method)
+    assert found.status == "exhausted"
+    assert 50 <= len(found.impacts) < 70
+    assert found.impacts.time[-1] <= scenario.duration
+    assert 0 < len(found.t) < 1000
+    assert f"{len(found.impacts)} impacts" in found.message
 
 
 @pytest.mark.parametrize(
