@@ -97,11 +97,3 @@ def test_sentences_of_most_captions_stand_once():
     assert common == "Shared by all, β = 1."
     assert left == ("A. Own one. Late.", "Late.", "Own three?")
     assert shared([SimpleNamespace(caption="One. Two.")] * 2)[0] == ""
-
-
-def test_a_strangers_dollar_sign_is_no_formula():
-    figure, axes = new_figure()
-    axes.plot([0.0, 1.0], [0.0, 1.0], label="$x_$ at r_CM")  # no formula of matplotlib's grammar
-    axes.set_title("$x_$")
-    axes.legend()
-    assert "<!-- $x_$ -->" in draw(figure).svg

@@ -13,6 +13,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -140,7 +141,7 @@ def _problem(summary: Any) -> str:
         if not (isinstance(bounds, list) and len(bounds) == 2 and all(map(_readable, bounds))):
             return f"finding {finding['id']!r}: admissible = {bounds!r} is not two numbers or nulls"
     ids = [finding["id"] for finding in findings]
-    twice = sorted({name for name in ids if ids.count(name) > 1})
+    twice = sorted(name for name, count in Counter(ids).items() if count > 1)
     return f"findings share the id {twice[0]!r}" if twice else ""
 
 

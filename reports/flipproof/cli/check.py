@@ -23,6 +23,7 @@ from flipproof.cli.arguments import (
     write_json,
     write_junit,
 )
+from flipproof.cli.console import inert
 
 tolerance = reader("a finite number of at least 0", float, lambda value: 0.0 <= value < math.inf)
 
@@ -74,7 +75,7 @@ def command_diff(options: argparse.Namespace) -> int:
 
         write_text(options.html, diff_page(options.old, options.new, old, new, found))
     write_json(options.json, found.to_mapping())
-    print(found.text)
+    print(inert(found.text))
     return 0 if found.same else 1
 
 
@@ -160,7 +161,7 @@ def command_compare(options: argparse.Namespace) -> int:
         return Curve.of(run)
 
     found = compare(load(options.first), load(options.second))
-    print(table(found))
+    print(inert(table(found)))
     allowed = math.inf if options.tolerance is None else options.tolerance
     held = claims(found, allowed)
     write_json(options.json, {**found.to_mapping(), "findings": [finding.to_mapping() for finding in held]})

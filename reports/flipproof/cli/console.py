@@ -27,6 +27,14 @@ def readable(words: str) -> str:
     return _cut(" ".join(_cut(word, 300) for word in words.split()), 2000)
 
 
+def inert(text: str) -> str:
+    r"""Return text for a terminal with control and formatting characters written as escapes, as \x1b; lines stay."""
+    hidden = {"Cc", "Cf", "Zl", "Zp"}
+    return "".join(
+        c.encode("unicode_escape").decode() if c != "\n" and unicodedata.category(c) in hidden else c for c in text
+    )
+
+
 def _cut(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 2 :]}"
 

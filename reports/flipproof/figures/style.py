@@ -58,6 +58,9 @@ STYLE: dict[Any, Any] = {
 INDEXED = re.compile(r"(?<![A-Za-z_$])([A-Zrvetθω])_(CM|[Mwbcfs]|max|table)(?![\w$])")
 """A symbol with its index in plain text."""
 
+DOLLAR = re.compile(r"\\*\$")
+"""A dollar sign with the backslashes before it."""
+
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -119,9 +122,9 @@ def draw(figure: Figure, png: bool = True) -> Drawing:
 def _written(text: str) -> str:
     """Return a text of a figure with solvers under their spoken names and indices set lower.
 
-    A dollar sign is a dollar sign: names of other people's solvers are no formulas.
+    A dollar sign in it is text, never the beginning of mathematics: names of solvers are others' words.
     """
-    return INDEXED.sub(r"$\1_{\\mathrm{\2}}$", spoken(text).replace("$", r"\$"))
+    return INDEXED.sub(r"$\1_{\\mathrm{\2}}$", DOLLAR.sub(r"\\$", spoken(text)))
 
 
 def solver_style(label: str, k: int = 0) -> dict[str, Any]:

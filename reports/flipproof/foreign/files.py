@@ -177,7 +177,7 @@ class Kit(Runner):
                 raise ValueError(f"format {index['kit']!r}, must be 1")
         except OSError as error:
             raise ValueError(f"{folder}: is no kit ({INDEX}: {error.strerror or error})") from None
-        except (ValueError, TypeError, KeyError) as error:
+        except (ValueError, TypeError, KeyError, RecursionError) as error:
             raise ValueError(f"{folder / INDEX}: is not readable ({error})") from None
         self.waiting: set[Path] = set()
 
