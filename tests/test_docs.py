@@ -1,6 +1,8 @@
 """Docs that point somewhere point somewhere that exists."""
 
+import argparse
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -8,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import slicemodel
+from flipproof.cli.main import parser
 from slicemodel import Scenario
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -43,6 +46,27 @@ def test_the_code_of_the_page_runs(page, capsys):
         exec(compile(block, page, "exec"), {})
     if page == "README.md":
         assert capsys.readouterr().out.strip().endswith("ok")
+
+
+def test_every_command_of_the_readme_is_understood_and_its_files_exist():
+    text = (ROOT / "README.md").read_text(encoding="utf-8").split("## Three users")[1]
+    blocks = re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
+    lines = [shlex.split(line, comments=True) for block in blocks for line in block.splitlines()]
+    assert len(lines) >= 9
+    written = set()
+    for program, *arguments in lines:
+        assert program == "flipproof"
+        options = vars(parser().parse_args(arguments))
+        written.add(str(options.get("out")))
+        for word in arguments:
+            if "/" in word and not any(word == out or word.startswith(f"{out}/") for out in written):
+                assert (ROOT / word.split(":")[0]).exists(), word
+
+
+def test_the_list_of_every_command_lacks_none():
+    text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    (commands,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
+    assert [name for name in commands.choices if f"flipproof {name}" not in text] == []
 
 
 def test_the_reference_is_built_without_a_warning(tmp_path):
