@@ -41,6 +41,15 @@ def stiff(model: str, scenario: Scenario, t: float, rate: float) -> str:
     )
 
 
+MAX_IMPACTS, IMPACTS_A_SLICE = 2_000_000, 20
+"""Greatest number of impacts of one run, and how many each slice adds to it; an impact takes 48 bytes of memory."""
+
+
+def max_impacts(slices: int) -> int:
+    """Return the number of impacts after which a run of so many slices ends as exhausted."""
+    return MAX_IMPACTS + IMPACTS_A_SLICE * slices
+
+
 def exhausted(model: str, impacts: int, t: float) -> str:
     """Return that the run has had as many impacts as a run may have."""
     return (

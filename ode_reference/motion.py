@@ -34,14 +34,6 @@ BoolArray = NDArray[np.bool_]
 
 PUBLISHED: Final = Switches()
 
-MAX_IMPACTS, IMPACTS_A_SLICE = 2_000_000, 20
-"""Greatest number of impacts of one run, and how many each slice adds to it; an impact takes 48 bytes of memory."""
-
-
-def max_impacts(slices: int) -> int:
-    """Return the number of impacts after which a run of so many slices ends as exhausted."""
-    return MAX_IMPACTS + IMPACTS_A_SLICE * slices
-
 
 @dataclass(frozen=True, slots=True)
 class Throw:

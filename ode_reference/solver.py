@@ -100,7 +100,7 @@ def solve(
         ``inertia_error``.
         Status "overflow", "stalled", "exhausted" or "diverged" returns the output times reached and says where it
         stopped: "stalled" with the reason "stiff" if the drag on a slice or on a light tube is too fast for the
-        duration, "exhausted" after ``ode_reference.motion.max_impacts`` impacts. These grow exponentially in
+        duration, "exhausted" after ``ode_reference.messages.max_impacts`` impacts. These grow exponentially in
         "accelerating-origin" with drag and e near 1, which gains energy in impacts without recoil.
 
     Raises

@@ -32,7 +32,7 @@ from ode_reference.arguments import known_name, number_above, number_within
 from ode_reference.contact import FREE, TOUCH, Ends, SideArray, resolve
 from ode_reference.energy import Ledger, nodes
 from ode_reference.impacts import LAWS, immovable
-from ode_reference.motion import Model, Motion, Throw, max_impacts
+from ode_reference.motion import Model, Motion, Throw
 from slicemodel.observables import grazes, opposite_hits
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import BASE, CAP, FloatArray, Impacts, Trajectory
@@ -351,7 +351,7 @@ class _Flight:
         self.counts["impacts"] += int(real.sum())
         self.counts["rests"] += int(np.count_nonzero((outcome.resting != FREE) & (self.resting == FREE)))
         self.counts["releases"] += int(np.count_nonzero((outcome.resting == FREE) & (self.resting != FREE)))
-        if self.counts["impacts"] >= max_impacts(self.n):
+        if self.counts["impacts"] >= messages.max_impacts(self.n):
             self.status = "exhausted"
             self.message = messages.exhausted(self.motion.model.name, self.counts["impacts"], self.t)
         if self.ledger is not None:

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ode_reference import motion
+from ode_reference import messages
 from ode_reference.motion import Throw
 from ode_reference.switches import Switches
 from slicemodel.scenario import Scenario
@@ -94,7 +94,7 @@ def prepare(
     # Nothing tells the ends of a full bottle apart if no weight pulls along it and impacts do not come one by one.
     now.mirrored = scenario.fill_fraction == 1.0 and now.gravity == 0.0 and not now.sequential
     now.ledger, now.step_limit, now.watch = settings["energy"], STEP_LIMIT, WATCH
-    now.impact_limit = motion.max_impacts(n)
+    now.impact_limit = messages.max_impacts(n)
     now.theta, now.A, now.dB = scenario.theta0, 1.0, 1.0
     points, marks = np.zeros((6, n)), np.zeros((3, n), dtype=np.int64)
     # A full bottle is mirror symmetric to the last digit: its stack is as high as the tube is long.

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ode_reference import LADDER, LAWS, MODELS, Switches, motion, solve, solve_batch, witness
+from ode_reference import LADDER, LAWS, MODELS, Switches, messages, solve, solve_batch, witness
 from ode_reference.combinations import acceleration_of
 from ode_reference.flow import api, layout
 from ode_reference.motion import Throw
@@ -287,8 +287,8 @@ def test_a_flight_that_chatters_is_not_called_stiff():
 
 @pytest.mark.parametrize("method", ["taylor", "DOP853"])
 def test_a_flight_ends_after_the_greatest_number_of_impacts(method, monkeypatch):
-    monkeypatch.setattr(motion, "MAX_IMPACTS", 50)
-    monkeypatch.setattr(motion, "IMPACTS_A_SLICE", 0)
+    monkeypatch.setattr(messages, "MAX_IMPACTS", 50)
+    monkeypatch.setattr(messages, "IMPACTS_A_SLICE", 0)
     scenario = Scenario(n_slices=20, restitution=1.0, drag=0.5)
     found = solve(scenario, "accelerating-origin", method=method)
     assert found.status == "exhausted"

@@ -12,9 +12,10 @@ from typing import Final, cast
 
 from flipproof.chapters.errata import equations, programs
 from flipproof.chapters.errata.equations import ROUND_OFF, Erratum
-from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Study, attempt, observed
+from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Missing, Study, attempt, observed
 from flipproof.frame.findings import finite_or_none
 from slicemodel import Scenario
+from slicemodel.scenario import ScenarioError
 
 AUDIT: Final[Mapping[str, Callable[[Scenario], Erratum]]] = {
     "eq4b-epsilon": equations.erratum_eq4b,
@@ -46,8 +47,15 @@ def study(ask: Ask) -> Study[Mapping[str, Erratum]]:
 
 
 def study_errata(throw: Scenario) -> dict[str, Erratum]:
-    """Return the audit; an item that cannot be computed has the value NaN and says why."""
-    found = {id_: attempt(item, throw) for id_, item in AUDIT.items()}
+    """Return the audit; an item whose bottle cannot be thrown has the value NaN and says why."""
+
+    def evaluate(item: Callable[[Scenario], Erratum]) -> Erratum:
+        try:
+            return item(throw)
+        except ScenarioError as error:
+            raise Missing(f"ScenarioError: {error}") from error
+
+    found = {id_: attempt(evaluate, item) for id_, item in AUDIT.items()}
     return {id_: each.found or Erratum(note=each.reason) for id_, each in found.items()}
 
 
