@@ -24,7 +24,7 @@ from typing import Any, Final
 from flipproof.build import ask_of
 from flipproof.chapters import chapters_named, parts
 from flipproof.check.diff import LEAST, ROUND_OFF, TOLERANCE, bands, number, read_summary, scenario_changes
-from flipproof.frame.findings import Finding
+from flipproof.frame.findings import Finding, interval_text
 from flipproof.frame.gather import gather, tell
 from flipproof.frame.pool import Here
 from flipproof.frame.store import RunStore
@@ -103,7 +103,7 @@ def check(
             moves = group == "thresholds" or (work is not None and finding.kind != "regression")
             if moves and (was is None or (work is not None and was["value"] is None)):
                 continue
-            held, needs = finding, _interval(finding.admissible)
+            held, needs = finding, _threshold(finding.admissible, finding.value)
             if was is not None:
                 held, needs = _held_to(finding, was, tolerance, moves=moves)
             found.append(held)
@@ -123,13 +123,8 @@ def line(finding: Finding, needs: str) -> str:
     return f"{word}  {finding.id}: {found}; {needs}" + (f" ({note})" if finding.failed and note else "")
 
 
-def _interval(admissible: tuple[float, float]) -> str:
-    low, high = admissible
-    if math.isinf(low) and math.isinf(high):
-        return "any number"
-    if math.isinf(low) or (low == 0.0 and not math.isinf(high)):
-        return f"threshold ≤ {high:.6g}"
-    return f"threshold ≥ {low:.6g}" if math.isinf(high) else f"threshold {low:.6g} to {high:.6g}"
+def _threshold(admissible: tuple[float, float], value: float | None) -> str:
+    return f"threshold {interval_text(admissible, value, digits=6)}"
 
 
 def _held_to(finding: Finding, was: Mapping[str, Any], tolerance: float, *, moves: bool) -> tuple[Finding, str]:
@@ -143,7 +138,7 @@ def _held_to(finding: Finding, was: Mapping[str, Any], tolerance: float, *, move
     bounds = [number(bound) for bound in was["admissible"]]
     low, high = (bound if bound is not None else math.copysign(math.inf, k - 0.5) for k, bound in enumerate(bounds))
     chosen = not (math.isinf(low) and math.isinf(high))
-    needs = [_interval((low, high))] if chosen else []
+    needs = [_threshold((low, high), finding.value)] if chosen else []
     value = number(was["value"])
     if moves and value is not None and math.isfinite(value):
         allowed = 2.0 * bands(was) + tolerance + ROUND_OFF * abs(value) + LEAST

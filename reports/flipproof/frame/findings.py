@@ -57,10 +57,7 @@ class Finding:
     @property
     def threshold_text(self) -> str:
         """The admissible interval as the table prints it."""
-        low, high = self.admissible
-        if math.isinf(low) or low == 0.0:
-            return "none" if math.isinf(low) and math.isinf(high) else f"≤ {high:.3g}"
-        return f"≥ {low:.3g}" if math.isinf(high) else f"{low:.3g} to {high:.3g}"
+        return interval_text(self.admissible, self.value)
 
     @property
     def value_text(self) -> str:
@@ -84,6 +81,21 @@ class Finding:
             "threshold": self.threshold_text,
             "verdict": self.verdict,
         }
+
+
+def interval_text(admissible: tuple[float, float], value: float | None, digits: int = 3) -> str:
+    """Return the closed interval that a value must lie in, its finite bounds with so many significant digits.
+
+    A lower bound of zero is left out unless the value is below it, as most values are distances. Without a finite bound
+    the text is "none".
+    """
+    low, high = admissible
+    if math.isinf(high):
+        return "none" if math.isinf(low) else f"≥ {low:.{digits}g}"
+    below = value is not None and value < low
+    if math.isinf(low) or (low == 0.0 and not below):
+        return f"≤ {high:.{digits}g}"
+    return f"{low:.{digits}g} to {high:.{digits}g}"
 
 
 def observed(
