@@ -211,7 +211,7 @@ def test_a_parent_that_cannot_be_made_is_named(tmp_path):
 
 def test_a_place_where_no_folder_can_be_made_is_refused_and_not_tried_for_ever(tmp_path, monkeypatch):
     (tmp_path / f"out{UNFINISHED}").symlink_to(tmp_path / "nowhere")
-    with pytest.raises(OutputError, match="cannot be written"), replaced_folder(tmp_path / "out", "report"):
+    with pytest.raises(OutputError, match="is a link"), replaced_folder(tmp_path / "out", "report"):
         raise AssertionError
     made = Path.mkdir
 
@@ -298,3 +298,42 @@ def test_an_interrupted_report_leaves_the_old_one(tmp_path, number):
     assert "Traceback" not in err
     assert read_report(target) == {"old"}
     assert [p.name for p in tmp_path.iterdir()] == ["latest"]
+
+
+@pytest.mark.parametrize("plant", [os.symlink, os.link])
+def test_a_planted_lock_is_refused_and_what_it_leads_to_is_as_it_was(tmp_path, plant):
+    victim = tmp_path / "thesis.txt"
+    victim.write_text("years of work")
+    beside = tmp_path / f"latest{UNFINISHED}"
+    beside.mkdir()
+    plant(victim, beside / "lock")
+    with pytest.raises(OutputError, match="lock"), replaced_folder(tmp_path / "latest", "report"):
+        pass
+    assert victim.read_text() == "years of work"
+
+
+def test_a_planted_unfinished_folder_is_refused(tmp_path):
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (tmp_path / f"latest{UNFINISHED}").symlink_to(elsewhere)
+    with pytest.raises(OutputError, match="link"), replaced_folder(tmp_path / "latest", "report"):
+        pass
+    assert not list(elsewhere.iterdir())
+
+
+def test_a_lock_in_a_folder_that_everybody_may_write_is_refused(tmp_path):
+    beside = tmp_path / f"latest{UNFINISHED}"
+    beside.mkdir()
+    beside.chmod(0o777)
+    with pytest.raises(OutputError, match="every user"), replaced_folder(tmp_path / "latest", "report"):
+        pass
+
+
+def test_a_planted_part_file_is_not_written_to(tmp_path):
+    victim = tmp_path / "thesis.txt"
+    victim.write_text("years of work")
+    (tmp_path / f"a.txt.{os.getpid()}.flipproof-part").symlink_to(victim)
+    write_text(tmp_path / "a.txt", "new")
+    assert (tmp_path / "a.txt").read_text() == "new"
+    assert not (tmp_path / "a.txt").is_symlink()
+    assert victim.read_text() == "years of work"

@@ -308,6 +308,15 @@ def test_a_killed_programs_half_files_are_swept_away(tmp_path):
         assert mine.read_bytes() == b"somebody's download"
 
 
+def test_a_pipe_in_place_of_the_file_is_refused(tmp_path):
+    with Store(tmp_path, design(), CODE):
+        pass
+    (tmp_path / "sweep.sqlite").unlink()
+    os.mkfifo(tmp_path / "sweep.sqlite")
+    with pytest.raises(SweepError, match="pipe"):
+        Store(tmp_path, design(), CODE)
+
+
 def test_a_file_is_whole_or_the_old_one(tmp_path):
     (tmp_path / "a").write_text("old")
     with pytest.raises(ValueError, match="broken"), whole_file(tmp_path / "a") as part:  # noqa: PT012

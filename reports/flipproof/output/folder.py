@@ -10,6 +10,7 @@ import errno
 import json
 import os
 import shutil
+import stat
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -93,9 +94,10 @@ def _some(names: list[str]) -> str:
 def sole_writer(lock: Path, folder: Path) -> Iterator[None]:
     """Hold the file ``lock`` for as long as the block lasts; the kernel lets go of it when this program dies.
 
-    Raises OutputError if another program holds it, naming its process number and the ``folder``, or if it cannot be
-    locked.
+    Raises OutputError if another program holds it, naming its process number and the ``folder``, if it cannot be
+    locked, and if ``check_private`` refuses the folder of the lock or the lock is not a file of this user alone.
     """
+    check_private(lock.parent)
     handle = _hold(lock, folder)
     try:
         os.truncate(handle, 0)
@@ -111,9 +113,31 @@ def sole_writer(lock: Path, folder: Path) -> Iterator[None]:
                 lock.unlink(missing_ok=True)
 
 
+def check_private(folder: Path) -> None:
+    """Refuse, by an OutputError, a folder of another user, and one in which other users may replace files."""
+    facts = folder.stat()
+    if sys.platform != "win32" and facts.st_uid != os.geteuid():
+        raise OutputError(f"{folder} belongs to another user; name a folder of your own")
+    if sys.platform != "win32" and facts.st_mode & stat.S_IWOTH and not facts.st_mode & stat.S_ISVTX:
+        raise OutputError(f"{folder} may be written by every user; run chmod o-w on it, or name another folder")
+
+
+def _open_lock(lock: Path) -> int:
+    """Open or make a lock; refuse a link and whatever else could lead to a file that is not ours."""
+    if lock.is_symlink():
+        raise OutputError(f"{lock} is a link, which flipproof does not make; remove it")
+    handle = os.open(lock, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
+    facts = os.fstat(handle)
+    ours = sys.platform == "win32" or facts.st_uid == os.geteuid()
+    if not stat.S_ISREG(facts.st_mode) or facts.st_nlink > 1 or not ours:
+        os.close(handle)
+        raise OutputError(f"{lock} is not a file that flipproof made for this user; remove it")
+    return handle
+
+
 def _hold(lock: Path, folder: Path) -> int:
     while True:
-        handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+        handle = _open_lock(lock)
         try:
             _lock(handle)
             if os.path.samestat(os.fstat(handle), os.stat(lock)):
@@ -226,6 +250,8 @@ def _held(beside: Path, target: Path) -> Iterator[None]:
         for left in reversed(range(1000)):
             beside.parent.mkdir(parents=True, exist_ok=True)
             try:
+                if beside.is_symlink():
+                    raise OutputError(f"{beside} is a link, which flipproof does not make; remove it")
                 beside.mkdir(exist_ok=True)
                 held.callback(_remove_empty, beside)
                 strangers = sorted(entry.name for entry in beside.iterdir() if entry.name not in (LOCK, NEW, OLD))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,9 +16,11 @@ TEMPORARY = ".flipproof-part"
 def whole_file(path: Path) -> Iterator[Path]:
     """Give a name beside ``path`` to write to; put the file in the place of ``path`` when the block ends well.
 
-    The content is on the disk before the name is: after a power failure too, a file of that name is whole.
+    The content is on the disk before the name is: after a power failure too, a file of that name is whole. The file
+    to write to is new and has a random name, so that no link that somebody left there is followed.
     """
-    part = path.with_name(f"{path.name}.{os.getpid()}{TEMPORARY}")
+    part = path.with_name(f"{path.name}.{secrets.token_hex(8)}{TEMPORARY}")
+    os.close(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
     try:
         yield part
         with part.open("rb+") as file:

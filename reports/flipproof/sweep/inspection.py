@@ -24,6 +24,8 @@ def inspect(file: Path, design: Plan, code: str, patience: float) -> None:
     try:
         if file.is_dir():
             raise SweepError(f"{file} is a folder, where a sweep keeps its rows in a file; name another --out")
+        if file.exists() and not file.is_file():
+            raise SweepError(f"{file} is a pipe or a device, not a file; name another --out")
         with file.open("rb") as opened:
             beginning = opened.read(16)
     except OSError as error:
