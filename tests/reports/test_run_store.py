@@ -211,6 +211,38 @@ def test_a_flipped_byte_makes_the_run_again(place, column):
     assert same(replace(made, seconds=again.seconds), again)
 
 
+def test_a_bit_flipped_in_the_schema_costs_the_store_and_no_report(place):
+    kept(place, RUN)
+    whole = place.read_bytes()
+    begin = whole.index(b"CREATE TABLE kept") - 60
+    for at in range(begin, begin + 320, 5):
+        for end in ("-wal", "-shm"):
+            place.with_name(place.name + end).unlink(missing_ok=True)
+        place.write_bytes(whole[:at] + bytes([whole[at] ^ 0x80]) + whole[at + 1 :])
+        kept(place, RUN)
+        kept(place, RUN)
+        assert found(place) is not None, at
+
+
+def test_a_store_that_others_may_have_written_is_not_read(place):
+    kept(place, RUN)
+    for mode in (0o720, 0o702):
+        place.parent.chmod(mode)
+        assert found(place) is None
+    place.parent.chmod(0o700)
+    assert found(place) is not None
+
+
+def test_entries_dated_in_the_future_do_not_drive_out_new_ones(place):
+    runs = [replace(RUN, scenario=replace(RUN.scenario, omega0=10.0 + k)) for k in range(4)]
+    kept(place, *runs[:2])
+    with sqlite3.connect(place) as rows:
+        (size,) = rows.execute("SELECT max(size) FROM kept").fetchone()
+        rows.execute("UPDATE kept SET used = '2999-01-01 00:00:00.000000'")
+    kept(place, *runs[2:], limit=int(2.5 * size))
+    assert [found(place, run) is not None for run in runs] == [False, False, True, True]
+
+
 def test_an_entry_of_another_run_is_not_taken_for_it(place):
     other = replace(RUN, scenario=replace(RUN.scenario, omega0=11.0))
     kept(place, RUN)

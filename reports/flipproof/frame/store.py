@@ -17,6 +17,7 @@ import hashlib
 import os
 import pickle
 import sqlite3
+import stat
 import sys
 import threading
 import time
@@ -47,9 +48,15 @@ CREATE TABLE IF NOT EXISTS kept (
 """
 EVICT: Final = """
 DELETE FROM kept WHERE key IN (
-    SELECT key FROM (SELECT key, sum(size) OVER (ORDER BY used DESC, key) AS together FROM kept) WHERE together > ?
+    SELECT key FROM (
+        SELECT key, sum(size) OVER (ORDER BY CASE WHEN used > ? THEN '' ELSE used END DESC, key) AS together FROM kept
+    ) WHERE together > ?
 )
 """
+"""What is dated in the future, by a clock that was wrong, goes first."""
+
+UNUSABLE: Final = (OSError, sqlite3.Error, UnicodeDecodeError)
+"""What opening or reading the file raises; UnicodeDecodeError when SQLite quotes a damaged schema."""
 
 
 class RunStore(AbstractContextManager["RunStore"]):
@@ -128,7 +135,7 @@ class RunStore(AbstractContextManager["RunStore"]):
                 return None
             try:
                 row = self._rows.execute("SELECT checksum, content FROM kept WHERE key = ?", (key,)).fetchone()
-            except sqlite3.Error as error:
+            except UNUSABLE as error:
                 if not _is(error, sqlite3.SQLITE_BUSY):
                     self._give_up(error)
                 return None
@@ -159,7 +166,7 @@ class RunStore(AbstractContextManager["RunStore"]):
             with self._lock:
                 row = (key, _checksum(key, content), _now(), len(content), content)
                 self._write("INSERT OR REPLACE INTO kept VALUES (?, ?, ?, ?, ?)", row)
-                self._write(EVICT, (self.limit,))
+                self._write(EVICT, (_now(), self.limit))
 
     def _same_program(self) -> bool:
         """Return whether no source has been changed since the store was opened."""
@@ -176,7 +183,7 @@ class RunStore(AbstractContextManager["RunStore"]):
             return
         try:
             self._rows.execute(statement, values)
-        except sqlite3.Error as error:
+        except UNUSABLE as error:
             if _is(error, sqlite3.SQLITE_BUSY):
                 self._rows.execute("PRAGMA busy_timeout = 0")  # it was waited for once, which is long
                 return
@@ -187,12 +194,13 @@ class RunStore(AbstractContextManager["RunStore"]):
     def _open(self, place: Path) -> None:
         try:
             place.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+            _check_own(place)
             self._rows = _connect(place)
-        except (OSError, sqlite3.Error) as error:
+        except UNUSABLE as error:
             self._give_up(error)
             if _is_damage(error):
                 # What is damaged was thrown away just now: begin anew.
-                with suppress(OSError, sqlite3.Error):
+                with suppress(*UNUSABLE):
                     self._rows = _connect(place)
 
     def _give_up(self, error: Exception) -> None:
@@ -257,6 +265,19 @@ def default_place() -> Path | None:
     return home / "flipproof" / "runs-1.sqlite"  # the number rises with every change of the table
 
 
+def _check_own(place: Path) -> None:
+    """Refuse, by an OSError, a store that another user may have written: what it holds is unpickled."""
+    folder = place.parent.stat()
+    if place.exists() and not place.is_file():
+        raise OSError("not a regular file")
+    if sys.platform == "win32":
+        return
+    if folder.st_uid != os.geteuid() or (place.exists() and place.stat().st_uid != os.geteuid()):
+        raise OSError("it belongs to another user")
+    if folder.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        raise OSError("its folder may be written by other users")
+
+
 def _connect(place: Path) -> sqlite3.Connection:
     rows = sqlite3.connect(place, timeout=BUSY, isolation_level=None, check_same_thread=False)
     try:
@@ -301,7 +322,9 @@ def _now(form: str = "%Y-%m-%d %H:%M:%S.%f") -> str:
 
 
 def _is_damage(error: Exception) -> bool:
-    return _is(error, sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
+    """Return whether the file is damaged. SQLITE_ERROR: a statement that is right does not fit the schema there."""
+    damage = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
+    return isinstance(error, UnicodeDecodeError) or _is(error, *damage)
 
 
 def _is(error: Exception, *codes: int) -> bool:
