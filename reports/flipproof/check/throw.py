@@ -124,6 +124,8 @@ def line(finding: Finding, needs: str) -> str:
 
 
 def _threshold(admissible: tuple[float, float], value: float | None) -> str:
+    if all(map(math.isinf, admissible)):
+        return "any number"
     return f"threshold {interval_text(admissible, value, digits=6)}"
 
 

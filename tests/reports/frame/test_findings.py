@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from flipproof.check.throw import _threshold
 from flipproof.frame.findings import Finding, interval_text
 
 
@@ -32,3 +33,5 @@ def test_the_printed_threshold_is_one_that_the_verdict_follows_from(admissible, 
 def test_check_prints_the_same_threshold_with_more_digits():
     assert interval_text((0.0, 1.2345678), 1.0, digits=6) == "≤ 1.23457"
     assert interval_text((0.0, 1.2345678), -1.0, digits=6) == "0 to 1.23457"
+    assert _threshold((0.0, 1.2345678), 1.0) == "threshold ≤ 1.23457"
+    assert _threshold((-math.inf, math.inf), 1.0) == "any number"

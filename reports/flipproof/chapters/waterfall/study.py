@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 from itertools import chain, combinations
 from typing import Final, NamedTuple, TypeVar
 
-from flipproof.frame.solvers import Missing, Run, finer
+from flipproof.frame.solvers import Run, finer
 from flipproof.frame.twins import band, twins
 from ode_reference.solver import COLUMN
 from ode_reference.switches import Switches
@@ -222,7 +222,7 @@ def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) 
         abs(total - sum(getattr(bar, split) for bar in bars)) for split in ("forward", "backward", "average")
     )
     if not residual <= 1e-12 * (1.0 + abs(start) + sum(abs(bar.average) for bar in bars)):
-        raise Missing(f"{observable.name}: the bars miss the total by {residual:.3g} {observable.unit}")
+        raise ArithmeticError(f"{observable.name}: the bars miss the total by {residual:.3g} {observable.unit}")
     return Waterfall(
         observable=observable,
         slices=program.scenario.n_slices,
