@@ -5,6 +5,7 @@ are skipped with the reason, unless FLIPPROOF_BROWSER=require: then they fail.
 """
 
 import os
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -13,12 +14,13 @@ from pathlib import Path
 import pytest
 
 from flipproof.build import write
-from flipproof.page.pdf import VARIABLE, find_browser
 
 HERE = Path(__file__).parent
 AXE = Path(os.environ.get("FLIPPROOF_AXE", HERE / "node_modules" / "axe-core" / "axe.min.js"))
 WIDE = (1440, 900)
 PHONE = (390, 844)
+VARIABLE = "FLIPPROOF_CHROMIUM"
+"""Environment variable that names another browser of the Chromium family."""
 
 
 def unavailable(reason: str) -> None:
@@ -30,7 +32,8 @@ def unavailable(reason: str) -> None:
 
 @pytest.fixture(scope="session")
 def chromium() -> str:
-    path = find_browser()
+    names = [os.environ[VARIABLE]] if VARIABLE in os.environ else ["chromium", "chromium-browser", "google-chrome"]
+    path = next(filter(None, map(shutil.which, names)), None)
     if path is None:
         unavailable(f"no Chromium: install the package chromium, or set {VARIABLE}")
     return path

@@ -8,7 +8,6 @@ import pytest
 from PIL import Image
 
 from flipproof.page.inline import LETTERS, SIZE
-from flipproof.page.pdf import print_page
 
 PAPER = (695, 1013)
 """A4 within the margins of the style sheet, in pixels."""
@@ -110,11 +109,9 @@ def test_a4_pages_cut_nothing_off(visit):
         assert visited.page.locator("nav").is_hidden()
 
 
-def test_pdf(folder, tmp_path):
-    made = tmp_path / "report.pdf"
-    print_page(folder / "index.html", made)
-    content = made.read_bytes()
-    assert content.startswith(b"%PDF-")
+def test_the_browser_prints_the_page_on_a4(visit):
+    with visit() as visited:
+        content = visited.page.pdf(prefer_css_page_size=True)
     boxes = re.findall(rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", content)
     assert len(boxes) >= 10
     assert {(round(float(width)), round(float(height))) for width, height in boxes} == {(595, 842)}

@@ -39,7 +39,6 @@ from flipproof.cli.arguments import (
     store_of,
 )
 from flipproof.cli.check import add_checks, add_compare
-from flipproof.cli.completion import add_completion
 from flipproof.cli.console import readable, speak_plainly
 from flipproof.cli.film import add_film
 from flipproof.cli.foreign import add_foreign, add_models
@@ -225,9 +224,6 @@ def parser() -> argparse.ArgumentParser:
     report.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
     add_no_cache(report)
     report.add_argument("--png", action="store_true", help="also write every figure as PNG, beside the SVG")
-    report.add_argument(
-        "--pdf", action="store_true", help="also print the page to report.pdf (needs Chromium, Chrome or Edge)"
-    )
 
     simulate = add_command(commands, "simulate", "Run one solver and write its trajectory as CSV.", command_simulate)
     simulate.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
@@ -249,7 +245,6 @@ def parser() -> argparse.ArgumentParser:
     add_animate(commands)
     add_landing(commands)
     add_foreign(commands)
-    add_completion(commands)
     add_models(commands)
     return top
 
@@ -258,7 +253,6 @@ def command_report(options: argparse.Namespace) -> int:
     """Write a report; return 1 if a regression claim failed."""
     scenario = read_scenario(options.scenario)
     from flipproof.output.folder import check_replaceable, replaced_folder
-    from flipproof.page.pdf import PrintError, print_page, require_browser
 
     check_replaceable(options.out, "report")
     check_guests(options.guests)
@@ -267,8 +261,6 @@ def command_report(options: argparse.Namespace) -> int:
         from flipproof.film.measured import read_measured
 
         measurement = read_measured(options.measured)
-    if options.pdf:
-        require_browser()
 
     from flipproof.build import ask_of, build, gather_report, write
     from flipproof.chapters import parts
@@ -285,7 +277,6 @@ def command_report(options: argparse.Namespace) -> int:
             print(f"flipproof: {time.perf_counter() - began:.0f} s: {stage}", file=sys.stderr, flush=True)
 
     ask = ask_of(scenario, "quick" if options.quick else "full", options.slices)
-    unprinted = ""
     with replaced_folder(options.out, "report") as folder:
         with store_of(options) as store, workers(options.jobs) as pool, progress_bar("runs", "run") as progress:
             contents = parts() if measurement is None else (part_measured(measurement), *parts())
@@ -295,18 +286,10 @@ def command_report(options: argparse.Namespace) -> int:
             facts = provenance(command_line()) | store.facts() | ({} if guests is None else guests.facts)
             report = build(gathered, facts, store.remembering(pool), png=options.png)
         write(report, folder)
-        if options.pdf:
-            try:
-                print_page(folder / "index.html", folder / "report.pdf")
-            except (PrintError, OSError) as error:
-                unprinted = f"the report is complete but for report.pdf: {error}"
-                (folder / "report.pdf").unlink(missing_ok=True)
     for guest in guests.guests if guests is not None else ():
         found = guest.visit.certificate
         print(f"{guest.label}: {found.conclusion if found else '; '.join(guest.visit.problems.values())}")
     _print_report(report, options.out, time.perf_counter() - began)
-    if unprinted:
-        return _complain(unprinted, BAD_INPUT)
     return 1 if report.failed else 0
 
 
