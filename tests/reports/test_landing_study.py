@@ -456,46 +456,6 @@ def test_the_sweep_goes_on(found, copied):
     assert outcomes <= {"upright", "lying", "cap", "undecided", None}
 
 
-def spoil(file, begin):
-    """Flip a bit behind the last place of ``begin`` in a file, and one of its header: it is damaged."""
-    content = bytearray(file.read_bytes())
-    content[content.rindex(begin)] ^= 1
-    content[30] ^= 1
-    file.write_bytes(content)
-
-
-@pytest.mark.parametrize("named", ["", "throws/sweep.sqlite"])
-def test_a_damaged_study_is_salvaged_and_gone_on_with(found, named, copied, tmp_path):
-    out, new = copied, tmp_path / "new"
-    spoil(out / "throws" / "sweep.sqlite", b"upright")
-    with pytest.raises(SweepError, match=rf"can be saved: the same command with --salvage {out}/throws/sweep\.sqlite"):
-        make_upright(THROW, SMALL, out, quiet, lambda _: None, jobs=1)
-    words = make_upright(THROW, SMALL, new, quiet, lambda _: None, jobs=1, damaged=out / named)
-    aims, throws = words.splitlines()
-    assert aims.endswith("none is missing")
-    assert throws.endswith("the same command without --salvage makes the other 1")
-    assert not (new / "upright.csv").exists()
-    with pytest.raises(SweepError, match="--salvage begins a new study"):
-        make_upright(THROW, SMALL, new, quiet, lambda _: None, jobs=1, damaged=out)
-    make_upright(THROW, SMALL, new, quiet, lambda _: None, jobs=1)
-    assert (new / "upright.csv").read_text(encoding="utf-8") == shares_csv(found)
-
-
-def test_a_study_is_salvaged_without_its_aims(copied, tmp_path):
-    """Aims are made anew; which throws are counted is known only after them."""
-    out, new = copied, tmp_path / "new"
-    (out / "aims" / "sweep.sqlite").write_bytes(b"")
-    words = make_upright(THROW, SMALL, new, quiet, lambda _: None, jobs=1, damaged=out)
-    aims, throws = words.splitlines()
-    assert aims.startswith("aims: ")
-    assert throws.endswith("none is missing")
-    with pytest.raises(
-        SweepError, match=r"nothing is no part of a study, which is a folder that holds aims/sweep\.sql"
-    ):
-        make_upright(THROW, SMALL, tmp_path / "more", quiet, print, damaged=tmp_path / "nothing")
-    assert not (tmp_path / "more").exists()
-
-
 def test_workers_of_a_scheduler_make_the_same(found, tmp_path, monkeypatch):
     monkeypatch.setattr("flipproof.landing.upright.figures", lambda _: ())
     with LocalCluster(
@@ -593,7 +553,6 @@ def test_an_outcome_that_no_program_certifies_is_told_with_its_reason():
         (["upright", "--out", "x", "--restitution", "2"], "table.restitution = 2.0 is outside [0, 1]"),
         (["upright", "--out", "x", "--map", "1x5"], "is not COLUMNSxROWS"),
         (["upright", "--out", "x", "--dask", "nonsense"], "is not tcp://HOST:PORT"),
-        (["upright", "--out", "x", "--salvage", "y"], "--salvage y is no part of a study"),
     ],
 )
 def test_bad_input_is_one_line_that_names_it(arguments, words, capsys, monkeypatch, tmp_path):

@@ -80,10 +80,6 @@ def add_store(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--export", type=Path, metavar="FILE", help="when complete, write all rows to a .csv or .parquet"
     )
-    command.add_argument(
-        "--salvage", type=Path, metavar="FILE", help="begin DIR with the rows that are whole in a damaged sweep's "
-        "FILE, and end; the same command without it makes the others",
-    )  # fmt: skip
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
@@ -126,7 +122,7 @@ def fill(options: argparse.Namespace, make: Callable[[Any, dict[str, Any]], str]
     try:
         with ExitStack() as bars:
             where = {"jobs": options.jobs, "dask": options.dask, "export_to": options.export}
-            words = make(begin, where | {"damaged": options.salvage})
+            words = make(begin, where)
     except KeyboardInterrupt:
         there = f"{stored[0]} of {stored[1]} points are stored; " if stored[1] else ""
         print(f"flipproof: interrupted; {there}the same command goes on from there", file=sys.stderr)

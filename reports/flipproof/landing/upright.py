@@ -11,7 +11,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,9 +23,6 @@ from flipproof.output.folder import MARKER, OutputError, check_own, marker_text
 from flipproof.sweep.command import Begin, completed
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import write_whole
-from flipproof.sweep.salvage import salvage
-from flipproof.sweep.schema import FILE
-from flipproof.sweep.work import code_identity
 from slicemodel import Scenario
 
 WAVES: Final = ("aims", "throws")
@@ -40,7 +37,6 @@ def make_upright(
     say: Callable[[str], None],
     *,
     export_to: Path | None = None,
-    damaged: Path | None = None,
     **how: Any,
 ) -> str:
     """Make every throw of the study that has no row in ``out``, write tables and figures; return lines that tell them.
@@ -48,26 +44,17 @@ def make_upright(
     Parameters
     ----------
     export_to, how : as for ``flipproof.sweep.command.completed``
-    damaged : path or None
-        Folder of a damaged study, or a file of it: ``out`` is begun with its whole rows, and only throws that choose an
-        aim are made, for without the aims it is not known which throws are counted.
 
     Raises
     ------
     SweepError
         If the folder, the workers or the disk will not do; what was stored is kept.
     """
-    if damaged and any((out / wave / FILE).exists() for wave in WAVES):
-        raise SweepError(f"--salvage begins a new study, and {out} holds one; name a new --out, or leave --salvage out")
-    files = _whole_files(damaged) if damaged else {}
     _own(out)
     told = []
 
-    def designed(wave: str, cases: Cases) -> Throws:
-        return Throws(cases=tuple(cases.values()), seed=size.seed, text=f"flipproof upright, {wave}")
-
     def make(wave: str, cases: Cases) -> Rows:
-        design = designed(wave, cases)
+        design = Throws(cases=tuple(cases.values()), seed=size.seed, text=f"flipproof upright, {wave}")
         say(f"{wave}: {design.size} throws")
         last = export_to if wave == WAVES[-1] else None
         with completed(design, out / wave, begin, export_to=last, **how) as (store, summary):
@@ -77,10 +64,7 @@ def make_upright(
             return design.by_case([Landed(**dict(zip(columns, row, strict=True))) for row in rows])
 
     aims, unaimed = aiming(throw, size)
-    saved = _saved(files, out, "aims", designed("aims", aims)) if damaged else ""
     throws = counting(throw, size, aims, make("aims", aims))
-    if damaged:
-        return f"{saved}\n{_saved(files, out, 'throws', designed('throws', throws))}"
     found = read(throw, size, throws, make("throws", throws), unaimed)
     say("figures")
     write_whole(out / "upright.csv", shares_csv(found).encode())
@@ -91,26 +75,6 @@ def make_upright(
         write_whole(out / f"{exhibit.name}.png", drawing.png)
     lines = [share_line(found, family) for family in size.families]
     return "\n".join([*lines, f"({found.assumed})", *told, f"Tables and figures: {out}"])
-
-
-def _whole_files(damaged: Path) -> dict[str, Path]:
-    """Return the file of each wave of the study that a path belongs to: its folder, one of a wave, or a file there."""
-    for folder in (damaged, *list(damaged.absolute().parents)[:2]):
-        found = {wave: folder / wave / FILE for wave in WAVES if (folder / wave / FILE).is_file()}
-        if found:
-            return found
-    holds = " and ".join(f"{wave}/{FILE}" for wave in WAVES)
-    raise SweepError(f"--salvage {damaged} is no part of a study, which is a folder that holds {holds}")
-
-
-def _saved(files: Mapping[str, Path], out: Path, wave: str, design: Throws) -> str:
-    """Begin the sweep of a wave with what is whole in its damaged file; say how much that is."""
-    if wave not in files:
-        return f"{wave}: the damaged study has none"
-    try:
-        return salvage(files[wave], out / wave, design, code_identity())
-    except SweepError as error:
-        return f"{wave}: {error}"
 
 
 def _own(out: Path) -> None:

@@ -22,7 +22,6 @@ from flipproof.sweep.entries import try_entries
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.files import whole_file
 from flipproof.sweep.run import Progress, dask_workers, local_workers, run_sweep
-from flipproof.sweep.salvage import salvage
 from flipproof.sweep.schema import FILE, columns
 from flipproof.sweep.store import Store
 from flipproof.sweep.work import OUTCOMES, code_identity
@@ -36,15 +35,13 @@ LEFT_OUT: Final = ("parameters", "versions", "curves", "checksum")
 def sweep(file: Path, out: Path, begin: Begin, **how: Any) -> str:
     """Make every point of the design in ``file`` that has no row in ``out``, as ``fill`` does; return its one line."""
     design = read_design(file)
-    if not how.get("damaged") and not (out / FILE).exists():
+    if not (out / FILE).exists():
         # Before the folder knows the design, so that the mended file may have the same folder.
         try_entries(design.entries)
     return fill(design, out, begin, lambda _, summary: summary, **how)
 
 
-def fill(
-    design: Plan, out: Path, begin: Begin, end: Callable[[Store, str], str], *, damaged: Path | None = None, **how: Any
-) -> str:
+def fill(design: Plan, out: Path, begin: Begin, end: Callable[[Store, str], str], **how: Any) -> str:
     """Make every point of ``design`` that has no row in ``out``; return lines that tell what is there.
 
     If the file, the folder, the workers or the disk will not do, a SweepError says so; what was stored is kept.
@@ -52,11 +49,8 @@ def fill(
     Parameters
     ----------
     end : callable (complete store, line that tells what is there) -> lines to return
-    damaged : path or None - a damaged sweep of this design: ``out`` is begun with its whole rows, no point is made
     how : ``jobs``, ``dask`` and ``export_to`` of ``completed``
     """
-    if damaged:
-        return salvage(damaged, out, design, code_identity())
     with completed(design, out, begin, **how) as (store, summary):
         return end(store, summary)
 

@@ -1,4 +1,4 @@
-"""What is wrong with a sweep's file, and what of it can be saved: asked before anything is written to it."""
+"""What is wrong with a sweep's file: asked before anything is written to it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from flipproof.sweep.damaged import count
 from flipproof.sweep.design import Plan
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.schema import APPLICATION, SCHEMA, columns, intact
@@ -18,8 +17,8 @@ from slicemodel.scenario import shortened
 def inspect(file: Path, design: Plan, code: str, patience: float) -> None:
     """Read a sweep's file through and refuse it unless every row is as it was written, of this design and this code.
 
-    A SweepError names the file, what is wrong with it, and how many points can be saved from it; if another program
-    holds the file for more than ``patience`` seconds, that is an sqlite3.Error.
+    A SweepError names the file and what is wrong with it; if another program holds the file for more than ``patience``
+    seconds, that is an sqlite3.Error.
     """
     try:
         if file.is_dir():
@@ -48,21 +47,13 @@ def inspect(file: Path, design: Plan, code: str, patience: float) -> None:
         except UnicodeDecodeError:  # raised in place of SQLite's error, which quotes what it cannot read
             wrong = "its schema is no text"
     if wrong:
-        raise damage(file, design, code, wrong)
+        raise damage(file, wrong)
 
 
-def damage(file: Path, design: Plan, code: str, wrong: str) -> SweepError:
-    """Return the error that says what is wrong with a file and how many of its points can be saved."""
-    try:
-        whole = count(file, design, code)
-    except OSError:
-        whole = 0
-    saved = (
-        f"{whole} of {design.size} points can be saved: the same command with --salvage {file} and a new --out"
-        if whole
-        else "no point of this design can be saved from it; name another --out"
-    )
-    return SweepError(f"{file} is damaged ({shortened(wrong, 120)}); {saved}")
+def damage(file: Path, wrong: str) -> SweepError:
+    """Return the error that says what is wrong with a file."""
+    advice = "name another --out to make its rows again; docs/sweeps.md says how sqlite3 copies those that can be read"
+    return SweepError(f"{file} is damaged ({shortened(wrong, 120)}); {advice}")
 
 
 def is_damage(error: Exception) -> bool:

@@ -23,7 +23,7 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -120,19 +120,6 @@ class Store(ExitStack):
                     self.connection.executemany("DELETE FROM points WHERE number = ?", gone)
                     self.connection.executemany(f"INSERT INTO points VALUES ({self._marks})", rows)
 
-    def restore(self, rows: Sequence[tuple[Any, ...]], versions: Mapping[int, str]) -> None:
-        """Write rows that were read from another file of this sweep; a point that has a row keeps it.
-
-        Their cells stand in the order of ``columns``; ``versions`` are those there by the id that rows refer to.
-        """
-        place = list(self._columns).index("versions")
-        with self._plainly(), _transaction(self.connection):
-            ids = {row[place]: 0 for row in rows}
-            for old in ids:
-                ids[old] = self._versions(versions.get(old, json.dumps({"lost": f"versions {old} of a damaged file"})))
-            moved = (self._signed((*row[:place], ids[row[place]], *row[place + 1 : -1])) for row in rows)
-            self.connection.executemany(f"INSERT OR IGNORE INTO points VALUES ({self._marks})", moved)
-
     def _begin(self) -> None:
         """Make the file with its tables; it gets its name when it is whole, so that no kill leaves half of it."""
         with whole_file(self.file) as part, closing(sqlite3.connect(part, isolation_level=None)) as connection:
@@ -182,7 +169,7 @@ class Store(ExitStack):
             raise SweepError(f"{self.folder}: {words} ({error})") from None
         except (OSError, sqlite3.Error) as error:
             if is_damage(error):
-                raise damage(self.file, self.design, self.code, str(error)) from None
+                raise damage(self.file, str(error)) from None
             words = getattr(error, "strerror", None) or str(error)
             # What SQLite refuses before it has changed anything.
             safe = sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM
