@@ -11,17 +11,31 @@ import pytest
 from made_up import command as run
 
 from flipproof.cli import main as cli
+from flipproof.cli.screens import commands_of
 
 
-def test_help_reads_like_a_manual(capsys):
-    status, out, _ = run(capsys, "--help")
+def test_eight_commands_stand_on_the_first_screen_and_every_other_on_the_second(capsys):
+    status, first, _ = run(capsys, "--help")
     assert status == 0
-    for word in ("report", "simulate", "compare", "models", "exit status", "examples"):
-        assert word in out
-    for command in ("report", "simulate", "compare", "models"):
+    listed = re.findall(r"^  (\w+) {2,}[A-Z]", first, re.MULTILINE)
+    assert listed == ["report", "compare", "check", "simulate", "sweep", "certify", "track", "fit"]
+    assert len(first.splitlines()) <= 20
+    assert run(capsys, "help") == (0, first, "")
+    assert run(capsys) == (2, first, "")
+    status, second, _ = run(capsys, "more")
+    assert status == 0
+    others = re.findall(r"^  ([a-z]\w+) {2,}[A-Z]", second, re.MULTILINE)
+    assert set(listed) | set(others) | {"more"} == set(commands_of(cli.parser()))
+    assert not set(listed) & set(others)
+    assert "exit status" in second
+
+
+def test_help_of_a_command_has_two_ways(capsys):
+    for command in commands_of(cli.parser()):
         status, out, _ = run(capsys, command, "--help")
         assert status == 0
-        assert "usage: flipproof" in out
+        assert f"usage: flipproof {command}" in out
+        assert run(capsys, "help", command) == (0, out, "")
 
 
 def test_simulate_writes_csv(capsys, tmp_path):
@@ -78,8 +92,12 @@ def test_models_lists_everything_with_reasons(capsys):
         (["compare", "--scenario", "{bad}", "eq8", "eq8"], ["water_mass"]),
         (["report", "--slices", "0"], ["'0' is not a whole number of at least 1"]),
         (["report", "--slices", "few"], ["'few' is not a whole number"]),
-        (["fly"], ["invalid choice: 'fly'"]),
-        ([], ["required: COMMAND"]),
+        (["repot"], ["command 'repot' is unknown", "did you mean 'report'?"]),
+        (["help", "repot"], ["did you mean 'report'?"]),
+        (["qqq"], ["command 'qqq' is unknown", "known: report"]),
+        (["report", "--quik"], ["flipproof report: option '--quik' is unknown", "did you mean '--quick'?"]),
+        (["--versoin"], ["option '--versoin' is unknown", "did you mean '--version'?"]),
+        (["simulate", "a.toml", "b.toml"], ["flipproof simulate takes no further argument: b.toml"]),
     ],
 )
 def test_every_mistake_is_one_line_and_status_2(capsys, tmp_path, arguments, words):
@@ -97,7 +115,7 @@ def test_every_mistake_is_one_line_and_status_2(capsys, tmp_path, arguments, wor
         assert word in err
 
 
-@pytest.mark.parametrize("arguments", [["nonsense"], [], ["simulate", "--solver"], ["simulate", "--steps", "-3"]])
+@pytest.mark.parametrize("arguments", [["nonsense"], ["simulate", "--solver"], ["simulate", "--steps", "-3"]])
 def test_a_wrong_argument_is_told_in_one_line(arguments, capsys):
     with pytest.raises(SystemExit) as ended:
         cli.main(arguments)

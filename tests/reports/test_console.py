@@ -162,7 +162,7 @@ def test_an_endless_scenario_ends_at_once(tmp_path, endless):
 @pytest.mark.parametrize("module", ["flipproof.cli.main", "flipproof.cli.start"])
 def test_an_interrupt_while_the_program_loads_is_one_line(tmp_path, module):
     """Python itself must have started: what it says before the program's first statement is its own."""
-    run = "from flipproof.cli.start import entry, guard; guard(); print('here', flush=True); entry()"
+    run = "from flipproof.cli import signals, start; signals.guard(); print('here', flush=True); start.entry()"
     start = ["-c", run] if module == "flipproof.cli.start" else ["-X", "importtime", "-m", module]
     for wait in (0.0, 0.05, 0.2, 0.5, 1.0):
         process = subprocess.Popen(

@@ -14,8 +14,8 @@ from flipproof.chapters.differences.chapter import BY_ENGINE, EQ8_FREE, PROGRAM_
 from flipproof.chapters.differences.study import percent
 from flipproof.chapters.finite_step.chapter import EVERYTHING, HELD, LOCATED, WAYS
 from flipproof.chapters.waterfall.study import STEP
+from flipproof.cli.snapshot import BEGIN, END, PLACE, README, front_page, write_front_page
 from flipproof.frame.solvers import FINER
-from flipproof.output.snapshot import BEGIN, END, PLACE, README, front_page, write_front_page
 from flipproof.page.headlines import Headline, Measure, headlines
 from flipproof.page.lead import amount, answer, lead_words, sentences, signed
 
@@ -135,7 +135,7 @@ def test_the_page_shows_the_same_answer_and_lead(report):
 
 
 def test_the_readme_says_what_the_snapshot_found(kept):
-    """``python -m flipproof.output.snapshot`` writes both."""
+    """``python -m flipproof.cli.snapshot`` writes both."""
     _, _, rest = README.read_text(encoding="utf-8").partition(BEGIN)
     assert rest.partition(END)[0].strip() == front_page(kept).strip()
 

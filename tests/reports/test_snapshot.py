@@ -9,8 +9,8 @@ import pytest
 
 from flipproof.check.diff import read_summary
 from flipproof.check.throw import check
-from flipproof.output import snapshot
-from flipproof.output.snapshot import KEPT, PICTURES, PLACE, main, take
+from flipproof.cli import snapshot
+from flipproof.cli.snapshot import KEPT, PICTURES, PLACE, main, take
 from flipproof.output.summary import SUMMARY_VERSION, schema_text, summary_text
 from slicemodel import Scenario
 

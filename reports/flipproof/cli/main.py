@@ -6,22 +6,19 @@ import sys
 
 if __name__ == "__main__":
     # Before anything else is imported: an interrupt meets this program while it loads, too.
-    from flipproof.cli.start import guard
+    from flipproof.cli.signals import guard
 
     guard()
 
-import _thread
 import argparse
 import os
-import signal
-import threading
 import time
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
-from types import FrameType
 from typing import Any, Final, NoReturn
 
+from flipproof.cli import signals
 from flipproof.cli.animate import add_animate
 from flipproof.cli.arguments import (
     SCENARIO_HELP,
@@ -44,8 +41,9 @@ from flipproof.cli.film import add_film
 from flipproof.cli.foreign import add_foreign, add_models
 from flipproof.cli.landing import add_landing
 from flipproof.cli.paper import add_paper
-from flipproof.cli.start import INTERRUPTED, INTERRUPTED_WORDS, SIGNALS
+from flipproof.cli.screens import FirstScreen, commands_of, second_screen
 from flipproof.cli.sweeps import add_sweeps
+from slicemodel.scenario import unknown_name
 
 BAD_INPUT: Final = 2
 """Exit status of a mistake in what was given; 3 is that of one in flipproof."""
@@ -53,60 +51,22 @@ BAD_INPUT: Final = 2
 DEFAULT_OUT = Path("reports/latest" if Path("reports/flipproof").is_dir() else "flipproof-report")
 """Where a report goes without --out: into the checkout if the command runs in one, else beside what the user has."""
 
-MANUAL = """\
-flipproof throws one bottle with many solvers and names every difference between them.
-
-The slice model of a flipping water bottle (closed-form steps, omega held constant over each)
-is compared with an event-driven integration of the paper's Eq. 8 and with a rigid tube full
-of sliding masses in the physics engines pymunk and MuJoCo.
-"""
-
-EXAMPLES = """\
-examples:
-  flipproof report                              the paper's own throw, report in flipproof-report
-  flipproof report throw.toml --out my-report   another throw
-  flipproof simulate --solver eq8 --out eq8.csv
-  flipproof compare published-python eq8
-  flipproof compare eq8.csv my-track/track.csv --tolerance 0.05
-  flipproof paper --figure 7b                   one of the paper's figures; without --figure all of them
-  flipproof check throw.toml --baseline summary.json
-  flipproof diff old-report new-report          what changed beyond its band
-  flipproof sweep sweep.toml --out my-sweep     many throws and solvers; run it again to go on
-  flipproof map --axis gamma --out my-map       which assumption has the largest fair share where; again: go on
-  flipproof waterfall --out my-waterfall        from the published program to free flight, one bar per assumption
-  flipproof track video.txt --cap cap --base base --length-unit m
-  flipproof fit flight.csv --model midpoint free-flight
-  flipproof animate --out flips.gif             the flights side by side, 9.6 times slower
-  flipproof land throw.toml --film landing.gif  what happens at the touch and after it, law by law
-  flipproof upright --out my-landings           how many scattered throws end upright; run it again to go on
-  flipproof certify mine.py:solve               anybody's solver: a line a check; place, explain and kit go on from here
-
-exit status:
-  0  done; for a report: every claim was evaluated and no regression claim failed
-  1  a regression claim failed (ice constancy, published vectors, convergence); for diff: something moved;
-     for compare: the curves are farther apart than --tolerance
-  2  bad input; one line on standard error says what and where
-  3  an error in flipproof itself; FLIPPROOF_TRACEBACK=1 shows where
-  130  interrupted; an older report is as it was, a sweep goes on where it stopped
-"""
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status (0, 1, 2, 3 or 130)."""
     try:
         return _status(arguments)
     except KeyboardInterrupt:
-        print(INTERRUPTED_WORDS, file=sys.stderr)
-        return INTERRUPTED
+        print(signals.INTERRUPTED_WORDS, file=sys.stderr)
+        return signals.INTERRUPTED
 
 
 def _status(arguments: Sequence[str] | None) -> int:
     """Run the command line; return its exit status unless it is interrupted."""
     speak_plainly()
-    for number in SIGNALS:
-        signal.signal(number, _interrupt)
+    signals.interrupt_main()
     try:
-        options = parser().parse_args(arguments)
+        options = parse(sys.argv[1:] if arguments is None else arguments)
         refuse_overwriting(options)
         status = options.action(options)
         sys.stdout.flush()
@@ -134,52 +94,15 @@ def _status(arguments: Sequence[str] | None) -> int:
 
 def entry() -> NoReturn:
     """Run the command line as a program."""
-    sys.unraisablehook = _unraisable
     try:
         status = _status(None)
     except KeyboardInterrupt:
         # Nothing is left to clean up. An orderly exit would wait for threads, and Python kills itself where it lets go
         # of what was loaded by half: the exception that holds it is never given up.
         sys.stdout.flush()
-        os.write(2, f"{INTERRUPTED_WORDS}\n".encode())
-        os._exit(INTERRUPTED)
-    for number in SIGNALS:
-        signal.signal(number, signal.SIG_IGN)  # the command is done, whatever comes while Python ends
+        signals.end()
+    signals.ignore()  # the command is done, whatever comes while Python ends
     sys.exit(status)
-
-
-def _interrupt(signalled: int, frame: FrameType | None) -> None:
-    if _importing(frame):
-        # Compiled modules print a traceback of their own when an import of theirs is broken off: let it end first.
-        _interrupt_again(signalled)
-        return
-    for number in SIGNALS:
-        signal.signal(number, signal.SIG_IGN)  # a second one must not break the cleaning up
-    raise KeyboardInterrupt
-
-
-def _interrupt_again(signalled: int) -> None:
-    later = threading.Timer(0.02, _thread.interrupt_main, (signalled,))
-    later.daemon = True
-    later.start()
-
-
-def _importing(frame: FrameType | None) -> bool:
-    """Return whether a module is being imported."""
-    while frame is not None:
-        if frame.f_code.co_filename.startswith("<frozen importlib"):
-            return True
-        frame = frame.f_back
-    return False
-
-
-def _unraisable(what: sys.UnraisableHookArgs) -> None:
-    """Interrupt again if the interrupt came where Python drops exceptions, such as a finalizer."""
-    if isinstance(what.exc_value, KeyboardInterrupt):
-        signal.signal(signal.SIGINT, _interrupt)
-        _interrupt_again(signal.SIGINT)
-    else:
-        sys.__unraisablehook__(what)
 
 
 def _words_of(error: OSError) -> str:
@@ -196,15 +119,35 @@ def _complain(words: str, status: int) -> int:
     return status
 
 
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Return the command and its options; a mistake ends with one line, what was probably meant, and status 2."""
+    words = list(arguments)
+    if words[:1] == ["help"]:
+        words = [*words[1:], "--help"]
+    top = parser()
+    commands = commands_of(top)
+    if words and not words[0].startswith("-") and words[0] not in commands:
+        top.error(unknown_name("command", words[0], [*commands, "help"]))
+    options, unread = top.parse_known_args(words)
+    command = commands.get(words[0], top) if words else top
+    for word in unread:
+        if word.startswith("-"):
+            top.error(unknown_name(f"{command.prog}: option", word.partition("=")[0], command._option_string_actions))
+    if unread:
+        top.error(f"{command.prog} takes no further argument: {' '.join(unread)}")
+    if "action" not in options:
+        top.print_help()
+        sys.exit(BAD_INPUT)
+    return options
+
+
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the whole command line."""
     from flipproof.output.provenance import version_of
 
-    top = OneLineParser(
-        prog="flipproof", description=MANUAL, epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    top = FirstScreen(prog="flipproof")
     top.add_argument("--version", action="version", version=f"flipproof {version_of('flipproof')}")
-    commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    commands = top.add_subparsers(metavar="COMMAND", parser_class=OneLineParser)
 
     report = add_command(commands, "report", "Run everything and write a validation report.", command_report)
     report.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
@@ -246,7 +189,14 @@ def parser() -> argparse.ArgumentParser:
     add_landing(commands)
     add_foreign(commands)
     add_models(commands)
+    add_command(commands, "more", "List every other command, and the exit statuses.", command_more)
     return top
+
+
+def command_more(_: argparse.Namespace) -> int:
+    """Print the second screen."""
+    print(second_screen(commands_of(parser())))
+    return 0
 
 
 def command_report(options: argparse.Namespace) -> int:

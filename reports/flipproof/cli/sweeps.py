@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, read_scenario, reader, sides
-from flipproof.cli.start import INTERRUPTED
+from flipproof.cli.signals import INTERRUPTED
 
 SLICES: Final = 50
 

@@ -1,7 +1,7 @@
 """The committed snapshot of a full report: what the front page of the repository shows.
 
-    python -m flipproof.output.snapshot               make a full report and keep its summary and key pictures
-    python -m flipproof.output.snapshot --from DIR    the same from a full report, made with --png, that is there
+    python -m flipproof.cli.snapshot               make a full report and keep its summary and key pictures
+    python -m flipproof.cli.snapshot --from DIR    the same from a full report, made with --png, that is there
 
 Both also write the numbers of the summary into the README, between its two marks. Run times, settings and figures are
 left out of the summary; what stays is compared with the code by the tests.
@@ -30,7 +30,7 @@ KEPT: Final = ("flipproof", "version", "scenario", "slices", "size", "lead", "he
 PICTURES: Final = ("omega", "waterfall", "differences")
 
 README: Final = PLACE.parents[1] / "README.md"
-BEGIN: Final = "<!-- findings: written by python -m flipproof.output.snapshot -->"
+BEGIN: Final = "<!-- findings: written by python -m flipproof.cli.snapshot -->"
 END: Final = "<!-- end of findings -->"
 
 
@@ -89,7 +89,7 @@ def write_front_page(summary: Mapping[str, Any], readme: Path) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Take the snapshot; return 0, 1 if the report could not be made, 2 if the folder cannot be used."""
-    parser = argparse.ArgumentParser(prog="python -m flipproof.output.snapshot", description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(prog="python -m flipproof.cli.snapshot", description=__doc__.partition("\n")[0])
     parser.add_argument("--from", type=Path, dest="report", metavar="DIR", help="folder of a full report")
     parser.add_argument("--to", type=Path, default=PLACE, metavar="DIR", help="folder to write (%(default)s)")
     options = parser.parse_args(arguments)
