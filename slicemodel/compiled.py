@@ -6,14 +6,18 @@ It does not look at the other files whose functions became part of it. Here the 
 
 from __future__ import annotations
 
-import hashlib
 import logging
 from collections.abc import Callable
+from contextlib import suppress
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+LOGGER = logging.getLogger(__name__)
+"""Says at level INFO that a function kept on disk is compiled, and at level WARNING that it cannot be kept."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -63,23 +67,54 @@ def kept_on_disk(*elsewhere: Path) -> Callable[[Callable[..., Any]], Any]:
         try:
             dispatcher._cache = cache_of_sources(function, elsewhere)
         except (RuntimeError, OSError) as error:
-            logging.getLogger(__name__).warning("compiling in memory, once per process: %s", error)
+            LOGGER.warning("compiling in memory, once per process: %s", error)
         return dispatcher
 
     return kept
 
 
+class _Checked(IndexDataCacheFile):
+    """Files of numba's cache that end with a checksum, so that damaged machine code is not run."""
+
+    def _dump(self, obj: object) -> bytes:
+        content: bytes = super()._dump(obj)  # type: ignore[no-untyped-call]
+        return content + sha256(content).digest()  # unpickling ignores what follows
+
+    def _load_data(self, name: str) -> Any:
+        content = Path(self._data_path(name)).read_bytes()  # type: ignore[no-untyped-call]
+        if sha256(content[:-32]).digest() != content[-32:]:
+            raise ValueError(f"{name} is damaged")
+        return super()._load_data(name)  # type: ignore[no-untyped-call]
+
+
+class _Cache(FunctionCache):
+    """numba's cache of a function; files that are damaged are thrown away and made again."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        found = None
+        try:
+            found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except Exception:  # unpickling raises whatever the damage leads to
+            with suppress(OSError):
+                self.flush()  # type: ignore[no-untyped-call]
+        if found is None:
+            LOGGER.info("compiling %s", self._py_func.__name__)
+        return found
+
+
 def cache_of_sources(function: Callable[..., Any], elsewhere: tuple[Path, ...]) -> Any:
     """Return numba's cache of a function, with the sources it may have been made of in the place of its own file."""
-    cache = FunctionCache(function)  # type: ignore[no-untyped-call]
-    cache._cache_file._source_stamp = stamp_of_sources(function, elsewhere)
+    cache = _Cache(function)  # type: ignore[no-untyped-call]
+    name = cache._impl.filename_base
+    stamp = stamp_of_sources(function, elsewhere)
+    cache._cache_file = _Checked(cache._cache_path, name, stamp)  # type: ignore[no-untyped-call]
     return cache
 
 
 def stamp_of_sources(function: Callable[..., Any], elsewhere: tuple[Path, ...] = ()) -> str:
     """Return a hash of all sources in the folder of a function, of this file, and of those ``elsewhere``."""
     own = Path(function.__code__.co_filename)
-    digest = hashlib.sha256()
+    digest = sha256()
     for file in [own, *sorted(own.parent.glob("*.py")), Path(__file__), *elsewhere]:
         content = file.read_bytes()
         digest.update(f"{file.name} {len(content)}\n".encode() + content)

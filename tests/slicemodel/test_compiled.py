@@ -152,3 +152,34 @@ def test_what_becomes_part_of_others_counts_no_references_and_makes_no_array():
     assert compiled.compiled(made)(x) == 0.0
     with pytest.raises(numba.core.errors.NumbaError, match="empty"):
         compiled.merged(made)(x)
+
+
+DAMAGES = {
+    "empty": lambda _: b"",
+    "cut": lambda content: content[: len(content) // 2],
+    "one bit": lambda content: content[:-50] + bytes([content[-50] ^ 1]) + content[-49:],
+}
+
+
+@pytest.mark.parametrize(("kind", "damage"), [("nbi", "empty"), ("nbi", "cut"), ("nbc", "cut"), ("nbc", "one bit")])
+def test_a_damaged_file_of_the_cache_is_thrown_away_and_made_again(package, kind, damage):
+    assert package() == "2.0 0"
+    (file,) = (package.root / "cache").rglob(f"*.{kind}")
+    file.write_bytes(DAMAGES[damage](file.read_bytes()))
+    assert [package(), package()] == ["2.0 0", "2.0 1"]
+
+
+def test_compiling_is_told_when_it_happens_and_reading_what_was_compiled_is_not(package):
+    code = "import logging; logging.basicConfig(level=20, format='%(message)s'); " + RUN.format(
+        name=package.folder.name
+    )
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join([str(package.root), str(Path(compiled.__file__).parent.parent)]),
+        "NUMBA_CACHE_DIR": str(package.root / "cache"),
+    }
+    said = [
+        subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True).stderr
+        for _ in range(2)
+    ]
+    assert [text.count("compiling entry") for text in said] == [1, 0]
