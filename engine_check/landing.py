@@ -43,16 +43,6 @@ with steps of 1e-4 s some 4 % of its touches end otherwise than event by event (
 
 LANDERS: Final[Mapping[str, Lander]] = MappingProxyType(
     {
-        "pymunk": Lander(
-            module="engine_check.landing_pymunk",
-            dt=STEP,
-            ice_dt=ICE_STEP,
-            halvings=4,
-            laws=("together",),
-            slices=("exclude", "staggered"),
-            rise=ENERGY_RISE,
-            reason="the engine's own contacts: all that touch in a step share its impulses, so that it knows one law",
-        ),
         "mujoco": Lander(
             module="engine_check.landing_mujoco",
             dt=STEP,
@@ -62,17 +52,6 @@ LANDERS: Final[Mapping[str, Lander]] = MappingProxyType(
             slices=("exclude", "staggered"),
             rise=ENERGY_RISE,
             reason="impulses from the engine's own mass matrix and Jacobians: rigid contacts under either law",
-        ),
-        "mujoco-compliant": Lander(
-            module="engine_check.landing_compliant",
-            dt=4e-5,
-            ice_dt=4e-5,
-            halvings=1,
-            laws=(),
-            slices=("staggered",),
-            rise=math.inf,
-            reason="the engine's own soft contacts and joint limits: bottle and water push for some tenths of a "
-            "millisecond, which is neither law",
         ),
     }
 )
@@ -210,11 +189,11 @@ def landed(body: Body, scenario: Scenario, dt: float) -> Run:
 def land(
     touch: Touch,
     table: Table,
-    engine: str = "pymunk",
+    engine: str = "mujoco",
     dt: float | None = None,
     *,
     law: str | None = None,
-    slices: str = "staggered",
+    slices: str = "exclude",
 ) -> Outcome:
     """Land a bottle on a table in a rigid-body engine until its outcome is certain.
 

@@ -57,7 +57,6 @@ SMALL = Size(
     frictions=(0.4,),
     scatters=(0.0, 1.0),
     map_cells=(3, 4),
-    engine_throws=0,
 )
 
 
@@ -205,7 +204,7 @@ def test_points_are_numbered_case_by_case(design):
     assert design.point(0).throw == design.point(3).throw  # the same thrower under another law
     assert design.point(4).settings["restitution"] == 0.5
     assert len({design.point(k).key("code") for k in range(5)}) == 5
-    engine = replace(design.cases[0], program="mujoco-compliant", law=None)
+    engine = replace(design.cases[0], program="mujoco")
     assert replace(design, cases=(*design.cases, engine)).lines == (range(5), range(5, 8))
 
 
@@ -286,7 +285,6 @@ def found():
 def test_the_study_counts_what_it_threw(found):
     assert found.unaimed == {}
     assert found.cell("together", 0.4).share.throws == 6
-    assert found.cell("compliant", 0.4) is None
     assert [value for value, _ in found.along("restitution", "ice")] == [0.0, 0.3]
     assert found.maps["together"].outcome.shape == (4, 3)
     assert set(found.maps) == {"together", "ice"}
@@ -406,7 +404,7 @@ def test_the_stored_witnesses_are_enough_and_agree(found):
     assert [case["law"] for case in stored["cases"]] == [None, "together", "in-turn"]
     assert {case["dt"] for case in stored["cases"]} == {None}  # the engines' own steps
     of_witnesses = [finding for finding in claims(found) if finding.id.startswith("landing-witnesses")]
-    assert len(of_witnesses) == 7
+    assert len(of_witnesses) == 3
     for finding in of_witnesses:
         assert finding.verdict == "pass"
         assert "reached" in finding.note

@@ -47,8 +47,7 @@ def add_landing(commands: Any) -> None:
     where.add_argument("--aim", choices=("A", "B"), help="solve for a throw that touches upright; see 'upright'")
     _add_table(land)
     land.add_argument("--law", metavar="NAME", help="together or in-turn (default: both)")
-    land.add_argument("--programs", default="ode_reference", metavar="A,B", help="ode_reference, pymunk, mujoco, "
-                      "mujoco-compliant (%(default)s)")  # fmt: skip
+    land.add_argument("--programs", default="ode_reference", metavar="A,B", help="ode_reference, mujoco (%(default)s)")
     land.add_argument("--slices", type=count, default=SLICES, metavar="N", help="slices (%(default)s)")
     land.add_argument("--film", type=Path, metavar="FILE", help="also write water beside ice as .gif or .mp4")
     land.add_argument("--slow", type=number, default=9.6, metavar="X", help="times slower than it is (%(default)s)")
@@ -74,9 +73,6 @@ def add_landing(commands: Any) -> None:
     )  # fmt: skip
     upright.add_argument("--seed", type=seed, default=1, metavar="N", help="seed of all throws (%(default)s)")
     upright.add_argument("--map", type=cells, default=(24, 24), metavar="CxR", help="cells of the map (24x24)")
-    upright.add_argument(
-        "--engine", type=seed, default=60, metavar="N", help="throws a point by soft contacts; 0: none (%(default)s)"
-    )
     _add_table(upright)
     add_store(upright)
 
@@ -149,7 +145,6 @@ def command_upright(options: argparse.Namespace) -> int:
         axis_throws=options.throws,
         aim_throws=max(1, options.throws // 5),
         map_cells=options.map,
-        engine_throws=options.engine,
         **{name: getattr(options, name) for name in ("throws", "slices", "restitution", "friction", "seed")},
     )
     if options.fillings:

@@ -165,14 +165,11 @@ def _undecided(found: Found) -> Finding:
 
 
 def _witnesses(stored: Mapping[str, Any]) -> Iterator[Finding]:
-    """Yield in how many touches two programs of one law differ, rods and ice; soft contacts are another law."""
+    """Yield in how many touches two programs of one law differ, rods and ice."""
     for case, matrix in [(each, matrix) for each in stored["cases"] for matrix in each["matrices"]]:
         (one, other), differ, both = matrix["programs"], matrix["differ"], matrix["decided by both"]
-        if "compliant" in one + other or case["slices"] == "staggered":
-            continue
         kind = "ice" if case["law"] is None else f"water-{case['law']}"
-        # Share of outcomes in which two programs of one law may differ: with MuJoCo's impulses, and with pymunk.
-        most = 0.03 if "mujoco" in (one, other) else 0.02
+        most = 0.03
         title = f"Outcomes in which {one} and {other} differ from one touch: {kind.replace('-', ', ')}"
         note = f"{differ} of {both} decided by both; at most {most:.0%} is asked for: "
         share = differ / both if both else None
@@ -205,7 +202,6 @@ CHAPTER: Final = Chapter(
             offsets=tuple(math.radians(angle) for angle in (-20, -10, 0, 10, 20)),
             axis_throws=50,
             map_cells=(16, 16),
-            engine_throws=0,
         )
     },
 )

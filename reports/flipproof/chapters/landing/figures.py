@@ -24,9 +24,7 @@ from flipproof.output.columns import rows_csv
 LOOKS: Final[Mapping[Kind, dict[str, Any]]] = {
     "together": {"color": "#0072B2", "marker": "o", "linestyle": "-"},
     "in-turn": {"color": "#56B4E9", "marker": "^", "linestyle": "--"},
-    "compliant": {"color": "#CC79A7", "marker": "v", "linestyle": ":"},
     "ice": {"color": "#444444", "marker": "s", "linestyle": "-"},
-    "ice, compliant": {"color": "#999999", "marker": "D", "linestyle": ":"},
 }
 
 SHADES: Final = {
@@ -44,7 +42,6 @@ def witnesses() -> Mapping[str, Any]:
 def figures(found: Found) -> list[Exhibit]:
     """Return every figure of the subject."""
     size = found.size
-    soft = f" (soft contacts {size.engine_throws})" if size.engine_throws else ""
     missed = "In family A ice that does not reach the table from above counts as not upright. "
 
     def exhibit(name: str, title: str, caption: str, alt: str, maker: Callable[..., Figure], table: str) -> Exhibit:
@@ -55,7 +52,7 @@ def figures(found: Found) -> list[Exhibit]:
         exhibit(
             "landing-shares",
             "Does it stand? Water and ice over the filling",
-            f"Share of throws that end upright, {size.throws} throws a point{soft}, with Wilson's 95 % interval. "
+            f"Share of throws that end upright, {size.throws} throws a point, with Wilson's 95 % interval. "
             "The laws of the impact are models of one landing and are not averaged. The shaded fillings are those "
             f"that the paper calls optimal. {missed if 'A' in size.families else ''}".rstrip(),
             " ".join(share_line(found, family).replace("\n ", " ") + "." for family in size.families),
@@ -263,7 +260,7 @@ def figure_energy(found: Found) -> Figure:
 def figure_witnesses(cases: Sequence[Mapping[str, Any]]) -> Figure:
     """Outcomes of two programs from one touch, a matrix for each pair and law."""
     matrices = [(case, matrix) for case in cases for matrix in case["matrices"]]
-    columns = 4
+    columns = 3
     rows = -(-len(matrices) // columns)
     figure, panels = new_figure(rows, columns, size=(8.6, 2.3 * rows), squeeze=False)
     names = ("upright", "lying", "cap", "undecided")

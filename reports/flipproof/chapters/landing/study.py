@@ -17,37 +17,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipproof.landing.design import SPARE, Aim, Case, Scatter, Share, Throws, Z, aimed, correlation
-from flipproof.landing.work import REFERENCE, Landed
+from flipproof.landing.work import Landed
 from ode_reference import fly
 from ode_reference.landing import path
 from slicemodel import Scenario, Table
 from slicemodel.observables import centre_of_mass_at_rest
 from slicemodel.trajectory import FloatArray
 
-Kind = Literal["together", "in-turn", "compliant", "ice", "ice, compliant"]
-
-COMPLIANT: Final = "mujoco-compliant"
+Kind = Literal["together", "in-turn", "ice"]
 
 
 class Landing(NamedTuple):
-    """What is landed, as figures and tables name it; whether it is frozen; law and program of the impact."""
+    """What is landed, as figures and tables name it; whether it is frozen; law of the impact."""
 
     words: str
     frozen: bool
     law: str | None
-    program: str
 
 
 KINDS: Final[Mapping[Kind, Landing]] = {
-    "together": Landing("water, together", False, "together", REFERENCE),
-    "in-turn": Landing("water, in turn", False, "in-turn", REFERENCE),
-    "ice": Landing("ice", True, None, REFERENCE),
-    "compliant": Landing("water, compliant", False, None, COMPLIANT),
-    "ice, compliant": Landing("ice, compliant", True, None, COMPLIANT),
+    "together": Landing("water, together", False, "together"),
+    "in-turn": Landing("water, in turn", False, "in-turn"),
+    "ice": Landing("ice", True, None),
 }
 """The laws of water are models of one impact and are never averaged."""
 
-WATER: Final[tuple[Kind, ...]] = ("together", "in-turn", "compliant")
+WATER: Final[tuple[Kind, ...]] = ("together", "in-turn")
 WATER_AND_ICE: Final[tuple[Kind, ...]] = ("together", "ice")
 AXIS_KINDS: Final[tuple[Kind, ...]] = ("together", "in-turn", "ice")
 """The laws of water; what is thrown beside one another everywhere, and along the axes of table and thrower."""
@@ -62,7 +57,7 @@ AXES: Final = {"restitution": 3, "friction": 4, "scatter": 5}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Size:
-    """How much work the study is. ``engine_throws``: those that an engine lands with soft contacts, at every filling.
+    """How much work the study is.
 
     ``map_cells`` are fillings by values of omega_0; ``axis_throws`` throws for each value of an axis.
     """
@@ -79,7 +74,6 @@ class Size:
     frictions: tuple[float, ...] = (0.1, 0.2, 0.4, 0.8)
     scatters: tuple[float, ...] = (0.25, 0.5, 1.0, 2.0)
     map_cells: tuple[int, int] = (24, 24)
-    engine_throws: int = 60
     restitution: float = 0.3
     friction: float = 0.4
     scatter: Scatter = field(default_factory=Scatter)
@@ -233,7 +227,7 @@ def aiming(throw: Scenario, size: Size) -> tuple[Cases, Mapping[Place, str]]:
 
 
 def counting(throw: Scenario, size: Size, aims: Cases, rows: Rows) -> Cases:
-    """Return the throws that are counted, about the aims that stood most often, and the map; an engine's come last."""
+    """Return the throws that are counted, about the aims that stood most often, and the map."""
     best: dict[Place, tuple[tuple[int, float], Aim]] = {}
     for (key, case), some in zip(aims.items(), rows, strict=True):
         rank = share_of(some).upright, -abs(key.value)  # of equals the least offset
@@ -246,9 +240,8 @@ def counting(throw: Scenario, size: Size, aims: Cases, rows: Rows) -> Cases:
         if filling not in size.fillings:
             continue
         for kind, landing in KINDS.items():
-            throws = size.throws if landing.program != COMPLIANT else size.engine_throws
-            if landing.frozen == frozen and throws and (landing.program != COMPLIANT or family == last):
-                asked[Key("filling", filling, family, filling, kind)] = _case(size, aim, kind, throws)
+            if landing.frozen == frozen:
+                asked[Key("filling", filling, family, filling, kind)] = _case(size, aim, kind, size.throws)
     values = {"restitution": size.restitutions, "friction": size.frictions, "scatter": size.scatters}
     for kind, axis in product(AXIS_KINDS, values):
         place = last, size.axis_filling, KINDS[kind].frozen
@@ -263,7 +256,7 @@ def counting(throw: Scenario, size: Size, aims: Cases, rows: Rows) -> Cases:
         bottle = replace(filled(throw, fill, size.slices, KINDS[kind].frozen), omega0=omega0)
         case = replace(_case(size, standing(bottle), kind, 1, MAPPING), scatter=size.scatter.times(0.0))
         asked[Key("map", omega0, "", fill, kind)] = case
-    return dict(sorted(asked.items(), key=lambda pair: pair[1].program == COMPLIANT))
+    return asked
 
 
 def standing(throw: Scenario) -> Aim:
@@ -276,9 +269,15 @@ def standing(throw: Scenario) -> Aim:
 
 
 def _case(size: Size, aim: Aim, kind: Kind, throws: int, stream: int = COUNTING) -> Case:
-    table = {"restitution": size.restitution, "friction": size.friction}
-    law, program = KINDS[kind].law, KINDS[kind].program
-    return Case(aim=aim, law=law, program=program, scatter=size.scatter, throws=throws, stream=stream, **table)
+    return Case(
+        aim=aim,
+        law=KINDS[kind].law,
+        restitution=size.restitution,
+        friction=size.friction,
+        scatter=size.scatter,
+        throws=throws,
+        stream=stream,
+    )
 
 
 # ---------------------------------------------------------------------- what it says
