@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ode_reference.bands import estimate_band
     from ode_reference.combinations import model_of
     from ode_reference.impacts import LAWS
     from ode_reference.landing import land
@@ -26,6 +27,7 @@ __all__ = [
     "METHODS",
     "MODELS",
     "Switches",
+    "estimate_band",
     "fly",
     "land",
     "land_batch",
@@ -41,6 +43,7 @@ _HOMES = {
     "METHODS": "ode_reference.witness",
     "MODELS": "ode_reference.models",
     "Switches": "ode_reference.switches",
+    "estimate_band": "ode_reference.bands",
     "fly": "ode_reference.landing_flight",
     "land": "ode_reference.landing",
     "land_batch": "ode_reference.landing_batch",

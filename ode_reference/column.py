@@ -17,7 +17,9 @@ equation of Lagrange for h, with Rayleigh's dissipation (1/2) N alpha <(s h')^2>
     m_e h'' = (1/2) omega^2 dJ/dh - (N alpha/3) h',      dJ/dh = M_w h/6 - mu (L - h)/2
 
 Start. The column rests at its height h_0 = M_tilde L and cannot be shorter. It spreads if and only if dJ/dh > 0 there,
-that is h_0/(L - h_0) > 3 M_b/(M_w + M_b); dJ/dh grows with h, so that it then spreads all the way.
+that is h_0/(L - h_0) > 3 M_b/(M_w + M_b); dJ/dh grows with h, so that it then spreads all the way. With less water it
+turns like ice: in the paper's bottle (M_b = 0.028 M_max) up to a filling of M_tilde = 0.239, where slices spread at any
+filling.
 
 End. The front stops at the cap, h = L. The law there is the perfectly inelastic one: h' = 0 from then on, the axial
 energy (1/2) m_e h'^2 is lost, and the water stays spread because dJ/dh = M_w L/6 > 0 there. No restitution enters: it
@@ -86,6 +88,9 @@ def solve(
     scenario: Scenario, rtol: float | None = None, atol: float | None = None, times: ArrayLike | None = None
 ) -> Trajectory:
     """Throw a bottle whose water is one uniformly stretching column (derived in this module).
+
+    With little water it does not spread and turns like ice, in the paper's bottle below a filling of 0.239;
+    ``diagnostics["spreads"]`` says whether it does.
 
     Parameters
     ----------

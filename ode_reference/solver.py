@@ -42,6 +42,12 @@ REST_SPEED: Final = 1e-5
 REST_SPEED_WITH_RECOIL: Final = 1e-3
 """The same with recoil [m/s]."""
 
+LEAST_REST_SPEED: Final = 1e-8
+"""Lowest rest speed that may be asked for [m/s]."""
+
+MAX_TWIN: Final = 10**9
+"""Highest number of a twin."""
+
 
 def solve(
     scenario: Scenario,
@@ -55,6 +61,7 @@ def solve(
     rest_speed: float | None = None,
     impact_law: str = "simultaneous",
     energy: bool = False,
+    twin: int = 0,
 ) -> Trajectory:
     """Solve one equation of motion through all its rebounds, rests and releases.
 
@@ -88,6 +95,9 @@ def solve(
     energy : bool
         Whether to keep the energy ledger, ``diagnostics["energy"]`` [J] (``ode_reference.energy``): "initial", "final",
         the work of each term, of impacts and of rests, and the "residual" that none of them explains.
+    twin : int
+        Number of a twin, whose release differs in the eleventh digit (``ode_reference.twins``), in [1, 1e9]; 0 is the
+        throw itself. The trajectory keeps the scenario of the throw.
 
     Returns
     -------
@@ -115,20 +125,22 @@ def solve(
     changes by less than 1e-7 omega_0 when the rest speed is cut tenfold, unless a slice grazes an end (``grazes``). The
     exception is "accelerating-origin" with 1e-4 omega_0, since there only a slice at rest pushes the tube. With recoil
     the band is 3e-3 omega_0 on the paper's throw, and 4e-3 has been seen on another bottle with 50 slices: which slice
-    rests when decides the order of all later impacts. Status "ok" says nothing of that band. With recoil,
-    drag and e above 0.9 slices hop on an end and hardly ever rest: there a change of omega0 by 3e-11 of itself moved
-    omega by more than 1e-4 omega_0 in 56 of 117 flights, by 5e-2 at the most; a tenth of the rest speed showed it in 11
-    of these. Ask for the band of a flight by a twin, ``solve_batch([throw, twin], model)``, with that change of omega0
-    and of bottle.mass: without drag and weight omega0 alone is a unit of time, and the twin follows the same orbit
-    whatever the rounding does to it (docs/theory.md, "Rests, and the band they cost"). Where gamma = |omega0| exactly
-    and ``roots`` are off, nothing pushes the water and it stays where it is. A full bottle that no weight pulls along
-    its axis is its own mirror image for ever, by the simultaneous law: all methods hold it to that, since rounding
-    would part the two halves as exp(theta) grows, and the hits of a pair with them. Water a hair short of full does
-    part, after some turns. The other methods add the error of their steps: at their default tolerances they agree with
-    "taylor" to the same band over half a second. An error grows as slices fly apart, and rests end it: with e = 1 and
-    without drag none comes to rest, and Eq. 8 at N = 20 is off by 1e-9 omega_0 after half a second and by 1e-4 omega_0
-    after three; rtol = 1e-13 leaves 1e-8 omega_0 there. "Radau" has a dense output of order 3 only: at rtol above 1e-8
-    its rebounds need max_step = 0.02 / |omega0|.
+    rests when decides the order of all later impacts. With recoil and e above 0.9 slices hop on an end and hardly ever
+    rest, and twins moved omega by up to 0.1 omega_0, most of all in a bottle a hair short of full. Status "ok" says
+    nothing of that band: ``ode_reference.estimate_band(flight)`` estimates it from eight twins, for a flight by any
+    method, and ``trusted_until`` says up to when (docs/theory.md, "Rests, and the band they cost"). Where gamma =
+    |omega0| exactly and ``roots`` are off, nothing pushes the water and it stays where it is. A full bottle that no
+    weight pulls along its axis is its own mirror image for ever, by the simultaneous law: all methods hold it to that,
+    since rounding would part the two halves as exp(theta) grows, and the hits of a pair with them. Water a hair short
+    of full does part, after some turns.
+
+    The other methods add the error of their steps: at their default tolerances they agree with "taylor" to the same
+    band over half a second. An error grows as slices fly apart, and rests end it: with e = 1 and without drag none
+    comes to rest, and Eq. 8 at N = 20 is off by 1e-9 omega_0 after half a second and by 1e-4 omega_0 after three; rtol
+    = 1e-13 leaves 1e-8 omega_0 there. Over seconds no tolerance helps where the equation itself parts: of Eq. 8 at
+    N = 4, e = 0.5, g = 25 m/s^2, omega0 = -20 rad/s, without drag, twins by any method part by 1e-3 omega_0 at 3.3 s
+    and by more than omega_0 before 5 s, with status "ok". "Radau" has a dense output of order 3 only: at rtol above
+    1e-8 its rebounds need max_step = 0.02 / |omega0|.
     """
     if not isinstance(scenario, Scenario):
         raise ValueError(f"scenario = {scenario!r} is not a slicemodel.Scenario")
@@ -137,17 +149,17 @@ def solve(
         from ode_reference import column
 
         return column.solve(scenario, rtol, atol, times)
-    chosen = _model(model)
+    chosen = model_named(model)
     known_name("impact_law", impact_law, LAWS)
     known_name("method", method, (TAYLOR, *INTEGRATORS))
-    speed = _rest_speed(rest_speed, chosen)
+    speed, twin = _rest_speed(rest_speed, chosen), _twin(twin)
     moments = output_times(scenario, times)
     if method != TAYLOR:
         from ode_reference import witness
 
         return witness.integrate(
             scenario, chosen, moments, method=method, rtol=rtol, atol=atol, max_step=max_step, rest_speed=speed,
-            impact_law=impact_law, energy=energy,
+            impact_law=impact_law, energy=energy, twin=twin,
         )  # fmt: skip
     for name, value in (("rtol", rtol), ("atol", atol), ("max_step", max_step)):
         if value is not None:
@@ -158,7 +170,7 @@ def solve(
     require_own_switches(chosen)
     from ode_reference.flow import api
 
-    return api.fly(scenario, moments, chosen.switches, _settings(chosen, speed, impact_law, energy))
+    return api.fly(scenario, moments, chosen.switches, _settings(chosen, speed, impact_law, energy, twin))
 
 
 def solve_batch(
@@ -169,6 +181,7 @@ def solve_batch(
     rest_speed: float | None = None,
     impact_law: str = "simultaneous",
     energy: bool = False,
+    twin: int = 0,
     states: bool = False,
     jobs: int | None = None,
 ) -> Batch:
@@ -181,7 +194,7 @@ def solve_batch(
         Output times of all throws, or of each [s]; 1000 uniform ones over each throw's duration by default.
     states : bool - whether r and v are kept; without, they have shape (0, N) in the trajectories
     jobs : int, optional - threads, in [1, 1024]; one per core by default
-    model, rest_speed, impact_law, energy - as of ``solve``
+    model, rest_speed, impact_law, energy, twin - as of ``solve``
 
     Returns
     -------
@@ -202,7 +215,7 @@ def solve_batch(
     for k, throw in enumerate(throws):
         if not isinstance(throw, Scenario):
             raise ValueError(f"throws[{k}] = {throw!r} is not a slicemodel.Scenario")
-    chosen = _model(model)
+    chosen = model_named(model)
     require_own_switches(chosen)
     known_name("impact_law", impact_law, LAWS)
     energy, states = true_or_false("energy", energy), true_or_false("states", states)
@@ -216,25 +229,33 @@ def solve_batch(
         except ValueError as error:
             raise ValueError(f"throws[{k}]: {error}") from None
     moments = np.array(rows).reshape(len(throws), len(rows[0]) if rows else 0)
-    settings = _settings(chosen, _rest_speed(rest_speed, chosen), impact_law, energy)
+    settings = _settings(chosen, _rest_speed(rest_speed, chosen), impact_law, energy, _twin(twin))
     return api.fly_all(throws, moments, jobs, chosen.switches, settings, states=states)
 
 
-def _settings(model: Model, rest_speed: float, impact_law: str, energy: bool) -> dict[str, Any]:
+def _settings(model: Model, rest_speed: float, impact_law: str, energy: bool, twin: int) -> dict[str, Any]:
     """Return the settings that repeat a run by "taylor"."""
-    return {
+    settings = {
         "model": model.name, "method": TAYLOR, "rest_speed": rest_speed, "impact_law": impact_law, "energy": energy,
     }  # fmt: skip
+    return settings | ({"twin": twin} if twin else {})
 
 
 def _rest_speed(given: float | None, model: Model) -> float:
     """Return the rest speed of a run [m/s]."""
     if given is None:
         return REST_SPEED_WITH_RECOIL if model.switches.recoil else REST_SPEED
-    return number_within("rest_speed", given, 1e-8, 0.1, unit=" m/s")
+    return number_within("rest_speed", given, LEAST_REST_SPEED, 0.1, unit=" m/s")
 
 
-def _model(model: str | Switches) -> Model:
+def _twin(number: int) -> int:
+    """Return the number of a twin."""
+    if problem := not_whole("twin", number, 0, MAX_TWIN):
+        raise ValueError(problem)
+    return int(number)
+
+
+def model_named(model: str | Switches) -> Model:
     """Return the model of that name or of those switches."""
     if isinstance(model, Switches):
         return model_of(model)

@@ -20,6 +20,7 @@ The program shares with the seven reduced equations the scenario, the trajectory
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -33,6 +34,7 @@ from ode_reference.contact import FREE, TOUCH, Ends, SideArray, resolve
 from ode_reference.energy import Ledger, nodes
 from ode_reference.impacts import LAWS, immovable
 from ode_reference.motion import Model, Motion, Throw
+from ode_reference.twins import twin_of
 from slicemodel.observables import grazes, opposite_hits
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import BASE, CAP, FloatArray, Impacts, Trajectory
@@ -77,6 +79,7 @@ def integrate(
     rest_speed: float,
     impact_law: str,
     energy: bool,
+    twin: int = 0,
 ) -> Trajectory:
     """Return the run of ``model``; parameters and accuracy as in ``ode_reference.solve``, whose defaults these are.
 
@@ -97,12 +100,14 @@ def integrate(
         "method": known_name("method", method, METHODS),
         "max_step": number_within("max_step", max_step, duration / STEP_LIMIT, unit=" s"),
         "energy": energy,
+        **({"twin": twin} if twin else {}),
     }
+    thrown, moved = twin_of(scenario, twin)
     # Overflow is a result here, reported as a status: it must not also appear as a warning.
     with np.errstate(all="ignore"):
-        flight = _Flight(scenario, model, settings, moments)
+        flight = _Flight(thrown, model, settings, moments, moved)
         flight.integrate()
-        return flight.trajectory()
+        return replace(flight.trajectory(), scenario=scenario)
 
 
 Event = Callable[[float, FloatArray], float]
@@ -118,7 +123,14 @@ class _StandstillError(Exception):
 class _Flight:
     """One run in progress: the state, who rests where, and what has been recorded so far."""
 
-    def __init__(self, scenario: Scenario, model: Model, settings: Mapping[str, Any], moments: FloatArray) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        model: Model,
+        settings: Mapping[str, Any],
+        moments: FloatArray,
+        moved: FloatArray | float = 0.0,
+    ) -> None:
         n = scenario.n_slices
         recoil = model.switches.recoil
         self.scenario, self.settings, self.moments, self.n = scenario, settings, moments, n
@@ -131,7 +143,7 @@ class _Flight:
         weightless = model.switches.weightless or scenario.gravity == 0.0
         self.mirrored = scenario.fill_fraction == 1.0 and weightless and self.law is not LAWS["sequential"]
         self.t = 0.0
-        self.y = np.concatenate([[scenario.theta0], scenario.initial_positions(), np.zeros(n)])
+        self.y = np.concatenate([[scenario.theta0], scenario.initial_positions() + moved, np.zeros(n)])
         self.resting: SideArray = np.zeros(n, dtype=np.int64)
         self.states: list[FloatArray] = []
         self.impacts: list[tuple[NDArray[Any], ...]] = []

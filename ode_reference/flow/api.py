@@ -15,6 +15,7 @@ from ode_reference import messages
 from ode_reference.flow import layout
 from ode_reference.flow.layout import ESCAPED, EXHAUSTED, INERTIA, OK, OVERFLOW, STALLED, TURN, WRONSKIAN
 from ode_reference.switches import Switches
+from ode_reference.twins import twin_of
 from slicemodel.observables import grazes, opposite_hits
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray, Impacts, Trajectory
@@ -35,10 +36,11 @@ def fly(
     states : bool - whether r and v are kept
     """
     half, points = scenario.bottle.length / 2, len(moments)
+    thrown, moved = twin_of(scenario, settings.get("twin", 0))
     rows, (y, v) = np.empty((3, points)), np.empty((2, points * states, scenario.n_slices))
     # Overflow is a result here, reported as a status: it must not also appear as a warning.
     with np.errstate(all="ignore"):
-        flight, places, marks = layout.prepare(scenario, switches, settings)
+        flight, places, marks = layout.prepare(thrown, switches, settings, moved)
         now = flight[0]
         if scenario.frozen or 2 * (scenario.r_max - half) <= now.tolerance:
             hits = _hold(now, places[layout.PLACE], moments, rows)
@@ -52,7 +54,7 @@ def fly(
         omega = now.momentum / inertia
     r = np.clip(half + y[:reached], scenario.r_min, scenario.r_max)
     if len(r) and moments[0] == 0.0:
-        r[0] = scenario.initial_positions()  # to the last digit, as output at release
+        r[0] = scenario.initial_positions() + moved  # to the last digit, as output at release
     # Impacts of one instant in the order of the slices.
     impacts = Impacts(*hits[np.lexsort((hits[:, 2], hits[:, 0]))].T[1:])
     found: dict[str, Any] = {name: int(now[name]) for name in ("steps", "impacts", "rests", "releases")}

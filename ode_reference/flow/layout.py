@@ -73,9 +73,12 @@ all that rest on its end."""
 
 
 def prepare(
-    scenario: Scenario, switches: Switches, settings: Mapping[str, Any]
+    scenario: Scenario, switches: Switches, settings: Mapping[str, Any], moved: FloatArray | float = 0.0
 ) -> tuple[NDArray[Any], FloatArray, IntArray]:
-    """Return the record of a flight at its release, shape (1,), with ``points``, (6, N), and ``marks``, (3, N)."""
+    """Return the record of a flight at its release, shape (1,), with ``points``, (6, N), and ``marks``, (3, N).
+
+    ``moved`` is by how much the slices are off their places, shape (N,) [m].
+    """
     throw, n = Throw.of(scenario), scenario.n_slices
     flight = np.zeros(1, dtype=RECORD).view(np.recarray)
     now = flight[0]
@@ -100,6 +103,7 @@ def prepare(
     # A full bottle is mirror symmetric to the last digit: its stack is as high as the tube is long.
     empty = (1.0 - scenario.fill_fraction) * scenario.bottle.length / 2
     points[PLACE] = empty + ((n - 1) / 2 - np.arange(n, dtype=np.float64)) * scenario.slice_height
+    points[PLACE] += moved
     return flight, points, marks
 
 

@@ -1,0 +1,52 @@
+"""Twins of a throw: the same throw with its release changed in the eleventh digit.
+
+An event-driven flight is exact between its impacts, and its status says so. Rounding changes the state by some 1e-16,
+impacts enlarge the change, and in some flights it decides which slice strikes next. A twin's release differs by far
+more than rounding, so that what twins make of omega(t) estimates what the last digits decide.
+
+    omega_0, M_b     larger or smaller by ``CHANGE`` of themselves
+    r of each slice  moved by ``CHANGE`` of L towards base or cap, but at most by ``ROOM`` of its distance from the
+                     nearer end; a slice that touches an end stays there, a full bottle stays its own mirror image
+
+The signs are drawn from the twin's number. Every slice moves on its own because some changes leave an orbit in place
+that rounding does not: a change of omega_0 without drag and weight is one of the unit of time, and one of M_b hardly
+moves a slice that hops within a gap g of an end (e = 1, a bottle short of full by g/L). Rounding changes its place in
+the hop by 1e-17 m of g, and with it when it strikes the end beside slices that strike at omega_0 L: a change of its
+place moved omega by some L/g times as much within a turn (docs/theory.md, "Rests, and the band they cost").
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from slicemodel.scenario import Scenario
+from slicemodel.trajectory import FloatArray
+
+CHANGE: Final = 3e-11
+"""By how much omega_0 and bottle mass of a twin differ, fraction of each, and its slices' places, fraction of L."""
+
+ROOM: Final = 1 / 16
+"""Largest share of its distance from the nearer end by which a slice is moved."""
+
+TOUCHING: Final = 1e-14
+"""Distance from an end, fraction of L, within which a slice touches it: rounding parts them by as much."""
+
+
+def twin_of(scenario: Scenario, number: int) -> tuple[Scenario, FloatArray]:
+    """Return the throw of a twin and by how much its slices are moved at release, shape (N,) [m]; 0 is the throw."""
+    n, bottle = scenario.n_slices, scenario.bottle
+    if number == 0:
+        return scenario, np.zeros(n)
+    signs = np.random.default_rng((number, n)).choice((-1.0, 1.0), n + 2)
+    r = scenario.initial_positions()
+    gap = np.minimum(r - scenario.r_min, scenario.r_max - r)
+    moved = signs[2:] * np.where(gap > TOUCHING * bottle.length, np.minimum(CHANGE * bottle.length, ROOM * gap), 0.0)
+    if scenario.fill_fraction == 1.0:
+        moved = (moved - moved[::-1]) / 2
+    mass = bottle.mass * (1.0 + CHANGE * signs[1])
+    return replace(
+        scenario, omega0=scenario.omega0 * (1.0 + CHANGE * signs[0]), bottle=replace(bottle, mass=mass)
+    ), moved

@@ -1,0 +1,128 @@
+"""Twins of a throw, and the band that they estimate."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import last_digits
+import numpy as np
+import pytest
+
+import ode_reference
+import slicemodel
+from ode_reference.bands import SAFETY, TWINS, estimate_band
+from ode_reference.twins import CHANGE, twin_of
+from slicemodel.scenario import Scenario
+
+THROW = Scenario().with_slices(6)
+NEAR_FULL = replace(
+    Scenario(), water_mass=0.9999994346911363, n_slices=4, drag=0.0, restitution=1.0, omega0=24.1675
+)  # fmt: skip
+CHAOTIC = Scenario(n_slices=4, drag=0.0, gravity=25.0, omega0=-20.0, duration=5.0)
+
+
+def test_a_twin_moves_every_free_slice_on_its_own():
+    throw, moved = twin_of(THROW, 3)
+    assert abs(throw.omega0 / THROW.omega0 - 1) == pytest.approx(CHANGE, rel=1e-4, abs=0)
+    assert abs(throw.bottle.mass / THROW.bottle.mass - 1) == pytest.approx(CHANGE, rel=1e-4, abs=0)
+    assert moved[0] == 0.0  # in contact with the base
+    np.testing.assert_allclose(np.abs(moved[1:]), CHANGE * THROW.bottle.length)
+    assert len(np.unique([twin_of(THROW, k)[1] for k in range(1, 9)], axis=0)) > 4
+
+
+def test_no_slice_is_moved_out_of_its_gap():
+    for water in (1.0 - 1e-6, 1.0 - 1e-11, 1.0 - 1e-13):
+        throw = replace(NEAR_FULL, water_mass=water)
+        _, moved = twin_of(throw, 1)
+        r = throw.initial_positions() + moved
+        assert throw.r_min < r[-1] < 2 * throw.r_min
+        assert moved[-1] != 0.0 or water > 1.0 - 1e-12
+
+
+def test_a_full_bottle_stays_its_own_mirror_image():
+    full = replace(NEAR_FULL, water_mass=1.0)
+    _, moved = twin_of(full, 1)
+    np.testing.assert_array_equal(moved, -moved[::-1])
+    assert np.count_nonzero(moved) in (0, 2)
+    assert ode_reference.solve(full, "free-flight", twin=1).diagnostics["opposite_hits"] > 0
+
+
+@pytest.mark.parametrize("method", ["taylor", "DOP853"])
+def test_a_twin_is_repeatable_and_keeps_the_throw(method):
+    throw = replace(THROW, duration=0.1)
+    own, one, again = (ode_reference.solve(throw, "eq8", [0, 0.05, 0.1], method=method, twin=k) for k in (0, 5, 5))
+    assert one.scenario == throw
+    assert one.settings == {**own.settings, "twin": 5}
+    np.testing.assert_array_equal(one.omega, again.omega)
+    assert 0.0 < np.abs(one.omega - own.omega).max() < 1e-8
+    assert ode_reference.solve_batch([throw], "eq8", [0, 0.05, 0.1], twin=5).omega[0, 1] == pytest.approx(one.omega[1])
+
+
+def test_both_methods_fly_the_same_twin():
+    throw = replace(THROW, duration=0.1)
+    by = [ode_reference.solve(throw, "eq8", method=method, twin=2, rest_speed=1e-5) for method in ("taylor", "DOP853")]
+    own = ode_reference.solve(throw, "eq8")
+    assert np.abs(by[0].r - by[1].r).max() < 0.1 * np.abs(by[0].r - own.r).max()
+
+
+@pytest.mark.parametrize("twin", [-1, 1.5, "2", True, 10**10])
+def test_what_is_no_number_of_a_twin_is_refused(twin):
+    with pytest.raises(ValueError, match="twin"):
+        ode_reference.solve(THROW, "eq8", twin=twin)
+    with pytest.raises(ValueError, match="twin"):
+        ode_reference.solve_batch([THROW], "eq8", twin=twin)
+
+
+def test_the_band_is_that_of_its_flights_and_never_falls():
+    flight = ode_reference.solve(THROW, "free-flight")
+    band = estimate_band(flight)
+    twins = [ode_reference.solve(THROW, "free-flight", twin=k).omega for k in range(1, TWINS + 1)]
+    rest = ode_reference.solve(THROW, "free-flight", rest_speed=1e-4).omega
+    widest = np.abs(np.array([*twins, rest]) - flight.omega).max() / THROW.omega0
+    assert band.largest == pytest.approx(SAFETY * widest)
+    assert band.flights == TWINS + 1
+    assert np.all(np.diff(band.size) >= 0.0)
+    assert band.trusted_until(np.inf) == THROW.duration
+    assert np.isnan(band.trusted_until(-1.0))
+
+
+@pytest.mark.parametrize("unit", [1.1, 1.7, 3.3])
+def test_a_bottle_a_hair_short_of_full_differs_from_itself_within_its_band(unit):
+    flight = ode_reference.solve(NEAR_FULL, "free-flight", last_digits.TIMES)
+    apart = np.abs(last_digits.in_other_unit(NEAR_FULL, unit) - flight.omega / NEAR_FULL.omega0)
+    assert flight.ok
+    assert apart.max() > 1e-3
+    assert np.all(apart <= np.maximum(estimate_band(flight).size, last_digits.FLOOR))
+
+
+@pytest.mark.parametrize("settings", [{}, {"method": "DOP853", "rtol": 1e-9}])
+def test_a_long_flight_says_up_to_when_it_may_be_trusted(settings):
+    flight = ode_reference.solve(CHAOTIC, "eq8", np.linspace(0, 5, 251), **settings)
+    band = estimate_band(flight)
+    assert flight.ok
+    assert band.largest > 0.5
+    assert 2.5 < band.trusted_until(1e-3) < 3.6
+    exact = ode_reference.solve(CHAOTIC, "eq8", flight.t)
+    assert np.all(np.abs(exact.omega - flight.omega) <= band.size * abs(CHAOTIC.omega0))
+
+
+def test_the_band_of_another_method_holds_the_error_of_its_steps():
+    coarse = ode_reference.solve(THROW, "eq8", method="RK45", rtol=1e-4, atol=1e-4)
+    exact = ode_reference.solve(THROW, "eq8")
+    error = np.abs(coarse.omega - exact.omega) / THROW.omega0
+    assert error.max() > 1e-5
+    assert np.all(error <= estimate_band(coarse).size)
+
+
+def test_a_flight_without_twins_is_refused():
+    for flight in (ode_reference.solve(THROW, "column"), slicemodel.solve(THROW, steps=100)):
+        with pytest.raises(ValueError, match="ode_reference"):
+            estimate_band(flight)
+    with pytest.raises(ValueError, match="twins"):
+        estimate_band(ode_reference.solve(THROW, "eq8"), twins=0)
+
+
+@pytest.mark.slow
+def test_further_twins_and_other_units_of_time_lie_within_the_band(monkeypatch):
+    monkeypatch.setattr("sys.argv", ["last_digits", "--throws", "10", "--near-full", "500", "--seed", "3"])
+    assert last_digits.main() == 0
