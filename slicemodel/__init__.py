@@ -5,7 +5,8 @@ Importing this package loads neither numba nor SciPy; the compiled loop is made 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import time
+from typing import TYPE_CHECKING, Any, Final
 
 from slicemodel.scenario import Bottle, Scenario, ScenarioError
 
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
     from slicemodel.step_advice import required_steps
     from slicemodel.table import Outcome, Table, Touch
     from slicemodel.trajectory import Impact, Impacts, Trajectory
+
+IMPORTED: Final = time.time_ns()
+"""When this program began to read the sources of the packages [ns]: what is kept by their hash asks for it."""
 
 __all__ = [
     "Batch",

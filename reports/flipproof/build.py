@@ -17,7 +17,7 @@ from flipproof.frame.exhibit import Exhibit, drawn
 from flipproof.frame.findings import Finding
 from flipproof.frame.gather import Gathered, Stages, gather, tell
 from flipproof.frame.pool import Here, Progress, compile_kernels, workers
-from flipproof.frame.store import RunStore
+from flipproof.frame.run_store import RunStore
 from flipproof.output.junit import junit_text
 from flipproof.output.summary import SCHEMA_NAME, schema_text, summarise, summary_text
 from flipproof.page.render import render

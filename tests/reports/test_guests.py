@@ -34,8 +34,8 @@ from flipproof.frame.exhibit import drawn
 from flipproof.frame.flights import Call, Flights
 from flipproof.frame.gather import gather, tell
 from flipproof.frame.pool import Here, make_all, workers
+from flipproof.frame.run_store import RunStore
 from flipproof.frame.solvers import Made, Missing, solve
-from flipproof.frame.store import RunStore
 from flipproof.output.summary import summary_text
 from ode_reference.models import MODELS
 from slicemodel import Scenario

@@ -32,7 +32,7 @@ from flipproof.cli.main import main
 from flipproof.frame.exhibit import drawn
 from flipproof.frame.gather import tell
 from flipproof.frame.pool import Here
-from flipproof.frame.store import RunStore
+from flipproof.frame.run_store import RunStore
 from flipproof.landing.design import Case, Scatter, Share, Throws, aimed, correlation, make_cases, scattered, wilson
 from flipproof.landing.throw import land_throw, told
 from flipproof.landing.upright import make_upright

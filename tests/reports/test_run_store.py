@@ -1,12 +1,15 @@
 """Runs kept from one report to the next."""
 
 import os
+import shutil
 import sqlite3
 import stat
 import subprocess
 import sys
 import threading
+import time
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +18,9 @@ import pytest
 from flipproof.frame import keys, store
 from flipproof.frame.keys import key_of, key_of_call
 from flipproof.frame.pool import make_all, workers
+from flipproof.frame.run_store import NAME, RunStore, default_place, packed
 from flipproof.frame.solvers import Made, Run, make
-from flipproof.frame.store import RunStore, _write_ahead, default_place
+from flipproof.frame.store import _write_ahead
 from slicemodel import Scenario
 
 RUN = Run("eq8", Scenario(n_slices=3, duration=0.1))
@@ -107,13 +111,13 @@ def test_only_slow_runs_that_ended_in_a_trajectory_are_kept(place):
 def test_what_is_as_soon_made_as_read_is_not_kept(place):
     with RunStore(place) as runs_kept:
         made = make(replace(RUN, scenario=RUN.scenario.with_slices(100)))
-        runs_kept.keep(replace(made, seconds=0.05))  # 1.6 MB: at the speed of reading that is soon made
+        runs_kept.keep(replace(made, seconds=0.3))  # 1.6 MB
         assert runs_kept.find(made.run) is None
-        runs_kept.keep(replace(made, seconds=0.06))
+        runs_kept.keep(replace(made, seconds=0.6))
         assert runs_kept.find(made.run) is not None
-        runs_kept.keep_call("quick", "answer", 0.04)
-        runs_kept.keep_call("slow", "answer", 0.06)
-        assert (runs_kept.find_call("quick"), runs_kept.find_call("slow")) == (None, ("answer",))
+        for key, seconds in ((b"quick", 0.04), (b"slow", 0.06)):
+            runs_kept.keep_call(key, "f", packed("answer", seconds, runs_kept.slow))
+        assert (runs_kept.find_call(b"quick"), runs_kept.find_call(b"slow")) == (None, ("answer",))
 
 
 def test_whatever_decides_a_run_is_in_its_key(monkeypatch):
@@ -154,12 +158,49 @@ def test_a_changed_source_makes_runs_again(place, tmp_path, monkeypatch):
     (room / "motion.py").write_text("G = 9.81\n")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(keys, "SOURCES", {"ode_reference": ("room_of_sources",)})
+    monkeypatch.setattr(keys, "IMPORTED", time.time_ns() + 10**12)  # as if each store were another program's
     kept(place, RUN)
     assert found(place) is not None
     (room / "motion.py").write_text("G = 9.82\n")
     assert found(place) is None
     (room / "motion.py").write_text("G = 9.81\n")
     assert found(place) is not None
+
+
+EDITED = """\
+import sys
+from pathlib import Path
+
+import {first}
+import flipproof
+
+place, source = Path(sys.argv[1]), Path(sys.argv[2])
+source.write_text(source.read_text() + "# edited\\n")
+from flipproof.frame.run_store import RunStore
+from flipproof.frame.solvers import Run, make
+from slicemodel import Scenario
+
+run = Run("exact-step", Scenario(n_slices=2, duration=0.01))
+with RunStore(place, slow=0.0) as store:
+    assert store.find(run) is None
+    store.keep(make(run))
+    assert "was changed after this program had read it" in store.facts()["from the store"], store.facts()
+assert not place.exists()
+"""
+
+
+@pytest.mark.parametrize("source", ["slicemodel.scenario", "flipproof.frame.solvers"])
+def test_an_edit_after_the_import_keeps_and_finds_nothing(place, tmp_path, source):
+    """A program that has read the sources before the edit would keep its answers under the key of the edited ones."""
+    copy = tmp_path / "copy"
+    for name in ("slicemodel", "ode_reference", "engine_check", "flipproof"):
+        package = Path(find_spec(name).origin).parent
+        shutil.copytree(package, copy / name, ignore=shutil.ignore_patterns("__pycache__"))
+    code = EDITED.format(first=source)
+    environment = {**os.environ, "PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"}
+    command = [sys.executable, "-c", code, str(place), str((copy / source.replace(".", "/")).with_suffix(".py"))]
+    ended = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert ended.returncode == 0, ended.stderr
 
 
 @pytest.mark.parametrize(
@@ -174,6 +215,7 @@ def test_nothing_is_kept_after_a_source_was_changed(place, tmp_path, monkeypatch
     os.utime(source, (0, 0))
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(keys, "SOURCES", {"ode_reference": ("room_of_sources",), "room_of_sources": ()})
+    monkeypatch.setattr(keys, "IMPORTED", time.time_ns() + 10**12)
     with RunStore(place, slow=0.0) as kept_here, workers(1) as pool:
         key = key_of_call(abs, (-1,), {})
         source.unlink()
@@ -183,7 +225,7 @@ def test_nothing_is_kept_after_a_source_was_changed(place, tmp_path, monkeypatch
         assert kept_here.remembering(pool).submit(abs, -1).result(timeout=60) == 1
         assert (kept_here.find(RUN), kept_here.find_call(key)) == (None, None)
     with sqlite3.connect(place) as rows:
-        assert rows.execute("SELECT count(*) FROM kept").fetchone() == (0,)
+        assert rows.execute("SELECT count(*) FROM made").fetchone() == (0,)
     source.write_text("G = 9.81\n")
     kept(place, RUN)
     assert found(place) is not None
@@ -194,16 +236,16 @@ def test_every_package_counts_its_own_sources_and_those_of_the_nouns():
         assert {package, "slicemodel", "flipproof.frame.solvers"} == set(names)
 
 
-@pytest.mark.parametrize("column", ["content", "checksum"])
+@pytest.mark.parametrize("column", ["answer", "asked", "checksum"])
 def test_a_flipped_byte_makes_the_run_again(place, column):
     (made,) = kept(place, RUN)
     with sqlite3.connect(place) as rows:
-        (cell,) = rows.execute(f"SELECT {column} FROM kept").fetchone()
-        cell = cell.encode() if isinstance(cell, str) else cell
+        (cell,) = rows.execute(f"SELECT {column} FROM made").fetchone()
+        kind, cell = type(cell), cell if isinstance(cell, bytes) else str(cell).encode()
         for at in {0, len(cell) // 3, len(cell) - 1}:
             damaged = cell[:at] + bytes([cell[at] ^ 1]) + cell[at + 1 :]
-            value = damaged if column == "content" else damaged.decode()
-            rows.execute(f"UPDATE kept SET {column} = ?", (value,))
+            value = damaged if kind is bytes else damaged.decode()
+            rows.execute(f"UPDATE made SET {column} = ?", (value,))
             rows.commit()
             assert found(place) is None
             kept(place, RUN)
@@ -214,7 +256,7 @@ def test_a_flipped_byte_makes_the_run_again(place, column):
 def test_a_bit_flipped_in_the_schema_costs_the_store_and_no_report(place):
     kept(place, RUN)
     whole = place.read_bytes()
-    begin = whole.index(b"CREATE TABLE kept") - 60
+    begin = whole.index(b"CREATE TABLE made") - 60
     for at in range(begin, begin + 320, 5):
         for end in ("-wal", "-shm"):
             place.with_name(place.name + end).unlink(missing_ok=True)
@@ -237,8 +279,8 @@ def test_entries_dated_in_the_future_do_not_drive_out_new_ones(place):
     runs = [replace(RUN, scenario=replace(RUN.scenario, omega0=10.0 + k)) for k in range(4)]
     kept(place, *runs[:2])
     with sqlite3.connect(place) as rows:
-        (size,) = rows.execute("SELECT max(size) FROM kept").fetchone()
-        rows.execute("UPDATE kept SET used = '2999-01-01 00:00:00.000000'")
+        (size,) = rows.execute("SELECT max(length(answer)) FROM made").fetchone()
+        rows.execute("UPDATE made SET used = 32503680000000")
     kept(place, *runs[2:], limit=int(2.5 * size))
     assert [found(place, run) is not None for run in runs] == [False, False, True, True]
 
@@ -247,7 +289,7 @@ def test_an_entry_of_another_run_is_not_taken_for_it(place):
     other = replace(RUN, scenario=replace(RUN.scenario, omega0=11.0))
     kept(place, RUN)
     with sqlite3.connect(place) as rows:
-        rows.execute("UPDATE kept SET key = ?", (key_of(other),))
+        rows.execute("UPDATE made SET key = ?", (key_of(other),))
     assert found(place, other) is None
 
 
@@ -281,7 +323,7 @@ import sys
 from pathlib import Path
 from dataclasses import replace
 from flipproof.frame.solvers import Run, make
-from flipproof.frame.store import RunStore
+from flipproof.frame.run_store import RunStore
 from slicemodel import Scenario
 
 place, first = Path(sys.argv[1]), int(sys.argv[2])
@@ -297,7 +339,7 @@ def test_two_programs_write_at_once(place):
     programs = [subprocess.Popen([sys.executable, "-c", WRITER, str(place), first]) for first in ("0", "20")]
     assert [program.wait(timeout=120) for program in programs] == [0, 0]
     with sqlite3.connect(place) as rows:
-        assert rows.execute("SELECT count(*) FROM kept").fetchone() == (60,)
+        assert rows.execute("SELECT count(*) FROM made").fetchone() == (60,)
         assert rows.execute("PRAGMA integrity_check").fetchone() == ("ok",)
     with RunStore(place) as runs_kept:
         for k in range(60):
@@ -313,7 +355,9 @@ def test_while_another_program_holds_the_file_it_is_read_and_what_is_made_is_not
         with RunStore(place, slow=0.0) as runs_kept:
             assert made_by(runs_kept, other).trajectory is not None
             assert runs_kept.find(RUN) is not None
-            assert runs_kept._rows.execute("PRAGMA busy_timeout").fetchone() == (0,)  # waited for once, not each time
+            assert runs_kept._store._rows.execute("PRAGMA busy_timeout").fetchone() == (
+                0,
+            )  # waited for once, not each time
             rows.execute("ROLLBACK")
             made_by(runs_kept, later)
     assert [found(place, run) is not None for run in (RUN, other, later)] == [True, False, True]
@@ -323,10 +367,10 @@ def test_while_another_program_holds_the_file_it_is_read_and_what_is_made_is_not
 def test_a_file_that_is_busy_when_it_is_read_is_read_again_later(place, code, found_later):
     kept(place, RUN)
     with RunStore(place) as runs_kept:
-        rows, runs_kept._rows = runs_kept._rows, Refusing(1, code)
+        store_there = runs_kept._store
+        rows, store_there._rows = store_there._rows, Refusing(1, code)
         assert runs_kept.find(RUN) is None
-        if runs_kept._rows is not None:
-            runs_kept._rows = rows
+        store_there._rows = rows
         assert (runs_kept.find(RUN) is not None) == found_later
         rows.close()
 
@@ -335,10 +379,10 @@ def test_a_full_disk_ends_the_keeping(place):
     kept(place, RUN)
     other, later = (replace(RUN, scenario=replace(RUN.scenario, omega0=omega0)) for omega0 in (11.0, 13.0))
     with RunStore(place, slow=0.0) as runs_kept:
-        (pages,) = runs_kept._rows.execute("PRAGMA page_count").fetchone()
-        runs_kept._rows.execute(f"PRAGMA max_page_count = {pages}")
+        (pages,) = runs_kept._store._rows.execute("PRAGMA page_count").fetchone()
+        runs_kept._store._rows.execute(f"PRAGMA max_page_count = {pages}")
         made_by(runs_kept, replace(other, scenario=other.scenario.with_slices(40)))
-        runs_kept._rows.execute(f"PRAGMA max_page_count = {2**30}")
+        runs_kept._store._rows.execute(f"PRAGMA max_page_count = {2**30}")
         made_by(runs_kept, later)
         assert runs_kept.find(RUN) is not None
     assert found(place, later) is None
@@ -348,14 +392,14 @@ def test_the_entries_stay_within_the_limit_and_the_last_used_stay(place):
     runs = [replace(RUN, scenario=replace(RUN.scenario, omega0=10.0 + k)) for k in range(6)]
     kept(place, runs[0])
     with sqlite3.connect(place) as rows:
-        (size,) = rows.execute("SELECT size FROM kept").fetchone()
+        (size,) = rows.execute("SELECT length(answer) FROM made").fetchone()
     limit = int(3.5 * size)
     for run in runs[1:3]:
         kept(place, run, limit=limit)
     assert found(place, runs[0]) is not None  # used last
     kept(place, *runs[3:5], limit=limit)
     with sqlite3.connect(place) as rows:
-        (together,) = rows.execute("SELECT sum(size) FROM kept").fetchone()
+        (together,) = rows.execute("SELECT sum(length(answer)) FROM made").fetchone()
     assert together <= limit
     assert [found(place, run) is not None for run in runs[:5]] == [True, False, False, True, True]
     kept(place, runs[5], limit=size // 2)  # too large for itself: it drives nothing out
@@ -390,14 +434,14 @@ def test_a_file_that_can_only_be_read_is_read(place):
     (made,) = kept(place, RUN)
     other = replace(RUN, scenario=replace(RUN.scenario, omega0=11.0))
     with RunStore(place, slow=0.0) as runs_kept:
-        runs_kept._rows.execute("PRAGMA query_only = ON")
+        runs_kept._store._rows.execute("PRAGMA query_only = ON")
         assert same(made, runs_kept.find(RUN))
         assert made_by(runs_kept, other).trajectory is not None
 
 
 def test_the_place_is_in_the_users_cache(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert default_place() == tmp_path / "flipproof" / "runs-1.sqlite"
+    assert default_place() == tmp_path / "flipproof" / NAME
     for given in ("", "relative/folder"):  # the standard says: an empty or relative one counts as not set
         monkeypatch.setenv("XDG_CACHE_HOME", given)
         assert Path.home() in default_place().parents

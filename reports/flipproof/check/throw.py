@@ -27,7 +27,7 @@ from flipproof.check.diff import LEAST, ROUND_OFF, TOLERANCE, bands, number, rea
 from flipproof.frame.findings import Finding, interval_text
 from flipproof.frame.gather import gather, tell
 from flipproof.frame.pool import Here
-from flipproof.frame.store import RunStore
+from flipproof.frame.run_store import RunStore
 from slicemodel import Scenario
 
 

@@ -16,7 +16,7 @@ from flipproof.cli.console import readable
 
 if TYPE_CHECKING:
     from flipproof.frame.findings import Finding
-    from flipproof.frame.store import RunStore
+    from flipproof.frame.run_store import RunStore
 
 Read = TypeVar("Read")
 
@@ -51,9 +51,10 @@ def add_no_cache(command: argparse.ArgumentParser) -> None:
 
 def store_of(options: argparse.Namespace) -> RunStore:
     """Return the store of runs that a command with ``--no-cache`` uses."""
-    from flipproof.frame.store import RunStore, default_place
+    from flipproof.frame.run_store import RunStore, default_place
 
-    return RunStore(None if options.no_cache else default_place())
+    place = None if options.no_cache else default_place()
+    return RunStore(place, say=lambda words: print(f"flipproof: {words}", file=sys.stderr, flush=True))
 
 
 def add_guests(command: argparse.ArgumentParser, what: str) -> None:

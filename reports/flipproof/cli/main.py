@@ -240,6 +240,7 @@ def command_report(options: argparse.Namespace) -> int:
         found = guest.visit.certificate
         print(f"{guest.label}: {found.conclusion if found else '; '.join(guest.visit.problems.values())}")
     _print_report(report, options.out, time.perf_counter() - began)
+    print(f"Cache: {store.whereabouts()}")
     return 1 if report.failed else 0
 
 

@@ -14,8 +14,8 @@ from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding
 from flipproof.frame.flights import Call, Flights, Outcome, attempt, chapter_errors
 from flipproof.frame.pool import Progress, make_all
+from flipproof.frame.run_store import RunStore
 from flipproof.frame.solvers import Run
-from flipproof.frame.store import RunStore
 
 
 class Stages:

@@ -6,6 +6,7 @@ import functools
 import hashlib
 import io
 import json
+import os
 import pickle
 import platform
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -17,6 +18,7 @@ import numpy as np
 
 from flipproof.frame.solvers import Run, find
 from flipproof.output.provenance import PACKAGES, version_of
+from slicemodel import IMPORTED
 
 SOURCES: Final[Mapping[str, tuple[str, ...]]] = {
     "slicemodel": ("slicemodel", "flipproof.frame.solvers"),
@@ -29,8 +31,8 @@ COMPUTING: Final = ("flipproof", "numpy", "scipy", "numba", "pymunk", "mujoco-co
 """Packages whose versions a run depends on; a call depends on those that draw, too."""
 
 
-def key_of(run: Run) -> str | None:
-    """Return the SHA-256 of all that decides a run; None for a run that cannot be kept."""
+def key_of(run: Run) -> bytes | None:
+    """Return 16 bytes of a hash of all that decides a run; None for a run that cannot be kept."""
     sources = SOURCES.get(find(run.solver).package)
     if sources is None:
         return None
@@ -42,8 +44,8 @@ def key_of(run: Run) -> str | None:
     return _key(text.encode(), COMPUTING, sources)
 
 
-def key_of_call(fn: Callable[..., Any], args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> str | None:
-    """Return the SHA-256 of all that decides what a call returns; None for arguments that cannot be pickled.
+def key_of_call(fn: Callable[..., Any], args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> bytes | None:
+    """Return 16 bytes of a hash of all that decides what a call returns; None for arguments that cannot be pickled.
 
     Equal arguments may be pickled in two ways, and are then made twice; different ones never are in one.
     """
@@ -57,9 +59,14 @@ def key_of_call(fn: Callable[..., Any], args: tuple[Any, ...], kwargs: Mapping[s
     return _key(given.getvalue(), PACKAGES, (*SOURCES, "flipproof"))
 
 
-def _key(given: bytes, packages: tuple[str, ...], sources: tuple[str, ...]) -> str:
-    versions = {"Python": platform.python_version(), **{name: version_of(name) for name in packages}}
-    return hashlib.sha256(f"{versions}\n{fingerprint(*sources)}\n".encode() + given).hexdigest()
+def _key(given: bytes, packages: tuple[str, ...], sources: tuple[str, ...]) -> bytes:
+    decided = f"{versions_of(packages)}\n{fingerprint(*sources)}\n".encode() + given
+    return hashlib.blake2b(decided, digest_size=16).digest()
+
+
+def versions_of(packages: Iterable[str] = COMPUTING) -> dict[str, str]:
+    """Return the versions of Python and of packages by their names."""
+    return {"Python": platform.python_version(), **{name: version_of(name) for name in packages}}
 
 
 def _plain(value: object) -> Any:
@@ -89,6 +96,17 @@ def sources_written() -> list[tuple[str, int, int]]:
     """
     facts = ((name, file.stat()) for name, file in _sources((*SOURCES, "flipproof")))
     return [(name, fact.st_mtime_ns, fact.st_ctime_ns) for name, fact in facts]
+
+
+def changed_since_import() -> str:
+    """Return the name of a source that was changed after this program had begun to import the packages, or nothing.
+
+    What such a program runs is not known from its sources: a module may have been read before or after the change.
+    """
+    for name, modified, changed in sources_written():
+        if (changed if os.name == "posix" else modified) > IMPORTED:
+            return name
+    return ""
 
 
 def _sources(names: Iterable[str]) -> Iterator[tuple[str, Path]]:

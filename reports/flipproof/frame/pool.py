@@ -9,8 +9,8 @@ from typing import Any
 
 from flipproof.frame.flights import Call, Outcome, attempt, chapter_errors
 from flipproof.frame.processes import WorkerDiedError, processes
+from flipproof.frame.run_store import RunStore
 from flipproof.frame.solvers import Made, Run, find, make
-from flipproof.frame.store import RunStore
 from slicemodel import Scenario
 
 Progress = Callable[[int, int, str], None]

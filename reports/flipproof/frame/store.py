@@ -1,87 +1,118 @@
-"""Slow runs and calls kept from one report to the next, in one SQLite file in the user's cache folder.
+"""What was made, by its key, in one SQLite file: rows of sweeps, and runs of reports.
 
-A run is looked up by all that decides its numbers: solver, scenario and settings, the versions of Python and of the
-packages that compute, and the sources of the package that makes it and of what that imports. A call of a worker, such
-as the flights of a map or the drawing of a figure, is looked up by function, arguments, versions and all sources.
-Whatever of these changes, it is made again. The processor is not among them: another one changes last digits, which no
-verdict rests on. After a source was changed while the store is open, nothing is kept: a worker may have read the
-changed program, and the keys are those of the one before.
+::
 
-An entry carries a checksum over key and content; one that does not agree with it is made again and replaced. Several
-programs may read and write at once. Where the file cannot be used, runs are made as if there were none.
+    shared   id, facts        JSON: what many entries have in common: solver, settings, code, versions, the base throw
+    made     key              16 bytes: all that was asked, and the code that made it
+             shared           the row of ``shared`` that belongs to it
+             asked            JSON: what was asked for beside that
+             answer           what came of it: JSON (a sweep), or a packed value (``packing``, a report)
+             used             when it was made or last read [ms since 1970]
+             checksum         CRC-32 of the other columns but ``used``
+
+Any number of programs may read and write the file at once. An entry that does not agree with its checksum is dropped,
+so that it is made again. A file that SQLite finds damaged is renamed, and what can still be read of it is copied to a
+new one.
+
+- ``journal_mode = WAL``: readers see the last transaction while a program writes the next.
+- ``synchronous = NORMAL``: a killed program loses nothing that it committed; a power failure may lose the last
+  transactions, whose entries are then made again, but never breaks the file.
 """
 
 from __future__ import annotations
 
-import hashlib
+import json
 import os
-import pickle
 import sqlite3
 import stat
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
-from concurrent.futures import CancelledError, Executor, Future
-from contextlib import AbstractContextManager, suppress
-from datetime import UTC, datetime
+import zlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, closing, suppress
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
-from flipproof.frame.keys import fingerprint, key_of, key_of_call, sources_written
-from flipproof.frame.solvers import Made, Run
-
-WORDS: Final = "from the store"
-"""Name of the store's line in the provenance."""
-
-BUSY: Final = 10.0
+BUSY: Final = 30.0
 """Seconds to wait for another program that writes."""
 
-TABLE: Final = """
-CREATE TABLE IF NOT EXISTS kept (
-    key TEXT PRIMARY KEY,    -- SHA-256 of all that decides what is kept
-    checksum TEXT NOT NULL,  -- SHA-256 of key and content
-    used TEXT NOT NULL,      -- when it was made or last read
-    size INTEGER NOT NULL,   -- bytes of the content
-    content BLOB NOT NULL    -- what was kept, and when it was made
+TABLES: Final = (
+    "CREATE TABLE IF NOT EXISTS shared (id INTEGER PRIMARY KEY, facts TEXT NOT NULL UNIQUE)",
+    "CREATE TABLE IF NOT EXISTS made (key BLOB PRIMARY KEY, shared INTEGER NOT NULL REFERENCES shared (id), "
+    "asked TEXT NOT NULL, answer NOT NULL, used INTEGER NOT NULL, checksum INTEGER NOT NULL)",
 )
-"""
+APPLICATION: Final = 0x464C4950
+"""SQLite's ``application_id`` of the file ("FLIP")."""
+
+SCHEMA: Final = 3
+"""SQLite's ``user_version`` of the file; rises with every change of the tables."""
+
 EVICT: Final = """
-DELETE FROM kept WHERE key IN (
+DELETE FROM made WHERE key IN (
     SELECT key FROM (
-        SELECT key, sum(size) OVER (ORDER BY CASE WHEN used > ? THEN '' ELSE used END DESC, key) AS together FROM kept
-    ) WHERE together > ?
+        SELECT key, sum(length(answer)) OVER (ORDER BY CASE WHEN used > ? THEN 0 ELSE used END DESC, rowid DESC) AS size
+        FROM made
+    ) WHERE size > ?
 )
 """
 """What is dated in the future, by a clock that was wrong, goes first."""
 
 UNUSABLE: Final = (OSError, sqlite3.Error, UnicodeDecodeError)
-"""What opening or reading the file raises; UnicodeDecodeError when SQLite quotes a damaged schema."""
+"""What opening, reading or writing the file raises; UnicodeDecodeError when SQLite quotes a damaged schema."""
+
+json_of = json.JSONEncoder(sort_keys=True, separators=(",", ":")).encode
 
 
-class RunStore(AbstractContextManager["RunStore"]):
-    """Runs by what decides them. Use as a context manager; ``RunStore(None)`` keeps nothing and finds nothing.
+class Entry(NamedTuple):
+    """What is kept under a key.
 
     Parameters
     ----------
-    place : Path or None - the file; ``default_place()`` unless somebody wants another
-    slow : float - seconds of a run from which it is kept, a faster one is as soon made as read; 0: all of any size
-    limit : int - bytes of all entries together; those used longest ago go first
+    key : bytes, 16
+    shared : mapping - what many entries have in common
+    asked : str - JSON
+    answer : str or bytes
     """
 
-    def __init__(self, place: Path | None, *, slow: float = 0.05, limit: int = 2**30) -> None:
-        self.place, self.slow, self.limit = place, slow, limit
-        self.asked, self.calls = 0, 0
-        self.found: list[str] = []
-        self.found_calls: list[str] = []
+    key: bytes
+    shared: Mapping[str, Any]
+    asked: str
+    answer: str | bytes
+
+
+class Store(AbstractContextManager["Store"]):
+    """Entries by their keys. Use as a context manager; threads may share it.
+
+    Parameters
+    ----------
+    path : Path - the file; it is begun if it is not there
+    say : callable or None
+        Gets a line if a damaged file was renamed. None: the file is not read through, and damage is raised.
+
+    Raises
+    ------
+    OSError
+        If the file or its folder cannot be used, is no regular file, or is another user's.
+    sqlite3.Error
+        If it is a database of something else, or another program holds it too long.
+    """
+
+    def __init__(self, path: Path, say: Callable[[str], object] | None = None) -> None:
+        self.path = path
         self._lock = threading.RLock()
-        self._rows: sqlite3.Connection | None = None
-        self._writable = True
-        self._problem = "not asked for"
-        if place is not None:
-            self._sources = sources_written()
-            fingerprint.cache_clear()  # a source may have been changed since the store before this one
-            self._open(place)
+        self._ids: dict[str, int] = {}
+        self._facts: dict[int, bytes] = {}
+        check_own(path)
+        try:
+            self._rows = _connect(path, through=say is not None)
+        except UNUSABLE as error:
+            if say is None or not is_damage(error):
+                raise
+            aside = _set_aside(path)
+            self._rows = _connect(path)
+            kept = self._copy(aside)
+            say(f"{path} was damaged ({error}); it is {aside.name} now, and {kept} entries of it were kept")
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -89,205 +120,140 @@ class RunStore(AbstractContextManager["RunStore"]):
     def close(self) -> None:
         """Close the file."""
         with self._lock:
-            if self._rows is not None:
-                self._rows.close()
-            self._rows = None
+            self._rows.close()
 
-    def find(self, run: Run) -> Made | None:
-        """Return the run as it was kept; None if it was not, or not by this code, or what was kept is damaged."""
-        self.asked += 1
-        kept = self._get(key_of(run), self.found) if self._rows is not None else None
-        return None if kept is None else Made(run, *kept[0])
-
-    def keep(self, made: Made) -> None:
-        """Keep a run that was slow and ended in a trajectory."""
-        if self._rows is not None and made.trajectory is not None and made.seconds >= self.slow:
-            self._put(key_of(made.run), (made.trajectory, made.seconds), made.seconds)
-
-    def remembering(self, pool: Executor) -> Executor:
-        """Return the pool as one that finds the answers of its calls in this store, and keeps them there."""
-        return _Remembering(pool, self) if self._rows is not None else pool
-
-    def find_call(self, key: str | None) -> tuple[Any] | None:
-        """Return the answer of a call as it was kept, alone in a tuple, or None."""
-        self.calls += 1
-        return self._get(key, self.found_calls)
-
-    def keep_call(self, key: str | None, answer: object, seconds: float) -> None:
-        """Keep the answer of a call that was slow."""
-        if seconds >= self.slow:
-            self._put(key, answer, seconds)
-
-    def facts(self) -> dict[str, str]:
-        """Return how much of what was asked for came from the store and when it was made, for the provenance."""
-        if self._rows is None and not self.found + self.found_calls:
-            return {WORDS: f"none: {self._problem}"}
-        runs = f"{len(self.found)} of {self.asked} runs"
-        calls = f"{len(self.found_calls)} of {self.calls} maps and audits" if self.calls else ""
-        when = sorted(self.found + self.found_calls)
-        made = f"made {when[0]} UTC" + (f" to {when[-1]} UTC" if when[-1] != when[0] else "") if when else ""
-        return {WORDS: ", ".join(part for part in (runs, calls, made) if part)}
-
-    def _get(self, key: str | None, found: list[str]) -> tuple[Any] | None:
-        """Return what was kept under a key, alone in a tuple, or None; note in ``found`` when it was made."""
+    def get(self, keys: Sequence[bytes]) -> dict[bytes, bytes]:
+        """Return the answers of those of at most 32 000 keys that have one; damaged ones are dropped."""
+        query = f"SELECT key, shared, asked, answer, checksum FROM made WHERE key IN ({','.join('?' * len(keys))})"
         with self._lock:
-            if self._rows is None or key is None:
-                return None
+            rows = self._rows.execute(query, keys).fetchall()
+            if not {shared for _, shared, *_ in rows} <= self._facts.keys():
+                self._facts = dict(self._rows.execute("SELECT id, facts FROM shared"))
+            whole = {row[0]: row[3] for row in rows if _whole(self._facts, *row)}
+            if len(whole) < len(rows):
+                damaged = [(row[0],) for row in rows if row[0] not in whole]
+                self._rows.executemany("DELETE FROM made WHERE key = ?", damaged)
+        return whole
+
+    def put(self, entries: Iterable[Entry]) -> None:
+        """Write entries in one transaction; of two under one key the later stays."""
+        with self._lock:
+            now = _now()
+            self._rows.execute("BEGIN IMMEDIATE")
             try:
-                row = self._rows.execute("SELECT checksum, content FROM kept WHERE key = ?", (key,)).fetchone()
-            except UNUSABLE as error:
-                if not _is(error, sqlite3.SQLITE_BUSY):
-                    self._give_up(error)
-                return None
-            if row is None:
-                return None
-            entry = _read(key, *row)
-            if entry is None:
-                self._write("DELETE FROM kept WHERE key = ?", (key,))
-                return None
-            self._write("UPDATE kept SET used = ? WHERE key = ?", (_now(), key))
-            value, made = entry
-            found.append(made)
-            return (value,)
+                rows = []
+                for key, shared, asked, answer in entries:
+                    facts = json_of(shared)
+                    rows.append((key, self._id(facts), asked, answer, now, _checksum(facts, key, asked, answer)))
+                self._rows.executemany("INSERT OR REPLACE INTO made VALUES (?, ?, ?, ?, ?, ?)", rows)
+                self._rows.execute("COMMIT")
+            except BaseException:
+                self._ids.clear()
+                if self._rows.in_transaction:  # SQLite has rolled back by itself after some errors
+                    self._rows.execute("ROLLBACK")
+                raise
 
-    def _put(self, key: str | None, value: object, seconds: float) -> None:
-        """Keep a value that took so long; not what cannot be pickled, or is made about as fast as it would be read.
+    def touch(self, key: bytes) -> None:
+        """Note that an entry was read now."""
+        with self._lock:
+            self._rows.execute("UPDATE made SET used = ? WHERE key = ?", (_now(), key))
 
-        What is kept is read some ten times as fast as 3e7 bytes in a second.
-        """
-        if key is None:
-            return
-        try:
-            content = pickle.dumps((value, _now("%Y-%m-%d %H:%M")), protocol=pickle.HIGHEST_PROTOCOL)
-        except Exception:  # whatever a class raises that cannot be pickled
-            return
-        worth = self.slow == 0.0 or len(content) <= 3e7 * seconds
-        if worth and len(content) <= self.limit and self._same_program():
-            with self._lock:
-                row = (key, _checksum(key, content), _now(), len(content), content)
-                self._write("INSERT OR REPLACE INTO kept VALUES (?, ?, ?, ?, ?)", row)
-                self._write(EVICT, (_now(), self.limit))
+    def evict(self, limit: int) -> None:
+        """Drop what was used longest ago until all answers together have at most ``limit`` bytes."""
+        with self._lock:
+            self._rows.execute(EVICT, (_now(), limit))
 
-    def _same_program(self) -> bool:
-        """Return whether no source has been changed since the store was opened."""
-        with suppress(OSError):  # a file that goes away meanwhile
-            return sources_written() == self._sources
-        return False
+    def shared(self) -> list[dict[str, Any]]:
+        """Return what entries have in common, each once."""
+        with self._lock:
+            return [json.loads(facts) for (facts,) in self._rows.execute("SELECT facts FROM shared ORDER BY id")]
 
-    def _write(self, statement: str, values: tuple[Any, ...]) -> None:
-        """Change the file; after a change that it does not take, such as on a full disk, it is only read.
+    def patience(self, seconds: float) -> None:
+        """Wait so long for another program that writes, from now on."""
+        self._rows.execute(f"PRAGMA busy_timeout = {int(1000 * seconds)}")
 
-        A change that another program keeps waiting is given up alone.
-        """
-        if self._rows is None or not self._writable:
-            return
-        try:
-            self._rows.execute(statement, values)
-        except UNUSABLE as error:
-            if _is(error, sqlite3.SQLITE_BUSY):
-                self._rows.execute("PRAGMA busy_timeout = 0")  # it was waited for once, which is long
-                return
-            self._writable = False
-            if _is_damage(error):
-                self._give_up(error)
+    def _id(self, facts: str) -> int:
+        """Return the number of shared facts, which are written if they are new."""
+        if facts not in self._ids:
+            self._rows.execute("INSERT OR IGNORE INTO shared (facts) VALUES (?)", (facts,))
+            ((number,),) = self._rows.execute("SELECT id FROM shared WHERE facts = ?", (facts,)).fetchall()
+            self._ids[facts] = int(number)
+        return self._ids[facts]
 
-    def _open(self, place: Path) -> None:
-        try:
-            place.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-            _check_own(place)
-            self._rows = _connect(place)
-        except UNUSABLE as error:
-            self._give_up(error)
-            if _is_damage(error):
-                # What is damaged was thrown away just now: begin anew.
-                with suppress(*UNUSABLE):
-                    self._rows = _connect(place)
-
-    def _give_up(self, error: Exception) -> None:
-        """Go on without the file; throw it away if it is damaged."""
-        self.close()
-        assert self.place is not None
-        self._problem = f"{self.place} cannot be used ({error})"
-        if _is_damage(error):
-            with suppress(OSError):
-                for end in ("", "-wal", "-shm"):
-                    self.place.with_name(self.place.name + end).unlink(missing_ok=True)
+    def _copy(self, aside: Path) -> int:
+        """Copy what is whole in a damaged file, up to the first page that cannot be read; return how much that is."""
+        some: list[Entry] = []
+        with suppress(*UNUSABLE, ValueError), closing(sqlite3.connect(aside)) as old:
+            old.text_factory = bytes
+            facts = dict(old.execute("SELECT id, facts FROM shared NOT INDEXED"))
+            for row in old.execute("SELECT key, shared, asked, answer, checksum FROM made NOT INDEXED"):
+                if _whole(facts, *row):
+                    key, shared, asked, answer, _ = row
+                    some.append(Entry(key, json.loads(facts[shared]), asked.decode(), answer))
+        self.put(some)
+        return len(some)
 
 
-class _Remembering(Executor):
-    """A pool whose calls are looked for in a store first; what an exception ends is not kept."""
-
-    def __init__(self, pool: Executor, store: RunStore) -> None:
-        self._pool, self._store = pool, store
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Return the answer as it was kept, or call ``fn`` in a worker and keep it."""
-        key = key_of_call(fn, args, kwargs)
-        known = self._store.find_call(key)
-        answer: Future[Any] = Future()
-        if known is not None:
-            answer.set_result(known[0])
-            return answer
-        answer.set_running_or_notify_cancel()
-
-        def keep(done: Future[Any]) -> None:
-            error = CancelledError() if done.cancelled() else done.exception()
-            if error is not None:
-                answer.set_exception(error)
-            else:
-                found, seconds = done.result()
-                answer.set_result(found)
-                self._store.keep_call(key, found, seconds)
-
-        self._pool.submit(_timed, fn, args, kwargs).add_done_callback(keep)
-        return answer
-
-
-def _timed(fn: Callable[..., Any], args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> tuple[Any, float]:
-    """Return the answer of a call, and the seconds that it took."""
-    began = time.perf_counter()
-    answer = fn(*args, **kwargs)
-    return answer, time.perf_counter() - began
-
-
-def default_place() -> Path | None:
-    """Return the file of this user, in XDG_CACHE_HOME, or where the system keeps caches; None without a home."""
-    given = os.environ.get("XDG_CACHE_HOME", "")
-    try:
-        if Path(given).is_absolute():
-            home = Path(given)
-        elif sys.platform == "win32":
-            home = Path(os.environ.get("LOCALAPPDATA") or Path.home())
-        else:
-            home = Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache")
-    except RuntimeError:
-        return None
-    return home / "flipproof" / "runs-1.sqlite"  # the number rises with every change of the table
-
-
-def _check_own(place: Path) -> None:
-    """Refuse, by an OSError, a store that another user may have written: what it holds is unpickled."""
-    folder = place.parent.stat()
-    if place.exists() and not place.is_file():
-        raise OSError("not a regular file")
+def check_own(path: Path) -> None:
+    """Make the folder of a store, or refuse, by an OSError, a file or folder that another user may have written."""
+    path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    folder = path.parent.stat()
+    if os.path.lexists(path) and not stat.S_ISREG(path.lstat().st_mode):
+        raise OSError("it is not a regular file")
     if sys.platform == "win32":
         return
-    if folder.st_uid != os.geteuid() or (place.exists() and place.stat().st_uid != os.geteuid()):
+    if folder.st_uid != os.geteuid() or (path.exists() and path.stat().st_uid != os.geteuid()):
         raise OSError("it belongs to another user")
-    if folder.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+    if folder.st_mode & stat.S_IWOTH and not folder.st_mode & stat.S_ISVTX:
         raise OSError("its folder may be written by other users")
 
 
-def _connect(place: Path) -> sqlite3.Connection:
-    rows = sqlite3.connect(place, timeout=BUSY, isolation_level=None, check_same_thread=False)
+def is_damage(error: Exception) -> bool:
+    """Return whether the file is damaged. SQLITE_ERROR: a statement that is right does not fit the schema there."""
+    damage = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
+    return isinstance(error, UnicodeDecodeError) or has_code(error, *damage)
+
+
+def has_code(error: Exception, *codes: int) -> bool:
+    """Return whether an error is one of SQLite's primary codes, whatever its extended code adds."""
+    return int(getattr(error, "sqlite_errorcode", 0)) & 0xFF in codes
+
+
+def _connect(path: Path, through: bool = False) -> sqlite3.Connection:
+    """Open or begin the file; ``through``: read all of it, so that damage is seen now."""
+    rows = sqlite3.connect(path, timeout=BUSY, isolation_level=None, check_same_thread=False)
     try:
+        rows.text_factory = bytes  # a damaged text may be no UTF-8
+        ((problem,),) = rows.execute("PRAGMA integrity_check(1)").fetchall() if through else ((b"ok",),)
+        if problem != b"ok":
+            raise _damage(problem.decode(errors="replace").replace("*** in database main ***", "").strip())
+        tables = {name for (name,) in rows.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+        ((application,),) = rows.execute("PRAGMA application_id").fetchall()
+        ((schema,),) = rows.execute("PRAGMA user_version").fetchall()
+        own = (application, schema) == (APPLICATION, SCHEMA), tables == {b"made", b"shared"}
+        if tables and own != (True, True):
+            if any(own):
+                raise _damage("its schema is not that of a store")
+            error = sqlite3.DatabaseError("it is a database of something else or of another version of flipproof")
+            error.sqlite_errorcode = sqlite3.SQLITE_MISUSE
+            raise error
         _write_ahead(rows)
         rows.execute("PRAGMA synchronous = NORMAL")
-        rows.execute(TABLE)
+        if not tables:
+            rows.execute("BEGIN IMMEDIATE")
+            for statement in (f"PRAGMA application_id = {APPLICATION}", f"PRAGMA user_version = {SCHEMA}", *TABLES):
+                rows.execute(statement)
+            rows.execute("COMMIT")
     except BaseException:
         rows.close()
         raise
     return rows
+
+
+def _damage(words: str) -> sqlite3.DatabaseError:
+    error = sqlite3.DatabaseError(words)
+    error.sqlite_errorcode = sqlite3.SQLITE_CORRUPT
+    return error
 
 
 def _write_ahead(rows: sqlite3.Connection) -> None:
@@ -297,36 +263,36 @@ def _write_ahead(rows: sqlite3.Connection) -> None:
         try:
             rows.execute("PRAGMA journal_mode = WAL").fetchall()
         except sqlite3.OperationalError as error:
-            if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > until:
+            if not has_code(error, sqlite3.SQLITE_BUSY) or time.monotonic() > until:
                 raise
             time.sleep(0.01)
         else:
             return
 
 
-def _read(key: str, checksum: object, content: object) -> tuple[Any, str] | None:
-    """Return what an entry holds and when it was made; None if it is damaged."""
-    with suppress(Exception):  # a class of another form: anything may come of it
-        if isinstance(content, bytes) and checksum == _checksum(key, content):
-            value, made = pickle.loads(content)
-            return value, made
-    return None
+def _set_aside(path: Path) -> Path:
+    """Rename a file with its log, which would otherwise be read into the new one; return the name it has now."""
+    aside = path.with_name(f"{path.stem}-damaged-{time.time_ns()}{path.suffix}")
+    for end in ("-shm", "-wal", ""):
+        with suppress(FileNotFoundError):
+            path.with_name(path.name + end).rename(aside.with_name(aside.name + end))
+    return aside
 
 
-def _checksum(key: str, content: bytes) -> str:
-    return hashlib.sha256(key.encode() + content).hexdigest()
+def _now() -> int:
+    return time.time_ns() // 1_000_000
 
 
-def _now(form: str = "%Y-%m-%d %H:%M:%S.%f") -> str:
-    return datetime.now(UTC).strftime(form)
+def _checksum(facts: str | bytes, key: bytes, asked: str | bytes, answer: str | bytes) -> int:
+    total = zlib.crc32(key)
+    for cell in (facts, asked, answer):
+        total = zlib.crc32(cell.encode() if isinstance(cell, str) else cell, total)
+    return total
 
 
-def _is_damage(error: Exception) -> bool:
-    """Return whether the file is damaged. SQLITE_ERROR: a statement that is right does not fit the schema there."""
-    damage = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
-    return isinstance(error, UnicodeDecodeError) or _is(error, *damage)
-
-
-def _is(error: Exception, *codes: int) -> bool:
-    """Return whether an error is one of SQLite's primary codes, whatever its extended code adds."""
-    return int(getattr(error, "sqlite_errorcode", 0)) & 0xFF in codes
+def _whole(facts: Mapping[int, bytes], key: Any, shared: Any, asked: Any, answer: Any, checksum: Any) -> bool:
+    """Return whether the cells of an entry, as SQLite gives them back, are those that were written."""
+    cells = (key, facts.get(shared), asked, answer)
+    if all(isinstance(cell, bytes) for cell in cells):
+        return bool(checksum == _checksum(facts[shared], key, asked, answer))
+    return False

@@ -13,7 +13,7 @@ from flipproof.frame.chapter import Ask, Chapter, Part, Study
 from flipproof.frame.exhibit import Exhibit, drawn
 from flipproof.frame.gather import gather
 from flipproof.frame.pool import Progress, workers
-from flipproof.frame.store import RunStore
+from flipproof.frame.run_store import RunStore
 from flipproof.output.columns import rows_csv
 from flipproof.output.folder import check_replaceable, replaced_folder
 from flipproof.page.templating import environment

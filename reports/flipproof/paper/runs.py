@@ -163,10 +163,9 @@ def _kept(made: Made, planned: Planned) -> Made:
     if planned.thin > 1:
         names = ("t", "theta", "omega", "r", "v", "r_cm", "inertia")
         run = replace(run, **{name: getattr(run, name)[:: planned.thin].copy() for name in names})
-    if not planned.whole:
-        none = np.empty((0, run.scenario.n_slices))
-        run = replace(run, r=none, v=none)
-    return replace(made, trajectory=run)
+    # No figure and no statement looks at velocities of slices.
+    none = np.empty((0, run.scenario.n_slices))
+    return replace(made, trajectory=replace(run, v=none, r=run.r if planned.whole else none))
 
 
 # ---------------------------------------------------------------------- what statements need beside the figures

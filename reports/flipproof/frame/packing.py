@@ -1,0 +1,111 @@
+"""Values as bytes and back without pickle: JSON beside NumPy arrays, in the NPZ format that ``numpy.load`` reads.
+
+What a cache folder holds may have been written by anybody. Here it can give numbers, words, containers, arrays, and
+data classes and named tuples of this program; no name is looked up in another package, no code of the file is run.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from importlib import import_module
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+OWN: Final = ("slicemodel", "ode_reference", "engine_check", "flipproof")
+"""Packages whose data classes can be packed."""
+
+TREE: Final = "value.json"
+"""Member of the archive that holds the value; an array is named there by its place among the arrays."""
+
+Arrays = list[NDArray[Any]]
+
+
+def pack(value: object) -> bytes:
+    """Return a value as the bytes of an NPZ archive; ``unpack`` gives an equal one, floats to the last bit.
+
+    Raises
+    ------
+    TypeError
+        If a part of it is no number, text, bytes, container, array, data class or named tuple of this program.
+    """
+    arrays: Arrays = []
+    tree = json.dumps(_plain(value, arrays))
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        archive.writestr(TREE, tree)
+        for number, array in enumerate(arrays):
+            member = io.BytesIO()
+            np.lib.format.write_array(member, np.asarray(array), allow_pickle=False)
+            archive.writestr(f"{number}.npy", member.getvalue())
+    return file.getvalue()
+
+
+def unpack(content: bytes) -> Any:
+    """Return the value that was packed.
+
+    Raises
+    ------
+    Exception
+        Of any kind, if the bytes are not those of ``pack``; a data class may refuse its values.
+    """
+    with np.load(io.BytesIO(content), allow_pickle=False) as archive:
+        return _value(json.loads(archive[TREE]), archive)
+
+
+def _plain(value: Any, arrays: Arrays) -> Any:
+    """Return a value as JSON has words for it: a list [kind, ...] for each that JSON has none for."""
+    if value is None or isinstance(value, bool | str) or type(value) in (int, float):
+        return value
+    if isinstance(value, np.ndarray | np.generic | bytes):
+        kind = "array" if isinstance(value, np.ndarray) else "bytes" if isinstance(value, bytes) else "scalar"
+        array = np.frombuffer(value, dtype=np.uint8) if isinstance(value, bytes) else np.asarray(value)
+        if array.dtype.hasobject:
+            raise TypeError("an array of objects cannot be packed")
+        arrays.append(array)
+        return [kind, len(arrays) - 1]
+    if type(value) in (list, tuple):
+        return [type(value).__name__, [_plain(each, arrays) for each in value]]
+    if isinstance(value, Mapping):
+        return ["dict", [[_plain(key, arrays), _plain(each, arrays)] for key, each in value.items()]]
+    cls = type(value)
+    if _is_named_tuple(cls) and cls.__module__.partition(".")[0] in OWN:
+        return ["data", f"{cls.__module__}:{cls.__qualname__}", _plain(value._asdict(), arrays)[1]]
+    if is_dataclass(cls) and cls.__module__.partition(".")[0] in OWN:
+        given = [[field.name, _plain(getattr(value, field.name), arrays)] for field in fields(cls) if field.init]
+        return ["data", f"{cls.__module__}:{cls.__qualname__}", given]
+    raise TypeError(f"{cls.__module__}.{cls.__qualname__} cannot be packed")
+
+
+def _value(tree: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
+    """Return what ``_plain`` made a tree of."""
+    if not isinstance(tree, list):
+        return tree
+    kind, content, *rest = tree
+    if kind in ("list", "tuple"):
+        values = [_value(each, arrays) for each in content]
+        return tuple(values) if kind == "tuple" else values
+    if kind == "dict":
+        return {_value(key, arrays): _value(each, arrays) for key, each in content}
+    if kind == "data":
+        return _class_of(content)(**{name: _value(each, arrays) for name, each in rest[0]})
+    array = arrays[f"{content}.npy"]
+    return array.tobytes() if kind == "bytes" else array[()] if kind == "scalar" else array
+
+
+def _class_of(name: str) -> type[Any]:
+    """Return a data class or named tuple of this program by "module:name"; a TypeError refuses everything else."""
+    module, _, inner = name.partition(":")
+    found: Any = getattr(import_module(module), inner, None) if module.partition(".")[0] in OWN else None
+    if not (isinstance(found, type) and (is_dataclass(found) or _is_named_tuple(found)) and found.__module__ == module):
+        raise TypeError(f"{name} is no data class of this program")
+    return found
+
+
+def _is_named_tuple(kind: type[Any]) -> bool:
+    return issubclass(kind, tuple) and hasattr(kind, "_fields")
