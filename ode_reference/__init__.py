@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ode_reference.landing_batch import land_batch
     from ode_reference.landing_flight import fly, turn
     from ode_reference.models import LADDER, MODELS
-    from ode_reference.solver import solve, solve_batch
+    from ode_reference.solver import solve, solve_batch, with_own_inertia
     from ode_reference.switches import Switches
     from ode_reference.witness import METHODS
 
@@ -35,6 +35,7 @@ __all__ = [
     "solve",
     "solve_batch",
     "turn",
+    "with_own_inertia",
 ]
 
 _HOMES = {
@@ -51,6 +52,7 @@ _HOMES = {
     "solve": "ode_reference.solver",
     "solve_batch": "ode_reference.solver",
     "turn": "ode_reference.landing_flight",
+    "with_own_inertia": "ode_reference.solver",
 }
 
 

@@ -20,8 +20,8 @@ at the body, and no other free rod feels it. Times and angles are quadratures, t
 this is the two-body problem of one rod against the tube with the other, in which M_c m / (M_c + m) is the reduced mass.
 
 A stack stays pressed while its innermost rod lies outward of the body's centre. Where that failed a rod would be
-released with a motion of its own, for ``ode_reference.rods`` to follow; in 3000 random throws it never did, and all
-bottles ended with the rods beyond C_M on the base and the others on the cap.
+released with a motion of its own, which nothing here follows; in 3000 random throws it never did, and all bottles ended
+with the rods beyond C_M on the base and the others on the cap. Infinitely many rods, and drag: ``ode_reference.rods``.
 """
 
 from __future__ import annotations

@@ -1,323 +1,294 @@
-r"""Rods in a free tube: what slices do that cannot pass through each other, from event to event.
+r"""Water as infinitely many thin rods that cannot overlap and do not bounce: it flies apart and piles up at both ends.
 
-     cap                                             base
-      |  gap n  [n-1]  gap n-1  ...  [1] gap 1 [0] gap 0 |   --> u_r
-      |         x_{n-1}              x_1       x_0        |
-      |<-------------------- L ------------------------->|   centre of the tube x_b, rods of length h/N
+     cap                     C_M                       base
+      |  pile p |     free water       |  pile q  |         x along the axis from C_M, positive toward the base;
+     B - L                   0                    B          label a = x at release, -a_1 <= a <= b
 
-Places x are measured along the axis from C_M, which falls, so that gravity has gone; u = x'. With p_j >= 0 the force
-that opens gap j, written once for all bodies, x = (x_0 .. x_{n-1}, x_b), masses M = diag(m .. m, M_b):
+In the frame of C_M, which falls, gravity has gone. Water of the height h_0 = M_tilde L lies on the base, lambda =
+M_w / h_0 of it a metre; d = alpha / m = 2 gamma is the rate of its drag against the wall. Along the axis nothing else
+acts on free water but the centrifugal force:
 
-    gaps     g = G x + g_0:   g_j = x_{j-1} - x_j - h/N,   g_0 = x_b + L/2 - x_0 - h/2N,   g_n likewise at the cap
-    flight   M x'' = omega^2 M x + drag + G^T p,   drag on rod i -alpha (u_i - u_b), on the tube their reactions
-    spin     theta' = omega = J_0 omega_0 / J,     J = sum m x_i^2 + M_b (x_b^2 + R^2/2 + L^2/12)
+    x'' = omega^2 x - d (x' - B')    so that    x = A a + z,   A'' = omega^2 A - d A',   z'' = omega^2 z - d (z' - B')
 
-Closed gaps hold by their p, found so that G x'' = 0 there; a gap opens when its p has fallen to zero. An impact is
-Newton's law on all gaps that are zero at that instant at once, with one restitution for ends and one for rods:
+with A = 1 and A', z, z' = 0 at release. A grows, so that rods which part never meet: they meet a pile and stay on it.
+With q and p the lengths of the piles on base and cap and sigma = q + p, free are the labels -(a_1 - p) < a < b - q.
+What is left to know are B, q and p, and three conditions say it:
 
-    w = G u,   w+ = w + A p,   A = G M^-1 G^T,   p >= 0,   w+ + e w >= 0,   the product of the last two 0
+    a rod next to the pile on the base touches it:   B - q = A (b - q) + z
+    the same at the cap, once water is there:        B - L + p = -A (a_1 - p) + z
+    C_M is the origin:   M_b (B - L/2) + lambda [q (B - q/2) + p (B - L + p/2) + integral of A a + z] = 0
 
-which is the minimum of |M^-1/2 G^T p - d|^2 over p >= 0 where d is any vector with G M^-1/2 d = -(1 + e) w.
+Until water reaches the cap, p = 0 and the first and the third give
 
-Nothing here is shared with ``ode_reference.models``: there the places are relative to the tube and slices pass
-through each other. Meant for few rods; the exact motion at e = 0 without drag is ``ode_reference.rod_stacks``.
+    lambda q^2 / 2 + M_b q = M_b L / 2 + M z / (A - 1)
+
+At release, z/(A - 1) = 0, the pile is the amount whose surface is the centre of mass of bottle and pile, whatever lies
+on it: the water above it leaves the base, as the tube recoils from the water that leaves for the cap. That amount is
+the threshold: with less water nothing moves, and the bottle turns like ice. From the first arrival on, the difference
+of the first two conditions is sigma, and the terms in q and p of the third cancel but for sigma:
+
+    sigma = h_0 - (L - h_0) / (A - 1)
+    B = L/2 - [lambda (L - sigma) (b - a_1) / 2 + lambda z (h_0 - sigma)] / (M_b + lambda sigma)
+    q = (b A + z - B) / (A - 1),   p = sigma - q
+
+So J is known from A and z, and omega = J_0 omega_0 / J. Without drag z = 0, J is a function of A alone, and
+
+    A'^2 = 2 integral of (J_0 omega_0 / J)^2 A dA,   t = integral of dA / A'
+
+is the whole flight. A restitution there is none: what arrives stays.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
-from scipy.optimize import nnls
 
 from ode_reference.arguments import number_above, number_within
 from slicemodel.scenario import Scenario
-from slicemodel.trajectory import BASE, CAP, FloatArray, Impacts, Trajectory, output_times
+from slicemodel.trajectory import FloatArray, Impacts, Trajectory, output_times
 
-BoolArray = NDArray[np.bool_]
+NAME: Final = "rods"
+"""The model of this module, as ``ode_reference.solve`` knows it."""
 
-MOST_EVENTS: Final = 100_000
-"""Events of one run at the most; a rebound that takes twice its rest speed to end costs about ten."""
+RTOL: Final = 1e-12
+ATOL: Final = 1e-14
 
-TOUCHING: Final = 1e-12
-"""Gap that counts as none [L]; the root of a gap leaves 1e-15, the lowest rebound rises 1e-12 m."""
+IMMOBILE: Final = 1e-12
+"""Room for the water, and water above the threshold, that count as none [L]."""
 
-LONGEST_TURN: Final = 0.02
-"""Longest step, as the angle by which the bottle turns in it at release [rad]: a gap that closes and opens again
-within one step is missed."""
+SPREAD: Final = 1e14
+"""A at which the flight of the water is over: what is still free is then shorter than 1e-14 L."""
 
-SLACK: Final = 1e-9
-"""Push that counts as none [M_w omega^2 L]: at the instant of a release its root leaves 1e-12."""
+SHRINKS: Final = 1e-9
+"""Loss of a pile between two steps that rounding explains [L]."""
 
 
-class Tube:
-    """The constants of one throw as the equations above name them."""
+class Piles(NamedTuple):
+    """Where the water lies at factors A and offsets z; numbers, or arrays of one shape.
 
-    def __init__(self, scenario: Scenario, rod_restitution: float) -> None:
-        bottle, n = scenario.bottle, scenario.n_slices
-        self.n, self.length = n, bottle.length
-        self.mass = np.array([*[scenario.slice_mass] * n, bottle.mass])
+    Parameters
+    ----------
+    base, cap : q and p, the lengths of the piles [m]
+    foot : B, the base from C_M [m]
+    below, above : b - q and a_1 - p, the labels of the free water at its two ends [m]
+    """
+
+    base: Any
+    cap: Any
+    foot: Any
+    below: Any
+    above: Any
+
+    @property
+    def columns(self) -> Piles:
+        """The same as columns, shape (P, 1) each."""
+        return Piles(*(np.asarray(each)[:, np.newaxis] for each in self))
+
+
+class Rods:
+    """The constants of one throw as the equations above name them, and what follows from A - 1 and z."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        bottle, water = scenario.bottle, scenario.water_mass
+        self.length, self.tube, self.total = bottle.length, bottle.mass, scenario.total_mass
+        self.depth = scenario.fill_fraction * bottle.length
+        self.density = water / self.depth
+        self.below = (water * self.depth / 2 + bottle.mass * bottle.length / 2) / self.total
+        self.above = self.depth - self.below
         self.own = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
-        self.drag = scenario.drag
-        # Row j of G: gap j grows with whatever is on its base side and shrinks with what is on its cap side.
-        self.gaps_of = np.zeros((n + 1, n + 1))
-        for j in range(n + 1):
-            self.gaps_of[j, j - 1 if j else n] += 1.0
-            self.gaps_of[j, j if j < n else n] -= 1.0
-        rod = scenario.slice_height
-        self.offset = np.array([bottle.length / 2 - rod / 2, *[-rod] * (n - 1), bottle.length / 2 - rod / 2])
-        e = scenario.restitution
-        self.restitution = np.array([e, *[rod_restitution] * (n - 1), e])
-        self.coupling = self.gaps_of / self.mass @ self.gaps_of.T
-        start = np.array([*scenario.initial_positions(), bottle.length / 2])
-        self.start = start - self.mass @ start / self.mass.sum()
-        self.angular_momentum = self.inertia(self.start) * scenario.omega0
+        self.drag = 0.0 if scenario.frozen else scenario.n_slices * scenario.drag / water
+        self.threshold = float(self.base_before_arrival(0.0))
+        room = min(self.length - self.depth, self.depth - self.threshold)
+        self.spreads = not scenario.frozen and room > IMMOBILE * self.length
+        self.at_rest = Piles(self.depth, 0.0, self.below, -self.above, self.above)
+        start = self.piles(0.0, 0.0, False) if self.spreads else self.at_rest
+        self.angular_momentum = float(self.inertia(0.0, 0.0, start)) * scenario.omega0
 
-    def inertia(self, x: FloatArray) -> float:
-        """Return J [kg m^2] for places ``x``, shape (n + 1,)."""
-        return float(self.mass @ (x * x)) + self.own
+    def base_before_arrival(self, ratio: Any) -> Any:
+        """Return q [m] for z / (A - 1) [m] as long as no water is at the cap."""
+        push = self.density * (self.tube * self.length + 2 * self.total * ratio)
+        return (np.sqrt(self.tube**2 + push) - self.tube) / self.density
 
-    def gaps(self, x: FloatArray) -> FloatArray:
-        """Return the gaps [m], base first, shape (n + 1,)."""
-        return np.asarray(self.gaps_of @ x + self.offset)
+    def piles(self, grown: Any, z: Any, arrived: bool) -> Piles:
+        """Return the piles at A = 1 + ``grown``, before or after the first water has arrived at the cap."""
+        if arrived:
+            piled = self.depth - (self.length - self.depth) / grown
+            pulled = (self.length - piled) * (self.below - self.above) / 2 + z * (self.depth - piled)
+            foot = self.length / 2 - self.density * pulled / (self.tube + self.density * piled)
+            base = self.below + (self.below + z - foot) / grown
+            cap = piled - base
+        else:
+            # Both are zero at release, z of the higher order; only a trial step has z < 0.
+            base = self.base_before_arrival(np.maximum(z, 0.0) / np.where(grown > 0.0, grown, 1.0))
+            foot = self.below + grown * (self.below - base) + z
+            cap = 0.0 * grown
+        return Piles(base, cap, foot, self.below - base, self.above - cap)
 
-    def free_acceleration(self, x: FloatArray, u: FloatArray) -> FloatArray:
-        """Return x'' [m/s^2] if no gap pushed, shape (n + 1,)."""
-        rub = self.drag * (u - u[-1])
-        rub[-1] = -rub[:-1].sum()
-        return np.asarray((self.angular_momentum / self.inertia(x)) ** 2 * x - rub / self.mass)
+    def inertia(self, grown: Any, z: Any, piles: Piles) -> Any:
+        """Return J [kg m^2]."""
+        base, cap, foot, below, above = piles
+        top, a = foot - self.length, 1.0 + grown
+        cubes = foot**3 - (foot - base) ** 3 + (top + cap) ** 3 - top**3
+        cubes += ((a * below + z) ** 3 + (a * above - z) ** 3) / a
+        return self.own + self.tube * (foot - self.length / 2) ** 2 + self.density * cubes / 3
 
-    def push(self, x: FloatArray, u: FloatArray, closed: BoolArray) -> FloatArray:
-        """Return the forces p [N] that keep the ``closed`` gaps closed, 0 at the others, shape (n + 1,)."""
-        p = np.zeros(self.n + 1)
-        if closed.any():
-            opening = (self.gaps_of @ self.free_acceleration(x, u))[closed]
-            p[closed] = np.linalg.solve(self.coupling[np.ix_(closed, closed)], -opening)
-        return p
+    def foot_speed(self, rate: Any, drift: Any, piles: Piles) -> Any:
+        """Return B' [m/s] for A' and z': the momentum of the free water is that of all else, reversed."""
+        base, cap, _, below, above = piles
+        free = (below + above) * (rate * (below - above) / 2 + drift)
+        return -self.density * free / (self.tube + self.density * (base + cap))
 
-    def thrust(self, demand: FloatArray, where: BoolArray) -> FloatArray:
-        """Return p >= 0 with A p >= ``demand`` and p (A p - demand) = 0 on the gaps ``where``, shape (n + 1,)."""
-        p = np.zeros(self.n + 1)
-        if where.any():
-            matrix = (self.gaps_of[where] / np.sqrt(self.mass)).T
-            target = np.linalg.lstsq(matrix.T, demand[where], rcond=None)[0]
-            p[where] = nnls(matrix, target)[0]
-        return p
+    def room(self, grown: float, z: float) -> float:
+        """Return the distance from the cap of the water that will be the first there [m]."""
+        foot = self.piles(grown, z, False).foot
+        return float(z - (1.0 + grown) * self.above - foot + self.length)
 
-    def pushed(self, p: FloatArray) -> FloatArray:
-        """Return M^-1 G^T p: what forces (impulses) p do to the accelerations (velocities)."""
-        return np.asarray(self.gaps_of.T @ p / self.mass)
+    def slope(self, y: FloatArray, arrived: bool) -> FloatArray:
+        """Return the derivative of (theta, A - 1, A', z, z')."""
+        _, grown, rate, z, drift = y
+        piles = self.piles(grown, z, arrived)
+        omega = self.angular_momentum / self.inertia(grown, z, piles)
+        slip = drift - self.foot_speed(rate, drift, piles)
+        pull = omega * omega
+        return np.array(
+            [omega, rate, pull * (1.0 + grown) - self.drag * rate, drift, pull * z - self.drag * slip], dtype=float
+        )
+
+    def parts(self, n: int, states: FloatArray, piles: Piles) -> tuple[FloatArray, FloatArray]:
+        """Return mean place from the cap [m] and mean velocity in the bottle [m/s] of n equal parts, shape (P, n)."""
+        column = states[:, :, np.newaxis]
+        _, grown, rate, z, drift = column
+        slip = drift - self.foot_speed(rate, drift, piles.columns)
+        _, _, foot, below, above = piles.columns
+        labels = self.below - self.depth * np.arange(n + 1) / n
+        on_cap, free = np.minimum(labels, -above) + self.above, np.clip(labels, -above, below)
+        on_base = np.maximum(labels, below) - below
+        # Integrals over the labels, counted from the cap: the place there is x - (B - L).
+        surface = self.length - piles.columns.base
+        place = on_cap**2 / 2 + (surface + on_base / 2) * on_base
+        place += (1.0 + grown) * (free**2 - above**2) / 2 + (z - foot + self.length) * (free + above)
+        speed = rate * (free**2 - above**2) / 2 + slip * (free + above)
+        width = self.depth / n
+        return -np.diff(place, axis=1) / width, -np.diff(speed, axis=1) / width
 
 
 def solve(
-    scenario: Scenario,
-    rod_restitution: float | None = None,
-    rtol: float = 1e-10,
-    atol: float = 1e-13,
-    rest_speed: float = 1e-4,
-    times: ArrayLike | None = None,
+    scenario: Scenario, rtol: float | None = None, atol: float | None = None, times: ArrayLike | None = None
 ) -> Trajectory:
-    """Throw a bottle whose slices are rods of length h/N that cannot overlap.
+    """Throw a bottle whose water cannot overlap and does not bounce (derived in this module).
 
     Parameters
     ----------
     scenario : Scenario
-        ``n_slices`` rods; every evaluation solves for all closed gaps, so that few of them are meant.
-    rod_restitution : float or None
-        Restitution of two rods that meet [1], in [0, 1]. None: the scenario's.
-    rtol, atol : float
-        Tolerances of DOP853, as in ``ode_reference.solve``.
-    rest_speed : float
-        Speed of a gap below which it stays closed if it is pressed [m/s], in [1e-5, 0.1]; slower rebounds would be
-        lower than ``TOUCHING``.
+        Its restitution has no effect; ``n_slices`` says only in how many parts the water is reported.
+    rtol, atol : float, optional
+        Tolerances of DOP853, in [1e-13, 1e-2] and (0, 1e-2]; 1e-12 and 1e-14 by default.
     times : array, shape (P,), optional
         Increasing output times in [0, duration] [s]; 1000 uniform ones by default.
 
     Returns
     -------
     Trajectory
-        ``impacts`` are those on the two ends; ``diagnostics`` counts those of two rods (``rod_impacts``), the events,
-        rests and releases, and holds the largest overlap and momentum left by round-off.
+        ``r`` are the mean places of N equal parts of the water, which at release are the slices of every other solver;
+        ``v`` their mean velocities in the bottle. ``inertia`` is the water's own J, above that of N points.
+        ``diagnostics``: ``spreads``; ``threshold``, the filling h_0/L up to which nothing moves; ``arrival`` [s], when
+        the first water is at the cap, None if none is; ``on_base`` and ``on_cap``, the shares of the water that lie
+        there at the end.
 
     Raises
     ------
     ValueError
         Naming the argument, its value and the admissible values.
+    ArithmeticError
+        If the integration fails, or if water that lies on an end would leave it.
 
     Accuracy
     --------
-    1e-9 omega_0 against ``rod_stacks`` (e = 0, no drag). With restitution between 0 and 1 a tenth of the rest speed
-    changes omega by less than 1e-5 omega_0 while no two orders of impacts compete.
+    omega to 1e-11 omega_0 at the default tolerances, against the quadrature above.
     """
-    between = scenario.restitution if rod_restitution is None else rod_restitution
-    between = number_within("rod_restitution", between, 0.0, 1.0)
-    rtol = number_within("rtol", rtol, 1e-13, 1e-2)
-    atol = number_above("atol", atol, 0.0, 1e-2)
-    rest_speed = number_within("rest_speed", rest_speed, 1e-5, 0.1, unit=" m/s")
-    flight = _Flight(scenario, Tube(scenario, between), rest_speed, {"rtol": rtol, "atol": atol, "method": "DOP853"})
+    rtol = number_within("rtol", RTOL if rtol is None else rtol, 1e-13, 1e-2)
+    atol = number_above("atol", ATOL if atol is None else atol, 0.0, 1e-2)
     moments = output_times(scenario, times)
-    states = flight.states(moments)
-    return flight.trajectory(
-        moments[: len(states)],
-        states,
-        {"rod_restitution": between, "rest_speed": rest_speed, "rtol": rtol, "atol": atol},
+    rods = Rods(scenario)
+    states, piles, arrival = _states(scenario, rods, moments, rtol, atol)
+    inertia = np.asarray(rods.inertia(states[1], states[3], piles))
+    r, v = rods.parts(scenario.n_slices, states, piles)
+    none = np.empty(0)
+    return Trajectory(
+        scenario=scenario,
+        solver="ode_reference",
+        method=NAME,
+        t=moments,
+        theta=states[0],
+        omega=rods.angular_momentum / inertia,
+        r=r,
+        v=v,
+        r_cm=rods.length - piles.foot,
+        inertia=inertia,
+        impacts=Impacts(none, none.astype(np.int64), none.astype(np.int64), none, none),
+        settings={"model": NAME, "rtol": rtol, "atol": atol, "method": "DOP853"},
+        diagnostics={
+            "spreads": rods.spreads,
+            "threshold": rods.threshold / rods.length,
+            "arrival": arrival,
+            "on_base": float(piles.base[-1]) / rods.depth,
+            "on_cap": float(piles.cap[-1]) / rods.depth,
+        },
     )
 
 
-class _Flight:
-    """One run in progress: the state y = (theta, x, u), which gaps are closed, and what has been counted."""
+def _states(
+    scenario: Scenario, rods: Rods, moments: FloatArray, rtol: float, atol: float
+) -> tuple[FloatArray, Piles, float | None]:
+    """Return (theta, A - 1, A', z, z') at ``moments``, shape (5, P), the piles then, and when water is at the cap."""
+    y, t, arrival = np.array([scenario.theta0, 0.0, 0.0, 0.0, 0.0]), 0.0, None
+    states = np.tile(y[:, np.newaxis], len(moments))
+    piles = Piles(*(np.full(len(moments), each) for each in rods.at_rest))
+    if not rods.spreads:
+        states[0] += scenario.omega0 * moments
+        return states, piles, None
+    for arrived in (False, True):
+        run = _integrate(rods, (t, scenario.duration), y, arrived, rtol, atol)
+        t, y = float(run.t[-1]), run.y[:, -1].copy()
+        here = (moments >= run.t[0]) & (moments <= t)
+        if here.any():
+            states[:, here] = run.sol(moments[here])
+            _fill(piles, rods.piles(states[1, here], states[3, here], arrived), here)
+        path = rods.piles(run.y[1], run.y[3], arrived)
+        for name, pile in (("base", path.base), ("cap", path.cap)):
+            if np.any(np.diff(pile) < -SHRINKS * rods.length):
+                raise ArithmeticError(f"rods: water that lies on the {name} would leave it")
+        if run.status == 0:
+            return states, piles, arrival
+        arrival = t if arrival is None else arrival
+    # All water has arrived but for what no digit shows: the bottle turns as a rigid body.
+    after = moments > t
+    states[:, after] = y[:, np.newaxis]
+    last = rods.piles(y[1], y[3], True)
+    _fill(piles, last, after)
+    states[0, after] += rods.angular_momentum / float(rods.inertia(y[1], y[3], last)) * (moments[after] - t)
+    return states, piles, arrival
 
-    def __init__(self, scenario: Scenario, tube: Tube, rest_speed: float, options: dict[str, Any]) -> None:
-        self.scenario, self.tube, self.rest_speed, self.options = scenario, tube, rest_speed, options
-        self.t = 0.0
-        self.y = np.concatenate([[scenario.theta0], tube.start, np.zeros(tube.n + 1)])
-        self.closed: BoolArray = np.zeros(tube.n + 1, dtype=bool)
-        self.rebounding: BoolArray = np.zeros(tube.n + 1, dtype=bool)
-        self.hits: list[tuple[float, int, int, float, float]] = []
-        self.counts = {"events": 0, "rod_impacts": 0, "rests": 0, "releases": 0}
-        room = tube.length - scenario.n_slices * scenario.slice_height
-        self.immobile = scenario.frozen or room <= TOUCHING * tube.length
-        self.status, self.message = "ok", ""
 
-    def split(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return x and u of a state."""
-        return y[1 : self.tube.n + 2], y[self.tube.n + 2 :]
+def _fill(piles: Piles, found: Piles, where: Any) -> None:
+    for whole, part in zip(piles, found, strict=True):
+        whole[where] = part
 
-    def slope(self, t: float, y: FloatArray) -> FloatArray:
-        """Return dy/dt with the gaps closed that are."""
+
+def _integrate(rods: Rods, span: tuple[float, float], y: FloatArray, arrived: bool, rtol: float, atol: float) -> Any:
+    """Return the run of ``solve_ivp`` until the first water is at the cap, or until all of it has arrived."""
+
+    def ends(t: float, y: FloatArray) -> float:
         del t
-        tube = self.tube
-        x, u = self.split(y)
-        omega = tube.angular_momentum / tube.inertia(x)
-        if self.immobile:
-            return np.concatenate([[omega], np.zeros(2 * tube.n + 2)])
-        a = tube.free_acceleration(x, u) + tube.pushed(tube.push(x, u, self.closed))
-        return np.concatenate([[omega], u, a])
+        return float(SPREAD - y[1]) if arrived else rods.room(y[1], y[3])
 
-    def states(self, moments: FloatArray) -> FloatArray:
-        """Advance to the duration; return the states at the output times reached, shape (P, 2n + 3)."""
-        kept = [self.y for moment in moments if moment == 0.0]
-        if not self.immobile:
-            self._meet()
-        while self.t < self.scenario.duration:
-            if self.counts["events"] >= MOST_EVENTS:
-                self.status = "stalled"
-                self.message = (
-                    f"{MOST_EVENTS} events by t = {self.t:.9g} s; raise rest_speed (now {self.rest_speed:g} m/s)"
-                )
-                break
-            kept += self._leg(moments)
-        return np.array(kept).reshape(-1, len(self.y))
-
-    def _leg(self, moments: FloatArray) -> list[FloatArray]:
-        """Integrate up to the next event; return the states at the output times on the way."""
-        stop = self._half_rebound()
-        inside = moments[(moments > self.t) & (moments <= stop)]
-        events = [] if self.immobile else [self._event(j) for j in range(self.tube.n + 1)]
-        run = solve_ivp(
-            self.slope, (self.t, stop), self.y, events=events or None, dense_output=True,
-            max_step=LONGEST_TURN / abs(self.scenario.omega0), **self.options,
-        )  # fmt: skip
-        if run.status < 0:
-            raise ArithmeticError(f"rods: {run.message} at t = {run.t[-1]:.9g} s")
-        self.t, self.y = float(run.t[-1]), run.y[:, -1].copy()
-        self.rebounding[:] = False
-        if run.status == 1:
-            self._meet()
-        path = run.sol
-        assert path is not None  # asked for with dense_output
-        return [np.asarray(path(moment)) for moment in inside if moment <= self.t]
-
-    def _half_rebound(self) -> float:
-        """Return how far to integrate: half of the shortest rebound that has just begun, else to the duration.
-
-        A gap that starts at zero may close again before the first step ends, and its root would be the start. It is
-        not watched while it still opens; half-way it is as wide as it gets.
-        """
-        stop = self.scenario.duration
-        if not self.rebounding.any():
-            return stop
-        w = self.tube.gaps_of @ self.split(self.y)[1]
-        a = self.tube.gaps_of @ self.split(self.slope(self.t, self.y))[1]
-        self.rebounding &= a < 0
-        until_top = -w[self.rebounding] / a[self.rebounding]
-        return min(stop, self.t + float(np.min(until_top, initial=np.inf)))
-
-    def _event(self, j: int) -> Callable[[float, FloatArray], float]:
-        """Return what falls through zero when gap ``j`` closes, or, if it is closed, opens."""
-
-        def event(t: float, y: FloatArray) -> float:
-            del t
-            x, u = self.split(y)
-            if self.closed[j]:
-                return float(self.tube.push(x, u, self.closed)[j])
-            return 1.0 if self.rebounding[j] else float(self.tube.gaps(x)[j])
-
-        event.terminal, event.direction = True, -1.0  # type: ignore[attr-defined]
-        return event
-
-    def _meet(self) -> None:
-        """Resolve all contacts of this instant: impacts, then who stays closed."""
-        tube = self.tube
-        self.counts["events"] += 1
-        x, u = self.split(self.y)
-        touching = self.closed | (tube.gaps(x) <= TOUCHING * tube.length)
-        w = tube.gaps_of @ u
-        struck = touching & ~self.closed & (w < 0)
-        before = self.closed
-        if struck.any():
-            u += tube.pushed(tube.thrust(-(1.0 + tube.restitution) * w, touching))
-        slow = touching & (tube.gaps_of @ u < self.rest_speed)
-        needed = tube.thrust(-(tube.gaps_of @ tube.free_acceleration(x, u)), slow)
-        scale = self.scenario.water_mass * tube.length * (tube.angular_momentum / tube.inertia(x)) ** 2
-        self.closed = needed > SLACK * scale
-        if self.closed.any():
-            matrix = tube.coupling[np.ix_(self.closed, self.closed)]
-            for values, wrong in ((u, tube.gaps_of @ u), (x, tube.gaps(x))):
-                p = np.zeros(tube.n + 1)
-                p[self.closed] = np.linalg.solve(matrix, -wrong[self.closed])
-                values += tube.pushed(p)
-        self.rebounding = touching & ~self.closed & (tube.gaps_of @ u > 0)
-        self.counts["rests"] += int(np.count_nonzero(self.closed & ~before))
-        self.counts["releases"] += int(np.count_nonzero(before & ~self.closed))
-        self._note(struck, w, tube.gaps_of @ u)
-
-    def _note(self, struck: BoolArray, before: FloatArray, after: FloatArray) -> None:
-        for j in np.flatnonzero(struck).tolist():
-            if j in (0, self.tube.n):
-                end = BASE if j == 0 else CAP
-                self.hits.append((self.t, 0 if j == 0 else self.tube.n - 1, end, -before[j], max(after[j], 0.0)))
-            else:
-                self.counts["rod_impacts"] += 1
-
-    def trajectory(self, t: FloatArray, states: FloatArray, settings: dict[str, Any]) -> Trajectory:
-        """Return what was recorded, with places relative to the cap and velocities relative to the tube."""
-        tube, n = self.tube, self.tube.n
-        x, u = states[:, 1 : n + 2], states[:, n + 2 :]
-        inertia = np.array([tube.inertia(row) for row in x])
-        columns = list(zip(*self.hits, strict=True)) or [()] * 5
-        gaps = x @ tube.gaps_of.T + tube.offset
-        return Trajectory(
-            scenario=self.scenario,
-            solver="ode_reference",
-            method="rods",
-            t=t,
-            theta=states[:, 0],
-            omega=tube.angular_momentum / inertia,
-            r=tube.length / 2 + x[:, :n] - x[:, n:],
-            v=u[:, :n] - u[:, n:],
-            r_cm=tube.length / 2 - x[:, n],
-            inertia=inertia,
-            impacts=Impacts(*(np.array(column) for column in columns)),
-            status=self.status,
-            message=self.message,
-            settings=settings,
-            diagnostics={
-                **self.counts,
-                "largest_overlap": max(0.0, -float(gaps.min(initial=0.0))),
-                "largest_momentum": float(np.max(np.abs(u @ tube.mass), initial=0.0)),
-            },
-        )
+    ends.terminal = True  # type: ignore[attr-defined]
+    run = solve_ivp(
+        lambda _, y: rods.slope(y, arrived), span, y, "DOP853", dense_output=True, events=ends, rtol=rtol, atol=atol
+    )
+    if run.status < 0:
+        raise ArithmeticError(f"rods: {run.message} at t = {run.t[-1]:.9g} s")
+    return run

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from importlib import import_module
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,14 +25,31 @@ if TYPE_CHECKING:
     from ode_reference.flow.api import Batch
 
 COLUMN: Final = "column"
-"""The name among the models of water as one stretching column."""
+RODS: Final = "rods"
+"""The names of two models of all the water at once."""
 
-COLUMN_EQUATION: Final = "m_e h'' = omega^2/2 dJ/dh - (N alpha/3) h', one column of height h"
-COLUMN_REASON: Final = (
-    "Water as one uniformly stretching column: it cannot overlap, a full bottle turns like ice, and there is nothing "
-    "to choose."
+
+class Water(NamedTuple):
+    """A model of all the water at once, solved by ``ode_reference.NAME``; equation and reason as of other models."""
+
+    equation: str
+    reason: str
+
+
+WATERS: Final[Mapping[str, Water]] = MappingProxyType(
+    {
+        COLUMN: Water(
+            "m_e h'' = omega^2/2 dJ/dh - (N alpha/3) h', one column of height h",
+            "Water as one uniformly stretching column: it cannot overlap, a full bottle turns like ice, and there is "
+            "nothing to choose.",
+        ),
+        RODS: Water(
+            "x'' = omega^2 x - (alpha/m) (x' - B') until it meets a pile on base or cap, from C_M, no rebound",
+            "Water as infinitely many rods that cannot overlap and do not bounce: nothing to choose, either.",
+        ),
+    }
 )
-"""What solves it, and why it is there, as of the other models (``ode_reference.column``)."""
+"""Models without slices, switches and restitution, by name: they stand beside the ladder."""
 
 TAYLOR: Final = "taylor"
 """The name of the reduced flow among the methods."""
@@ -62,6 +83,7 @@ def solve(
     impact_law: str = "simultaneous",
     energy: bool = False,
     twin: int = 0,
+    own_inertia: bool = False,
 ) -> Trajectory:
     """Solve one equation of motion through all its rebounds, rests and releases.
 
@@ -71,8 +93,9 @@ def solve(
     model : str or Switches
         A name in ``ode_reference.MODELS``, from "published-limit" (what the published program solves as its time
         step goes to zero) by way of "eq8" (Eq. 8 exactly as printed) to "free-flight"; or any ``Switches``, or
-        their name, such as "switches:110000"; or "column", water as one stretching column that cannot overlap
-        (``ode_reference.column``), to which only rtol, atol and ``times`` apply.
+        their name, such as "switches:110000"; or water that cannot overlap: "column", one stretching column
+        (``ode_reference.column``), or "rods", infinitely many that do not bounce (``ode_reference.rods``). To these two
+        only rtol, atol, ``times`` and ``own_inertia`` apply.
     times : array, shape (P,), optional
         Increasing output times in [0, duration] [s]; 1000 uniform ones by default. They do not change the
         solution. At the time of an impact the state just before it is returned.
@@ -98,6 +121,9 @@ def solve(
     twin : int
         Number of a twin, whose release differs in the eleventh digit (``ode_reference.twins``), in [1, 1e9]; 0 is the
         throw itself. The trajectory keeps the scenario of the throw.
+    own_inertia : bool
+        Whether water has the moment of inertia of discs about their own diameters, M_w R^2/4 in all, which the paper
+        leaves out by cutting it into points.
 
     Returns
     -------
@@ -145,10 +171,15 @@ def solve(
     if not isinstance(scenario, Scenario):
         raise ValueError(f"scenario = {scenario!r} is not a slicemodel.Scenario")
     energy = true_or_false("energy", energy)
-    if model == COLUMN:
-        from ode_reference import column
-
-        return column.solve(scenario, rtol, atol, times)
+    if true_or_false("own_inertia", own_inertia):
+        run = solve(
+            with_own_inertia(scenario), model, times, method=method, rtol=rtol, atol=atol, max_step=max_step,
+            rest_speed=rest_speed, impact_law=impact_law, energy=energy, twin=twin,
+        )  # fmt: skip
+        return replace(run, scenario=scenario, settings={**run.settings, "own_inertia": True})
+    if model in WATERS:
+        run = import_module(f"ode_reference.{model}").solve(scenario, rtol, atol, times)
+        return cast(Trajectory, run)
     chosen = model_named(model)
     known_name("impact_law", impact_law, LAWS)
     known_name("method", method, (TAYLOR, *INTEGRATORS))
@@ -171,6 +202,17 @@ def solve(
     from ode_reference.flow import api
 
     return api.fly(scenario, moments, chosen.switches, _settings(chosen, speed, impact_law, energy, twin))
+
+
+def with_own_inertia(scenario: Scenario) -> Scenario:
+    """Return a throw that moves as if its slices were discs: J is larger by M_w R^2/4, and nothing else changes.
+
+    That inertia is constant, as is the bottle's own, M_b (R^2/2 + L^2/12); so a wider tube of the same mass has it, and
+    no equation along the axis knows R.
+    """
+    bottle = scenario.bottle
+    wider = bottle.radius * math.sqrt(1.0 + scenario.water_mass / (2.0 * bottle.mass))
+    return replace(scenario, bottle=replace(bottle, radius=wider))
 
 
 def solve_batch(

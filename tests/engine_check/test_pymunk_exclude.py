@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pymunk
 import pytest
+import rods_by_events as event_driven
 
 from engine_check import SetupError, solve
 from engine_check import pymunk_rods as rods
@@ -15,7 +16,6 @@ from engine_check.pymunk_setup import verify
 from engine_check.pymunk_world import BatchReader, build
 from engine_check.watch import State
 from ode_reference import rod_stacks
-from ode_reference import rods as event_driven
 from slicemodel.scenario import Bottle, Scenario
 
 FULL_BOTTLE = 1e-3

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import rods_by_events
 
 import engine_check
 import ode_reference
-from ode_reference import rods
 from ode_reference.landing import path, world_of
 from ode_reference.landing_forms import Block, corner_ratio, critical_share, ends_upright, quarter_period
 from slicemodel import Bottle, Outcome, Scenario, ScenarioError, Table, Touch, touch
@@ -197,7 +197,7 @@ def test_it_slides_until_friction_has_taken_its_speed():
 def test_its_flight_is_that_of_the_rods(n):
     """Over a table out of reach the landing's equations are another program for what ``rods`` solves."""
     scenario = Scenario(n_slices=n, water_mass=0.4, drag=0.1, restitution=0.5, duration=0.12)
-    flight = rods.solve(scenario, times=[0.12])
+    flight = rods_by_events.solve(scenario, times=[0.12])
     axis = np.array([math.sin(scenario.theta0), -math.cos(scenario.theta0)])
     arm = scenario.bottle.length / 2 - flight.scenario.bottle.length + block(scenario)[2]
     across = arm * scenario.omega0 * np.array([-axis[1], axis[0]])

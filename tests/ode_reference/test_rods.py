@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import rods_by_events as by_events
 
-from ode_reference import rod_stacks, rods, solve
+from ode_reference import rod_stacks, solve
 from slicemodel import observables
 from slicemodel.scenario import Bottle, Scenario
 
@@ -41,7 +42,7 @@ def meeting(monkeypatch):
 def test_the_closed_form_and_the_event_driven_run_agree(n, water_mass):
     scenario = replace(INELASTIC, n_slices=n, water_mass=water_mass)
     theta, omega, r = rod_stacks.solve(scenario).at(TIMES)
-    run = rods.solve(scenario, times=TIMES)
+    run = by_events.solve(scenario, times=TIMES)
     assert run.ok
     assert np.max(np.abs(run.omega - omega)) < ROUND_OFF * scenario.omega0
     assert np.max(np.abs(run.r - r)) < ROUND_OFF * scenario.bottle.length
@@ -109,7 +110,7 @@ def test_a_stack_that_lets_go_has_no_closed_form():
 def test_two_rods_that_never_meet_are_two_slices():
     """In the paper's throw neither can tell rods from slices that overlap: the two programs share no equation."""
     scenario = Scenario().with_slices(2)
-    run = rods.solve(scenario, times=TIMES, rest_speed=1e-3)
+    run = by_events.solve(scenario, times=TIMES, rest_speed=1e-3)
     slices = solve(scenario, "free-flight", times=TIMES, rest_speed=1e-3)
     assert run.diagnostics["rod_impacts"] == 0
     assert len(run.impacts) > 10
@@ -123,13 +124,13 @@ def test_two_rods_that_never_meet_are_two_slices():
 
 def test_a_full_bottle_does_not_change():
     for n in (1, 2, 5):
-        run = rods.solve(replace(Scenario(), water_mass=1.0).with_slices(n), times=TIMES)
+        run = by_events.solve(replace(Scenario(), water_mass=1.0).with_slices(n), times=TIMES)
         assert np.max(np.abs(run.omega / 20.0 - 1.0)) < 1e-12
         assert np.all(run.r == run.r[0])
 
 
 def test_elastic_rods_without_drag_keep_energy_through_their_impacts(meeting):
-    run = rods.solve(meeting, times=np.linspace(0.0, 0.3, 61))
+    run = by_events.solve(meeting, times=np.linspace(0.0, 0.3, 61))
     assert run.diagnostics["rod_impacts"] >= 2
     np.testing.assert_allclose(energy(run), energy(run)[0], rtol=1e-9)
     assert run.diagnostics["largest_momentum"] < 1e-12
@@ -138,7 +139,7 @@ def test_elastic_rods_without_drag_keep_energy_through_their_impacts(meeting):
 
 @pytest.mark.parametrize("between", [0.0, 0.25, 0.5, 0.75, 1.0])
 def test_two_rods_part_with_their_own_restitution(meeting, between):
-    tube = rods.Tube(meeting, between)
+    tube = by_events.Tube(meeting, between)
     touching = np.array([False, True, False])
     u = np.array([-0.7, 0.9, 0.1])
     w = tube.gaps_of @ u
@@ -146,14 +147,14 @@ def test_two_rods_part_with_their_own_restitution(meeting, between):
     assert (tube.gaps_of @ after)[1] == pytest.approx(between * 1.6, abs=1e-13)
     assert tube.mass @ after == pytest.approx(tube.mass @ u, abs=1e-14)
     assert after[2] == u[2]
-    run = rods.solve(replace(meeting, restitution=0.8), between, times=[0.3])
+    run = by_events.solve(replace(meeting, restitution=0.8), between, times=[0.3])
     assert run.settings["rod_restitution"] == between
     assert run.diagnostics["rod_impacts"] > 0
 
 
 def test_impulses_solve_the_complementarity_problem():
     """p >= 0, w+ + e w >= 0, and one of them zero: 200 random impacts of five rods on all gaps but one."""
-    tube = rods.Tube(replace(Scenario(), restitution=0.7).with_slices(5), 0.4)
+    tube = by_events.Tube(replace(Scenario(), restitution=0.7).with_slices(5), 0.4)
     rng = np.random.default_rng(1)
     for _ in range(200):
         touching = np.ones(6, dtype=bool)
@@ -169,30 +170,30 @@ def test_impulses_solve_the_complementarity_problem():
 @pytest.mark.parametrize(("n", "water_mass", "restitution"), [(2, 0.9, 0.5), (3, 0.5, 0.5), (5, 0.7, 0.5)])
 def test_the_rest_speed_does_not_matter(n, water_mass, restitution):
     scenario = replace(Scenario(), water_mass=water_mass, restitution=restitution).with_slices(n)
-    fine, coarse = (rods.solve(scenario, times=TIMES, rest_speed=speed) for speed in (1e-5, 1e-3))
+    fine, coarse = (by_events.solve(scenario, times=TIMES, rest_speed=speed) for speed in (1e-5, 1e-3))
     assert fine.diagnostics["events"] > coarse.diagnostics["events"]
     assert np.max(np.abs(fine.omega - coarse.omega)) < 1e-6 * scenario.omega0
 
 
 def test_energy_never_grows_and_drag_takes_some(meeting):
-    run = rods.solve(replace(meeting, restitution=0.6, drag=0.2), 0.3, times=np.linspace(0.0, 0.3, 301))
+    run = by_events.solve(replace(meeting, restitution=0.6, drag=0.2), 0.3, times=np.linspace(0.0, 0.3, 301))
     values = energy(run)
     assert np.all(np.diff(values) <= 1e-12)
     assert values[-1] < 0.98 * values[0]
 
 
 def test_ice_is_ice_and_output_times_are_met():
-    ice = rods.solve(replace(Scenario(), frozen=True).with_slices(3), times=[0.0, 0.1, 0.5])
+    ice = by_events.solve(replace(Scenario(), frozen=True).with_slices(3), times=[0.0, 0.1, 0.5])
     assert ice.t.tolist() == [0.0, 0.1, 0.5]
     assert ice.theta[-1] == pytest.approx(math.pi / 2 + 10.0, rel=1e-12, abs=0.0)
-    late = rods.solve(Scenario().with_slices(3), times=[0.3, 0.31])
-    full = rods.solve(Scenario().with_slices(3), times=[0.1, 0.3, 0.31])
+    late = by_events.solve(Scenario().with_slices(3), times=[0.3, 0.31])
+    full = by_events.solve(Scenario().with_slices(3), times=[0.1, 0.3, 0.31])
     np.testing.assert_allclose(late.omega, full.omega[1:], rtol=1e-12)
 
 
 def test_too_many_events_are_a_stall(monkeypatch):
-    monkeypatch.setattr(rods, "MOST_EVENTS", 5)
-    run = rods.solve(Scenario().with_slices(2), times=TIMES)
+    monkeypatch.setattr(by_events, "MOST_EVENTS", 5)
+    run = by_events.solve(Scenario().with_slices(2), times=TIMES)
     assert run.status == "stalled"
     assert "raise rest_speed" in run.message
     assert 0 < len(run.t) < len(TIMES)
@@ -203,4 +204,4 @@ def test_too_many_events_are_a_stall(monkeypatch):
 )
 def test_arguments_out_of_range_are_named(argument, value):
     with pytest.raises(ValueError, match=f"{argument} = "):
-        rods.solve(Scenario().with_slices(2), **{argument: value})
+        by_events.solve(Scenario().with_slices(2), **{argument: value})

@@ -12,7 +12,7 @@ from flipproof.foreign.checking import effort_of
 from flipproof.foreign.contract import Answer, AnswerError, Ask, Traits, answer_of, trajectory_of
 from flipproof.foreign.specs import ForeignError, Runner, content_of, opened
 from flipproof.frame import solvers
-from ode_reference.solver import COLUMN
+from ode_reference.solver import WATERS
 from slicemodel import Scenario, Trajectory
 from slicemodel.trajectory import FloatArray, output_times
 
@@ -63,8 +63,8 @@ class Own(Runner):
 
     def __init__(self, solver: solvers.Solver) -> None:
         self.solver = solver
-        # The column is no equation of slices: it stands on no rung and declares none.
-        equation = None if solver.name == COLUMN else solver.name
+        # Column and rods are no equations of slices: they stand on no rung and declare none.
+        equation = None if solver.name in WATERS else solver.name
         order = 2.0 if solver.name == "midpoint" else 1.0
         declared: dict[str, dict[str, Any]] = {
             "slicemodel": {"equation": equation, "refined_by": "steps", "order": order},

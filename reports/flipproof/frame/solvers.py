@@ -38,12 +38,12 @@ def catalogue() -> dict[str, Solver]:
     """Return every solver by name: the schemes, the models of the reference, the engines."""
     from engine_check.solver import ENGINES
     from ode_reference.models import MODELS
-    from ode_reference.solver import COLUMN, COLUMN_EQUATION, COLUMN_REASON
+    from ode_reference.solver import WATERS
     from slicemodel.schemes import SCHEMES
 
     solvers = [Solver(s.name, "slicemodel", "scheme", s.limit, s.reason) for s in SCHEMES.values()]
     solvers += [Solver(m.name, "ode_reference", "model", m.equation, m.reason) for m in MODELS.values()]
-    solvers.append(Solver(COLUMN, "ode_reference", "model", COLUMN_EQUATION, COLUMN_REASON))
+    solvers += [Solver(name, "ode_reference", "model", m.equation, m.reason) for name, m in WATERS.items()]
     solvers += [Solver(e.name, "engine_check", "engine", e.equation, e.reason) for e in ENGINES.values()]
     return {solver.name: solver for solver in solvers}
 

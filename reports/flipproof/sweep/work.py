@@ -22,7 +22,7 @@ from flipproof.frame.keys import fingerprint
 from flipproof.frame.solvers import Run, find, make
 from flipproof.output.provenance import provenance, version_of
 from flipproof.sweep.design import Point
-from ode_reference.solver import COLUMN
+from ode_reference.solver import WATERS
 from slicemodel.observables import centre_of_mass_velocity, plateau
 from slicemodel.scenario import Scenario, ScenarioError
 from slicemodel.trajectory import STATUSES, FloatArray, Trajectory
@@ -174,7 +174,7 @@ def make_together(points: Sequence[Point]) -> list[Outcome] | None:
     solver, settings = points[0].solver, points[0].settings
     if any(point.solver != solver or point.settings != settings for point in points):
         return None
-    if find(solver).package != "ode_reference" or solver == COLUMN or not settings.keys() <= SHARED:
+    if find(solver).package != "ode_reference" or solver in WATERS or not settings.keys() <= SHARED:
         return None
     from ode_reference import solve_batch
 

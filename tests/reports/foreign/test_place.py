@@ -18,7 +18,7 @@ EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "foreign"
 VARIANTS = Path(__file__).with_name("rk4_variants.py")
 PLACED = {name: LIMITS.get(name, "free-flight" if solver.package == "engine_check" else name)
           for name, solver in catalogue().items()
-          if name not in ("published-matlab", "paper-typeset", "column")}  # fmt: skip
+          if name not in ("published-matlab", "paper-typeset", "column", "rods")}  # fmt: skip
 
 
 def placed(spec):
@@ -52,8 +52,9 @@ def test_typeset_paper_lets_nothing_move():
     assert "omega stays constant" in found.text
 
 
-def test_water_that_cannot_overlap_solves_no_equation_of_overlapping_slices():
-    assert not placed("column").on_lattice
+@pytest.mark.parametrize("name", ["column", "rods"])
+def test_water_that_cannot_overlap_solves_no_equation_of_overlapping_slices(name):
+    assert not placed(name).on_lattice
 
 
 def test_published_matlab_does_not_answer():
