@@ -80,6 +80,7 @@ PLAIN: Final[Mapping[str, str]] = {
     "regressions": "count findings kind regression",
     "vectors": "count findings id vectors-*",
     "experiments": "length paper/experiment",
+    "telling": "count paper/experiment discriminates True",
     "gravity": "scenario/scenario/gravity",
 }
 """Name -> source of a number that is printed as it is."""
@@ -177,13 +178,13 @@ def _nearest(summary: Summary) -> list[SimpleNamespace]:
         return []
     found = [
         SimpleNamespace(
-            name=NAMES[solver],
+            name=SPOKEN.get(solver, solver),
             agrees=summary.number(f"count paper/experiment equations/{solver}/verdict holds", plain),
             nearest=summary.number(f"count paper/experiment closest {solver}", plain),
         )
-        for solver in ("free-flight", "published-python", "eq8")
+        for solver in ("rods", "free-flight", "published-python", "column", "eq8")
     ]
-    return sorted(found, key=lambda one: -one.nearest.value)
+    return sorted(found, key=lambda one: (-one.agrees.value, -one.nearest.value))
 
 
 def _map(table: str | None) -> dict[str, Any] | None:
@@ -269,4 +270,4 @@ class Summary:
 def _has(found: Any, wanted: str) -> bool:
     if isinstance(found, list):
         return wanted in found
-    return str(found).startswith(wanted[:-1]) if wanted.endswith("*") else found == wanted
+    return str(found).startswith(wanted[:-1]) if wanted.endswith("*") else str(found) == wanted

@@ -15,11 +15,16 @@ import numpy as np
 from flipproof.frame.flights import Call, Flights
 from flipproof.frame.solvers import Made, Run, make, solve
 from flipproof.paper import observe
-from flipproof.paper.cases import Case, all_cases, family, numbers, paper_steps, paper_throw
+from flipproof.paper.cases import ICE, Case, all_cases, family, numbers, paper_steps, paper_throw
+from ode_reference.models import LADDER
+from ode_reference.solver import WATERS
 from slicemodel import Scenario, Trajectory
 
 PUBLISHED: Final = "published-python"
 SOLVERS: Final = (PUBLISHED, "eq8", "free-flight")
+
+CONTESTANTS: Final = (*SOLVERS, *(model for model in LADDER if model not in SOLVERS), *WATERS)
+"""What is held against the bottles really thrown: the published program and every registered model."""
 
 BANDS: Final[Mapping[str, float]] = MappingProxyType({"eq8": 1e-7, "free-flight": 3e-3})
 """How far omega / omega_0 may move when the rest speed is cut tenfold, or the release changed in the eleventh digit, by
@@ -180,7 +185,8 @@ SAME_STEPS_KEY: Final = "filling {:g}, exact-step"
 
 def plan_claims() -> list[Planned]:
     """Return the runs of all statements: those that are not grouped, and those of the published program."""
-    return [*plan_halved(), *plan_further(), *(each for half in HALVES for each in plan_published(half))]
+    published = (each for half in HALVES for each in plan_published(half))
+    return [*plan_halved(), *plan_further(), *plan_contest(), *published]
 
 
 def _planned(solver: str, key: str, scenario: Scenario, half: Half = "", *, by: str = "", **settings: Any) -> Planned:
@@ -207,6 +213,19 @@ def plan_further() -> Iterator[Planned]:
         yield _planned(PUBLISHED, key, paper_throw(filling), steps=MANY_STEPS, store="summary")
         yield _same_steps(filling)
     yield _planned(WEIGHTLESS, WEIGHTLESS_KEY, paper_throw(STEADY_FILLING))
+
+
+def plan_contest() -> Iterator[Planned]:
+    """Yield the flights of all other contestants, at which no statement but those about the experiment looks."""
+    cases = {case.key: case.scenario for case in family("filling")} | {ICE: all_cases()[ICE].scenario}
+    for solver in CONTESTANTS[len(SOLVERS) :]:
+        for key, scenario in cases.items():
+            halves: tuple[Half, ...] = (
+                ("",) if solver in WATERS or scenario.n_slices == 1 or key == ICE else ("", "slices")
+            )
+            for half in halves:
+                planned = _planned(solver, key, _halved(scenario) if half else scenario, half)
+                yield replace(planned, whole=False, grouped=True)
 
 
 def plan_halved() -> Iterator[Planned]:

@@ -3,20 +3,37 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Final
 
 from flipproof.frame.findings import Finding, regression
+from flipproof.frame.spoken import SPOKEN
 from flipproof.paper import claims_figure_5, claims_figures_6_7, claims_figures_8_9
 from flipproof.paper.claims_figures_8_9 import claim_filling_of_change
-from flipproof.paper.experiment import CAVEAT, Observation, closest_overall, compare_all, standing
+from flipproof.paper.experiment import CAVEAT, FREEDOM, Observation, closest_overall, compare_all, standing
 from flipproof.paper.observe import Flights, steady_level
-from flipproof.paper.runs import BANDS, PUBLISHED, SOLVERS, STEADY_FILLING, WEIGHTLESS, WEIGHTLESS_KEY, PaperRuns
+from flipproof.paper.runs import (
+    BANDS,
+    CONTESTANTS,
+    PUBLISHED,
+    SOLVERS,
+    STEADY_FILLING,
+    WEIGHTLESS,
+    WEIGHTLESS_KEY,
+    PaperRuns,
+)
 from flipproof.paper.statements import MARKS, OMEGA, Statement, judge
+from ode_reference.solver import WATERS
 
 NAMES: Final = {"published-python": "published program", "eq8": "Eq. 8 as printed", "free-flight": "free flight"}
 """Equation -> its name over a column."""
+
+CONTEST: Final[Mapping[str, str]] = {name: NAMES.get(name, SPOKEN.get(name, name)) for name in CONTESTANTS}
+"""Contestant -> its name in sentences."""
+
+SHOWN: Final = (*SOLVERS, *WATERS)
+"""Contestants with a column of their own; the rungs in between are counted."""
 
 CLAIMS: Final = tuple(
     each
@@ -43,6 +60,8 @@ class PaperVerdicts:
     weights: tuple[Finding, ...]
     solvers: ClassVar = SOLVERS
     names: ClassVar = NAMES
+    contest: ClassVar = CONTEST
+    shown: ClassVar = SHOWN
     caveat: ClassVar = CAVEAT
     marks: ClassVar = MARKS
 
@@ -67,12 +86,18 @@ class PaperVerdicts:
     @property
     def closest(self) -> str:
         """Which equation comes closest to what the text says of the experiment, in words."""
-        best = " and ".join(NAMES[solver] for solver in closest_overall(self.comparisons))
-        each = "; ".join(
-            f"{NAMES[solver]} agrees with {agrees} and is the closest, or level with it, for {nearest}"
-            for solver, (agrees, nearest) in standing(self.comparisons).items()
+        best = " and ".join(CONTEST[solver] for solver in closest_overall(self.comparisons))
+        found = standing(self.comparisons)
+        counted = "; ".join(
+            f"{CONTEST[solver]} agrees with {agrees} and is the closest, or level with it, for {nearest}"
+            for solver, (agrees, nearest) in sorted(found.items(), key=lambda each: each[1], reverse=True)
         )
-        return f"Closest to the experiment as the text tells it: {best}. Of {len(self.comparisons)} statements, {each}."
+        total, telling = len(self.comparisons), sum(each.discriminates for each in self.comparisons)
+        return (
+            f"Closest to the experiment as the text tells it, of {len(found)}: {best}. Of {total} statements {telling} "
+            f"tell equations apart; with each of the other {total - telling} all agree, or none. Of all {total}, "
+            f"{counted}. {FREEDOM}"
+        )
 
     def findings(self) -> Iterator[Finding]:
         """Yield all findings: regressions for what the weight does, observations for the paper's statements."""
@@ -91,9 +116,13 @@ class PaperVerdicts:
 
 def judge_paper(runs: PaperRuns) -> PaperVerdicts:
     """Return what becomes of the paper's statements by the runs that were made for them."""
-    flights = [runs.flights(solver) for solver in SOLVERS]
+    flights = {solver: runs.flights(solver) for solver in CONTESTANTS}
     weights = (*(claim_weight_slows_the_tenth(runs, solver) for solver in STEADY), claim_filling_of_change())
-    return PaperVerdicts(statements=judge_all(flights), comparisons=compare_all(flights), weights=weights)
+    return PaperVerdicts(
+        statements=judge_all([flights[solver] for solver in SOLVERS]),
+        comparisons=compare_all(list(flights.values())),
+        weights=weights,
+    )
 
 
 def judge_all(flights: list[Flights]) -> tuple[Statement, ...]:
