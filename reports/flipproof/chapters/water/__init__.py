@@ -1,0 +1,1 @@
+"""Which equation comes nearest to water, by filling."""

@@ -1,0 +1,165 @@
+"""The plateau of every equation over the filling, beside what two crude fluids gave in the same bottle."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any, Final
+
+import numpy as np
+
+from flipproof.chapters.maps.study import vary
+from flipproof.frame.chapter import Ask, Made, Run, Study
+from flipproof.frame.spoken import SPOKEN
+from ode_reference.solver import COLUMN, RODS
+from slicemodel.observables import plateau
+from slicemodel.trajectory import FloatArray
+
+FILLS: Final = (0.05, 0.1, 0.15, 0.2, 0.25, 0.33, 0.4, 0.5, 0.6, 0.75, 0.9, 1.0)
+"""Fillings of the curves; those of the fluids are among them."""
+
+DISCS: Final = "rods as discs, no drag"
+"""Rods with the inertia of discs and without drag, as the fluids have none."""
+
+EQUATIONS: Final[Mapping[str, str]] = {
+    "published-python": "Its errors partly cancel: nothing damps, weight pushes the water, slices overlap.",
+    "eq8": "Weight pushes its water along a bottle that falls, and slices overlap.",
+    "free-flight": "Right for slices; but slices pass through each other, and water does not: from three quarters full "
+    "on nothing here is farther off.",
+    COLUMN: "No part of it may leave the base before all of it stretches, so that it starts late or not at all.",
+    RODS: "Nothing holds its water together (no suction), so that it parts too early; nothing swirls; it has no "
+    "inertia of its own.",
+    DISCS: "The same with inertia of its own, and without the drag that the paper chose.",
+}
+"""Equation -> why it misses water."""
+
+
+def name_of(equation: str) -> str:
+    """Return an equation's name in sentences."""
+    return SPOKEN.get(equation, equation)
+
+
+@cache
+def fluids() -> Mapping[str, Any]:
+    """Return what was recorded of the fluids."""
+    text = resources.files("flipproof.chapters.water").joinpath("fluids.json").read_text(encoding="utf-8")
+    recorded: Mapping[str, Any] = json.loads(text)
+    return recorded
+
+
+def fluid_band() -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the fillings of the fluids, and the lowest and the highest plateau of any fluid there, shape (F,)."""
+    recorded = fluids()
+    levels = np.array([fluid["plateau"] for fluid in recorded["fluids"]], dtype=float)
+    return np.array(recorded["fillings"]), np.nanmin(levels, axis=0), np.nanmax(levels, axis=0)
+
+
+def start_band() -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return two fillings, and the lowest and the highest plateau of one fluid over the starts of its water there."""
+    starts = fluids()["starts"]
+    levels = np.array(list(starts["plateau"].values()), dtype=float)
+    return np.array(starts["fillings"]), levels.min(axis=0), levels.max(axis=0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Water:
+    """Every equation over the filling. Arrays have shape (F,), in the order of ``FILLS``.
+
+    Parameters
+    ----------
+    slices : of the equations that have any
+    level : equation -> plateau of omega / omega_0; NaN where a run failed
+    early : equation -> time to 0.75 omega_0 [s]; NaN where it is not reached
+    apart : equation -> filling -> r.m.s. difference in omega(t) from the fluid with suction, in omega_0
+    own_inertia : equation -> by how much the inertia of discs moves the plateau of the half-full bottle
+    """
+
+    slices: int
+    level: Mapping[str, FloatArray]
+    early: Mapping[str, FloatArray]
+    apart: Mapping[str, Mapping[float, float]]
+    own_inertia: Mapping[str, float]
+
+    def at(self, equation: str, filling: float) -> float:
+        """Return a plateau at one of ``FILLS``."""
+        return float(self.level[equation][FILLS.index(filling)])
+
+    def miss(self, equation: str, filling: float) -> float:
+        """Return how far a plateau lies outside the fluids' band [omega_0]: below it negative, inside 0."""
+        fills, low, high = fluid_band()
+        k, value = int(np.flatnonzero(fills == filling)[0]), self.at(equation, filling)
+        return value - float(np.clip(value, low[k], high[k]))
+
+    def distance(self, equation: str) -> float:
+        """Return the r.m.s. of ``miss`` over the fillings from a quarter on, below which the fluids disagree."""
+        return float(np.sqrt(np.mean([self.miss(equation, filling) ** 2 for filling in fluids()["fillings"][1:]])))
+
+    def time(self, equation: str, filling: float) -> float:
+        """Return the time to 0.75 omega_0 at one of ``FILLS`` [s]."""
+        return float(self.early[equation][FILLS.index(filling)])
+
+
+def study(ask: Ask) -> Study[Water]:
+    """Throw the paper's own bottle, in which the fluids were thrown, at every filling by every equation."""
+    cut = ask.reference
+    runs = {(equation, filling): _run(equation, filling, ask) for equation in EQUATIONS for filling in FILLS}
+    half = {
+        (equation, own): Run(
+            equation, cut, {"times": _times(ask), "own_inertia": own}, f"water, {equation}, own inertia {own}"
+        )
+        for equation in ("free-flight", RODS)
+        for own in (False, True)
+    }
+    flights = yield [*runs.values(), *half.values()]
+    level, early = (
+        {equation: np.array([read(flights[runs[equation, fill]]) for fill in FILLS]) for equation in EQUATIONS}
+        for read in (_level, _early)
+    )
+    apart = {
+        equation: {
+            float(f): _apart(flights[runs[equation, float(f)]], curve) for f, curve in fluids()["curves"].items()
+        }
+        for equation in EQUATIONS
+    }
+    own = {name: _level(flights[half[name, True]]) - _level(flights[half[name, False]]) for name, _ in half}
+    return Water(slices=cut.n_slices, level=level, early=early, apart=apart, own_inertia=own)
+
+
+def _times(ask: Ask) -> FloatArray:
+    return np.linspace(0.0, ask.reference.duration, 501)
+
+
+def _run(equation: str, filling: float, ask: Ask) -> Run:
+    throw, label = vary(ask.reference, fill=filling), f"water, {equation}, filling {filling:g}"
+    if equation == DISCS:
+        return Run(
+            RODS, vary(ask.reference, fill=filling, damping=0.0), {"times": _times(ask), "own_inertia": True}, label
+        )
+    if equation == "published-python":
+        return Run(equation, throw, {"steps": ask.steps, "store": "summary"}, label)
+    return Run(equation, throw, {"times": _times(ask)}, label)
+
+
+def _level(made: Made) -> float:
+    run = made.trajectory
+    return float("nan") if run is None or not run.ok else plateau(run.t, run.omega, run.scenario.omega0)
+
+
+def _early(made: Made) -> float:
+    run = made.trajectory
+    if run is None or not run.ok:
+        return float("nan")
+    below = np.flatnonzero(run.omega / run.scenario.omega0 < 0.75)
+    return float(run.t[below[0]]) if below.size else float("nan")
+
+
+def _apart(made: Made, curve: list[float]) -> float:
+    run = made.trajectory
+    if run is None or not run.ok:
+        return float("nan")
+    times = np.linspace(0.0, run.scenario.duration, len(curve))
+    omega = np.interp(times, run.t, run.omega) / run.scenario.omega0
+    return float(np.sqrt(np.mean((omega - np.array(curve)) ** 2)))

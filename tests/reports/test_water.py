@@ -1,0 +1,82 @@
+"""Which equation comes nearest to water: the recorded fluids, what is read of the runs, and what is said of them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flipproof.build import ask_of
+from flipproof.chapters.water.chapter import CHAPTER, claims, figures, summary, verdict
+from flipproof.chapters.water.study import DISCS, EQUATIONS, FILLS, Water, fluid_band, fluids, start_band, study
+from flipproof.figures.style import draw
+from flipproof.frame.solvers import make
+from slicemodel import Scenario
+
+
+@pytest.fixture(scope="module")
+def found():
+    steps = study(ask_of(Scenario(), "quick", 10, ()))
+    made = {run: make(run) for run in next(steps)}
+    with pytest.raises(StopIteration) as done:
+        steps.send(made)
+    return done.value.value
+
+
+def made_up(level):
+    levels = {name: np.full(len(FILLS), level) for name in EQUATIONS}
+    return Water(slices=50, level=levels, early=levels, apart={key: {} for key in EQUATIONS}, own_inertia={})
+
+
+def test_what_was_recorded_is_whole_and_says_where_it_comes_from():
+    recorded = fluids()
+    assert "made again by no command" in recorded["provenance"]
+    assert set(recorded["fillings"]) <= set(FILLS)
+    assert all(len(fluid["plateau"]) == len(recorded["fillings"]) for fluid in recorded["fluids"])
+    assert {fluid["suction"] for fluid in recorded["fluids"]} == {True, False}
+    assert all(len(curve) == 101 and curve[0] == 1.0 for curve in recorded["curves"].values())
+    for _, low, high in (fluid_band(), start_band()):
+        assert np.all(low < high)
+        assert np.all((low > 0.0) & (high <= 1.0))
+
+
+def test_a_miss_is_the_distance_from_the_band():
+    _, low, high = fluid_band()
+    k = fluids()["fillings"].index(0.5)
+    assert made_up(0.0).miss("eq8", 0.5) == pytest.approx(-low[k])
+    assert made_up(1.0).miss("eq8", 0.5) == pytest.approx(1.0 - high[k])
+    assert made_up((low[k] + high[k]) / 2).miss("eq8", 0.5) == 0.0
+    assert made_up(1.0).distance("eq8") == pytest.approx(np.sqrt(np.mean((1.0 - high[1:]) ** 2)))
+
+
+def test_by_plateau_rods_come_nearest_and_overlap_is_worst_in_a_full_bottle(found):
+    assert min(EQUATIONS, key=found.distance) in ("rods", DISCS)
+    assert found.distance("rods") < 0.03 < found.distance("column")
+    for filling in (0.75, 1.0):
+        assert max(EQUATIONS, key=lambda name: abs(found.miss(name, filling))) == "free-flight"
+    assert found.at("rods", 1.0) == pytest.approx(1.0, abs=1e-12)
+    # When the water spreads is another matter: without suction it parts too early.
+    assert all(found.time("rods", f) < t for f, t in zip((0.25, 0.5, 0.75), (0.124, 0.092, 0.174), strict=True))
+    assert found.apart["column"][0.5] < found.apart["rods"][0.5]
+
+
+def test_own_inertia_raises_the_plateau(found):
+    assert found.own_inertia == pytest.approx({"free-flight": 0.016, "rods": 0.024}, abs=0.005)
+
+
+def test_findings_say_what_is_recorded_and_a_missing_run_is_no_number(found):
+    findings = {finding.id: finding for finding in claims(found)}
+    assert len(findings) == 1 + len(EQUATIONS) + 2
+    assert findings["water-rods-full"].verdict == "pass"
+    assert "fluids recorded" in findings["water-eq8"].note
+    broken = replace(found, level=found.level | {"eq8": np.full(len(FILLS), np.nan)})
+    assert {f.id: f for f in claims(broken)}["water-eq8"].value is None
+    assert summary(broken)["water"]["equations"][1]["distance"] is None
+
+
+def test_figure_and_table_hold_every_equation(found):
+    (exhibit,) = figures(found)
+    assert draw(exhibit.maker(*exhibit.data)).svg
+    table = verdict(found)
+    assert [len(row.cells) for row in table.rows] == [len(table.fillings)] * len(EQUATIONS)
+    assert [float(row.distance) for row in table.rows] == sorted(float(row.distance) for row in table.rows)
+    assert CHAPTER.work.keys() == {"quick", "full"}
