@@ -199,9 +199,9 @@ def flights(throws: Sequence[Scenario], solver: str, times: FloatArray) -> tuple
         return sampled(np.linspace(0.0, throws[0].duration, steps), batch.theta, batch.omega, times)
     import ode_reference
     from flipproof.foreign.specs import ForeignError
-    from ode_reference.solver import COLUMN
+    from ode_reference.solver import WATERS
 
-    if package == "ode_reference" and solver != COLUMN:
+    if package == "ode_reference" and solver not in WATERS:
         flown = ode_reference.solve_batch(throws, solver, times)
         return flown.theta, flown.omega
     found = np.full((2, len(throws), len(times)), np.nan)
