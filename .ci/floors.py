@@ -11,7 +11,7 @@ import tomllib
 from pathlib import Path
 
 LINTERS = "dev"
-FLOOR = re.compile(r"(?P<name>[A-Za-z0-9_.-]+)\s*>=\s*(?P<version>[0-9.]+)(?:\s*,.*)?")
+FLOOR = re.compile(r"(?P<name>[A-Za-z0-9_.-]+)\s*>=\s*(?P<version>[0-9.]+)(?:\s*[,;].*)?")
 
 
 def floors(text: str) -> list[str]:
