@@ -35,6 +35,7 @@ from flipproof.cli.arguments import (
     refuse_overwriting,
     store_of,
 )
+from flipproof.cli.bounce import add_bounce
 from flipproof.cli.check import add_checks, add_compare
 from flipproof.cli.console import readable, speak_plainly
 from flipproof.cli.film import add_film
@@ -188,6 +189,7 @@ def parser() -> argparse.ArgumentParser:
     add_animate(commands)
     add_landing(commands)
     add_foreign(commands)
+    add_bounce(commands)
     add_models(commands)
     add_command(commands, "more", "List every other command, and the exit statuses.", command_more)
     return top

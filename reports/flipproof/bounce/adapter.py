@@ -1,0 +1,191 @@
+"""What an engine's author writes: one function that drops a body, and, if the engine has bodies that meet, a second.
+
+    def drop(height, speed, restitution, gravity, dt, duration):
+        ...                     # y = height above the floor [m], speed upward [m/s], gravity downward [m/s^2]
+        return t, y, v          # at the engine's own steps, from release to duration
+
+    def line(masses, positions, velocities, restitution, dt, duration):
+        ...                     # bodies on a line, without gravity; two of them touch where their positions are equal
+        return t, x, v          # x and v of shape (P, bodies)
+
+An adapter is named as a solver is: file.py:name, package.module:name, or cmd:'program {height} {speed} {restitution}
+{gravity} {dt} {duration}', which prints the columns t,y,v as CSV. The name stands for ``drop`` itself, or for a module,
+class or object that has it, with ``line`` if it likes and ``settings``, a mapping to be printed.
+"""
+
+from __future__ import annotations
+
+import io
+import shlex
+import subprocess
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from slicemodel.scenario import shortened, unknown_name
+
+FloatArray = NDArray[np.float64]
+Drop = Callable[[float, float, float, float, float, float], tuple[FloatArray, FloatArray, FloatArray]]
+Line = Callable[
+    [Sequence[float], Sequence[float], Sequence[float], float, float, float], tuple[FloatArray, FloatArray, FloatArray]
+]
+
+BUILT_IN: Final = ("pymunk", "mujoco", "box2d")
+"""Adapters that are here already (``flipproof.bounce.engines``)."""
+
+PLACES: Final = ("height", "speed", "restitution", "gravity", "dt", "duration")
+"""What the words of a command may name in braces."""
+
+TIMEOUT: Final = 20.0
+"""Seconds that a command may take for one flight."""
+
+
+class AdapterError(ValueError):
+    """An adapter cannot be loaded, or its answer is no flight; the message says in one line what came."""
+
+
+@dataclass(frozen=True)
+class Adapter:
+    """An engine, as its author wrote it.
+
+    Parameters
+    ----------
+    name : str
+    settings : mapping - what the engine says of its settings, printed as it is
+    """
+
+    name: str
+    ask_drop: Callable[..., Any]
+    ask_line: Callable[..., Any] | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    def drop(
+        self, height: float, speed: float, restitution: float, gravity: float, dt: float, duration: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return t [s], y [m] and v [m/s] of one body, shape (P,) each.
+
+        Raises
+        ------
+        AdapterError
+            If they are no flight of the duration asked.
+        """
+        answer = self.ask_drop(*map(float, (height, speed, restitution, gravity, dt, duration)))
+        t, y, v = _arrays(answer, ("t", "y", "v"), (1, 1, 1))
+        _check_times(t, dt, duration)
+        return t, y, v
+
+    def line(
+        self,
+        masses: Sequence[float],
+        positions: Sequence[float],
+        velocities: Sequence[float],
+        restitution: float,
+        dt: float,
+        duration: float,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return t, shape (P,), x and v, shape (P, bodies), of bodies on a line."""
+        assert self.ask_line is not None
+        t, x, v = _arrays(
+            self.ask_line(masses, positions, velocities, restitution, dt, duration), ("t", "x", "v"), (1, 2, 2)
+        )
+        if x.shape[1] != len(masses):
+            raise AdapterError(f"line: x has {x.shape[1]} columns for {len(masses)} bodies")
+        _check_times(t, dt, duration)
+        return t, x, v
+
+
+def load(spec: str) -> Adapter:
+    """Return the adapter that a name stands for.
+
+    Raises
+    ------
+    AdapterError
+        If there is none, or it has no ``drop``.
+    """
+    if spec in BUILT_IN:
+        from flipproof.bounce import engines
+
+        return engines.adapter(spec)
+    if spec.startswith("cmd:"):
+        return Adapter(spec, _command(shlex.split(spec.removeprefix("cmd:"))))
+    if ":" not in spec:
+        raise AdapterError(
+            unknown_name("adapter", spec, BUILT_IN) + "; or file.py:name, package.module:name, cmd:'...'"
+        )
+    from flipproof.foreign.specs import load as load_object
+
+    try:
+        named: Any = load_object(spec)
+    except (ValueError, ImportError, AttributeError) as error:
+        raise AdapterError(shortened(str(error), 300)) from None
+    if isinstance(named, type):
+        named = named()
+    drop = getattr(named, "drop", named)
+    if not callable(drop):
+        raise AdapterError(f"{spec} is no function and has no method drop")
+    return Adapter(spec, drop, getattr(named, "line", None), dict(getattr(named, "settings", {})))
+
+
+def _command(words: list[str]) -> Drop:
+    for word in words:
+        try:
+            word.format(**dict.fromkeys(PLACES, 0.0))
+        except (KeyError, IndexError, ValueError):
+            raise AdapterError(f"cmd: {word!r} names something else than {', '.join(PLACES)} in braces") from None
+
+    def drop(*asked: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        given = dict(zip(PLACES, map(repr, asked), strict=True))  # repr: to the last digit
+        try:
+            done = subprocess.run(
+                [word.format(**given) for word in words], capture_output=True, text=True, timeout=TIMEOUT, check=False
+            )
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise AdapterError(f"cmd: {shortened(str(error), 200)}") from None
+        if done.returncode:
+            raise AdapterError(f"cmd: exit status {done.returncode}: {shortened(done.stderr, 200)}")
+        head, _, body = done.stdout.partition("\n")
+        if head.replace(" ", "").strip() != "t,y,v":
+            raise AdapterError(f"cmd: the first line is {shortened(head, 60)!r}, not 't,y,v'")
+        try:
+            table = np.loadtxt(io.StringIO(body), delimiter=",", ndmin=2)
+        except ValueError as error:
+            raise AdapterError(f"cmd: {shortened(str(error), 200)}") from None
+        if table.shape[1:] != (3,):
+            raise AdapterError("cmd: the lines do not have three numbers each")
+        return table[:, 0], table[:, 1], table[:, 2]
+
+    return drop
+
+
+def _arrays(answer: Any, names: Sequence[str], dimensions: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return three arrays of equal length, all finite."""
+    if not isinstance(answer, Sequence) or len(answer) != 3:
+        raise AdapterError(f"the answer is no triple of {', '.join(names)}")
+    arrays = []
+    for name, part, dimension in zip(names, answer, dimensions, strict=True):
+        array = _numbers(name, part)
+        if array.ndim != dimension or len(array) != len(_numbers(names[0], answer[0])):
+            raise AdapterError(f"{name} has shape {array.shape}; t has {len(answer[0])} entries")
+        if not np.isfinite(array).all():
+            raise AdapterError(
+                f"{name}[{int(np.argmin(np.isfinite(array).reshape(len(array), -1).all(1)))}] is not finite"
+            )
+        arrays.append(array)
+    return arrays[0], arrays[1], arrays[2]
+
+
+def _numbers(name: str, part: ArrayLike) -> FloatArray:
+    try:
+        return np.asarray(part, dtype=float)
+    except (TypeError, ValueError):
+        raise AdapterError(f"{name} is no array of numbers") from None
+
+
+def _check_times(t: FloatArray, dt: float, duration: float) -> None:
+    if len(t) < 2 or not (np.diff(t) > 0).all():
+        raise AdapterError("t does not increase")
+    if not abs(t[-1] - duration) <= 1.5 * dt:
+        raise AdapterError(f"t ends at {t[-1]:.6g} s; {duration:.6g} s were asked")

@@ -1,0 +1,403 @@
+"""The passport of an engine's bounces: what was measured, beside the exact answer, and a remark where they part."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+
+from flipproof.bounce import exact
+from flipproof.bounce.adapter import Adapter, AdapterError, FloatArray
+
+SPEEDS: Final = tuple(float(v) for v in np.geomspace(0.02, 10.0, 12))
+"""Speeds of impact [m/s]."""
+
+RESTITUTIONS: Final = (0.0, 0.25, 0.5, 0.8, 1.0)
+PHASES: Final = (0.1, 0.35, 0.6, 0.85)
+"""Parts of a step between the hit and the step before it."""
+
+STEPS: Final = (4.0, 2.0, 1.0, 0.5)
+"""Steps of the studies of energy and order, in units of the passport's step."""
+
+GRAVITY: Final = 9.81
+OFF: Final = 2e-3
+"""Difference of a restitution from the one asked that is remarked."""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One property of an engine.
+
+    Parameters
+    ----------
+    name : str - of the property
+    sentence : str - what was measured, with units
+    remark : str - where it parts from the exact answer; empty if it does not
+    numbers : mapping - the numbers themselves, for JSON
+    """
+
+    name: str
+    sentence: str
+    remark: str = ""
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Passport:
+    """All measurements of one engine at one step [s]."""
+
+    adapter: str
+    settings: Mapping[str, Any]
+    dt: float
+    measurements: tuple[Measurement, ...]
+
+    def __getitem__(self, name: str) -> Measurement:
+        return next(m for m in self.measurements if m.name == name)
+
+    @property
+    def remarks(self) -> dict[str, str]:
+        """Name -> remark of the properties in which the engine parts from the exact answers."""
+        return {m.name: m.remark for m in self.measurements if m.remark}
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the passport as JSON takes it."""
+        return {
+            "adapter": self.adapter,
+            "settings": {name: str(value) for name, value in self.settings.items()},
+            "dt": self.dt,
+            "measurements": {
+                m.name: {"sentence": m.sentence, "remark": m.remark, **m.numbers} for m in self.measurements
+            },
+        }
+
+
+def measure(adapter: Adapter, dt: float = 1e-3) -> Iterator[Measurement]:
+    """Yield the measurements of an adapter one by one.
+
+    Parameters
+    ----------
+    dt : float - step [s], in [1e-5, 1e-2]
+
+    Raises
+    ------
+    AdapterError
+        If an answer is no flight; a ValueError if dt is outside its range.
+    """
+    if not 1e-5 <= dt <= 1e-2:
+        raise ValueError(f"dt = {dt!r} s is outside [1e-05, 0.01]")
+    for name, measured in (MEASURES if adapter.ask_line is None else MEASURES | OF_LINES).items():
+        try:
+            yield measured(adapter, dt)
+        except AdapterError as error:
+            raise AdapterError(f"{adapter.name}: {name}: {error}") from None
+
+
+def passport(adapter: Adapter, dt: float = 1e-3) -> Passport:
+    """Return all measurements of an adapter; arguments and errors are those of ``measure``."""
+    return Passport(adapter.name, adapter.settings, dt, tuple(measure(adapter, dt)))
+
+
+def contract(adapter: Adapter, dt: float) -> Measurement:
+    """Whether a flight begins as asked, v is the rate of y, and the same question gets the same answer."""
+    height, speed, seconds = 1.0, 2.0, 0.2
+    t, y, v = adapter.drop(height, speed, 0.5, GRAVITY, dt, seconds)
+    again = adapter.drop(height, speed, 0.5, GRAVITY, dt, seconds)
+    reached, rate = exact.dropped(height, speed, 0.5, GRAVITY, t)
+    slack = 4 * GRAVITY * dt * (1 + seconds) + 1e-4
+    remarks = []
+    if not abs(y[0] - reached[0]) <= slack * max(dt, t[0]) + 1e-5:
+        remarks.append(f"y begins at {y[0]:.6g} m where {reached[0]:.6g} m was asked")
+    if not abs(v[0] - rate[0]) <= slack:
+        remarks.append(f"v begins at {v[0]:.6g} m/s where {rate[0]:.6g} m/s was asked")
+    slope = float(np.abs(np.diff(y) / np.diff(t) - (v[1:] + v[:-1]) / 2).max())
+    if not slope <= slack:
+        remarks.append(f"v is not the rate of y: they differ by up to {slope:.2g} m/s")
+    same = all(np.array_equal(a, b) for a, b in zip((t, y, v), again, strict=True))
+    if not same:
+        remarks.append("the same question gets another answer")
+    sentence = f"the same question gets {'the same answer to the last bit' if same else 'another answer'}"
+    return Measurement("contract", sentence, "; ".join(remarks), {"deterministic": same, "largest_rate_error": slope})
+
+
+def free_fall(adapter: Adapter, dt: float) -> Measurement:
+    """Free fall before the first impact, under two gravities, one of them not the Earth's."""
+    errors: dict[str, list[float]] = {}
+    off = []
+    for gravity in (GRAVITY, 3.7, 0.0):
+        rows = []
+        for step in STEPS:
+            t, y, v = adapter.drop(3.0, 1.5, 0.5, gravity, step * dt, 0.5)
+            reached, _ = exact.dropped(3.0, 1.5, 0.5, gravity, t)
+            rows.append(float(abs(y[-1] - reached[-1])))
+        errors[f"{gravity:g}"] = rows
+        acts = float((v[0] - v[-1]) / (t[-1] - t[0]))
+        if not abs(acts - gravity) <= 1e-3 * max(gravity, 1.0):
+            off.append(f"gravity acts with {acts:.5g} m/s^2 where {gravity:g} was asked")
+    worst = max(errors.values(), key=max)
+    slope = convergence(worst)
+    return Measurement(
+        "free fall",
+        f"height after 0.5 s is off by {worst[2]:.1e} m at a step of {dt:g} s ({_of_order(slope)})",
+        "; ".join(off),
+        {"errors_m": errors, "steps_s": [step * dt for step in STEPS]},
+    )
+
+
+def ratio(adapter: Adapter, speed: float, restitution: float, dt: float, phase: float) -> float:
+    """Return speed after over speed before an impact without gravity."""
+    _, _, v = adapter.drop(speed * (0.05 + phase * dt), -speed, restitution, 0.0, dt, 0.2)
+    return float(v[-1] / speed)
+
+
+def restitution(adapter: Adapter, dt: float) -> Measurement:
+    """Restitution over the speed of impact, for five restitutions and four phases of the step."""
+    table = np.array(
+        [[[ratio(adapter, v, e, dt, p) for p in PHASES] for v in SPEEDS] for e in RESTITUTIONS]
+    )  # (e, speed, phase)
+    asked = np.array(RESTITUTIONS)[:, None, None]
+    off, bounces = np.abs(table - asked), table > asked / 2
+    remarks = []
+    dead = [v for k, v in enumerate(SPEEDS) if not bounces[2:, k].any()]
+    fast = [v for k, v in enumerate(SPEEDS) if bounces[2:, k].all()]
+    threshold = math.nan
+    counted = np.ones(len(SPEEDS), dtype=bool)
+    if dead and fast and max(dead) < min(v for v in fast if v > max(dead)):
+        threshold = _threshold(adapter, max(dead), min(v for v in fast if v > max(dead)), dt)
+        remarks.append(f"nothing rebounds below {threshold:.3g} m/s")
+        counted = np.array([v > max(dead) for v in SPEEDS])
+    elif dead:
+        remarks.append(f"nothing rebounds at {', '.join(f'{v:.2g}' for v in dead)} m/s")
+    seen = off * counted[None, :, None]
+    k, s, p = (int(index) for index in np.unravel_index(int(np.argmax(seen)), seen.shape))
+    worst = float(seen[k, s, p])
+    if not worst <= OFF:
+        remarks.append(
+            f"restitution is off by up to {worst:.2g} (asked {RESTITUTIONS[k]:g}, got {table[k, s, p]:.4g} at "
+            f"{SPEEDS[s]:.2g} m/s)"
+        )
+    spread = float((table.max(2) - table.min(2))[:, counted].max())
+    if not spread <= OFF:
+        remarks.append(f"the rebound hangs on the phase of the step by up to {spread:.2g}")
+    return Measurement(
+        "restitution",
+        f"at {len(SPEEDS)} speeds from {SPEEDS[0]:g} to {SPEEDS[-1]:g} m/s, {len(RESTITUTIONS)} restitutions and "
+        f"{len(PHASES)} phases of the step, restitution is off by {worst:.1e} at most",
+        "; ".join(remarks),
+        {
+            "speeds_m_s": list(SPEEDS),
+            "asked": list(RESTITUTIONS),
+            "phases": list(PHASES),
+            "measured": table.tolist(),
+            "largest_difference": worst,
+            "phase_spread": spread,
+            "threshold_m_s": None if math.isnan(threshold) else threshold,
+        },
+    )
+
+
+def _threshold(adapter: Adapter, low: float, high: float, dt: float) -> float:
+    """Return the speed between two from which on a body rebounds, to 1 %."""
+    while high > 1.01 * low:
+        middle = math.sqrt(low * high)
+        if ratio(adapter, middle, 0.8, dt, 0.5) > 0.4:
+            high = middle
+        else:
+            low = middle
+    return math.sqrt(low * high)
+
+
+def time_of_hit(adapter: Adapter, dt: float) -> Measurement:
+    """When a body is returned: read off the straight flight after an elastic hit, at two speeds."""
+    late = {}
+    for speed in (2.0, 8.0):
+        rows = []
+        for phase in np.arange(16) / 16 + 1 / 37:
+            height = speed * (0.05 + phase * dt)
+            t, y, v = adapter.drop(height, -speed, 1.0, 0.0, dt, 0.2)
+            if v[-1] <= 0:
+                return Measurement("time of hit", "an elastic hit was not returned", "an elastic hit was not returned")
+            rows.append(float(t[-1] - y[-1] / v[-1] - height / speed))
+        late[speed] = np.array(rows)
+    slow, fast = late[2.0], late[8.0]
+    spread = float(np.ptp(fast) / dt)
+    # A floor that lies higher by s returns a body earlier by 2 s / speed; a delay is the same for both.
+    shift = float((fast.mean() - slow.mean()) / (1 / 2.0 - 1 / 8.0) / 2)
+    delay = float(fast.mean() + 2 * shift / 8.0)
+    remarks = []
+    if not abs(shift) <= max(1e-4, dt):
+        remarks.append(f"the floor lies {abs(shift) * 1e3:.2g} mm too {'high' if shift > 0 else 'low'}")
+    if not abs(delay) <= 1.5 * dt + 1e-5:
+        remarks.append(f"a body is returned {abs(delay) / dt:.2g} steps too {'late' if delay > 0 else 'early'}")
+    where = "inside a step" if spread < 0.02 else f"on the grid of steps: they spread over {spread:.2g} steps"
+    return Measurement(
+        "time of hit",
+        f"hits are located {where}; a body is returned {fast.mean() / dt:.2g} steps late on average, at 8 m/s",
+        "; ".join(remarks),
+        {"spread_steps": spread, "mean_steps": float(fast.mean() / dt), "floor_m": shift},
+    )
+
+
+def energy(adapter: Adapter, dt: float) -> Measurement:
+    """Energy after twenty elastic bounces from one metre, over energy before, at four steps."""
+    seconds = 20 * 2 * math.sqrt(2 / GRAVITY)
+    kept = []
+    for step in STEPS:
+        _, y, v = adapter.drop(1.0, 0.0, 1.0, GRAVITY, step * dt, seconds)
+        kept.append(float(y[-1] + v[-1] ** 2 / (2 * GRAVITY)))
+    low, high = min(kept), max(kept)
+    remark = ""
+    if not max(abs(low - 1), abs(high - 1)) <= 0.01:
+        remark = f"twenty elastic bounces leave {low:.4g} to {high:.4g} of the energy"
+    return Measurement(
+        "energy",
+        f"twenty elastic bounces leave {low:.4f} to {high:.4f} of the energy, at steps from {STEPS[-1] * dt:g} to "
+        f"{STEPS[0] * dt:g} s",
+        remark,
+        {"kept": kept, "steps_s": [step * dt for step in STEPS]},
+    )
+
+
+def order(adapter: Adapter, dt: float) -> Measurement:
+    """Order of the error across several impacts: e = 0.7, 1.2 s, root mean square over sixteen heights."""
+    errors = []
+    for step in STEPS:
+        rows = []
+        for height in np.linspace(0.9, 1.1, 16):
+            t, y, _ = adapter.drop(float(height), 0.0, 0.7, GRAVITY, step * dt, 1.2)
+            rows.append(y[-1] - exact.dropped(float(height), 0.0, 0.7, GRAVITY, t)[0][-1])
+        errors.append(float(np.sqrt(np.mean(np.square(rows)))))
+    slope = convergence(errors)
+    remark = ""
+    if not (slope >= 0.5 or errors[-1] <= 1e-5):
+        remark = f"across impacts the error does not fall with the step: {errors[0]:.1e} m at {STEPS[0] * dt:g} s, "
+        remark += f"{errors[-1]:.1e} m at {STEPS[-1] * dt:g} s"
+    return Measurement(
+        "order",
+        f"1.2 s of a fall from 1 m with e = 0.7 end {errors[2]:.1e} m off at a step of {dt:g} s ({_of_order(slope)} "
+        "across impacts)",
+        remark,
+        {"errors_m": errors, "steps_s": [step * dt for step in STEPS], "order": slope},
+    )
+
+
+def convergence(errors: list[float]) -> float:
+    """Return the slope of log error over log step; infinity where every error is of the size of rounding."""
+    if max(errors) < 1e-6:
+        return math.inf
+    return float(np.polyfit(np.log(STEPS), np.log(np.maximum(errors, 1e-300)), 1)[0])
+
+
+def _of_order(slope: float) -> str:
+    return "rounding alone" if math.isinf(slope) else f"order {slope:.1f}"
+
+
+def rest(adapter: Adapter, dt: float) -> Measurement:
+    """Whether a body comes to rest: e = 0.5 from 0.1 m, where the exact impacts end after 0.43 s."""
+    over = exact.rest_time(0.1, 0.5, GRAVITY)
+    t, y, v = adapter.drop(0.1, 0.0, 0.5, GRAVITY, dt, over + 1.0)
+    late = t > over + 0.5
+    low, high, speed = float(y[late].min()), float(y[late].max()), float(np.abs(v[late]).max())
+    remarks = []
+    if not high - low <= 1e-3:
+        remarks.append(f"half a second after its last exact impact the body still hops {(high - low) * 1e3:.2g} mm")
+    elif not abs(low) <= 1e-3:
+        remarks.append(f"it rests {abs(low) * 1e3:.2g} mm {'above' if low > 0 else 'below'} the floor")
+    _, y, _ = adapter.drop(0.2, 0.0, 0.0, GRAVITY, dt, 0.6)
+    after = float(y[len(y) // 2 :].max() - y[-1])
+    if not after <= 1e-3:
+        remarks.append(f"with e = 0 it rebounds by {after * 1e3:.2g} mm")
+    return Measurement(
+        "rest",
+        f"at rest it lies {low * 1e3:.2g} to {high * 1e3:.2g} mm above the floor, at {speed:.1e} m/s or less",
+        "; ".join(remarks),
+        {"lowest_m": low, "highest_m": high, "speed_m_s": speed, "rebound_of_e0_m": after},
+    )
+
+
+def penetration(adapter: Adapter, dt: float) -> Measurement:
+    """How far a body of 10 m/s goes below the floor."""
+    lowest = min(float(adapter.drop(10.0 * (0.05 + phase * dt), -10.0, 0.5, 0.0, dt, 0.1)[1].min()) for phase in PHASES)
+    deep = max(-lowest, 0.0)
+    remark = ""
+    if not deep <= 10.0 * dt * 1.01 + 1e-6:
+        remark = f"it goes {deep * 1e3:.2g} mm below the floor, {deep / (10 * dt):.2g} times what it flies in a step"
+    return Measurement(
+        "penetration", f"at 10 m/s it goes {deep * 1e3:.2g} mm below the floor", remark, {"depth_m": deep}
+    )
+
+
+def precision(adapter: Adapter, dt: float) -> Measurement:
+    """Whether the answers are numbers of float32, or fewer digits."""
+    _, y, v = adapter.drop(1.0, 0.3, 0.7, GRAVITY, dt, 0.8)
+    numbers: FloatArray = np.concatenate([y[1:], v[1:]])
+    with np.errstate(over="ignore"):
+        half = bool(np.array_equal(numbers, numbers.astype(np.float16)))
+    # Adapters subtract the size of a body in float64, so v alone tells.
+    single = bool(np.array_equal(v, v.astype(np.float32)))
+    bits = 16 if half else 32 if single else 64
+    remark = "the answers are numbers of float16" if half else ""
+    return Measurement("precision", f"speeds are numbers of float{bits}", remark, {"bits": bits})
+
+
+def pairs(adapter: Adapter, dt: float) -> Measurement:
+    """Two bodies of 1 : 1000 and 1 : 1, elastic and not, against momentum and e."""
+    worst, words = 0.0, ""
+    for masses in ((1.0, 1.0), (1.0, 1000.0), (1000.0, 1.0)):
+        for e in (0.0, 0.5, 1.0):
+            start = (1.0, 0.0)
+            _, _, v = adapter.line(masses, (0.0, 0.05 + 0.3 * dt), start, e, dt, 0.12)
+            off = float(np.abs(v[-1] - exact.line_velocities(masses, start, e)).max())
+            if off > worst:
+                worst, words = off, f"masses {masses[0]:g} : {masses[1]:g}, e = {e:g}"
+    remark = "" if worst <= OFF else f"velocities after a pair's impact are off by {worst:.2g} m/s ({words})"
+    return Measurement(
+        "pairs", f"velocities after a pair's impact at 1 m/s are off by {worst:.1e} m/s at most", remark,
+        {"largest_difference_m_s": worst},
+    )  # fmt: skip
+
+
+def three_in_line(adapter: Adapter, dt: float) -> Measurement:
+    """Three equal bodies in touch but for a thousandth of a step: the last one alone flies on, as in a cradle."""
+    gap = 1e-3 * dt
+    _, _, v = adapter.line((1.0, 1.0, 1.0), (0.0, 0.05, 0.05 + gap), (1.0, 0.0, 0.0), 1.0, dt, 0.12)
+    off = float(np.abs(v[-1] - (0.0, 0.0, 1.0)).max())
+    shown = ", ".join(f"{u:.3f}" for u in v[-1])
+    remark = "" if off <= OFF else f"of a cradle of three all move on, with {shown} m/s (exact: 0, 0, 1)"
+    return Measurement("three in line", f"a cradle of three ends with {shown} m/s", remark, {"velocities": list(v[-1])})
+
+
+def one_instant(adapter: Adapter, dt: float) -> Measurement:
+    """Two bodies strike a third from both sides at one instant; the answer must not hang on their order."""
+    _, _, v = adapter.line((1.0, 1.0, 1.0), (-0.05, 0.0, 0.05), (1.0, 0.0, -1.0), 1.0, dt, 0.12)
+    off = float(np.abs(v[-1] + v[-1][::-1]).max())
+    remark = (
+        ""
+        if off <= 1e-6
+        else f"hits at one instant hang on the order of the bodies: mirrored speeds differ by {off:.2g} m/s"
+    )
+    return Measurement(
+        "one instant", f"two hits at one instant are mirror images of each other to {off:.1e} m/s", remark,
+        {"asymmetry_m_s": off},
+    )  # fmt: skip
+
+
+Measure = Callable[[Adapter, float], Measurement]
+
+MEASURES: Final[dict[str, Measure]] = {
+    "contract": contract,
+    "free fall": free_fall,
+    "restitution": restitution,
+    "time of hit": time_of_hit,
+    "energy": energy,
+    "order": order,
+    "rest": rest,
+    "penetration": penetration,
+    "precision": precision,
+}
+"""What is measured of every engine."""
+
+OF_LINES: Final[dict[str, Measure]] = {"pairs": pairs, "three in line": three_in_line, "one instant": one_instant}
+"""What is measured of an adapter that has ``line``, too."""

@@ -1,0 +1,58 @@
+"""The command ``flipproof bounce``: a passport of how an engine bounces."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from flipproof.cli.arguments import add_command, add_json, check_outputs, number, progress_bar, write_json
+from flipproof.cli.console import inert
+
+
+def add_bounce(commands: Any) -> None:
+    """Add the command."""
+    bounce = add_command(commands, "bounce", "Measure how an engine bounces: its passport.", command_bounce)
+    bounce.add_argument(
+        "adapter",
+        nargs="+",
+        metavar="ADAPTER",
+        help="pymunk, mujoco, box2d, file.py:name, package.module:name or cmd:'program {height} {speed} {restitution} "
+        "{gravity} {dt} {duration}'; it runs with your rights",
+    )
+    bounce.add_argument("--dt", type=number, default=1e-3, metavar="S", help="step in seconds (default 0.001)")
+    add_json(bounce, "the passports")
+    bounce.add_argument(
+        "--plot", type=Path, metavar="FILE.png", help="draw the passports, a row an engine (.png or .svg)"
+    )
+
+
+def command_bounce(options: argparse.Namespace) -> int:
+    """Measure, print a line a property, write what was asked for; the status is 0 whatever was remarked."""
+    from flipproof.bounce.adapter import load
+    from flipproof.bounce.passport import Passport, measure
+
+    check_outputs(options, "json", "plot")
+    if options.plot and options.plot.suffix not in (".png", ".svg"):
+        raise ValueError(f"--plot {options.plot} ends neither in .png nor in .svg")
+    passports = []
+    for adapter in map(load, options.adapter):
+        print(inert(adapter.name) + f", step {options.dt:g} s")
+        print(inert("".join(f"  {name} = {value}\n" for name, value in adapter.settings.items())), end="")
+        made = []
+        with progress_bar(adapter.name, " properties") as progress:
+            for measurement in measure(adapter, options.dt):
+                made.append(measurement)
+                progress(len(made), max(len(made) + 1, 9), measurement.name)
+        for measurement in made:
+            print(inert(f"{'!' if measurement.remark else ' '} {measurement.name:<14} {measurement.sentence}"))
+            if measurement.remark:
+                print(inert(f"  {'':<14} {measurement.remark}"))
+        passports.append(Passport(adapter.name, adapter.settings, options.dt, tuple(made)))
+    write_json(options.json, {"passports": [passport.to_mapping() for passport in passports]})
+    if options.plot:
+        from flipproof.bounce.figure import picture
+
+        drawing = picture(passports)
+        options.plot.write_bytes(drawing.png if options.plot.suffix == ".png" else drawing.svg.encode())
+    return 0

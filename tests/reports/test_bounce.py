@@ -1,0 +1,246 @@
+"""The passport of bounces: good bouncers get no remark, each planted mistake gets the right one."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from flipproof.bounce import exact
+from flipproof.bounce.adapter import Adapter, AdapterError, load
+from flipproof.bounce.passport import MEASURES, OF_LINES, passport
+
+
+def located(height, speed, restitution, gravity, dt, duration):
+    """Every hit at its exact time: closed forms between impacts, written for this test alone."""
+    times = dt * np.arange(round(duration / dt) + 1)
+    y, v, h, u, begin = np.empty(len(times)), np.empty(len(times)), height, speed, 0.0
+    for k, t in enumerate(times):
+        while True:
+            s = t - begin
+            root = (u + np.sqrt(u * u + 2 * gravity * h)) / gravity if gravity else (h / -u if u < 0 else np.inf)
+            if s <= root or (h == 0 and abs(u) < 1e-9):
+                break
+            begin, h, u = begin + root, 0.0, -restitution * (u - gravity * root)
+        resting = h == 0 and abs(u) < 1e-9
+        y[k], v[k] = (0.0, 0.0) if resting else (h + u * s - gravity * s * s / 2, u - gravity * s)
+    return times, y, v
+
+
+def single(*asked):
+    return tuple(np.asarray(part, np.float32).astype(float) for part in located(*asked))
+
+
+def on_the_grid(height, speed, restitution, gravity, dt, duration):
+    """Leapfrog that turns a body round where a step ends below the floor, at the speed it has there."""
+    y, v, rows = height, speed, [(height, speed)]
+    for _ in range(round(duration / dt)):
+        v_half = v - gravity * dt / 2
+        y += dt * v_half
+        v = v_half - gravity * dt / 2
+        if y < 0 and v < 0:
+            v = -restitution * v if -v * restitution > 2 * gravity * dt else 0.0
+            y = 0.0 if v == 0.0 else y
+        if y <= 0 and v == 0.0:
+            y, v = 0.0, 0.0
+        rows.append((y, v))
+    return dt * np.arange(len(rows)), *map(np.array, zip(*rows, strict=True))
+
+
+@pytest.mark.parametrize("dt", [4e-3, 1e-3])
+@pytest.mark.parametrize("good", [located, single])
+def test_a_good_bouncer_gets_no_remark(good, dt):
+    assert passport(Adapter("good", good), dt).remarks == {}
+
+
+def test_a_bouncer_on_the_grid_is_of_first_order_and_says_so():
+    made = passport(Adapter("grid", on_the_grid))
+    assert 0.6 < made["order"].numbers["order"] < 1.6
+    assert "on the grid" in made["time of hit"].sentence
+    assert "restitution" not in made.remarks
+    assert "order" not in made.remarks
+
+
+def changed(**names):
+    """Return a bouncer that is asked something else than it was."""
+    order = ("height", "speed", "restitution", "gravity", "dt", "duration")
+
+    def drop(*asked):
+        given = dict(zip(order, asked, strict=True))
+        return located(*(names.get(name, lambda given, name=name: given[name])(given) for name in order))
+
+    return drop
+
+
+def answered(change):
+    """Return a bouncer whose answer is changed."""
+    return lambda *asked: change(*located(*asked))
+
+
+def threshold(least):
+    def drop(height, speed, restitution, gravity, dt, duration):
+        if gravity == 0 and -speed < least:
+            restitution = 0.0
+        return located(height, speed, restitution, gravity, dt, duration)
+
+    return drop
+
+
+def late(steps):
+    def drop(height, speed, restitution, gravity, dt, duration):
+        t, y, v = located(height, speed, restitution, gravity, dt, duration + steps * dt)
+        hit = int(np.argmax(v > 0)) if speed < 0 else len(t)
+        held = [np.concatenate([part[:hit], np.repeat(part[hit - 1 : hit], steps), part[hit:]]) for part in (y, v)]
+        n = len(t) - steps
+        return t[:n], held[0][:n], held[1][:n]
+
+    return drop
+
+
+def phase(asked):
+    """Return which part of a step is left at the hit."""
+    return asked["height"] / abs(asked["speed"] or 1.0) / asked["dt"] % 1
+
+
+MISTAKES = {
+    "e squared": (changed(restitution=lambda q: q["restitution"] ** 2), "restitution"),
+    "e at most .9": (changed(restitution=lambda q: min(q["restitution"], 0.9)), "restitution"),
+    "e at least .1": (changed(restitution=lambda q: max(q["restitution"], 0.1)), "restitution"),
+    "e one per cent low": (changed(restitution=lambda q: 0.99 * q["restitution"]), "restitution"),
+    "e falls with speed": (changed(restitution=lambda q: q["restitution"] / (1 - 0.02 * q["speed"])), "restitution"),
+    "threshold of 1 m/s": (threshold(1.0), "restitution"),
+    "threshold of 5 cm/s": (threshold(0.05), "restitution"),
+    "gravity of the Earth": (changed(gravity=lambda _: 9.81), "free fall"),
+    "gravity one per cent strong": (changed(gravity=lambda q: 1.01 * q["gravity"]), "free fall"),
+    "thrown at rest": (changed(speed=lambda q: min(q["speed"], 0.0)), "contract"),
+    "floor 1 cm high": (
+        lambda h, *asked: (lambda t, y, v: (t, y + 0.01, v))(*located(h - 0.01, *asked)),
+        "time of hit",
+    ),
+    "hit three steps late": (late(3), "time of hit"),
+    "v of the wrong sign": (answered(lambda t, y, v: (t, y, -v)), "contract"),
+    "half precision": (
+        answered(lambda t, y, v: (t, y.astype(np.float16).astype(float), v.astype(np.float16).astype(float))),
+        "precision",
+    ),
+    "noise": (
+        answered(lambda t, y, v: (t, y + 1e-9 * np.random.default_rng().standard_normal(len(y)), v)),
+        "contract",
+    ),
+    "e hangs on the phase": (changed(restitution=lambda q: q["restitution"] * (1 - 0.1 * phase(q))), "restitution"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_planted_mistake_is_remarked_where_it_is(mistake):
+    drop, name = MISTAKES[mistake]
+    assert MEASURES[name](Adapter(mistake, drop), 1e-3).remark
+
+
+def test_thresholds_are_measured():
+    for least in (0.05, 1.0):
+        made = MEASURES["restitution"](Adapter("threshold", threshold(least)), 1e-3)
+        assert made.numbers["threshold_m_s"] == pytest.approx(least, rel=0.02, abs=0)
+
+
+def in_line(masses, positions, velocities, restitution, dt, duration):
+    """Bodies that meet two by two, the earliest pair first; of pairs at one instant the left one."""
+    x, v, t, rows = np.array(positions, float), np.array(velocities, float), 0.0, []
+    for when in dt * np.arange(round(duration / dt) + 1):
+        while True:
+            closing, gap = v[:-1] - v[1:], np.maximum(x[1:] - x[:-1], 0)
+            waits = np.where(closing > 1e-12, gap / np.maximum(closing, 1e-300), np.inf)
+            k = int(np.argmin(waits))
+            if t + waits[k] > when:
+                break
+            x, t = x + v * waits[k], t + waits[k]
+            v[k : k + 2] = exact.line_velocities(masses[k : k + 2], v[k : k + 2], restitution)
+        x, t = x + v * (when - t), when
+        rows.append((x.copy(), v.copy()))
+    return dt * np.arange(len(rows)), *map(np.array, zip(*rows, strict=True))
+
+
+def test_bodies_in_line():
+    for name in ("pairs", "three in line"):
+        assert OF_LINES[name](Adapter("line", located, in_line), 1e-3).remark == ""
+
+    def without_masses(masses, *asked):
+        return in_line([1.0] * len(masses), *asked)
+
+    def together(masses, positions, velocities, restitution, dt, duration):
+        t, x, v = in_line(masses, positions, velocities, restitution, dt, duration)
+        return t, x, np.where(t[:, None] > 0.06, v.mean(1, keepdims=True), v) if len(masses) == 3 else v
+
+    def leaning(masses, positions, velocities, restitution, dt, duration):
+        t, x, v = in_line(masses, positions, velocities, restitution, dt, duration)
+        return t, x, v + 1e-3 * (t[:, None] > 0.06) * (velocities[-1] < 0)
+
+    for line, name in ((without_masses, "pairs"), (together, "three in line"), (leaning, "one instant")):
+        assert OF_LINES[name](Adapter("line", located, line), 1e-3).remark
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "mujoco"])
+def test_engines_of_the_project_have_a_passport(engine):
+    pytest.importorskip(engine)
+    made = passport(load(engine))
+    assert made["contract"].numbers["deterministic"]
+    if engine == "pymunk":
+        assert made.remarks == {}
+        assert made["restitution"].numbers["largest_difference"] < 1e-3
+        assert 0.7 < made["order"].numbers["order"] < 1.3
+    else:
+        assert {"restitution", "energy", "penetration"} <= set(made.remarks)
+        assert 0.005 < made["restitution"].numbers["largest_difference"] < 0.3
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        (([0, 1], [1, 2]), "triple"),
+        (([0.0, 0.2], [1.0, np.nan], [0.0, 0.0]), "not finite"),
+        (([0.2, 0.1], [1.0, 1.0], [0.0, 0.0]), "increase"),
+        (([0.0, 0.1], [1.0, 1.0], [0.0, 0.0]), "ends at"),
+        (([0.0, 0.2], [1.0, 1.0, 1.0], [0.0, 0.0]), "shape"),
+        (([0.0, 0.2], ["a", "b"], [0.0, 0.0]), "numbers"),
+    ],
+)
+def test_an_answer_that_is_no_flight_is_named(answer, words):
+    with pytest.raises(AdapterError, match=words):
+        Adapter("bad", lambda *_: answer).drop(1.0, 0.0, 0.5, 9.81, 1e-3, 0.2)
+
+
+@pytest.mark.parametrize("spec", ["nothing", "nowhere.py:drop", "cmd:true {effort}", "cmd:false", "cmd:echo x"])
+def test_a_bad_adapter_is_named_in_one_line(spec):
+    with pytest.raises(AdapterError) as error:
+        passport(load(spec))
+    assert "\n" not in str(error.value)
+
+
+def test_the_command_takes_files_and_programs(tmp_path):
+    program = tmp_path / "ball.py"
+    program.write_text(
+        "import sys\n\n\ndef drop(height, speed, restitution, gravity, dt, duration):\n"
+        "    t, y, v = [0.0], [height], [speed]\n"
+        "    for k in range(round(duration / dt)):\n"
+        "        u = v[-1] - gravity * dt\n"
+        "        h = y[-1] + u * dt\n"
+        "        if h < 0 and u < 0:\n"
+        "            u *= -restitution\n"
+        "        t.append((k + 1) * dt), y.append(h), v.append(u)\n"
+        "    return t, y, v\n\n\n"
+        "if __name__ == '__main__':\n"
+        "    print('t,y,v')\n"
+        "    for row in zip(*drop(*map(float, sys.argv[1:]))):\n"
+        "        print(*row, sep=',')\n"
+    )
+    run = [sys.executable, "-m", "flipproof", "bounce", f"{program}:drop", "--dt", "0.004"]
+    done = subprocess.run([*run, "--json", "a.json", "--plot", "a.svg"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    made = json.loads((tmp_path / "a.json").read_text())["passports"][0]
+    assert made["measurements"]["precision"]["bits"] == 64
+    assert (tmp_path / "a.svg").read_text().startswith("<?xml")
+    words = " ".join(f"{{{name}}}" for name in ("height", "speed", "restitution", "gravity", "dt", "duration"))
+    spoken = load(f"cmd:{sys.executable} {program} {words}").drop(1.0, 0.0, 0.5, 9.81, 0.01, 0.3)
+    silent = load(f"{program}:drop").drop(1.0, 0.0, 0.5, 9.81, 0.01, 0.3)
+    assert all(np.array_equal(a, b) for a, b in zip(spoken, silent, strict=True))
