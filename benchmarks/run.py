@@ -1,4 +1,4 @@
-"""Everything that is measured of speed, in one run: the loop, batches, the reference, the engines, the report.
+"""Everything that is measured of speed, in one run: the loop, batches, the reference, the report.
 
     python benchmarks/run.py                 prints, writes benchmarks/results/benchmarks.json and .png, five minutes
     python benchmarks/run.py --record        the same into docs/, with its table
@@ -20,7 +20,6 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import engine_share
 import flow
 import kernel
 import report_time
@@ -71,7 +70,6 @@ def rows(facts: dict[str, Any]) -> list[tuple[str, str, str]]:
         )
         for run in facts["flow"]
     ]
-    table += engine_share.rows(facts["engines"])
     for place, result in facts.get("report", {}).items():
         stages = ", ".join(f"{name} {seconds:.0f}" for name, seconds in result["stages"].items())
         table.append(
@@ -111,7 +109,6 @@ def main() -> int:
     facts: dict[str, Any] = {"machine": machine(), "kernel": kernel.measure(arguments.throws)}
     kernel.report(facts["kernel"])
     facts["flow"] = flow.runs(100)
-    facts["engines"] = engine_share.measure_all()
     if not arguments.no_report:
         found = report_time.measure_all(("quick", "full"))
         facts["report"] = {", ".join(key): result | {"limit": report_time.LIMITS[key]} for key, result in found.items()}

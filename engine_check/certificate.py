@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -20,8 +20,7 @@ from numpy.typing import ArrayLike
 
 from engine_check.refinement import Level, Runs, Verdict, search
 from engine_check.restitution import Rebound, measure_restitution
-from engine_check.solver import DEFAULT_TOLERANCE, checked_number
-from engine_check.witness import witness_of
+from engine_check.solver import DEFAULT_TOLERANCE, ENGINES, checked_number
 from slicemodel.scenario import Scenario, not_whole
 from slicemodel.trajectory import FloatArray, Trajectory, output_times
 
@@ -139,9 +138,10 @@ class Certificate:
     def to_mapping(self) -> dict[str, Any]:
         """Return the certificate without its arrays, fit for JSON: what is not a number is None, with a reason."""
         end = float(self.richardson[-1]) if len(self.richardson) else math.nan
+        engine = ENGINES[self.engine]
         return {
             "engine": self.engine,
-            "witness": asdict(witness_of(self.settings)),
+            "witness": {name: getattr(engine, name) for name in ("equation", "theirs", "ours")},
             "status": self.status,
             "reason": self.reason,
             "tolerance": self.tolerance,
@@ -168,9 +168,7 @@ def certify(
     tolerance: float = DEFAULT_TOLERANCE,
     times: ArrayLike | None = None,
     ice: str = "rigid",
-    frame: str = "free",
     slices: str = "overlap",
-    hits: str | None = None,
     levels: int = DEFAULT_LEVELS,
     **knobs: float,
 ) -> Certificate:
@@ -179,53 +177,43 @@ def certify(
     Parameters
     ----------
     scenario : Scenario
-    engine, times, ice, frame, slices, hits, **knobs
+    engine, times, ice, slices, **knobs
         As in ``solve``.
     tolerance : float
         Largest change of omega at any output time to the certified settings from twice the step, from them to twice
-        the iterations, by late answers to hits in ``frame = "rotating"``, and by what does not cancel when the bottle
-        is changed by a step and by two (``refinement``; up to 1.5 times the tolerance there); fraction of omega_0, in
-        (0, 1).
+        the iterations, and by what does not cancel when the bottle is changed by a step and by two (``refinement``; up
+        to 1.5 times the tolerance there); fraction of omega_0, in (0, 1).
     levels : int
         Settings tried at the most, in [1, 20].
 
     Raises
     ------
     ValueError, SetupError
-        As ``solve``; ``tolerance`` or ``levels`` out of range; ``grid_offset``, which is the certificate's to choose.
+        As ``solve``; ``tolerance`` or ``levels`` out of range.
 
     Accuracy
     --------
     At order 1 a certified run is off by the change from twice the step, thus by less than the tolerance. The band
     is ``SAFETY`` times the largest up to then of the change from 2h, half of that from 4h to 2h (all of it if no
-    order is observed), what another bottle leaves and, in ``frame = "rotating"``, what late answers to hits leave
-    (``refinement``); and twice the change by iterations. Of a run that is not certified no order may be assumed: its
-    band is ``SAFETY`` times the spread of all runs about it.
+    order is observed) and what another bottle leaves (``refinement``); and twice the change by iterations. Of a run
+    that is not certified no order may be assumed: its band is ``SAFETY`` times the spread of all runs about it.
 
     Known failure: impacts closer than a step, where hits are left to the grid, that change place in none of these runs
-    stay unseen; so does, in ``frame = "free"``, how late a hit in the last step before an output time is answered. Of
+    stay unseen; so does how late a hit in the last step before an output time is answered. Of
     72 throws in pymunk (N 2 to 50, e 0 to 0.5, three bottles; ``benchmarks/engine_matrix.py``) with hits on the grid,
     all 36 with drag are certified and within 3e-3 omega_0 of event-driven free flight. Of the 36 without drag 31 are
     within it and 30 are certified, two of these wrongly: off by 1.0e-2 and 6.6e-3 at 7.8e-6 s (20 and 50 slices; in
-    the first, two slices reach the base 6.4e-6 s apart). With located hits all 36 without drag are certified and
-    within it.
+    the first, two slices reach the base 6.4e-6 s apart).
     """
     tolerance = checked_number("tolerance", tolerance, 0.0, 1.0)
     problem = not_whole("levels", levels, 1, MOST_LEVELS)
     if problem:
         raise ValueError(problem)
-    if "grid_offset" in knobs:
-        raise ValueError(
-            f"grid_offset = {knobs['grid_offset']!r} is not offered to a certificate, which takes 0 and 0.5; give dt"
-        )
     moments = output_times(scenario, times)
-    world: dict[str, Any] = {"frame": frame, "slices": slices, "hits": hits}
-    runs = Runs(scenario, engine, {"times": moments, "ice": ice, **world, **knobs})
+    runs = Runs(scenario, engine, {"times": moments, "ice": ice, "slices": slices, **knobs})
     verdict = search(runs, tolerance, levels)
     run = runs.make("on trial", verdict.dt, verdict.iterations)
-    # What is measured is the world that is certified: the throw that measures has no drag, and would choose anew.
-    world["hits"] = run.settings["hits"]
-    rebounds = () if scenario.frozen else measure_restitution(engine, **world, knobs=knobs)
+    rebounds = () if scenario.frozen else measure_restitution(engine, slices=slices, knobs=knobs)
     wrong = [rebound for rebound in rebounds if not rebound.holds]
     status, reason = verdict.status, verdict.reason
     if wrong:
@@ -301,8 +289,6 @@ def _band(runs: Runs, at: Verdict, run: Trajectory, order: float) -> FloatArray:
         if coarsest is not None:
             # Half a step is half the error only if an order is observed.
             errors.append(runs.apart(coarsest, coarse) / (2 if math.isfinite(order) else 1))
-        if runs.movable and not isinstance(late := runs.delay(at.dt, at.iterations), Trajectory):
-            errors.append(late)
         band = SAFETY * np.max(errors, axis=0)
     else:
         band = SAFETY * runs.spread(run, at.iterations)

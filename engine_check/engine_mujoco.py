@@ -114,7 +114,6 @@ def _fly(scenario: Scenario, order: Order, settings: MujocoKnobs) -> Trajectory:
             "dt": order.dt,
             "iterations": None,
             "ice": order.ice if scenario.frozen else None,
-            "frame": order.frame,
             "slices": order.slices,
             "hits": None if scenario.frozen else "located",
             "points": len(order.times),

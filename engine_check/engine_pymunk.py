@@ -16,10 +16,8 @@ from typing import Any, Final
 import numpy as np
 import pymunk
 
-from engine_check import pymunk_impacts as impacts
 from engine_check import pymunk_rods as rods
 from engine_check import watch
-from engine_check.pymunk_rotating import run_rotating
 from engine_check.pymunk_settings import (
     CAP_ELASTICITY,
     PymunkKnobs,
@@ -45,9 +43,7 @@ def run(scenario: Scenario, order: Order) -> Trajectory:
 
     Accuracy
     --------
-    omega, theta, r: order 2 in dt without drag if hits are located (``pymunk_impacts``), with impacts in their true
-    order as soon as the step tells them apart. Left to the grid, order 2 before the first impact without drag if e = 1,
-    else order 1, because
+    omega, theta, r: order 2 in dt before the first impact without drag if e = 1, else order 1, because
 
     - the damper acts on the velocity at the end of the step (error about gamma dt),
     - an impact is seen at the next grid point and sinks in by up to v dt; at an output time that is an
@@ -63,21 +59,12 @@ def run(scenario: Scenario, order: Order) -> Trajectory:
     Output intervals that need unequal steps cost one order: a leapfrog whose step changes from h to h' has
     kicked its velocities for (h - h')/2 too long.
     """
-    if order.frame == "rotating":
-        return run_rotating(scenario, order)
     settings = PymunkKnobs.from_overrides(order.knobs)
-    if settings.grid_offset:
-        raise ValueError(
-            f"grid_offset = {settings.grid_offset!r} has no effect in frame = 'free'; leave it out, or take frame = "
-            "'rotating'"
-        )
     iterations = enough_iterations(scenario) if order.iterations is None else order.iterations
     ice, dt, times = order.ice, order.dt, order.times
-    hits = impacts.hits_of(scenario, order)
     world = build(scenario, settings, iterations, ice, order.slices)
     setup = verify(world, scenario, settings, iterations, ice, order.slices)
-    located = _located(world, scenario, settings, iterations, order) if hits == "located" else None
-    flight = _Flight(world, scenario, settings, setup["angular_momentum"], order.slices == "exclude", located)
+    flight = _Flight(world, scenario, settings, setup["angular_momentum"], order.slices == "exclude")
 
     for when, count in order.legs():
         if count == 0:
@@ -93,9 +80,8 @@ def run(scenario: Scenario, order: Order) -> Trajectory:
             "dt": dt,
             "iterations": iterations,
             "ice": ice if scenario.frozen else None,
-            "frame": order.frame,
             "slices": order.slices,
-            "hits": hits,
+            "hits": None if scenario.frozen else "grid",
             "points": len(times),
             **settings.to_mapping(),
             "slice_restitution": restitution_between_slices(scenario, settings, order.slices),
@@ -105,34 +91,13 @@ def run(scenario: Scenario, order: Order) -> Trajectory:
     )
 
 
-def _located(
-    world: World, scenario: Scenario, knobs: PymunkKnobs, iterations: int, order: Order
-) -> impacts.LocatedHits:
-    meant = (
-        impacts.impact_scenario(scenario),
-        impacts.impact_knobs(knobs),
-        impacts.impact_iterations(iterations),
-        order.ice,
-        order.slices,
-    )
-    impact = build(*meant)
-    verify(impact, *meant)
-    return impacts.LocatedHits(world, impact, scenario)
-
-
 class _Flight:
     """The bookkeeping of one run: where it is, what was recorded, the largest residuals, and the verdict."""
 
     def __init__(
-        self,
-        world: World,
-        scenario: Scenario,
-        knobs: PymunkKnobs,
-        angular_momentum: float,
-        exclude: bool,
-        located: impacts.LocatedHits | None,
+        self, world: World, scenario: Scenario, knobs: PymunkKnobs, angular_momentum: float, exclude: bool
     ) -> None:
-        self._world, self._scenario, self._exclude, self._located = world, scenario, exclude, located
+        self._world, self._scenario, self._exclude = world, scenario, exclude
         self._cap_thickness = knobs.cap_thickness
         self._angular_momentum = angular_momentum
         self._reader = BatchReader(world)
@@ -172,12 +137,6 @@ class _Flight:
 
     def _step(self, step: float, count: int) -> FloatArray:
         """Take ``count`` steps, and return the state before the last."""
-        if self._located is not None:
-            # As in ``_centred``.
-            with np.errstate(over="ignore", invalid="ignore"):
-                for _ in range(count):
-                    before = self._located.step(step, self._sizes[0] / 2)
-            return before
         for _ in range(count - 1):
             self._world.space.step(step)
         before = self._reader.read()
@@ -211,12 +170,10 @@ class _Flight:
                 residuals |= rods.measure(self._state, self._scenario)
             for name, value in residuals.items():
                 self._worst[name] = max(self._worst[name], value)
-            bands = (*([impacts.BANDS] if self._located is not None else []), *([rods.BANDS] if self._exclude else []))
-            left = (watch.first_left(residuals, each)[0] for each in (watch.BANDS, *bands))
+            bands = (watch.BANDS, rods.BANDS) if self._exclude else (watch.BANDS,)
+            left = (watch.first_left(residuals, each)[0] for each in bands)
             self._reason = next(filter(None, left), "")
             cause = watch.broken(residuals, self._cap_thickness)
-            if self._located is not None:
-                cause = cause or watch.first_left(residuals, impacts.BANDS)[1]
             return cause or (rods.broken(residuals, self._scenario) if self._exclude else "")
 
     def trajectory(self, *, method: str, settings: Mapping[str, Any], setup: Mapping[str, float]) -> Trajectory:
@@ -233,8 +190,6 @@ class _Flight:
             v = np.zeros_like(r)
         omega = np.array([state.omega for state in good])
         diagnostics: dict[str, Any] = {"steps": self._steps, **self._worst, "setup": dict(setup)}
-        if self._located is not None:
-            diagnostics["located_hits"] = self._located.hits
         if scenario.frozen:
             diagnostics |= _ice_drift(scenario, omega, r)
         message = f"diverged at t = {self._state.t:.6g} s: {self._cause}" if self._cause else ""

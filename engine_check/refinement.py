@@ -4,7 +4,6 @@ r"""The search for settings that an engine run can be believed at: step and iter
     iterations                |           |       bottle's mass, omega(t) must change by less than the tolerance
                               |          2n       (``LIMITS``), a fraction of omega_0. 4h only shows the order.
     bottle       M_b (1 - d), M_b (1 + d),    d = 2h |omega_0|, its square if hits are located, and twice that
-    grid                  moved by h      moved by h/2       where the frame turns with the tube
 
 Nothing here knows an engine: runs go through ``engine_check.solve``, and iterations are refined only if the run
 states some.
@@ -18,18 +17,6 @@ order as soon as their times, which are of order 2, tell them apart: there the f
 answers in proportion and cancels in omega(d) + omega(-d) - 2 omega(0); what an exchange of two impacts does, stays. It
 is asked at twice the step, where runs cost half and impacts change places sooner. And what moved omega at the trial
 before by more than an order can make up for has not been resolved since, but hidden.
-
-Nor does halving show by how much hits on the grid are late. All grids have the output times in common, so that a hit in
-the last h before one of them is answered there on every grid, up to h late, and no halving moves it. In general a hit
-that lies u before the next point of the coarsest grid is answered u mod h late, and the halving changes that by 0 or h.
-Half a step beside it another grid answers the same hit h/2 earlier or later. With ``mean``, of the run and of its
-neighbour on that grid, a hit that moves omega by a times its delay gives
-
-    |omega_h - mean_h| = a h/4,     |mean_2h - mean_h| = a h/4 if u mod h < h/2, else 3 a h/4
-
-so that their sum is a h/2 or a h, never less than the error a (u mod h), once all have answered it, 2h later. What is
-smooth and of order 1 cancels in the first and is told by the second. Delays of several hits add up and may cancel there
-as they may anywhere: what the two steps above leave counts too, by half (``Runs.delay``).
 """
 
 from __future__ import annotations
@@ -54,7 +41,6 @@ DOUBLE: Final = "twice the step"
 EARLIER: Final = "the trial before"
 BENT: Final = "a bottle that differs by a step or two"
 BEND_STEPS: Final = (1.0, 2.0)
-MOVED: Final = "the grid moved by half a step"
 ITERATED: Final = "twice the iterations"
 
 LARGEST_BEND: Final = 0.01
@@ -113,9 +99,7 @@ class Runs:
     def __init__(self, scenario: Scenario, engine: str, settings: Mapping[str, Any]) -> None:
         self.scenario, self.engine, self.settings = scenario, engine, settings
         self.history: list[Level] = []
-        self.movable = settings.get("frame") == "rotating"
         self._made: dict[tuple[float, int | None], Trajectory] = {}
-        self._moved: dict[tuple[float, int | None], Trajectory] = {}
         self._bent: dict[tuple[float, int | None], FloatArray] = {}
 
     def known(self, dt: float, iterations: int | None) -> Trajectory | None:
@@ -160,37 +144,9 @@ class Runs:
         self._note(BENT, dt, member, cost, None)
         return member
 
-    def delay(self, dt: float, iterations: int | None) -> Trajectory | FloatArray:
-        """Return how far off late answers to hits may put the run at these settings, or a run that diverged.
-
-        The runs at these settings and at twice the step must have been made and be complete.
-        """
-        omegas, means = [], []
-        for step in (dt, 2 * dt, 4 * dt):
-            run = self.known(step, iterations)
-            moved = None if run is None else self._off_the_grid(step, iterations, run)
-            if run is None or moved is None or not moved.ok:
-                break
-            omegas.append(run.omega)
-            means.append((run.omega + moved.omega) / 2)
-        if len(means) < 2 and moved is not None:
-            return moved
-        # Half a step is half the delay.
-        levels = zip(omegas, means, means[1:], (1.0, 2.0), strict=False)
-        off = [(np.abs(omega - fine) + np.abs(coarse - fine)) / share for omega, fine, coarse, share in levels]
-        return np.asarray(np.max(off, axis=0) / abs(self.scenario.omega0))
-
-    def _off_the_grid(self, dt: float, iterations: int | None, run: Trajectory) -> Trajectory:
-        if (dt, iterations) not in self._moved:
-            moved, cost = self._flown(self.scenario, dt, iterations, grid_offset=0.5)
-            self._moved[dt, iterations] = moved
-            self._note(MOVED, dt, moved, cost, self.apart(moved, run))
-        return self._moved[dt, iterations]
-
     def spread(self, run: Trajectory, iterations: int | None) -> FloatArray:
         """Return how far any complete run at these iterations, and any bend, lies from ``run``, shape (P,)."""
-        made = [*self._made.items(), *self._moved.items()]
-        others = [self.apart(run, other) for (_, n), other in made if n == iterations and other.ok]
+        others = [self.apart(run, other) for (_, n), other in self._made.items() if n == iterations and other.ok]
         return np.asarray(np.max([*others, *(bent for (_, n), bent in self._bent.items() if n == iterations)], axis=0))
 
     def bent(self, dt: float, iterations: int | None) -> FloatArray | None:
@@ -212,9 +168,9 @@ class Runs:
         both = min(len(one.t), len(other.t))
         return np.asarray(np.abs(one.omega[:both] - other.omega[:both]) / abs(self.scenario.omega0))
 
-    def _flown(self, scenario: Scenario, dt: float, iterations: int | None, **more: Any) -> tuple[Trajectory, float]:
+    def _flown(self, scenario: Scenario, dt: float, iterations: int | None) -> tuple[Trajectory, float]:
         began = time.perf_counter()
-        run = solve(scenario, self.engine, dt, iterations, **self.settings, **more)
+        run = solve(scenario, self.engine, dt, iterations, **self.settings)
         return run, time.perf_counter() - began
 
     def _note(self, role: str, dt: float, run: Trajectory, seconds: float, change: FloatArray | None) -> None:
@@ -274,9 +230,8 @@ def _trial(runs: Runs, tolerance: float, dt: float, iterations: int | None) -> t
 
     if not run.ok:
         return refused("diverged", run.message, _reached(run)), RAISE in run.message
-    moved = (MOVED,) if runs.movable else ()
     iterated = (ITERATED,) if iterations is not None else ()
-    for role in (DOUBLE, EARLIER, BENT, *moved, *iterated):
+    for role in (DOUBLE, EARLIER, BENT, *iterated):
         found = _changed(runs, role, run, dt, iterations)
         if isinstance(found, Trajectory):
             return refused("diverged", f"{role}: {found.message}", _reached(found)), RAISE in found.message
@@ -294,8 +249,6 @@ def _changed(runs: Runs, role: str, run: Trajectory, dt: float, iterations: int 
     """Return the change of omega at the output times, or the run that diverged."""
     if role == BENT:
         return runs.bend(2 * dt, iterations)
-    if role == MOVED:
-        return runs.delay(dt, iterations)
     if role == EARLIER:
         return runs.earlier(dt, iterations)
     if role == ITERATED and iterations is not None:

@@ -91,9 +91,7 @@ def measure_restitution(
     coefficients: Sequence[float] = COEFFICIENTS,
     ends: Sequence[str] = ENDS,
     dt: float = STEP,
-    frame: str = "free",
     slices: str = "overlap",
-    hits: str | None = None,
     knobs: Mapping[str, float] | None = None,
 ) -> tuple[Rebound, ...]:
     """Throw one slice against each end for each restitution and return what came back.
@@ -108,7 +106,7 @@ def measure_restitution(
         Of "base", "cap".
     dt : float
         Upper bound of the step [s].
-    frame, slices, hits : str
+    slices : str
         As in ``solve``.
     knobs : mapping, optional
         Overrides of the engine's settings, by name.
@@ -124,7 +122,7 @@ def measure_restitution(
     e_out within 1e-3 of e_in in pymunk at 1e-4 s: an impact that is answered at the next grid point keeps the
     speeds on both sides of it.
     """
-    settings = {"frame": frame, "slices": slices, "hits": hits, **(knobs or {})}
+    settings = {"slices": slices, **(knobs or {})}
     return tuple(_rebound(engine, end, float(e), dt, settings) for end in ends for e in coefficients)
 
 

@@ -20,17 +20,22 @@ from slicemodel.trajectory import FloatArray, Trajectory, output_times
 class Engine:
     """A physics engine: the module whose ``run`` throws the bottle in it, what it solves and why it is here.
 
-    ``frames``, ``contacts`` and ``hits`` name the worlds it can build and how it answers hits, of ``FRAMES``,
-    ``CONTACTS`` and ``HITS``.
+    A comparison tests only what the engine does itself (``theirs``); what we hand it (``ours``: an impact law, times of
+    impacts) is on both sides, and agreement says nothing about it. ``contacts`` are those of ``CONTACTS`` that it has.
     """
 
     name: str
     module: str
     equation: str
     reason: str
-    frames: tuple[str, ...] = ("free",)
+    theirs: str
+    ours: str
     contacts: tuple[str, ...] = ("overlap",)
-    hits: tuple[str, ...] = ("located",)
+
+    @property
+    def words(self) -> str:
+        """What is the engine's and what is ours, in one sentence each."""
+        return f"The engine's: {self.theirs}. Ours: {self.ours}."
 
 
 ENGINES: Final[Mapping[str, Engine]] = MappingProxyType(
@@ -44,9 +49,10 @@ ENGINES: Final[Mapping[str, Engine]] = MappingProxyType(
                 reason="Bodies, joints and contacts of the engine in the lab frame: no equation of motion and no law "
                 "of impact of ours enters, so that the moving origin and the recoil of the tube follow from the engine "
                 "alone. A hit on an end is answered at the next step of the grid.",
-                frames=("free", "rotating"),
+                theirs="the motion, the law of impact, the recoil, rests, and the times of hits, which wait for the "
+                "step's grid",
+                ours="the initial state and the settings",
                 contacts=("overlap", "exclude"),
-                hits=("grid", "located"),
             ),
             Engine(
                 name="mujoco",
@@ -55,6 +61,8 @@ ENGINES: Final[Mapping[str, Engine]] = MappingProxyType(
                 reason="The engine's equations of motion in generalised coordinates, by Runge-Kutta steps: the masses "
                 "cannot leave the axis. Impacts are ours: our simultaneous law, solved with the engine's mass matrix "
                 "at times that we locate.",
+                theirs="the motion between impacts, and the mass matrix that impacts are solved with",
+                ours="the simultaneous law of impact, the times and the order of impacts, rests and releases",
             ),
         )
     }
@@ -68,15 +76,8 @@ DEFAULT_TOLERANCE: Final = 2e-3
 """Change of omega under refinement below which a run is certified, fraction of omega_0."""
 
 ICE_MODELS: Final = ("rigid", "welded")
-FRAMES: Final = ("free", "rotating")
-"""Who moves the tube: "free", the engine, in the lab; "rotating", it is held, and Eq. 8's fictitious forces act."""
-
 CONTACTS: Final = ("overlap", "exclude")
 """What two slices do when they meet: pass through each other as in the paper, or collide as rods of length h/N."""
-
-HITS: Final = ("grid", "located")
-"""When a slice's hit on an end is answered: at the next step of the grid, as engines do, or at its own time, located by
-us: then the run is a hybrid (``witness``)."""
 
 MOST_ITERATIONS: Final = 1_000_000
 MOST_DRIFT: Final = 5e3
@@ -94,9 +95,7 @@ class Order:
     iterations: int | None
     times: FloatArray
     ice: str = "rigid"
-    frame: str = "free"
     slices: str = "overlap"
-    hits: str | None = None
     knobs: Mapping[str, float]
 
     def legs(self) -> Iterator[tuple[float, int]]:
@@ -121,9 +120,7 @@ def solve(
     *,
     tolerance: float = DEFAULT_TOLERANCE,
     ice: str = "rigid",
-    frame: str = "free",
     slices: str = "overlap",
-    hits: str | None = None,
     **knobs: float,
 ) -> Trajectory:
     """Throw the bottle in a rigid-body engine and return what the engine's own bodies did.
@@ -146,14 +143,8 @@ def solve(
     ice : str
         How ``scenario.frozen`` is built: "rigid" (one body) or "welded" (slices held by joints, whose
         drift is reported). Without effect on a scenario that is not frozen.
-    frame : str
-        "free" or "rotating" (``FRAMES``).
     slices : str
         "overlap" or "exclude" (``CONTACTS``).
-    hits : str or None
-        "grid" or "located" (``HITS``). None: "grid" in pymunk, which is the engine as it is; "located" in MuJoCo, which
-        has no other. pymunk offers "located" where the frame is free, slices overlap and there is no drag
-        (``pymunk_impacts``). ``settings`` states which.
     **knobs
         Overrides of the engine's settings (``PymunkKnobs``), for sensitivity studies.
 
@@ -161,7 +152,8 @@ def solve(
     -------
     Trajectory
         ``impacts`` is None where the engine resolves contacts and knows no impacts (pymunk). ``settings`` holds every
-        knob and version, ``diagnostics`` the set-up as read back and the largest residuals. Without dt and
+        knob and version and ``hits``, "grid" if they wait for the step's grid, "located" if we locate them;
+        ``diagnostics`` the set-up as read back and the largest residuals. Without dt and
         iterations also ``settings["certified"]``, ``diagnostics["certificate"]`` and ``diagnostics["omega_band"]``
         (``certificate.Certificate.band``); a run that could not be certified is returned as it is, and its message
         says why.
@@ -169,8 +161,8 @@ def solve(
     Raises
     ------
     ValueError
-        Unknown engine, ice model, frame, contact, kind of hits or knob (with the nearest known name), or one that
-        this engine does not have, or not for this throw; ``dt``, ``iterations``, ``times`` or a knob out of range
+        Unknown engine, ice model, contact or knob (with the nearest known name), or one that
+        this engine does not have; ``dt``, ``iterations``, ``times`` or a knob out of range
         (with the admissible range).
     SetupError
         If the engine did not receive what was meant.
@@ -185,9 +177,7 @@ def solve(
     has = ENGINES[engine]
     asked = (
         ("ice", ice, ICE_MODELS, ICE_MODELS),
-        ("frame", frame, FRAMES, has.frames),
         ("slices", slices, CONTACTS, has.contacts),
-        *([] if hits is None else [("hits", hits, HITS, has.hits)]),
     )
     for what, name, known, offered in asked:
         if name not in known:
@@ -204,7 +194,7 @@ def solve(
         )
     if dt is None and iterations is None:
         certified = import_module("engine_check.certificate").certified
-        settings = {"times": times, "tolerance": tolerance, "ice": ice, "frame": frame, "slices": slices, "hits": hits}
+        settings = {"times": times, "tolerance": tolerance, "ice": ice, "slices": slices}
         certified_run: Trajectory = certified(scenario, engine, **settings, **knobs)
         return certified_run
     run = import_module(has.module).run
@@ -213,9 +203,7 @@ def solve(
         iterations=_checked_iterations(iterations),
         times=output_times(scenario, times),
         ice=ice,
-        frame=frame,
         slices=slices,
-        hits=hits,
         knobs=knobs,
     )
     trajectory: Trajectory = run(scenario, order)

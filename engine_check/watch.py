@@ -36,8 +36,7 @@ BANDS: Final[Mapping[str, Band]] = MappingProxyType(
             1e-2,
             "|L/L_0 - 1|",
             "every impulse acts along the line between two bodies, so L is exact to round-off (1e-13); "
-            "only a position correction, if switched on, moves it, by up to 5e-3, and hits that are located "
-            "(``pymunk_impacts.BANDS``)",
+            "only a position correction, if switched on, moves it, by up to 5e-3",
             "raise iterations",
         ),
         "linear_momentum_residual": Band(

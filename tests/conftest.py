@@ -57,7 +57,7 @@ def pytest_collection_modifyitems(items):
 @pytest.fixture(scope="session")
 def gathered() -> Gathered:
     """Gathered once per process."""
-    ask = replace(ask_of(Scenario(), "quick", 20, tuple(WITNESSES)), reference=Scenario().with_slices(20))
+    ask = replace(ask_of(Scenario(), "quick", 20, WITNESSES), reference=Scenario().with_slices(20))
     # In this process: test_report.py has a report made by workers, whose start costs a fifth of all of it.
     return gather_report(ask, work={"work-precision": contenders.QUICK}, pool=Here())
 

@@ -11,8 +11,7 @@ import pytest
 import engine_check
 import ode_reference
 from engine_check import DEFAULT_DT, ENGINES, certificate, certify, engine_pymunk, measure_restitution
-from engine_check.refinement import BENT, COARSEST, DOUBLE, EARLIER, ITERATED, MOVED, Runs, coarsest_step
-from engine_check.witness import WITNESSES, witness_of
+from engine_check.refinement import BENT, COARSEST, DOUBLE, EARLIER, ITERATED, Runs, coarsest_step
 from slicemodel.scenario import Bottle, Scenario
 from slicemodel.trajectory import output_times
 
@@ -49,29 +48,14 @@ def test_a_certificate_confirms_step_iterations_and_order_of_impacts_at_its_own_
     assert roles(of_ten)[-5:] == [BENT] * 4 + [ITERATED]
 
 
-@pytest.mark.parametrize(
-    ("settings", "name", "shared"),
-    [
-        ({}, "pymunk", "the initial state and the settings"),
-        ({"hits": "located"}, "pymunk, hits located (a hybrid)", "the times and the order of hits"),
-        ({"frame": "rotating"}, "pymunk in Eq. 8's frame", "the forces of Eq. 8"),
-        ({"engine": "mujoco"}, "mujoco", "the simultaneous law of impact"),
-    ],
-)
-def test_a_certificate_says_what_is_the_engines_and_what_is_ours(settings, name, shared):
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_certificate_says_what_is_the_engines_and_what_is_ours(engine):
     dry = replace(SHORT, drag=0.0, duration=0.002)
-    witness = certify(dry, times=[0.002], **settings).to_mapping()["witness"]
-    assert witness["name"] == name
-    assert shared in witness["ours"]
-    assert ("law of impact" in witness["theirs"]) == (name.startswith("pymunk") and "frame" not in name)
-
-
-def test_every_way_to_run_an_engine_has_a_witness_and_ice_has_that_of_its_engine():
-    for engine in ENGINES.values():
-        assert {(engine.name, frame) for frame in engine.frames} <= {key[:2] for key in WITNESSES}
-    ways = {(e.name, "free", hits) for e in ENGINES.values() for hits in e.hits}
-    assert ways <= set(WITNESSES)
-    assert witness_of({"engine": "mujoco", "frame": "free", "hits": None}).name == "mujoco"
+    told = certify(dry, engine, times=[0.002]).to_mapping()["witness"]
+    theirs_only = "law of impact" in told["theirs"]
+    assert theirs_only == (engine == "pymunk")
+    assert ("law of impact" in told["ours"]) != theirs_only
+    assert told["equation"] == ENGINES[engine].equation
 
 
 def test_half_the_certified_step_changes_less_than_the_tolerance(of_ten):
@@ -107,21 +91,18 @@ def free_flight(scenario):
 
 
 @pytest.mark.parametrize(
-    ("scenario", "hits"),
+    "scenario",
     [
-        (LIGHT, "grid"),
-        (replace(LIGHT, drag=0.0, restitution=0.35), "grid"),
-        (replace(LIGHT, drag=0.0, restitution=0.35), "located"),
-        (replace(PAIR, restitution=0.35), "grid"),
-        (replace(TEN, drag=0.0), "grid"),
-        (replace(TEN, drag=0.0), "located"),
+        LIGHT,
+        replace(LIGHT, drag=0.0, restitution=0.35),
+        replace(PAIR, restitution=0.35),
+        replace(TEN, drag=0.0),
     ],
-    ids=["light", "light, dry", "light, dry, located", "pair", "ten, dry", "ten, dry, located"],
+    ids=["light", "light, dry", "pair", "ten, dry"],
 )
-def test_certified_runs_are_free_flight_within_their_bands(scenario, hits):
-    found = certify(scenario, times=TIMES, hits=hits)
+def test_certified_runs_are_free_flight_within_their_bands(scenario):
+    found = certify(scenario, times=TIMES)
     assert found.ok, found.reason
-    assert found.settings["hits"] == hits
     exact, band = free_flight(scenario)
     error = np.abs(found.trajectory.omega - exact) / scenario.omega0
     assert np.max(error) <= 3e-3
@@ -142,7 +123,7 @@ def test_creep_of_resting_slices_is_refined_away_by_the_step_alone():
 def test_impacts_that_share_a_step_are_not_certified_away():
     """Dry, N = 20, e = 0.35: two impacts at 0.1283 s lie 6e-6 s apart; no halving at 1e-5 s shows that they swap."""
     dry = replace(Scenario(restitution=0.35).with_slices(20), drag=0.0)
-    found = certify(dry, times=TIMES, levels=2, hits="grid")
+    found = certify(dry, times=TIMES, levels=2)
     assert found.status == "not-converged"
     assert found.horizon is not None
     assert found.horizon < 0.25
@@ -153,92 +134,16 @@ def test_impacts_that_share_a_step_are_not_certified_away():
     assert "moves omega" in found.reason
 
 
-@pytest.mark.slow
-def test_located_hits_put_those_impacts_in_order_and_are_certified():
-    """On the grid this throw is certified at 7.8e-6 s and off by 1e-2 omega_0."""
-    dry = replace(Scenario(restitution=0.35).with_slices(20), drag=0.0)
-    found = certify(dry, times=TIMES, hits="located")
-    exact, band = free_flight(dry)
-    error = np.abs(found.trajectory.omega - exact) / dry.omega0
-    assert found.ok, found.reason
-    assert np.max(error) <= 3e-3
-    assert np.mean(error <= found.band + band) >= 0.95
-
-
 def test_an_exchange_of_impacts_that_half_the_step_does_not_show_is_seen_by_another_bottle():
     """Dry, N = 20, e = 0: halving 1.25e-4 s changes 1e-3 omega_0, yet both steps are off by 2.6e-3 from 0.34 s on."""
     dry = replace(Scenario(restitution=0.0).with_slices(20), drag=0.0)
-    found = certify(dry, times=TIMES, levels=2, hits="grid")
+    found = certify(dry, times=TIMES, levels=2)
     half = [level.change for level in found.history if level.role == "on trial"][-1]
     exact, band = free_flight(dry)
     error = np.abs(found.trajectory.omega - exact) / dry.omega0
     assert half < 0.6 * np.max(error)
     assert np.max(error) <= 3e-3
     assert np.mean(error <= found.band + band) >= 0.95
-
-
-# ---------------------------------------------------------------- hits that are answered late
-
-
-def off_eq8(run):
-    exact = ode_reference.solve(run.scenario, "eq8", run.t).omega
-    return np.abs(run.omega - exact) / abs(run.scenario.omega0)
-
-
-def test_a_hit_in_the_last_step_before_an_output_time_is_told_by_no_halving_but_by_another_grid():
-    """Default throw, N = 50: the first hit, at 0.0148988 s, lies 0.93 h before the point that 4h, 2h and h share."""
-    fifty = Scenario().with_slices(50)
-    times = np.linspace(0.0, 0.5, 1000)[:41]
-    h = times[1] / 4
-    short = replace(fifty, duration=float(times[-1]))
-    runs = Runs(short, "pymunk", {"times": times, "frame": "rotating"})
-    of_4h, of_2h, of_h = (runs.make("", factor * h, 2) for factor in (4, 2, 1))
-    hit = ode_reference.solve(short, "eq8", times).impacts.time
-    assert len(hit) == 1
-    late = times[np.searchsorted(times, hit[0])] - hit[0]
-    assert 0.0 < late < h
-    after = times > hit[0]
-    error = off_eq8(of_h)[after]
-    for change in (runs.apart(of_4h, of_2h)[after] / 2, runs.apart(of_2h, of_h)[after]):
-        assert np.all(1.25 * change < error)
-    found = certify(short, times=times, frame="rotating")
-    assert found.ok, found.reason
-    assert found.settings["dt"] == pytest.approx(h, rel=1e-12, abs=0.0)
-    answered = (times < hit[0]) | (times > hit[0] + 2 * h)
-    assert np.all((off_eq8(found.trajectory) <= found.band)[answered])
-    assert roles(found).count(MOVED) == 3
-    # One hit: the error is a u, and the two grids are a h / 2 apart.
-    moved = engine_check.solve(short, dt=h, times=times, frame="rotating", grid_offset=0.5)
-    apart = np.abs(moved.omega - of_h.omega)[after] / short.omega0
-    assert apart[0] / (error[0] - off_eq8(of_h)[~after][-1]) == pytest.approx(h / 2 / late, rel=0.05, abs=0.0)
-
-
-@pytest.mark.parametrize(
-    "scenario",
-    [
-        Scenario().with_slices(50),
-        replace(Scenario(restitution=0.2).with_slices(50), drag=0.0),
-        replace(PAIR, restitution=0.8),
-        replace(TEN, restitution=0.0, omega0=-15.0),
-    ],
-    ids=["fifty", "fifty, dry", "pair", "ten, sticking"],
-)
-def test_certified_runs_in_eq8s_frame_are_eq8_within_their_bands(scenario):
-    found = certify(scenario, frame="rotating")
-    assert found.ok, found.reason
-    assert np.mean(off_eq8(found.trajectory) <= found.band) >= 0.99
-
-
-def test_where_late_hits_move_omega_beyond_the_tolerance_the_run_is_not_certified(monkeypatch):
-    monkeypatch.setattr(Runs, "delay", lambda *_: np.array([0.0, 1.1e-3]))
-    found = certify(SHORT, times=[0.0, 0.02], frame="rotating", tolerance=1e-3, levels=1)
-    assert found.status == "not-converged"
-    assert found.reason.startswith(MOVED)
-
-
-def test_a_certificate_chooses_its_grids_itself():
-    with pytest.raises(ValueError, match=r"grid_offset = 0\.5 is not offered to a certificate.*give dt"):
-        certify(SHORT, frame="rotating", grid_offset=0.5)
 
 
 def test_a_change_that_is_not_a_number_is_not_below_the_tolerance(monkeypatch):
@@ -249,7 +154,7 @@ def test_a_change_that_is_not_a_number_is_not_below_the_tolerance(monkeypatch):
 
 
 def test_a_change_that_vanishes_faster_than_any_order_is_not_trusted():
-    found = certify(replace(Scenario().with_slices(10), drag=0.0), times=TIMES, levels=1, hits="grid")
+    found = certify(replace(Scenario().with_slices(10), drag=0.0), times=TIMES, levels=1)
     assert found.status == "not-converged"
     assert found.reason.startswith(EARLIER)
 
@@ -371,10 +276,6 @@ def test_every_engine_returns_e_times_the_known_speed(engine):
         assert rebound.speed_in == pytest.approx(speed_at_the_end(), rel=3e-3, abs=0.0)
         assert rebound.measured == pytest.approx(rebound.asked, abs=5e-5 if rebound.asked else 3e-3)
         assert rebound.holds
-
-
-def test_restitution_in_the_frame_that_turns():
-    assert all(rebound.holds for rebound in measure_restitution(frame="rotating", coefficients=(0.0, 0.5)))
 
 
 # ---------------------------------------------------------------- seeded faults that pass no read-back

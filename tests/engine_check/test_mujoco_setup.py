@@ -183,7 +183,6 @@ def test_importing_the_package_does_not_load_mujoco():
         ({"rest_flight": 0.0}, r"rest_flight = 0.0 is outside \(0, 1000\]"),
         ({"rest_flight": np.nan}, r"rest_flight = nan is outside"),
         ({"iterations": 100}, "iterations = 100 has no meaning for engine = 'mujoco'"),
-        ({"frame": "rotating"}, "has no frame = 'rotating'"),
         ({"slices": "exclude"}, "has no slices = 'exclude'"),
     ],
 )

@@ -5,9 +5,9 @@ import dataclasses
 from made_up import page_of, spoiled
 
 from engine_check.solver import DEFAULT_TOLERANCE
-from flipproof.chapters.solvers import CERTIFIED, UNCERTIFIED_DT, WITNESSES, solver_runs, witnesses
+from flipproof.chapters.solvers import CERTIFIED, UNCERTIFIED_DT, WITNESSES, solver_runs
 from flipproof.frame.gather import tell
-from flipproof.frame.solvers import REFERENCE, make
+from flipproof.frame.solvers import REFERENCE
 
 ENGINES = ("flights", "differences", "certificates", "agreement")
 
@@ -22,20 +22,8 @@ def engine_runs(throw, size):
 
 def test_a_report_certifies_to_what_solve_asks_by_itself():
     runs = engine_runs(REFERENCE, "full")
-    assert tuple(runs) == witnesses(REFERENCE)
+    assert tuple(runs) == WITNESSES
     assert all(run.settings["tolerance"] == DEFAULT_TOLERANCE for run in runs.values())
-
-
-def test_the_hybrid_stands_beside_the_grid_where_there_is_no_drag_and_nowhere_else():
-    dry = dataclasses.replace(REFERENCE, drag=0.0)
-    assert witnesses(REFERENCE) == ("pymunk", "mujoco", "pymunk rotating")
-    assert witnesses(dry) == ("pymunk", "pymunk located", "mujoco", "pymunk rotating")
-    assert witnesses(dataclasses.replace(dry, frozen=True)) == ("pymunk", "mujoco", "pymunk rotating")
-    short = dataclasses.replace(dry.with_slices(3), duration=0.02)
-    runs = {name: make(run).trajectory for name, run in engine_runs(short, "quick").items()}
-    assert {name: run.settings["hits"] for name, run in runs.items()} == {
-        "pymunk": "grid", "pymunk located": "located", "mujoco": "located", "pymunk rotating": "grid",
-    }  # fmt: skip
 
 
 def test_a_quick_report_says_what_it_does_not_certify(gathered, report):
@@ -50,11 +38,11 @@ def test_a_quick_report_says_what_it_does_not_certify(gathered, report):
 
 def test_every_witness_has_its_certificate(gathered, report, read_page):
     found = gathered.found("certificates")
-    assert tuple(found.certificates) == witnesses(gathered.ask.throw)
+    assert tuple(found.certificates) == WITNESSES
     assert all(certificate["status"] == "certified" for certificate in found.certificates.values())
     agreements = gathered.found("agreement")
     assert set(agreements["free-flight"].names) == {"free-flight", "solve_ivp", "pymunk", "mujoco"}
-    assert set(agreements["eq8"].names) == {"eq8", "solve_ivp", "pymunk rotating"}
+    assert set(agreements["eq8"].names) == {"eq8", "solve_ivp"}
     assert not any(agreement.words.startswith("all but") for agreement in agreements.values())
     page = read_page(report.html)
     assert {"engines", "work-precision", "figure-stability", "figure-horizon", "figure-overlap"} <= set(page.ids)
@@ -70,7 +58,7 @@ def test_an_engine_that_is_not_installed_is_named_with_its_reason(gathered):
 
 
 def test_without_any_engine_the_equations_are_held_against_the_witness(gathered):
-    poorest = without(gathered, "mujoco", "pymunk", "pymunk rotating")
+    poorest = without(gathered, *WITNESSES)
     agreements = poorest.found("agreement")
     assert {name: agreement.names for name, agreement in agreements.items()} == {
         "free-flight": ("free-flight", "solve_ivp"),

@@ -35,7 +35,6 @@ def test_symbols_get_their_indices_where_text_is_typeset(text, html):
     [
         ("published-python → published-limit", "published program → published program (Δt → 0)"),
         ("eq8-weightless, eq8: largest", "Eq. 8 without weight, Eq. 8: largest"),
-        ("pymunk rotating and pymunk", "pymunk by Eq. 8 and pymunk"),
         ("trajectories/eq8/data.csv mujoco-compliant", "trajectories/eq8/data.csv mujoco-compliant"),
         ("switches:eq8 and mine.py:eq8", "switches:eq8 and mine.py:eq8"),
     ],
@@ -44,7 +43,7 @@ def test_charts_and_sentences_have_the_spoken_names_of_solvers(text, said):
     assert spoken(text) == said
     assert "eq8" not in re.sub(r"<[^>]*>", "", linked("<h3>eq8</h3><p>of eq8</p>"))
     assert ">eq8</a>" in linked("<table><tr><td>eq8</td></tr></table>")
-    assert set(SPOKEN) - set(catalogue()) == {"pymunk rotating"}
+    assert set(SPOKEN) <= set(catalogue())
 
 
 def test_a_figure_has_spoken_names_and_indices_everywhere():

@@ -93,10 +93,8 @@ def test_everyone_of_every_registry_competes_or_is_absent_for_a_reason(case, eff
     absent = left_out(effort)
     assert len({rival.key for rival in rivals}) == len(rivals)
     assert {rival.solver for rival in rivals if rival.family == "scheme"} == set(SCHEMES)
-    worlds = {(rival.solver, rival.fixed["frame"]) for rival in rivals if rival.family == "engine"}
+    assert {rival.solver for rival in rivals if rival.family == "engine"} == set(ENGINES)
     for engine in ENGINES.values():
-        for frame in engine.frames:
-            assert ((engine.name, frame) in worlds) != (f"{engine.name}, frame {frame}" in absent)
         for contact in engine.contacts:
             assert (contact == "overlap") != (f"{engine.name}, slices = {contact}" in absent)
     asked = {(rival.name, rival.equation) for rival in rivals if rival.family == "method"}
@@ -111,7 +109,7 @@ def test_everyone_of_every_registry_competes_or_is_absent_for_a_reason(case, eff
 def test_each_is_held_against_its_own_equation(case):
     for rival in contenders(case, FULL):
         if rival.family == "engine":
-            assert rival.equation == {"free": "free-flight", "rotating": "eq8"}[rival.fixed["frame"]]
+            assert rival.equation == "free-flight"
         elif rival.family == "method":
             assert rival.equation == rival.solver
         else:
@@ -316,7 +314,7 @@ def test_a_price_in_seconds_steps_and_work(monkeypatch):
 @pytest.mark.parametrize(
     ("name", "order"),
     [*((scheme, 2.0 if scheme == "midpoint" else 1.0) for scheme in SCHEMES if scheme != "published-matlab"),
-     ("pymunk", 1.0), ("pymunk rotating", 1.0)],
+     ("pymunk", 1.0)],
 )  # fmt: skip
 def test_orders_before_the_first_impact(smooth, name, order):
     found = next(c for c in smooth[1].curves.values() if c.contender.name == name)
@@ -373,7 +371,6 @@ def test_work_is_counted_as_stated():
     assert work_of(slicemodel.solve(case.scenario, "midpoint", 101)) == 200 * n
     for solver, settings, per_step in (
         ("pymunk", {"iterations": 7}, 7),
-        ("pymunk", {"iterations": 3, "frame": "rotating"}, 3),
         ("mujoco", {}, 4),
     ):
         dt = case.scenario.duration / 80

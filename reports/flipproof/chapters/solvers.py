@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
-from engine_check.solver import DEFAULT_TOLERANCE
+from engine_check.solver import DEFAULT_TOLERANCE, ENGINES
 from flipproof.frame.solvers import Run
 from ode_reference.models import LADDER
 from slicemodel import Scenario
@@ -24,22 +24,14 @@ LIMITS: Final = {
 SCHEMES: Final = ("published-python", "exact-step")
 """The schemes that are told of in words: the published program, and the exact step of Eq. 8."""
 
-LOCATED: Final = "pymunk located"
-"""Name of the hybrid, which exists for throws without drag only."""
-
-WITNESSES: Final[Mapping[str, tuple[str, Mapping[str, Any]]]] = {
-    "pymunk": ("pymunk", {}),
-    LOCATED: ("pymunk", {"hits": "located"}),
-    "mujoco": ("mujoco", {}),
-    "pymunk rotating": ("pymunk", {"frame": "rotating"}),
-}
-"""Name -> engine and settings of every engine run that a report certifies, where the throw allows it."""
+WITNESSES: Final = tuple(ENGINES)
+"""The engines; a full report certifies the run of each."""
 
 UNCERTIFIED_DT: Final = 1.25e-4
 """Step of a witness that is not certified [s]: where a certificate begins."""
 
-CERTIFIED: Final = {"check": (), "quick": ("pymunk rotating",), "full": tuple(WITNESSES)}
-"""Witnesses that are certified: a certificate of a free tube costs several runs of all its slices."""
+CERTIFIED: Final[Mapping[str, tuple[str, ...]]] = {"check": (), "quick": (), "full": WITNESSES}
+"""Engines whose runs are certified: a certificate costs several runs of all slices."""
 
 FLIGHTS: Final = ("published-python", "published-limit", "exact-step", "eq8", ENGINE, FREE)
 """The solvers whose flights are drawn."""
@@ -52,19 +44,12 @@ OTHERS: Final = (
 )
 
 
-def witnesses(throw: Scenario) -> tuple[str, ...]:
-    """Return those of ``WITNESSES`` that can fly the throw: hits are located only without drag, and ice has none."""
-    dry = throw.drag == 0.0 and not throw.frozen
-    return tuple(name for name in WITNESSES if dry or name != LOCATED)
-
-
 def solver_runs(throw: Scenario, steps: int, certified: tuple[str, ...]) -> dict[str, Run]:
     """Return the run of every solver by its name, the slowest first."""
     runs = {}
-    for name in witnesses(throw):
-        engine, settings = WITNESSES[name]
+    for name in WITNESSES:
         # A certificate of a report must hold what ``engine_check.solve`` asks by itself.
         accuracy = {"tolerance": DEFAULT_TOLERANCE} if name in certified else {"dt": UNCERTIFIED_DT}
-        runs[name] = Run(engine, throw, {**settings, **accuracy}, name)
+        runs[name] = Run(name, throw, accuracy, name)
     runs |= {model: Run(model, throw, {}, model) for model in reversed(LADDER)}
     return runs | {scheme: Run(scheme, throw, {"steps": steps}, scheme) for scheme in (*SCHEMES, *OTHER_SCHEMES)}

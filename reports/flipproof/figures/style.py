@@ -34,7 +34,6 @@ STYLES: dict[str, dict[str, Any]] = {
     "free-flight": {"color": "#00402F", "linestyle": (0, (5, 3)), "linewidth": 1.4},
     "midpoint": {"color": "#CC79A7", "linestyle": "-", "linewidth": 1.6},
     "mujoco": {"color": "#E69F00", "linestyle": (0, (1, 1.5)), "linewidth": 2.0},
-    "pymunk rotating": {"color": "#882255", "linestyle": (0, (3, 1, 1, 1)), "linewidth": 1.6},
 }
 ASSUMPTIONS = (
     "#E69F00", "#6A5ACD", "#CC79A7", "#882255", "#999933", "#0072B2", "#44AA99", "#D55E00", "#999999", "#000000",

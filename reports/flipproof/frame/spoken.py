@@ -22,7 +22,6 @@ SPOKEN: Final[Mapping[str, str]] = {
     "accelerating-origin": "moving origin",
     "free-flight": "free flight",
     "mujoco": "MuJoCo",
-    "pymunk rotating": "pymunk by Eq. 8",
 }
 """Name in commands, files and tables -> name in charts, headings and sentences."""
 

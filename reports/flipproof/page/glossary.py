@@ -51,8 +51,6 @@ TERMS: Final[Mapping[str, str]] = {
     "pymunk": "A physics engine for games: bodies, joints and contacts, advanced by impulses in small steps.",
     "mujoco": "A physics engine for robotics: motion in joint coordinates; here the law and the times of impact "
     "are ours.",
-    "pymunk rotating": "The engine pymunk moving slices in the turning bottle under the forces of Eq. 8, which "
-    "we give it.",
     "engine": "A program by others that moves bodies by the laws of mechanics and knows nothing of Eq. 8 or of "
     "our equations.",
     "fair share": "What a change does to a result, as the mean over all orders in which all the changes can be "

@@ -63,7 +63,6 @@ SOURCES: Final[Mapping[str, str]] = {
     "second_eq8": "findings/reference-eq8/value",
     "second_free": "findings/reference-free-flight/value",
     "exact": "findings/exact-cases-free-flight/value",
-    "rotating": "findings/difference-eq8-pymunk-rotating/value",
     "weight": "differences/gravity in Eq. 8/largest",
     "origin": "differences/origin at rest, drag on the tube/largest",
     "recoil": "differences/no recoil in impacts/largest",

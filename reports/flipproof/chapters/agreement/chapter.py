@@ -12,7 +12,7 @@ import numpy as np
 
 from flipproof.chapters.differences.chapter import MODEL_FLOOR
 from flipproof.chapters.reference.chapter import witnessed
-from flipproof.chapters.solvers import FREE, LOCATED
+from flipproof.chapters.solvers import FREE, WITNESSES
 from flipproof.frame.chapter import Ask, Chapter, Claims, Flights, Missing, Run, Study, attempt, observed
 from flipproof.frame.twins import twins, usual_rest_speed
 from slicemodel import Trajectory
@@ -105,7 +105,7 @@ def study(ask: Ask) -> Study[Mapping[str, Agreement]]:
     """
     runs: dict[str, dict[str, Run]] = {}
     coarser: dict[str, Run] = {}
-    for equation, engines in ((FREE, ("pymunk", LOCATED, "mujoco")), ("eq8", ("pymunk rotating",))):
+    for equation, engines in ((FREE, WITNESSES), ("eq8", ())):
         settings = witnessed(ask.throw, equation)
         coarse = {**settings, "rtol": 1e-9, "atol": 1e-12, "rest_speed": usual_rest_speed(equation)}
         runs[equation] = {

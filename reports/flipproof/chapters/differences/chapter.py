@@ -51,7 +51,6 @@ PAIRS: Final = (
     ("finite step of the exact step", "exact-step", "eq8"),
     *ladder_pairs(MODELS),
     (BY_ENGINE, FREE, ENGINE),
-    ("Eq. 8, event-driven and by an engine with our forces", "eq8", "pymunk rotating"),
     (PROGRAM_EQ8, "published-python", "eq8"),
     (EQ8_FREE, "eq8", FREE),
     (TOTAL, "published-python", FREE),

@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from engine_check.witness import witness_of
+from engine_check.solver import ENGINES
 from flipproof.chapters.solvers import FLIGHTS, LIMITS, OTHERS, SCHEMES
 from flipproof.figures.style import new_figure, shared_legend, shown_name, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Exhibit, Made, Study, Touch
@@ -64,8 +64,7 @@ def solver_row(name: str, made: Made) -> dict[str, Any]:
     if run is None:
         return row | {"status": "failed", "message": made.reason}
     if solver.package == "engine_check":
-        witness = witness_of(run.settings)
-        row |= {"equation": witness.equation, "reason": witness.words}
+        row |= {"reason": ENGINES[made.run.solver].words}
     landed = run.t[-1] >= run.scenario.duration * (1 - 1e-12)
     return row | {
         "status": run.status,

@@ -53,7 +53,6 @@ def claim_work_precision(studies: Sequence[WorkPrecision]) -> Iterator[Finding]:
     if "impacts" in by_name:
         study = by_name["impacts"]
         yield _pair(study, "exact-step on eq8", "midpoint on eq8")
-        yield _pair(study, "exact-step on eq8", "pymunk rotating on eq8")
         yield _pair(study, "pymunk on free-flight", "mujoco on free-flight")
         yield _cheapest(study, 1e-3)
         yield _cheapest(study, 1e-6)

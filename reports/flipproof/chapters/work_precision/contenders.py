@@ -47,7 +47,7 @@ OWN_LIMIT: Final = "limit of "
 """Leads the name of an equation that no model states: where the scheme itself goes on finer grids."""
 
 EQUATION_OF_SCHEME: Final[Mapping[str, str]] = {**LIMITS, "paper-typeset": AT_REST}
-EQUATION_OF_FRAME: Final[Mapping[str, str]] = {"free": "free-flight", "rotating": "eq8"}
+EQUATION_OF_ENGINES: Final = "free-flight"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -199,7 +199,7 @@ def left_out(effort: Effort) -> dict[str, str]:
     reasons = {
         f"{model}, all methods": "no scheme and no engine solves this equation: methods would only meet one another"
         for model in MODELS
-        if model not in (*EQUATION_OF_SCHEME.values(), *EQUATION_OF_FRAME.values())
+        if model not in (*EQUATION_OF_SCHEME.values(), EQUATION_OF_ENGINES)
     }
     for method in METHODS:
         if method not in effort.methods:
@@ -210,9 +210,6 @@ def left_out(effort: Effort) -> dict[str, str]:
                 f"left to benchmarks/work_precision.py for its time; the size «{effort.name}» asks where most compete"
             )
     for engine in ENGINES.values():
-        for frame in engine.frames:
-            if frame not in EQUATION_OF_FRAME:
-                reasons[f"{engine.name}, frame {frame}"] = "no model states the equation of this frame"
         for contact in engine.contacts:
             if contact != "overlap":
                 reasons[f"{engine.name}, slices = {contact}"] = (
@@ -236,25 +233,20 @@ def _schemes(effort: Effort) -> Iterator[Contender]:
 
 
 def _engines(case: Case, effort: Effort) -> Iterator[Contender]:
-    from engine_check.pymunk_rotating import ITERATIONS
     from engine_check.pymunk_settings import enough_iterations
 
     duration = case.scenario.duration
     for engine in ENGINES.values():
-        for frame in engine.frames:
-            if frame not in EQUATION_OF_FRAME:
-                continue
-            # Iterations by rule, where the engine's world iterates; they depend on the throw, not on dt.
-            iterations = ITERATIONS if frame == "rotating" else enough_iterations(case.scenario)
-            yield Contender(
-                name=engine.name if frame == "free" else f"{engine.name} {frame}",
-                family="engine",
-                solver=engine.name,
-                equation=EQUATION_OF_FRAME[frame],
-                fixed={"frame": frame, "times": case.times}
-                | ({"iterations": iterations} if engine.name == "pymunk" else {}),
-                levels=effort.engines.settings(lambda steps: {"dt": duration / steps}),
-            )
+        # Iterations by rule, where the engine iterates; they depend on the throw, not on dt.
+        iterated = {"iterations": enough_iterations(case.scenario)} if engine.name == "pymunk" else {}
+        yield Contender(
+            name=engine.name,
+            family="engine",
+            solver=engine.name,
+            equation=EQUATION_OF_ENGINES,
+            fixed={"times": case.times, **iterated},
+            levels=effort.engines.settings(lambda steps: {"dt": duration / steps}),
+        )
 
 
 def _methods(case: Case, effort: Effort, solved: list[str]) -> Iterator[Contender]:
