@@ -18,9 +18,9 @@ import reference
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 PAGES = {
-    "README.md": "Start", "docs/tutorial.md": "A lesson", "docs/theory.md": "Theory", "docs/landing.md": "The landing",
-    "docs/own-solver.md": "Your own solver", "docs/bounce.md": "Bounces", "docs/commands.md": "Commands",
-    "docs/sweeps.md": "Sweeps",
+    "README.md": "Start", "docs/tutorial.md": "A lesson", "docs/theory.md": "Theory", "docs/water.md": "Water",
+    "docs/landing.md": "The landing", "docs/own-solver.md": "Your own solver", "docs/bounce.md": "Bounces",
+    "docs/commands.md": "Commands", "docs/sweeps.md": "Sweeps",
     "docs/howto.md": "How to add a thing", "docs/house.md": "The house", "docs/measurements.md": "Measured numbers",
     "docs/dependencies.md": "Dependencies",
 }  # fmt: skip

@@ -84,6 +84,18 @@ PLAIN: Final[Mapping[str, str]] = {
 }
 """Name -> source of a number that is printed as it is."""
 
+WATER: Final = {
+    f"{name}_{word}": f"water/{place}"
+    for word, filling in (("half", "0.5"), ("three", "0.75"))
+    for name, place in {
+        "low": f"fluids/{filling}/low",
+        "high": f"fluids/{filling}/high",
+        "rods": f"equations/rods/fillings/{filling}/plateau",
+        "free": f"equations/free-flight/fillings/{filling}/plateau",
+    }.items()
+}
+"""Name -> source of a plateau over omega_0."""
+
 EXPERIMENTS: Final = {"minimum": "minimum", "change": "change-of-behaviour", "landing": "landing-angle"}
 
 
@@ -118,6 +130,7 @@ def story(content: Mapping[str, Any], tables: Mapping[str, str | None]) -> Simpl
         shares=_shares(summary),
         experiments={name: _experiment(summary, id_) for name, id_ in EXPERIMENTS.items()},
         nearest=_nearest(summary),
+        water=_water(summary),
         times={id_: summary.number(f"headlines/{id_}/time", rounded) for id_ in ("eq8-free", "whole", "program-eq8")},
         map=_map(tables.get("map-gamma")),
         names=NAMES,
@@ -169,6 +182,14 @@ def _experiment(summary: Summary, id_: str) -> SimpleNamespace | None:
     equations = {solver: summary.number(f"{place}/{solver}/value", shown) for solver in NAMES if solver != "pymunk"}
     verdicts = {solver: summary.at(f"{place}/{solver}/verdict") for solver in equations}
     return SimpleNamespace(values=equations, verdicts=verdicts)
+
+
+def _water(summary: Summary) -> SimpleNamespace | None:
+    """Return the plateaus of fluids, rods and free flight, half and three quarters full; None if any is missing."""
+    numbers = {name: summary.number(source, rounded) for name, source in WATER.items()}
+    for name, solver in (("rods", "rods"), ("free", "free-flight")):
+        numbers[f"{name}_off"] = summary.number(f"findings/water-{solver}/value", small)
+    return SimpleNamespace(**numbers) if all(numbers.values()) else None
 
 
 def _nearest(summary: Summary) -> list[SimpleNamespace]:
