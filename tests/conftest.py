@@ -10,7 +10,7 @@ import pytest
 
 from flipproof.build import Report, ask_of, build, gather_report
 from flipproof.chapters.solvers import WITNESSES
-from flipproof.chapters.work_precision import contenders
+from flipproof.chapters.work_precision.contenders import Asked, Effort, Grids
 from flipproof.frame.gather import Gathered
 from flipproof.frame.pool import Here
 from flipproof.output.provenance import provenance
@@ -24,6 +24,13 @@ LOOPS = (
     "land(Touch(scenario=throw, r=throw.initial_positions(), **still), Table(height=0.0))",
 )
 """A call of each compiled loop."""
+
+WORK = Effort(
+    schemes=Grids(6, (4, 6)),
+    engines=Grids(4, (4,)),
+    methods={"DOP853": Asked((1e-3, 1e-5, 1e-7)), "LSODA": Asked((1e-3, 1e-5, 1e-7), ("eq8",))},
+)
+"""A small study of work and precision."""
 
 
 def pytest_sessionstart(session):
@@ -59,7 +66,7 @@ def gathered() -> Gathered:
     """Gathered once per process."""
     ask = replace(ask_of(Scenario(), "quick", 20, WITNESSES), reference=Scenario().with_slices(20))
     # In this process: test_report.py has a report made by workers, whose start costs a fifth of all of it.
-    return gather_report(ask, work={"work-precision": contenders.QUICK}, pool=Here())
+    return gather_report(ask, work={"work-precision": WORK}, pool=Here())
 
 
 @pytest.fixture(scope="session")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, NamedTuple
 
-from flipproof.chapters.work_precision.contenders import CASES, COMMON, FULL
+from flipproof.chapters.work_precision.contenders import CASE, FULL
 from flipproof.chapters.work_precision.figure import figure_work_precision
 from flipproof.chapters.work_precision.study import (
     Cost,
@@ -16,7 +16,6 @@ from flipproof.chapters.work_precision.study import (
     WorkPrecision,
     plan_work_precision,
     study_work_precision,
-    words_of,
 )
 from flipproof.frame.chapter import Ask, Call, Chapter, Exhibit, Finding, Study, observed
 from flipproof.frame.findings import finite_or_none
@@ -25,41 +24,31 @@ from flipproof.output.columns import rows_csv
 from slicemodel.scenario import shortened
 
 
-def study(ask: Ask) -> Study[tuple[WorkPrecision, ...]]:
-    """Have workers time the runs of every throw of the effort ``ask.work``, those of one solver together."""
-    cases = [CASES[name] for name in ask.work.cases]
-    jobs = batches([(run, case.times) for case in cases for run in plan_work_precision(case, ask.work)])
+def study(ask: Ask) -> Study[WorkPrecision]:
+    """Have workers time the runs of the effort ``ask.work``, those of one solver together."""
+    jobs = batches([(run, CASE.times) for run in plan_work_precision(CASE, ask.work)])
     calls = [Call(make_timed, (job,), f"work, {job[0][0].solver}", timed=True) for job in jobs]
     # After the other runs, so that the compiled loop is there and its compiling is not counted.
     yield ()
     flights = yield calls
     made = {each.run: each for call in calls for each in flights.answer(call)}
-    return tuple(study_work_precision(case, ask.work, made) for case in cases)
+    return study_work_precision(CASE, ask.work, made)
 
 
-def claim_work_precision(studies: Sequence[WorkPrecision]) -> Iterator[Finding]:
-    """Yield what the throw through impacts says, and what impacts cost compared with the smooth one.
-
-    The other throws stand in the tables.
-    """
-    by_name = {study.case.name: study for study in studies}
-    for study in studies:
-        curve = study.curves["midpoint on eq8"]
-        title = f"observed order in cost of midpoint, {study.case.title}"
-        words = "order 2 where nothing strikes; v_CM jumps at an impact, and drag feels a mean of it for one whole step"
-        order = None if math.isnan(curve.slope) else curve.slope
-        note = curve.slope_reason or words
-        yield observed(f"work-order-midpoint-{study.case.name}", title, order, note=note, band=curve.slope_error)
-    if "impacts" in by_name:
-        study = by_name["impacts"]
-        yield _pair(study, "exact-step on eq8", "midpoint on eq8")
-        yield _pair(study, "pymunk on free-flight", "mujoco on free-flight")
-        yield _cheapest(study, 1e-3)
-        yield _cheapest(study, 1e-6)
-        yield _floors(study)
-        yield from _failures(study)
-        if "smooth" in by_name:
-            yield from _price_of_impacts(by_name["smooth"], study)
+def claims(study: WorkPrecision) -> Iterator[Finding]:
+    """Yield the order in cost of midpoint, prices side by side, the floors and what failed."""
+    curve = study.curves["midpoint on eq8"]
+    title = f"observed order in cost of midpoint, {study.case.title}"
+    words = "order 2 where nothing strikes; v_CM jumps at an impact, and drag feels a mean of it for one whole step"
+    order = None if math.isnan(curve.slope) else curve.slope
+    note = curve.slope_reason or words
+    yield observed(f"work-order-midpoint-{study.case.name}", title, order, note=note, band=curve.slope_error)
+    yield _pair(study, "exact-step on eq8", "midpoint on eq8")
+    yield _pair(study, "pymunk on free-flight", "mujoco on free-flight")
+    yield _cheapest(study, 1e-3)
+    yield _cheapest(study, 1e-6)
+    yield _floors(study)
+    yield from _failures(study)
 
 
 def _pair(study: WorkPrecision, first_key: str, second_key: str) -> Finding:
@@ -130,56 +119,29 @@ def _failures(study: WorkPrecision) -> Iterator[Finding]:
         yield observed("work-failed", title, float(sum(map(len, failed.values()))), note=note)
 
 
-def _price_of_impacts(smooth: WorkPrecision, through: WorkPrecision) -> Iterator[Finding]:
-    """Say what impacts cost a method: updates per second of flight to one error, before the first and through all."""
-    for equation in ("eq8", "free-flight"):
-        studies = smooth, through
-        prices = [study.curves[f"DOP853 on {equation}"].price(3e-4) for study in studies]
-        rates = [p.value / study.case.scenario.duration for p, study in zip(prices, studies, strict=True) if p]
-        if len(rates) == 2:
-            title = f"{equation}: updates of DOP853 per second of flight, through impacts over before the first"
-            note = f"error 3e-4 of ω₀; {rates[0]:.2g} updates per second before, {rates[1]:.2g} through all impacts"
-            yield observed(f"work-impacts-{equation}", title, rates[1] / rates[0], note=note)
-
-
-def figures(studies: Sequence[WorkPrecision]) -> Iterator[Exhibit]:
-    """Yield a figure for each throw over updates; if there are several, one of them over processor time as well."""
-    for study in studies:
-        yield _exhibit(study, "work")
-    if len(studies) > 1:
-        # Through impacts: there methods differ by what an event costs them.
-        yield _exhibit(next(study for study in studies if study.case.name == "impacts"), "seconds")
-
-
-def _exhibit(study: WorkPrecision, cost: Literal["work", "seconds"]) -> Exhibit:
-    timed = cost == "seconds"
+def figures(study: WorkPrecision) -> Iterator[Exhibit]:
+    """Yield the figure over updates of one slice."""
 
     def reached(curve: Curve) -> str:
         """Return error and cost of a contender's first and last level, or why there is none."""
         if not curve.whole:
             return f"{curve.contender.key}: {curve.failed[0].reason.partition(':')[0]}"
-        levels = (curve.whole[0], curve.whole[-1])
-        words = (f"{level.error:.1e} for {level.cost(cost):.1e}{' s' if timed else ''}" for level in levels)
+        words = (f"{level.error:.1e} for {level.work:.1e}" for level in (curve.whole[0], curve.whole[-1]))
         return f"{curve.contender.key}: {' to '.join(words)}"
 
     levels = "; ".join(map(reached, study.curves.values()))
     floors = ", ".join(f"{r.equation} {r.floor:.1e}" for r in study.references.values() if math.isfinite(r.floor))
-    return Exhibit(
-        name=f"work-precision-{study.case.name}{'-time' if timed else ''}",
-        title=f"What a digit costs: {study.case.title}{', in processor time' if timed else ''}",
+    yield Exhibit(
+        name=f"work-precision-{study.case.name}",
+        title=f"What a digit costs: {study.case.title}",
         caption="Farther left is cheaper, farther down is better; p is the order in cost. Each panel holds one "
         "equation and those who solve it, so that what lies between equations does not enter. In the grey nothing is "
         "claimed: there the reference itself is uncertain. A cross at the top edge is a run that failed; the table "
-        "says why. "
-        + (
-            "Schemes and engines run in compiled code, methods in Python: this is the price of a program."
-            if timed
-            else "An update of one slice is counted the same on every machine, but is not the same work to everyone."
-        ),
-        alt=f"Log-log plots of error, of omega_0, against {'processor time' if timed else 'updates of one slice'}. "
+        "says why. An update of one slice is counted the same on every machine, but is not the same work to everyone.",
+        alt="Log-log plots of error, of omega_0, against updates of one slice. "
         f"From the first level to the last: {levels}. Floors: {floors}.",
         maker=figure_work_precision,
-        data=(study, cost),
+        data=(study,),
         table=_levels_csv(study),
     )
 
@@ -211,17 +173,8 @@ class Table(NamedTuple):
     note: str = ""
 
 
-def tabulate_work_precision(studies: Sequence[WorkPrecision]) -> Iterator[Table]:
-    """Yield results and settings of every throw, then who is absent and why."""
-    for study in studies:
-        yield _results(study)
-        yield _settings(study)
-        yield _references(study)
-    # The same of every throw.
-    yield Table("work-absent", "Not competing", ("what", "why"), list(studies[0].absent.items()))
-
-
-def _results(study: WorkPrecision) -> Table:
+def tabulate(study: WorkPrecision) -> Table:
+    """Return what every contender reached and what an error costs it."""
     errors = (1e-2, 1e-3, 1e-4, 1e-6)
 
     rows = []
@@ -248,45 +201,8 @@ def _results(study: WorkPrecision) -> Table:
     )  # fmt: skip
 
 
-def _settings(study: WorkPrecision) -> Table:
-    counted = {
-        "scheme": "steps × slices (× 2 where it predicts)",
-        "method": "right-hand sides × slices",
-        "engine": "steps × slices × iterations, or × 4 for RK4",
-    }
-    rows = []
-    for curve in study.curves.values():
-        rival, levels = curve.contender, curve.contender.levels
-        name, first = next(iter(levels[0][0].items()))
-        refined = f"{name} {first:.3g} to {levels[-1][-1][name]:.3g}"
-        count = f"{len(levels)}" + (f" of {len(levels[0])} grids" if len(levels[0]) > 1 else "")
-        rows.append((rival.name, rival.equation, refined, count, words_of(curve.held), counted[rival.family]))
-    return Table(
-        f"work-settings-{study.case.name}",
-        f"Settings: {study.case.title}",
-        ("contender", "equation", "refined", "levels", "held", "an update is"),
-        rows,
-        f"{study.case.scenario.n_slices} slices; errors at {COMMON + 1} times that all grids share. A method's "
-        "absolute tolerance is a thousandth of its relative one.",
-    )
-
-
-def _references(study: WorkPrecision) -> Table:
-    rows = []
-    for one in study.references.values():
-        floors = (f"{floor:.1e}" if math.isfinite(floor) else "–" for floor in (one.floor, one.plateau_floor))
-        rows.append((one.equation, *floors, one.words + (f" ({one.reason})" if one.reason else "")))
-    return Table(
-        f"work-references-{study.case.name}",
-        f"References: {study.case.title}",
-        ("equation", "floor of ω", "floor of the plateau", "reference; its witnesses"),
-        rows,
-        "The floor is the largest difference between the reference and a witness, and never less than 1e-13.",
-    )
-
-
-def summarise_work_precision(studies: Sequence[WorkPrecision]) -> dict[str, Any]:
-    """Return every number of the diagrams as JSON-ready data; what is not finite becomes null."""
+def summarise_work_precision(study: WorkPrecision) -> dict[str, Any]:
+    """Return every number of the diagram as JSON-ready data; what is not finite becomes null."""
     return {
         study.case.name: {
             "title": study.case.title,
@@ -301,9 +217,7 @@ def summarise_work_precision(studies: Sequence[WorkPrecision]) -> dict[str, Any]
                 }
                 for key, curve in study.curves.items()
             },
-            "absent": dict(study.absent),
         }
-        for study in studies
     }
 
 
@@ -317,9 +231,9 @@ CHAPTER: Final = Chapter(
     name="work-precision",
     title="What a digit costs",
     study=study,
-    claims=claim_work_precision,
+    claims=claims,
     figures=figures,
     work={"full": FULL},
     summary=lambda found: {"work_precision": summarise_work_precision(found)},
-    page=lambda found: {"tables": list(tabulate_work_precision(found))},
+    page=lambda found: {"table": tabulate(found)},
 )

@@ -1,4 +1,4 @@
-"""Who competes in the work-precision study, on which throws, with which settings, against which equation.
+"""Who competes in the work-precision study, with which settings, against which equation.
 
 Every scheme of the slice model, every method of the reference and every engine comes from its package's own registry:
 a new one appears by itself. Each is held against the equation *it* solves, never against the one we believe in: what
@@ -20,7 +20,7 @@ engine has several members: their impacts fall at other phases of the step, and 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
@@ -30,12 +30,9 @@ from flipproof.chapters.solvers import LIMITS
 from flipproof.frame.solvers import Run
 from flipproof.frame.twins import usual_rest_speed
 from ode_reference.models import MODELS
-from slicemodel import Bottle, Scenario
+from slicemodel import Scenario
 from slicemodel.schemes import SCHEMES
 from slicemodel.trajectory import FloatArray
-
-METHODS: Final = ("DOP853", "LSODA", "Radau")
-"""The methods of ``ode_reference`` that compete."""
 
 COMMON: Final = 40
 """Intervals that all runs of a throw share."""
@@ -67,25 +64,8 @@ class Case:
 # With 20 slices, ten times the rest speed moves free flight by 1.4e-3 omega_0 after 1251 impacts, and nothing finer
 # than that could be told apart; with 12 by 1e-5.
 THROW: Final = Scenario().with_slices(12)
-OTHER: Final = Scenario(
-    bottle=Bottle(length=0.22, radius=0.033, mass=0.024, capacity=0.75),
-    water_mass=0.3,
-    n_slices=30,
-    drag=0.06,
-    restitution=0.35,
-    omega0=16.0,
-    theta0=1.1,
-    duration=0.45,
-).with_slices(12)
-
-CASES: Final[Mapping[str, Case]] = {
-    name: Case(name=name, title=title, scenario=scenario)
-    for name, title, scenario in (
-        ("smooth", "the paper's throw up to shortly before the first impact", replace(THROW, duration=0.03)),
-        ("impacts", "the paper's throw, with all its impacts", THROW),
-        ("other-bottle", "a smaller bottle, e = 0.35, less drag, slower spin", OTHER),
-    )
-}
+CASE: Final = Case(name="impacts", title="the paper's throw, with all its impacts", scenario=THROW)
+"""The throw of the report."""
 
 
 class Grids(NamedTuple):
@@ -108,27 +88,14 @@ class Asked(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effort:
-    """How much is run: throws, grids of schemes and engines, and what methods are asked."""
+    """How much is run: grids of schemes and engines, and what methods are asked."""
 
-    name: str
-    cases: tuple[str, ...]
     schemes: Grids
     engines: Grids
     methods: Mapping[str, Asked]
 
 
-COMPLETE: Final = Effort(
-    name="complete",
-    cases=tuple(CASES),
-    schemes=Grids(10, (4, 5, 6, 7)),
-    engines=Grids(7, (4, 5, 6, 7)),
-    methods=dict.fromkeys(METHODS, Asked((1e-3, 1e-5, 1e-7, 1e-9, 1e-11))),
-)
-"""By command only; a few minutes."""
-
-FULL: Final = replace(
-    COMPLETE,
-    name="full",
+FULL: Final = Effort(
     schemes=Grids(7, (4, 5, 6)),
     engines=Grids(5, (4, 6)),
     methods={
@@ -137,15 +104,6 @@ FULL: Final = replace(
         "LSODA": Asked((1e-3, 1e-6, 1e-9, 1e-11), ("eq8", "free-flight")),
         "Radau": Asked((1e-5, 1e-8), ("eq8", "free-flight")),
     },
-)
-
-QUICK: Final = replace(
-    FULL,
-    name="quick",
-    cases=("impacts",),
-    schemes=Grids(6, (4, 6)),
-    engines=Grids(4, (4,)),
-    methods={"DOP853": Asked((1e-3, 1e-5, 1e-7)), "LSODA": Asked((1e-3, 1e-5, 1e-7), ("eq8",))},
 )
 
 
@@ -192,31 +150,6 @@ def contenders(case: Case, effort: Effort) -> tuple[Contender, ...]:
     rivals = (*_schemes(effort), *_engines(case, effort))
     solved = {rival.equation for rival in rivals}
     return (*rivals, *_methods(case, effort, [model for model in MODELS if model in solved]))
-
-
-def left_out(effort: Effort) -> dict[str, str]:
-    """Return what does not compete, each with the reason."""
-    reasons = {
-        f"{model}, all methods": "no scheme and no engine solves this equation: methods would only meet one another"
-        for model in MODELS
-        if model not in (*EQUATION_OF_SCHEME.values(), EQUATION_OF_ENGINES)
-    }
-    for method in METHODS:
-        if method not in effort.methods:
-            reasons[method] = f"its runs take longest; the size «{effort.name}» leaves it to the larger ones"
-        elif effort.methods[method].equations:
-            asked = " and ".join(effort.methods[method].equations)
-            reasons[f"{method}, equations but {asked}"] = (
-                f"left to benchmarks/work_precision.py for its time; the size «{effort.name}» asks where most compete"
-            )
-    for engine in ENGINES.values():
-        for contact in engine.contacts:
-            if contact != "overlap":
-                reasons[f"{engine.name}, slices = {contact}"] = (
-                    "slices that meet are another equation, to which no scheme and no method here converges"
-                )
-    unthrown = (name for name in CASES if name not in effort.cases)
-    return reasons | {f"throw «{name}»": f"the size «{effort.name}» takes one throw" for name in unthrown}
 
 
 def _schemes(effort: Effort) -> Iterator[Contender]:

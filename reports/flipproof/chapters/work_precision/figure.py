@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
 
-from flipproof.chapters.work_precision.study import Cost, Curve, WorkPrecision
+from flipproof.chapters.work_precision.study import Curve, WorkPrecision
 from flipproof.figures.style import OTHERS, STYLES, new_figure, styled
 from ode_reference.models import MODELS
 
@@ -50,27 +50,27 @@ class Limits(NamedTuple):
 
 
 @styled
-def figure_work_precision(study: WorkPrecision, cost: Cost = "work") -> Figure:
+def figure_work_precision(study: WorkPrecision) -> Figure:
     """Draw one panel per equation on common axes, and a last one that explains the signs."""
     rows = math.ceil((len(study.references) + 1) / 2)
     figure, panels = new_figure(rows, 2, size=(8.0, 0.4 + 2.55 * rows), sharex=True, sharey=True, squeeze=False)
     *used, legend = list(panels.flat)[: len(study.references) + 1]
     for spare in list(panels.flat)[len(study.references) + 1 :]:
         spare.set_visible(False)
-    limits = _limits(study, cost)
+    limits = _limits(study)
     for axes, equation in zip(used, study.references, strict=True):
-        _panel(axes, study, equation, cost, limits)
+        _panel(axes, study, equation, limits)
     for axes in panels[:, 0]:
         axes.set_ylabel("max |Δω| / ω₀ [1]")
     for axes in used[-2:]:
-        axes.set_xlabel("updates of one slice [1]" if cost == "work" else "processor time, least of several runs [s]")
+        axes.set_xlabel("updates of one slice [1]")
         axes.xaxis.set_tick_params(labelbottom=True)
     _explain(legend)
     return figure
 
 
-def _limits(study: WorkPrecision, cost: Cost) -> Limits:
-    costs = [point.cost(cost) for curve in study.curves.values() for point in curve.points]
+def _limits(study: WorkPrecision) -> Limits:
+    costs = [point.work for curve in study.curves.values() for point in curve.points]
     finite = [value for value in costs if math.isfinite(value) and value > 0.0] or [1.0, 10.0]
     floors = [reference.floor for reference in study.references.values() if math.isfinite(reference.floor)]
     left, beside = min(finite) / 1.6, 1.6 * max(finite)
@@ -78,7 +78,7 @@ def _limits(study: WorkPrecision, cost: Cost) -> Limits:
     return Limits(left, beside, right, max(1e-14, min([1e-10, *floors]) / 10))
 
 
-def _panel(axes: Axes, study: WorkPrecision, equation: str, cost: Cost, limits: Limits) -> None:
+def _panel(axes: Axes, study: WorkPrecision, equation: str, limits: Limits) -> None:
     floor = study.references[equation].floor
     axes.set(xscale="log", yscale="log", xlim=(limits.left, limits.right), ylim=(limits.bottom, HIGHEST))
     # No ticks under the labels.
@@ -97,12 +97,12 @@ def _panel(axes: Axes, study: WorkPrecision, equation: str, cost: Cost, limits: 
     labels = []
     counts = dict.fromkeys(LINES, 0)
     for curve in study.of(equation):
-        labels.append(_curve(axes, curve, counts[curve.contender.family], cost))
+        labels.append(_curve(axes, curve, counts[curve.contender.family]))
         counts[curve.contender.family] += 1
     _write(axes, [label for label in labels if label is not None], limits)
 
 
-def _curve(axes: Axes, curve: Curve, k: int, cost: Cost) -> Label | None:
+def _curve(axes: Axes, curve: Curve, k: int) -> Label | None:
     """Draw a curve, the ``k``-th of its family; return its label if it has a point.
 
     The line tells the family, the marker who within it.
@@ -111,8 +111,8 @@ def _curve(axes: Axes, curve: Curve, k: int, cost: Cost) -> Label | None:
     known = STYLES.get(contender.name) or STYLES.get(contender.solver if contender.family == "engine" else "")
     colour = known["color"] if known else COLOURS.get(contender.name, OTHERS[k % len(OTHERS)])
     marker = MARKERS[contender.family][k % len(MARKERS[contender.family])]
-    whole = [point for point in curve.whole if math.isfinite(point.cost(cost))]
-    x = np.array([point.cost(cost) for point in whole])
+    whole = [point for point in curve.whole if math.isfinite(point.work)]
+    x = np.array([point.work for point in whole])
     low, y, high = (
         np.array([max(getattr(point, name), floor) for point in whole]) for name in ("lowest", "error", "highest")
     )
@@ -124,7 +124,7 @@ def _curve(axes: Axes, curve: Curve, k: int, cost: Cost) -> Label | None:
             x[chosen], y[chosen], linestyle="none", marker=marker, markersize=4.5, markerfacecolor=face,
             markeredgecolor=colour,
         )  # fmt: skip
-    failed = [point.cost(cost) for point in curve.failed if math.isfinite(point.cost(cost))]
+    failed = [point.work for point in curve.failed if math.isfinite(point.work)]
     if failed:
         axes.plot(
             failed, np.ones(len(failed)), "x", color=colour, markersize=6, markeredgewidth=1.5,

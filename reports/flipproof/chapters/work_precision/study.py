@@ -28,7 +28,7 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 
 from flipproof.chapters.step_size.chapter import ROUND_OFF, observed_order
-from flipproof.chapters.work_precision.contenders import AT_REST, Case, Contender, Effort, contenders, left_out
+from flipproof.chapters.work_precision.contenders import AT_REST, Case, Contender, Effort, contenders
 from flipproof.frame.solvers import Made, Run
 from flipproof.frame.timing import at_times
 from flipproof.frame.twins import usual_rest_speed
@@ -144,12 +144,11 @@ class Curve:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorkPrecision:
-    """The diagram of one throw. Every contender is in ``curves`` or, with its reason, in ``absent``."""
+    """The diagram of one throw."""
 
     case: Case
     references: Mapping[str, Reference]
     curves: Mapping[str, Curve]
-    absent: Mapping[str, str]
 
     def of(self, equation: str) -> tuple[Curve, ...]:
         """Return the curves of one equation."""
@@ -210,7 +209,7 @@ def study_work_precision(case: Case, effort: Effort, made: Mapping[Run, Made]) -
         for rival in rivals
     }
     references = {equation: reference for equation, (reference, _) in truths.items()}
-    return WorkPrecision(case=case, references=references, curves=curves, absent=left_out(effort))
+    return WorkPrecision(case=case, references=references, curves=curves)
 
 
 def _reference(case: Case, equation: str, runs: Sequence[Made]) -> tuple[Reference, FloatArray | None]:
