@@ -21,7 +21,7 @@ PAGES = {
     "README.md": "Start", "docs/tutorial.md": "A lesson", "docs/theory.md": "Theory", "docs/water.md": "Water",
     "docs/landing.md": "The landing", "docs/own-solver.md": "Your own solver", "docs/bounce.md": "Bounces",
     "docs/commands.md": "Commands", "docs/sweeps.md": "Sweeps",
-    "docs/howto.md": "How to add a thing", "docs/house.md": "The house", "docs/measurements.md": "Measured numbers",
+    "docs/howto.md": "How to add a thing", "docs/house.md": "The house",
     "docs/dependencies.md": "Dependencies",
 }  # fmt: skip
 """File -> its name in the site's contents, in their order."""
