@@ -1,8 +1,8 @@
 // A Runge-Kutta solver of Eq. 8 in JavaScript, which knows flipproof only by files.
 //
 //   flipproof certify "cmd:node eq8.mjs {scenario} {times} {start} {effort} {out}" --equation eq8
-//   flipproof kit --out my-kit --name eq8.mjs --equation eq8 --refined-by dt
-//   node eq8.mjs my-kit && flipproof grade my-kit
+//   flipproof certify csv:answers --equation eq8 --refined-by dt --order 4      (writes the questions)
+//   node eq8.mjs answers && flipproof certify csv:answers
 
 import { existsSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
@@ -100,9 +100,9 @@ if (rest.length) {
   const [times, start, effort, out] = rest;
   answer(first, times, start, Number(effort), out);
 } else {
-  for (const name of readdirSync(join(first, "asks")).sort()) {
-    const at = (file) => join(first, "asks", name, file);
-    if (existsSync(at("answer.csv"))) continue;
+  for (const name of readdirSync(first).sort()) {
+    const at = (file) => join(first, name, file);
+    if (!existsSync(at("effort.txt")) || existsSync(at("answer.csv"))) continue;
     answer(at("scenario.toml"), at("times.csv"), at("start.csv"), Number(readFileSync(at("effort.txt"), "utf8")), at("answer.csv"));
   }
 }

@@ -1,8 +1,8 @@
 % The paper's MATLAB program (Supplementary Text 1) for Octave, as a solver that flipproof asks by files.
 %
 %   flipproof certify "cmd:octave-cli -q paper.m {scenario} {times} {start} {effort} {out}" --equation published-matlab
-%   flipproof kit --out my-kit --name paper.m --equation published-matlab --refined-by dt --order 1
-%   octave-cli -q paper.m my-kit && flipproof grade my-kit
+%   flipproof certify csv:answers --equation published-matlab --refined-by dt --order 1     (writes the questions)
+%   octave-cli -q paper.m answers && flipproof certify csv:answers
 %
 % The step, the signs, g = 9.8 and the rebound factor -1/2 are as printed. Bottle, water, drag and release are those of
 % the throw that is asked for, and only the present step is kept. Slices leave the bottle here, as they do there.
@@ -99,10 +99,10 @@ end
 given = argv();
 if numel(given) == 5
   Answer(given{1:3}, str2double(given{4}), given{5});
-else  % the folder of a kit: answer every ask that has no answer
-  for name = sort({dir(fullfile(given{1}, "asks")).name})
-    place = fullfile(given{1}, "asks", name{1});
-    if name{1}(1) != "." && !exist(fullfile(place, "answer.csv"), "file")
+else  % a folder of questions: answer every one that has no answer
+  for name = sort({dir(given{1}).name})
+    place = fullfile(given{1}, name{1});
+    if name{1}(1) != "." && exist(fullfile(place, "effort.txt"), "file") && !exist(fullfile(place, "answer.csv"), "file")
       effort = str2double(fileread(fullfile(place, "effort.txt")));
       Answer(fullfile(place, "scenario.toml"), fullfile(place, "times.csv"), fullfile(place, "start.csv"), effort, ...
         fullfile(place, "answer.csv"));

@@ -103,6 +103,8 @@ def prepare(
     # A full bottle is mirror symmetric to the last digit: its stack is as high as the tube is long.
     empty = (1.0 - scenario.fill_fraction) * scenario.bottle.length / 2
     points[PLACE] = empty + ((n - 1) / 2 - np.arange(n, dtype=np.float64)) * scenario.slice_height
+    if type(scenario).initial_positions is not Scenario.initial_positions:  # let go elsewhere than Eq. 3a says
+        points[PLACE] = scenario.initial_positions() - scenario.bottle.length / 2
     points[PLACE] += moved
     return flight, points, marks
 

@@ -7,7 +7,7 @@ import pytest
 from flipproof.check.diff import read_summary
 from flipproof.cli.main import main
 from flipproof.figures.style import draw, new_figure, shared_legend, styled
-from flipproof.foreign.files import Kit
+from flipproof.foreign.files import Folder
 
 
 @styled
@@ -21,10 +21,10 @@ def test_a_name_with_dollar_signs_is_drawn_as_text(name):
     assert "<svg" in draw(figure).svg
 
 
-def test_a_kit_nested_without_end_is_refused_by_its_file(tmp_path):
-    (tmp_path / "kit.json").write_text("[" * 200_000)
-    with pytest.raises(ValueError, match=r"kit\.json"):
-        Kit(tmp_path)
+def test_a_folder_of_questions_nested_without_end_is_refused_by_its_file(tmp_path):
+    (tmp_path / "solver.json").write_text("[" * 200_000)
+    with pytest.raises(ValueError, match=r"solver\.json"):
+        Folder(tmp_path)
 
 
 def finding(name, value):

@@ -1,11 +1,14 @@
-"""The commands of ``flipproof`` about solvers, its own and anybody's: models, certify, place, explain, kit, power."""
+"""The commands of ``flipproof`` about solvers, its own and anybody's: models, certify, place, explain, power."""
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
+import stat
 import sys
 import textwrap
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
@@ -24,8 +27,8 @@ from flipproof.cli.arguments import (
 from flipproof.cli.console import patience
 
 SPEC_HELP = (
-    "a name that flipproof models lists, package.module:name, file.py:name, csv:file.csv or "
-    "cmd:'program {scenario} {times} {out}'; it runs with your rights"
+    "a name that flipproof models lists, package.module:name, file.py:name, "
+    "cmd:'program {scenario} {times} {start} {effort} {out}' or csv:FOLDER; it runs with your rights"
 )
 
 
@@ -36,6 +39,16 @@ def add_foreign(commands: Any) -> None:
     )
     _add_spec(certify)
     certify.add_argument("--equation", metavar="E", help="hold it to this equation, whatever it declares")
+    said = certify.add_argument_group("of a cmd: or csv: solver, which cannot say it of itself")
+    said.add_argument("--name", help="its name")
+    said.add_argument("--refined-by", choices=("dt", "steps", "rtol"), help="what its effort is")
+    said.add_argument(
+        "--precision",
+        choices=("float64", "float32", "8 digits", "7 digits", "6 digits"),
+        help="of its arithmetic, or of what it prints",
+    )
+    said.add_argument("--order", type=float, metavar="P", help="order of its error before impacts")
+    certify.add_argument("--seed", type=int, metavar="K", help="draw other throws for the check elsewhere")
     add_json(certify, "the passport (traits, results, versions)")
     certify.add_argument("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML")
 
@@ -48,18 +61,6 @@ def add_foreign(commands: Any) -> None:
     explain.add_argument("second", metavar="B", help="the same")
     explain.add_argument("--scenario", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     explain.add_argument("--slices", type=count, default=10, metavar="N", help="slices of the throw (default 10)")
-
-    kit = add_command(commands, "kit", "Write the conformance suite as files, for any language.", command_kit)
-    kit.add_argument("--out", type=Path, required=True, metavar="DIR", help="a new folder")
-    kit.add_argument("--name", default="my solver", help="name of the solver (default: my solver)")
-    kit.add_argument("--equation", metavar="E", help="the equation it solves, if you know")
-    kit.add_argument("--refined-by", choices=("dt", "steps", "rtol"), help="what effort.txt means to it")
-    kit.add_argument("--precision", choices=("float64", "float32"), default="float64", help="of its arithmetic")
-    kit.add_argument("--order", type=float, metavar="P", help="order of its error before impacts")
-
-    grade = add_command(commands, "grade", "Judge the answers in a kit.", command_grade)
-    grade.add_argument("folder", type=Path, metavar="DIR", help="the folder that flipproof kit made")
-    add_json(grade, "the passport")
 
     power = add_command(
         commands, "power", "Plant known mistakes in a good solver; which checks see them?", command_power
@@ -106,31 +107,80 @@ def _add_spec(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--timeout", type=count, metavar="S", help="seconds one run may take (default: as it declares)"
     )
+    command.add_argument(
+        "--memory", type=count, metavar="MB", help="megabytes it may take (default: half of the machine's)"
+    )
+
+
+def _opened(options: argparse.Namespace, **given: Any) -> Any:
+    """Return the runner of ``options.spec``, with its limits."""
+    from flipproof.foreign.specs import offered, opened
+    from flipproof.frame.solvers import catalogue
+
+    if options.spec in catalogue() and options.spec in offered():
+        print(f"flipproof: {options.spec} is flipproof's own; the entry point of that name is hidden", file=sys.stderr)
+    memory = options.memory * 1e6 if options.memory else None
+    return opened(options.spec, options.timeout, memory=memory, given=given)
 
 
 def command_certify(options: argparse.Namespace) -> int:
-    """Print one line a check; return 1 if one failed."""
+    """Print one line a check; return 1 if one failed, or if answers are missing."""
+    from flipproof.foreign.isolated import watched
+
+    with watched():  # before anything starts threads
+        return _certified(options)
+
+
+def _certified(options: argparse.Namespace) -> int:
     from flipproof.foreign.certify import certify, findings_of
     from flipproof.foreign.contract import check_equation
-    from flipproof.foreign.specs import opened
+    from flipproof.foreign.elsewhere import SEED
+    from flipproof.foreign.files import Folder
 
     if options.equation is not None:
         check_equation(options.equation)
     check_outputs(options, "json", "junit")
-    with closing(opened(options.spec, options.timeout)) as runner, patience(20.0):
-        found = certify(runner, equation=options.equation, say=lambda result: print(result.line, flush=True))
-    write_json(options.json, found.to_mapping())
-    write_junit(options.junit, findings_of(found), f"flipproof certify {found.traits.name}")
-    print(found.conclusion)
-    return 1 if found.failed else 0
+    names = ("name", "refined_by", "precision", "order")
+    given = {name: value for name in names if (value := getattr(options, name)) is not None}
+    lines: list[str] = []
+
+    def say(line: str) -> None:
+        lines.append(line)
+        print(line, flush=True)
+
+    seed = SEED if options.seed is None else options.seed
+    with closing(_opened(options, **given)) as runner, patience(20.0):
+        found = certify(runner, equation=options.equation, seed=seed, say=lambda result: say(result.line))
+        write_json(options.json, found.to_mapping())
+        write_junit(options.junit, findings_of(found), f"flipproof certify {found.traits.name}")
+    say(found.conclusion)
+    waiting = len(runner.waiting) if isinstance(runner, Folder) else 0
+    if waiting:
+        questions = "1 question waits" if waiting == 1 else f"{waiting} questions wait"
+        say(f"{questions} for answer.csv (columns t, theta, omega; r_0 to r_(N-1), v_0 to v_(N-1) if you have them)")
+        say(f"in {runner.folder}; certify again when they are there")
+    _print_again(lines)
+    return 1 if found.failed or waiting else 0
+
+
+def _print_again(lines: Sequence[str]) -> None:
+    """Print all lines once more if somebody has shortened the file that standard output goes to."""
+    try:
+        there = os.fstat(1)
+        if stat.S_ISREG(there.st_mode) and there.st_size < os.lseek(1, 0, os.SEEK_CUR):
+            os.lseek(1, 0, os.SEEK_SET)
+            os.ftruncate(1, 0)
+            print("\n".join(lines), flush=True)
+    except (OSError, ValueError):
+        pass
 
 
 def command_place(options: argparse.Namespace) -> int:
     """Print where a solver stands; return 1 if it is off the lattice."""
     from flipproof.foreign.place import place
-    from flipproof.foreign.specs import ForeignError, opened
+    from flipproof.foreign.specs import ForeignError
 
-    with closing(opened(options.spec, options.timeout)) as runner, patience():
+    with closing(_opened(options)) as runner, patience():
         _ = runner.traits  # loads the solver: one that cannot be loaded is an error, not off the lattice
         try:
             found = place(runner)
@@ -150,37 +200,6 @@ def command_explain(options: argparse.Namespace) -> int:
     with closing(opened(options.first)) as one, closing(opened(options.second)) as other, patience():
         print(explain(one, other, throw).text)
     return 0
-
-
-def command_kit(options: argparse.Namespace) -> int:
-    """Write the asks into a new folder."""
-    from flipproof.foreign.contract import Traits
-    from flipproof.foreign.files import Kit
-
-    traits = {name: getattr(options, name) for name in ("name", "equation", "refined_by", "precision", "order")}
-    try:
-        kit = Kit.made(options.out, Traits(**traits))
-    except OSError as error:
-        raise ValueError(f"--out {options.out} cannot be written ({error.strerror or error})") from None
-    asks = f"{len(kit.asks)} asks in {options.out / 'asks'}"
-    print(f"{asks}: write answer.csv beside each scenario.toml (columns t, theta,")
-    print(f"omega; r_0 to r_(N-1) if you have them), then run: flipproof grade {options.out}")
-    return 0
-
-
-def command_grade(options: argparse.Namespace) -> int:
-    """Print one line a check; return 1 if one failed or answers are missing."""
-    from flipproof.foreign.files import Kit
-
-    found, waiting = Kit(options.folder).grade()
-    for result in found.results:
-        print(result.line)
-    write_json(options.json, found.to_mapping())
-    print(found.conclusion)
-    if waiting:
-        asks = "1 ask waits" if waiting == 1 else f"{waiting} asks wait"
-        print(f"{asks} for answers in {options.folder / 'asks'}; grade again when they are there")
-    return 1 if found.failed or waiting else 0
 
 
 def command_power(options: argparse.Namespace) -> int:

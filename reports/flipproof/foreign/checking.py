@@ -1,7 +1,7 @@
 """What a check is: a generator that yields asks, is sent the answers, and returns what it found.
 
 Checks are written this way so that whoever drives them decides where the answers come from: a solver that is asked one
-ask after the other (``certify``), or a folder of answers that somebody made elsewhere (``files.Kit``).
+ask after the other (``certify``), or a folder of answers that somebody made elsewhere (``files.Folder``).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from flipproof.foreign.contract import Answer, Ask, Traits
-from flipproof.foreign.specs import WaitingError
+from flipproof.foreign.specs import ForeignError, WaitingError
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
@@ -33,7 +33,7 @@ class Found:
     """What a check found.
 
     ``expected`` and ``came`` are phrases with numbers, ``where`` names throw and time, ``advice`` says what to do if
-    the check failed; ``facts`` goes into the passport.
+    the check failed; ``weak`` says what the check could not see although it holds; ``facts`` goes into the passport.
     """
 
     holds: bool
@@ -41,6 +41,7 @@ class Found:
     came: str
     where: str = ""
     advice: str = ""
+    weak: str = ""
     facts: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -85,7 +86,14 @@ def drive(making: Generator[Sequence[Ask], Sequence[Answer], Result], runner: Ca
     try:
         asks = next(making)
         while True:
-            asks = making.send(_answers(asks, runner))
+            try:
+                answers = _answers(asks, runner)
+            except WaitingError:
+                raise
+            except ForeignError as error:
+                asks = making.throw(error)
+                continue
+            asks = making.send(answers)
     except StopIteration as end:
         found: Result = end.value
         return found

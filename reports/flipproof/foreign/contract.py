@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -23,8 +23,10 @@ from slicemodel.observables import centre_of_mass, moment_of_inertia
 from slicemodel.scenario import shown, unknown_name
 from slicemodel.trajectory import IMPACT_FIELDS, FloatArray, Impacts, Trajectory
 
-PRECISIONS: Final = MappingProxyType({"float64": 2.0**-52, "float32": 2.0**-23})
-"""Number formats a solver may compute in, with the spacing of their numbers at 1."""
+PRECISIONS: Final = MappingProxyType(
+    {"float64": 2.0**-52, "float32": 2.0**-23, "8 digits": 1e-8, "7 digits": 1e-7, "6 digits": 1e-6}
+)
+"""Number formats a solver may compute in or print, with the spacing of their numbers at 1."""
 
 REFINERS: Final = ("dt", "steps", "rtol")
 """What the effort of a solver may be: a step [s], a number of steps, a relative tolerance."""
@@ -59,6 +61,26 @@ class Ask:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Started(Scenario):
+    """A throw whose slices are let go at ``places`` [m from the cap] instead of as a stack on the base."""
+
+    places: tuple[float, ...]
+
+    def initial_positions(self) -> FloatArray:
+        """Return the places, shape (N,) [m]."""
+        return np.array(self.places)
+
+
+def started(ask: Ask) -> Scenario:
+    """Return the throw of an ask for flipproof's own solvers, which take the start from the throw."""
+    throw = ask.scenario
+    if np.array_equal(ask.start, throw.initial_positions()):
+        return throw
+    given = {f.name: getattr(throw, f.name) for f in fields(throw)}
+    return Started(**given, places=tuple(ask.start.tolist()))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Traits:
     """What a solver says of itself.
 
@@ -71,7 +93,7 @@ class Traits:
         The equation that it solves: a rung of the ladder ("eq8"), a set of switches ("switches:111100"), or a
         published program ("published-python"). None: flipproof is to find out.
     refined_by : {"dt", "steps", "rtol"} or None - what ``Ask.effort`` means to it
-    precision : {"float64", "float32"} - of its arithmetic
+    precision : {"float64", "float32", "8 digits", "7 digits", "6 digits"} - of its arithmetic, or of what it prints
     order : float or None - order of its error in dt before the first impact
     distribution : str - the installed package it comes from, for the record
     timeout : float - seconds one run may take, in (0, 86400]

@@ -1,13 +1,4 @@
-"""Solvers that answer by files: a curve that is there already, any program that reads and writes CSV, and a kit.
-
-A kit is the suite as a folder, for solvers in any language:
-
-    DIR/kit.json             what the solver says of itself, and the list of asks
-    DIR/asks/0001/           scenario.toml, scenario.json, times.csv, start.csv, effort.txt
-    DIR/asks/0001/answer.csv is written by the solver: columns t, theta, omega and, if known, r_0 ..., v_0 ..., r_cm
-
-Some asks depend on earlier answers: ``grade`` adds them, and says how many wait.
-"""
+"""Solvers that answer by files: a curve that is there already, any program that reads and writes CSV, and a folder."""
 
 from __future__ import annotations
 
@@ -15,21 +6,22 @@ import csv
 import hashlib
 import json
 import re
+import shutil
 import subprocess
 import tempfile
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from types import MappingProxyType
+from typing import Any, Final
 
 import numpy as np
 
 from flipproof.foreign.contract import PER_SLICE, Answer, AnswerError, Ask, Traits, answer_of
-from flipproof.foreign.isolated import PATIENCE, end_group, last_line
+from flipproof.foreign.isolated import PATIENCE, accuse, end, half_of_memory, last_line, start
 from flipproof.foreign.specs import ForeignError, Runner, WaitingError, words_of, written
 from flipproof.sweep.files import write_whole
-
-if TYPE_CHECKING:
-    from flipproof.foreign.certify import Certificate
+from slicemodel.scenario import unknown_name
 
 
 def read_answer(path: Path, n_slices: int) -> dict[str, Any]:
@@ -44,6 +36,9 @@ def read_answer(path: Path, n_slices: int) -> dict[str, Any]:
             body = [(rows.line_num, row) for row in rows if row]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise AnswerError(f"{path} cannot be read ({error})") from None
+    if len(header) == 1 and (mark := next((m for m in (";", "\t") if m in header[0]), "")):
+        kind = "semicolons" if mark == ";" else "tabs"
+        raise AnswerError(f"{path} separates its columns by {kind}; commas are needed, and points in numbers")
     if not header or not body:
         raise AnswerError(f"{path} has no {'rows' if header else 'header'}; columns t, theta, omega are needed")
     if len(set(header)) < len(header):
@@ -52,12 +47,14 @@ def read_answer(path: Path, n_slices: int) -> dict[str, Any]:
     cells: dict[str, list[float]] = {name: [] for name in header}
     for line, row in body:
         if len(row) != len(header):
-            raise AnswerError(f"{path}: line {line} has {len(row)} cells, the header {len(header)}")
+            why = "; a decimal comma? numbers need points" if len(row) == 2 * len(header) else ""
+            raise AnswerError(f"{path}: line {line} has {len(row)} cells, the header {len(header)}{why}")
         for name, cell in zip(header, row, strict=True):
             try:
                 cells[name].append(float(cell))
             except ValueError as error:
-                raise AnswerError(f"{path}: line {line}, column {name}: {error}") from None
+                comma = "; a decimal comma? numbers need points" if re.fullmatch(r"\s*[-+]?\d+,\d+.*", cell) else ""
+                raise AnswerError(f"{path}: line {line}, column {name}: {error}{comma}") from None
     columns: dict[str, Any] = {name: np.array(values) for name, values in cells.items()}
     for name in PER_SLICE:
         needed = [f"{name}_{i}" for i in range(n_slices)]
@@ -90,7 +87,8 @@ def answer_in(path: Path, ask: Ask, name: str, *, own_times: bool = False) -> An
     try:
         return answer_of(ask, read_answer(path, ask.scenario.n_slices), own_times=own_times)
     except AnswerError as error:
-        raise ForeignError(str(error).replace(str(path), name)) from None
+        said = str(error).replace(str(path), name)
+        raise ForeignError(said if name in said else f"{name}: {said}") from None
 
 
 class File(Runner):
@@ -107,29 +105,50 @@ class File(Runner):
         return answer_in(self.path, ask, str(self.path), own_times=True)
 
 
-class Command(Runner):
-    """A program: flipproof writes scenario, times and start as files, calls it, and reads the CSV that it wrote."""
+PLACEHOLDERS: Final = ("scenario", "times", "start", "effort", "out")
+"""What a command may hold in braces: the files that it is to read, its effort, and the file that it is to write."""
 
-    def __init__(self, spec: str, timeout: float | None = None) -> None:
+
+class Command(Runner):
+    """A program: flipproof writes scenario, times and start as files, calls it, and reads the CSV that it wrote.
+
+    What it cannot say of itself is ``given``; one with {effort} takes it for a step unless that says otherwise.
+    """
+
+    def __init__(
+        self,
+        spec: str,
+        timeout: float | None = None,
+        memory: float | None = None,
+        given: Mapping[str, Any] = MappingProxyType({}),
+    ) -> None:
         self.words = words_of(spec)
         if not self.words or not any("{out}" in word for word in self.words):
             raise ValueError(f"solver {spec!r}: a command must hold {{out}}, the CSV file that it is to write")
-        effort = any("{effort" in word for word in self.words)
-        self.timeout = timeout or 60.0
+        for name in re.findall(r"(?<!\{)\{([A-Za-z_]+)\}(?!\})", " ".join(self.words)):
+            if name not in PLACEHOLDERS:
+                words = unknown_name(f"solver {spec!r}: placeholder", name, PLACEHOLDERS)
+                raise ValueError(f"{words} (write {{{{{name}}}}} if it is the program's own)")
+        effort = any("{effort}" in word for word in self.words)
+        self.timeout, self.memory = timeout or 60.0, memory or half_of_memory()
         self._late = 0
         name = next((Path(w).name for w in self.words[1:] if not w.startswith(("-", "{"))), Path(self.words[0]).name)
-        self.traits = Traits(name=name, refined_by="dt" if effort else None, timeout=self.timeout)
+        said = {"name": name, "refined_by": "dt" if effort else None, "timeout": self.timeout, **given}
+        if said["refined_by"] and not effort:
+            raise ValueError(f"solver {spec!r}: refined_by = {said['refined_by']!r} needs {{effort}} in the command")
+        self.traits = Traits(**said)
 
     def __call__(self, ask: Ask) -> Answer:
         """Return the checked answer."""
         if self._late >= PATIENCE:
             raise ForeignError(f"not asked: {PATIENCE} runs in a row gave no answer in time")
-        with tempfile.TemporaryDirectory(prefix="flipproof-") as scratch:
+        with tempfile.TemporaryDirectory(prefix="flipproof-", ignore_cleanup_errors=True) as scratch:
             values = write_ask(ask, Path(scratch))
             words = self.words
             for name, value in values.items():
                 words = [word.replace(f"{{{name}}}", value) for word in words]
-            self._run(words)
+            self._run([word.replace("{{", "{").replace("}}", "}") for word in words])
+            accuse()
             out = Path(values["out"])
             if not out.is_file():
                 raise ForeignError(f"{self.words[0]} ended without writing {{out}}")
@@ -138,9 +157,8 @@ class Command(Runner):
     def _run(self, words: list[str]) -> None:
         with tempfile.TemporaryFile() as said:
             try:
-                process = subprocess.Popen(
-                    words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=said, start_new_session=True
-                )
+                null = subprocess.DEVNULL
+                process = start(words, self.memory, stdin=null, stdout=null, stderr=said)
             except OSError as error:
                 raise ForeignError(f"{words[0]} cannot be started ({error.strerror or error})") from None
             try:
@@ -150,81 +168,52 @@ class Command(Runner):
                 self._late += 1
                 raise ForeignError(f"no answer within {self.timeout:g} s; the program was ended") from None
             finally:
-                if process.poll() is None:
-                    end_group(process)
+                end(process)
             if status:
                 said.seek(max(0, said.seek(0, 2) - 4096))
                 last = last_line(said.read())
                 raise ForeignError(f"{words[0]} ended with status {status}{f': {last}' if last else ''}")
 
 
-INDEX: Final = "kit.json"
+class Folder(Runner):
+    """Questions and answers as files, for a solver that cannot be called; a new question is added to them.
 
-
-class Kit(Runner):
-    """A folder of asks and answers as a runner, which adds asks that are not there yet.
-
-    A folder that is no kit raises a ValueError.
+    ``FOLDER/0001-KEY/`` holds scenario.toml, scenario.json, times.csv, start.csv and effort.txt; the solver's author
+    puts answer.csv beside them. ``FOLDER/solver.json`` keeps what is ``given`` of the solver. Equal questions have
+    equal keys. Raises ValueError for a folder that holds something else.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        try:
-            index = json.loads((folder / INDEX).read_text(encoding="utf-8"))
-            self.traits = Traits(**index["solver"])
-            self.asks: list[str] = [str(key) for key in index["asks"]]
-            if index["kit"] != 1:
-                raise ValueError(f"format {index['kit']!r}, must be 1")
-        except OSError as error:
-            raise ValueError(f"{folder}: is no kit ({INDEX}: {error.strerror or error})") from None
-        except (ValueError, TypeError, KeyError, RecursionError) as error:
-            raise ValueError(f"{folder / INDEX}: is not readable ({error})") from None
+    def __init__(self, folder: Path, given: Mapping[str, Any] = MappingProxyType({})) -> None:
+        self.folder, index = folder, folder / "solver.json"
         self.waiting: set[Path] = set()
-
-    @classmethod
-    def made(cls, folder: Path, traits: Traits) -> Kit:
-        """Return a new kit with every ask that needs no earlier answer; the folder must be new or empty."""
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            raise ValueError(f"{folder} is not empty; name a new folder")
-        (folder / "asks").mkdir(parents=True)
-        _write_index(folder, traits, [])
-        kit = cls(folder)
-        kit.grade()
-        return kit
-
-    def grade(self) -> tuple[Certificate, int]:
-        """Return the certificate by the answers that are there, and how many different asks wait for one."""
-        from flipproof.foreign.certify import certify
-
-        self.waiting.clear()
-        return certify(self), len(self.waiting)
+        if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not index.is_file())):
+            raise ValueError(f"{folder} holds something else than questions; name a new folder")
+        try:
+            said = json.loads(index.read_text(encoding="utf-8")) if index.is_file() else {"name": folder.name}
+            self.traits = Traits(**{**said, **given})
+        except (OSError, ValueError, TypeError, RecursionError) as error:
+            raise ValueError(f"{index}: is not readable ({error})") from None
+        if given or not index.is_file():
+            folder.mkdir(parents=True, exist_ok=True)
+            kept = {name: value for name, value in asdict(self.traits).items() if value not in (None, "", {})}
+            write_whole(index, (json.dumps(kept, indent=1) + "\n").encode())
 
     def __call__(self, ask: Ask) -> Answer:
-        """Return the answer that lies in the folder of an ask; add the folder if there is none."""
-        path = self._place(ask) / "answer.csv"
+        """Return the answer beside a question; add the question if it is not there."""
+        text = json.dumps([ask.scenario.to_mapping(), ask.effort, dict(ask.options)], sort_keys=True).encode()
+        key = hashlib.sha256(text + ask.times.tobytes() + ask.start.tobytes()).hexdigest()[:12]
+        place = next(iter(self.folder.glob(f"[0-9]*-{key}")), None)
+        if place is None:
+            place = self.folder / f"{len(list(self.folder.glob('[0-9]*-*'))) + 1:04d}-{key}"
+            with tempfile.TemporaryDirectory(dir=self.folder, prefix=".new-") as new:  # whole or not at all
+                write_ask(ask, Path(new))
+                effort = "" if ask.effort is None else f"{ask.effort!r}\n"
+                throw = json.dumps(ask.scenario.to_mapping(), indent=1) + "\n"
+                (Path(new) / "scenario.json").write_text(throw, encoding="utf-8")
+                (Path(new) / "effort.txt").write_text(effort, encoding="utf-8")
+                shutil.copytree(new, place)
+        path = place / "answer.csv"
         if not path.is_file():
             self.waiting.add(path)
             raise WaitingError(f"{path.relative_to(self.folder)} is not there yet")
         return answer_in(path, ask, str(path.relative_to(self.folder)))
-
-    def _place(self, ask: Ask) -> Path:
-        """Return the folder of an ask, which equal asks share."""
-        text = json.dumps([ask.scenario.to_mapping(), ask.effort, dict(ask.options)], sort_keys=True)
-        key = hashlib.sha256(text.encode() + np.ascontiguousarray(ask.times).tobytes()).hexdigest()[:16]
-        if key in self.asks:
-            return self.folder / "asks" / f"{self.asks.index(key) + 1:04d}"
-        self.asks.append(key)
-        place = self.folder / "asks" / f"{len(self.asks):04d}"
-        # A folder that the index does not have is of a run that was interrupted; its ask may have been another one.
-        place.mkdir(exist_ok=True)
-        (place / "answer.csv").unlink(missing_ok=True)
-        write_ask(ask, place)
-        (place / "scenario.json").write_text(json.dumps(ask.scenario.to_mapping(), indent=1) + "\n", encoding="utf-8")
-        (place / "effort.txt").write_text("" if ask.effort is None else f"{ask.effort!r}\n", encoding="utf-8")
-        _write_index(self.folder, self.traits, self.asks)
-        return place
-
-
-def _write_index(folder: Path, traits: Traits, asks: list[str]) -> None:
-    index = {"kit": 1, "solver": asdict(traits), "asks": asks}
-    write_whole(folder / INDEX, (json.dumps(index, indent=1) + "\n").encode())

@@ -7,24 +7,29 @@ flipproof keeps the end.
 
 from __future__ import annotations
 
+import _thread
 import contextlib
 import functools
+import io
+import itertools
 import json
+import math
 import os
-import queue
+import selectors
 import signal
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any, BinaryIO, Final
 
 import numpy as np
 
 from flipproof.foreign import contract
 from flipproof.foreign.contract import IMPACT, Answer, AnswerError, Ask, Traits, answer_of
-from flipproof.foreign.specs import ForeignError, Runner, distribution_of, load
+from flipproof.foreign.specs import ForeignError, Runner, distribution_of, is_foreign, load
 from slicemodel import Scenario
 from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
@@ -33,13 +38,100 @@ PATIENCE: Final = 2
 """Runs in a row without an answer in time after which a solver is not asked again."""
 
 
-def end_group(process: subprocess.Popen[bytes]) -> None:
-    """End a process that leads a group, and whatever it started."""
+def start(words: list[str], memory: float, **pipes: Any) -> subprocess.Popen[bytes]:
+    """Start a program in a session of its own, in which it may take ``memory`` bytes of data (Linux)."""
+    mark = f"{os.getpid()}-{next(_COUNT)}"
+    environment = {**os.environ, MARK: mark}
+    process = subprocess.Popen(words, start_new_session=True, bufsize=0, env=environment, **pipes)
+    _MARKS[process.pid] = mark
+    if sys.platform == "linux":
+        import resource
+
+        with contextlib.suppress(OSError, ValueError):
+            _, hard = resource.prlimit(process.pid, resource.RLIMIT_DATA)
+            most = int(memory) if hard == resource.RLIM_INFINITY else min(int(memory), hard)
+            resource.prlimit(process.pid, resource.RLIMIT_DATA, (most, hard))
+    return process
+
+
+KEPT: Final = 4096
+"""Bytes of what a solver prints that are kept, from the end."""
+
+MARK: Final = "FLIPPROOF_SOLVER"
+"""Environment variable of a solver's process, by which what it leaves behind is known."""
+
+_MARKS: Final[dict[int, str]] = {}
+_COUNT: Final = itertools.count()
+
+ACCUSED: Final[set[str]] = set()
+"""Names of the signals that a solver has sent to this process (``watched``)."""
+
+
+def half_of_memory() -> float:
+    """Return half of the machine's memory [bytes]."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 2
+    except (AttributeError, ValueError, OSError):
+        return 8.0 * 2**30
+
+
+def end(process: subprocess.Popen[bytes]) -> None:
+    """End a process that leads a group, and whatever it started, also in other groups, as far as that is marked."""
     if os.name == "posix":
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(process.pid, signal.SIGKILL)
     process.kill()
     process.wait()
+    mark = f"{MARK}={_MARKS.pop(process.pid, '')}".encode()
+    for path in Path("/proc").glob("[0-9]*/environ"):
+        with contextlib.suppress(OSError):
+            if mark in path.read_bytes().split(b"\0"):
+                os.kill(int(path.parent.name), signal.SIGKILL)
+
+
+def is_solver(number: int) -> bool:
+    """Return whether a process is that of a solver of this process, or was started by one."""
+    with contextlib.suppress(OSError):
+        return f"\0{MARK}={os.getpid()}-".encode() in b"\0" + Path(f"/proc/{number}/environ").read_bytes()
+    return False
+
+
+@contextlib.contextmanager
+def watched() -> Iterator[None]:
+    """Take a SIGTERM that comes from a solver for its failure; one from anybody else is what it always is.
+
+    To be entered before threads are started, which inherit that the signal is blocked.
+    """
+    if sys.platform != "linux":
+        yield
+        return
+    done = threading.Event()
+
+    def watch() -> None:
+        while not done.is_set():
+            came = signal.sigtimedwait({signal.SIGTERM}, 0.2)
+            if came is not None and is_solver(came.si_pid):
+                ACCUSED.add("SIGTERM")
+            elif came is not None:
+                _thread.interrupt_main(signal.SIGTERM)
+
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        done.set()
+        watcher.join()
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
+
+
+def accuse() -> None:
+    """Raise ForeignError if a solver has sent a signal to this process."""
+    if ACCUSED:
+        names = ", ".join(sorted(ACCUSED))
+        ACCUSED.clear()
+        raise ForeignError(f"it sent {names} to flipproof")
 
 
 def last_line(printed: bytes) -> str:
@@ -51,8 +143,8 @@ def last_line(printed: bytes) -> str:
 class Isolated(Runner):
     """The solver that a spec names, in a process that is started when it is first needed and again after a crash."""
 
-    def __init__(self, spec: str, timeout: float | None = None) -> None:
-        self.spec, self.timeout = spec, timeout
+    def __init__(self, spec: str, timeout: float | None = None, memory: float | None = None) -> None:
+        self.spec, self.timeout, self.memory = spec, timeout, memory or half_of_memory()
         self._process: subprocess.Popen[bytes] | None = None
         self._late = 0
 
@@ -77,6 +169,7 @@ class Isolated(Runner):
         most = 8 * (len(ask.times) * (5 + 2 * ask.scenario.n_slices) + 5 * 10_000_000)
         header, arrays = self._exchange(header, {"times": ask.times, "start": ask.start}, limit, most)
         self._late = 0
+        accuse()
         if "reason" in header:
             raise ForeignError(str(header["reason"]))
         fields: dict[str, Any] = {name: array for name, array in arrays.items() if "." not in name}
@@ -88,45 +181,35 @@ class Isolated(Runner):
             raise ForeignError(f"answer: {error}") from None
 
     def close(self) -> None:
-        """End the process and whatever it started."""
+        """End the process and whatever it started; nothing waits for a pipe that somebody else holds open."""
         process, self._process = self._process, None
         if process is None:
             return
-        end_group(process)
+        end(process)
         for stream in (process.stdin, process.stdout, process.stderr):
-            if stream is not None:
-                with contextlib.suppress(OSError):
-                    stream.close()
+            with contextlib.suppress(OSError):
+                stream.close()  # type: ignore[union-attr]
 
     def _start(self) -> Traits:
         """Start the process and return what the solver says of itself, loaded within a minute."""
         # Threads that the solver left behind keep nothing alive.
         code = "from flipproof.foreign import isolated; isolated.serve(); import os; os._exit(0)"
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-c", code],  # -P: the working folder is no place of modules
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            start_new_session=True,
-        )
-        self._printed = bytearray()
-        self._reader = threading.Thread(target=self._drain, args=(self._process.stderr,), daemon=True)
-        self._reader.start()
+        pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+        self._process = start([sys.executable, "-P", "-c", code], self.memory, **pipes)  # -P: no modules from here
+        self._printed = b""
+        for stream in (self._process.stdin, self._process.stdout, self._process.stderr):
+            os.set_blocking(stream.fileno(), False)  # type: ignore[union-attr]
         header, _ = self._exchange({"spec": self.spec}, {}, 60.0, 0)
         if "reason" in header:
             self.close()
             raise ForeignError(f"{self.spec} cannot be loaded: {header['reason']}")
         try:
-            return Traits(**header["traits"])
+            traits = Traits(**header["traits"])
+            refuse_built_in(traits.name)
         except (TypeError, ValueError, KeyError) as error:
             self.close()
             raise ForeignError(f"{self.spec}: {error}") from None
-
-    def _drain(self, stream: Any) -> None:
-        kept = 4096  # bytes of what a solver prints, from the end
-        with contextlib.suppress(OSError, ValueError):
-            while part := stream.read1(65536):
-                self._printed = (self._printed + part)[-kept:]
+        return traits
 
     def _exchange(
         self, header: dict[str, Any], arrays: dict[str, Any], limit: float, most: int
@@ -134,28 +217,45 @@ class Isolated(Runner):
         """Send one frame and return the one that comes back within ``limit`` seconds."""
         process = self._process
         assert process is not None
-        replies: queue.Queue[Any] = queue.Queue()
-
-        def read() -> None:
-            try:
-                send(process.stdin, header, arrays)  # type: ignore[arg-type]
-                replies.put(receive(process.stdout, most))  # type: ignore[arg-type]
-            except (BrokenFrameError, OSError, ValueError, MemoryError) as error:
-                replies.put(error)
-
-        threading.Thread(target=read, daemon=True).start()
+        assert process.stdin is not None
+        frame = io.BytesIO()
+        send(frame, header, arrays)
+        asked, answer, deadline = memoryview(frame.getvalue()), bytearray(), time.monotonic() + limit
         try:
-            reply = replies.get(timeout=limit)
-        except queue.Empty:
-            self._late += 1
+            with selectors.DefaultSelector() as ready:
+                ready.register(process.stdin, selectors.EVENT_WRITE)
+                for stream in (process.stdout, process.stderr):
+                    ready.register(stream, selectors.EVENT_READ)  # type: ignore[arg-type]
+                while not whole(answer, most):
+                    dead = process.poll() is not None
+                    left = deadline - time.monotonic()
+                    if left <= 0:
+                        self._late += 1
+                        self.close()
+                        raise ForeignError(f"no answer within {limit:g} s; the process was ended")
+                    events = ready.select(0.0 if dead else min(0.2, left))
+                    if dead and not any(key.fileobj is not process.stdin for key, _ in events):
+                        raise BrokenFrameError("the stream ended")  # what it left behind may hold its pipes open
+                    for key, _ in events:
+                        if key.fileobj is process.stdin:
+                            asked = asked[os.write(key.fd, asked) :] if not dead else asked[:0]
+                            if not asked:
+                                ready.unregister(process.stdin)
+                            continue
+                        part = os.read(key.fd, 1 << 20)
+                        if not part:
+                            ready.unregister(key.fileobj)
+                            if key.fileobj is process.stdout:
+                                raise BrokenFrameError("the stream ended")
+                        elif key.fileobj is process.stderr:
+                            self._printed = (self._printed + part)[-KEPT:]
+                        else:
+                            answer += part
+            return receive(io.BytesIO(answer), most)
+        except (BrokenFrameError, OSError, MemoryError) as error:
+            how = self._ending(error)
             self.close()
-            raise ForeignError(f"no answer within {limit:g} s; the process was ended") from None
-        if isinstance(reply, Exception):
-            how = self._ending(reply)
-            self.close()
-            raise ForeignError(how)
-        header, arrays = reply
-        return header, arrays
+            raise ForeignError(how) from None
 
     def _ending(self, error: Exception) -> str:
         """Return how the process ended, and the last line it printed."""
@@ -164,13 +264,21 @@ class Isolated(Runner):
             status = self._process.wait(timeout=2.0)
         except subprocess.TimeoutExpired:
             return str(error)
-        self._reader.join(timeout=1.0)
-        said = last_line(bytes(self._printed))
+        with contextlib.suppress(OSError, ValueError):
+            while part := os.read(self._process.stderr.fileno(), 65536):  # type: ignore[union-attr]
+                self._printed = (self._printed + part)[-KEPT:]
+        said = last_line(self._printed)
         how = f"ended with status {status}"
         if status < 0:
             known = [each.name for each in signal.Signals if each == -status]
             how = f"was ended by {known[0] if known else f'signal {-status}'}"
         return f"the process {how} before it answered{f'; last line printed: {said}' if said else ''}"
+
+
+def refuse_built_in(name: str) -> None:
+    """Refuse by a ValueError a name that one of flipproof's own solvers has."""
+    if not is_foreign(name):
+        raise ValueError(f"name = {name!r} is that of one of flipproof's own solvers; choose another")
 
 
 # ---------------------------------------------------------------------- in the process of the solver
@@ -183,8 +291,13 @@ def serve() -> None:
     empty = os.open(os.devnull, os.O_RDONLY)
     os.dup2(empty, 0)
     os.dup2(2, 1)
-    _limit_memory()
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
     threading.Thread(target=_watch, args=(os.getppid(),), daemon=True).start()
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     spec = receive(inbox, 0)[0]["spec"]
     try:
         solver = load(spec)
@@ -227,19 +340,6 @@ def _reason(error: BaseException) -> str:
     return f"answer: {words}" if isinstance(error, AnswerError) else f"{type(error).__name__}: {words}"
 
 
-def _limit_memory() -> None:
-    """Take at most 8 GiB of address space, or less as the user has set; leave no core behind."""
-    try:
-        import resource
-    except ImportError:  # not on this system
-        return
-    most = 8 * 2**30
-    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    if soft == resource.RLIM_INFINITY or soft > most:  # then the hard limit is not below ``most`` either
-        resource.setrlimit(resource.RLIMIT_AS, (most, hard))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-
-
 def _watch(parent: int) -> None:
     """End this process when flipproof's has ended; a solver that never returns must not outlive it."""
     while os.getppid() == parent:
@@ -265,6 +365,23 @@ def send(stream: BinaryIO, header: Mapping[str, Any], arrays: Mapping[str, Float
     stream.flush()
 
 
+def whole(received: bytearray, most: int) -> bool:
+    """Return whether a frame has come to its end, or is none: ``receive`` says which."""
+    if len(received) < 8:
+        return False
+    size = int.from_bytes(received[:8], "little")
+    if size > 1 << 20:
+        return True
+    if len(received) < 8 + size:
+        return False
+    try:
+        shapes = json.loads(received[8 : 8 + size])["arrays"].values()
+        counts = [math.prod(int(k) for k in shape) for shape in shapes]
+    except (ValueError, KeyError, AttributeError, TypeError, RecursionError):
+        return True
+    return min(counts, default=0) < 0 or 8 * sum(counts) > most or len(received) >= 8 + size + 8 * sum(counts)
+
+
 def receive(stream: BinaryIO, most: int) -> tuple[dict[str, Any], dict[str, FloatArray]]:
     """Read one frame of at most ``most`` bytes of numbers; raises BrokenFrameError."""
     size = int.from_bytes(_exactly(stream, 8), "little")
@@ -273,7 +390,7 @@ def receive(stream: BinaryIO, most: int) -> tuple[dict[str, Any], dict[str, Floa
     try:
         header = json.loads(_exactly(stream, size))
         shapes = {str(name): tuple(int(k) for k in shape) for name, shape in header.pop("arrays").items()}
-    except (ValueError, KeyError, AttributeError, TypeError):
+    except (ValueError, KeyError, AttributeError, TypeError, RecursionError):
         raise BrokenFrameError("what came is no frame") from None
     sizes = {name: 8 * int(np.prod(shape, dtype=np.int64)) for name, shape in shapes.items()}
     if min(sizes.values(), default=0) < 0 or sum(sizes.values()) > most:

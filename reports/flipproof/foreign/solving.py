@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.foreign.checking import effort_of
-from flipproof.foreign.contract import Answer, AnswerError, Ask, Traits, answer_of, trajectory_of
+from flipproof.foreign.contract import Answer, Ask, Traits, answer_of, started, trajectory_of
 from flipproof.foreign.specs import ForeignError, Runner, content_of, opened
 from flipproof.frame import solvers
 from ode_reference.solver import WATERS
@@ -76,35 +76,41 @@ class Own(Runner):
     def __call__(self, ask: Ask) -> Answer:
         """Return the checked answer; the slice model computes on a uniform grid that holds the asked times."""
         settings: dict[str, Any] = dict(ask.options)
-        stride = 1
+        grid: FloatArray | None = None
         if self.solver.package == "slicemodel":
-            stride, settings["steps"] = _grid_of(ask)
+            settings["steps"] = _points_of(ask)
+            grid = np.linspace(0.0, ask.scenario.duration, settings["steps"])
         else:
             settings["times"] = ask.times
             if self.solver.package == "engine_check" and ask.effort is not None:
                 settings["dt"] = ask.effort
         try:
-            found = solvers.solve(self.solver.name, ask.scenario, **settings)
+            found = solvers.solve(self.solver.name, started(ask), **settings)
             if not found.ok:
                 raise ForeignError(f"status = {found.status!r}: {found.message}")
-            if stride == 1:
+            if grid is None:
                 return answer_of(ask, found)
-            names = ("t", "theta", "omega", "r", "v", "r_cm", "inertia")
-            return answer_of(ask, {n: getattr(found, n)[::stride] for n in names} | {"impacts": found.impacts})
+            names = ("theta", "omega", "r", "v", "r_cm", "inertia")
+            values = {n: _between(grid, getattr(found, n), ask.times) for n in names}
+            return answer_of(ask, {"t": ask.times, **values, "impacts": found.impacts})
         except ForeignError:
             raise
         except (ValueError, ArithmeticError, MemoryError, RuntimeError) as error:
             raise ForeignError(f"{type(error).__name__}: {error}") from None
 
 
-def _grid_of(ask: Ask) -> tuple[int, int]:
-    """Return steps between asked times, and points of the grid, for ``effort`` steps or more.
-
-    Times that are off a uniform grid by more than 1e-9 of the duration raise AnswerError.
-    """
+def _points_of(ask: Ask) -> int:
+    """Return the points of a uniform grid of ``effort`` steps or more, which holds the asked times if they are even."""
     points, duration = len(ask.times), ask.scenario.duration
-    uniform = np.linspace(0.0, duration, points)
-    if points < 2 or float(np.max(np.abs(ask.times - uniform))) > 1e-9 * duration:
-        raise AnswerError(f"times are not a uniform grid over [0, {duration:g}] s, which the slice model computes on")
-    stride = max(1, math.ceil((ask.effort or 1000.0) / (points - 1) - 1e-9))
-    return stride, stride * (points - 1) + 1
+    steps = max(1, math.ceil((ask.effort or 1000.0) - 1e-9))
+    even = points > 1 and float(np.max(np.abs(ask.times - np.linspace(0.0, duration, points)))) <= 1e-9 * duration
+    return (points - 1) * math.ceil(steps / (points - 1)) + 1 if even else steps + 1
+
+
+def _between(grid: FloatArray, values: FloatArray, times: FloatArray) -> FloatArray:
+    """Return values at ``times``: those of the grid where it has them, straight lines between."""
+    k = np.clip(np.searchsorted(grid, times), 1, len(grid) - 1)
+    part = np.clip((times - grid[k - 1]) / (grid[k] - grid[k - 1]), 0.0, 1.0)
+    part = np.where(np.abs(part - np.round(part)) < 1e-6, np.round(part), part)
+    part = part.reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray(np.where(part == 1.0, values[k], values[k - 1] + part * (values[k] - values[k - 1])))

@@ -5,6 +5,7 @@
     package.module:name                an importable object
     path/to/file.py:name               an object of a file
     csv:file.csv                       a curve that is there already: columns t, theta, omega
+    csv:FOLDER                         questions as files, and the answers that somebody puts beside them
     cmd:"julia mine.jl {scenario} {times} {out}"     any program that reads and writes files
 
 An object is a callable, an object with ``solve(ask)``, or a class of such objects without arguments. Specs are
@@ -23,7 +24,7 @@ import importlib
 import os
 import shlex
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib.abc import PathEntryFinder
 from importlib.machinery import (
@@ -37,8 +38,8 @@ from importlib.machinery import (
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
-from types import CodeType
-from typing import TYPE_CHECKING, Final
+from types import CodeType, MappingProxyType
+from typing import TYPE_CHECKING, Any, Final
 
 from flipproof.frame.keys import files_in
 from flipproof.frame.solvers import catalogue, find
@@ -104,31 +105,54 @@ def check_spec(spec: str) -> None:
 
 def check_asked(spec: str) -> None:
     """Refuse by a ValueError a curve in a file, which cannot be asked for another throw."""
-    if written(spec)[0] == CSV:
-        raise ValueError(f"solver {spec!r}: a curve cannot be asked; flipproof compare holds it against a solver")
+    how, held = written(spec)
+    if how == CSV and not is_folder(held):
+        raise ValueError(
+            f"solver {spec!r}: a curve cannot be asked; flipproof compare holds it against a solver, and certify "
+            "csv:FOLDER writes questions into a folder"
+        )
 
 
-def opened(spec: str, timeout: float | None = None, *, curves: bool = False) -> Runner:
+def is_folder(held: str) -> bool:
+    """Return whether what stands behind "csv:" is a folder of questions, there or to be made, and no curve."""
+    return Path(held).is_dir() or not (Path(held).exists() or Path(held).suffix)
+
+
+def opened(
+    spec: str,
+    timeout: float | None = None,
+    *,
+    curves: bool = False,
+    memory: float | None = None,
+    given: Mapping[str, Any] = MappingProxyType({}),
+) -> Runner:
     """Return the solver that a spec names, ready to be asked; raises ValueError if it names nothing.
 
-    A run may take ``timeout`` seconds, or what the solver says. With ``curves`` a curve in a file will do, which
-    answers one throw at its own times and nothing else.
+    A run may take ``timeout`` seconds, or what the solver says, and ``memory`` bytes, or half of the machine's.
+    ``given`` are traits of a program or a folder, which cannot say them. With ``curves`` a curve in a file will do,
+    which answers one throw at its own times and nothing else.
     """
     if not is_foreign(spec):
         from flipproof.foreign.solving import Own
 
         return Own(find(spec))
-    how, _ = written(spec)
+    how, held = written(spec)
     if how != OBJECT:
-        from flipproof.foreign.files import Command, File
+        from flipproof.foreign.files import Command, File, Folder
 
+        if how == COMMAND:
+            return Command(spec, timeout, memory, given)
+        if is_folder(held):
+            return Folder(Path(held), given)
         if not curves:
             check_asked(spec)
-        return File(spec) if how == CSV else Command(spec, timeout)
+        return File(spec)
+    if given:
+        raise ValueError(f"solver {spec!r}: says itself what it is: {', '.join(given)} cannot be given")
     locate(spec)
     from flipproof.foreign.isolated import Isolated
 
-    return Isolated(spec, timeout)
+    return Isolated(spec, timeout, memory)
 
 
 def locate(spec: str) -> EntryPoint | tuple[str, str]:
@@ -239,7 +263,9 @@ def files_of(spec: str) -> Iterator[tuple[str, Path]]:
     """Yield every file that the spec of a foreign solver stands for, with the name by which it counts."""
     how, held = written(spec)
     if how == CSV:
-        yield "", Path(held)
+        yield from (
+            [("", Path(held))] if not is_folder(held) else ((p.parent.name, p) for p in Path(held).rglob("answer.csv"))
+        )
         return
     if how == COMMAND:
         for k, word in enumerate(words_of(spec)):

@@ -2,43 +2,26 @@
 
 import json
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import ode_reference
 from flipproof.foreign import checks_measured
-from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, certify, findings_of
-from flipproof.foreign.contract import Ask
+from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, WEAK, certify, findings_of
+from flipproof.foreign.contract import Ask, started
+from flipproof.foreign.elsewhere import SEED, drawn
 from flipproof.foreign.mistakes import MISTAKES
 from flipproof.foreign.power import CLEAN, Caught, InProcess, claim_power, matrix_csv
-from flipproof.foreign.specs import load, opened
+from flipproof.foreign.specs import ForeignError, load, opened
 from flipproof.foreign.subject import Subject
 from flipproof.frame.solvers import solve
 from flipproof.output.junit import junit_text
 from slicemodel import Scenario
 
 VARIANTS = Path(__file__).with_name("rk4_variants.py")
-
-SEES = {
-    "start": "LateStart",
-    "determinism": "Noise",
-    "ice": "IceMoves",
-    "angle": "Degrees",
-    "angular-momentum": "InitialOmega",
-    "restitution": "RestitutionLow",
-    "gravity": "Weight",
-    "mirror": "PositiveSpin",
-    "moving-frame": "AirDrag",
-    "order-before-impacts": "Euler",
-    "precision-floor": "SinglePrecision",
-    "equation": "NoDrag",
-}
-"""Check -> a mistake that it sees."""
-
-
-def variant(name):
-    return InProcess(load(f"{VARIANTS}:{name}"), name)
 
 
 class InitialOmega(Subject):
@@ -48,7 +31,70 @@ class InitialOmega(Subject):
         return super().solve(ask) | {"omega": np.full(len(ask.times), ask.scenario.omega0)}
 
 
-LONG = ("restitution", "order-across-impacts", "equation", "published-vectors")
+class EffortIgnored(Subject):
+    """Steps are always 0.3 ms."""
+
+    def steps(self, span, _dt):
+        return super().steps(span, 3e-4)
+
+
+class InertiaAboutTheCap(Subject):
+    """J is answered about the cap."""
+
+    def solve(self, ask):
+        found = super().solve(ask)
+        return found | {"inertia": ask.scenario.total_mass * np.ones(len(ask.times))}
+
+
+class HalfSpeed(Subject):
+    """v is half of what it is."""
+
+    def solve(self, ask):
+        found = super().solve(ask)
+        return found | {"v": found["v"] / 2}
+
+
+class WeightBelowNine(Subject):
+    """Weight acts where gravity is weaker than 9 m/s^2."""
+
+    def weight(self, y, _omega):
+        return float(-self.g * np.cos(y[0])) if self.g < 9 else 0.0
+
+
+class AlwaysHalf(Subject):
+    """The restitution is 0.5, whatever the throw's is."""
+
+    def restitution(self, *_):
+        return 0.5
+
+
+MINE = (InitialOmega, EffortIgnored, InertiaAboutTheCap, HalfSpeed, WeightBelowNine, AlwaysHalf)
+
+SEES = {
+    "digits": "SinglePrecision",
+    "start": "LateStart",
+    "determinism": "Noise",
+    "refinement": "EffortIgnored",
+    "ice": "IceMoves",
+    "angle": "Degrees",
+    "definitions": "InertiaAboutTheCap",
+    "velocity": "HalfSpeed",
+    "angular-momentum": "InitialOmega",
+    "restitution": "RestitutionLow",
+    "equation": "NoDrag",
+    "gravity": "WeightBelowNine",
+    "mirror": "PositiveSpin",
+    "moving-frame": "AirDrag",
+    "order-before-impacts": "Euler",
+}
+"""Check -> a mistake that it sees; "elsewhere" has tests of its own."""
+
+
+def variant(name):
+    return InProcess(load(f"{VARIANTS}:{name}"), name)
+
+
+LONG = ("restitution", "order-across-impacts", "equation", "gravity", "elsewhere", "published-vectors")
 """Checks that ``flipproof power`` makes of the good solver, and ``test_our_own_solvers_pass`` of faster ones."""
 
 
@@ -66,7 +112,7 @@ def test_our_own_solvers_pass(name):
 
 @pytest.mark.parametrize(("check", "mistake"), SEES.items())
 def test_a_check_sees_the_mistake_it_is_there_for(check, mistake):
-    kind = InitialOmega if mistake == "InitialOmega" else MISTAKES[mistake]
+    kind = {**MISTAKES, **{each.__name__: each for each in MINE}}[mistake]
     (result,) = certify(InProcess(kind(), mistake), [check]).results
     assert result.verdict == FAILED
     assert result.found.advice in result.line
@@ -125,26 +171,23 @@ class SingleEuler(Subject):
         return (y + h * self.slope(y)).astype(np.float32)
 
 
-def floor_of(kind, **traits):
-    (result,) = certify(InProcess(type("Kind", (kind,), traits)(), "x"), ["precision-floor"]).results
+def result_of(check, kind, **traits):
+    (result,) = certify(InProcess(type("Kind", (kind,), traits)(), "x"), [check]).results
     return result
 
 
 def test_float32_is_named_by_its_numbers_and_allowed_if_declared():
     single = MISTAKES["SinglePrecision"]
-    result = floor_of(single)
+    result = result_of("digits", single)
     assert result.verdict == FAILED
     assert "the numbers of theta, r, v are those of float32" in result.found.came
     assert result.found.facts["arithmetic"] == "float32"
-    declared = floor_of(single, precision="float32")
-    assert declared.verdict == PASSED
-    assert declared.found.came == result.found.came
+    assert result_of("digits", single, precision="float32").verdict == PASSED
+    assert result_of("precision-floor", single, precision="float32").verdict == PASSED
 
 
 def test_a_floor_is_found_within_two_levels_where_noise_passes_for_a_falling_error():
-    result = floor_of(SingleEuler)
-    facts = result.found.facts
-    assert result.verdict == FAILED
+    facts = result_of("precision-floor", SingleEuler).found.facts
     assert len(facts["changes"]) == 2
     # By the changes alone it still falls; steps shorter by a sixteenth say that it does not.
     assert facts["changes"][1] < checks_measured.STILL * facts["changes"][0]
@@ -157,48 +200,93 @@ def test_a_floor_is_found_within_two_levels_where_noise_passes_for_a_falling_err
     )
 
 
-def test_float32_is_known_by_its_numbers_also_where_they_were_printed():
-    class Printed(SingleEuler):
+@pytest.mark.parametrize(("digits", "verdict"), [(4, FAILED), (6, WEAK), (8, WEAK), (9, PASSED)])
+def test_printed_digits_are_counted(digits, verdict):
+    class Printed(Subject):
         def solve(self, ask):
             found = super().solve(ask)
-            return {"t": found["t"], "omega": found["omega"],
-                    "theta": [float(f"{np.float32(one):.9g}") for one in found["theta"]]}  # fmt: skip
+            return {n: np.vectorize(lambda x: float(f"{x:.{digits}g}"))(found[n]) for n in ("t", "theta", "omega")}
 
-    assert "the numbers of theta are those of float32" in floor_of(Printed).found.came
+    result = result_of("digits", Printed)
+    assert result.verdict == verdict
+    assert (f"printed with {digits} digits" in result.line) == (digits < 9)
 
 
-@pytest.mark.parametrize("precision", ["float64", "float32"])
-def test_a_floor_that_no_float32_explains_is_not_called_one(precision):
+def test_a_tolerance_inside_that_no_step_refines_is_a_weakness_with_its_number():
     class Loose(Subject):
-        """A solver with a tolerance of 1e-6 inside that no step refines."""
-
         def solve(self, ask):
             found = super().solve(ask)
             return found | {"omega": found["omega"] * (1 + 1e-6 * np.sin(1e7 * ask.effort))}
 
-    result = floor_of(Loose, precision=precision)
-    assert result.found.facts["arithmetic"] is None
-    assert "float32" not in result.found.came
-    if precision == "float64":
-        assert result.verdict == FAILED
-        assert result.found.came.endswith("no longer falling: something else than refinement limits it")
-    else:
-        assert result.verdict == PASSED
+    result = result_of("precision-floor", Loose)
+    assert result.verdict == WEAK
+    assert "refinement ends at" in result.line
+    assert 1e-7 < result.found.facts["floor"] < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [(AlwaysHalf, "right at e = 0.5, wrong at e = "), (HalfSpeed, "omega is right, v not")],
+)
+def test_one_knob_tells_right_from_wrong_elsewhere(kind, said):
+    found = certify(InProcess(kind(), "x"), ["elsewhere"])
+    assert [r.verdict for r in found.results] == [FAILED]
+    assert said in found.results[0].line
+    assert found.to_mapping()["facts"]["seed"] == SEED
+    low, high = found.domain["slices"]
+    assert (low, high > 64) == (1, True)
+    assert "N 1 to " in found.conclusion
+
+
+def test_throws_are_drawn_anew_by_a_seed():
+    assert drawn(1) == drawn(1) != drawn(2)
+    for seed in range(20):
+        throws = [knobs.ask(seed) for knobs in drawn(seed)]
+        assert {0.0, 1.0} < {ask.scenario.restitution for ask in throws}
+        assert {1, 2, 9} < {ask.scenario.n_slices for ask in throws}
+        assert max(ask.scenario.n_slices for ask in throws) > 64
+        for ask in throws:
+            assert ask.times[0] > 0.0
+            assert ask.scenario.r_min <= ask.start.min() <= ask.start.max() <= ask.scenario.r_max
+
+
+def test_the_reference_begins_where_it_is_asked_to():
+    """By the reduced flow and, all 2N + 1 equations at once, by ``solve_ivp``."""
+    for knobs in drawn(3)[:3]:
+        ask = replace(knobs, angle=2.0).ask(3)
+        one, other = (ode_reference.solve(started(ask), "eq8", ask.times, method=m) for m in ("taylor", "DOP853"))
+        np.testing.assert_allclose(one.r, other.r, atol=1e-6 * ask.scenario.bottle.length)
+        np.testing.assert_allclose(one.omega, other.omega, rtol=1e-6)
 
 
 def test_expected_failures_count_for_themselves():
     known = type("Known", (MISTAKES["LateStart"],), {"expected_failures": {"start": "the bottle is old"}})
     found = certify(InProcess(known(), "known"), ["shape", "start", "published-vectors"])
     assert [r.verdict for r in found.results] == [PASSED, EXPECTED, IDLE]
-    assert found.conclusion == (
+    assert found.conclusion.startswith(
         "3 checks: 1 passed, 0 failed, 1 expected failure, 1 not applicable (published-vectors: no published program "
         "is claimed)"
     )
     assert not found.failed
-    idle = type("Idle", (Subject,), {"expected_failures": {"ice": "never tried"}})
-    (result,) = certify(InProcess(idle(), "idle"), ["ice"]).results
-    assert result.verdict == PASSED
+
+
+def test_a_declared_failure_that_holds_fails_and_an_unknown_one_is_refused():
+    result = result_of("ice", Subject, expected_failures={"ice": "never tried"})
+    assert result.verdict == FAILED
     assert "declared as a failure (never tried), but holds" in result.line
+    with pytest.raises(ForeignError, match="check 'icy' is unknown; did you mean 'ice'"):
+        result_of("ice", Subject, expected_failures={"icy": "never tried"})
+
+
+def test_what_declares_nothing_is_not_certified():
+    class Still:
+        def solve(self, ask):
+            omega = np.full(len(ask.times), ask.scenario.omega0)
+            return {"t": ask.times, "theta": ask.scenario.theta0 + omega * ask.times, "omega": omega}
+
+    found = certify(InProcess(Still(), "still"))
+    assert [r.check for r in found.failed] == ["enough"]
+    assert "declare equation, refined_by and order" in found.failed[0].line
 
 
 def test_what_a_solver_does_not_say_is_not_held_against_it():
@@ -214,10 +302,12 @@ def test_what_a_solver_does_not_say_is_not_held_against_it():
     assert [r.reason.partition(";")[0] for r in found.results] == ["no order is declared", "no equation is declared"]
 
 
-def test_an_equation_can_be_asked_for():
-    (result,) = certify(InProcess(Subject(), "x"), ["gravity"], equation="eq8").results
+def test_an_equation_can_be_asked_for_and_what_spoils_it_is_named():
+    (result,) = certify(InProcess(Subject(), "x"), ["equation"], equation="eq8").results
     assert result.verdict == FAILED
-    assert "as in eq8" in result.found.expected
+    assert result.found.expected == "eq8"
+    (result,) = certify(InProcess(MISTAKES["Weight"](), "x"), ["equation"]).results
+    assert "right without weight" in result.line
 
 
 def test_the_passport_is_json_and_the_verdicts_are_junit():

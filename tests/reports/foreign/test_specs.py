@@ -45,6 +45,7 @@ def test_names_of_our_own_are_not_foreign():
         ("package.module:1x", "'1x' is no name"),
         ("mine.py", "name the object in the file, too: mine.py:solve"),
         ("cmd:program {times}", "must hold {out}"),
+        ("cmd:program {times} {efort} {out}", "placeholder 'efort' is unknown; did you mean 'effort'"),
         ("cmd:'open", "No closing quotation"),
         ("csv:nowhere.csv", "a curve cannot be asked"),
     ],
@@ -118,6 +119,15 @@ def test_a_program_answers_by_files(tmp_path):
         ("import sys; open(sys.argv[1], 'w').write('t,theta\\n0,1\\n')", "omega missing"),
         ("import sys; open(sys.argv[1], 'w').write('t,theta,omega\\n0,1\\n')", "line 2 has 2 cells, the header 3"),
         ("import sys; open(sys.argv[1], 'w').write('t,theta,omega\\n0,1,x\\n')", "column omega: could not convert"),
+        (
+            "import sys; open(sys.argv[1], 'w').write('t;theta;omega\\n0;1;2\\n')",
+            "{out} separates its columns by semicolons",
+        ),
+        ("import sys; open(sys.argv[1], 'w').write('t\\ttheta\\tomega\\n')", "{out} separates its columns by tabs"),
+        (
+            "import sys; open(sys.argv[1], 'w').write('t,theta,omega\\n0,1,1,0,2,0\\n')",
+            "line 2 has 6 cells.*decimal comma",
+        ),
         ("import sys; open(sys.argv[1], 'wb').write(bytes(range(256)))", "cannot be read"),
     ],
 )
@@ -127,6 +137,17 @@ def test_a_program_that_fails_says_how(tmp_path, body, said):
     with pytest.raises(ForeignError, match=said) as caught:
         opened(f"cmd:{sys.executable} {program} {{out}}", timeout=1.0 if "sleep" in body else 300.0)(ASK)
     assert "\n" not in str(caught.value)
+
+
+def test_what_a_program_cannot_say_is_given():
+    spec = "cmd:program {effort} {out}"
+    traits = opened(spec, given={"refined_by": "rtol", "precision": "float32", "name": "mine"}).traits
+    assert (traits.name, traits.refined_by, traits.precision) == ("mine", "rtol", "float32")
+    with pytest.raises(ValueError, match=r"needs \{effort\} in the command"):
+        opened("cmd:program {out}", given={"refined_by": "dt"})
+    with pytest.raises(ValueError, match="says itself what it is"):
+        opened("mine.py:solve", given={"order": 2.0})
+    assert opened("cmd:awk '{{print}}' {out}").words[1] == "{{print}}"
 
 
 def test_a_program_that_is_not_there_says_so():

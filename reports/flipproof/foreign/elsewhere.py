@@ -1,0 +1,397 @@
+"""Throws that differ from those of the other checks in everything at once, and what a solver gets wrong there.
+
+A throw is a set of ``Knobs``: bottle, filling, slices, start, spin, weight, drag, restitution, output times. ``drawn``
+takes them from a seed, so that no solver is tuned to them. Each answer is compared with the exact solution of its
+equation in every field that it gives:
+
+    abs(answer - reference) <= room(t) = FLOOR + OWN x own error(t) + BAND x band(t)
+
+own error   change of the answer under refinement; it grows with the flight, so its running maximum counts
+band        change of the reference with a release that differs by 1e-6 and with another rest speed: what no solver owes
+
+Where the room exceeds ``BLURRED`` nothing is judged. Of a throw that is wrong each knob is turned alone, from the
+paper's throw or back to it, until one of them tells right from wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
+from typing import Any, Final
+
+import numpy as np
+
+import ode_reference
+from flipproof.foreign.checking import THROW, Found, Making, NotApplicableError, effort_of
+from flipproof.foreign.contract import Answer, Ask, Traits, started
+from flipproof.foreign.place import name_of, placing, switches_of
+from flipproof.foreign.specs import ForeignError
+from flipproof.frame.twins import usual_rest_speed
+from ode_reference.switches import Switches
+from slicemodel import Bottle, Scenario, Trajectory
+from slicemodel.observables import moment_of_inertia
+from slicemodel.trajectory import FloatArray
+
+SEED: Final = 26
+"""Seed of the throws where none is named."""
+
+FLOOR: Final = 1e-4
+"""Room of every field, a fraction of its scale (``scales``)."""
+
+OWN: Final = 5.0
+BAND: Final = 2.0
+BLURRED: Final = 0.1
+"""Room of omega, fraction of omega_0, from which on a throw tells nothing more."""
+
+WEAK: Final = 0.01
+"""Own error of omega, fraction of omega_0, from which on it hides what the check is there for."""
+
+STRAY: Final = 0.03
+"""Share of the values of v that may be off: a slice turns round at an impact, and an output time may lie beside it."""
+
+LEVELS: Final = (3, 2.4, 1.7)
+"""Levels of refinement; no step of one is a multiple of another's, so that none shares the luck of its grid."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Knobs:
+    """What a throw is made of; SI units, ``damping`` is alpha / m [1/s], ``angle`` is abs(omega_0) T [rad]."""
+
+    mass: float = THROW.bottle.mass
+    length: float = THROW.bottle.length
+    radius: float = THROW.bottle.radius
+    capacity: float = THROW.bottle.capacity
+    filling: float = THROW.fill_fraction
+    slices: int = THROW.n_slices
+    start: str = "stacked"
+    restitution: float = THROW.restitution
+    damping: float = 2 * THROW.damping_rate
+    gravity: float = THROW.gravity
+    theta0: float = THROW.theta0
+    omega0: float = THROW.omega0
+    angle: float = THROW.omega0 * THROW.duration
+    times: str = "even from 0"
+    velocity: tuple[float, float] = THROW.launch_velocity
+
+    def ask(self, seed: int) -> Ask:
+        """Return the ask, without effort; ``seed`` scatters slices and times."""
+        water = self.filling * self.capacity
+        bottle = Bottle(mass=self.mass, length=self.length, radius=self.radius, capacity=self.capacity)
+        throw = Scenario(
+            bottle=bottle,
+            water_mass=water,
+            n_slices=self.slices,
+            drag=self.damping * water / self.slices,
+            restitution=self.restitution,
+            omega0=self.omega0,
+            theta0=self.theta0,
+            duration=self.angle / abs(self.omega0),
+            gravity=self.gravity,
+            launch_velocity=self.velocity,
+        )
+        rng, start = np.random.default_rng(seed), throw.initial_positions()
+        if self.start == "permuted":
+            start = np.roll(rng.permutation(start), 1) if self.slices > 2 else start[::-1].copy()
+        elif self.start == "scattered":
+            start = rng.uniform(throw.r_min, throw.r_max, self.slices)
+        times = np.linspace(0.0, throw.duration, 61)
+        if self.times != "even from 0":
+            first = min(0.01, throw.duration / 20)
+            times = np.concatenate([[first], np.sort(rng.uniform(first, throw.duration, 58)), [throw.duration]])
+        for array in (start, times):
+            array.setflags(write=False)
+        return Ask(scenario=throw, times=times, start=start)
+
+
+PAPER: Final = Knobs()
+
+WORDS: Final[Mapping[str, tuple[str, str]]] = {
+    "restitution": ("e = {:.3g}", "take the restitution from the throw, at both ends and also when it is 0 or 1"),
+    "slices": ("N = {}", "every slice moves, also the ninth, the last one of a loop over blocks, and a single one"),
+    "start": ("a {} start", "begin at ask.start, in the order in which it stands there, which need not be a stack"),
+    "times": (
+        "output times {}",
+        "the flight begins at t = 0; ask.times are answered as they stand, uneven and later than 0",
+    ),
+    "damping": ("alpha / m = {:.3g} /s", "the drag of a slice is alpha v with alpha of the throw, weak, strong or 0"),
+    "gravity": ("g = {:.3g} m/s^2", "take gravity from the throw and scale the weight with it"),
+    "theta0": ("theta_0 = {:.3g} rad", "theta begins at theta_0 and is never wrapped; the weight goes with cos(theta)"),
+    "omega0": ("omega_0 = {:.3g} rad/s", "the spin is the throw's, fast or slow and in either direction"),
+    "angle": ("{:.3g} rad turned", "nothing may depend on how long the flight lasts or how many impacts it has"),
+    "filling": ("filling {:.3g}", "water mass and the height of a slice come from the throw"),
+    "mass": ("M_b = {:.3g} kg", "take the mass of the bottle from the throw"),
+    "length": ("L = {:.3g} m", "take the length of the bottle from the throw, also in its moment of inertia"),
+    "radius": ("R = {:.3g} m", "take the radius of the bottle from the throw: I_b = M_b (R^2 / 2 + L^2 / 12)"),
+    "capacity": ("M_max = {:.3g} kg", "the height of a slice is water mass / capacity x L / N"),
+    "velocity": ("v_0 = {} m/s", "the flight of the centre of mass does not act inside the bottle"),
+}
+"""Knob -> how it is printed, and what to look at if it tells right from wrong."""
+
+
+def said(knobs: Knobs, name: str) -> str:
+    """Return one knob in words."""
+    return WORDS[name][0].format(getattr(knobs, name))
+
+
+def drawn(seed: int) -> tuple[Knobs, ...]:
+    """Return the seven throws of a seed: every list in another order, its numbers moved by some percent."""
+    rng = np.random.default_rng(seed)
+
+    def dealt(*values: float, spread: float = 0.08) -> list[float]:
+        order = rng.permutation(np.array(values, dtype=float))
+        return [float(v) for v in order * (1 + spread * rng.uniform(-1, 1, len(values)))]
+
+    signs = rng.permutation([1, 1, 1, -1, -1, -1, -1])
+    length, radius = dealt(0.1, 0.16, 0.2, 0.28, 0.36, 0.45, 0.6), dealt(0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1)
+    fluid = dealt(700, 710, 800, 1000, 1000, 3000, 13_500)  # [kg/m^3]
+    e = dealt(0.0, 0.25, 0.8, 2.0, 0.3, 0.7, 0.9)
+    columns: dict[str, list[Any]] = {
+        "mass": dealt(0.01, 0.02, 0.03, 0.05, 0.06, 0.1, 0.2),
+        "length": length,
+        "radius": radius,
+        "capacity": [d * np.pi * r * r * x for d, r, x in zip(fluid, radius, length, strict=True)],
+        "filling": dealt(0.14, 0.16, 0.35, 0.45, 0.6, 0.75, 0.9, spread=0.05),
+        "slices": rng.permutation([1, 2, 3, 5, 9, int(rng.integers(11, 16)), int(rng.integers(66, 75))]).tolist(),
+        "start": rng.permutation(["scattered"] * 3 + ["permuted"] * 3 + ["stacked"]).tolist(),
+        "restitution": [min(each, 1.0) for each in e],
+        "damping": dealt(0.0, 0.0, 0.5, 2.0, 6.0, 15.0, 50.0),
+        "gravity": dealt(3.7, 1.6, 9.81, 0.0, 24.0, 3.7, 9.81),
+        "theta0": dealt(0.7, 7.0, -2.0, 4.0, 0.7, -9.0, 2.5),
+        "omega0": [s * w for s, w in zip(signs, dealt(5.0, 9.0, 12.0, 18.0, 24.0, 30.0, 45.0), strict=True)],
+        "angle": dealt(14.0, 13.5, 8.0, 7.0, 6.0, 5.0, 4.0, spread=0.04),
+        "times": ["uneven from 10 ms"] * 7,
+        "velocity": [tuple(v) for v in rng.uniform(-3.0, 3.0, (7, 2)).round(2).tolist()],
+    }
+    return tuple(Knobs(**{name: column[k] for name, column in columns.items()}) for k in range(7))
+
+
+# ---------------------------------------------------------------------- the reference
+
+
+@lru_cache(maxsize=256)
+def _flown(switches: Switches, throw: Scenario, times: bytes, rest_speed: float) -> Trajectory:
+    return ode_reference.solve(throw, switches, np.frombuffer(times), rest_speed=rest_speed)
+
+
+def references(equation: str, ask: Ask) -> list[Trajectory]:
+    """Return the exact flight of an equation from the ask's start, and its two twins: in release, in rest speed."""
+    switches = switches_of(equation)
+    throw, usual, times = started(ask), usual_rest_speed(switches.name), ask.times.tobytes()
+    bottle = replace(throw.bottle, mass=throw.bottle.mass * (1 + 1e-6))
+    other = replace(throw, bottle=bottle, omega0=throw.omega0 * (1 + 1e-6))
+    rest = 1e-3 if usual < 1e-3 else 1e-4
+    return [
+        _flown(switches, throw, times, usual),
+        _flown(switches, other, times, usual),
+        _flown(switches, throw, times, rest),
+    ]
+
+
+def scales(ask: Ask) -> dict[str, float]:
+    """Return by field what its differences are fractions of."""
+    throw = ask.scenario
+    spin, length = abs(throw.omega0), throw.bottle.length
+    return {
+        "omega": spin,
+        "theta": max(1.0, spin * throw.duration),
+        "r": length,
+        "r_cm": length,
+        "inertia": float(moment_of_inertia(throw, ask.start)),
+        "v": length * spin,
+    }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judged:
+    """What is wrong on one throw: field -> (difference, room, time), fractions of its scale.
+
+    ``own`` is the solver's own error of omega where it was judged, ``error`` says why there is no answer.
+    """
+
+    wrong: Mapping[str, tuple[float, float, float]]
+    own: float = 0.0
+    largest: float = 0.0
+    share: float = 1.0
+    error: str = ""
+
+    @property
+    def excess(self) -> float:
+        """The largest difference over its room."""
+        return max((off / room for off, room, _ in self.wrong.values()), default=0.0)
+
+
+def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, unrefined: float) -> Judged:
+    """Judge the answer to one throw; ``answers`` is the finest first, then coarser ones, if it can be refined."""
+    scale = scales(ask)
+    truth, *twins = references(equation, ask)
+    reached = min(len(run.t) for run in (truth, *twins))
+
+    def sizes(one: Any, other: Any, name: str) -> FloatArray:
+        difference = np.abs(getattr(one, name)[:reached] - getattr(other, name)[:reached]) / scale[name]
+        return np.asarray(difference)
+
+    def grown(values: FloatArray) -> FloatArray:
+        return np.maximum.accumulate(values if values.ndim == 1 else values.max(axis=1))
+
+    mine = answers[0]
+    floor = max(FLOOR, 1024 * traits.epsilon)
+    given = [name for name in scale if getattr(mine, name) is not None]
+    rooms: dict[str, FloatArray] = {}
+    owns: dict[str, FloatArray] = {}
+    for name in given:
+        summed = grown if name != "v" else lambda x: np.full(reached, np.quantile(x, 1 - STRAY))
+        own = np.max([np.zeros(reached), *(summed(sizes(mine, one, name)) for one in answers[1:])], axis=0)
+        owns[name] = own if len(answers) > 1 else np.full(reached, unrefined)
+        rooms[name] = floor + OWN * owns[name] + BAND * sum(summed(sizes(truth, twin, name)) for twin in twins)
+    clear = rooms["omega"] <= BLURRED
+    wrong: dict[str, tuple[float, float, float]] = {}
+    for name in given:
+        off = sizes(mine, truth, name)[clear]
+        room = rooms[name][clear]
+        if not off.size:
+            continue
+        if name == "v":
+            beyond = off > 10 * room[:, None]
+            if np.count_nonzero(beyond) <= max(2, STRAY * off.size):
+                continue
+        rows = off if off.ndim == 1 else off.max(axis=1)
+        k = int(np.argmax(rows / room))
+        if not rows[k] <= room[k]:
+            wrong[name] = float(rows[k]), float(room[k]), float(ask.times[k])
+    return Judged(
+        wrong=wrong,
+        own=float(np.max(owns["omega"][clear])) if clear.any() else float(owns["omega"].min()),
+        largest=float(np.max(sizes(mine, truth, "omega")[clear], initial=0.0)),
+        share=float(np.mean(clear)) * reached / len(ask.times),
+    )
+
+
+Judging = Generator[Sequence[Ask], Sequence[Answer], Judged]
+
+
+def judging(traits: Traits, knobs: Knobs, seed: int, equation: str, unrefined: float) -> Judging:
+    """Ask for one throw, at three levels if the solver can be refined, and judge it."""
+    plain = knobs.ask(seed)
+    levels = LEVELS if traits.refined_by else LEVELS[:1]
+    try:
+        answers = yield [replace(plain, effort=effort_of(traits, plain.scenario, level)) for level in levels]
+    except ForeignError as error:
+        return Judged(wrong={"answer": (1.0, 1e-3, 0.0)}, error=str(error))
+    return judge(traits, plain, answers, equation, unrefined)
+
+
+def check_elsewhere(traits: Traits, seed: int = SEED) -> Making:
+    """Other bottles, fillings, slices, starts, spins and times: every field is that of the equation."""
+    found = yield from placing(traits)
+    equation = traits.equation or found.equation
+    if not found.on_lattice or found.equation != name_of(switches_of(equation)):
+        raise NotApplicableError("needs an equation that the solver is found to solve")
+    unrefined = 0.01 + 4 * found.distance  # as far off as where it was placed
+    flights = []
+    for knobs in drawn(seed):
+        judged = yield from judging(traits, knobs, seed, equation, unrefined)
+        flights.append((knobs, judged))
+        if judged.error:  # and may do so again and again, each time as late as it may be
+            break
+    wrong = [(knobs, judged) for knobs, judged in flights if judged.wrong]
+    own = max((judged.own for _, judged in flights if not judged.error), default=0.0)
+    facts = {
+        "seed": seed,
+        "elsewhere": [
+            {"own": judged.own, "largest": judged.largest, "judged": judged.share, "wrong": sorted(judged.wrong)}
+            for _, judged in flights
+        ],
+    }
+    expected = f"{equation} in every field, on {len(flights)} throws of seed {seed}"
+    if not wrong:
+        largest = max(judged.largest for _, judged in flights)
+        blurred = sum(judged.share < 0.3 for _, judged in flights)
+        weak = own > WEAK or blurred > len(flights) // 2
+        words = f"its own error, {own:.2g} of omega_0, hides mistakes smaller than {OWN * own:.2g}" if weak else ""
+        came = f"at most {largest:.2g} of omega_0 off, its own error {own:.2g}"
+        return Found(holds=True, expected=expected, came=came, weak=words, facts=facts)
+    came, advice = yield from bisected(traits, *min(wrong, key=lambda one: -one[1].excess), seed, equation, unrefined)
+    where = f"{len(wrong)} of {len(flights)} throws"
+    return Found(holds=False, expected=expected, came=came, where=where, advice=advice, facts=facts)
+
+
+def bisected(
+    traits: Traits, knobs: Knobs, judged: Judged, seed: int, equation: str, unrefined: float
+) -> Generator[Sequence[Ask], Sequence[Answer], tuple[str, str]]:
+    """Return the sentence that tells right from wrong by one knob, and what to look at."""
+    how: Callable[[Knobs], Judging] = lambda one: judging(traits, one, seed, equation, unrefined)  # noqa: E731
+    lost = _wrong_words(judged)
+    if (base := (yield from how(PAPER))).wrong:
+        return f"{_wrong_words(base)} on the paper's throw, too", _field_advice(base)
+    names = [f.name for f in fields(Knobs) if getattr(knobs, f.name) != getattr(PAPER, f.name)]
+    names = [name for name in WORDS if name in names]
+    alone: dict[str, Judged] = {}
+    for name in names:
+        if (one := (yield from how(replace(PAPER, **{name: getattr(knobs, name)})))).wrong:
+            alone[name] = one
+    if alone:
+        name = max(alone, key=lambda each: alone[each].excess)
+        return (
+            f"right at {said(PAPER, name)}, wrong at {said(knobs, name)}: {_wrong_words(alone[name])}",
+            f"{WORDS[name][1]}{_field_advice(alone[name], '; ')}",
+        )
+    for name in names:
+        back = yield from how(replace(knobs, **{name: getattr(PAPER, name)}))
+        if not back.wrong and back.share > 0.3:
+            return (
+                f"right at {said(PAPER, name)}, wrong at {said(knobs, name)} where other things are changed, too: "
+                f"{lost}",
+                f"{WORDS[name][1]}{_field_advice(judged, '; ')}",
+            )
+    return f"{lost} where {', '.join(said(knobs, name) for name in names)}", _field_advice(judged)
+
+
+def simplified(traits: Traits, equation: str) -> Generator[Sequence[Ask], Sequence[Answer], str]:
+    """Return without what a throw is right, if anything tells: weight, drag, impacts; and what to look at then."""
+    whole = Knobs(damping=8.0, filling=0.45)
+    simpler = {
+        "weight": replace(whole, gravity=0.0),
+        "drag": replace(whole, damping=0.0),
+        "impacts": replace(whole, angle=1.0),
+        "all": replace(whole, gravity=0.0, damping=0.0, angle=1.0),
+    }
+    if not (yield from judging(traits, whole, 0, equation, 0.003)).wrong:
+        return ""
+    right = set()
+    for name, knobs in simpler.items():
+        if not (yield from judging(traits, knobs, 0, equation, 0.003)).wrong:
+            right.add(name)
+    if {"weight", "impacts"} <= right:
+        return "right without weight, and without impacts: look at when slices rest on an end and weight lifts them; "
+    if "weight" in right:
+        return "right without weight: look at the weight term, g cos(theta) along the bottle; "
+    if "drag" in right:
+        return "right without drag: look at the drag, alpha v / m, and against what v is measured; "
+    if "impacts" in right:
+        return "right before the first impact: look at impacts (restitution, recoil, their places) and rests; "
+    if "all" in right:
+        return "right without weight, drag and impacts, and wrong without any single one of them; "
+    return (
+        "wrong before the first impact without weight and drag, too: look at the centrifugal term omega^2 (r - r_cm), "
+        "the inertia and the masses; "
+    )
+
+
+def _wrong_words(judged: Judged) -> str:
+    """Return what is wrong, the worst first."""
+    if judged.error:
+        return f"no answer ({judged.error})"
+    worst = sorted(judged.wrong, key=lambda name: judged.wrong[name][0] / judged.wrong[name][1], reverse=True)
+    off, room, time = judged.wrong[worst[0]]
+    unit = {"omega": "omega_0", "theta": "the angle turned", "inertia": "J_0", "v": "L omega_0"}.get(worst[0], "L")
+    also = f", and {', '.join(worst[1:])}" if len(worst) > 1 else ""
+    return f"{worst[0]} is {off:.2g} of {unit} off (room {room:.1g}) at t = {time:.3g} s{also}"
+
+
+def _field_advice(judged: Judged, before: str = "") -> str:
+    """Return what to look at by the fields that are wrong, if omega is right."""
+    if judged.error or "omega" in judged.wrong:
+        return ""
+    only = ", ".join(judged.wrong)
+    return f"{before}omega is right, {only} not: look at how the answer is put together"
