@@ -73,11 +73,11 @@ def band(scenario, model, usual):
 def solved(browser):
     """The curves of all settings as a browser solves them, with the time each took."""
     page = browser.new_page()
-    for name in ("live.js", "column.js"):
+    for name in ("live.js", "column.js", "rods.js"):
         page.add_script_tag(content=str(read_assets()[name]))
     throws = drawn_at_random()
     curves = page.evaluate(
-        "throws => throws.map(thrown => Object.fromEntries(['program', 'eq8', 'free', 'column'].map("
+        "throws => throws.map(thrown => Object.fromEntries(['program', 'eq8', 'free', 'column', 'rods'].map("
         "name => [name, Array.from(flipproofLive[name](thrown))])))",
         throws,
     )
@@ -110,6 +110,16 @@ def test_the_column_in_the_browser_is_that_of_the_reference(solved):
         stops.append(expected.diagnostics["stop_time"])
     # Of these throws some columns rest all the time, and some meet the cap.
     assert 0 < stops.count(None) < SETTINGS
+
+
+def test_the_rods_in_the_browser_are_those_of_the_reference(solved):
+    arrivals = []
+    for thrown, curves in solved:
+        scenario = scenario_of(thrown)
+        expected = ode_reference.solve(scenario, model="rods")
+        assert apart(curves["rods"], expected.omega, scenario) < COLUMN, thrown
+        arrivals.append(expected.diagnostics["arrival"])
+    assert 0 < arrivals.count(None) < SETTINGS
 
 
 @pytest.mark.parametrize(
@@ -168,7 +178,8 @@ def line(visited, name):
 def test_gravity_moves_eq8_and_not_free_flight(visit):
     """Asserted from what is drawn: the points of the curves with g = 9.81 m/s^2 and with none."""
     with visit(fragment="#live") as visited:
-        before = {name: line(visited, name) for name in ("eq8", "free-flight", "published-python", "column")}
+        names = ("eq8", "free-flight", "published-python", "column", "rods")
+        before = {name: line(visited, name) for name in names}
         visited.page.get_by_test_id("live-weightless").click()
         visited.page.wait_for_function(
             "() => document.querySelector('[data-testid=live-said]').textContent.startsWith('With g = 0')"
@@ -176,6 +187,7 @@ def test_gravity_moves_eq8_and_not_free_flight(visit):
         after = {name: line(visited, name) for name in before}
         assert after["free-flight"] == before["free-flight"]
         assert after["column"] == before["column"]
+        assert after["rods"] == before["rods"]
         assert visited.page.locator("[data-testid=live-omega] .chart-label", has_text="column").count() == 1
         assert max(abs(a - b) for a, b in zip(after["eq8"], before["eq8"], strict=True)) > 50
         assert max(abs(a - b) for a, b in zip(after["published-python"], before["published-python"], strict=True)) > 10

@@ -87,14 +87,14 @@ def test_the_chart_of_the_sliders_tells_its_values_at_a_cursor(visit, g):
         page.evaluate("g => { flipproofSliders.set({ g }); }", g)
         svg = page.get_by_test_id("live-omega")
         svg.scroll_into_view_if_needed()
-        assert page.locator("#sliders [data-toggle]").count() == 4
+        assert page.locator("#sliders [data-toggle]").count() == 5
         assert page.locator("#sliders [data-line=eq8]").count() == (1 if g else 2)
         box = svg.bounding_box()
         page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 100)
         time = float(page.locator("#sliders .chart-tools > .soft").text_content().split()[4])
         assert 0.1 < time < 0.4
         curves = page.evaluate("flipproofSliders.drawn().curves.eq8.length") - 1
-        for name in ("published-python", "eq8", "free-flight", "column"):
+        for name in ("published-python", "eq8", "free-flight", "column", "rods"):
             at = page.evaluate(
                 "([name, k]) => flipproofSliders.drawn().curves[name][k] / flipproofSliders.drawn().thrown.omega0",
                 [name, round(time / 0.5 * curves)],

@@ -179,6 +179,7 @@ def test_nothing_in_the_assets_asks_the_network():
         "motion.js",
         "live.js",
         "column.js",
+        "rods.js",
         "sliders.js",
         "touch.js",
         "story.js",

@@ -5,13 +5,13 @@
   if (!root) return;
   const { g, theta0, fill, gamma, e, omega0, ...fixed } = JSON.parse(document.getElementById("live-data").textContent);
   const start = { g, theta0, fill, gamma, e, omega0 }, scale = { theta0: Math.PI / 180, fill: 0.01 };
-  const chart = window.flipproofChart, { program, eq8, free, column } = window.flipproofLive;
+  const chart = window.flipproofChart, { program, eq8, free, column, rods } = window.flipproofLive;
   const find = (name) => root.querySelector(`[data-testid="live-${name}"]`);
   const inputs = [...root.querySelectorAll("input")];
-  const names = { "published-python": "program", eq8: "Eq. 8", "free-flight": "free flight", column: "column" };
+  const names = { "published-python": "program", eq8: "Eq. 8", "free-flight": "free flight", column: "column", rods: "rods" };
   let thrown = { ...start }, drawn = {}, waiting = false, touched = null;
 
-  const solvers = { "published-python": program, eq8, "free-flight": free, column };
+  const solvers = { "published-python": program, eq8, "free-flight": free, column, rods };
   const flown = (set) => Object.fromEntries(Object.entries(solvers).map(([name, solve]) => [name, solve({ ...fixed, ...set })]));
   // The throw with the gravity of the report is solved anew when something else than gravity is changed.
   let usual = { key: "", curves: null };
@@ -27,7 +27,7 @@
 
   function draw() {
     const began = performance.now(), changed = thrown.g !== start.g, before = unchanged({ ...thrown, g: start.g });
-    // Free flight and the column are solved again too: that they do not change is what is to be seen.
+    // Free flight, column and rods are solved again too: that they do not change is what is to be seen.
     const now = changed ? flown(thrown) : before, x = Array.from(now.eq8, (_, k) => (k * fixed.duration) / (now.eq8.length - 1));
     const lines = (curves, look) => Object.keys(names).map((name) => ({ name, x, y: Array.from(curves[name], (value) => value / thrown.omega0), ...look(name) }));
     const plot = { behind: changed ? lines(before, () => ({ faint: true })) : [], lines: lines(now, (name) => ({ label: names[name] })) };
@@ -43,8 +43,8 @@
     }
     find("weightless").textContent = thrown.g === 0 ? "Gravity on" : "Gravity off";
     find("said").textContent = changed
-      ? `With g = ${chart.shown(thrown.g, 2)} instead of ${chart.shown(start.g, 2)} m/s², ω moves by up to ${percent(now.eq8, before.eq8)} of ω₀ by Eq. 8, ${percent(now["published-python"], before["published-python"])} by the program, ${percent(now.column, before.column)} for the column, and ${percent(now["free-flight"], before["free-flight"])} in free flight.`
-      : `Eq. 8 and free flight differ by up to ${percent(now.eq8, now["free-flight"])} of ω₀, the program and free flight by ${percent(now["published-python"], now["free-flight"])}, the column and free flight by ${percent(now.column, now["free-flight"])}. Now switch gravity off.`;
+      ? `With g = ${chart.shown(thrown.g, 2)} instead of ${chart.shown(start.g, 2)} m/s², ω moves by up to ${percent(now.eq8, before.eq8)} of ω₀ by Eq. 8, ${percent(now["published-python"], before["published-python"])} by the program, ${percent(now.column, before.column)} for the column, ${percent(now.rods, before.rods)} for rods, and ${percent(now["free-flight"], before["free-flight"])} in free flight.`
+      : `Eq. 8 and free flight differ by up to ${percent(now.eq8, now["free-flight"])} of ω₀, the program and free flight by ${percent(now["published-python"], now["free-flight"])}, the column and free flight by ${percent(now.column, now["free-flight"])}, rods and free flight by ${percent(now.rods, now["free-flight"])}. Now switch gravity off.`;
     drawn = { thrown: { ...fixed, ...thrown }, curves: now, before, milliseconds: performance.now() - began };
   }
   function set(change, remember = true) {
