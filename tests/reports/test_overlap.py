@@ -12,6 +12,7 @@ from flipproof.chapters.overlap.chapter import (
     COLUMN,
     EXCLUDE,
     PASS,
+    RODS,
     claim_column,
     figure_overlap,
     figures,
@@ -33,7 +34,10 @@ def flat(run, level, status="ok", message=""):
     return Made(run, trajectory_of(run.scenario, run.settings["times"], **told), 0.0)
 
 
-LEVELS = {EXCLUDE: (0.23, 0.996), COARSER: (0.22, 0.99), PASS: (0.19, 0.4), CHECK: (0.191, 0.402), COLUMN: (0.33, 1.0)}
+LEVELS = {
+    EXCLUDE: (0.23, 0.996), COARSER: (0.22, 0.99), PASS: (0.19, 0.4), CHECK: (0.191, 0.402), COLUMN: (0.33, 1.0),
+    RODS: (0.23, 1.0),
+}  # fmt: skip
 
 
 def made_up(spoil=lambda _made: None):
@@ -46,15 +50,16 @@ def made_up(spoil=lambda _made: None):
 def test_the_plan_differs_in_contacts_alone_and_halves_the_step():
     by_kind = plan_overlap(THROW, FILLS, slices=4, dt=2e-4)
     runs = [run for curve in by_kind.values() for run in curve]
-    assert len({run.label for run in runs}) == len(runs) == 10
+    assert len({run.label for run in runs}) == len(runs) == 12
     assert {run.scenario.n_slices for run in runs} == {4}
-    assert [run.scenario.damping_rate for run in runs] == pytest.approx([THROW.damping_rate] * 10)
+    assert [run.scenario.damping_rate for run in runs] == pytest.approx([THROW.damping_rate] * 12)
     assert {run.settings["slices"] for run in by_kind[EXCLUDE] + by_kind[COARSER]} == {"exclude"}
     assert all("slices" not in run.settings for run in by_kind[PASS] + by_kind[CHECK])
     assert by_kind[EXCLUDE][0].settings["dt"] == by_kind[COARSER][0].settings["dt"] / 2 == 1e-4
     assert by_kind[PASS][0].settings["dt"] == 2e-4
     assert {run.solver for run in by_kind[CHECK]} == {"free-flight"}
     assert {run.solver for run in by_kind[COLUMN]} == {"column"}
+    assert {run.solver for run in by_kind[RODS]} == {"rods"}
     assert [run.scenario.fill_fraction for run in by_kind[PASS]] == [0.5, 1.0]
 
 

@@ -19,7 +19,7 @@ from flipproof.chapters.maps.study import vary
 from flipproof.figures.style import STYLES, new_figure, shared_legend, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, observed, regression
 from flipproof.output.columns import columns_csv
-from ode_reference.solver import COLUMN
+from ode_reference.solver import COLUMN, RODS
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray
@@ -39,8 +39,8 @@ class Overlap:
     ----------
     fills, throw : fill fractions M_w / M_max, and the throw of the first; its slices and its restitution, also that
         between slices, are those of all
-    level : name -> mean of omega / omega_0 over the second half, for PASS, EXCLUDE, CHECK and COLUMN, which is water as
-        one stretching column (``ode_reference.column``); NaN where the run failed
+    level : name -> mean of omega / omega_0 over the second half, for PASS, EXCLUDE, CHECK, and for COLUMN and RODS,
+        which are water that cannot overlap (``ode_reference.column``, ``ode_reference.rods``); NaN where the run failed
     reason : name -> F strings, "" or why the run cannot be used
     band : twice what halving the step changed for EXCLUDE
     """
@@ -75,6 +75,7 @@ def plan_overlap(throw: Scenario, fills: Sequence[float], slices: int, dt: float
         PASS: ("pymunk", {"dt": dt}),
         CHECK: ("free-flight", {}),
         COLUMN: (COLUMN, {}),
+        RODS: (RODS, {}),
     }
     return {
         name: [
@@ -98,7 +99,7 @@ def study_overlap(fills: Sequence[float], runs: Mapping[str, Sequence[Run]], mad
         return plateau(flight.t, flight.omega, flight.scenario.omega0), ""
 
     found = {name: list(zip(*(read(made[run]) for run in curve), strict=True)) for name, curve in runs.items()}
-    level = {name: np.array(found[name][0]) for name in (PASS, EXCLUDE, CHECK, COLUMN)}
+    level = {name: np.array(found[name][0]) for name in (PASS, EXCLUDE, CHECK, COLUMN, RODS)}
     return Overlap(
         fills=np.asarray(fills),
         throw=runs[PASS][0].scenario,
@@ -190,7 +191,8 @@ def figures(found: Found) -> Iterator[Exhibit]:
         "down. In the same engine, slices that are rods and exclude each other keep the angular velocity of a full "
         "bottle. The two curves differ by what overlap does. Water as one stretching column cannot overlap either, and "
         "has no parameter to choose; free flight minus the column is what overlap changes between two exact equations. "
-        f"That is a difference of two models, free flight at N = {study.throw.n_slices}, and no share{most}. In the "
+        f"That is a difference of two models, free flight at N = {study.throw.n_slices}, and no share{most}. Rods "
+        "are infinitely many slices that exclude each other and do not bounce. In the "
         "paper's experiment the fall is largest at fillings of 0.25 to 0.5, and a filling of 0.1 turns like ice. Bars: "
         "twice what halving the step changes.",
         alt=f"Line plot of the plateau of omega over omega_0 against the fill fraction; ice is 1. {rows}.",
@@ -205,6 +207,7 @@ LOOKS = {
     CHECK: STYLES["free-flight"] | {"marker": "x"},
     EXCLUDE: {"color": "#0072B2", "linestyle": "-", "linewidth": 2.2, "marker": "s"},
     COLUMN: {"color": "#CC79A7", "linestyle": "-.", "linewidth": 1.8, "marker": "d"},
+    RODS: {"color": "#E69F00", "linestyle": "-", "linewidth": 1.8, "marker": "^"},
 }
 
 
