@@ -26,7 +26,7 @@ from flipproof.output.columns import columns_csv
 from ode_reference.solver import COLUMN, RODS
 
 LIMITS: Final = (
-    "May be said: from three quarters full on, overlap is refuted. At a third and at a half the plateau of Eq. 8 lies "
+    "May be said: from three quarters full on, overlap is refuted. At a half the plateau of Eq. 8 lies "
     "outside whatever start the water had. All equations spread the water too early, having no suction. May not be "
     "said: that these fluids are real water; any level better than 0.03 ω₀ for their numerics, or than 0.1 ω₀ for the "
     "start of the water, which no hand controls; anything at a filling of 0.1; that an equal plateau is equal physics. "
