@@ -111,6 +111,21 @@ def test_findings_have_ids_of_their_own_and_visits_travel(studied):
     assert pickle.loads(pickle.dumps(studied.guests[0].visit)).spec == RK4
 
 
+def test_the_flight_that_is_shown_is_held_to_the_equation_of_the_guest(tmp_path, studied, ladder):
+    (right,) = (finding for finding in claim_guests(studied) if finding.id == "guest-naive-rk4-flight")
+    assert right.kind == "regression"
+    assert right.value == studied.guests[0].differences["eq8"].largest
+    assert "N = 5" in right.note
+    shutil.copy(RK4.rpartition(":")[0], tmp_path)
+    (tmp_path / "few.py").write_text(
+        "import rk4\nfrom dataclasses import replace\n\n\nclass Eq8(rk4.Eq8):\n    def solve(self, ask):\n"
+        "        more = 1.0 if ask.scenario.n_slices < 5 else 2.0  # wrong where there are five slices\n"
+        "        return super().solve(replace(ask, scenario=replace(ask.scenario, drag=more * ask.scenario.drag)))\n"
+    )
+    wrong = study_guests([visit(f"{tmp_path / 'few.py'}:Eq8", THROW, TIMES)], ladder, {})
+    assert [finding.id for finding in claim_guests(wrong) if finding.failed] == ["guest-naive-rk4-flight"]
+
+
 def test_solvers_of_one_name_are_told_apart(ladder):
     one = visit(RK4, THROW, TIMES)
     found = study_guests([one, one], ladder, {})

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import _thread
 import argparse
 import json
 import os
+import signal
 import stat
 import sys
 import textwrap
-from collections.abc import Sequence
-from contextlib import closing
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -123,11 +126,43 @@ def _opened(options: argparse.Namespace, **given: Any) -> Any:
     return opened(options.spec, options.timeout, memory=memory, given=given)
 
 
+@contextmanager
+def _watched() -> Iterator[None]:
+    """Take a SIGTERM that comes from a solver for its failure; one from anybody else is what it always is.
+
+    To be entered before NumPy is imported: its threads inherit that the signal is blocked.
+    """
+    if sys.platform != "linux":
+        yield
+        return
+    done = threading.Event()
+
+    def watch() -> None:
+        while not done.is_set():
+            came = signal.sigtimedwait({signal.SIGTERM}, 0.2)
+            if came is None:
+                continue
+            from flipproof.foreign.isolated import ACCUSED, is_solver
+
+            if is_solver(came.si_pid):
+                ACCUSED.add("SIGTERM")
+            else:
+                _thread.interrupt_main(signal.SIGTERM)
+
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        done.set()
+        watcher.join()
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
+
+
 def command_certify(options: argparse.Namespace) -> int:
     """Print one line a check; return 1 if one failed, or if answers are missing."""
-    from flipproof.foreign.isolated import watched
-
-    with watched():  # before anything starts threads
+    with _watched():
         return _certified(options)
 
 
@@ -143,6 +178,7 @@ def _certified(options: argparse.Namespace) -> int:
     names = ("name", "refined_by", "precision", "order")
     given = {name: value for name in names if (value := getattr(options, name)) is not None}
     lines: list[str] = []
+    before = _appended()
 
     def say(line: str) -> None:
         lines.append(line)
@@ -159,20 +195,32 @@ def _certified(options: argparse.Namespace) -> int:
         questions = "1 question waits" if waiting == 1 else f"{waiting} questions wait"
         say(f"{questions} for answer.csv (columns t, theta, omega; r_0 to r_(N-1), v_0 to v_(N-1) if you have them)")
         say(f"in {runner.folder}; certify again when they are there")
-    _print_again(lines)
+    _print_again(lines, before)
     return 1 if found.failed or waiting else 0
 
 
-def _print_again(lines: Sequence[str]) -> None:
-    """Print all lines once more if somebody has shortened the file that standard output goes to."""
+def _appended() -> int | None:
+    """Let standard output, if it is a file, be written at its end whatever becomes of it; return its length [bytes]."""
     try:
-        there = os.fstat(1)
-        if stat.S_ISREG(there.st_mode) and there.st_size < os.lseek(1, 0, os.SEEK_CUR):
-            os.lseek(1, 0, os.SEEK_SET)
-            os.ftruncate(1, 0)
-            print("\n".join(lines), flush=True)
-    except (OSError, ValueError):
-        pass
+        sys.stdout.flush()
+        there = os.fstat(sys.stdout.fileno())
+        if not stat.S_ISREG(there.st_mode):
+            return None
+        import fcntl
+
+        fcntl.fcntl(sys.stdout.fileno(), fcntl.F_SETFL, fcntl.fcntl(sys.stdout.fileno(), fcntl.F_GETFL) | os.O_APPEND)
+        return there.st_size
+    except (ImportError, OSError, ValueError):
+        return None
+
+
+def _print_again(lines: Sequence[str], before: int | None) -> None:
+    """Print all lines once more if the file that they were printed to has lost some."""
+    if before is None:
+        return
+    sys.stdout.flush()
+    if os.fstat(sys.stdout.fileno()).st_size < before + sum(len(line) + 1 for line in lines):
+        print("what was printed was cut off from outside; once more:", *lines, sep="\n", flush=True)
 
 
 def command_place(options: argparse.Namespace) -> int:

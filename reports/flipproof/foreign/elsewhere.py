@@ -287,7 +287,7 @@ def check_elsewhere(traits: Traits, seed: int = SEED) -> Making:
     equation = traits.equation or found.equation
     if not found.on_lattice or found.equation != name_of(switches_of(equation)):
         raise NotApplicableError("needs an equation that the solver is found to solve")
-    unrefined = 0.01 + 4 * found.distance  # as far off as where it was placed
+    unrefined = min(0.01 + 4 * found.distance, 0.018)  # as far off as where it was placed, and not blurred
     flights = []
     for knobs in drawn(seed):
         judged = yield from judging(traits, knobs, seed, equation, unrefined)

@@ -7,7 +7,6 @@ flipproof keeps the end.
 
 from __future__ import annotations
 
-import _thread
 import contextlib
 import functools
 import io
@@ -21,7 +20,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO, Final
 
@@ -48,9 +47,9 @@ def start(words: list[str], memory: float, **pipes: Any) -> subprocess.Popen[byt
         import resource
 
         with contextlib.suppress(OSError, ValueError):
-            _, hard = resource.prlimit(process.pid, resource.RLIMIT_DATA)
-            most = int(memory) if hard == resource.RLIM_INFINITY else min(int(memory), hard)
-            resource.prlimit(process.pid, resource.RLIMIT_DATA, (most, hard))
+            soft, hard = resource.prlimit(process.pid, resource.RLIMIT_DATA)
+            least = min(int(memory), *(x for x in (soft, hard) if x != resource.RLIM_INFINITY), int(memory))
+            resource.prlimit(process.pid, resource.RLIMIT_DATA, (least, hard))
     return process
 
 
@@ -64,7 +63,7 @@ _MARKS: Final[dict[int, str]] = {}
 _COUNT: Final = itertools.count()
 
 ACCUSED: Final[set[str]] = set()
-"""Names of the signals that a solver has sent to this process (``watched``)."""
+"""Names of the signals that a solver has sent to this process."""
 
 
 def half_of_memory() -> float:
@@ -94,36 +93,6 @@ def is_solver(number: int) -> bool:
     with contextlib.suppress(OSError):
         return f"\0{MARK}={os.getpid()}-".encode() in b"\0" + Path(f"/proc/{number}/environ").read_bytes()
     return False
-
-
-@contextlib.contextmanager
-def watched() -> Iterator[None]:
-    """Take a SIGTERM that comes from a solver for its failure; one from anybody else is what it always is.
-
-    To be entered before threads are started, which inherit that the signal is blocked.
-    """
-    if sys.platform != "linux":
-        yield
-        return
-    done = threading.Event()
-
-    def watch() -> None:
-        while not done.is_set():
-            came = signal.sigtimedwait({signal.SIGTERM}, 0.2)
-            if came is not None and is_solver(came.si_pid):
-                ACCUSED.add("SIGTERM")
-            elif came is not None:
-                _thread.interrupt_main(signal.SIGTERM)
-
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
-    watcher = threading.Thread(target=watch, daemon=True)
-    watcher.start()
-    try:
-        yield
-    finally:
-        done.set()
-        watcher.join()
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
 
 
 def accuse() -> None:

@@ -1,5 +1,6 @@
 """Whatever a solver raises, hangs on, prints or returns becomes one line in place, and costs its own run alone."""
 
+import json
 import os
 import re
 import shutil
@@ -134,17 +135,17 @@ def test_a_file_that_changes_ends_the_process_of_its_old_code(tmp_path):
 LIMITED = """
 import resource, sys
 soft, hard = (resource.RLIM_INFINITY if size == "unlimited" else int(size) * 2**20 for size in sys.argv[2:])
-resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
 from flipproof.foreign.checking import THROW, times_of
 from flipproof.foreign.contract import Ask
 from flipproof.foreign.isolated import Isolated
-solver = Isolated(sys.argv[1])
+solver = Isolated(sys.argv[1], memory=8192 * 2**20)
 print(int(solver(Ask.of(THROW, times_of(THROW))).omega[0]))
 solver.close()
 """
 
 
-@pytest.mark.skipif(os.name != "posix", reason="no limits on this system")
+@pytest.mark.skipif(sys.platform != "linux", reason="no limits on this system")
 @pytest.mark.parametrize(
     ("soft", "hard", "left"),
     [(6000, 6000, 6000), (6000, "unlimited", 6000), (9000, 9000, 8192), ("unlimited", "unlimited", 8192)],
@@ -155,7 +156,7 @@ def test_a_lower_limit_of_memory_is_kept(tmp_path, soft, hard, left):
     file.write_text(
         "import resource\nfrom numpy import full\n"
         "def solve(ask):\n"
-        "    limit = resource.getrlimit(resource.RLIMIT_AS)[0] / 2**20\n"
+        "    limit = resource.getrlimit(resource.RLIMIT_DATA)[0] / 2**20\n"
         "    return {'t': ask.times, 'theta': ask.times, 'omega': full(len(ask.times), limit)}\n"
     )
     done = subprocess.run(
@@ -180,3 +181,86 @@ def test_certify_finishes_and_names_each(runner, name):
     assert [result.verdict for result in found.results] == [FAILED] * 3
     assert all(re.search(WRONG[name], result.reason) for result in found.results)
     assert "3 checks: 0 passed, 3 failed" in found.conclusion
+
+
+LEAVES = """
+import os, subprocess, sys, time
+import numpy as np
+
+def answer(ask):
+    omega = np.full(len(ask.times), ask.scenario.omega0)
+    return {"t": ask.times, "theta": ask.scenario.theta0 + omega * ask.times, "omega": omega}
+
+def helper(ask):
+    with open(__file__ + ".pid", "a") as file:
+        sleeper = "import time; time.sleep(600)"
+        print(subprocess.Popen([sys.executable, "-c", sleeper], start_new_session=True).pid, file=file)
+    os._exit(0)
+
+def terminates(ask):
+    import signal
+    os.kill(os.getppid(), signal.SIGTERM)
+    time.sleep(0.5)
+    return answer(ask)
+
+def takes_all(ask):
+    return answer(ask) | {"r": np.ones(20_000_000_000 // 8)}
+
+def truncates(ask):
+    try:
+        os.truncate(f"/proc/{os.getppid()}/fd/1", 0)
+    except OSError:
+        pass
+    return answer(ask)
+"""
+
+
+@pytest.fixture
+def leaves(tmp_path):
+    (tmp_path / "leaves.py").write_text(LEAVES)
+    return tmp_path / "leaves.py"
+
+
+def certified(file, name, *options):
+    """Run the command as a program, its output into a file; return status, output and passport."""
+    out, passport = file.with_suffix(".txt"), file.with_suffix(".json")
+    with out.open("w") as stream:
+        words = [sys.executable, "-m", "flipproof", "certify", f"{file}:{name}", "--json", str(passport), *options]
+        done = subprocess.run(words, stdout=stream, stderr=subprocess.PIPE, timeout=500, check=False)
+    return done.returncode, out.read_text(), json.loads(passport.read_text())
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are found by /proc")
+def test_a_helper_in_a_session_of_its_own_holds_up_nothing_and_is_ended(leaves):
+    solver = Isolated(f"{leaves}:helper", 100.0)
+    with pytest.raises(ForeignError, match="ended with status 0 before it answered"):
+        solver(ASK)
+    child = int(Path(f"{leaves}.pid").read_text().split()[-1])
+    for _ in range(100):
+        if not _runs(child):
+            return
+        time.sleep(0.05)
+    pytest.fail("the helper still runs")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="who sent a signal is not said")
+def test_a_signal_to_flipproof_is_the_failure_of_the_solver(leaves):
+    status, out, passport = certified(leaves, "terminates")
+    assert status == 1
+    assert "it sent SIGTERM to flipproof" in out
+    assert passport["conclusion"].startswith("21 checks: ")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no limit of memory")
+def test_a_limit_of_memory_makes_a_reason(leaves):
+    solver = Isolated(f"{leaves}:takes_all", 100.0, memory=4e9)
+    with pytest.raises(ForeignError, match="MemoryError"):
+        solver(ASK)
+    solver.close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no /proc")
+def test_output_that_a_solver_truncates_is_printed_again(leaves):
+    _, out, passport = certified(leaves, "truncates")
+    assert "\0" not in out
+    assert all(sum(check["check"] in line for line in out.splitlines()) >= 1 for check in passport["checks"])

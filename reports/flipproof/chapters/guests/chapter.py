@@ -9,12 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from flipproof.chapters.differences.study import Difference
 from flipproof.chapters.guests.study import Guest, Guests, Split, study
 from flipproof.chapters.waterfall.chapter import DOWN, UP, WHOLE
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.figures.style import ASSUMPTIONS, MARKERS, new_figure, shared_legend, solver_style, styled
 from flipproof.foreign.certify import findings_of
-from flipproof.frame.chapter import Absent, Chapter, Exhibit, Finding, Kind, observed
+from flipproof.frame.chapter import Absent, Chapter, Exhibit, Finding, Kind, observed, regression
 from flipproof.output.columns import curves_csv, rows_csv
 from flipproof.output.tables import trajectory_csv
 from slicemodel import Trajectory
@@ -36,6 +37,8 @@ def claim_guests(found: Guests) -> Iterator[Finding]:
         for rung, difference in guest.differences.items():
             title, note = f"{label} and {rung}: largest difference in ω", f"at t = {difference.largest_time:.4g} s"
             yield observed(f"{head}-{rung}", title, difference.largest, "of ω₀", note, band=difference.band)
+        if (rung := placed_on(guest)) in guest.differences:
+            yield _claim_flight(guest, f"{head}-flight", guest.differences[rung])
         if guest.split is not None:
             split = guest.split
             parts = ", ".join(f"{NAMES[name]} {share:+.3g}" for name, share in split.bars.items()) or "none"
@@ -47,6 +50,31 @@ def claim_guests(found: Guests) -> Iterator[Finding]:
         if guest.rise is not None:
             title = f"{label}: largest rise of the energy between two output times"
             yield observed(f"{head}-energy", title, guest.rise, "of E(0)")
+
+
+def placed_on(guest: Guest) -> str:
+    """Return the rung that a guest declares, or else that it was placed on; empty if neither is known."""
+    visit = guest.visit
+    if visit.traits is not None and visit.traits.equation is not None:
+        return visit.traits.equation
+    results = () if visit.certificate is None else visit.certificate.results
+    places = [r.found.facts["place"] for r in results if r.found is not None and "place" in r.found.facts]
+    return str(places[0]["equation"]) if places and places[0]["on_lattice"] else ""
+
+
+def _claim_flight(guest: Guest, id_: str, difference: Difference) -> Finding:
+    """Return the claim that the flight shown is that of the guest's equation, as far as its own error explains."""
+    if guest.band is None:
+        room, own = 0.09, "it cannot be refined"
+    else:
+        room, own = (
+            1e-3 + 5 * (difference.band or 0.0),
+            f"its own change between its finest efforts is {guest.band:.2g}",
+        )
+    slices = guest.run.scenario.n_slices if guest.run is not None else 0
+    title = f"{guest.label}: largest difference in ω from {difference.first}, the equation it was placed on"
+    note = f"N = {slices}, t = {difference.largest_time:.4g} s; {own}"
+    return regression(id_, title, difference.largest, "of ω₀", (0.0, room), note)
 
 
 def draw_guests(found: Guests) -> Iterator[Exhibit]:
