@@ -79,15 +79,23 @@ def gather_report(
 
 
 def build(
-    gathered: Gathered, provenance: Mapping[str, str], pool: Executor | None = None, *, png: bool = False
+    gathered: Gathered,
+    provenance: Mapping[str, str],
+    pool: Executor | None = None,
+    progress: Progress = lambda *_: None,
+    *,
+    png: bool = False,
 ) -> Report:
     """Evaluate every claim, draw every figure and write the page, all in memory.
 
-    Figures are drawn by the workers of ``pool``, or in this process; ``png`` says whether as PNG, too.
+    Figures are drawn by the workers of ``pool``, or in this process, and reported to ``progress``; ``png`` says whether
+    as PNG, too.
     """
     told = tell(gathered)
     with gathered.stages.lap("figures"):
-        exhibits = drawn([figure for each in told.values() for figure in each.figures], pool or Here(), png=png)
+        exhibits = drawn(
+            [figure for each in told.values() for figure in each.figures], pool or Here(), progress, png=png
+        )
     rest = iter(exhibits)
     told = {name: replace(each, figures=tuple(islice(rest, len(each.figures)))) for name, each in told.items()}
     summary = summarise(gathered, told, provenance)

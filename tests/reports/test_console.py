@@ -183,16 +183,3 @@ def test_an_interrupt_while_the_program_loads_is_one_line(tmp_path, module):
             (130, ["flipproof: interrupted; nothing was overwritten"]),
             (0, []),
         )
-
-
-def test_a_long_silence_is_explained_once_and_a_short_one_not(capsys):
-    with console.patience(60.0):
-        pass
-    assert not capsys.readouterr().err
-    with console.patience(0.0):
-        for _ in range(200):
-            if said := capsys.readouterr().err:
-                break
-            time.sleep(0.05)
-    assert said.count("\n") == 1
-    assert "compiles the reference" in said

@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, progress_bar, read_scenario
+from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, read_scenario
+from flipproof.cli.progress import progress_bar
 
 SLICES: Final = 50
 
@@ -38,12 +39,10 @@ def command_animate(options: argparse.Namespace) -> int:
     times = plan_film(throw, options.slow, options.fps)
     names = chosen_solvers(options.solvers, FLOWN)
 
-    from tqdm import tqdm
-
     from flipproof.frame.solvers import solve
 
     runs = []
-    for name in tqdm(names, desc="throwing", unit="bottle", disable=True if options.quiet else None, leave=False):
+    for name in names:
         run = solve(name, throw)
         if len(run.t) < 2:
             raise ValueError(f"--solvers {name}: nothing to show on this throw: {run.status}: {run.message}")

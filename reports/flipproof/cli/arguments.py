@@ -8,7 +8,7 @@ import os
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 
@@ -180,21 +180,6 @@ def write_junit(
         from flipproof.output.junit import junit_text
 
         write_text(path, junit_text(findings, suite, seconds))
-
-
-@contextmanager
-def progress_bar(what: str, unit: str, *, quiet: bool = False) -> Iterator[Callable[..., None]]:
-    """Give what is to be called with the number made, the number planned and a name; a terminal shows a bar."""
-    from tqdm import tqdm
-
-    with tqdm(desc=what, unit=unit, disable=True if quiet else None, leave=False) as bar:
-
-        def progress(made: int, planned: int, label: str = "") -> None:
-            bar.total = planned
-            bar.set_postfix_str(label, refresh=False)
-            bar.update(made - bar.n)
-
-        yield progress
 
 
 def command_line() -> str:

@@ -5,10 +5,7 @@ from __future__ import annotations
 import codecs
 import os
 import sys
-import threading
 import unicodedata
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any, Final
 
 ASCII: Final = {
@@ -37,19 +34,6 @@ def inert(text: str) -> str:
 
 def _cut(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 2 :]}"
-
-
-@contextmanager
-def patience(seconds: float = 5.0) -> Iterator[None]:
-    """Say on standard error why nothing is said, if what is done takes longer than this."""
-    words = "flipproof: at work; the first use of a new installation compiles the reference, a minute or two"
-    timer = threading.Timer(seconds, lambda: print(words, file=sys.stderr, flush=True))
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
 
 
 def speak_plainly() -> None:

@@ -19,10 +19,10 @@ from flipproof.cli.arguments import (
     count,
     digits,
     number,
-    progress_bar,
     read_scenario,
     reader,
 )
+from flipproof.cli.progress import progress_bar
 
 DELIMITERS = {"tab": "\t", "comma": ",", "semicolon": ";", "space": " "}
 

@@ -27,7 +27,6 @@ from flipproof.cli.arguments import (
     write_json,
     write_junit,
 )
-from flipproof.cli.console import patience
 
 SPEC_HELP = (
     "a name that flipproof models lists, package.module:name, file.py:name, "
@@ -185,7 +184,7 @@ def _certified(options: argparse.Namespace) -> int:
         print(line, flush=True)
 
     seed = SEED if options.seed is None else options.seed
-    with closing(_opened(options, **given)) as runner, patience(20.0):
+    with closing(_opened(options, **given)) as runner:
         found = certify(runner, equation=options.equation, seed=seed, say=lambda result: say(result.line))
         write_json(options.json, found.to_mapping())
         write_junit(options.junit, findings_of(found), f"flipproof certify {found.traits.name}")
@@ -228,7 +227,7 @@ def command_place(options: argparse.Namespace) -> int:
     from flipproof.foreign.place import place
     from flipproof.foreign.specs import ForeignError
 
-    with closing(_opened(options)) as runner, patience():
+    with closing(_opened(options)) as runner:
         _ = runner.traits  # loads the solver: one that cannot be loaded is an error, not off the lattice
         try:
             found = place(runner)
@@ -245,7 +244,7 @@ def command_explain(options: argparse.Namespace) -> int:
     from flipproof.foreign.specs import opened
 
     throw = read_scenario(options.scenario, options.slices)
-    with closing(opened(options.first)) as one, closing(opened(options.second)) as other, patience():
+    with closing(opened(options.first)) as one, closing(opened(options.second)) as other:
         print(explain(one, other, throw).text)
     return 0
 

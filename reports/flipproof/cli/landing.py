@@ -16,11 +16,11 @@ from flipproof.cli.arguments import (
     digits,
     number,
     numbers,
-    progress_bar,
     read_scenario,
     reader,
     sides,
 )
+from flipproof.cli.progress import progress_bar
 from flipproof.cli.sweeps import add_store, fill
 
 SLICES: Final = 20

@@ -30,7 +30,6 @@ from flipproof.cli.arguments import (
     check_outputs,
     command_line,
     count,
-    progress_bar,
     read_scenario,
     refuse_overwriting,
     store_of,
@@ -42,8 +41,10 @@ from flipproof.cli.film import add_film
 from flipproof.cli.foreign import add_foreign, add_models
 from flipproof.cli.landing import add_landing
 from flipproof.cli.paper import add_paper
+from flipproof.cli.progress import ReportProgress
 from flipproof.cli.screens import FirstScreen, commands_of, second_screen
 from flipproof.cli.sweeps import add_sweeps
+from flipproof.frame.compiling import announce_compiling
 from slicemodel.scenario import unknown_name
 
 BAD_INPUT: Final = 2
@@ -66,6 +67,7 @@ def _status(arguments: Sequence[str] | None) -> int:
     """Run the command line; return its exit status unless it is interrupted."""
     speak_plainly()
     signals.interrupt_main()
+    announce_compiling()
     try:
         options = parse(sys.argv[1:] if arguments is None else arguments)
         refuse_overwriting(options)
@@ -222,21 +224,15 @@ def command_report(options: argparse.Namespace) -> int:
     from flipproof.output.provenance import provenance
 
     began = time.perf_counter()
-
-    def say(stage: str) -> None:
-        # A terminal shows a bar; a log gets a line now and then, so that its reader sees where the time goes.
-        if not sys.stderr.isatty():
-            print(f"flipproof: {time.perf_counter() - began:.0f} s: {stage}", file=sys.stderr, flush=True)
-
     ask = ask_of(scenario, "quick" if options.quick else "full", options.slices)
     with replaced_folder(options.out, "report") as folder:
-        with store_of(options) as store, workers(options.jobs) as pool, progress_bar("runs", "run") as progress:
+        with store_of(options) as store, workers(options.jobs) as pool, ReportProgress(ask.size) as bar:
             contents = parts() if measurement is None else (part_measured(measurement), *parts())
             work = {"guests": (tuple(options.guests), options.timeout)} if options.guests else {}
-            gathered = gather_report(ask, progress, Stages(say), store, pool, contents=contents, work=work)
+            gathered = gather_report(ask, bar.show, Stages(bar.begin), store, pool, contents=contents, work=work)
             guests = gathered.found("guests")
             facts = provenance(command_line()) | store.facts() | ({} if guests is None else guests.facts)
-            report = build(gathered, facts, store.remembering(pool), png=options.png)
+            report = build(gathered, facts, store.remembering(pool), bar.show, png=options.png)
         write(report, folder)
     for guest in guests.guests if guests is not None else ():
         found = guest.visit.certificate

@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from flipproof.cli.arguments import add_command, add_no_cache, command_line, count, progress_bar, store_of
+from flipproof.cli.arguments import add_command, add_no_cache, command_line, count, store_of
+from flipproof.cli.progress import progress_bar
 
 
 def add_paper(commands: Any) -> None:
@@ -30,7 +31,7 @@ def command_paper(options: argparse.Namespace) -> int:
     from flipproof.output.provenance import provenance
     from flipproof.paper.figures import make_gallery
 
-    with store_of(options) as store, progress_bar("groups of flights", "group") as progress:
+    with store_of(options) as store, progress_bar("figures", "group") as progress:
         words = make_gallery(names, options.out, progress, provenance(command_line()), jobs=options.jobs, store=store)
     print(words)
     return 0

@@ -63,8 +63,16 @@ class Exhibit:
         return self.drawn or draw(self.maker(*self.data))
 
 
-def drawn(exhibits: Sequence[Exhibit], pool: Executor, *, png: bool = True) -> tuple[Exhibit, ...]:
+def drawn(
+    exhibits: Sequence[Exhibit],
+    pool: Executor,
+    progress: Callable[[int, int, str], None] = lambda *_: None,
+    *,
+    png: bool = True,
+) -> tuple[Exhibit, ...]:
     """Return the exhibits with their figures, in the order given, drawn by the workers of a pool.
+
+    ``progress`` is called with figures drawn, all figures and a name.
 
     The bytes are the same whoever draws; ``png`` says whether the figures are wanted as PNG, too. A ChapterError names
     a figure that cannot be drawn.
@@ -76,6 +84,7 @@ def drawn(exhibits: Sequence[Exhibit], pool: Executor, *, png: bool = True) -> t
     for exhibit in exhibits:
         with chapter_errors(f"figure {exhibit.name!r}"):
             finished.append(replace(exhibit, drawn=pending[exhibit.name].result()))
+        progress(len(finished), len(exhibits), exhibit.name)
     return tuple(finished)
 
 

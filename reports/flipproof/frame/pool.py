@@ -40,6 +40,11 @@ def make_all(
     died = f"the worker process died {TRIES} times with this"
     keeping = store.remembering(pool)
     pending_calls = {call: (pool if call.timed else keeping).submit(call.function, *call.arguments) for call in calls}
+
+    def tell(label: str) -> None:
+        done = len(made) + sum(answer.done() for answer in pending_calls.values())
+        progress(done, len(runs) + len(pending_calls), label)
+
     made: dict[Run, Made] = {run: found for run in runs if (found := store.find(run)) is not None}
     jobs = _jobs([run for run in runs if run not in made])
     while jobs:
@@ -58,7 +63,7 @@ def make_all(
             for result in results:
                 store.keep(result)
                 made[result.run] = result
-                progress(len(made), len(runs) + len(pending_calls), result.run.name)
+                tell(result.run.name)
     called: dict[Call, Outcome[Any]] = {}
     for call, answer in pending_calls.items():
         try:
@@ -66,7 +71,7 @@ def make_all(
                 called[call] = attempt(answer.result)
         except WorkerDiedError as error:
             called[call] = Outcome(None, f"{call.label}: {died} call ({error})")
-        progress(len(made) + len(called), len(runs) + len(pending_calls), call.label)
+        tell(call.label)
     # In the order asked, whichever worker was faster: what is read off this table must not depend on load.
     return {run: made[run] for run in runs}, called
 

@@ -21,6 +21,8 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any
 
+from flipproof.frame.compiling import announce_compiling
+
 Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
 
 
@@ -61,6 +63,7 @@ class Processes(Executor):
         self._lock = threading.Lock()
         self._alive: set[BaseProcess] = set()
         self._ended = False
+        self._announcing = True
         self._threads = [threading.Thread(target=self._serve, daemon=True) for _ in range(count)]
         for thread in self._threads:
             thread.start()
@@ -135,7 +138,7 @@ class Processes(Executor):
         with self._lock:
             if self._ended:
                 raise WorkerDiedError("the workers have ended")
-            worker = _Worker()
+            worker, self._announcing = _Worker(self._announcing), False
             self._alive.add(worker.process)
             return worker
 
@@ -146,13 +149,16 @@ class Processes(Executor):
 
 
 class _Worker:
-    """One process and the pipe to it; ``ready`` from its first word on, which says that it could start."""
+    """One process and the pipe to it; ``ready`` from its first word on, which says that it could start.
 
-    def __init__(self) -> None:
+    One that is ``announcing`` writes a line on standard error when it compiles.
+    """
+
+    def __init__(self, announcing: bool) -> None:
         context = multiprocessing.get_context("spawn")
         self.ready = False
         self.pipe, far = context.Pipe()
-        self.process = context.Process(target=_answer_calls, args=(far,), daemon=True)
+        self.process = context.Process(target=_answer_calls, args=(far, announcing), daemon=True)
         self.process.start()
         # Only the worker holds the far end now, so that its death ends the pipe.
         far.close()
@@ -170,10 +176,12 @@ class _Worker:
         return self.process.exitcode
 
 
-def _answer_calls(pipe: Connection) -> None:
+def _answer_calls(pipe: Connection, announcing: bool) -> None:
     """Live as a worker: answer calls until the pipe or the parent ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    if announcing:
+        announce_compiling()
     pipe.send(True)
     while True:
         try:

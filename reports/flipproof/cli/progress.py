@@ -1,0 +1,135 @@
+"""Progress of a command: on a terminal one line that moves, in a log a line for every stage.
+
+The time that is left is told in words, and only when there is something to tell it from.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Final, Self
+
+COSTS: Final[Mapping[str, Mapping[str, float]]] = {}
+"""Measured seconds of the stages of a report by its size."""
+
+LEAST_SHARE: Final = 0.05
+LEAST_SECONDS: Final = 3.0
+"""Share that must be done, and time that must have passed, before the time that is left is told."""
+
+WIDTH: Final = 20
+"""Characters of a bar."""
+
+
+def time_left(share: float, seconds: float) -> str:
+    """Return how long a work takes on, in words; nothing as long as that would be a guess.
+
+    Parameters
+    ----------
+    share : float - what is done, in [0, 1]
+    seconds : float - time that it took [s]
+    """
+    if not LEAST_SHARE <= share < 1.0 or seconds < LEAST_SECONDS:
+        return ""
+    left = seconds * (1.0 - share) / share
+    if left < 90.0:
+        return f"about {5 * max(1, round(left / 5.0))} s left"
+    return f"about {left / 60.0:.0f} min left" if left < 5400.0 else f"about {left / 3600.0:.0f} h left"
+
+
+class Line:
+    """One line on standard error, drawn anew twice a second, so that it moves while nothing is reported."""
+
+    def __init__(self, title: str, *, hidden: bool) -> None:
+        self._title, self._share, self._words = title, 0.0, ""
+        self._began = time.monotonic()
+        self._ended = threading.Event()
+        self._thread = None if hidden else threading.Thread(target=self._draw_on, daemon=True)
+        if self._thread:
+            self._thread.start()
+
+    def show(self, share: float, words: str) -> None:
+        """Take over the share that is done and what is done now."""
+        self._share, self._words = min(1.0, max(0.0, share)), words
+
+    def end(self) -> None:
+        """Take the line away."""
+        self._ended.set()
+        if self._thread:
+            self._thread.join()
+
+    def _draw_on(self) -> None:
+        while not self._ended.wait(0.5):
+            self._write(self.text(time.monotonic() - self._began))
+        self._write("")
+
+    def text(self, seconds: float) -> str:
+        """Return the line after so many seconds."""
+        full = int(WIDTH * self._share)
+        parts = (f"{seconds:.0f} s", time_left(self._share, seconds), self._words)
+        return (
+            f"{self._title} [{'#' * full}{'-' * (WIDTH - full)}] {self._share:4.0%}  {', '.join(filter(None, parts))}"
+        )
+
+    def _write(self, text: str) -> None:
+        room = shutil.get_terminal_size().columns - 1
+        sys.stderr.write(f"\r\x1b[K{text[:room]}")
+        sys.stderr.flush()
+
+
+@contextmanager
+def progress_bar(title: str, unit: str, *, quiet: bool = False) -> Iterator[Callable[..., None]]:
+    """Give what is to be called with the number made, the number planned and a name; a terminal shows a bar."""
+    line = Line(title, hidden=quiet or not sys.stderr.isatty())
+
+    def progress(made: int, planned: int | None, label: str = "") -> None:
+        counted = f"{made} of {planned} {unit}s" if planned else f"{made} {unit}s"
+        line.show(made / planned if planned else 0.0, f"{counted}, {label}" if label else counted)
+
+    try:
+        yield progress
+    finally:
+        line.end()
+
+
+class ReportProgress:
+    """Progress of a report: one bar over all stages, each as long as it took where it was measured.
+
+    ``begin`` is called with the name of every stage, ``show`` with what of it is done, what is planned, and a name.
+    """
+
+    def __init__(self, size: str) -> None:
+        self._costs = COSTS.get(size, {})
+        self._terminal = sys.stderr.isatty()
+        self._began = time.monotonic()
+        self._line: Line | None = None
+        self._done, self._stage = 0.0, ""
+
+    def begin(self, stage: str) -> None:
+        """Begin a stage; the line appears with the first, when nothing is left to compile."""
+        self._done += self._costs.get(self._stage, 0.0)
+        self._stage = stage
+        if self._terminal:
+            self._line = self._line or Line("report", hidden=False)
+            self.show(0, 1)
+        elif stage in self._costs:
+            sys.stderr.write(f"flipproof: {time.monotonic() - self._began:.0f} s: {stage}\n")
+            sys.stderr.flush()
+
+    def show(self, made: int, planned: int, label: str = "") -> None:
+        """Take over how much of the stage is done."""
+        if self._line:
+            part = self._costs.get(self._stage, 0.0) * made / max(planned, 1)
+            whole = sum(self._costs.values()) or 1.0
+            self._line.show((self._done + part) / whole, f"{self._stage}: {label}" if label else self._stage)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Take the line away."""
+        if self._line:
+            self._line.end()

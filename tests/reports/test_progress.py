@@ -1,0 +1,96 @@
+"""Progress: the time left in words, one bar over a report's stages, and one line when functions are compiled."""
+
+import os
+import pty
+import re
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from flipproof.cli.progress import COSTS, Line, ReportProgress, time_left
+from flipproof.frame.compiling import WORDS
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.mark.parametrize(
+    ("share", "seconds", "words"),
+    [
+        (0.0, 100.0, ""),
+        (0.04, 100.0, ""),
+        (0.5, 2.0, ""),
+        (1.0, 60.0, ""),
+        (0.2, 10.0, "about 40 s left"),
+        (0.99, 10.0, "about 5 s left"),
+        (0.1, 60.0, "about 9 min left"),
+        (0.05, 3600.0, "about 19 h left"),
+    ],
+)
+def test_the_time_left_is_in_words_or_not_told(share, seconds, words):
+    assert time_left(share, seconds) == words
+
+
+def test_a_line_shows_no_number_that_it_does_not_know():
+    line = Line("fit", hidden=True)
+    assert line.text(0.4) == "fit [--------------------]   0%  0 s"
+    line.show(0.5, "eq8")
+    assert line.text(20.0) == "fit [##########----------]  50%  20 s, about 20 s left, eq8"
+
+
+def test_stages_weigh_what_they_cost(monkeypatch):
+    monkeypatch.setitem(COSTS, "full", {"runs, wave 1": 30.0, "figures": 10.0})
+    shares = []
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    with ReportProgress("full") as progress:
+        for stage in ("runs, wave 1", "studies", "figures"):
+            progress.begin(stage)
+            for made in (1, 2):
+                progress.show(made, 2)
+                shares.append(progress._line._share)
+    assert shares == pytest.approx([0.375, 0.75, 0.75, 0.75, 0.875, 1.0])
+
+
+def test_without_a_terminal_a_stage_is_one_line(monkeypatch, capsys):
+    monkeypatch.setitem(COSTS, "full", {"runs, wave 1": 30.0, "figures": 10.0})
+    with ReportProgress("full") as progress:
+        for stage in ("runs, wave 1", "studies", "figures"):
+            progress.begin(stage)
+            progress.show(1, 2, "pymunk")
+    assert re.sub(r"\d+ s", "0 s", capsys.readouterr().err) == (
+        "flipproof: 0 s: runs, wave 1\nflipproof: 0 s: figures\n"
+    )
+
+
+def test_compiling_is_told_once_and_only_when_it_happens(tmp_path):
+    """With a cache of numba's that is empty, then with the one that this leaves."""
+    command = [sys.executable, "-m", "flipproof", "simulate", "--slices", "2", "--out", str(tmp_path / "a.csv")]
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    said = [
+        subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=True).stderr
+        for _ in range(2)
+    ]
+    assert said == [f"{WORDS}\n", ""]
+
+
+def test_a_bar_moves_on_a_terminal_and_leaves_nothing_behind():
+    code = (
+        "import time; from flipproof.cli.progress import progress_bar\n"
+        "with progress_bar('drawing', 'frame') as step:\n"
+        "    time.sleep(1.2); step(1, 4); time.sleep(0.7)"
+    )
+    near, far = pty.openpty()
+    process = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, stderr=far)
+    os.close(far)
+    shown = b""
+    with suppress(OSError):  # the end of a terminal that nobody holds open
+        while more := os.read(near, 10_000):
+            shown += more
+    assert process.wait() == 0
+    drawn = shown.decode().split("\r\x1b[K")
+    assert len(drawn) >= 4
+    assert "25%" in drawn[-2]
+    assert "1 of 4 frames" in drawn[-2]
+    assert drawn[-1] == ""
