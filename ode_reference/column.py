@@ -40,7 +40,7 @@ from scipy.integrate import solve_ivp
 
 from ode_reference.arguments import number_above, number_within
 from slicemodel.scenario import Scenario
-from slicemodel.trajectory import FloatArray, Impacts, Trajectory, output_times
+from slicemodel.trajectory import FloatArray, Impacts, Trajectory, check_states, output_times
 
 NAME: Final = "column"
 """The model of this module, as ``ode_reference.solve`` knows it."""
@@ -122,6 +122,7 @@ def solve(
     rtol = number_within("rtol", RTOL if rtol is None else rtol, 1e-13, 1e-2)
     atol = number_above("atol", ATOL if atol is None else atol, 0.0, 1e-2)
     moments = output_times(scenario, times)
+    check_states(scenario.n_slices, len(moments), "cut it coarser, or ask for fewer times")
     column = Column(scenario)
     states, diagnostics = _states(scenario, column, moments, rtol, atol)
     theta, h, speed, _ = states

@@ -19,7 +19,7 @@ from ode_reference.models import MODELS
 from ode_reference.motion import Model
 from ode_reference.switches import Switches, are_switches
 from slicemodel.scenario import Scenario, not_whole
-from slicemodel.trajectory import Trajectory, output_times, times_given
+from slicemodel.trajectory import Trajectory, check_states, output_times, times_given
 
 if TYPE_CHECKING:
     from ode_reference.flow.api import Batch
@@ -185,6 +185,7 @@ def solve(
     known_name("method", method, (TAYLOR, *INTEGRATORS))
     speed, twin = _rest_speed(rest_speed, chosen), _twin(twin)
     moments = output_times(scenario, times)
+    check_states(scenario.n_slices, len(moments), "cut it coarser, or ask for fewer times")
     if method != TAYLOR:
         from ode_reference import witness
 
@@ -271,6 +272,9 @@ def solve_batch(
         except ValueError as error:
             raise ValueError(f"throws[{k}]: {error}") from None
     moments = np.array(rows).reshape(len(throws), len(rows[0]) if rows else 0)
+    if states:
+        slices = sum(throw.n_slices for throw in throws)
+        check_states(slices, moments.shape[1], "leave out states, or solve fewer throws at a time")
     settings = _settings(chosen, _rest_speed(rest_speed, chosen), impact_law, energy, _twin(twin))
     return api.fly_all(throws, moments, jobs, chosen.switches, settings, states=states)
 

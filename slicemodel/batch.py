@@ -12,8 +12,8 @@ import numpy as np
 
 from slicemodel.scenario import Scenario, not_whole, shortened
 from slicemodel.schemes import Scheme, StepForm
-from slicemodel.solver import FULL_LIMIT, Rebound, advance, checked, grid, trajectory
-from slicemodel.trajectory import FloatArray, Trajectory
+from slicemodel.solver import Rebound, advance, checked, grid, trajectory
+from slicemodel.trajectory import STATES_LIMIT, FloatArray, Trajectory
 
 if TYPE_CHECKING:
     from slicemodel.kernel import Record, Run
@@ -126,10 +126,10 @@ def solve_batch(
     if problem:
         raise ValueError(f"{problem} (threads)")
     size = 32 * len(throws) * steps
-    if size > FULL_LIMIT:
+    if size > STATES_LIMIT:
         raise ValueError(
             f"{len(throws)} scenarios of steps = {steps} need {size / 2**30:.1f} GiB, more than "
-            f"{FULL_LIMIT / 2**30:.0f} GiB; solve fewer at a time"
+            f"{STATES_LIMIT / 2**30:.0f} GiB; solve fewer at a time"
         )
     rows = np.empty((len(throws), 4, steps))
     workers = min(jobs or cores, len(throws))

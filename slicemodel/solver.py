@@ -8,14 +8,12 @@ import numpy as np
 
 from slicemodel.scenario import Scenario, not_whole, unknown_name
 from slicemodel.schemes import SCHEMES, Scheme, StepConstants, StepForm
-from slicemodel.trajectory import FloatArray, Impacts, Trajectory
+from slicemodel.trajectory import FloatArray, Impacts, Trajectory, check_states
 
 if TYPE_CHECKING:
     from slicemodel.kernel import Record, Run
 
 MOST_STEPS = 1_000_000_000
-FULL_LIMIT = 4 * 2**30
-"""Bytes of r and v together beyond which store="full" is refused."""
 
 SURELY_LISTED = 1024
 MOST_LISTED = 1 << 22
@@ -83,12 +81,8 @@ def solve(
         form = form._replace(lagged=bool(lagged))
     if store not in get_args(Store):
         raise ValueError(unknown_name("store =", store, get_args(Store)))
-    size = 16 * steps * scenario.n_slices
-    if store == "full" and size > FULL_LIMIT:
-        raise ValueError(
-            f"steps = {steps} of n_slices = {scenario.n_slices} need {size / 2**30:.1f} GiB, more than "
-            f"{FULL_LIMIT / 2**30:.0f} GiB; use store = 'summary' or fewer of either"
-        )
+    if store == "full":
+        check_states(scenario.n_slices, steps, "use store = 'summary' or fewer of either")
     from slicemodel import kernel
 
     shape = (steps if store == "full" else 0, scenario.n_slices)

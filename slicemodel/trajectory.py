@@ -31,6 +31,26 @@ STATUSES: Final = MappingProxyType(
 )
 """Reason codes of a trajectory."""
 
+STATES_LIMIT: Final = 4 * 2**30
+"""Bytes of r and v together beyond which no run is begun."""
+
+
+def check_states(n_slices: int, points: int, advice: str) -> None:
+    """Raise ValueError, before anything is allocated, if r and v would take more than ``STATES_LIMIT`` bytes.
+
+    Parameters
+    ----------
+    n_slices : int - of all throws together
+    points : int - output times
+    advice : str - what to ask for instead
+    """
+    size, limit = 16 * n_slices * points, STATES_LIMIT
+    if size > limit:
+        raise ValueError(
+            f"n_slices = {n_slices} at {points} output times need {size / 2**30:.1f} GiB (admissible: at most "
+            f"{limit / 2**30:.0f} GiB, {limit // (16 * points)} slices); {advice}"
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class Impact:

@@ -86,6 +86,7 @@ def command_land(options: argparse.Namespace) -> int:
     """Throw one bottle on a table and say how it lands."""
     throw = read_scenario(options.scenario, options.slices)
     from flipproof.chapters.landing.study import standing
+    from flipproof.frame.beside import beside
     from flipproof.landing.design import aimed
     from flipproof.landing.throw import land_throw, told
     from slicemodel import Table
@@ -97,13 +98,13 @@ def command_land(options: argparse.Namespace) -> int:
     Table(height=0.0, restitution=options.restitution, friction=options.friction)
     height = options.height
     if options.aim:
-        aim = aimed(throw, options.aim)
+        aim = beside(aimed, throw, options.aim)
         throw, height = replace(aim.throw, duration=aim.time), aim.height
         print(f"aimed: omega_0 = {throw.omega0:.4f} rad/s, table at {height:.4f} m, touch after {aim.time:.4f} s")
     elif height is None:
         height = standing(throw).height
     table = Table(height=height, restitution=options.restitution, friction=options.friction)
-    rows = land_throw(throw, table, options.law, [name.strip() for name in options.programs.split(",")])
+    rows = beside(land_throw, throw, table, options.law, [name.strip() for name in options.programs.split(",")])
     print(told(rows, table))
     if options.film:
         _film(options, rows, table)

@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.foreign.contract import PER_SLICE, Answer, AnswerError, Ask, Traits, answer_of
-from flipproof.foreign.isolated import PATIENCE, accuse, end, half_of_memory, last_line, start
+from flipproof.foreign.isolated import PATIENCE, PRCTL, accuse, die_with_parent, end, half_of_memory, last_line, start
 from flipproof.foreign.specs import ForeignError, Runner, WaitingError, words_of, written
 from flipproof.sweep.files import write_whole
 from slicemodel.scenario import unknown_name
@@ -158,7 +158,8 @@ class Command(Runner):
         with tempfile.TemporaryFile() as said:
             try:
                 null = subprocess.DEVNULL
-                process = start(words, self.memory, stdin=null, stdout=null, stderr=said)
+                bound = die_with_parent if PRCTL else None
+                process = start(words, self.memory, stdin=null, stdout=null, stderr=said, preexec_fn=bound)
             except OSError as error:
                 raise ForeignError(f"{words[0]} cannot be started ({error.strerror or error})") from None
             try:

@@ -8,12 +8,14 @@ flipproof keeps the end.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import functools
 import io
 import itertools
 import json
 import math
 import os
+import select
 import selectors
 import signal
 import subprocess
@@ -32,6 +34,9 @@ from flipproof.foreign.specs import ForeignError, Runner, distribution_of, is_fo
 from slicemodel import Scenario
 from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
+
+PRCTL: Final = ctypes.CDLL(None).prctl if sys.platform == "linux" else None
+PR_SET_PDEATHSIG: Final = 1
 
 PATIENCE: Final = 2
 """Runs in a row without an answer in time after which a solver is not asked again."""
@@ -101,6 +106,12 @@ def accuse() -> None:
         names = ", ".join(sorted(ACCUSED))
         ACCUSED.clear()
         raise ForeignError(f"it sent {names} to flipproof")
+
+
+def die_with_parent() -> None:
+    """Let the kernel end this process when the thread that started it ends, whatever it does (Linux only)."""
+    if PRCTL is not None:
+        PRCTL(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def last_line(printed: bytes) -> str:
@@ -255,6 +266,7 @@ def refuse_built_in(name: str) -> None:
 
 def serve() -> None:
     """Call one solver for the asks that come in, and send its checked answers, until the other side goes away."""
+    _end_with_other_side()
     inbox = os.fdopen(os.dup(0), "rb")
     outbox = os.fdopen(os.dup(1), "wb")
     empty = os.open(os.devnull, os.O_RDONLY)
@@ -262,7 +274,6 @@ def serve() -> None:
     os.dup2(2, 1)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
-    threading.Thread(target=_watch, args=(os.getppid(),), daemon=True).start()
     with contextlib.suppress(ImportError, ValueError, OSError):
         import resource
 
@@ -309,8 +320,24 @@ def _reason(error: BaseException) -> str:
     return f"answer: {words}" if isinstance(error, AnswerError) else f"{type(error).__name__}: {words}"
 
 
+def _end_with_other_side() -> None:
+    """Let this process and all that it starts end with flipproof's; a solver that never returns must not outlive it.
+
+    A process beside this one waits for the other end of standard input to close: a thread of this one would wait for
+    a solver that never lets another run.
+    """
+    if os.name != "posix":
+        threading.Thread(target=_watch, args=(os.getppid(),), daemon=True).start()
+    elif not os.fork():
+        os.closerange(1, 256)
+        closed = select.poll()
+        closed.register(0, 0)  # a pipe that the other side has closed is told without being asked for
+        while not closed.poll():
+            pass
+        os.killpg(0, signal.SIGKILL)
+
+
 def _watch(parent: int) -> None:
-    """End this process when flipproof's has ended; a solver that never returns must not outlive it."""
     while os.getppid() == parent:
         time.sleep(0.5)
     os._exit(1)

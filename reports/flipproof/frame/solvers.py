@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from flipproof.frame.beside import beside
 from slicemodel import Scenario, Trajectory
 from slicemodel.scenario import unknown_name
 
@@ -168,7 +169,10 @@ def solve(name: str, scenario: Scenario, **settings: Any) -> Trajectory:
         # Without step and tolerance an engine would certify each run, at several times its cost; the report's own
         # refinement (``chapters.differences``) says what its runs are worth.
         settings = {"dt": package.DEFAULT_DT, **settings}
-    trajectory: Trajectory = package.solve(scenario, **settings)
+    if solver.package == FOREIGN:  # waits for a process, which signals interrupt
+        foreign: Trajectory = package.solve(scenario, **settings)
+        return foreign
+    trajectory: Trajectory = beside(package.solve, scenario, **settings)
     return trajectory
 
 
