@@ -7,7 +7,7 @@ import pytest
 from made_up import study_map, trajectory_of
 
 import ode_reference
-from flipproof.chapters.maps.chapter import _beyond, claims, figure_map, figures
+from flipproof.chapters.maps.chapter import _beyond, _regions, _thrown_words, claims, figure_map, figures
 from flipproof.chapters.maps.study import (
     COLUMN,
     EXTRA,
@@ -22,7 +22,7 @@ from flipproof.chapters.maps.study import (
     study_readings,
     vary,
 )
-from flipproof.chapters.waterfall.study import NAMES
+from flipproof.chapters.waterfall.study import NAMES, STEP
 from flipproof.figures.style import draw
 from flipproof.frame.flights import Outcome
 from flipproof.frame.solvers import Made, Run, make
@@ -31,6 +31,7 @@ from slicemodel.observables import plateau
 
 THROW = Scenario().with_slices(6)
 FILLS = (0.3, 0.6)
+DRAG, SIGNS, ORIGIN = (NAMES[switch] for switch in ("drag_on_centre", "signs", "origin"))
 
 
 def flat(run: Run, level: float, status: str = "ok") -> Made:
@@ -52,16 +53,16 @@ def by_rung(rung: int):
     The drag reference has an effect only with Eq. 9d's signs and a fixed origin. Its jump is there in one of six orders
     of these three; what the other two would get of it is taken from their own jumps.
     """
-    jumps = dict.fromkeys(RUNGS, 0.01) | {"drag reference": 0.0} | {RUNGS[rung]: 0.2}
-    if RUNGS[rung] == "drag reference":
-        jumps |= {"sign of Eq. 9d": 0.01 - 0.2 / 6.0, "moving origin": 0.01 + 0.2 / 3.0}
+    jumps = dict.fromkeys(RUNGS, 0.01) | {DRAG: 0.0} | {RUNGS[rung]: 0.2}
+    if RUNGS[rung] == DRAG:
+        jumps |= {SIGNS: 0.01 - 0.2 / 6.0, ORIGIN: 0.01 + 0.2 / 3.0}
     worth = {switch: jumps[name] for switch, name in zip(NAMES, RUNGS[1:], strict=True)}
 
     def level(run):
         if run.solver not in SETS.values():
             return 0.2
         mended = next(s for s, name in SETS.items() if name == run.solver)
-        return 0.2 + jumps["step size"] + sum(w for name, w in worth.items() if getattr(mended, name))
+        return 0.2 + jumps[STEP] + sum(w for name, w in worth.items() if getattr(mended, name))
 
     return level
 
@@ -114,8 +115,8 @@ def test_the_largest_fair_share_dominates(rung):
     study = made_up("gamma", (0.1, 0.2, 0.3), by_rung(rung))
     assert study.dominant.shape == (3, 2)
     assert (study.dominant == rung).all()
-    largest = 0.2 / 6.0 if RUNGS[rung] == "drag reference" else 0.2
-    whole = largest + 0.01 * (len(RUNGS) - (1 if RUNGS[rung] == "drag reference" else 2))
+    largest = 0.2 / 6.0 if RUNGS[rung] == DRAG else 0.2
+    whole = largest + 0.01 * (len(RUNGS) - (1 if RUNGS[rung] == DRAG else 2))
     assert study.shares[rung] == pytest.approx(largest)
     assert study.shares.sum(axis=0) == pytest.approx(whole)
     assert study.error == pytest.approx(whole)
@@ -143,7 +144,7 @@ def test_fair_shares_colour_a_map_where_every_set_was_flown():
     made = {run: flat(run, by_set(worth)(run)) for run in runs}
     study = study_map(THROW, "gamma", FILLS, (0.1, 0.2), made)
     assert study.shares[:, 1, 0] == pytest.approx([0.1, 0.11, -0.02, 0.0, 0.05, 0.01, 0.04], abs=1e-12)
-    assert (study.dominant == RUNGS.index("sign of Eq. 9d")).all()
+    assert (study.dominant == RUNGS.index(SIGNS)).all()
     assert study.shares.sum(axis=0) == pytest.approx(study.level["free-flight"] - study.level["published-python"])
     missing = {**made, runs[5]: Made(runs[5], None, 0.0, "MemoryError: too much")}
     assert (study_map(THROW, "gamma", FILLS, (0.1, 0.2), missing).dominant == -1).sum() == 1
@@ -208,7 +209,7 @@ def test_figures_name_their_axes_with_units_and_their_levels(axis):
     assert axes.get_xlabel() == "fill fraction M_w / M_max [1]"
     assert axes.get_ylabel().endswith("[1]")
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert set(RUNGS) <= set(labels)
+    assert {f"{k}  {name}" for k, name in enumerate(RUNGS, start=1)} <= set(labels)
     assert sum("10%" in label for label in labels) == 2
     shaded = "step error of published-python" if axis == "step" else "error of published-python"
     assert f": {shaded} (shade)" in axes.get_title(loc="left")
@@ -256,5 +257,27 @@ def test_without_gravity_the_weight_is_no_mistake():
     far = replace(THROW, gravity=0.0)
     made = {run: make(run) for run in plan_map(far, "gamma", (0.5,), (0.25,))}
     study = study_map(far, "gamma", (0.5,), (0.25,), made)
-    assert study.shares[RUNGS.index("gravity")] == pytest.approx(0.0, abs=1e-3)
-    assert study.dominant[0, 0] != RUNGS.index("gravity")
+    assert study.shares[RUNGS.index(NAMES["weightless"])] == pytest.approx(0.0, abs=1e-3)
+    assert study.dominant[0, 0] != RUNGS.index(NAMES["weightless"])
+
+
+@pytest.mark.parametrize(
+    ("axis", "place"), [("gamma", (0.5, 0.25)), ("step", (0.5, 20.0 * 0.5 / 999)), ("restitution", (0.5, 0.5))]
+)
+def test_the_throw_is_marked_where_its_axes_say(axis, place):
+    study = made_up(axis, (0.1, 0.2, 0.3), by_rung(4))
+    assert study.thrown == pytest.approx(place)
+    crosses = [line for line in figure_map(study).axes[0].lines if line.get_marker() == "x"]
+    assert [line.get_xydata().tolist() for line in crosses] == [[pytest.approx(place)]]
+    assert f"the largest fair share is that of “{RUNGS[4]}”" in _thrown_words(study)
+
+
+def test_every_region_carries_its_name_or_its_number():
+    inside = np.zeros((8, 9), dtype=bool)
+    inside[:6, :6] = inside[7, 8] = True
+    assert sorted(_regions(inside)) == [(2, 2, 36), (7, 8, 1)]
+    drawn = figure_map(made_up("gamma", (0.1, 0.2, 0.3), by_rung(4)))
+    assert [text.get_text() for text in drawn.axes[0].texts if text.get_weight() == "bold"] == ["5"]
+    legend = [text.get_text() for text in drawn.legends[0].get_texts()]
+    assert f"5  {RUNGS[4]}" in legend
+    assert "this throw" in legend

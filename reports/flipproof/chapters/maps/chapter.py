@@ -14,7 +14,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch, Rectangle
 from matplotlib.path import Path
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
+from scipy.ndimage import label
 
 from flipproof.chapters.maps.study import (
     EXTRA,
@@ -51,6 +53,11 @@ RANGE = (1e-3, 1.0)
 
 CONTOURS: tuple[tuple[float, Literal["--", "-"]], ...] = ((0.01, "--"), (0.1, "-"))
 """Error of the approximation as a fraction of omega_0, and the line that shows it."""
+
+WORDED: Final = 30
+"""Cells of a region from which its name is written into it; a smaller one has its number."""
+
+HALO: Final = [withStroke(linewidth=2.5, foreground="#FFFFFF")]
 
 
 Maps = Mapping[Axis, Outcome[ValidityMap]]
@@ -109,7 +116,7 @@ def _exhibit(study: ValidityMap) -> Exhibit:
         caption=f"Every cell is a throw. The shade of a cell is {shade} in the plateau, the mean of "
         "ω/ω₀ over the second half. "
         f"The outline around cells names the assumption with the largest {which} in the plateau. "
-        f"The contours are where {contours}. Hatched cells could not be computed."
+        f"The contours are where {contours}. Hatched cells could not be computed.{_thrown_words(study)}"
         f"{_band_words(study)}",
         alt=f"Map of {dominant.size} throws of {study.slices} slices, fill fraction {study.fills[0]:g} to "
         f"{study.fills[-1]:g} by {AXES[study.axis]} {study.values[0]:g} to {study.values[-1]:g}. Cells by "
@@ -118,6 +125,22 @@ def _exhibit(study: ValidityMap) -> Exhibit:
         data=(study,),
         table=_cells_csv(study),
     )
+
+
+def _thrown_words(study: ValidityMap) -> str:
+    """Return what the cross marks, and which share is largest in the nearest cell."""
+    if study.thrown is None:
+        return ""
+    column = int(np.abs(study.fills - study.thrown[0]).argmin())
+    row = int(np.abs(_as_drawn(study.values, study.axis) - _as_drawn(study.thrown[1], study.axis)).argmin())
+    k = int(study.dominant[row, column])
+    largest = f"; in the cell nearest to it the largest fair share is that of “{RUNGS[k]}”" if k >= 0 else ""
+    return f" The cross is the throw of this report{largest}."
+
+
+def _as_drawn(values: Any, axis: Axis) -> Any:
+    """Return values of an axis as they are spaced on it."""
+    return values if axis == "restitution" else np.log(np.maximum(values, 1e-300))
 
 
 def _beyond(study: ValidityMap) -> str:
@@ -193,7 +216,11 @@ def figure_map(study: ValidityMap) -> Figure:
         if outline:
             border = Path.make_compound_path(*map(Path, outline))
             axes.add_patch(PathPatch(border, fill=False, edgecolor=colour, linewidth=2.2, capstyle="projecting"))
-        handles.append(Patch(facecolor="none", edgecolor=colour, linewidth=2.2, label=name))
+        handles.append(Patch(facecolor="none", edgecolor=colour, linewidth=2.2, label=f"{k + 1}  {name}"))
+        for row, column, extent in _regions(study.dominant == k):
+            words = f"{k + 1}  {name.partition(':')[0].partition(',')[0]}" if extent >= WORDED else f"{k + 1}"
+            place: dict[str, Any] = {"ha": "center", "va": "center", "path_effects": HALO}
+            axes.text(study.fills[column], study.values[row], words, color=colour, size=8, weight="bold", **place)
     hatched: dict[str, Any] = {"facecolor": "none", "edgecolor": "#555555", "hatch": "////"}
     for row, column in zip(*np.nonzero(study.dominant < 0), strict=True):
         size = (x[column + 1] - x[column], y[row + 1] - y[row])
@@ -202,6 +229,9 @@ def figure_map(study: ValidityMap) -> Figure:
         handles += _contours(axes, study, error, name, colour)
     if logarithmic:
         axes.set_yscale("log")
+    if study.thrown is not None:
+        cross: dict[str, Any] = {"markersize": 10, "markeredgewidth": 2.5, "path_effects": HALO}
+        handles += axes.plot(*study.thrown, "x", color="#000000", label="this throw", zorder=5, **cross)
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel="fill fraction M_w / M_max [1]", ylabel=LABELS[study.axis])
     axes.grid(visible=False)
     title = f"Plateau of ω / ω₀ at N = {study.slices}: {shaded} (shade), largest fair share (outline)"
@@ -211,6 +241,15 @@ def figure_map(study: ValidityMap) -> Figure:
         handles.append(Patch(label=f"not computed: {reasons}", **hatched))
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
+
+
+def _regions(inside: NDArray[np.bool_]) -> Iterator[tuple[int, int, int]]:
+    """Yield row and column of the cell in the middle of every connected region, and the number of its cells."""
+    numbers, count = label(inside)
+    for number in range(1, count + 1):
+        at = np.argwhere(numbers == number)
+        row, column = at[((at - at.mean(axis=0)) ** 2).sum(axis=1).argmin()]
+        yield int(row), int(column), len(at)
 
 
 def errors(study: ValidityMap) -> Sequence[tuple[str, FloatArray]]:

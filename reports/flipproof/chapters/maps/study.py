@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipproof.chapters.solvers import FREE, LIMITS, SCHEMES
-from flipproof.chapters.waterfall.study import NAMES, canonical, fair_share
+from flipproof.chapters.waterfall.study import NAMES, STEP, canonical, fair_share
 from flipproof.frame.solvers import Made, Run, make
 from flipproof.frame.twins import band, twins
 from ode_reference.models import LADDER as MODELS
@@ -36,10 +36,8 @@ Axis = Literal["gamma", "step", "restitution"]
 LADDER: Final = ("published-python", *MODELS)
 """From what was published to what is right; each differs from the next by one mistake."""
 
-RUNGS: Final = (
-    "step size", "sign of Eq. 9d", "roots of Eq. 9a", "drag reference", "gravity", "moving origin", "recoil"
-)  # fmt: skip
-"""The mistake between each entry of LADDER and the next."""
+RUNGS: Final = (STEP, *NAMES.values())
+"""The mistake between each entry of LADDER and the next, named as in the waterfall."""
 
 SETS: Final = {
     switches: next(
@@ -99,6 +97,7 @@ class ValidityMap:
         Fair share of every rung in the plateau, signed; they add up from the published program to free flight.
     band : array or None
         By how much twins move the plateau of free flight, the most sensitive equation; None if they were not flown.
+    thrown : (fill fraction, quantity along y) of the throw that the map varies, or None
     """
 
     axis: Axis
@@ -111,6 +110,7 @@ class ValidityMap:
     reason: NDArray[np.str_]
     shares: FloatArray
     band: FloatArray | None = None
+    thrown: tuple[float, float] | None = None
 
     @property
     def error(self) -> FloatArray:
@@ -232,7 +232,19 @@ def study_readings(
         reason=reason,
         shares=np.array([level[LADDER[1]] - level[LADDER[0]], *(fair_share(name, of_sets) for name in NAMES)]),
         band=np.array([band(run, levels) for run in free]).reshape(shape) if banded else None,
+        thrown=place_of(throw, axis, how.get("steps", 1000)),
     )
+
+
+def place_of(throw: Scenario, axis: Axis, steps: int) -> tuple[float, float]:
+    """Return the place of a throw, flown by schemes in ``steps`` points, on a map."""
+    turn = abs(throw.omega0)
+    values = {
+        "gamma": throw.damping_rate / turn,
+        "step": turn * throw.duration / (steps - 1),
+        "restitution": throw.restitution,
+    }
+    return throw.fill_fraction, values[axis]
 
 
 def read_flight(made: Made) -> Reading:
