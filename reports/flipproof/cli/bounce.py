@@ -6,8 +6,9 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from flipproof.cli.arguments import add_command, add_json, check_outputs, number, progress_bar, write_json
+from flipproof.cli.arguments import add_command, add_json, check_outputs, number, write_json
 from flipproof.cli.console import inert
+from flipproof.cli.progress import progress_bar
 
 
 def add_bounce(commands: Any) -> None:
@@ -40,7 +41,7 @@ def command_bounce(options: argparse.Namespace) -> int:
         print(inert(adapter.name) + f", step {options.dt:g} s")
         print(inert("".join(f"  {name} = {value}\n" for name, value in adapter.settings.items())), end="")
         made = []
-        with progress_bar(adapter.name, " properties") as progress:
+        with progress_bar(adapter.name, "measurement") as progress:
             for measurement in measure(adapter, options.dt):
                 made.append(measurement)
                 progress(len(made), max(len(made) + 1, 9), measurement.name)

@@ -24,11 +24,15 @@ def readable(words: str) -> str:
     return _cut(" ".join(_cut(word, 300) for word in words.split()), 2000)
 
 
-def inert(text: str) -> str:
-    r"""Return text for a terminal with control and formatting characters written as escapes, as \x1b; lines stay."""
+def inert(text: str, *, lines: bool = True) -> str:
+    r"""Return text for a terminal with control and formatting characters written as escapes, as \x1b.
+
+    ``lines`` says that the text may have several; a text that has one cannot forge another.
+    """
     hidden = {"Cc", "Cf", "Zl", "Zp"}
     return "".join(
-        c.encode("unicode_escape").decode() if c != "\n" and unicodedata.category(c) in hidden else c for c in text
+        c.encode("unicode_escape").decode() if unicodedata.category(c) in hidden and not (lines and c == "\n") else c
+        for c in text
     )
 
 

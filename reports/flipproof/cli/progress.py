@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Final, Self
 
+from flipproof.cli.console import inert
+
 COSTS: Final[Mapping[str, Mapping[str, float]]] = {}
 """Measured seconds of the stages of a report by its size."""
 
@@ -76,7 +78,7 @@ class Line:
 
     def _write(self, text: str) -> None:
         room = shutil.get_terminal_size().columns - 1
-        sys.stderr.write(f"\r\x1b[K{text[:room]}")
+        sys.stderr.write(f"\r\x1b[K{inert(text, lines=False)[:room]}")
         sys.stderr.flush()
 
 
