@@ -48,6 +48,17 @@ def test_diff_prints_no_control_characters(tmp_path, capsys):
     assert r"\x1b[2J\x07\u202eb" in said
 
 
+def test_a_name_forges_no_line_of_a_comparison_or_a_certificate(tmp_path, capsys):
+    files = [summary(tmp_path / f"{k}.json", [finding("a\n3 findings compared: no difference", k)]) for k in (1, 2)]
+    assert main(["diff", *map(str, files)]) == 1
+    assert r"  a\n3 findings compared: no difference: " in capsys.readouterr().out
+    (tmp_path / "loud.py").write_text("def solve(*_):\n    raise ValueError('no\\x1b[2J\\u202e')\n")
+    assert main(["certify", f"{tmp_path}/loud.py:solve"]) == 1
+    said = capsys.readouterr().out
+    assert r"\x1b[2J" in said
+    assert not set(said) & {"\x1b", "\u202e"}
+
+
 class CountedId(str):
     """An id that counts how often it is compared."""
 

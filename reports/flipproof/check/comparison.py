@@ -132,7 +132,7 @@ def table(found: Comparison) -> str:
             parting = first_crossing(one.t, one.size, PARTING_BAND)
             words = "never" if parting is None else f"{parting:.5g} s"
             lines.append(f"first more than {PARTING_BAND:.0%} of omega_0 apart: {words}")
-    return "\n".join(lines)
+    return "\n".join(line.replace("\n", r"\n") for line in lines)
 
 
 def _times(found: Comparison) -> str:

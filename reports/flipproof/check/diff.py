@@ -96,7 +96,7 @@ class Comparison:
             if chosen:
                 lines.append(f"{heading} ({len(chosen)}):")
                 lines += [f"  {change.id}: {change.words}" for change in chosen]
-        return "\n".join([*lines, self.conclusion])
+        return "\n".join(line.replace("\n", r"\n") for line in (*lines, self.conclusion))
 
 
 def read_summary(path: Path) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import functools
 import math
 from pathlib import Path
 from typing import Any, Final
@@ -98,7 +97,10 @@ def command_check(options: argparse.Namespace) -> int:
     from flipproof.check.throw import check
 
     allowed = TOLERANCE if options.tolerance is None else options.tolerance
-    say = functools.partial(print, flush=True)
+
+    def say(line: str) -> None:
+        print(inert(line, lines=False), flush=True)
+
     with store_of(options) as store:
         found = check(
             scenario, groups, baseline=options.baseline, tolerance=allowed, say=say, store=store,

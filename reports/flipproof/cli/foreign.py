@@ -27,6 +27,7 @@ from flipproof.cli.arguments import (
     write_json,
     write_junit,
 )
+from flipproof.cli.console import inert
 
 SPEC_HELP = (
     "a name that flipproof models lists, package.module:name, file.py:name, "
@@ -180,8 +181,8 @@ def _certified(options: argparse.Namespace) -> int:
     before = _appended()
 
     def say(line: str) -> None:
-        lines.append(line)
-        print(line, flush=True)
+        lines.append(inert(line, lines=False))
+        print(lines[-1], flush=True)
 
     seed = SEED if options.seed is None else options.seed
     with closing(_opened(options, **given)) as runner:
@@ -232,9 +233,10 @@ def command_place(options: argparse.Namespace) -> int:
         try:
             found = place(runner)
         except ForeignError as error:
-            print(f"{options.spec} cannot be placed; it does not answer the throws that tell equations apart: {error}")
+            words = f"{options.spec} cannot be placed; it does not answer the throws that tell equations apart: {error}"
+            print(inert(words, lines=False))
             return 1
-    print(json.dumps(found.to_mapping(), indent=1) if options.json else found.text)
+    print(json.dumps(found.to_mapping(), indent=1) if options.json else inert(found.text))
     return 0 if found.on_lattice else 1
 
 
@@ -245,7 +247,7 @@ def command_explain(options: argparse.Namespace) -> int:
 
     throw = read_scenario(options.scenario, options.slices)
     with closing(opened(options.first)) as one, closing(opened(options.second)) as other:
-        print(explain(one, other, throw).text)
+        print(inert(explain(one, other, throw).text))
     return 0
 
 

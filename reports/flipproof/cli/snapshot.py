@@ -22,7 +22,7 @@ from flipproof.check.diff import read_summary
 from flipproof.output.folder import replaced_folder
 from flipproof.output.summary import SCHEMA_NAME, SUMMARY_VERSION, summary_text
 from flipproof.page.headlines import Headline
-from flipproof.page.lead import answered, asides, percent_at
+from flipproof.page.lead import answered, percent_at, shares_said
 
 PLACE: Final = Path(__file__).resolve().parents[2] / "snapshot"
 
@@ -60,14 +60,18 @@ def take(report: Path, place: Path = PLACE) -> None:
 
 
 def front_page(summary: Mapping[str, Any]) -> str:
-    """Return what the README says that was found, from a summary alone: a table of answers, and what it leaves out."""
+    """Return what the README says that was found, from a summary alone: an answer a line, and the largest shares."""
     found = [Headline.from_mapping(mapping) for mapping in summary["headlines"]]
     slices = sorted({n for h in found for n in (h.slices, h.finer_slices) if n is not None})
-    head = ("asked", "answer", "largest difference of ω of one pair, % of ω₀", *(f"N = {n}" for n in slices))
-    rows = [(*words, *(percent_at(headline, n) for n in slices)) for *words, headline in answered(found)]
-    table = "".join(f"| {' | '.join(cells)} |\n" for cells in (head, ("---",) * len(head), *rows))
-    text = "\n".join(fill(_plain(f"- {said}"), 118, subsequent_indent="  ") for said in asides(found))
-    return f"{_plain(table)}\n{text}\n"
+    items: list[str] = []
+    for question, verdict, pair, headline in answered(found):
+        sizes = ", ".join(f"{percent_at(headline, n)} at N = {n}" for n in slices)
+        if question:
+            items.append(f"- **{question}** {verdict} {pair[0].upper()}{pair[1:]}: {sizes}")
+        else:
+            items[-1] += f"; {pair}: {sizes}"
+    items += [f"- {' '.join(shares[:2])}"] if (shares := list(shares_said(found))) else []
+    return "\n".join(fill(_plain(item), 118, subsequent_indent="  ") for item in items) + "\n"
 
 
 def _plain(text: str) -> str:

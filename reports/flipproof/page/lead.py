@@ -56,7 +56,7 @@ def answers(headlines: Sequence[Headline]) -> Iterator[tuple[str, list[str]]]:
 
 
 def answered(headlines: Sequence[Headline]) -> Iterator[tuple[str, str, str, Headline]]:
-    """Yield the lines of the table of answers: a question, yes or no, and a number after what it is the difference of.
+    """Yield the numbers of the answers: a question, yes or no, what is held against what, and their difference.
 
     Question and verdict stand in the first line of several.
     """
@@ -64,34 +64,25 @@ def answered(headlines: Sequence[Headline]) -> Iterator[tuple[str, str, str, Hea
     steps = found["step"].note if "step" in found else "the steps"
     asked = {
         "Is it justified to hold ω constant over a step?": {
-            "held-through": "exact step of Eq. 8, with rebounds located inside the step, from Eq. 8; all impacts",
-            "held": "published program without its lag of one step, from its equation; before the first impact",
+            "held-through": "exact step of Eq. 8, with rebounds located inside the step, against Eq. 8",
+            "held": "before the first impact, published program without its lag of one step, against its equation",
         },
         f"Are {steps} enough?": {
-            "step": (
-                "published program, with its lag of one step and rebounds on the grid, from its equation; all impacts"
-            )
+            "step": ("published program, with its lag of one step and rebounds on the grid, against its equation")
         },
         "Is Eq. 8 free flight?": {
-            "eq8-free": "Eq. 8, from free flight",
-            "program-eq8": "published program, from Eq. 8",
-            "whole": "published program, from free flight",
+            "eq8-free": "Eq. 8 against free flight",
+            "program-eq8": "published program against Eq. 8",
+            "whole": "published program against free flight",
         },
-        "Does a physics engine agree?": {"engine": "pymunk, with its hits on the grid of its step, from free flight"},
+        "Does a physics engine agree?": {
+            "engine": "pymunk, with its hits on the grid of its step, against free flight"
+        },
     }
     for question, pairs in asked.items():
         there = [(words, found[id_]) for id_, words in pairs.items() if id_ in found]
         for k, (words, headline) in enumerate(there):
             yield "" if k else question, "" if k else _verdict(found, *pairs), words, headline
-
-
-def asides(headlines: Sequence[Headline]) -> Iterator[str]:
-    """Yield what the table of answers does not say, a paragraph each."""
-    found = {headline.id: headline for headline in headlines}
-    yield from _farther(found)
-    yield from _shares(found)
-    if "engine" in found:
-        yield " ".join(list(_engine(found["engine"]))[1:])
 
 
 def _verdict(found: Mapping[str, Headline], *ids: str) -> str:
@@ -148,6 +139,11 @@ def _farther(found: Mapping[str, Headline]) -> Iterator[str]:
             f"In ω on landing the program differs from Eq. 8 by {amount(ends[0])} and from free flight by "
             f"{amount(ends[1])}."
         )
+
+
+def shares_said(headlines: Sequence[Headline]) -> Iterator[str]:
+    """Yield what is said of the fair shares, sentence by sentence."""
+    yield from _shares({headline.id: headline for headline in headlines})
 
 
 def _shares(found: Mapping[str, Headline]) -> Iterator[str]:
