@@ -65,8 +65,7 @@ def test_own_inertia_raises_the_plateau(found):
 
 def test_findings_say_what_is_recorded_and_a_missing_run_is_no_number(found):
     findings = {finding.id: finding for finding in claims(found)}
-    assert len(findings) == 1 + len(EQUATIONS) + 2
-    assert findings["water-rods-full"].verdict == "pass"
+    assert len(findings) == len(EQUATIONS) + 2
     assert "fluids recorded" in findings["water-eq8"].note
     broken = replace(found, level=found.level | {"eq8": np.full(len(FILLS), np.nan)})
     assert {f.id: f for f in claims(broken)}["water-eq8"].value is None
