@@ -1,4 +1,4 @@
-"""The tutorial's blocks, run in order in an empty folder as a class would."""
+"""The tutorial's blocks, each by itself, in a folder that has the files of the blocks before it."""
 
 import json
 import re
@@ -21,7 +21,6 @@ PAGE = Path(__file__).resolve().parent.parent / "docs" / "tutorial.md"
 def lesson(tmp_path_factory):
     """Return the folder that the lesson leaves."""
     folder = tmp_path_factory.mktemp("lesson")
-    names: dict[str, object] = {}
     blocks = re.findall(r"^```(\w+)\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
@@ -29,7 +28,7 @@ def lesson(tmp_path_factory):
             if kind == "toml":
                 Path(text.splitlines()[0].removeprefix("# ")).write_text(text, encoding="utf-8")
             elif kind == "python":
-                exec(compile(text, str(PAGE), "exec"), names)
+                exec(compile(text, str(PAGE), "exec"), {})  # alone: with no names of earlier blocks
             else:
                 assert kind == "sh", kind
                 for line in text.splitlines():
@@ -49,6 +48,11 @@ def test_every_step_leaves_what_the_page_says(lesson):
         "my-fit/allowed.png",
     ):
         assert (lesson / name).stat().st_size > 1000, name
+
+
+def test_a_millimetre_explains_the_noise_as_the_page_says(lesson):
+    summary = json.loads((lesson / "my-fit" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["noise"] == pytest.approx(1e-3 * np.sqrt(2.0) / 0.28, rel=0.25, abs=0.0)
 
 
 def test_the_fit_finds_the_throw_and_the_equation(lesson):
