@@ -275,7 +275,7 @@ def test_the_throw_is_marked_where_its_axes_say(axis, place):
 def test_every_region_carries_its_name_or_its_number():
     inside = np.zeros((8, 9), dtype=bool)
     inside[:6, :6] = inside[7, 8] = True
-    assert sorted(_regions(inside)) == [(2, 2, 36), (7, 8, 1)]
+    assert sorted(_regions(inside)) == [(2, 2, 6), (7, 8, 1)]
     drawn = figure_map(made_up("gamma", (0.1, 0.2, 0.3), by_rung(4)))
     assert [text.get_text() for text in drawn.axes[0].texts if text.get_weight() == "bold"] == ["5"]
     legend = [text.get_text() for text in drawn.legends[0].get_texts()]

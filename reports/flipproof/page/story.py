@@ -22,10 +22,12 @@ from typing import Any, Final
 from markupsafe import Markup
 
 from flipproof.chapters.differences.study import PARTING_BAND, percent
+from flipproof.chapters.maps.study import RUNGS, place_of
 from flipproof.figures.style import SUPERSCRIPTS
 from flipproof.frame.findings import finite_or_none
 from flipproof.frame.spoken import SPOKEN
 from flipproof.page.lead import signed
+from slicemodel import Scenario
 
 NAMES: Final[Mapping[str, str]] = {name: SPOKEN[name] for name in ("published-python", "eq8", "free-flight")} | {
     "pymunk": "engine (pymunk)"
@@ -132,7 +134,7 @@ def story(content: Mapping[str, Any], tables: Mapping[str, str | None]) -> Simpl
         nearest=_nearest(summary),
         water=_water(summary),
         times={id_: summary.number(f"headlines/{id_}/time", rounded) for id_ in ("eq8-free", "whole", "program-eq8")},
-        map=_map(tables.get("map-gamma")),
+        map=_map(tables.get("map-gamma"), content),
         names=NAMES,
     )
 
@@ -207,8 +209,11 @@ def _nearest(summary: Summary) -> list[SimpleNamespace]:
     return sorted(found, key=lambda one: (-one.agrees.value, -one.nearest.value))
 
 
-def _map(table: str | None) -> dict[str, Any] | None:
-    """Return the map over filling and damping for the script, from the CSV of its figure; None without one."""
+def _map(table: str | None, content: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Return the map over filling and damping for the script, from the CSV of its figure; None without one.
+
+    ``thrown`` is the place of the report's throw on it, ``numbers`` are those of the assumptions in the figure.
+    """
     if not table:
         return None
     rows = list(csv.DictReader(io.StringIO(table)))
@@ -223,7 +228,8 @@ def _map(table: str | None) -> dict[str, Any] | None:
     return {
         "fills": sorted({float(row[fill]) for row in rows}),
         "dampings": sorted({float(row[damping]) for row in rows}),
-        "shares": sorted({row["largest fair share"] for row in rows if row.get("largest fair share")}),
+        "numbers": {name: k for k, name in enumerate(RUNGS, start=1)},
+        "thrown": place_of(Scenario.from_mapping(content["scenario"]), "gamma", 1000),
         "solvers": solvers,
         "cells": [
             {

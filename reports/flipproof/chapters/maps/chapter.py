@@ -54,8 +54,8 @@ RANGE = (1e-3, 1.0)
 CONTOURS: tuple[tuple[float, Literal["--", "-"]], ...] = ((0.01, "--"), (0.1, "-"))
 """Error of the approximation as a fraction of omega_0, and the line that shows it."""
 
-WORDED: Final = 30
-"""Cells of a region from which its name is written into it; a smaller one has its number."""
+WORDED: Final = 6
+"""Cells side by side from which the name of a region is written into it; a narrower one has its number."""
 
 HALO: Final = [withStroke(linewidth=2.5, foreground="#FFFFFF")]
 
@@ -217,8 +217,8 @@ def figure_map(study: ValidityMap) -> Figure:
             border = Path.make_compound_path(*map(Path, outline))
             axes.add_patch(PathPatch(border, fill=False, edgecolor=colour, linewidth=2.2, capstyle="projecting"))
         handles.append(Patch(facecolor="none", edgecolor=colour, linewidth=2.2, label=f"{k + 1}  {name}"))
-        for row, column, extent in _regions(study.dominant == k):
-            words = f"{k + 1}  {name.partition(':')[0].partition(',')[0]}" if extent >= WORDED else f"{k + 1}"
+        for row, column, beside in _regions(study.dominant == k):
+            words = f"{k + 1}  {name.partition(':')[0].partition(',')[0]}" if beside >= WORDED else f"{k + 1}"
             place: dict[str, Any] = {"ha": "center", "va": "center", "path_effects": HALO}
             axes.text(study.fills[column], study.values[row], words, color=colour, size=8, weight="bold", **place)
     hatched: dict[str, Any] = {"facecolor": "none", "edgecolor": "#555555", "hatch": "////"}
@@ -244,12 +244,12 @@ def figure_map(study: ValidityMap) -> Figure:
 
 
 def _regions(inside: NDArray[np.bool_]) -> Iterator[tuple[int, int, int]]:
-    """Yield row and column of the cell in the middle of every connected region, and the number of its cells."""
+    """Yield row and column of the cell in the middle of every connected region, and the number of cells beside it."""
     numbers, count = label(inside)
     for number in range(1, count + 1):
         at = np.argwhere(numbers == number)
         row, column = at[((at - at.mean(axis=0)) ** 2).sum(axis=1).argmin()]
-        yield int(row), int(column), len(at)
+        yield int(row), int(column), int((at[:, 0] == row).sum())
 
 
 def errors(study: ValidityMap) -> Sequence[tuple[str, FloatArray]]:

@@ -102,7 +102,11 @@
     const limits = [0.01, 0.03, 0.1, 0.3];
     const shade = (value) => limits.filter((limit) => value > limit).length;
     const edge = { left: 62, right: 8, top: 20, bottom: 64 };
-    let here = [Math.floor(data.fills.length / 2), Math.floor(data.dampings.length / 2)];
+    // The throw of the report, in cells from the first: fillings are equally spaced, drags in equal ratios.
+    const thrown = [(data.thrown[0] - data.fills[0]) / (data.fills[1] - data.fills[0]), Math.log(data.thrown[1] / data.dampings[0]) / Math.log(data.dampings[1] / data.dampings[0])];
+    const size = [data.fills.length, data.dampings.length];
+    const shown = thrown.every((place, axis) => place >= -0.5 && place <= size[axis] - 0.5);
+    let here = thrown.map((place, axis) => Math.round(Math.max(0, Math.min(size[axis] - 1, place || 0))));
 
     function tell(i, j) {
       here = [i, j];
@@ -146,10 +150,17 @@
         chart.element("rect", { class: `map-cell shade-${k}`, x: edge.left + k * part, y: key, width: part, height: 8 }, svg);
         chart.words(words, { x: edge.left + (k + 0.5) * part, y: key + 21, "text-anchor": "middle" }, svg);
       });
+      if (shown) {
+        const [cx, cy] = [edge.left + (thrown[0] + 0.5) * w, edge.top + (ny - 0.5 - thrown[1]) * h];
+        const cross = `M${cx - 6} ${cy - 6}l12 12m0-12l-12 12`;
+        chart.element("path", { class: "map-throw map-throw-halo", d: cross }, svg);
+        chart.element("path", { class: "map-throw", d: cross, "data-testid": "map-throw" }, svg);
+        chart.words("this throw", { class: "map-name", x: cx + 10, y: cy - 6 }, svg);
+      }
       chart.element("rect", { class: "map-here", width: w, height: h, transform: `translate(${x(here[0])} ${y(here[1])})` }, svg);
     }
 
-    // The name of a change where its largest connected region has most room.
+    // Every region has the name of its change, or the number of it where there is no room.
     function regions(x, y, w, h) {
       const seen = new Set();
       for (const start of cells.keys()) {
@@ -163,15 +174,15 @@
           found.push([i, j]);
           waiting.push(`${i + 1} ${j}`, `${i - 1} ${j}`, `${i} ${j + 1}`, `${i} ${j - 1}`);
         }
-        if (found.length < 16 || !which) continue;
+        if (!which) continue;
         const [ci, cj] = [0, 1].map((axis) => found.reduce((sum, place) => sum + place[axis], 0) / found.length);
         const [i, j] = found.reduce((best, place) => (Math.hypot(place[0] - ci, place[1] - cj) < Math.hypot(best[0] - ci, best[1] - cj) ? place : best));
-        // A name that its own region has no room for is told by the line below the map alone.
+        const short = which.split(/[:,]/)[0], number = String(data.numbers[which]);
         const room = w * Math.min(...[-1, 0, 1].map((row) => found.filter((place) => place[1] === j + row).length));
-        if (room < 7 * which.length) continue;
+        const words = room < 7 * (short.length + 3) ? number : `${number} ${short}`;
         const left = x(Math.min(...found.filter((place) => place[1] === j).map((place) => place[0])));
-        const middle = Math.max(x(i) + w / 2, left + 3.6 * which.length);
-        chart.words(which, { class: "map-name", x: middle, y: y(j) + h / 2 + 4, "text-anchor": "middle" }, svg);
+        const middle = words === number ? x(i) + w / 2 : Math.max(x(i) + w / 2, left + 3.6 * words.length);
+        chart.words(words, { class: "map-name", x: middle, y: y(j) + h / 2 + 4, "text-anchor": "middle" }, svg);
       }
     }
     svg.addEventListener("keydown", (event) => {
@@ -184,6 +195,7 @@
     if ([...choice.options].some(({ value }) => value === window.flipproofState.kept("map"))) choice.value = window.flipproofState.kept("map");
     chart.onWidth(svg, draw);
     draw();
+    tell(...here);
   }
 
   window.addEventListener("load", () => setTimeout(() => { ride(); map(); }, 0));
