@@ -93,8 +93,7 @@ FAULTS = (
      "return max(abs(band) for band in", "test_diff.py"),
     ("reports/flipproof/foreign/checks_measured.py", "holds=abs(order - declared) <= ORDER_ROOM",
      "holds=order - declared <= ORDER_ROOM", "foreign/test_certify.py"),
-    ("reports/flipproof/frame/twins.py", "mass=throw.bottle.mass * (1.0 + CHANGE)", "mass=throw.bottle.mass",
-     "test_waterfall.py"),
+    ("reports/flipproof/frame/twins.py", '{"twin": k}', '{"twin": 1}', "test_waterfall.py"),
     ("reports/flipproof/frame/keys.py", '"settings": dict(run.settings)}', '"settings": {}}', "test_run_store.py"),
 )  # fmt: skip
 

@@ -81,7 +81,7 @@ class Certificate:
     richardson : (P,) [rad/s]
         omega(t) extrapolated to dt -> 0; NaN if the run at twice the step is not complete.
     band : (P,)
-        Bound of |omega - exact| of the certified run, fraction of omega_0; grows with time. NaN as before.
+        Estimate of |omega - exact| of the certified run, fraction of omega_0; grows with time. NaN as before.
     horizon : float or None
         First output time at which a change exceeds the tolerance [s]; None: the run holds to its end.
     rebounds : tuple of Rebound

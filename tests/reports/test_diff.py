@@ -20,7 +20,7 @@ from flipproof.check.diff_page import read_curves
 from flipproof.cli.check import add_checks
 from flipproof.figures.report_pair import differences, figure_report_pair
 from flipproof.frame import pool, solvers
-from flipproof.frame.findings import Finding
+from flipproof.frame.findings import Band, Finding
 from flipproof.frame.gather import gather, tell
 from flipproof.output.columns import curves_csv
 from flipproof.output.provenance import provenance
@@ -130,7 +130,8 @@ def test_the_sign_fault_of_eq_9d_is_named_by_the_findings_it_moves(sound, made, 
 
 def finding(**changes):
     usual = {"id": "x", "title": "x", "value": 1.0, "unit": "m", "kind": "observation", "band": 0.1}
-    return Finding(**{**usual, **changes}).to_mapping()
+    given = {**usual, **changes}
+    return Finding(**given | {"band": Band.of(given["band"], "twins")}).to_mapping()
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,6 @@ from flipproof.sweep.planned import (
     map_facts,
     plan_split,
     read_runs,
-    releases,
     split_rows,
     waterfall_csv,
 )
@@ -219,7 +218,7 @@ def split(tmp_path_factory):
     """Return the throw of a waterfall, its runs, and a folder in which half of them were made twice over."""
     throw = Scenario(duration=0.1).with_slices(2)
     runs = plan_split(throw)
-    design = design_of_runs(runs, releases(runs), ENDS, "test")
+    design = design_of_runs(runs, {"omega0": [throw.omega0]}, ENDS, "test")
     out = tmp_path_factory.mktemp("split") / "out"
     for part in (range(0, design.size, 2), range(1, design.size, 2)):
         with Store(out, design, code_identity()) as store:
@@ -255,13 +254,13 @@ def test_the_waterfall_command_draws_every_observable(capsys, tmp_path, monkeypa
     status, out, err = run(capsys, *options, "--quiet")
     assert (status, err) == (0, "")
     assert "published program" in out
-    assert "328 points" in out
+    assert "402 points" in out
     for observable in OBSERVABLES:
         assert (tmp_path / "out" / f"waterfall-{observable.name}.png").stat().st_size > 10_000
     drawn = Drawing("<svg/>", b"anew")
     monkeypatch.setattr("flipproof.sweep.planned.draw", lambda _: drawn)
     status, out, _ = run(capsys, *options)
-    assert "; 328 were there" in out
+    assert "; 402 were there" in out
     for observable in OBSERVABLES:
         assert (tmp_path / "out" / f"waterfall-{observable.name}.png").read_bytes() == b"anew"
 

@@ -9,7 +9,7 @@ import pytest
 from made_up import trajectory_of
 
 from flipproof.build import ask_of
-from flipproof.chapters.differences.chapter import run_bands
+from flipproof.chapters.differences.chapter import band_calls, run_bands
 from flipproof.chapters.differences.study import first_crossing, largest_change, study_difference
 from flipproof.chapters.engine_facts.chapter import claim_gravity_cancels
 from flipproof.chapters.ice.chapter import measure
@@ -23,10 +23,9 @@ from flipproof.chapters.step_size.chapter import (
     plan_step_size,
     study_step_size,
 )
-from flipproof.frame.findings import Finding
-from flipproof.frame.flights import Flights
+from flipproof.frame.findings import Band, Finding
+from flipproof.frame.flights import Flights, Outcome
 from flipproof.frame.solvers import Made, Missing, Run
-from flipproof.frame.twins import twins
 from slicemodel import Impacts, Scenario, Trajectory
 
 SCENARIO = Scenario(n_slices=1)
@@ -185,7 +184,7 @@ def test_verdicts(value, verdict, failed):
 
 
 def test_an_observation_cannot_fail_and_json_holds_no_infinity():
-    finding = Finding(id="x", title="x", value=math.inf, unit="", kind="observation", band=math.nan)
+    finding = Finding(id="x", title="x", value=math.inf, unit="", kind="observation", band=Band(math.nan, "twins"))
     assert not finding.failed
     assert finding.to_mapping()["admissible"] == [None, None]
     assert finding.to_mapping()["value"] == "inf"
@@ -235,22 +234,21 @@ def test_a_run_that_is_not_whole_is_not_evaluated_and_says_why():
 def test_bands_of_runs():
     """A disturbed throw whose label began with a model's name once set that model's band: 1.3e-6 where 1e-9 holds."""
     runs = ask_of(SCENARIO, "quick").solvers
-    release, rest = twins(runs["eq8"])
     disturbed = Run("eq8", dataclasses.replace(SCENARIO, theta0=1.0), label="eq8, release changed by 1e-06")
     certified = dataclasses.replace(curve([20, 20]), diagnostics={"certificate": {"band": 2e-3}})
     flown = {
         runs["published-limit"]: curve([20, 20]),
-        twins(runs["published-limit"])[0]: curve([20, 20]),
         runs["eq8"]: curve([20, 20]),
-        release: curve([20, 20 + 2e-6]),
-        rest: curve([20, 20 + 4e-6]),
         disturbed: curve([20, 20 + 2e-3]),
         runs["pymunk"]: certified,
         runs["mujoco"]: curve([20, 20]),
     }
-    bands = run_bands(runs, Flights({run: Made(run, flight, 0.0) for run, flight in flown.items()}))
-    assert bands["published-limit"] == 1e-9  # never finer than independent methods share
+    calls = band_calls(runs)
+    answers = {call: Outcome(None, "a twin ended early") for call in calls.values()}
+    answers |= {calls["eq8"]: Outcome(np.array([1e-9, 2e-7]))}
+    bands = run_bands(runs, calls, Flights({run: Made(run, flight, 0.0) for run, flight in flown.items()}, answers))
     assert bands["eq8"] == pytest.approx(2e-7)
+    assert "published-limit" not in bands
     assert bands["pymunk"] == 2e-3
     assert "mujoco" not in bands  # without a certificate there is none
     assert bands["published-python"] == 0.0

@@ -10,7 +10,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from flipproof.frame.findings import Finding
+from flipproof.frame.findings import Band, Finding, regression
 from flipproof.frame.gather import Told
 from flipproof.output.columns import columns_csv, curves_csv, rows_csv
 from flipproof.output.junit import junit_text
@@ -20,7 +20,7 @@ SCHEMA = json.loads(schema_text())
 
 FINDINGS = (
     Finding(id="ice-eq8", title="holds", value=0.0, unit="of ω₀", kind="regression", admissible=(0.0, 1e-12)),
-    Finding(id="order-eq8", title="fails", value=1.5, unit="", kind="regression", admissible=(0.9, 1.1), band=0.01),
+    regression("order-eq8", "fails", 1.5, "", (0.9, 1.1), band=Band(0.01, "fit")),
     Finding(id="order-bad", title="is not a number", value=math.nan, unit="", kind="regression", admissible=(0.9, 1.1)),
     Finding(id="vectors-x", title="missing", value=None, unit="", kind="regression", note="x: failed\x00 & <burst>"),
     Finding(id="difference-a-b", title="apart", value=math.inf, unit="of ω₀", kind="observation", note="late"),
@@ -101,7 +101,7 @@ def test_regressions_are_test_cases_and_observations_properties():
     cases = {case.get("name"): case for case in suite.iter("testcase")}
     assert list(cases) == ["ice-eq8", "order-eq8", "order-bad", "vectors-x"]
     assert [child.tag for child in cases["ice-eq8"]] == ["system-out"]
-    assert cases["order-eq8"].find("failure").get("message") == "1.50 ± 0.01, threshold 0.9 to 1.1"
+    assert cases["order-eq8"].find("failure").get("message") == "1.50 ± 0.01 (fit), threshold 0.9 to 1.1"
     assert "nan" in cases["order-bad"].find("failure").get("message")
     assert cases["vectors-x"].find("error").get("message") == "x: failed� & <burst>"
     assert {each.get("name") for each in suite.iter("property")} == {"difference-a-b", "limit-a"}

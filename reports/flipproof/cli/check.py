@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import math
+import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -147,6 +149,7 @@ def command_compare(options: argparse.Namespace) -> int:
     check_outputs(options, "junit", "json")
     from flipproof.check.comparison import claims, compare, table
     from flipproof.frame.solvers import find, solve
+    from flipproof.frame.twins import TRUSTED, doubt
     from flipproof.output.tables import Curve, read_curve
 
     scenario = read_scenario(options.scenario, options.slices)
@@ -157,10 +160,13 @@ def command_compare(options: argparse.Namespace) -> int:
         path = Path(name)
         if path.is_file() or ((path.suffix or "/" in name) and ":" not in name):
             return read_curve(path)
+        began = time.perf_counter()
         run = solve(find(name).name, scenario)
+        seconds = time.perf_counter() - began
         if len(run.t) < 2:
             raise ValueError(f"{name} has nothing to compare on this throw: {run.status}: {run.message}")
-        return Curve.of(run)
+        words = doubt(run, seconds, TRUSTED if options.tolerance is None else options.tolerance)
+        return replace(Curve.of(run), notes=(words,) if words else ())
 
     found = compare(load(options.first), load(options.second))
     print(inert(table(found)))

@@ -259,8 +259,9 @@ def _print_report(report: Any, out: Path, seconds: float) -> None:
 
 
 def command_simulate(options: argparse.Namespace) -> int:
-    """Run one solver and write CSV."""
+    """Run one solver and write CSV; say on standard error what stopped it, or up to when it may be trusted."""
     from flipproof.frame.solvers import find, solve
+    from flipproof.frame.twins import doubt
     from flipproof.output.folder import write_text
     from flipproof.output.tables import trajectory_csv
 
@@ -269,7 +270,9 @@ def command_simulate(options: argparse.Namespace) -> int:
     if options.steps is not None and solver.package != "slicemodel":
         raise ValueError(f"--steps {options.steps}: {solver.name} is not a scheme and chooses its own steps")
     check_outputs(options, "out")
+    began = time.perf_counter()
     trajectory = solve(solver.name, scenario, **({} if options.steps is None else {"steps": options.steps}))
+    seconds = time.perf_counter() - began
     table = trajectory_csv(trajectory)
     if options.out:
         write_text(options.out, table)
@@ -277,6 +280,8 @@ def command_simulate(options: argparse.Namespace) -> int:
         sys.stdout.write(table)
     if not trajectory.ok:
         print(f"flipproof: {solver.name}: {trajectory.status}: {trajectory.message}", file=sys.stderr)
+    if words := doubt(trajectory, seconds):
+        print(f"flipproof: {words}", file=sys.stderr)
     return 0
 
 

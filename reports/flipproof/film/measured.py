@@ -18,7 +18,7 @@ from flipproof.film.fit.problem import ALSO, SLICES, Measurement, Quantity, pose
 from flipproof.film.fit.reading import QUANTITIES
 from flipproof.frame.chapter import Ask, Call, Chapter, Part, Study
 from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.findings import Finding, observed
+from flipproof.frame.findings import Band, Finding, observed
 from flipproof.output.columns import columns_csv
 from flipproof.output.tables import read_curve
 from slicemodel import Scenario
@@ -66,15 +66,15 @@ class Measured:
 
     def findings(self) -> Iterator[Finding]:
         """Yield one observation for each solver, and one for each fit."""
-        label, unit = self.measurement.label, self.measurement.unit
+        label, unit, band = self.measurement.label, self.measurement.unit, Band(self.noise, "noise")
         for name, misfit in self.misfits.items():
             title = f"{HELD[name]} as thrown, held against {label}"
             note = "root mean square of measured minus computed, nothing fitted; the band is the noise of a value"
-            yield observed(f"measured-{name}", title, misfit, unit, note, band=self.noise)
+            yield observed(f"measured-{name}", title, misfit, unit, note, band=band)
         for one in self.fits:
             id_, title = f"measured-fit-{one.solver}", f"{HELD[one.solver]} fitted to {label}"
             note = ", ".join(f"{i.name} = {i.value:.4g} [{i.low:.4g}, {i.high:.4g}]" for i in one.intervals)
-            yield observed(id_, title, one.root_mean_square, unit, note, band=self.noise)
+            yield observed(id_, title, one.root_mean_square, unit, note, band=band)
 
     def exhibit(self) -> Exhibit:
         """Return the figure: the measurement over the solvers, and what is left of it."""

@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
 from flipproof.frame.exhibit import Exhibit, Touch
-from flipproof.frame.findings import Finding, Kind, observed, regression
+from flipproof.frame.findings import Band, Finding, Kind, observed, regression
 from flipproof.frame.flights import Call, Flights, Outcome, attempt, known
 from flipproof.frame.solvers import REFERENCE, Made, Missing, Run
 from slicemodel import Scenario
 
 __all__ = [
-    "Absent", "Ask", "Call", "Chapter", "Claims", "Exhibit", "Finding", "Flights", "Kind", "Made", "Missing", "Outcome",
-    "Part", "Run", "Size", "Study", "Touch", "attempt", "judged", "known", "observed", "regression",
+    "Absent", "Ask", "Band", "Call", "Chapter", "Claims", "Exhibit", "Finding", "Flights", "Kind", "Made", "Missing",
+    "Outcome", "Part", "Run", "Size", "Study", "Touch", "attempt", "judged", "known", "observed", "regression",
 ]  # fmt: skip
 """All that a chapter is written with."""
 

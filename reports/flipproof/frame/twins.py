@@ -1,47 +1,48 @@
-"""Twins of an event-driven run: by how much they differ from it is its band.
+"""The band of an event-driven run: what twins of it and a tenth of the rest speed change (``ode_reference.bands``).
 
-The equations are solved exactly between impacts, so that there is no tolerance to cut. Two things remain open:
-
-    release       omega_0 and the mass of the bottle are larger by ``CHANGE`` of themselves, which is more than
-                  round-off adds up to in a flight: what the impacts make of it is what the last digits decide. Without
-                  drag and weight a change of omega_0 alone is one of the unit of time, and leaves every impact in place
-    rest speed    a tenth of the usual one: below which speed a slice counts as at rest is a choice of the solver
-
-Whether the equations are solved right is another question, which an independent integration answers.
+The equations are solved exactly between impacts, so that there is no tolerance to cut. Two things remain open: what the
+last digits decide, which twins show, whose release differs in the eleventh digit; and below which speed a slice counts
+as at rest, which is a choice of the solver. Whether the equations are solved right is another question, which an
+independent integration answers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
-from flipproof.frame.solvers import Run
+import numpy as np
+
+from flipproof.frame.flights import Call
+from flipproof.frame.solvers import Missing, Run, make
+from ode_reference.bands import CUT, SAFETY, TWINS, band_of, estimate_band
 from ode_reference.models import MODELS
 from ode_reference.solver import REST_SPEED, REST_SPEED_WITH_RECOIL
 from ode_reference.switches import Switches
+from slicemodel.trajectory import FloatArray, Trajectory
 
-CHANGE: Final = 3e-11
-"""By how much omega_0 and the mass of the bottle of the twin in release are larger, fraction of each."""
+FLOOR: Final = 1e-9
+"""Least band of omega, fraction of omega_0: the digits that independent methods share; none finer is claimed."""
 
-CUT: Final = 10.0
-"""Usual rest speed over that of the twin in rest speed."""
+TRUSTED: Final = 1e-3
+"""Band up to which omega(t) is trusted unless another tolerance is asked for, fraction of omega_0."""
+
+SLOW: Final = 10.0
+"""Seconds of a flight from which its twins are not flown unasked: they take nine times as long."""
 
 BAND_WORDS: Final = (
-    f"the larger of two changes: with ω₀ and the mass of the bottle larger by {CHANGE:g} of themselves, and with a "
-    f"rest speed {CUT:g} times smaller"
+    f"estimated as {SAFETY:g} times the largest change by {TWINS} twins, whose release differs in the eleventh digit, "
+    f"and by a rest speed {CUT:g} times smaller"
 )
 
 
-def twins(run: Run) -> tuple[Run, Run]:
-    """Return both twins of a run of an equation that has the solver's own rest speed: in release, in rest speed."""
-    throw = run.scenario
-    bottle = replace(throw.bottle, mass=throw.bottle.mass * (1.0 + CHANGE))
-    released = replace(throw, omega0=throw.omega0 * (1.0 + CHANGE), bottle=bottle)
-    rest = {**run.settings, "rest_speed": usual_rest_speed(run.solver) / CUT}
-    return (
-        replace(run, label=f"{run.name}, twin in release", scenario=released),
-        replace(run, label=f"{run.name}, twin in rest speed", settings=rest),
+def twins(run: Run) -> tuple[Run, ...]:
+    """Return the twins of a run of an equation at its usual rest speed, and last the run at a tenth of that."""
+    changes: list[tuple[str, dict[str, Any]]] = [(f"twin {k}", {"twin": k}) for k in range(1, TWINS + 1)]
+    changes.append(("a tenth of the rest speed", {"rest_speed": usual_rest_speed(run.solver) / CUT}))
+    return tuple(
+        replace(run, label=f"{run.name}, {words}", settings={**run.settings, **change}) for words, change in changes
     )
 
 
@@ -52,5 +53,41 @@ def usual_rest_speed(model: str) -> float:
 
 
 def band(run: Run, values: Mapping[Run, float]) -> float:
-    """Return the larger difference of a run's number from those of its twins."""
-    return max(abs(values[run] - values[twin]) for twin in twins(run))
+    """Return the band of a run's number from its own value and those of its ``twins``."""
+    return float(band_of(values[run], [values[twin] for twin in twins(run)]))
+
+
+def omega_band(run: Run) -> FloatArray:
+    """Make a run and return the band of its omega(t), at least ``FLOOR``, shape (P,) [omega_0]; a ``Call`` of a study.
+
+    It never falls. A run or a twin that does not reach the end raises Missing.
+    """
+    size = estimate_band(make(run).whole).size
+    if not np.isfinite(size).all():
+        raise Missing(f"{run.name}: a twin ended early, so that its band is not known")
+    return np.maximum(size, FLOOR)
+
+
+def omega_band_call(run: Run) -> Call:
+    """Return the call for ``omega_band`` of a run."""
+    return Call(omega_band, (run,), f"{run.name}, band")
+
+
+def doubt(flight: Trajectory, seconds: float, tolerance: float = TRUSTED) -> str:
+    """Return up to when omega(t) of a flight may be trusted to a tolerance [omega_0]; nothing if that is to its end.
+
+    ``seconds`` is how long the flight took. Of a solver without twins nothing is said.
+    """
+    if flight.solver != "ode_reference" or "rest_speed" not in flight.settings or not len(flight.t):
+        return ""
+    if seconds > SLOW:
+        return f"{flight.label}: no band was estimated, which takes nine times its {seconds:.0f} s"
+    band = estimate_band(flight)
+    until = band.trusted_until(tolerance)
+    if until == flight.t[-1]:
+        return ""
+    when = "at no time" if np.isnan(until) else f"until t = {until:.4g} s"
+    return (
+        f"{flight.label}: omega(t) may be trusted to {tolerance:g} omega_0 {when}; by the end {TWINS} twins, whose "
+        f"release differs in the eleventh digit, put its band at {band.largest:.1g} omega_0"
+    )

@@ -55,8 +55,8 @@ TERMS: Final[Mapping[str, str]] = {
     "our equations.",
     "fair share": "What a change does to a result, as the mean over all orders in which all the changes can be "
     "made; the fair shares sum to the whole.",
-    "band": "How far a number could move by numerical causes alone: tighter settings, or a release changed in "
-    "the eleventh digit.",
+    "band": "An estimate of how far a number could move by numerical causes alone: eight flights whose release "
+    "differs in the eleventh digit, or finer settings. It is no bound.",
     "recoil": "The kick that the bottle gets when a slice strikes one of its ends.",
     "certified": "Neither half the step nor twice the iterations moves ω by more than the tolerance, and "
     "rebounds are as asked.",

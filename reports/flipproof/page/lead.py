@@ -212,7 +212,7 @@ def _engine(engine: Headline) -> Iterator[str]:
         f"{amount(engine)}."
     )
     if engine.band is not None:
-        yield f"The numerical band of the difference between free flight and pymunk is {percent(engine.band)} of ω₀."
+        yield f"The band of the difference between free flight and pymunk is estimated at {percent(engine.band)} of ω₀."
     yield "Agreement with pymunk tests the solution of free flight, not whether slices describe water."
 
 

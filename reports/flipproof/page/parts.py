@@ -13,7 +13,7 @@ from markupsafe import Markup
 
 from flipproof.frame.chapter import Part
 from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.findings import Finding
+from flipproof.frame.findings import RULES, Finding
 from flipproof.frame.gather import Gathered, Told
 from flipproof.frame.solvers import FINER
 from flipproof.page.glossary import indexed, linked
@@ -125,10 +125,16 @@ def _chapter(gathered: Gathered, told: Told, templates: Environment) -> Markup:
     )
 
 
+def _rules(parts: Sequence[Section]) -> dict[str, str]:
+    """Return the rules of the bands of all findings, in words."""
+    used = {finding.band.rule for part in parts for finding in part.findings if finding.band is not None}
+    return {rule: words for rule, words in RULES.items() if rule in used}
+
+
 def behind(parts: Sequence[Section], templates: Environment, context: Mapping[str, Any]) -> Iterator[Section]:
     """Yield the sections that stand behind the parts of a report, with links to the glossary."""
     for id_, (title, sentence) in BEHIND.items():
-        html = templates.get_template(f"{id_}.html.j2").render(context, parts=parts)
+        html = templates.get_template(f"{id_}.html.j2").render(context, parts=parts, rules=_rules(parts))
         yield Section(id=id_, title=title, sentence=sentence, html=(indexed if id_ == "glossary" else linked)(html))
 
 

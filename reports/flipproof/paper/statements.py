@@ -13,7 +13,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any, Final, Literal
 
-from flipproof.frame.findings import Finding, finite_or_none, observed
+from flipproof.frame.findings import Band, Finding, finite_or_none, observed
 from flipproof.frame.solvers import Missing
 from flipproof.paper.observe import Flights
 from flipproof.paper.runs import BANDS
@@ -304,8 +304,9 @@ class Statement:
             number, id_ = judgement.deciding, f"paper-{self.id}-{judgement.solver}"
             title = f"{self.place}: {self.says} By {judgement.solver}: {self.word(judgement)}"
             value = None if number is None or math.isnan(number.value) else number.value
-            band = None if number is None or math.isnan(number.band) else number.band
-            yield observed(id_, title, value, number.unit if number else "", judgement.words, band=band)
+            size = None if number is None or math.isnan(number.band) else number.band
+            unit, band = number.unit if number else "", Band.of(size, "refinement")
+            yield observed(id_, title, value, unit, judgement.words, band=band)
 
 
 def states(

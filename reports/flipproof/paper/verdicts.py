@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Final
 
-from flipproof.frame.findings import Finding, regression
+from flipproof.frame.findings import Band, Finding, regression
 from flipproof.frame.spoken import SPOKEN
 from flipproof.paper import claims_figure_5, claims_figures_6_7, claims_figures_8_9
 from flipproof.paper.claims_figures_8_9 import claim_filling_of_change
@@ -143,4 +143,6 @@ def claim_weight_slows_the_tenth(runs: PaperRuns, solver: str) -> Finding:
     if run is not None:
         value = steady_level(run)
         note += f"; N = {run.scenario.n_slices}, γ = {run.scenario.damping_rate:.3g} /s"
-    return regression(f"paper-weight-{solver}", title, value, OMEGA, (low, high), note, band=BANDS.get(solver))
+    return regression(
+        f"paper-weight-{solver}", title, value, OMEGA, (low, high), note, band=Band.of(BANDS.get(solver), "assumed")
+    )

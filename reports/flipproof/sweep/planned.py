@@ -210,13 +210,6 @@ def plan_split(throw: Scenario) -> list[Run]:
     return [replace(r, settings={**r.settings, "store": "full"}) if r.solver == PROGRAM else r for r in runs]
 
 
-def releases(runs: list[Run]) -> dict[str, list[Value]]:
-    """Return the fields in which the throws differ: those of twins have a little more spin and a heavier bottle."""
-    throws = [run.scenario for run in runs]
-    fields = {"omega0": [throw.omega0 for throw in throws], "bottle.mass": [throw.bottle.mass for throw in throws]}
-    return {name: list(dict.fromkeys(values)) for name, values in fields.items()}
-
-
 def make_split(throw: Scenario, out: Path, begin: Begin, **how: Any) -> str:
     """Make every run of the waterfall that has no row in ``out``, as ``fill`` does, and draw it; return its table.
 
@@ -231,7 +224,7 @@ def make_split(throw: Scenario, out: Path, begin: Begin, **how: Any) -> str:
         write_whole(out / "waterfall.csv", waterfall_csv(waterfalls).encode())
         return f"{_table(waterfalls[0])}\n{summary}"
 
-    return fill(design_of_runs(runs, releases(runs), ENDS, "flipproof waterfall"), out, begin, end, **how)
+    return fill(design_of_runs(runs, {"omega0": [throw.omega0]}, ENDS, "flipproof waterfall"), out, begin, end, **how)
 
 
 def split_rows(rows: Mapping[Run, Outcome]) -> tuple[Waterfall, ...]:

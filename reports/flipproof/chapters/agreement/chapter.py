@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Final
 
 import numpy as np
 
-from flipproof.chapters.differences.chapter import MODEL_FLOOR
 from flipproof.chapters.reference.chapter import witnessed
 from flipproof.chapters.solvers import FREE, WITNESSES
-from flipproof.frame.chapter import Ask, Chapter, Claims, Flights, Missing, Run, Study, attempt, observed
-from flipproof.frame.twins import twins, usual_rest_speed
+from flipproof.frame.chapter import (
+    Ask,
+    Band,
+    Call,
+    Chapter,
+    Claims,
+    Flights,
+    Missing,
+    Run,
+    Study,
+    attempt,
+    observed,
+)
+from flipproof.frame.twins import FLOOR, omega_band_call, usual_rest_speed
 from slicemodel import Trajectory
 from slicemodel.trajectory import FloatArray
 
@@ -115,19 +126,20 @@ def study(ask: Ask) -> Study[Mapping[str, Agreement]]:
         }
         coarser[equation] = Run(equation, ask.throw, coarse, f"{equation}, {SOLVE_IVP}, coarser")
     every = [run for each in runs.values() for run in each.values()]
-    flights = yield [*every, *coarser.values(), *(twin for name in runs for twin in twins(runs[name][name]))]
-    return {name: agreement_on(name, each, coarser[name], flights) for name, each in runs.items()}
+    calls = {name: omega_band_call(each[name]) for name, each in runs.items()}
+    flights = yield [*every, *coarser.values(), *calls.values()]
+    return {name: agreement_on(name, each, coarser[name], calls[name], flights) for name, each in runs.items()}
 
 
-def agreement_on(equation: str, runs: Mapping[str, Run], coarser: Run, flights: Flights) -> Agreement:
+def agreement_on(equation: str, runs: Mapping[str, Run], coarser: Run, own_band: Call, flights: Flights) -> Agreement:
     """Compare the solvers of one equation, each within its own band, up to the horizon of the engines."""
     made = {name: run for name, run in flights.trajectories(runs).items() if run.ok}
     bands: dict[str, FloatArray] = {
         name: run.diagnostics["omega_band"] for name, run in made.items() if "omega_band" in run.diagnostics
     }
     if equation in made:
-        bands[equation] = band_over_time(runs[equation], twins(runs[equation]), flights)
-    witness = attempt(band_over_time, runs[SOLVE_IVP], (coarser,), flights)
+        bands[equation] = flights.answer(own_band)
+    witness = attempt(band_over_time, runs[SOLVE_IVP], coarser, flights)
     if SOLVE_IVP in made and witness.found is not None:
         bands[SOLVE_IVP] = witness.found
     certificates = [made[name].diagnostics["certificate"] for name in bands if name not in (equation, SOLVE_IVP)]
@@ -135,13 +147,13 @@ def agreement_on(equation: str, runs: Mapping[str, Run], coarser: Run, flights: 
     return study_agreement({name: run for name, run in made.items() if name in bands}, bands, until=until)
 
 
-def band_over_time(run: Run, others_of: Iterable[Run], flights: Flights) -> FloatArray:
-    """Return up to when other runs of the same flight differ from it by how much, fraction of omega_0."""
-    usual, *others = (flights[each].flight for each in (run, *others_of))
-    if any(len(usual.t) != len(other.t) for other in others):
-        raise Missing(f"{run.name} and its twins end at different times: its band is not known")
-    moved = [np.abs(other.omega - usual.omega) / abs(usual.scenario.omega0) for other in others]
-    return np.asarray(np.maximum.accumulate(np.max([*moved, np.full(len(usual.t), MODEL_FLOOR)], axis=0)))
+def band_over_time(run: Run, other: Run, flights: Flights) -> FloatArray:
+    """Return by how much another run of the same flight has differed from it so far, fraction of omega_0."""
+    usual, again = flights[run].flight, flights[other].flight
+    if len(usual.t) != len(again.t):
+        raise Missing(f"{run.name} and {other.name} end at different times: its band is not known")
+    moved = np.abs(again.omega - usual.omega) / abs(usual.scenario.omega0)
+    return np.asarray(np.maximum.accumulate(np.maximum(moved, FLOOR)))
 
 
 def claims(found: Mapping[str, Agreement]) -> Claims:
@@ -152,7 +164,7 @@ def claims(found: Mapping[str, Agreement]) -> Claims:
         id_ = "agreement" if equation == FREE else f"agreement-{equation}"
         title = f"{', '.join(agreement.names)}: {agreement.words}"
         note = f"{'; '.join(pairs)}; up to {1e3 * agreement.until:.0f} ms"
-        yield observed(id_, title, widest.largest, "of ω₀", note, band=widest.bands)
+        yield observed(id_, title, widest.largest, "of ω₀", note, band=Band(widest.bands, "twins and refinement"))
 
 
 CHAPTER: Final = Chapter("agreement", "One equation by several solvers", study, claims)

@@ -16,10 +16,11 @@ from flipproof.chapters.predictability.chapter import parting_words
 from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, WITNESSES
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Run, Study, Touch, observed
+from flipproof.frame.chapter import Absent, Ask, Band, Call, Chapter, Claims, Exhibit, Run, Study, Touch, observed
+from flipproof.frame.findings import Rule
 from flipproof.frame.flights import Flights, attempt, known
 from flipproof.frame.solvers import find, finer
-from flipproof.frame.twins import BAND_WORDS, twins
+from flipproof.frame.twins import BAND_WORDS, omega_band_call
 from flipproof.output.columns import curves_csv
 from ode_reference.models import LADDER, MODELS, ladder_of
 from ode_reference.motion import Model
@@ -60,9 +61,6 @@ PAIRS: Final = (
 LEAST, MOST = 1e-6, 2.0
 """Ends of the axis of the figure, as shares of omega_0."""
 
-MODEL_FLOOR: Final = 1e-9
-"""Least band of a model, fraction of omega_0: the digits that independent methods share; none finer is claimed."""
-
 
 class Differences(NamedTuple):
     """Every pair both of whose flights were made, how each difference grows, and up to when free flight goes.
@@ -92,8 +90,9 @@ def study(ask: Ask) -> Study[Differences]:
         again = (*((ENGINE,) if ask.size == "full" else ()), *SCHEMES, *LADDER)
         more = {name: finer(runs[name]) for name in again}
         more |= {name: replace(more[name], settings={**more[name].settings, "store": "summary"}) for name in SCHEMES}
-        flights = yield [*more.values(), *runs.values(), *(twin for model in LADDER for twin in twins(runs[model]))]
-        bands = run_bands(runs, flights)
+        calls = band_calls(runs)
+        flights = yield [*more.values(), *runs.values(), *calls.values()]
+        bands = run_bands(runs, calls, flights)
     flown = flights.trajectories(runs)
     refined = {name: run for name, run in flights.trajectories(more).items() if run.ok}
 
@@ -121,20 +120,21 @@ def study(ask: Ask) -> Study[Differences]:
     return Differences(pairs, growths, ended, missing)
 
 
-def run_bands(runs: Mapping[str, Run], flights: Flights) -> dict[str, float]:
+def band_calls(runs: Mapping[str, Run]) -> dict[str, Call]:
+    """Return the call for the band of every model."""
+    return {model: omega_band_call(runs[model]) for model in LADDER}
+
+
+def run_bands(runs: Mapping[str, Run], calls: Mapping[str, Call], flights: Flights) -> dict[str, float]:
     """Return each flight's numerical band as a fraction of omega_0.
 
     A scheme at its number of steps is a definite program: its step error is a difference with a bar of its own, so its
-    band is zero. For a model it is the largest change of omega in its twins (another release in the eleventh digit, a
-    tenth of the rest speed), and never less than MODEL_FLOOR; for an engine that of its certificate.
+    band is zero. For a model it is that of its twins, for an engine that of its certificate.
     """
     bands = dict.fromkeys(SCHEMES, 0.0)
+    for model, found in known({model: attempt(flights.answer, call) for model, call in calls.items()}).items():
+        bands[model] = float(found[-1])
     flown = flights.trajectories(runs)
-    for model in LADDER:
-        for other in map(flights.trajectory, twins(runs[model])):
-            if model in flown and other is not None and flown[model].ok and other.ok:
-                apart = study_difference(model, flown[model], other).largest
-                bands[model] = max(bands.get(model, MODEL_FLOOR), apart)
     certified = {name: flown[name].diagnostics.get("certificate", {}) for name in WITNESSES if name in flown}
     return bands | {name: each["band"] for name, each in certified.items() if each.get("band") is not None}
 
@@ -145,7 +145,8 @@ def claims(found: Differences) -> Claims:
         more = "" if d.finer is None else f"; {d.finer[1]:.3g} at N = {d.finer[0]}"
         note = f"largest difference of this pair, at t = {d.largest_time * 1e3:.1f} ms, N = {d.slices}{more}"
         id_, title = _id(d.first, d.second), f"{d.name}: {d.first} against {d.second}"
-        yield observed(id_, title, d.largest, "of ω₀", f"{note}; {d.moment}", band=d.band)
+        rule: Rule = "twins and refinement" if {d.first, d.second} & set(WITNESSES) else "twins"
+        yield observed(id_, title, d.largest, "of ω₀", f"{note}; {d.moment}", band=Band.of(d.band, rule))
     for (name, first, second), reason in found.missing.items():
         yield Absent(_id(first, second), name, reason, "observation")
 

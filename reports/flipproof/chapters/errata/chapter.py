@@ -12,7 +12,7 @@ from typing import Final, cast
 
 from flipproof.chapters.errata import equations, programs
 from flipproof.chapters.errata.equations import ROUND_OFF, Erratum
-from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Missing, Study, attempt, observed
+from flipproof.frame.chapter import Ask, Band, Call, Chapter, Claims, Missing, Study, attempt, observed
 from flipproof.frame.findings import finite_or_none
 from slicemodel import Scenario
 from slicemodel.scenario import ScenarioError
@@ -66,7 +66,7 @@ def claims(found: Mapping[str, Erratum]) -> Claims:
         band = None if value is None else abs(value) * (ROUND_OFF[1] - 1.0)
         note = f"prints {erratum.prints}; follows {erratum.follows}" + (f"; {erratum.note}" if erratum.note else "")
         title = f"{erratum.place}: {erratum.verdict}"
-        yield observed(f"erratum-{id_}", title, value, erratum.number.unit, note, band=band)
+        yield observed(f"erratum-{id_}", title, value, erratum.number.unit, note, band=Band.of(band, "rounding"))
 
 
 CHAPTER: Final = Chapter("errata", "Errata", study, claims, work={"check": None, "quick": None, "full": None})

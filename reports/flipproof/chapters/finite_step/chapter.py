@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from flipproof.chapters.solvers import LIMITS
-from flipproof.frame.chapter import Ask, Chapter, Claims, Run, Study, attempt, observed
+from flipproof.frame.chapter import Ask, Band, Chapter, Claims, Run, Study, attempt, known, observed
 from flipproof.frame.solvers import finer
+from flipproof.frame.twins import omega_band_call
 from slicemodel import Trajectory
 
 
@@ -52,7 +53,7 @@ WAYS: Final = (
 class StepCost:
     """What one way costs: the largest error of omega before the first impact and over the flight [omega_0].
 
-    ``start`` is NaN if no slice ever strikes an end.
+    ``start`` is NaN if no slice ever strikes an end; ``band`` is that of its equation [omega_0], None if unknown.
     """
 
     way: Way
@@ -60,6 +61,7 @@ class StepCost:
     start: float
     first_impact: float | None
     flight: float
+    band: float | None = None
 
 
 class StepCosts(NamedTuple):
@@ -78,10 +80,13 @@ def study(ask: Ask) -> Study[StepCosts]:
         run = Run(way.scheme, ask.throw, settings, f"finite step, {way.name}")
         pairs[way] = run, Run(way.model, ask.throw, {}, way.model)
     more = {way: (finer(run), finer(truth)) for way, (run, truth) in pairs.items()}
-    flights = yield [run for both in (*pairs.values(), *more.values()) for run in both]
+    calls = {truth: omega_band_call(truth) for _, truth in pairs.values()}
+    flights = yield [*(run for both in (*pairs.values(), *more.values()) for run in both), *calls.values()]
+    bands = known({truth: attempt(flights.answer, call) for truth, call in calls.items()})
 
     def costs(of: dict[Way, tuple[Run, Run]]) -> tuple[StepCost, ...]:
-        return tuple(cost_of(way, flights[run].whole, flights[truth].whole) for way, (run, truth) in of.items())
+        found = ((cost_of(way, flights[run].whole, flights[truth].whole), truth) for way, (run, truth) in of.items())
+        return tuple(replace(cost, band=float(bands[truth][-1]) if truth in bands else None) for cost, truth in found)
 
     return StepCosts(costs(pairs), attempt(costs, more).found or (), ask.throw.n_slices)
 
@@ -97,15 +102,14 @@ def cost_of(way: Way, run: Trajectory, reference: Trajectory) -> StepCost:
 
 
 def claims(found: StepCosts) -> Claims:
-    """Yield what every way costs, against the equation that it converges to.
-
-    Its band is what an equation without recoil may be off by on the throws of a report.
-    """
+    """Yield what every way costs, against the equation that it converges to; its band is that of the equation."""
     for cost in found.costs:
         start = f"{cost.start:.2g} of ω₀ before the first impact"
         note = f"{cost.steps} steps; {'no slice strikes an end' if math.isnan(cost.start) else start}"
         title = f"{cost.way.words}: largest difference in ω from {cost.way.model}"
-        yield observed(f"finite-step-{cost.way.name}", title, cost.flight, "of ω₀", note, band=1e-9)
+        yield observed(
+            f"finite-step-{cost.way.name}", title, cost.flight, "of ω₀", note, band=Band.of(cost.band, "twins")
+        )
 
 
 CHAPTER: Final = Chapter("finite-step", "What a step of finite length costs, taken apart", study, claims)

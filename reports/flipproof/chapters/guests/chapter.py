@@ -15,7 +15,7 @@ from flipproof.chapters.waterfall.chapter import DOWN, UP, WHOLE
 from flipproof.chapters.waterfall.study import NAMES
 from flipproof.figures.style import ASSUMPTIONS, MARKERS, new_figure, shared_legend, solver_style, styled
 from flipproof.foreign.certify import findings_of
-from flipproof.frame.chapter import Absent, Chapter, Exhibit, Finding, Kind, observed, regression
+from flipproof.frame.chapter import Absent, Band, Chapter, Exhibit, Finding, Kind, observed, regression
 from flipproof.output.columns import curves_csv, rows_csv
 from flipproof.output.tables import trajectory_csv
 from slicemodel import Trajectory
@@ -36,7 +36,8 @@ def claim_guests(found: Guests) -> Iterator[Finding]:
             yield Absent(f"{head}-{name.replace(' ', '-')}-missing", f"{label}: {name}", reason, kind).finding
         for rung, difference in guest.differences.items():
             title, note = f"{label} and {rung}: largest difference in ω", f"at t = {difference.largest_time:.4g} s"
-            yield observed(f"{head}-{rung}", title, difference.largest, "of ω₀", note, band=difference.band)
+            band = Band.of(difference.band, "twins and refinement")
+            yield observed(f"{head}-{rung}", title, difference.largest, "of ω₀", note, band=band)
         if (rung := placed_on(guest)) in guest.differences:
             yield _claim_flight(guest, f"{head}-flight", guest.differences[rung])
         if guest.split is not None:
@@ -44,7 +45,8 @@ def claim_guests(found: Guests) -> Iterator[Finding]:
             parts = ", ".join(f"{NAMES[name]} {share:+.3g}" for name, share in split.bars.items()) or "none"
             title = f"{label}: mean of ω/ω₀ over the second half, free flight minus it"
             note = f"fair shares of what {split.equation} assumes: {parts}; the rest {split.rest:+.2g}"
-            yield observed(f"{head}-waterfall", title, split.end - split.start, "", note, band=guest.band)
+            band = Band.of(guest.band, "refinement")
+            yield observed(f"{head}-waterfall", title, split.end - split.start, "", note, band=band)
         if visit.ice is not None:
             yield observed(f"{head}-ice", f"{label}: drift of ω in ice on this throw", visit.ice.largest, "of ω₀")
         if guest.rise is not None:

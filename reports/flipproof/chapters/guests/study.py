@@ -31,7 +31,7 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.chapters.agreement.chapter import Agreement, study_agreement
-from flipproof.chapters.differences.chapter import run_bands
+from flipproof.chapters.differences.chapter import band_calls, run_bands
 from flipproof.chapters.differences.study import Difference, study_difference
 from flipproof.chapters.ice.chapter import Drift, measure
 from flipproof.chapters.waterfall.study import equation_run
@@ -42,7 +42,6 @@ from flipproof.foreign.contract import Traits, trajectory_of
 from flipproof.foreign.place import changes_of, mean, name_of, switches_of
 from flipproof.foreign.specs import CSV, Runner, content_of, opened, written
 from flipproof.frame.chapter import Ask, Call, Flights, Missing, Run, Study, attempt
-from flipproof.frame.twins import twins
 from ode_reference.models import LADDER, MODELS
 from ode_reference.switches import Switches
 from slicemodel import Scenario, Trajectory
@@ -166,11 +165,12 @@ def study(ask: Ask) -> Study[Guests]:
     calls = {spec: Call(visit, (spec, ask.throw, times, timeout), f"guest {spec}", timed=True) for spec in specs}
     solvers = {name: run for name, run in ask.solvers.items() if name in LADDER or ask.size != "check"}
     ladder = {rung: solvers[rung] for rung in LADDER}
-    flights = yield [*calls.values(), *solvers.values(), *(twin for run in ladder.values() for twin in twins(run))]
+    bands = band_calls(ladder)
+    flights = yield [*calls.values(), *solvers.values(), *bands.values()]
     flown = {name: run for name, run in flights.trajectories(solvers).items() if run.ok}
     rungs = {rung: flown[rung] for rung in LADDER if rung in flown}
     others = {name: run for name, run in flown.items() if name not in rungs}
-    found = study_guests(received(calls, flights), rungs, run_bands(ask.solvers, flights), others)
+    found = study_guests(received(calls, flights), rungs, run_bands(ask.solvers, bands, flights), others)
     starts = {g.label: switches_made(g.visit.traits, g.visit.certificate, g.equation) for g in found.guests}
     flights = yield plan_splits([start for start in starts.values() if start is not None], ask.throw)
     guests = tuple(with_split(guest, starts[guest.label], flights) for guest in found.guests)

@@ -11,7 +11,7 @@ from typing import Any, Final
 from flipproof.chapters.landing.figures import figures, page, witnesses
 from flipproof.chapters.landing.study import KINDS, OPTIMAL, WATER, Cases, Cell, Found, Size, aiming, counting, read
 from flipproof.frame.chapter import Ask, Call, Chapter, Flights, Study
-from flipproof.frame.findings import Finding, observed, regression
+from flipproof.frame.findings import Band, Finding, observed, regression
 from flipproof.frame.solvers import REFERENCE
 from flipproof.landing.design import Case, make_cases
 from flipproof.landing.work import Landed
@@ -70,7 +70,8 @@ def _water_and_ice(found: Found) -> Iterator[Finding]:
         verdict = _judged(low, high, ("water stands more often", "ice stands more often", "undistinguished"))
         title = f"P(upright) of water minus ice at filling {filling:g} (abstract, section 3: redistribution helps)"
         note = f"{verdict}; law together; {laws}; {found.assumed}"
-        yield observed(f"landing-water-minus-ice-{filling:g}", title, difference, "", note, band=(high - low) / 2)
+        band = Band((high - low) / 2, "sample")
+        yield observed(f"landing-water-minus-ice-{filling:g}", title, difference, "", note, band=band)
 
 
 def _best_filling(found: Found) -> Finding:
@@ -116,7 +117,7 @@ def _slow_rotation(found: Found) -> Finding:
     slow, fast = found.slow[found.size.families[-1], "together"]
     difference, low, high = slow.minus(fast)
     note = f"halves of |omega| at the touch within each filling; {_judged(low, high)}; {found.assumed}"
-    return observed(name, title, difference, note=note, band=(high - low) / 2)
+    return observed(name, title, difference, note=note, band=Band((high - low) / 2, "sample"))
 
 
 def _bounces(found: Found) -> Finding:
@@ -129,7 +130,7 @@ def _bounces(found: Found) -> Finding:
     difference, band = ice.bounces - water.bounces, math.hypot(ice.bounces_band, water.bounces_band)
     words = _judged(difference - band, difference + band, digits=2)
     note = f"until the outcome is certain; ice {ice.bounces:.2f}, water {water.bounces:.2f}; {words}; {found.assumed}"
-    return observed(name, title, difference, "bounces", note, band=band)
+    return observed(name, title, difference, "bounces", note, band=Band(band, "sample"))
 
 
 def _model_uncertainty(found: Found) -> Finding:
@@ -148,7 +149,7 @@ def _model_uncertainty(found: Found) -> Finding:
         f"{where}; 95 % interval of this pair alone {low:+.3f} to {high:+.3f}; the laws are models of one impact and "
         f"are not averaged; {found.assumed}"
     )
-    return observed(name, title, widest, note=note, band=(high - low) / 2)
+    return observed(name, title, widest, note=note, band=Band((high - low) / 2, "sample"))
 
 
 def _undecided(found: Found) -> Finding:

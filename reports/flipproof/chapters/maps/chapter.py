@@ -155,13 +155,13 @@ def _beyond(study: ValidityMap) -> str:
 
 
 def _band_words(study: ValidityMap) -> str:
-    """Return how certain free flight, the most sensitive equation, is in the cells."""
+    """Return the bands of free flight, the most sensitive equation, over the cells."""
     known = np.array([]) if study.band is None else study.band[np.isfinite(study.band)]
     if not len(known):
         return ""
     return (
-        f" The plateau of free flight is certain to {np.median(known):.1g} in the median cell and {known.max():.1g} in "
-        f"the worst: {BAND_WORDS}."
+        f" The plateau of free flight has a band of {np.median(known):.1g} in the median cell and of {known.max():.1g} "
+        f"in the worst, {BAND_WORDS}."
     )
 
 

@@ -21,7 +21,7 @@ from scipy.optimize import brentq, least_squares
 from scipy.stats import f as f_distribution
 
 from flipproof.chapters.step_size.chapter import ROUND_OFF, errors_of, plan_step_size
-from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Study, judged, observed
+from flipproof.frame.chapter import Ask, Band, Chapter, Claims, Finding, Study, judged, observed
 from flipproof.frame.flights import Call, Outcome, attempt, known
 from flipproof.frame.solvers import Run
 from slicemodel.trajectory import FloatArray
@@ -323,7 +323,7 @@ def claim_limit(id_: str, scheme: str, limit: Richardson) -> Finding:
     if not limit.ok:
         return observed(id_, title, None, note=limit.reason)
     note = f"observed order {limit.order:.2f}; band: grid-convergence index; {limit.reason}"
-    return observed(id_, title, limit.value, note=note, band=limit.gci)
+    return observed(id_, title, limit.value, note=note, band=Band(limit.gci, "refinement"))
 
 
 def claim_model_form(id_: str, title: str, form: ModelForm) -> Finding:

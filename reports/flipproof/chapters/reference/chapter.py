@@ -7,7 +7,8 @@ from typing import Any, Final
 
 from flipproof.chapters.differences.study import claim_change
 from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Made, Run, Study, judged
-from flipproof.frame.twins import CUT, usual_rest_speed
+from flipproof.frame.twins import usual_rest_speed
+from ode_reference.bands import CUT
 from ode_reference.models import LADDER
 from slicemodel import Scenario, Trajectory
 

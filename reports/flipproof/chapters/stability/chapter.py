@@ -22,11 +22,25 @@ from flipproof.chapters.stability.study import (
     RULE_DT,
     Cell,
     StabilityPanel,
+    plan_bands,
     plan_stability,
     study_stability,
 )
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, judged, observed, regression
+from flipproof.frame.chapter import (
+    Ask,
+    Band,
+    Chapter,
+    Claims,
+    Exhibit,
+    Finding,
+    Study,
+    attempt,
+    judged,
+    known,
+    observed,
+    regression,
+)
 from flipproof.frame.solvers import Made, Run
 from flipproof.output.columns import rows_csv
 from slicemodel import Trajectory
@@ -38,8 +52,11 @@ Found = tuple[tuple[StabilityPanel, ...], Made]
 def study(ask: Ask) -> Study[Found]:
     """Fly every cell of the layout ``ask.work``."""
     default = Run("pymunk", ask.throw, {"iterations": DEFAULT_ITERATIONS}, f"pymunk, {DEFAULT_ITERATIONS} iterations")
-    flights = yield [*plan_stability(ask.reference, ask.work), default]
-    return study_stability(ask.reference, ask.work, flights), flights[default]
+    calls = plan_bands(ask.reference, ask.work)
+    flights = yield [*plan_stability(ask.reference, ask.work), default, *calls.values()]
+    bands = known({run: attempt(flights.answer, call) for run, call in calls.items()})
+    largest = {run: float(band[-1]) for run, band in bands.items()}
+    return study_stability(ask.reference, ask.work, flights, largest), flights[default]
 
 
 def claims(found: Found) -> Claims:
@@ -62,7 +79,7 @@ def claim_rule_of_iterations(panels: Sequence[StabilityPanel]) -> Finding:
         value=float(np.max(errors)) if errors else None,
         unit="of ω₀",
         admissible=(0.0, GOOD),
-        band=float(np.max([panel.band for panel in panels])),
+        band=Band(float(np.max([panel.band for panel in panels])), "twins"),
         note=f"{len(errors)} runs; " + "; ".join(panel.words for panel in panels),
     )
 

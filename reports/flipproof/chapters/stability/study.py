@@ -16,9 +16,9 @@ import numpy as np
 
 from flipproof.chapters.differences.study import largest_change
 from flipproof.chapters.maps.study import vary
-from flipproof.frame.flights import attempt
+from flipproof.frame.flights import Call, attempt
 from flipproof.frame.solvers import Made, Run
-from flipproof.frame.twins import twins
+from flipproof.frame.twins import omega_band_call
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import plateau
 from slicemodel.scenario import shortened
@@ -104,7 +104,7 @@ class StabilityPanel:
     ----------
     mass_ratio : M_w / M_b [1]
     enough : iterations that the rule asks for
-    band : by how much twins of the reference differ from it, fraction of omega_0; NaN if unknown
+    band : of omega(t) of the reference, estimated from its twins, fraction of omega_0; NaN if unknown
     """
 
     layout: Layout
@@ -148,13 +148,19 @@ def panel_throw(throw: Scenario, mass_ratio: float, slices: int, duration: float
     return replace(vary(throw.with_slices(slices), fill=fill), duration=duration)
 
 
+def plan_bands(throw: Scenario, layout: Layout) -> dict[Run, Call]:
+    """Return the call for the band of each panel's reference."""
+    references = [_plan_panel(throw, layout, *panel)[0] for panel in layout.panels]
+    return {reference: omega_band_call(reference) for reference in references}
+
+
 def plan_stability(throw: Scenario, layout: Layout) -> list[Run]:
-    """Return the runs of a chart: each panel's reference with its twins, and the cells in budget, slowest first."""
+    """Return the runs of a chart: each panel's reference, and the cells in budget, slowest first."""
     runs: list[Run] = []
     cells: list[tuple[float, Run]] = []
     for panel in layout.panels:
         reference, planned = _plan_panel(throw, layout, *panel)
-        runs += [reference, *twins(reference)]
+        runs.append(reference)
         cells += [(cost, run) for cost, run in planned.values() if cost <= layout.budget]
     return runs + [run for _, run in sorted(cells, key=lambda pair: -pair[0])]
 
@@ -174,17 +180,25 @@ def _plan_panel(
     return Run("free-flight", scenario, {"times": layout.times}, f"{label}, free-flight"), cells
 
 
-def study_stability(throw: Scenario, layout: Layout, made: Mapping[Run, Made]) -> tuple[StabilityPanel, ...]:
-    """Read what ``plan_stability`` planned with the same arguments."""
-    return tuple(_panel(throw, layout, *panel, made) for panel in layout.panels)
+def study_stability(
+    throw: Scenario, layout: Layout, made: Mapping[Run, Made], bands: Mapping[Run, float]
+) -> tuple[StabilityPanel, ...]:
+    """Read what ``plan_stability`` planned with the same arguments; ``bands`` are those of the references [omega_0]."""
+    return tuple(_panel(throw, layout, *panel, made, bands) for panel in layout.panels)
 
 
-def _panel(throw: Scenario, layout: Layout, mass_ratio: float, slices: int, made: Mapping[Run, Made]) -> StabilityPanel:
+def _panel(
+    throw: Scenario,
+    layout: Layout,
+    mass_ratio: float,
+    slices: int,
+    made: Mapping[Run, Made],
+    bands: Mapping[Run, float],
+) -> StabilityPanel:
     from engine_check.pymunk_settings import enough_iterations
 
     reference, planned = _plan_panel(throw, layout, mass_ratio, slices)
-    truth, *others = (attempt(lambda run: made[run].whole, run).found for run in (reference, *twins(reference)))
-    apart = [math.nan if truth is None or other is None else largest_change(truth, other) for other in others]
+    truth = attempt(lambda: made[reference].whole).found
 
     def cell(cost: float, run: Run) -> Cell:
         if cost > layout.budget:
@@ -202,7 +216,7 @@ def _panel(throw: Scenario, layout: Layout, mass_ratio: float, slices: int, made
 
     cells = {at: cell(*each) for at, each in planned.items()}
     return StabilityPanel(
-        layout, mass_ratio, slices, cells, enough_iterations(reference.scenario), float(np.max(apart))
+        layout, mass_ratio, slices, cells, enough_iterations(reference.scenario), bands.get(reference, math.nan)
     )
 
 

@@ -20,7 +20,19 @@ from matplotlib.ticker import NullFormatter
 
 from flipproof.chapters.solvers import LIMITS, SCHEMES
 from flipproof.figures.style import MARKERS, STYLES, new_figure, shared_legend, solver_style, styled
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Kind, Study, judged, observed, regression
+from flipproof.frame.chapter import (
+    Ask,
+    Band,
+    Chapter,
+    Claims,
+    Exhibit,
+    Finding,
+    Kind,
+    Study,
+    judged,
+    observed,
+    regression,
+)
 from flipproof.frame.flights import Flights, Outcome, attempt, known
 from flipproof.frame.solvers import Missing, Run
 from flipproof.output.columns import rows_csv
@@ -224,9 +236,9 @@ def claim_order(study: StepSize, where: str, *, kind: Kind = "regression") -> Fi
         + ("" if study.refined else "; refinement does not always help")
     )
     if kind == "observation":
-        return observed(id_, title, study.order, note=note, band=study.order_error)
+        return observed(id_, title, study.order, note=note, band=Band(study.order_error, "fit"))
     order = study.order if study.refined else math.nan
-    return regression(id_, title, order, "", (0.9, 1.1), note, band=study.order_error)
+    return regression(id_, title, order, "", (0.9, 1.1), note, band=Band(study.order_error, "fit"))
 
 
 def figures(found: Orders) -> Iterator[Exhibit]:

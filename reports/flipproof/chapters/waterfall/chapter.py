@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
 from typing import Any, Final
 
 from matplotlib.figure import Figure
 
-from flipproof.chapters.waterfall.study import Waterfall, observe, plan_finer, plan_waterfall, program_run, split_all
+from flipproof.chapters.waterfall.study import (
+    Waterfall,
+    observe_all,
+    plan_finer,
+    plan_waterfall,
+    program_run,
+    split_all,
+)
 from flipproof.figures.style import new_figure, shared_legend, styled
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, observed
+from flipproof.frame.chapter import Ask, Band, Call, Chapter, Claims, Exhibit, Finding, Study, observed
 from flipproof.frame.solvers import FINER
 from flipproof.output.columns import rows_csv
+
+CHUNK: Final = 16
+"""Runs that a worker makes at a time; it returns what was observed alone."""
 
 UP, DOWN, WHOLE = "#0072B2", "#D55E00", "#666666"
 
@@ -20,8 +31,11 @@ def study(ask: Ask) -> Study[tuple[Waterfall, ...]]:
     """Fly every combination of assumptions at ``ask.work`` slices, or those of the throw if they are fewer."""
     cut = ask.throw.with_slices(min(ask.work, ask.throw.n_slices))
     runs = [*plan_waterfall(cut, ask.steps), *plan_finer(cut, ask.steps)]
-    flights = yield runs
-    return split_all(program_run(cut, ask.steps), {run: observe(flights[run].whole) for run in runs})
+    chunks = [runs[k : k + CHUNK] for k in range(0, len(runs), CHUNK)]
+    calls = [Call(observe_all, (chunk,), f"waterfall, {len(chunk)} runs") for chunk in chunks]
+    flights = yield calls
+    observed = (zip(chunk, flights.answer(call), strict=True) for chunk, call in zip(chunks, calls, strict=True))
+    return split_all(program_run(cut, ask.steps), dict(chain.from_iterable(observed)))
 
 
 def claims(found: tuple[Waterfall, ...]) -> Claims:
@@ -42,7 +56,9 @@ def claim_waterfall(waterfall: Waterfall) -> Finding:
     )
     unit = "" if observable.unit == "1" else observable.unit
     title = f"{observable.words}: free flight minus published program"
-    return observed(f"waterfall-{observable.name}", title, waterfall.total, unit, note, band=waterfall.end_band)
+    return observed(
+        f"waterfall-{observable.name}", title, waterfall.total, unit, note, band=Band(waterfall.end_band, "twins")
+    )
 
 
 def claim_overlap(waterfall: Waterfall) -> Finding:
@@ -51,7 +67,7 @@ def claim_overlap(waterfall: Waterfall) -> Finding:
     title = f"{waterfall.observable.words}: column minus free flight, what forbidding overlap changes"
     note = f"a difference of two models, no share; free flight at N = {waterfall.slices}, the column has no slices"
     note += f"; {finer:+.3g} at N = {FINER * waterfall.slices}" if finer is not None else ""
-    return observed("waterfall-overlap", title, waterfall.overlap, note=note, band=waterfall.end_band)
+    return observed("waterfall-overlap", title, waterfall.overlap, note=note, band=Band(waterfall.end_band, "twins"))
 
 
 def figures(found: tuple[Waterfall, ...]) -> Iterator[Exhibit]:

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 from itertools import chain, combinations
 from typing import Final, NamedTuple, TypeVar
 
-from flipproof.frame.solvers import Run, finer
+from flipproof.frame.solvers import Run, finer, make
 from flipproof.frame.twins import band, twins
 from ode_reference.solver import COLUMN
 from ode_reference.switches import Switches
@@ -74,9 +74,14 @@ def observe(run: Trajectory) -> dict[str, float]:
     }
 
 
+def observe_all(runs: Iterable[Run]) -> list[dict[str, float]]:
+    """Make runs and return every observable of each; one that does not reach its end raises Missing."""
+    return [observe(make(run).whole) for run in runs]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bar:
-    """What mending one assumption changes, in the units of the observable; a band is what twins of the runs change.
+    """What mending one assumption changes, in the units of the observable; a band is the sum of its runs' bands.
 
     ``forward`` in the order of the ladder, ``backward`` in reverse; ``average``, the fair share, is the mean over all
     orders, between ``low`` and ``high`` in single ones; ``finer`` is the average at ``FINER`` times the slices, None if
@@ -162,7 +167,7 @@ def column_run(throw: Scenario) -> Run:
 
 
 def plan_waterfall(throw: Scenario, steps: int) -> list[Run]:
-    """Return the program's run, every equation with its twins, and the column's (122 runs)."""
+    """Return the program's run, every equation with its twins, and the column's (402 runs)."""
     equations = _plan_equations(throw)
     return [program_run(throw, steps), *equations, *chain.from_iterable(map(twins, equations)), column_run(throw)]
 

@@ -17,7 +17,7 @@ from flipproof.chapters.work_precision.study import (
     plan_work_precision,
     study_work_precision,
 )
-from flipproof.frame.chapter import Ask, Call, Chapter, Exhibit, Finding, Study, observed
+from flipproof.frame.chapter import Ask, Band, Call, Chapter, Exhibit, Finding, Study, observed
 from flipproof.frame.findings import finite_or_none
 from flipproof.frame.timing import batches, make_timed
 from flipproof.output.columns import rows_csv
@@ -42,7 +42,8 @@ def claims(study: WorkPrecision) -> Iterator[Finding]:
     words = "order 2 where nothing strikes; v_CM jumps at an impact, and drag feels a mean of it for one whole step"
     order = None if math.isnan(curve.slope) else curve.slope
     note = curve.slope_reason or words
-    yield observed(f"work-order-midpoint-{study.case.name}", title, order, note=note, band=curve.slope_error)
+    band = Band(curve.slope_error, "fit")
+    yield observed(f"work-order-midpoint-{study.case.name}", title, order, note=note, band=band)
     yield _pair(study, "exact-step on eq8", "midpoint on eq8")
     yield _pair(study, "pymunk on free-flight", "mujoco on free-flight")
     yield _cheapest(study, 1e-3)

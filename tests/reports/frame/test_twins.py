@@ -1,0 +1,64 @@
+"""The band of a run, by its twins."""
+
+import numpy as np
+import pytest
+
+import ode_reference
+from flipproof.cli.main import main
+from flipproof.frame import twins
+from flipproof.frame.findings import RULES, Band, observed
+from flipproof.frame.solvers import Missing, Run
+from slicemodel import Scenario
+
+THROW = Scenario().with_slices(6)
+
+
+@pytest.mark.parametrize("model", ["eq8", "free-flight"])
+def test_the_band_of_omega_is_that_of_the_library_and_never_below_the_floor(model):
+    flight = ode_reference.solve(THROW, model)
+    expected = np.maximum(ode_reference.estimate_band(flight).size, twins.FLOOR)
+    np.testing.assert_array_equal(twins.omega_band(Run(model, THROW)), expected)
+
+
+def test_the_band_of_a_number_is_twice_the_largest_change():
+    run = Run("free-flight", THROW)
+    others = twins.twins(run)
+    assert len(others) == 9
+    values = dict.fromkeys(others, 1.0) | {run: 1.0, others[3]: 0.75}
+    assert twins.band(run, values) == 0.5
+    assert np.isnan(twins.band(run, values | {others[8]: np.nan}))
+
+
+def test_a_run_that_fails_has_no_band():
+    light = Scenario(n_slices=2, drag=1e12, duration=0.5)
+    with pytest.raises(Missing):
+        twins.omega_band(Run("signs-limit", light))
+
+
+def test_every_band_says_its_rule():
+    for rule in RULES:
+        finding = observed("x", "x", 1.0, band=Band(2e-3, rule))
+        assert finding.band_text == f"± 0.002 ({rule})"
+        assert (finding.to_mapping()["band"], finding.to_mapping()["band_rule"]) == (2e-3, rule)
+    assert observed("x", "x", 1.0, band=Band.of(None, "fit")).to_mapping()["band_rule"] is None
+
+
+LONG = "[scenario]\nn_slices = 4\ndrag = 0.0\ngravity = 25.0\nomega0 = -20.0\nduration = 5.0\n"
+
+
+def test_simulate_and_compare_say_up_to_when_a_flight_may_be_trusted(tmp_path, capsys):
+    throw = tmp_path / "throw.toml"
+    throw.write_text(LONG)
+    assert main(["simulate", str(throw), "--solver", "eq8", "--out", str(tmp_path / "eq8.csv")]) == 0
+    assert "trusted to 0.001 omega_0 until t = 3." in capsys.readouterr().err
+    assert main(["compare", "eq8", "exact-step", "--scenario", str(throw)]) == 0
+    assert "eq8: omega(t) may be trusted to 0.001 omega_0 until t = 3." in capsys.readouterr().out
+    assert main(["compare", "eq8", "eq8", "--slices", "4"]) == 0
+    assert "trusted" not in capsys.readouterr().out
+
+
+def test_a_slow_flight_is_not_flown_nine_times_more_unasked():
+    flight = ode_reference.solve(THROW, "eq8")
+    assert "no band was estimated" in twins.doubt(flight, 11.0)
+    assert twins.doubt(ode_reference.solve(THROW, "column"), 0.1) == ""
+    assert "at no time" in twins.doubt(flight, 0.1, -1.0)
