@@ -43,7 +43,7 @@ CONTENTS: Final[tuple[tuple[str, str, str, tuple[str, ...]], ...]] = (
     ("maps", "Maps of validity", "Over filling and damping, step size or restitution: how wrong an approximation is, "
      "and which assumption is to blame.", ("maps",)),
     ("paper", "The paper's figures and claims", "Every statement of the paper about its model and about the bottles "
-     "really thrown, judged by three equations.", ("paper",)),
+     "really thrown: the first judged by three equations, the second by every model.", ("paper",)),
     ("guests", "Guests",
      "Solvers of other people: each is certified first, then held against the ladder on the throw of this report.",
      ("guests",)),
