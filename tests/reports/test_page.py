@@ -2,10 +2,13 @@
 
 import re
 
-from made_up import page_of, spoiled
+from made_up import command, page_of, spoiled
 
+from flipproof import build
 from flipproof.chapters.solvers import FLIGHTS
 from flipproof.chapters.waterfall.study import program_run
+from flipproof.frame.flights import Flights
+from flipproof.frame.gather import Gathered, Stages
 from flipproof.page.render import read_assets, unbroken
 
 
@@ -45,3 +48,21 @@ def test_scripts_and_styles_cannot_end_early():
     for name, text in assets.items():
         assert "</script" not in text.lower(), name
         assert "</style" not in text.lower(), name
+
+
+def test_a_report_ends_with_its_verdict_and_opens_if_asked(monkeypatch, capsys, tmp_path, report):
+    def gather_nothing(ask, *_, **__):
+        return Gathered(ask=ask, parts=(), outcomes={}, flights=Flights({}), stages=Stages())
+
+    opened = []
+    monkeypatch.setattr(build, "gather_report", gather_nothing)
+    monkeypatch.setattr(build, "build", lambda *_, **__: report)
+    monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)
+    folder = tmp_path / "latest"
+    status, printed, _ = command(capsys, "report", "--open", "--no-cache", "--jobs", 1, "--out", folder)
+    assert status == 0
+    assert opened == [(folder / "index.html").as_uri()]
+    verdict, claims, where = printed.splitlines()[-4:-1]
+    assert verdict.startswith("Not as it stands: ")
+    assert claims.endswith(" regression claims hold.")
+    assert where.endswith(opened[0])

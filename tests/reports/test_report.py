@@ -190,7 +190,7 @@ def test_a_users_settings_of_matplotlib_change_no_figure():
             assert {name: matplotlib.rcParams[name] for name in users} == users
 
 
-def with_a_stand_in(exhibits, _pool, *, png=False):
+def with_a_stand_in(exhibits, _pool, _progress, *, png=False):
     drawing = Drawing("<?xml?><svg/>", b"\x89PNG" if png else b"")
     return tuple(dataclasses.replace(exhibit, drawn=drawing) for exhibit in exhibits)
 

@@ -169,6 +169,7 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     report.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
     add_no_cache(report)
+    report.add_argument("--open", action="store_true", help="open the page in the browser when it is written")
     report.add_argument("--png", action="store_true", help="also write every figure as PNG, beside the SVG")
 
     simulate = add_command(commands, "simulate", "Run one solver and write its trajectory as CSV.", command_simulate)
@@ -239,10 +240,18 @@ def command_report(options: argparse.Namespace) -> int:
         print(f"{guest.label}: {found.conclusion if found else '; '.join(guest.visit.problems.values())}")
     _print_report(report, options.out, time.perf_counter() - began)
     print(f"Cache: {store.whereabouts()}")
+    if options.open:
+        import webbrowser
+
+        if not webbrowser.open((options.out / "index.html").resolve().as_uri()):
+            print("flipproof: no browser could be opened", file=sys.stderr)
     return 1 if report.failed else 0
 
 
 def _print_report(report: Any, out: Path, seconds: float) -> None:
+    from flipproof.page.headlines import Headline
+    from flipproof.page.lead import answer
+
     print("Largest |difference in omega| / omega_0:")
     for finding in report.findings:
         if finding.id.startswith("difference-"):
@@ -254,8 +263,10 @@ def _print_report(report: Any, out: Path, seconds: float) -> None:
     for finding in report.findings:
         if finding.id.startswith("measured-fit-"):
             print(f"{finding.title}: {finding.value_text} root mean square")
+    page = out / "index.html"
+    print(answer([Headline.from_mapping(mapping) for mapping in report.summary.get("headlines", ())]))
     print(f"{len(regressions) - len(report.failed)} of {len(regressions)} regression claims hold.")
-    print(f"Report: {out / 'index.html'} ({seconds:.0f} s)")
+    print(f"Report: {page} ({seconds:.0f} s); open {page.resolve().as_uri()}")
 
 
 def command_simulate(options: argparse.Namespace) -> int:
