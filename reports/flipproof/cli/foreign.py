@@ -253,6 +253,7 @@ def command_explain(options: argparse.Namespace) -> int:
 
 def command_power(options: argparse.Namespace) -> int:
     """Print a line a mistake; return 1 if one is caught by no check, or the clean solver by any."""
+    from flipproof.foreign.heldout import HELD_OUT
     from flipproof.foreign.mistakes import MISTAKES
     from flipproof.foreign.power import CLEAN, claim_power, detect, matrix_csv
     from flipproof.frame.pool import workers
@@ -262,7 +263,7 @@ def command_power(options: argparse.Namespace) -> int:
         check_replaceable(options.out, "power")
     found = []
     with workers(options.jobs) as pool:
-        for caught in pool.map(detect, [CLEAN, *MISTAKES]):
+        for caught in pool.map(detect, [CLEAN, *MISTAKES, *HELD_OUT]):
             seen = ", ".join(caught.checks) or "no check"
             print(f"{caught.mistake:22} {caught.words} Seen by: {seen}", flush=True)
             found.append(caught)

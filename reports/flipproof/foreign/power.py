@@ -1,4 +1,8 @@
-"""The testbed's own detection rate: which check sees which of the mistakes planted in the good solver."""
+"""The testbed's own detection rate: which check sees which of the mistakes planted in the good solver.
+
+There are two lists: ours, by those who wrote the checks (``mistakes``), and one by somebody who had seen none of them
+(``heldout``). The second says what the first cannot: how many mistakes pass that nobody here thought of.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,7 @@ from typing import Any, Final
 
 from flipproof.foreign.certify import CHECKS, FAILED, certify
 from flipproof.foreign.contract import Answer, AnswerError, Ask, answer_of, traits_of
+from flipproof.foreign.heldout import HELD_OUT
 from flipproof.foreign.mistakes import MISTAKES
 from flipproof.foreign.specs import ForeignError, Runner
 from flipproof.foreign.subject import Subject
@@ -45,24 +50,29 @@ class Caught:
 
 def detect(name: str) -> Caught:
     """Plant one mistake and make all checks; ``CLEAN`` plants none."""
-    kind = Subject if name == CLEAN else MISTAKES[name]
+    kind = Subject if name == CLEAN else {**MISTAKES, **HELD_OUT}[name]
     found = certify(InProcess(kind(), name))
     words = "no mistake" if name == CLEAN else (kind.__doc__ or "").partition("\n")[0]
     return Caught(name, words, tuple(r.check for r in found.results if r.verdict == FAILED))
 
 
 def claim_power(found: Sequence[Caught]) -> tuple[Finding, ...]:
-    """Return two claims: every planted mistake is caught by a check, and the solver without one by none."""
-    planted = [caught for caught in found if caught.mistake != CLEAN]
-    missed = [caught.mistake for caught in planted if not caught.checks]
+    """Return three claims: every mistake of either list is caught by a check, and the solver without one by none."""
     accused = [name for caught in found if caught.mistake == CLEAN for name in caught.checks]
-    count = float(len(planted))
-    note = f"not seen: {', '.join(missed)}" if missed else ""
-    seen, title = count - len(missed), "planted mistakes that at least one check sees"
     clean = "checks that accuse the solver without a mistake"
     return (
-        regression("power-caught", title, seen, f"of {len(planted)}", (count, count), note),
+        _claim_caught("power-caught", "planted mistakes of ours", [c for c in found if c.mistake in MISTAKES]),
+        _claim_caught("power-held-out", "mistakes by somebody else", [c for c in found if c.mistake in HELD_OUT]),
         regression("power-clean", clean, float(len(accused)), "", (0.0, 0.0), ", ".join(accused)),
+    )
+
+
+def _claim_caught(id_: str, title: str, planted: Sequence[Caught]) -> Finding:
+    """Return the claim that at least one check sees each of these mistakes."""
+    missed, count = [caught.mistake for caught in planted if not caught.checks], float(len(planted))
+    note = f"not seen: {', '.join(missed)}" if missed else ""
+    return regression(
+        id_, f"{title} that at least one check sees", count - len(missed), f"of {len(planted)}", (count, count), note
     )
 
 

@@ -13,6 +13,7 @@ from flipproof.foreign import checks_measured
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, WEAK, certify, findings_of
 from flipproof.foreign.contract import Ask, started
 from flipproof.foreign.elsewhere import SEED, drawn
+from flipproof.foreign.heldout import HELD_OUT
 from flipproof.foreign.mistakes import MISTAKES
 from flipproof.foreign.power import CLEAN, Caught, InProcess, claim_power, matrix_csv
 from flipproof.foreign.specs import ForeignError, load, opened
@@ -332,17 +333,36 @@ def test_the_good_solver_is_free_flight():
 
 
 def test_there_are_at_least_twenty_mistakes_and_each_says_what_it_is():
-    assert len(MISTAKES) >= 20
-    assert all(kind.__doc__.endswith(".") for kind in MISTAKES.values())
+    assert len(MISTAKES) + len(HELD_OUT) >= 50
+    assert not set(MISTAKES) & set(HELD_OUT)
+    assert all(kind.__doc__.endswith(".") for kind in [*MISTAKES.values(), *HELD_OUT.values()])
     table = matrix_csv([Caught("none", "no mistake", ()), Caught("x", "y", ("ice",))]).splitlines()
     assert table[0] == "mistake," + ",".join(CHECKS)
     assert table[2].split(",").count("1") == 1
 
 
 def test_a_mistake_that_nobody_sees_and_a_clean_solver_that_is_accused_fail():
-    good = [Caught(CLEAN, "no mistake", ()), Caught("x", "y", ("ice",))]
+    good = [Caught(CLEAN, "no mistake", ()), Caught("Weight", "y", ("ice",)), Caught("OmegaAbs", "z", ("mirror",))]
     assert not any(claim.failed for claim in claim_power(good))
-    missed, accused = claim_power([Caught(CLEAN, "no mistake", ("ice",)), Caught("x", "y", ())])
+    missed, held_out, accused = claim_power(
+        [Caught(CLEAN, "no mistake", ("ice",)), Caught("Weight", "y", ()), Caught("OmegaAbs", "z", ())]
+    )
     assert missed.failed
-    assert missed.note == "not seen: x"
+    assert (missed.note, held_out.note) == ("not seen: Weight", "not seen: OmegaAbs")
+    assert held_out.failed
     assert accused.failed
+
+
+HELD_OUT_FIRST = {
+    "RestitutionNeverOne": "elsewhere", "AngleFolded": "elsewhere", "OwnStart": "elsewhere",
+    "UniformTimes": "elsewhere", "WaterFloor": "elsewhere", "ThetaFromZero": "start", "OmegaLate": "angle",
+    "CentreFromMiddle": "definitions", "FourDigits": "digits", "EffortFloor": "refinement",
+}  # fmt: skip
+"""Some mistakes of the second list, and the check that is to name them first."""
+
+
+@pytest.mark.parametrize(("mistake", "check"), [(m, c) for m, c in HELD_OUT_FIRST.items() if c != "elsewhere"])
+def test_the_first_check_that_fails_is_the_one_that_tells(mistake, check):
+    names = [name for name in CHECKS if name not in LONG]
+    found = certify(InProcess(HELD_OUT[mistake](), mistake), names[: names.index(check) + 1])
+    assert [r.check for r in found.failed] == [check]
