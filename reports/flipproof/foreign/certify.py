@@ -28,8 +28,8 @@ CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
     {
         "shape": checks_basic.check_shape,
         "digits": checks_measured.check_digits,
-        "start": checks_basic.check_start,
         "determinism": checks_basic.check_determinism,
+        "start": checks_basic.check_start,
         "refinement": checks_measured.check_refinement,
         "ice": checks_basic.check_ice,
         "angle": checks_basic.check_angle,

@@ -38,12 +38,15 @@ def check_start(traits: Traits) -> Making:
         off["r"] = float(np.max(np.abs(answer.r[0] - ask.start))) / THROW.bottle.length
     worst = max(off, key=lambda name: off[name])
     bound = max(1e-12, 8 * traits.epsilon)
+    late = (answer.theta[0] - THROW.theta0) / THROW.omega0
+    drifted = worst == "theta" and bound < late < 0.02  # a step or two; answers may belong to other times
     return Found(
         holds=off[worst] <= bound,
         expected=f"theta_0, omega_0 and start within {bound:.1g}",
-        came=f"{worst} off by {off[worst]:.2g}",
+        came=f"{worst} off by {off[worst]:.2g}" + (f", as if it were {late:.2g} s later" if drifted else ""),
         where="t = 0 s",
-        advice="begin at scenario.theta0, scenario.omega0 and ask.start, with all slices at rest",
+        advice=("answer at ask.times themselves; " if drifted else "")
+        + "begin at scenario.theta0, scenario.omega0 and ask.start, with all slices at rest",
     )
 
 

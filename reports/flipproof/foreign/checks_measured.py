@@ -290,6 +290,8 @@ def measure(answer: Answer, scenario: Scenario, end: str) -> Rebound | None:
     s = float(crossing[np.argmin(np.abs(crossing))]) if crossing.size else 0.0
     s = s if abs(s) <= 2.0 else 0.0
     fast, slow = float(np.polyval(np.polyder(before), s)) / step, float(np.polyval(np.polyder(after), s)) / step
+    if not fast > 0.0:  # it jumped, or stood still
+        return None
     return Rebound(end, scenario.omega0, fast, -slow / fast, float(answer.t[k]))
 
 
@@ -336,7 +338,8 @@ def _rebounds(traits: Traits, spins: Sequence[float], answers: Sequence[Answer])
             throw = throw_of(spin)
             if (one := measure(answer, throw, end)) is not None:
                 unsure = 4 * traits.epsilon * throw.bottle.length / float(answer.t[1] - answer.t[0]) / one.speed
-                found.append(replace(one, room=RESTITUTION_ROOM + unsure))
+                if unsure < RESTITUTION / 4:  # else it is too slow to be measured
+                    found.append(replace(one, room=RESTITUTION_ROOM + unsure))
     return found
 
 
