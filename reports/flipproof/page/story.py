@@ -200,7 +200,7 @@ def _nearest(summary: Summary) -> list[SimpleNamespace]:
         return []
     found = [
         SimpleNamespace(
-            name=SPOKEN.get(solver, solver),
+            name=("the " if solver in ("published-python", "column") else "") + SPOKEN.get(solver, solver),
             agrees=summary.number(f"count paper/experiment equations/{solver}/verdict holds", plain),
             nearest=summary.number(f"count paper/experiment closest {solver}", plain),
         )
