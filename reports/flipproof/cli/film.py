@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,54 +16,23 @@ from flipproof.cli.arguments import (
     check_outputs,
     command_line,
     count,
-    digits,
     number,
     read_scenario,
-    reader,
 )
 from flipproof.cli.progress import progress_bar
 
 DELIMITERS = {"tab": "\t", "comma": ",", "semicolon": ";", "space": " "}
 
-frames = reader("a whole number in [0, 1000]", digits, lambda value: value <= 1000)
-
-LINE = 15.0
-"""Seconds between two lines of a log."""
-
 
 def add_film(commands: Any) -> None:
     """Add the three commands."""
-    track = add_command(commands, "track", "Analyse a bottle flip tracked in the Tracker video tool.", command_track)
+    track = add_command(commands, "track", "Say what a video of a bottle flip tells, and cannot tell.", command_film)
     track.add_argument(
-        "files", nargs="+", type=Path, metavar="FILE", help="what Tracker's File > Export > Data File wrote"
-    )
-    track.add_argument("--cap", required=True, metavar="NAME", help="track of the cap")
-    track.add_argument("--base", required=True, metavar="NAME", help="track of the base")
-    centre = track.add_mutually_exclusive_group()
-    centre.add_argument("--ice-top", metavar="NAME", help="track of the top of the ice: C_M half-way to the base")
-    centre.add_argument("--centre", metavar="NAME", help="track of the centre of mass")
-    centre.add_argument(
-        "--r-cm", type=number, metavar="M", help="centre of mass fixed at this distance from the cap [m]"
-    )
-    track.add_argument("--length-unit", default="", metavar="UNIT", help="of x and y: m, cm, mm (needed unless stated)")
-    track.add_argument("--angle-unit", default="", metavar="UNIT", help="of exported angles: deg, rad")
-    track.add_argument("--time-unit", default="s", metavar="UNIT", help="of t: s, ms (%(default)s)")
-    track.add_argument("--frame-rate", type=number, metavar="HZ", help="of the recording, if t is that of slow motion")
-    track.add_argument("--length", type=number, metavar="M", help="cap to base, measured by hand [m]")
-    track.add_argument(
-        "--table-height", type=number, metavar="M", help="y of the table [m]: landing when the base is there"
-    )
-    track.add_argument("--release", type=number, metavar="S", help="time of release [s] instead of finding it")
-    track.add_argument("--landing", type=number, metavar="S", help="time of landing [s] instead of finding it")
-    track.add_argument(
-        "--window", type=count, default=11, metavar="N", help="frames of the derivative, odd (%(default)s)"
-    )
-    track.add_argument(
-        "--max-gap", dest="most_gap", type=frames, default=3, metavar="N", help="frames interpolated at most "
-        "(%(default)s)",
+        "files", nargs="+", type=Path, metavar="FILE", help="what Tracker's File > Export > Data File wrote, or a "
+        "track.csv",
     )  # fmt: skip
-    track.add_argument("--angle-track", metavar="NAME", help="track whose own angle is compared with Eq. 1")
-    track.add_argument("--out", type=Path, metavar="DIR", help="folder for track.csv, figures and page")
+    _add_film_arguments(track)
+    track.set_defaults(kind="track", model=["free-flight"], quantity=None, minutes=10.0)
 
     export = add_command(
         commands, "export", "Write a simulation as a table that Tracker lays over a video.", command_export
@@ -86,74 +54,137 @@ def add_film(commands: Any) -> None:
     export.add_argument("--length-unit", default="m", metavar="UNIT", help="of the video: m, cm, mm (%(default)s)")
     export.add_argument("--delimiter", choices=tuple(DELIMITERS), default="tab", help="between cells (%(default)s)")
 
-    fit = add_command(commands, "fit", "Estimate drag and restitution from a measured flight.", command_fit)
+    fit = add_command(commands, "fit", "Fit equations to a measured flight and compare them.", command_film)
     fit.add_argument(
-        "file", type=Path, metavar="FILE", help="CSV with columns t [s] and theta [rad] or omega [rad/s], of which a "
-        "track.csv gives its flight, or, with --cap and --base, an export of the Tracker video tool",
+        "files", nargs="+", type=Path, metavar="FILE", help="as of track, or a CSV with columns t [s] and theta [rad] "
+        "or omega [rad/s] from the release on",
     )  # fmt: skip
-    fit.add_argument("--scenario", metavar="THROW.toml", help=f"what is known: bottle, water, release; {SCENARIO_HELP}")
+    _add_film_arguments(fit)
     fit.add_argument(
-        "--model", nargs="+", default=["midpoint"], metavar="NAME", help="equations to fit and compare, see 'flipproof "
-        "models'; midpoint solves eq8 in steps of 0.5 ms (default midpoint)",
+        "--model", nargs="+", default=["free-flight"], metavar="NAME", help="equations to fit and compare, see "
+        "'flipproof models'; midpoint solves eq8 in steps of 0.5 ms (default free-flight)",
     )  # fmt: skip
+    fit.add_argument("--quantity", choices=("points", "theta", "omega"), help="what of a table to fit (points if any)")
     fit.add_argument(
-        "--also", nargs="+", default=[], choices=("omega0", "theta0"), help="fit these too, instead of trusting the "
-        "scenario",
-    )  # fmt: skip
-    fit.add_argument("--starts", type=count, metavar="K", help="descents from different starts (default 4)")
-    fit.add_argument(
-        "--minutes", type=_positive, metavar="M", help="time that a fit with another solver, such as mine.py:solve, "
-        "may take: it decides between the usual search, a coarse one and none, and ends the search (default 10)",
-    )  # fmt: skip
-    fit.add_argument("--slices", type=count, metavar="N", help="slices of every throw, alpha/2m unchanged (50)")
-    fit.add_argument("--quantity", choices=("theta", "omega"), help="column to fit (theta if there is one)")
-    fit.add_argument(
-        "--averaged", type=count, metavar="N", help="omega was made of theta by differences and a mean over N points"
+        "--each", action="store_true", help="every FILE is a film of the same bottle: gamma and restitution are shared"
     )
     fit.add_argument(
-        "--noise", type=_positive, metavar="S", help="standard deviation of one value [rad or rad/s] (default: "
-        "estimated from neighbouring values)",
+        "--minutes", type=_positive, default=10.0, metavar="M", help="after which intervals are made no narrower, for "
+        "a slow solver such as mine.py:solve (%(default)g)",
     )  # fmt: skip
-    fit.add_argument("--release", type=number, metavar="S", help="time of release by the file's clock [s]")
-    fit.add_argument("--landing", type=number, metavar="S", help="time of landing by the file's clock [s]")
-    fit.add_argument("--cap", metavar="NAME", help="track of the cap in a Tracker export")
-    fit.add_argument("--base", metavar="NAME", help="track of the base in a Tracker export")
-    fit.add_argument("--length-unit", default="", metavar="UNIT", help="of a Tracker export: m, cm, mm")
-    fit.add_argument("--out", type=Path, metavar="DIR", help="folder for figures, residuals and summary.json")
+    fit.set_defaults(kind="fit")
 
 
-def command_track(options: argparse.Namespace) -> int:
-    """Analyse a video, print a few lines and write the folder."""
-    from flipproof.output.folder import check_replaceable
+def _add_film_arguments(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--cap", metavar="NAME", help="track of the cap in a Tracker export")
+    command.add_argument("--base", metavar="NAME", help="track of the base in a Tracker export")
+    command.add_argument("--length-unit", default="", metavar="UNIT", help="of x and y of an export: m, cm, mm")
+    command.add_argument("--time-unit", default="s", metavar="UNIT", help="of t of an export: s, ms (%(default)s)")
+    command.add_argument(
+        "--frame-rate", type=number, metavar="HZ", help="of the recording, if t is that of slow motion"
+    )
+    command.add_argument("--scenario", metavar="THROW.toml", help=f"bottle and water; {SCENARIO_HELP}")
+    command.add_argument("--slices", type=count, metavar="N", help="slices of every throw, gamma unchanged (50)")
+    command.add_argument("--release", type=number, metavar="S", help="known time of release by the film's clock [s]")
+    command.add_argument("--landing", type=number, metavar="S", help="known time of the touch by the film's clock [s]")
+    command.add_argument("--table-height", type=number, metavar="M", help="known y of the table in the picture [m]")
+    command.add_argument("--noise", type=_positive, metavar="S", help="known noise of one coordinate [m, rad, rad/s]")
+    command.add_argument(
+        "--hold", nargs="+", default=[], choices=("tilt", "scale"), help="known: the camera is level; the picture's "
+        "scale and clock are right",
+    )  # fmt: skip
+    command.add_argument("--out", type=Path, metavar="DIR", help="folder for track.csv, figures, summary.json and page")
+
+
+def command_film(options: argparse.Namespace) -> int:
+    """Estimate what films tell, print it and write the folder; return 1 for a film that cannot be right."""
+    from flipproof.output.folder import check_replaceable, replaced_folder
+    from flipproof.output.provenance import provenance
 
     if options.out is not None:
-        check_replaceable(options.out, "track")
-    from flipproof.film.tracker.bench import Request, lines, measure
+        check_replaceable(options.out, options.kind)
+    if len(set(options.model)) < len(options.model):
+        raise ValueError(f"--model names {next(n for n in options.model if options.model.count(n) > 1)} twice")
+    from flipproof.film import page
+    from flipproof.film.judge import Judged, UnsoundError, compared, ranked, together
 
-    given = {field.name: getattr(options, field.name) for field in fields(Request)}
-    measured = measure(Request(**given | {"files": tuple(options.files)}))
-
-    def write(folder: Path, made: Mapping[str, str]) -> None:
-        from flipproof.film.tracker.page import write
-
-        write(measured, folder, made)
-
-    print("\n".join([*lines(measured), *_written(options, "track", write, "index.html")]))
+    each = options.kind == "fit" and options.each
+    if each and len(options.model) > 1:
+        raise ValueError("--each fits one equation to several films; name one --model")
+    scenario = read_scenario(options.scenario)
+    groups = [(path,) for path in options.files] if each else [tuple(options.files)]
+    films: list[list[Judged]] = []
+    for paths in groups:
+        judged = ranked([Judged(_estimate(options, paths, scenario, name)) for name in options.model])
+        try:
+            judged[0].check()
+        except UnsoundError as error:
+            print(f"flipproof: {error}", file=sys.stderr)
+            return 1
+        films.append(judged)
+    lines: list[str] = []
+    for judged in films:
+        film = judged[0].estimate.film
+        lines += [f"{film.label}: {len(film.t)} frames ({'; '.join(film.notes)})"]
+        for one in judged:
+            lines += one.lines()
+        lines += [compared(judged), ""]
+    if each:
+        lines += _shared(*together([judged[0] for judged in films]))
+    text = "\n".join(lines).rstrip()
+    print(text)
+    if options.out is not None:
+        made: Mapping[str, str] = provenance(command_line())
+        with replaced_folder(options.out, options.kind) as folder:
+            for k, judged in enumerate(films):
+                place = folder / f"film-{k + 1}" if each else folder
+                place.mkdir(exist_ok=True)
+                page.write(judged, text, place, made)
+        print(f"written  {options.out / ('film-1/index.html' if each else 'index.html')}")
     return 0
 
 
-def _written(
-    options: argparse.Namespace, kind: str, write: Callable[[Path, Mapping[str, str]], None], first: str
-) -> list[str]:
-    """Write the folder that ``--out`` names, if any, and return the line that tells what to open first."""
-    if options.out is None:
-        return []
-    from flipproof.output.folder import replaced_folder
-    from flipproof.output.provenance import provenance
+def _estimate(options: argparse.Namespace, paths: tuple[Path, ...], scenario: Any, solver: str) -> Any:
+    from flipproof.film.clip import read_film
+    from flipproof.film.estimate import estimate
+    from flipproof.film.likelihood import Held
 
-    with replaced_folder(options.out, kind) as folder:
-        write(folder, provenance(command_line()))
-    return [f"written  {options.out / first}"]
+    film = read_film(
+        paths, cap=options.cap, base=options.base, length_unit=options.length_unit, time_unit=options.time_unit,
+        frame_rate=options.frame_rate, quantity=options.quantity,
+    )  # fmt: skip
+    if options.release is not None and options.landing is not None and not options.release < options.landing:
+        raise ValueError(f"landing = {options.landing:g} s does not follow release = {options.release:g} s")
+    held = Held(
+        release=options.release, touch=options.landing, table=options.table_height, tilt="tilt" in options.hold,
+        scale="scale" in options.hold, noise=options.noise,
+    )  # fmt: skip
+    with progress_bar(solver, "flight") as step:
+        seconds = 60.0 * options.minutes
+        return estimate(film, scenario, solver, held, slices=options.slices, seconds=seconds, tick=_counter(step))
+
+
+def _counter(step: Callable[..., None]) -> Callable[[int], object]:
+    made = 0
+
+    def tick(flights: int) -> None:
+        nonlocal made
+        made += flights
+        step(made, None)
+
+    return tick
+
+
+def _shared(draws: Mapping[str, Any], words: str) -> list[str]:
+    import numpy as np
+
+    from flipproof.film.estimate import UNITS, shortest
+
+    lines = [f"all films together: {words}"]
+    for name, values in draws.items():
+        low, high = shortest(values, 0.95)
+        lines.append(f"  {name:12} {np.median(values):.3g} [{low:.3g}, {high:.3g}] {UNITS[name]}".rstrip())
+    return lines
 
 
 def command_export(options: argparse.Namespace) -> int:
@@ -202,93 +233,6 @@ def _pair(text: str) -> tuple[float, float]:
     if not comma:
         raise argparse.ArgumentTypeError(f"{text!r} is not X,Y in m, such as 0.1,1.2")
     return number(x), number(y)
-
-
-def command_fit(options: argparse.Namespace) -> int:
-    """Fit every equation, print estimates and comparison, and write the folder."""
-    from flipproof.output.folder import check_replaceable
-
-    if options.out is not None:
-        check_replaceable(options.out, "fit")
-    if (options.cap is None) != (options.base is None):
-        raise ValueError("--cap and --base name the two tracks of a Tracker export; give both or neither")
-    if options.length_unit and options.cap is None:
-        raise ValueError(f"--length-unit {options.length_unit} is that of a Tracker export; give --cap and --base, too")
-    if len(set(options.model)) < len(options.model):
-        raise ValueError(f"--model names {next(n for n in options.model if options.model.count(n) > 1)} twice")
-    throw = read_scenario(options.scenario)
-    measured, remarks = _read(options)
-
-    from flipproof.film.fit.compare import compare, report
-    from flipproof.film.fit.problem import disagreements, pose
-
-    also = tuple(options.also)
-    problems = [pose(measured, throw, name, also=also, slices=options.slices) for name in options.model]
-    remarks += disagreements(problems[0], throw, also)
-    contenders = compare(_estimates(problems, options.starts, options.minutes))
-    text = report(contenders, remarks)
-
-    def write(folder: Path, made: Mapping[str, str]) -> None:
-        from flipproof.film.fit.folder import write
-
-        write(contenders, text, folder, made)
-
-    print("\n".join([text, *_written(options, "fit", write, "fit.txt")]))
-    return 0
-
-
-def _read(options: argparse.Namespace) -> tuple[Any, list[str]]:
-    """Return the measurement, and remarks on how it was read."""
-    from flipproof.film.fit.reading import read_flight, read_tracker
-
-    known = {name: getattr(options, name) for name in ("release", "landing", "noise")}
-    if options.cap is None:
-        return read_flight(options.file, quantity=options.quantity, averaged=options.averaged, **known)
-    if options.quantity == "omega" or options.averaged is not None:
-        raise ValueError(
-            "a Tracker export is fitted by its theta (Eq. 1); --quantity omega and --averaged are for tables"
-        )
-    tracks = {"cap": options.cap, "base": options.base, "length_unit": options.length_unit}
-    measured, words = read_tracker(options.file, **tracks, **known)
-    return measured, [words]
-
-
-def _estimates(problems: Sequence[Any], starts: int | None, minutes: float | None) -> list[Any]:
-    """Fit one problem after the other under a bar that counts flights; a log gets a line now and then."""
-    from flipproof.film.fit.estimate import MINUTES, USUAL, affordable, estimate
-    from flipproof.foreign.specs import is_foreign
-
-    searches = []
-    for problem in problems:
-        effort, seconds = USUAL, math.inf
-        if is_foreign(problem.solver):
-            budget = affordable(problem, minutes or MINUTES)
-            print(f"flipproof: {problem.solver}: {budget.words}", file=sys.stderr, flush=True)
-            effort, seconds = budget.effort, 60.0 * budget.minutes
-        searches.append((problem, replace(effort, starts=starts) if starts else effort, seconds))
-    estimates = []
-    for problem, effort, seconds in searches:
-        with progress_bar(problem.solver, "flight") as step:
-            tick = _ticker(step, problem.solver, is_foreign(problem.solver))
-            estimates.append(estimate(problem, effort, seconds=seconds, tick=tick))
-    return estimates
-
-
-def _ticker(step: Callable[..., None], solver: str, slow: bool) -> Callable[[int], object]:
-    """Return what counts flights: the bar of a terminal, and lines in a log of a search that may be ``slow``."""
-    began = time.perf_counter()
-    made, due = 0, began + LINE
-
-    def tick(count: int) -> None:
-        nonlocal made, due
-        made += count
-        step(made, None)
-        now = time.perf_counter()
-        if slow and now >= due and not sys.stderr.isatty():
-            due = now + LINE
-            print(f"flipproof: {solver}: {made} flights in {now - began:.0f} s", file=sys.stderr, flush=True)
-
-    return tick
 
 
 def _positive(text: str) -> float:

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flipproof.film.tracker.kinematics import direction
 from slicemodel import Scenario, Trajectory
 from slicemodel.landing import lab_motion, landing
 from slicemodel.observables import centre_of_mass_at_rest
@@ -64,6 +63,11 @@ def synthetic_video(run: Trajectory) -> SyntheticVideo:
     return SyntheticVideo(
         t=tau - tau[0], cap=cap, base=base, centre=centre, release=float(-tau[0]), landing=float(flight - tau[0])
     )
+
+
+def direction(theta: FloatArray) -> FloatArray:
+    """Return the unit vectors of cap -> base at angles (P,), shape (P, 2)."""
+    return np.column_stack((np.sin(theta), -np.cos(theta)))
 
 
 def with_noise(points: FloatArray, deviation: float, seed: int) -> FloatArray:

@@ -1,0 +1,120 @@
+"""How often the intervals of ``track`` hold the truth: films of known truth on a fraction of a grid, drawn anew.
+
+    python benchmarks/films.py [--films 20] [--first 0] [--slices 6]      coverage, one line a cell
+    python benchmarks/films.py --spoiled 500 --noise 200                  spoiled and random films: no traceback
+
+Frames per second and noise of a click, three levels each, are crossed; tilt, bad clicks, missing points and filling run
+through their levels by an orthogonal fraction of 18 cells.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+import traceback
+from collections import Counter
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import film_simulator
+import numpy as np
+
+from flipproof.film.estimate import estimate
+from flipproof.film.judge import Judged
+from flipproof.film.likelihood import Film
+from slicemodel import Scenario
+
+NAMES = ("gamma", "omega0", "release", "tilt", "restitution")
+
+
+def cells() -> list[dict[str, Any]]:
+    """Return the cells of the fraction: tilt follows frames and noise as a Latin square, the rest alternates."""
+    found = []
+    for (i, fps), (j, noise), k in product(enumerate((30, 60, 240)), enumerate((0.5e-3, 1e-3, 3e-3)), range(2)):
+        tilt = (0.0, 3.0, 8.0)[(i + j + k) % 3]
+        found.append(
+            {"fps": fps, "noise": noise, "tilt": tilt, "bad": 2 * k, "missing": 3 * ((i + j + k) % 2),
+             "filling": (0.25, 0.5)[(i + k) % 2]}
+        )  # fmt: skip
+    return found
+
+
+def film_of(made: film_simulator.Clip) -> Film:
+    """Return a clip as what the estimate takes."""
+    values = np.array([made.cap, made.base])
+    return Film(label="film", t=made.t, values=values, quantity="points", lines=np.arange(len(made.t)))
+
+
+def drawn(rng: np.random.Generator, cell: dict[str, Any], slices: int) -> film_simulator.Clip:
+    """Return a film of a cell with a truth drawn anew."""
+    truth: dict[str, Any] = {"gamma": rng.uniform(2, 10), "e": rng.uniform(0.1, 0.8), "omega0": rng.uniform(14, 22)}
+    return film_simulator.film(rng, slices=slices, **cell, **truth)
+
+
+def coverage(films: int, first: int, slices: int) -> None:
+    """Print for every cell how many intervals hold the truth, and their median width."""
+    total = Counter[str]()
+    for index, cell in enumerate(cells()):
+        held, refused = Counter[str](), 0
+        widths: dict[str, list[float]] = {name: [] for name in NAMES}
+        began = time.process_time()
+        for k in range(first, first + films):
+            made = drawn(np.random.default_rng([index, k]), cell, slices)
+            throw = Scenario(water_mass=cell["filling"]).with_slices(slices)
+            try:
+                judged = Judged(estimate(film_of(made), throw))
+                judged.check()
+            except ValueError as error:
+                refused += 1
+                print("   refused:", error, flush=True)
+                continue
+            for name in NAMES:
+                if name == "restitution" and judged.verdict(name) == "cannot tell":
+                    continue
+                low, high = judged.estimate.interval(name)
+                held[name] += low <= made.truth[name] <= high
+                widths[name].append(high - low)
+        words = [
+            f"{name} {held[name]}/{len(w)} ({np.median(w):.2g})" if w else f"{name} -" for name, w in widths.items()
+        ]
+        spent = (time.process_time() - began) / films
+        print(*cell.values(), "|", "; ".join(words), f"| refused {refused}, {spent:.1f} s a film", flush=True)
+        for name in NAMES:
+            total[name] += held[name]
+            total["of " + name] += len(widths[name])
+    print("all:", ", ".join(f"{name} {total[name]} of {total['of ' + name]}" for name in NAMES))
+
+
+def rough(spoiled: int, noise: int, slices: int) -> None:
+    """Print how spoiled and random films end: an estimate that holds the truth, one that does not, a refusal."""
+    outcome = Counter[str]()
+    for k in range(spoiled + noise):
+        rng = np.random.default_rng([99, k])
+        made = drawn(rng, {"fps": (30, 60)[k % 2], "noise": 1e-3, "tilt": 3.0}, slices)
+        film = (film_simulator.spoiled if k < spoiled else film_simulator.noise)(rng, film_of(made))
+        try:
+            judged = Judged(estimate(film, Scenario().with_slices(slices)))
+            judged.check()
+            low, high = judged.estimate.interval("gamma", 0.999)
+            sound = "explains" if judged.explained else "does not explain"
+            outcome[f"{sound}, gamma {'held' if low <= made.truth['gamma'] <= high else 'missed'}"] += 1
+        except ValueError as error:
+            outcome["refused" if "\n" not in str(error) else "refused in several lines"] += 1
+        except Exception:
+            outcome["TRACEBACK"] += 1
+            traceback.print_exc()
+    print(dict(outcome))
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).parent))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name, default in (("films", 20), ("first", 0), ("slices", 6), ("spoiled", 0), ("noise", 0)):
+        parser.add_argument(f"--{name}", type=int, default=default)
+    options = parser.parse_args()
+    if options.spoiled or options.noise:
+        rough(options.spoiled, options.noise, options.slices)
+    else:
+        coverage(options.films, options.first, options.slices)

@@ -1,0 +1,178 @@
+"""What an equation says of a throw's turning, as curves over the angle it would turn as ice.
+
+Over s = |omega_0| t the curves F = |theta - theta_0|, F' = |omega / omega_0| and R = r_CM / L of an equation without
+weight depend on gamma / omega_0 and e alone, whatever omega_0 and theta_0 are: one flight serves every release. Of
+other equations two more flights give the linear change with omega_0 and theta_0 about a reference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from flipproof.frame.solvers import FOREIGN, catalogue, find, solve
+from ode_reference.solver import WATERS
+from slicemodel import Scenario
+from slicemodel.trajectory import FloatArray
+
+SLICES: Final = 50
+"""Slices that a throw is cut into at the most, unless others are asked for."""
+
+STEP: Final = 0.025
+"""Spacing of the curves [rad of ice]; between them lie cubics of F and F'."""
+
+CHANGE: Final = 0.01
+"""Relative change of omega_0, and change of theta_0 [rad], over which slopes of weighted equations are taken."""
+
+
+Flown = tuple[FloatArray, FloatArray, FloatArray]
+"""theta, omega and r_CM of one flight."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """One flight: rows F, F' and R over s = 0, STEP, ... (S,), and their slopes by ln omega_0 and theta_0, if any.
+
+    ``slopes`` has shape (2, 3, S) and counts from ``omega0`` and ``theta0`` (in the lab).
+    """
+
+    rows: FloatArray
+    slopes: FloatArray | None = None
+    omega0: float = 1.0
+    theta0: float = 0.0
+
+    def at(self, s: FloatArray, omega0: float, theta0: float) -> FloatArray:
+        """Return F, F', R, dR/ds, and dF, dR by ln omega_0 and by theta_0, at s; shape (8, P).
+
+        Before s = 0 the water rests.
+        """
+        k = np.clip((s / STEP).astype(int), 0, self.rows.shape[1] - 2)
+        x = np.maximum(s / STEP - k, 0.0)
+        (f0, w0, r0), (f1, w1, r1) = self.rows[:, k], self.rows[:, k + 1]
+        x = np.minimum(x, 1.0)
+        rise, y = f1 - f0, 1.0 - x
+        late = np.maximum(s - STEP * (self.rows.shape[1] - 1), 0.0)
+        turned = f0 + x * rise + x * y * (y * (STEP * w0 - rise) - x * (STEP * w1 - rise)) + late * w1
+        rest = s < 0
+        out = np.array(
+            [np.where(rest, s, turned), np.where(rest, 1.0, y * w0 + x * w1), y * r0 + x * r1,
+             np.where(rest, 0.0, (r1 - r0) / STEP), *np.zeros((4, len(s)))]
+        )  # fmt: skip
+        if self.slopes is not None:
+            low, high = self.slopes[:, :, k], self.slopes[:, :, k + 1]
+            slope = np.where(rest, 0.0, y * low + x * high)
+            d = np.array([np.log(omega0 / self.omega0), theta0 - self.theta0])
+            out[:3] += np.tensordot(d, slope, 1)
+            out[4:] = slope[0, 0], slope[0, 2], slope[1, 0], slope[1, 2]
+        return out
+
+
+@dataclass(frozen=True)
+class Equation:
+    """The flights of one solver for one bottle.
+
+    Parameters
+    ----------
+    solver : str - a scheme of ``slicemodel``, a model of ``ode_reference`` or somebody else's
+    throw : Scenario - bottle, water and gravity; its drag, restitution, omega0, theta0 and duration are not used
+    reach : float - largest s [rad]
+    places : bool - whether r_CM is asked for
+    tick : callable - called with the number of flights made
+    """
+
+    solver: str
+    throw: Scenario
+    reach: float
+    places: bool = True
+    tick: Callable[[int], object] = field(default=lambda _: None, compare=False)
+
+    def __post_init__(self) -> None:
+        package_of(self.solver)
+
+    @cached_property
+    def weighted(self) -> bool:
+        """Whether weight makes a difference to the turning."""
+        throw = self._throw(0.25, 0.5, 20.0, 1.0)
+        (with_weight,), (without,) = self._fly([throw]), self._fly([replace(throw, gravity=0.0)])
+        return not np.allclose(with_weight, without, rtol=0, atol=1e-9, equal_nan=True)
+
+    def curves(self, nodes: FloatArray, omega0: float, theta0: float) -> list[Curve | None]:
+        """Return the curve of every (gamma / |omega_0|, e) in ``nodes`` (K, 2); None where the solver gave up.
+
+        ``omega0`` and ``theta0`` (in the lab) are where slopes of a weighted equation are taken.
+        """
+        if not self.weighted:
+            rows = self._fly([self._throw(g, e, 20.0, 1.0) for g, e in nodes])
+            return [Curve(row) if np.isfinite(row).all() else None for row in rows]
+        sides = ((0, 0), (CHANGE, 0), (-CHANGE, 0), (0, CHANGE), (0, -CHANGE))
+        throws = [self._throw(g, e, omega0 * np.exp(a), theta0 + b) for g, e in nodes for a, b in sides]
+        made = self._fly(throws).reshape(len(nodes), 5, 3, -1)
+        slopes = (made[:, 1::2] - made[:, 2::2]) / (2 * CHANGE)
+        return [
+            Curve(rows[0], slope, omega0, theta0) if np.isfinite(rows).all() else None
+            for rows, slope in zip(made, slopes, strict=True)
+        ]
+
+    def _throw(self, rate: float, e: float, omega0: float, theta0: float) -> Scenario:
+        throw = replace(self.throw, omega0=omega0, theta0=theta0, duration=self.reach / abs(omega0))
+        return replace(throw, drag=2.0 * throw.slice_mass * rate * abs(omega0), restitution=e)
+
+    def _fly(self, throws: Sequence[Scenario]) -> FloatArray:
+        """Return F, F' and R of throws (K, 3, S); NaN from where a solver gave up."""
+        count = int(self.reach / STEP) + 1
+        rows = np.full((len(throws), 3, count), np.nan)
+        for k, (throw, flown) in enumerate(zip(throws, self._flown(throws, count), strict=True)):
+            if flown is not None:
+                sign, size = np.sign(throw.omega0), len(flown[0])
+                turned, rate = (flown[0] - throw.theta0) * sign, flown[1] / throw.omega0
+                rows[k, :, :size] = turned, rate, flown[2] / throw.bottle.length
+        self.tick(len(throws))
+        return rows
+
+    def _flown(self, throws: Sequence[Scenario], count: int) -> Sequence[Flown | None]:
+        """Return theta, omega and r_CM of each throw at its ``count`` values of s."""
+        times = [np.minimum(np.arange(count) * STEP / abs(throw.omega0), throw.duration) for throw in throws]
+        package = package_of(self.solver)
+        if package == "ode_reference" and self.solver not in WATERS:
+            import ode_reference
+
+            batch = ode_reference.solve_batch(throws, self.solver, np.array(times))
+            return [(run.theta, run.omega, run.r_cm) for run in batch]
+        if package == "slicemodel":
+            from slicemodel.batch import solve_batch
+
+            found: list[Flown] = []
+            for throw, t in zip(throws, times, strict=True):
+                # The paper's own step, 1000 of them in half a second, and a whole number of them between two values.
+                fine = int(np.ceil(t[1] / 5e-4))
+                one = solve_batch([replace(throw, duration=float(t[-1]))], self.solver, fine * (count - 1) + 1)
+                found.append((one.theta[0, ::fine], one.omega[0, ::fine], one.r_cm[0, ::fine]))
+            return found
+        from flipproof.foreign.specs import ForeignError
+
+        flown: list[Flown | None] = [None] * len(throws)
+        for k, (throw, t) in enumerate(zip(throws, times, strict=True)):
+            with suppress(ForeignError):
+                run = solve(self.solver, throw, times=t)
+                if self.places and "r_cm" in run.diagnostics.get("not_given", ()):
+                    raise ValueError(f"model = {self.solver!r} gives no r_cm, which a film of cap and base needs")
+                flown[k] = run.theta, run.omega, run.r_cm
+        return flown
+
+
+def package_of(solver: str) -> str:
+    """Return the package of a solver that can be fitted; an engine, a curve in a file, an unknown name are refused."""
+    from flipproof.foreign.specs import check_asked
+
+    package = find(solver).package
+    if package == "engine_check":
+        able = [name for name, other in catalogue().items() if other.package != package]
+        raise ValueError(f"model = {solver!r} is a physics engine, too slow to fit with; choose from {', '.join(able)}")
+    if package == FOREIGN:
+        check_asked(solver)
+    return package

@@ -1,0 +1,456 @@
+"""The one estimate that every command shares: from the points of a film to what was thrown, with what is not known.
+
+Given gamma / |omega_0| and e, one flight says how the bottle turns, and all else, the release among it, is fitted to
+the points by scoring. What the data allow of these others is a normal distribution to good accuracy (Laplace), so
+their integral is known at every pair; the pairs themselves, over which the likelihood has folds wherever a slice
+rebounds, are covered by a grid that closes in on all pairs that matter. The sum over its nodes is the posterior, and
+the evidence of the equation. There is no chance in it: equal data give equal answers.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from flipproof.film.curves import SLICES, Curve, Equation
+from flipproof.film.likelihood import TOUCH, Film, Fit, Held, Likelihood
+from slicemodel import Scenario
+from slicemodel.trajectory import FloatArray
+
+SCALE: Final = 0.05
+"""gamma / |omega_0| up to which its coordinate asinh(gamma / |omega_0| / SCALE) is linear."""
+
+MAX_RATE: Final = 5.0
+"""Largest gamma / |omega_0|: a slice then creeps less than a fifth of its distance from the centre while the bottle
+turns by 2 rad."""
+
+COARSE: Final = (8, 5)
+FINE: Final = (13, 9)
+"""Nodes of the first grid and of the last, along gamma and e."""
+
+FEW: Final = 4
+"""Nodes that matter at the least before a grid is believed to have seen all that does."""
+
+NEGLIGIBLE: Final = 9.0
+"""Logarithm of how much less likely than the best a pair must be to be left out."""
+
+DRAWS: Final = 8000
+"""Sets of parameters drawn from the posterior."""
+
+UNITS: Final = {
+    "gamma": "/s", "restitution": "", "omega0": "rad/s", "theta0": "rad", "release": "s", "touch": "s", "tilt": "deg",
+    "g": "m/s^2", "noise": "m", "length": "m", "x0": "m", "y0": "m", "vx": "m/s", "vy": "m/s",
+}  # fmt: skip
+
+
+class NoFlightError(ValueError):
+    """A film in which no flight is found; the message says what to do."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Estimate:
+    """What a film says of a throw under one equation.
+
+    Parameters
+    ----------
+    film, throw, solver, held : what was asked
+    likelihood : Likelihood - with the time of the touch
+    curve, fit : of the most likely pair
+    draws : name -> (DRAWS,) - the posterior; names and units as of ``UNITS``
+    evidence : float - logarithm of the density of the data under this equation
+    touched : bool - whether the record goes on after the flight
+    flights : int - of the solver
+    """
+
+    film: Film
+    throw: Scenario
+    solver: str
+    held: Held
+    likelihood: Likelihood
+    curve: Curve
+    fit: Fit
+    draws: dict[str, FloatArray]
+    evidence: float
+    touched: bool
+    flights: int
+
+    @property
+    def best(self) -> dict[str, float]:
+        """The median of every parameter."""
+        return {name: float(np.median(values)) for name, values in self.draws.items()}
+
+    def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
+        """Return the shortest interval that holds a parameter with this probability."""
+        return shortest(self.draws[name], level)
+
+    @property
+    def flying(self) -> NDArray[np.bool_]:
+        """Which frames lie between release and touch, shape (P,)."""
+        t = self.film.t
+        return np.asarray((t >= self.fit.x[0] - 1e-9) & (t <= self.likelihood.touch + 1e-9))
+
+    @property
+    def doubted(self) -> NDArray[np.bool_]:
+        """Which clicks in flight are more likely bad than not, shape (B, P)."""
+        _, good, _ = self.likelihood.pieces(self.curve, self.fit.x)
+        return np.asarray((good < 0.5) & self.film.clicked & self.flying)
+
+
+def shortest(values: FloatArray, level: float) -> tuple[float, float]:
+    """Return the shortest interval that holds a share of draws."""
+    ordered = np.sort(values)
+    count = max(1, int(np.ceil(level * len(ordered))) - 1)
+    k = int(np.argmin(ordered[count:] - ordered[:-count]))
+    return float(ordered[k]), float(ordered[k + count])
+
+
+def estimate(
+    film: Film,
+    throw: Scenario,
+    solver: str = "free-flight",
+    held: Held | None = None,
+    *,
+    slices: int | None = None,
+    seconds: float = math.inf,
+    tick: Callable[[int], object] = lambda _: None,
+) -> Estimate:
+    """Return what a film says of a throw under an equation.
+
+    Parameters
+    ----------
+    throw : what is known: bottle, water, gravity; the rest is fitted
+    slices : of the equation; ``SLICES`` or the throw's, if fewer, by default
+    seconds : after which the grid is refined no further; intervals are wider then
+    tick : called with the number of flights made
+
+    Raises
+    ------
+    ValueError
+        If the film has too few values, or no flight in it (``NoFlightError``), or the solver cannot be fitted.
+    """
+    held = held or Held()
+    known = throw.with_slices(slices or min(throw.n_slices, SLICES))
+    made = 0
+
+    def count(flights: int) -> None:
+        nonlocal made
+        made += flights
+        tick(flights)
+
+    likelihood, x = _start(film, known, held)
+    span = likelihood.touch - x[0]
+    likelihood = near_flight(likelihood, float(x[0]))
+    equation = Equation(solver, known, float(np.clip(1.4 * abs(x[2]) * span + 0.5, 2.0, 60.0)), likelihood.two, count)
+    likelihood, nodes, curves, fits, cell = _grid(likelihood, equation, x, seconds)
+    levels = np.array([fit.evidence for fit in fits])
+    best = int(np.argmax(levels))
+    prior = np.arcsinh(MAX_RATE / SCALE)
+    draws = _draws(likelihood, nodes, fits, levels, cell)
+    times, costs, _ = _touches(likelihood, curves[best], fits[best].x)
+    chance = np.exp(costs.min() - costs)
+    rng = np.random.default_rng(1)
+    picked = rng.choice(len(times), DRAWS, p=chance / chance.sum())
+    draws["touch"] = times[picked] + (times[1] - times[0]) * (rng.random(DRAWS) - 0.5)
+    likelihood = Likelihood(film, held, likelihood.touch, likelihood.noise, likelihood.speed)
+    return Estimate(
+        film=film, throw=known, solver=solver, held=held, likelihood=likelihood, curve=curves[best], fit=fits[best],
+        draws=draws, evidence=float(np.logaddexp.reduce(levels) + np.log(cell[0] * cell[1] / prior)),
+        touched=bool(likelihood.touch < film.t[-1]), flights=made,
+    )  # fmt: skip
+
+
+def near_flight(likelihood: Likelihood, release: float) -> Likelihood:
+    """Return the likelihood of the frames in flight and those just before and after it, which say when it is."""
+    film, margin = likelihood.film, 0.08
+    near = (film.t >= release - margin) & (film.t <= likelihood.touch + margin)
+    part = replace(film, t=film.t[near], values=film.values[:, near], lines=film.lines[near])
+    return Likelihood(part, likelihood.held, likelihood.touch, likelihood.noise, likelihood.speed)
+
+
+# ---------------------------------------------------------------------- the grid over gamma and e
+
+
+def _grid(
+    likelihood: Likelihood, equation: Equation, x: FloatArray, seconds: float
+) -> tuple[Likelihood, FloatArray, list[Curve], list[Fit], tuple[float, float]]:
+    """Return the likelihood with its touch settled, the last grid's nodes, curves and fits, and the size of a cell."""
+    low, high = np.zeros(2), np.array([np.arcsinh(MAX_RATE / SCALE), 1.0])
+    seeds, nearest = np.array([[np.nan, np.nan]]), [x]
+    shape = COARSE
+    began = time.perf_counter()
+    for _ in range(9):
+        cell = (high - low) / shape
+        axes = [low[k] + cell[k] * (np.arange(shape[k]) + 0.5) for k in range(2)]
+        nodes = np.array(list(product(*axes)))
+        x = nearest[0]
+        tilt = float(np.arctan2(x[7], -x[8])) if likelihood.two else 0.0
+        rates = np.column_stack((SCALE * np.sinh(nodes[:, 0]), nodes[:, 1]))
+        flown = equation.curves(rates, float(x[2]), float(x[1]) - tilt)
+        nodes = nodes[[curve is not None for curve in flown]]
+        curves = [curve for curve in flown if curve is not None]
+        if not curves:
+            raise ValueError(f"{equation.solver}: gives up on every throw that could be this one")
+        near = [nearest[int(np.nanargmin(((seeds - node) ** 2 / (cell**2)).sum(axis=1)))] if len(nearest) > 1 else x
+                for node in nodes]  # fmt: skip
+        fits = [likelihood.fitted(curve, start) for curve, start in zip(curves, near, strict=True)]
+        levels = np.array([fit.evidence for fit in fits])
+        order = np.argsort(-levels)
+        best = int(order[0])
+        if shape == FINE or time.perf_counter() - began > 0.5 * seconds:
+            break
+        settled = settle(likelihood, curves[best], fits[best].x)
+        if settled is not likelihood:
+            likelihood = settled
+            fits = [likelihood.fitted(curve, fit.x) for curve, fit in zip(curves, fits, strict=True)]
+            levels = np.array([fit.evidence for fit in fits])
+            order = np.argsort(-levels)
+            best = int(order[0])
+        pad = cell
+        if (levels > levels[best] - NEGLIGIBLE).sum() <= FEW:
+            # What matters is smaller than a cell: descents from several nodes say where it is.
+            for k in order[:3]:
+                more = _descent(likelihood, equation, nodes[k], fits[k].x, cell, (low, high))
+                nodes = np.concatenate((nodes, [one[0] for one in more]))
+                curves += [one[1] for one in more]
+                fits += [one[2] for one in more]
+            levels = np.array([fit.evidence for fit in fits])
+            order = np.argsort(-levels)
+            best, pad = int(order[0]), 0.3 * cell
+        matters = np.union1d(np.flatnonzero(levels > levels[best] - NEGLIGIBLE), order[:3])
+        seeds, nearest = nodes[order], [fits[k].x for k in order]
+        wide = high - low
+        low = np.maximum(low, nodes[matters].min(axis=0) - pad)
+        high = np.minimum(high, nodes[matters].max(axis=0) + pad)
+        if np.prod((high - low) / wide) > 0.4:
+            shape = FINE
+    return likelihood, nodes, curves, fits, (float(cell[0]), float(cell[1]))
+
+
+def _descent(
+    likelihood: Likelihood,
+    equation: Equation,
+    node: FloatArray,
+    x: FloatArray,
+    cell: FloatArray,
+    box: tuple[FloatArray, FloatArray],
+) -> list[tuple[FloatArray, Curve, Fit]]:
+    """Return what Nelder and Mead's simplex sees on its way down from a node; it asks no slopes, which have folds."""
+    seen: list[tuple[FloatArray, Curve, Fit]] = []
+    tilt = float(np.arctan2(x[7], -x[8])) if likelihood.two else 0.0
+
+    def less(place: FloatArray) -> float:
+        rate = np.array([[SCALE * np.sinh(place[0]), place[1]]])
+        (curve,) = equation.curves(rate, float(x[2]), float(x[1]) - tilt)
+        if curve is None:
+            return math.inf
+        seen.append((place.copy(), curve, likelihood.fitted(curve, seen[-1][2].x if seen else x)))
+        return -seen[-1][2].evidence
+
+    simplex = np.clip(node + np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]]) * cell, *box)
+    minimize(
+        less, node, method="Nelder-Mead", bounds=list(zip(*box, strict=True)),
+        options={"initial_simplex": simplex, "maxfev": 40, "xatol": 1e-6, "fatol": 0.5},
+    )  # fmt: skip
+    return seen
+
+
+def _draws(
+    likelihood: Likelihood, nodes: FloatArray, fits: list[Fit], levels: FloatArray, cell: tuple[float, float]
+) -> dict[str, FloatArray]:
+    """Return draws of the posterior: a node, a place in its cell, and the other parameters given it."""
+    rng = np.random.default_rng(0)
+    chance = np.exp(levels - levels.max())
+    picked = rng.choice(len(nodes), DRAWS, p=chance / chance.sum())
+    place = nodes[picked] + (rng.random((DRAWS, 2)) - 0.5) * cell
+    inner = np.empty((DRAWS, len(fits[0].x)))
+    for k in np.unique(picked):
+        mine = picked == k
+        root = np.linalg.cholesky(np.linalg.inv(fits[k].hessian))
+        moved = rng.standard_normal((int(mine.sum()), len(root))) @ root.T
+        # All deviations grow with the noise, which is a draw, too.
+        at = likelihood.index["log_noise"]
+        wider = np.exp(moved[:, at : at + 1])
+        inner[mine] = fits[k].x + np.where(np.arange(len(root)) == at, moved, moved * wider)
+    found = dict(zip(likelihood.film.names, inner.T, strict=True))
+    draws = {
+        "gamma": SCALE * np.sinh(np.maximum(place[:, 0], 0.0)) * np.abs(found["omega0"]),
+        "restitution": np.clip(place[:, 1], 0.0, 1.0),
+        **{name: found[name] for name in ("omega0", "theta0", "release")},
+        "noise": np.exp(found["log_noise"]),
+    }
+    if likelihood.two:
+        tilt = np.arctan2(found["ax"], -found["ay"])
+        draws |= {name: found[name] for name in ("length", "x0", "y0", "vx", "vy")}
+        draws |= {"tilt": np.degrees(tilt), "g": np.hypot(found["ax"], found["ay"]), "theta0": found["theta0"] - tilt}
+    return draws
+
+
+# ---------------------------------------------------------------------- the touch
+
+
+def _touches(likelihood: Likelihood, curve: Curve, x: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Return times of a touch near the likeliest, 16 to a frame, the cost of each, and the velocity taken."""
+    film = likelihood.film
+    step = float(np.median(np.diff(film.t)))
+    if likelihood.held.touch is not None or not likelihood.two or not (film.t > x[0]).any():
+        return np.array([likelihood.touch, likelihood.touch + 1e-9]), np.array([0.0, np.inf]), likelihood.speed
+    if likelihood.held.table is not None:
+        touch = _at_table(likelihood, curve, x, likelihood.held.table)
+        return np.array([touch, touch + 1e-9]), np.array([0.0, np.inf]), likelihood.speed
+    frames = np.append(film.t[film.t > x[0]], film.t[-1] + step)
+    rough = {speed: likelihood.touches(curve, x, frames, speed) for speed in TOUCH}
+    speed = min(rough, key=lambda one: float(rough[one].min()))
+    near = frames[int(np.argmin(rough[speed]))]
+    times = np.minimum(near + step * np.arange(-32, 33) / 16, film.t[-1] + step)
+    return times, likelihood.touches(curve, x, times, speed), speed
+
+
+def _at_table(likelihood: Likelihood, curve: Curve, x: FloatArray, height: float) -> float:
+    """Return when the fitted bottle, falling, comes down to the table with an end."""
+    film = likelihood.film
+    times = np.linspace(float(x[0]), float(film.t[-1]), 2000)
+    dense = replace(film, t=times, values=np.zeros((2, len(times), 2)), lines=np.zeros(len(times), dtype=np.int64))
+    values, _ = Likelihood(dense, Held(), np.inf, 1.0).model(curve, x)
+    lowest = values[:, :, 1].min(axis=0)
+    below = np.flatnonzero((lowest[1:] <= height) & (lowest[:-1] > height))
+    if not len(below):
+        raise ValueError(
+            f"{film.label}: table_height = {height:g} m: the bottle never comes down to it; its lowest end is in "
+            f"[{lowest.min():.4g}, {lowest.max():.4g}] m"
+        )
+    return float(times[below[-1] + 1])
+
+
+def settle(likelihood: Likelihood, curve: Curve, x: FloatArray) -> Likelihood:
+    """Return the likelihood with the most likely touch; the same one if it is the present one."""
+    times, costs, speed = _touches(likelihood, curve, x)
+    touch = float(times[int(np.argmin(costs))])
+    if abs(touch - likelihood.touch) < 1e-9 and speed == likelihood.speed:
+        return likelihood
+    return Likelihood(likelihood.film, likelihood.held, touch, likelihood.noise, speed)
+
+
+# ---------------------------------------------------------------------- the start
+
+
+def _start(film: Film, throw: Scenario, held: Held) -> tuple[Likelihood, FloatArray]:
+    """Return a likelihood with a first guess of the touch, and a first guess of the inner parameters.
+
+    Every frame may be the release: the turning that follows is held against free flight with little, some and much
+    drag, and the one that stays with it, and with a parabola, for longest is taken.
+    """
+    if film.quantity != "points":
+        return _start_table(film, held)
+    theta, t = film.angle, film.t
+    known = np.flatnonzero(~np.isnan(theta))
+    if len(known) < 8:
+        raise NoFlightError(f"{film.label}: cap and base were clicked together in {len(known)} frames; 8 are needed")
+    step = float(np.median(np.diff(t)))
+    equation = Equation("free-flight", throw, 30.0)
+    curves = [curve for curve in equation.curves(np.array([(0.05, 0.4), (0.3, 0.4), (1.0, 0.4)]), 20.0, 0.0) if curve]
+    apart = np.hypot(*(film.values[1] - film.values[0]).T)
+    length = float(np.nanmedian(apart))
+    angle, times = theta[known], t[known]
+    first = known if held.release is None else known[times >= held.release - 1e-9]
+    found: list[tuple[float, Curve, float, FloatArray]] = []
+    for k in first[:: max(1, len(first) // 80)]:
+        after = times >= t[k] - 1e-9
+        for omega in _rates(times[after], angle[after], max(4, int(0.03 / step))):
+            for curve in curves:
+                f = curve.at(abs(omega) * (times[after] - t[k]), 1.0, 0.0)[0]
+                off = angle[after] - np.sign(omega) * f
+                start = np.angle(np.median(np.exp(1j * off[:5]).real) + 1j * np.median(np.exp(1j * off[:5]).imag))
+                near = np.abs(np.angle(np.exp(1j * (off - start)))) < 0.3
+                stays = _run(near)
+                if stays >= 6 and abs(f[stays - 1]) > 0.5:
+                    end = times[after][stays - 1]
+                    found.append((float(near[:stays].sum()), curve, float(end), np.array([t[k], start, omega])))
+    found.sort(key=lambda one: -one[0])
+    most = found[0][0] if found else 0.0
+    best: tuple[float, Likelihood, FloatArray] | None = None
+    for _, curve, end, spin in [one for one in found if one[0] > 0.4 * most][:: max(1, len(found) // 60)]:
+        x, noise = _placed(film, curve, spin, end, length)
+        likelihood = Likelihood(film, held, end if held.touch is None else held.touch, max(noise, 1e-5))
+        fit = likelihood.fitted(curve, x, 8)
+        likelihood = settle(likelihood, curve, fit.x)
+        fit = likelihood.fitted(curve, fit.x, 8)
+        if best is None or fit.cost < best[0]:
+            best = fit.cost, likelihood, fit.x
+    if best is None:
+        raise NoFlightError(
+            f"{film.label}: no stretch of the film is free flight; check that y points up and that cap and base are "
+            "not exchanged, or give --release and --landing"
+        )
+    return best[1], best[2]
+
+
+def _rates(t: FloatArray, angle: FloatArray, window: int) -> list[float]:
+    """Return angular velocities with which a turning may begin, from the first frames [rad/s]."""
+    head, times = np.unwrap(angle[: window + 1]), t[: window + 1]
+    lag = max(1, len(head) // 2)
+    if len(head) <= lag:
+        return []
+    rate = float(np.median((head[lag:] - head[:-lag]) / (times[lag:] - times[:-lag])))
+    return [rate * factor for factor in (0.95, 1.1, 1.3)] if abs(rate) > 0.3 else []
+
+
+def _run(near: NDArray[np.bool_]) -> int:
+    """Return how many frames a turning stays, up to where three of four have left it."""
+    for k in range(len(near)):
+        if not near[k] and (~near[k : k + 4]).sum() >= min(3, len(near) - k):
+            return k
+    return len(near)
+
+
+def _placed(film: Film, curve: Curve, spin: FloatArray, end: float, length: float) -> tuple[FloatArray, float]:
+    """Return all inner parameters for a given spin, the place by a robust linear fit up to ``end``, and the noise."""
+    inside = (film.t >= spin[0] - 1e-9) & (film.t <= end + 1e-9)
+    part = replace(film, t=film.t[inside], values=film.values[:, inside], lines=film.lines[inside])
+    x = np.array([*spin, 0.0, 0.0, 0.0, 0.0, 0.0, -9.81, length, np.log(0.002), np.log(40.0)])
+    likelihood = Likelihood(part, Held(), end, 0.002)
+    values, slopes = likelihood.model(curve, x)
+    seen = np.repeat(part.clicked[:, :, None], 2, axis=2).ravel()
+    matrix, rest = slopes[..., 3:10].reshape(-1, 7)[seen], (part.values - values).ravel()[seen]
+    weight: FloatArray = np.ones(len(rest))
+    move: NDArray[Any] = np.zeros(7)
+    noise = 1.0
+    for _ in range(6):
+        move = np.linalg.lstsq(matrix * weight[:, None], rest * weight, rcond=None)[0]
+        left: FloatArray = rest - matrix @ move
+        noise = 1.4826 * float(np.median(np.abs(left))) + 1e-6
+        weight = 1.0 / np.sqrt(1.0 + (left / (3 * noise)) ** 2)
+    x[3:10] += move
+    x[9] = length
+    x[10] = np.log(noise)
+    return x, noise
+
+
+def _start_table(film: Film, held: Held) -> tuple[Likelihood, FloatArray]:
+    """Return a first guess from the first eighth of a table of theta or omega that begins at its release."""
+    values, t = film.values[0, :, 0], film.t
+    release = float(t[0]) if held.release is None else held.release
+    count = max(6, len(t) // 8)
+    turning = np.unwrap(values) if film.quantity == "theta" else values
+    line = np.polynomial.Polynomial.fit(t[:count] - release, turning[:count], 2 if film.quantity == "theta" else 1)
+    theta0, omega0 = (
+        (float(line(0.0)), float(line.deriv()(0.0))) if film.quantity == "theta" else (0.0, float(line(0.0)))
+    )
+    noise = max(third_differences(values), 1e-7 * float(np.ptp(values)), 1e-12)
+    likelihood = Likelihood(film, replace(held, release=release), float(t[-1]), noise)
+    return likelihood, np.array([release, theta0, omega0, np.log(noise)])
+
+
+def third_differences(values: FloatArray) -> float:
+    """Return the standard deviation of independent noise on a smooth curve (P,), from its third differences.
+
+    These remove parabolas; of white noise they leave sqrt(20) times its standard deviation.
+    """
+    return 1.4826 * float(np.median(np.abs(np.diff(values, 3)))) / float(np.sqrt(20.0)) if len(values) > 3 else 0.0

@@ -1,0 +1,301 @@
+"""The likelihood of clicked points: where cap and base of a thrown bottle are, and how far a click may miss them.
+
+    cap(t)  = p_0 + v_0 tau + a tau^2/2 - l R u        u = (sin theta, -cos theta), tau = t - t_r
+    base(t) = cap(t) + l u                             R = r_CM / L and theta by the equation (``curves``)
+
+Every click of two coordinates misses by a normal deviate of variance v, but for a share of bad clicks, which may lie
+anywhere in the picture. In flight v = sigma^2. Before the release a hand pulls with an acceleration of size A that
+nobody knows, and after the touch the table takes the velocity:
+
+    v = sigma^2 + (A tau^2/2)^2  before,     v = sigma^2 + (V (t - t_d))^2  after,  never beyond the picture.
+
+So frames in the hand and on the table count for nothing but for this: release and touch do not jump. A table of theta
+or omega alone has rows of one coordinate, no hand and no table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipproof.film.curves import Curve
+from slicemodel.trajectory import FloatArray
+
+GRAVITY: Final = 9.81
+"""What the picture's gravity is held against [m/s^2]."""
+
+BAD: Final = 0.01
+"""Share of clicks that may lie anywhere."""
+
+HAND: Final = (40.0, 1.0)
+"""Acceleration of a hand less gravity [m/s^2], and the standard deviation of its logarithm."""
+
+TOUCH: Final = (1.0, 3.0, 10.0)
+"""Velocities that a table may take [m/s]; the likeliest is used."""
+
+Quantity = Literal["points", "theta", "omega"]
+
+POINTS: Final = ("release", "theta0", "omega0", "x0", "y0", "vx", "vy", "ax", "ay", "length", "log_noise", "log_hand")
+SPIN: Final = ("release", "theta0", "omega0", "log_noise")
+"""Inner parameters of points and of a table of theta or omega; gamma / |omega_0| and e are the outer ones."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Film:
+    """What was clicked or measured.
+
+    Parameters
+    ----------
+    t : (P,) - times [s], increasing
+    values : (B, P, D) - cap and base (2, P, 2) [m], or theta [rad] or omega [rad/s] (1, P, 1); NaN where missing
+    quantity : what ``values`` are
+    lines : (P,) - lines of the file, 0 where a frame has none
+    notes : how the file was read
+    """
+
+    label: str
+    t: FloatArray
+    values: FloatArray
+    quantity: Quantity
+    lines: NDArray[np.int64]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the inner parameters."""
+        return POINTS if self.quantity == "points" else SPIN
+
+    @property
+    def clicked(self) -> NDArray[np.bool_]:
+        """Whether a body has a value in a frame, shape (B, P)."""
+        return np.asarray(~np.isnan(self.values).any(axis=2))
+
+    @property
+    def area(self) -> float:
+        """Size of the range in which a bad click lies: [m^2], or [rad] or [rad/s]."""
+        seen = self.values.reshape(-1, self.values.shape[2])
+        span = np.nanmax(seen, axis=0) - np.nanmin(seen, axis=0)
+        return float(np.prod(np.maximum(span, 1e-3 * max(1e-6, float(span.max())))))
+
+    @property
+    def angle(self) -> FloatArray:
+        """Angle of cap -> base from the downward vertical (Eq. 1), or theta, shape (P,) [rad]; not unwrapped."""
+        if self.quantity == "points":
+            x, y = (self.values[1] - self.values[0]).T
+            return np.where(np.hypot(x, y) > 0, np.arctan2(x, -y), np.nan)
+        return self.values[0, :, 0] if self.quantity == "theta" else np.full(len(self.t), np.nan)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Held:
+    """What is known beforehand, and is held.
+
+    Parameters
+    ----------
+    release, touch : float or None - [s] by the film's clock
+    table : float or None - y of the table in the picture [m]: the touch is when an end comes down to it
+    tilt : bool - the picture's vertical is true
+    scale : bool - gravity in the picture is 9.81 m/s^2
+    noise : float or None - standard deviation of one coordinate
+    """
+
+    release: float | None = None
+    touch: float | None = None
+    table: float | None = None
+    tilt: bool = False
+    scale: bool = False
+    noise: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """Inner parameters at the largest posterior density for one curve; ``x`` (K,), ``hessian`` (K, K)."""
+
+    x: FloatArray
+    cost: float
+    hessian: FloatArray
+    log_noise: float
+    degrees: int
+
+    @property
+    def evidence(self) -> float:
+        """Logarithm of the integral over the inner parameters, by Laplace."""
+        _, size = np.linalg.slogdet(self.hessian)
+        cost = self.cost + self.degrees * self.log_noise
+        return float(-cost - 0.5 * size + 0.5 * len(self.x) * np.log(2 * np.pi))
+
+
+class Likelihood:
+    """Minus the logarithm of the density of a film's values and of the weak priors, as a function of ``Film.names``."""
+
+    def __init__(self, film: Film, held: Held, touch: float, noise: float, speed: float = TOUCH[1]) -> None:
+        """Take the time of the touch, a first guess of the noise, and the velocity that the table takes."""
+        self.film, self.held, self.touch, self.noise, self.speed = film, held, touch, noise, speed
+        self.area, self.seen = film.area, film.clicked
+        self.two = film.values.shape[2] == 2
+        self.index = {name: k for k, name in enumerate(film.names)}
+        fixed = [held.release is not None, self.two and held.tilt, self.two and held.scale]
+        self.degrees = (10 if self.two else 3) - sum(fixed)
+
+    # ------------------------------------------------------------------ the model
+
+    def model(self, curve: Curve, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the values that were meant, (B, P, D), and their slopes by the inner parameters, (B, P, D, K)."""
+        film, n = self.film, self.index
+        theta0, omega0 = x[1], x[2]
+        tau = film.t - x[0]
+        tilt = np.arctan2(x[n["ax"]], -x[n["ay"]]) if self.two else 0.0
+        f, w, r, dr, f_omega, r_omega, f_theta, r_theta = curve.at(abs(omega0) * tau, omega0, theta0 - tilt)
+        sign = np.sign(omega0)
+        theta, omega = theta0 + sign * f, omega0 * w
+        # Slopes of theta and R by release, theta_0 and omega_0.
+        turn = np.array([-omega, 1.0 + sign * f_theta, w * tau + sign * f_omega / omega0])
+        slide = np.array([-abs(omega0) * dr, r_theta, sign * dr * tau + r_omega / omega0])
+        if not self.two:
+            slopes = np.zeros((1, len(tau), 1, len(n)))
+            if film.quantity == "theta":
+                slopes[0, :, 0, :3] = turn.T
+                return theta[None, :, None], slopes
+            bend = np.gradient(omega, film.t) if len(tau) > 1 else np.zeros_like(omega)
+            slopes[0, :, 0, 0], slopes[0, :, 0, 2] = -bend, w + bend * tau / omega0
+            return omega[None, :, None], slopes
+        u = np.column_stack((np.sin(theta), -np.cos(theta)))
+        across = np.column_stack((np.cos(theta), np.sin(theta)))
+        p, v, a, length = x[3:5], x[5:7], x[7:9], x[9]
+        centre = p + np.outer(tau, v) + 0.5 * np.outer(tau**2, a)
+        values = np.array([centre - (length * r)[:, None] * u, centre + (length * (1 - r))[:, None] * u])
+        slopes = np.zeros((2, len(tau), 2, len(n)))
+        for body, along in enumerate((-r, 1 - r)):
+            slope = slopes[body]
+            for k in range(3):
+                slope[:, :, k] = length * ((along * turn[k])[:, None] * across - slide[k][:, None] * u)
+            slope[:, :, 0] -= v + np.outer(tau, a)
+            for d in range(2):
+                slope[:, d, 3 + d], slope[:, d, 5 + d], slope[:, d, 7 + d] = 1.0, tau, 0.5 * tau**2
+            slope[:, :, 9] = along[:, None] * u
+        return values, slopes
+
+    def variance(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the variance of one coordinate (P,), and its slopes by the inner parameters (P, K)."""
+        t, n = self.film.t, self.index
+        sigma = np.exp(2 * x[n["log_noise"]])
+        slopes = np.zeros((len(t), len(n)))
+        slopes[:, n["log_noise"]] = 2 * sigma
+        if not self.two:
+            return np.full(len(t), sigma), slopes
+        most = self.area / (2 * np.pi)
+        before, hand = np.minimum(t - x[0], 0.0), np.exp(x[n["log_hand"]])
+        pulled, taken = (0.5 * hand * before**2) ** 2, (self.speed * np.maximum(t - self.touch, 0.0)) ** 2
+        added = pulled + taken
+        free = most / (most + added)
+        # What exceeds the picture levels off there.
+        slopes[:, 0] = -(hand**2) * before**3 * free**2
+        slopes[:, n["log_hand"]] = 2 * pulled * free**2
+        return sigma + added * free, slopes
+
+    # ------------------------------------------------------------------ densities
+
+    def pieces(self, curve: Curve, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return of every value its cost (B, P), the probability that it is no bad click, and what it misses by."""
+        values, _ = self.model(curve, x)
+        variance, _ = self.variance(x)
+        return self._density(self.film.values - values, variance)
+
+    def touches(self, curve: Curve, x: FloatArray, times: FloatArray, speed: float) -> FloatArray:
+        """Return the cost of every frame's values had the touch been at some times, shape (len(times),)."""
+        values, _ = self.model(curve, x)
+        old, self.touch = self.touch, np.inf
+        variance, _ = self.variance(x)
+        self.touch = old
+        missed = np.where(self.seen[:, :, None], self.film.values - values, 0.0)
+        most = self.area / (2 * np.pi)
+        taken = (speed * np.maximum(self.film.t - times[:, None], 0.0)) ** 2
+        spread = variance + taken * most / (most + taken)
+        cost = np.zeros(len(times))
+        for seen, one in zip(self.seen, (missed**2).sum(axis=2), strict=True):
+            good = np.log1p(-BAD) - one / (2 * spread) - np.log(2 * np.pi * spread)
+            cost -= np.logaddexp(good, np.log(BAD / self.area))[:, seen].sum(axis=1)
+        return cost
+
+    def _density(self, missed: FloatArray, variance: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        missed = np.where(self.seen[:, :, None], missed, 0.0)
+        power = missed.shape[2] / 2
+        q = (missed**2).sum(axis=2) / (2 * variance)
+        good = np.log1p(-BAD) - q - power * np.log(2 * np.pi * variance)
+        bad = np.log(BAD / self.area)
+        both = np.logaddexp(good, bad)
+        return np.where(self.seen, -both, 0.0), np.where(self.seen, np.exp(good - both), 0.0), missed
+
+    def penalty(self, x: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Return cost, gradient and curvature of priors: what is held, and weak ones that keep parameters in reach."""
+        n, held, size = self.index, self.held, len(x)
+        rows: list[tuple[float, FloatArray]] = []
+
+        def prior(name: str, value: float, deviation: float) -> None:
+            row = np.zeros(size)
+            row[n[name]] = 1.0 / deviation
+            rows.append(((x[n[name]] - value) / deviation, row))
+
+        tight = 1e-6
+        if held.release is not None:
+            prior("release", held.release, tight)
+        if held.noise is not None:
+            prior("log_noise", float(np.log(held.noise)), tight)
+        else:
+            prior("log_noise", float(np.log(self.noise)), 3.0)
+        if self.two:
+            prior("log_hand", float(np.log(HAND[0])), HAND[1])
+            if held.tilt:
+                prior("ax", 0.0, tight)
+            if held.scale:
+                a = x[7:9]
+                down = float(np.hypot(*a))
+                row = np.zeros(size)
+                row[7:9] = a / down / tight
+                rows.append(((down - GRAVITY) / tight, row))
+        elif self.film.quantity == "omega":
+            prior("theta0", 0.0, 1.0)
+        r, j = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
+        gradient = j.T @ r
+        # The integral over what else is fitted is the larger the larger the noise: the mode is that of the noise alone.
+        gradient[n["log_noise"]] -= self.degrees
+        return float(0.5 * r @ r - self.degrees * x[n["log_noise"]]), gradient, j.T @ j
+
+    def terms(self, curve: Curve, x: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Return the cost, its gradient and Fisher's information."""
+        values, slopes = self.model(curve, x)
+        variance, dv = self.variance(x)
+        cost, good, missed = self._density(self.film.values - values, variance)
+        dlog = dv / variance[:, None]
+        power = missed.shape[2] / 2
+        q = (missed**2).sum(axis=2) / (2 * variance)
+        root = np.sqrt(good / variance)[:, :, None]
+        flat = (root[..., None] * slopes).reshape(-1, len(x))
+        gradient = (good * (power - q)).sum(axis=0) @ dlog - (root * missed).ravel() @ flat
+        loose = np.sqrt(power * good.sum(axis=0))[:, None] * dlog
+        total, pull, stiff = self.penalty(x)
+        return float(cost.sum()) + total, gradient + pull, flat.T @ flat + loose.T @ loose + stiff
+
+    def fitted(self, curve: Curve, x: FloatArray, steps: int = 30) -> Fit:
+        """Return the inner parameters of the least cost near ``x``, by scoring with Levenberg's damping."""
+        cost, gradient, hessian = self.terms(curve, x)
+        damping = 1e-6
+        for _ in range(steps):
+            scale = np.diag(hessian) + 1e-12
+            step = -np.linalg.solve(hessian + damping * np.diag(scale), gradient)
+            trial = x + step
+            sound = trial[2] * x[2] > 0 and abs(step[self.index["log_noise"]]) < 5
+            new = self.terms(curve, trial) if sound else None
+            if new is None or not new[0] <= cost:
+                damping *= 10
+                if damping > 1e6:
+                    break
+                continue
+            gain = cost - new[0]
+            x, (cost, gradient, hessian), damping = trial, new, max(damping / 5, 1e-9)
+            if gain < 1e-3:
+                break
+        return Fit(x, cost, hessian, float(x[self.index["log_noise"]]), self.degrees)

@@ -1,0 +1,218 @@
+"""Films of known truth: the estimate holds it, says what it cannot tell, and refuses what cannot be right."""
+
+from dataclasses import replace
+
+import film_simulator
+import numpy as np
+import pytest
+
+from flipproof.cli.main import main
+from flipproof.film.clip import SCHEMA, read_film
+from flipproof.film.estimate import NoFlightError, estimate, shortest
+from flipproof.film.judge import Judged, together
+from flipproof.film.likelihood import Film, Held
+from flipproof.film.measured import hold, read_measured
+from flipproof.output.tables import read_curve
+from slicemodel import Scenario
+
+THROW = Scenario().with_slices(6)
+ASKED = ("gamma", "omega0", "release", "tilt")
+
+
+def clip(seed=0, **options):
+    return film_simulator.film(np.random.default_rng(seed), slices=6, **options)
+
+
+def film_of(made, label="film"):
+    values = np.array([made.cap, made.base])
+    return Film(label=label, t=made.t, values=values, quantity="points", lines=np.arange(len(made.t)) + 1)
+
+
+def written(path, made):
+    """Write a clip as Tracker exports it; return its path."""
+    rows = ["#multi:", "\tcap\t\tbase\t\t", "t\tx\ty\tx\ty\t"]
+    for t, *cells in np.column_stack((made.t, made.cap, made.base)).tolist():
+        rows.append("\t".join([repr(t), *("" if np.isnan(cell) else repr(cell) for cell in cells)]))
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def poor():
+    """The poorest film of a class: 30 frames a second, a tilted camera, a bad click, three missing points."""
+    made = clip(3, fps=30, tilt=3.0, bad=1, missing=3)
+    return made, Judged(estimate(film_of(made), THROW))
+
+
+def test_the_slope_of_every_value_is_that_of_the_model(poor):
+    one = poor[1].estimate
+    x = one.fit.x + 1e-3
+    _, slopes = one.likelihood.model(one.curve, x)
+    for k in range(10):
+        step = np.zeros(len(x))
+        step[k] = 1e-5
+        up, down = (one.likelihood.model(one.curve, x + sign * step)[0] for sign in (1, -1))
+        # The curve bends at its nodes, and the release where the water starts.
+        assert np.median(np.abs((up - down) / 2e-5 - slopes[..., k])) < 1e-3
+
+
+def test_the_poorest_film_tells_the_truth(poor):
+    made, judged = poor
+    for name in ASKED:
+        low, high = shortest(judged.estimate.draws[name], 0.999)
+        assert low <= made.truth[name] <= high, name
+    assert judged.explained
+    assert judged.estimate.doubted.sum() == 1
+    judged.check()
+
+
+@pytest.mark.slow
+def test_intervals_hold_the_truth_as_often_as_they_say():
+    """A small form of benchmarks/films.py."""
+    held, count = dict.fromkeys(ASKED, 0), 12
+    for k in range(count):
+        rng = np.random.default_rng([7, k])
+        options = {"fps": (30, 60, 120)[k % 3], "noise": (0.5e-3, 1e-3, 3e-3)[k // 4], "tilt": (0, 3, 8)[k % 3]}
+        truth = {"gamma": rng.uniform(3, 9), "e": rng.uniform(0.1, 0.8), "omega0": rng.uniform(15, 21)}
+        made = film_simulator.film(rng, slices=6, bad=2 * (k % 2), missing=3 * (k % 2), **options, **truth)
+        found = estimate(film_of(made), THROW)
+        for name in ASKED:
+            low, high = found.interval(name)
+            held[name] += low <= made.truth[name] <= high
+    assert min(held.values()) >= count - 3, held
+
+
+def test_a_bad_click_before_the_release_changes_nothing():
+    made = clip(1, fps=60)
+    spoiled = clip(1, fps=60)
+    spoiled.cap[3] += 0.08
+    one, other = (estimate(film_of(m), THROW).interval("omega0") for m in (made, spoiled))
+    assert one == pytest.approx(other, abs=0.05)
+
+
+def test_a_small_drag_is_told_from_none():
+    """121 angles with a noise of 0.1 mrad: an interval below 2 % of the range is no interval at zero."""
+    made = clip(2, fps=240, gamma=0.06, noise=1e-9)
+    inside = (made.t > made.truth["release"]) & (made.t < made.truth["touch"])
+    t = np.concatenate(([0.0], made.t[inside] - made.truth["release"]))
+    angle = np.unwrap(film_of(made).angle[inside])
+    angle = np.concatenate(([made.truth["theta0"]], angle)) + np.random.default_rng(0).normal(0, 1e-4, len(t))
+    film = Film(label="angles", t=t, values=angle[None, :, None], quantity="theta", lines=np.arange(len(t)))
+    low, high = shortest(estimate(film, THROW).draws["gamma"], 0.999)
+    assert 0.0 < low <= 0.06 <= high < 0.2
+
+
+def test_what_is_known_is_held():
+    made = clip(4, fps=30)
+    found = estimate(film_of(made), THROW, held=Held(release=made.truth["release"], tilt=True, scale=True))
+    assert np.ptp(found.draws["release"]) < 1e-4
+    assert np.ptp(found.draws["tilt"]) < 1e-3
+    assert found.best["g"] == pytest.approx(9.81, abs=1e-4)
+    low, high = found.interval("gamma", 0.999)
+    assert low <= 6.0 <= high
+
+
+def test_another_equation_is_not_said_to_explain():
+    made = clip(5, fps=120, model="eq8", noise=0.5e-3)
+    judged = Judged(estimate(film_of(made), THROW))
+    assert not judged.explained
+    assert judged.discrepancy > 1.0
+    assert "does not explain" in judged.words
+
+
+def test_ice_tells_nothing_of_drag():
+    made = clip(6, fps=60)
+    turning = np.linspace(0.0, 8.0, len(made.t))
+    film = Film(label="ice", t=made.t, values=turning[None, :, None], quantity="theta", lines=np.arange(len(made.t)))
+    film = replace(film, values=film.values + np.random.default_rng(0).normal(0, 3e-3, film.values.shape))
+    judged = Judged(estimate(film, replace(THROW, frozen=True)))
+    assert judged.verdict("gamma") == judged.verdict("restitution") == "cannot tell"
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda made: replace_clip(made, made.t * 1.2), "frame rate"),
+        (lambda made: cut(made, made.truth["release"] + 0.01), "within two frames of the first"),
+    ],
+    ids=["clock", "begins in flight"],
+)
+def test_what_cannot_be_right_is_refused_with_what_to_click(tmp_path, capsys, spoil, words):
+    path = written(tmp_path / "film.txt", spoil(clip(7, fps=60)))
+    throw = tmp_path / "throw.toml"
+    throw.write_text(THROW.to_toml(), encoding="utf-8")
+    asked = ["--cap", "cap", "--base", "base", "--length-unit", "m", "--scenario", str(throw)]
+    assert main(["track", str(path), *asked, "--out", str(tmp_path / "out")]) == 1
+    message = capsys.readouterr().err
+    assert words in message
+    assert message.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def replace_clip(made, t):
+    return replace(made, t=t)
+
+
+def cut(made, begin):
+    kept = made.t >= begin
+    return replace(made, t=made.t[kept], cap=made.cap[kept], base=made.base[kept])
+
+
+def test_nothing_that_flies_is_refused():
+    rng = np.random.default_rng(0)
+    t = np.arange(60) / 60
+    still = np.tile([[[0.0, 0.28]], [[0.0, 0.0]]], (1, 60, 1)) + rng.normal(0, 1e-3, (2, 60, 2))
+    with pytest.raises(NoFlightError):
+        estimate(Film(label="still", t=t, values=still, quantity="points", lines=np.arange(60)), THROW)
+
+
+def test_every_door_gives_the_same_numbers(tmp_path, poor, capsys):
+    path = written(tmp_path / "film.txt", poor[0])
+    throw = tmp_path / "throw.toml"
+    throw.write_text(THROW.to_toml(), encoding="utf-8")
+    tracks, known = ["--cap", "cap", "--base", "base", "--length-unit", "m"], ["--scenario", str(throw)]
+    out = tmp_path / "track"
+    assert main(["track", str(path), *tracks, *known, "--out", str(out)]) == 0
+    assert main(["fit", str(path), *tracks, *known]) == 0
+    assert main(["fit", str(out / "track.csv"), *known]) == 0
+    numbers = [line for line in capsys.readouterr().out.splitlines() if line.startswith("  ")]
+    third = len(numbers) // 3
+    assert numbers[:third] == numbers[third : 2 * third] == numbers[2 * third :]
+    film = read_film([out / "track.csv"])
+    assert film.values == pytest.approx(np.array([poor[0].cap, poor[0].base]), abs=1e-12, nan_ok=True)
+    names = {path.name for path in out.iterdir()}
+    assert {"track.csv", "summary.json", "index.html", "film.svg", "allowed.png", "fit.txt"} <= names
+    header = next(line for line in (out / "track.csv").read_text().splitlines() if not line.startswith("#"))
+    assert header.split(",") == list(SCHEMA)
+    assert set(read_curve(out / "track.csv").series) == {"theta", "omega"}
+    measured = hold(read_measured(out / "track.csv"), THROW)
+    best = next(fit for fit in measured.fits if fit.estimate.solver == "free-flight").estimate
+    assert best.best["gamma"] == pytest.approx(poor[1].estimate.best["gamma"], rel=1e-6)
+    assert measured.fits[0].estimate.solver == "free-flight"
+    assert len(list(measured.findings())) == 3
+
+
+def test_films_of_one_bottle_share_drag_and_restitution():
+    judged = [Judged(estimate(film_of(clip(seed, fps=30)), THROW)) for seed in (11, 12, 13)]
+    draws, words = together(judged)
+    assert words == "the films agree"
+    low, high = shortest(draws["gamma"], 0.999)
+    assert low <= 6.0 <= high
+    assert high - low < min(np.subtract(*shortest(one.estimate.draws["gamma"], 0.999)[::-1]) for one in judged)
+
+
+def test_a_spoiled_film_is_estimated_or_refused():
+    """Cells of a film changed at random: an estimate, or one line; benchmarks/films.py does it 700 times."""
+    for seed in range(4):
+        made = clip(20 + seed, fps=30)
+        film = film_simulator.spoiled(np.random.default_rng(seed), film_of(made))
+        message, draws = "", {}
+        try:
+            judged = Judged(estimate(film, THROW))
+            judged.check()
+            draws = judged.estimate.draws
+        except ValueError as error:  # NoFlightError and UnsoundError are
+            message = str(error)
+        assert bool(message) != bool(draws)
+        assert "\n" not in message
+        assert all(np.isfinite(values).all() for values in draws.values())
