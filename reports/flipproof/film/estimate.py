@@ -89,7 +89,12 @@ class Estimate:
 
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
         """Return the shortest interval that holds a parameter with this probability."""
-        return shortest(self.draws[name], level)
+        if name != "gamma":
+            return shortest(self.draws[name], level)
+        # In the coordinate in which all values are equally likely beforehand.
+        scale = SCALE * abs(self.best["omega0"])
+        low, high = shortest(np.arcsinh(self.draws[name] / scale), level)
+        return scale * math.sinh(low), scale * math.sinh(high)
 
     @property
     def flying(self) -> NDArray[np.bool_]:
@@ -147,7 +152,6 @@ def estimate(
 
     likelihood, x = _start(film, known, held)
     span = likelihood.touch - x[0]
-    likelihood = near_flight(likelihood, float(x[0]))
     equation = Equation(solver, known, float(np.clip(1.4 * abs(x[2]) * span + 0.5, 2.0, 60.0)), likelihood.two, count)
     likelihood, nodes, curves, fits, cell = _grid(likelihood, equation, x, seconds)
     levels = np.array([fit.evidence for fit in fits])
@@ -167,9 +171,9 @@ def estimate(
     )  # fmt: skip
 
 
-def near_flight(likelihood: Likelihood, release: float) -> Likelihood:
-    """Return the likelihood of the frames in flight and those just before and after it, which say when it is."""
-    film, margin = likelihood.film, 0.08
+def near_flight(film: Film, likelihood: Likelihood, release: float) -> Likelihood:
+    """Return the likelihood of a film's frames in flight and of those before and after it, which say when it is."""
+    margin = 0.15
     near = (film.t >= release - margin) & (film.t <= likelihood.touch + margin)
     part = replace(film, t=film.t[near], values=film.values[:, near], lines=film.lines[near])
     return Likelihood(part, likelihood.held, likelihood.touch, likelihood.noise, likelihood.speed)
@@ -185,12 +189,13 @@ def _grid(
     low, high = np.zeros(2), np.array([np.arcsinh(MAX_RATE / SCALE), 1.0])
     seeds, nearest = np.array([[np.nan, np.nan]]), [x]
     shape = COARSE
-    began = time.perf_counter()
+    film, began = likelihood.film, time.perf_counter()
     for _ in range(9):
         cell = (high - low) / shape
         axes = [low[k] + cell[k] * (np.arange(shape[k]) + 0.5) for k in range(2)]
         nodes = np.array(list(product(*axes)))
         x = nearest[0]
+        likelihood = near_flight(film, likelihood, float(x[0]))
         tilt = float(np.arctan2(x[7], -x[8])) if likelihood.two else 0.0
         rates = np.column_stack((SCALE * np.sinh(nodes[:, 0]), nodes[:, 1]))
         flown = equation.curves(rates, float(x[2]), float(x[1]) - tilt)
@@ -355,7 +360,9 @@ def _start(film: Film, throw: Scenario, held: Held) -> tuple[Likelihood, FloatAr
         raise NoFlightError(f"{film.label}: cap and base were clicked together in {len(known)} frames; 8 are needed")
     step = float(np.median(np.diff(t)))
     equation = Equation("free-flight", throw, 30.0)
-    curves = [curve for curve in equation.curves(np.array([(0.05, 0.4), (0.3, 0.4), (1.0, 0.4)]), 20.0, 0.0) if curve]
+    rates = np.array(list(product((0.02, 0.1, 0.3, 1.0), (0.2, 0.5, 0.8))))
+    every = [curve for curve in equation.curves(rates, 20.0, 0.0) if curve]
+    curves = every[1::3]
     apart = np.hypot(*(film.values[1] - film.values[0]).T)
     length = float(np.nanmedian(apart))
     angle, times = theta[known], t[known]
@@ -375,21 +382,34 @@ def _start(film: Film, throw: Scenario, held: Held) -> tuple[Likelihood, FloatAr
                     found.append((float(near[:stays].sum()), curve, float(end), np.array([t[k], start, omega])))
     found.sort(key=lambda one: -one[0])
     most = found[0][0] if found else 0.0
-    best: tuple[float, Likelihood, FloatArray] | None = None
-    for _, curve, end, spin in [one for one in found if one[0] > 0.4 * most][:: max(1, len(found) // 60)]:
+    tried: list[tuple[float, Likelihood, FloatArray]] = []
+    for _, curve, end, spin in [one for one in found if one[0] > 0.4 * most][:: max(1, len(found) // 40)]:
         x, noise = _placed(film, curve, spin, end, length)
         likelihood = Likelihood(film, held, end if held.touch is None else held.touch, max(noise, 1e-5))
-        fit = likelihood.fitted(curve, x, 8)
-        likelihood = settle(likelihood, curve, fit.x)
-        fit = likelihood.fitted(curve, fit.x, 8)
-        if best is None or fit.cost < best[0]:
-            best = fit.cost, likelihood, fit.x
+        tried.append(_better(likelihood, curve, x))
+    # The turning late in a flight looks like one of its own: releases far apart are tried with every curve.
+    tried.sort(key=lambda one: one[0])
+    apart_by: list[tuple[float, Likelihood, FloatArray]] = []
+    for one in tried:
+        if len(apart_by) < 4 and all(abs(one[2][0] - other[2][0]) > 0.04 for other in apart_by):
+            apart_by.append(one)
+    best = min(
+        (_better(one[1], curve, one[2]) for one in apart_by for curve in every), key=lambda one: one[0], default=None
+    )
     if best is None:
         raise NoFlightError(
             f"{film.label}: no stretch of the film is free flight; check that y points up and that cap and base are "
             "not exchanged, or give --release and --landing"
         )
     return best[1], best[2]
+
+
+def _better(likelihood: Likelihood, curve: Curve, x: FloatArray) -> tuple[float, Likelihood, FloatArray]:
+    """Return cost, likelihood and parameters after some steps, the touch settled among them."""
+    fit = likelihood.fitted(curve, x, 8)
+    likelihood = settle(likelihood, curve, fit.x)
+    fit = likelihood.fitted(curve, fit.x, 8)
+    return fit.cost, likelihood, fit.x
 
 
 def _rates(t: FloatArray, angle: FloatArray, window: int) -> list[float]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import gaussian_kde, norm
 
-from flipproof.film.estimate import DRAWS, MAX_RATE, UNITS, Estimate, shortest, third_differences
+from flipproof.film.estimate import DRAWS, MAX_RATE, SCALE, UNITS, Estimate, shortest, third_differences
 from flipproof.film.likelihood import GRAVITY
 from slicemodel.trajectory import FloatArray
 
@@ -119,9 +119,11 @@ class Judged:
                 return "cannot tell"
             return "bounded above" if low < 0.02 else "bounded below" if high > 0.98 else "told"
         if name == "gamma":
-            most = MAX_RATE * abs(self.estimate.best["omega0"])
-            if high > 0.9 * most:
-                return "cannot tell" if low < 0.1 * most else "bounded below"
+            scale = SCALE * abs(self.estimate.best["omega0"])
+            if math.asinh(high / scale) - math.asinh(low / scale) > 0.6 * math.asinh(MAX_RATE / SCALE):
+                return "cannot tell"
+            if high > 0.9 * MAX_RATE / SCALE * scale:
+                return "bounded below"
             return "bounded above" if low < 0.02 * high else "told"
         return "told"
 
