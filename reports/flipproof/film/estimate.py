@@ -150,9 +150,10 @@ def estimate(
         made += flights
         tick(flights)
 
-    likelihood, x = _start(film, known, held)
-    span = likelihood.touch - x[0]
-    equation = Equation(solver, known, float(np.clip(1.4 * abs(x[2]) * span + 0.5, 2.0, 60.0)), likelihood.two, count)
+    starts = _start(film, known, held)
+    reach = max(1.4 * abs(x[2]) * (likelihood.touch - x[0]) for likelihood, x in starts) + 0.5
+    equation = Equation(solver, known, float(np.clip(reach, 2.0, 60.0)), film.quantity == "points", count)
+    likelihood, x = starts[0] if len(starts) == 1 else _chosen(starts, equation)
     likelihood, nodes, curves, fits, cell = _grid(likelihood, equation, x, seconds)
     levels = np.array([fit.evidence for fit in fits])
     best = int(np.argmax(levels))
@@ -237,6 +238,26 @@ def _grid(
         if np.prod((high - low) / wide) > 0.4:
             shape = FINE
     return likelihood, nodes, curves, fits, (float(cell[0]), float(cell[1]))
+
+
+def _chosen(starts: list[tuple[Likelihood, FloatArray]], equation: Equation) -> tuple[Likelihood, FloatArray]:
+    """Return the start that a coarse grid explains best, and where that ends."""
+    axes = [(np.arange(n) + 0.5) / n for n in COARSE]
+    rates = np.array([(SCALE * np.sinh(a * np.arcsinh(MAX_RATE / SCALE)), e) for a, e in product(*axes)])
+    best: tuple[float, Likelihood, FloatArray] | None = None
+    flown: list[Curve | None] = []
+    for start, x in starts:
+        if not flown or equation.weighted:
+            flown = equation.curves(rates, float(x[2]), float(x[1]))
+        pairs = [(curve, start.fitted(curve, x, 15)) for curve in flown if curve is not None]
+        for curve, fit in sorted(pairs, key=lambda pair: pair[1].cost)[:4]:
+            likelihood = settle(start, curve, fit.x)
+            for _ in range(2):
+                again = likelihood.fitted(curve, fit.x)
+                likelihood = settle(likelihood, curve, again.x)
+            if best is None or again.cost < best[0]:
+                best = again.cost, likelihood, again.x
+    return starts[0] if best is None else best[1:]
 
 
 def _descent(
@@ -346,14 +367,14 @@ def settle(likelihood: Likelihood, curve: Curve, x: FloatArray) -> Likelihood:
 # ---------------------------------------------------------------------- the start
 
 
-def _start(film: Film, throw: Scenario, held: Held) -> tuple[Likelihood, FloatArray]:
-    """Return a likelihood with a first guess of the touch, and a first guess of the inner parameters.
+def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[Likelihood, FloatArray]]:
+    """Return first guesses, the likeliest first: a likelihood with a touch, and the inner parameters.
 
     Every frame may be the release: the turning that follows is held against free flight with little, some and much
-    drag, and the one that stays with it, and with a parabola, for longest is taken.
+    drag, and those that stay with it, and with a parabola, are taken.
     """
     if film.quantity != "points":
-        return _start_table(film, held)
+        return [_start_table(film, held)]
     theta, t = film.angle, film.t
     known = np.flatnonzero(~np.isnan(theta))
     if len(known) < 8:
@@ -393,15 +414,15 @@ def _start(film: Film, throw: Scenario, held: Held) -> tuple[Likelihood, FloatAr
     for one in tried:
         if len(apart_by) < 4 and all(abs(one[2][0] - other[2][0]) > 0.04 for other in apart_by):
             apart_by.append(one)
-    best = min(
-        (_better(one[1], curve, one[2]) for one in apart_by for curve in every), key=lambda one: one[0], default=None
-    )
-    if best is None:
+    if not apart_by:
         raise NoFlightError(
             f"{film.label}: no stretch of the film is free flight; check that y points up and that cap and base are "
             "not exchanged, or give --release and --landing"
         )
-    return best[1], best[2]
+    polished = [
+        min((_better(one[1], curve, one[2]) for curve in every), key=lambda other: other[0]) for one in apart_by
+    ]
+    return [(one[1], one[2]) for one in sorted(polished, key=lambda one: one[0])]
 
 
 def _better(likelihood: Likelihood, curve: Curve, x: FloatArray) -> tuple[float, Likelihood, FloatArray]:
