@@ -53,10 +53,12 @@ def drawn(rng: np.random.Generator, cell: dict[str, Any], slices: int) -> film_s
     return film_simulator.film(rng, slices=slices, **cell, **truth)
 
 
-def coverage(films: int, first: int, slices: int) -> None:
+def coverage(films: int, first: int, slices: int, only: list[int]) -> None:
     """Print for every cell how many intervals hold the truth, and their median width."""
     total = Counter[str]()
     for index, cell in enumerate(cells()):
+        if only and cell["fps"] not in only:
+            continue
         held, refused = Counter[str](), 0
         widths: dict[str, list[float]] = {name: [] for name in NAMES}
         began = time.process_time()
@@ -113,8 +115,9 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name, default in (("films", 20), ("first", 0), ("slices", 6), ("spoiled", 0), ("noise", 0)):
         parser.add_argument(f"--{name}", type=int, default=default)
+    parser.add_argument("--fps", type=int, nargs="*", default=[], help="cells of these frame rates alone")
     options = parser.parse_args()
     if options.spoiled or options.noise:
         rough(options.spoiled, options.noise, options.slices)
     else:
-        coverage(options.films, options.first, options.slices)
+        coverage(options.films, options.first, options.slices, options.fps)

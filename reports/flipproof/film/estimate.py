@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from flipproof.film.curves import SLICES, Curve, Equation
-from flipproof.film.likelihood import TOUCH, Film, Fit, Held, Likelihood
+from flipproof.film.likelihood import HAND, TOUCH, Film, Fit, Held, Likelihood
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
@@ -336,7 +336,9 @@ def _touches(likelihood: Likelihood, curve: Curve, x: FloatArray) -> tuple[Float
     speed = min(rough, key=lambda one: float(rough[one].min()))
     near = frames[int(np.argmin(rough[speed]))]
     times = np.minimum(near + step * np.arange(-32, 33) / 16, film.t[-1] + step)
-    return times, likelihood.touches(curve, x, times, speed), speed
+    # How fast the table takes the velocity, and since when, look alike.
+    costs = [likelihood.touches(curve, x, times, one) for one in TOUCH]
+    return times, -np.asarray(np.logaddexp.reduce(-np.array(costs), axis=0)), speed
 
 
 def _at_table(likelihood: Likelihood, curve: Curve, x: FloatArray, height: float) -> float:
@@ -455,7 +457,7 @@ def _placed(film: Film, curve: Curve, spin: FloatArray, end: float, length: floa
     """Return all inner parameters for a given spin, the place by a robust linear fit up to ``end``, and the noise."""
     inside = (film.t >= spin[0] - 1e-9) & (film.t <= end + 1e-9)
     part = replace(film, t=film.t[inside], values=film.values[:, inside], lines=film.lines[inside])
-    x = np.array([*spin, 0.0, 0.0, 0.0, 0.0, 0.0, -9.81, length, np.log(0.002), np.log(40.0)])
+    x = np.array([*spin, 0.0, 0.0, 0.0, 0.0, 0.0, -9.81, length, 0.0, 0.0, 0.0, np.log(0.002), np.log(HAND[0])])
     likelihood = Likelihood(part, Held(), end, 0.002)
     values, slopes = likelihood.model(curve, x)
     seen = np.repeat(part.clicked[:, :, None], 2, axis=2).ravel()
@@ -470,7 +472,7 @@ def _placed(film: Film, curve: Curve, spin: FloatArray, end: float, length: floa
         weight = 1.0 / np.sqrt(1.0 + (left / (3 * noise)) ** 2)
     x[3:10] += move
     x[9] = length
-    x[10] = np.log(noise)
+    x[13] = np.log(noise)
     return x, noise
 
 

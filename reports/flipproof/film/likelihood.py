@@ -4,10 +4,10 @@
     base(t) = cap(t) + l u                             R = r_CM / L and theta by the equation (``curves``)
 
 Every click of two coordinates misses by a normal deviate of variance v, but for a share of bad clicks, which may lie
-anywhere in the picture. In flight v = sigma^2. Before the release a hand pulls with an acceleration of size A that
-nobody knows, and after the touch the table takes the velocity:
+anywhere in the picture. In flight v = sigma^2. Before the release a hand adds accelerations of C_M and of theta that
+nobody knows, which are fitted, and which change at a rate of size A, and after the touch the table takes the velocity:
 
-    v = sigma^2 + (A tau^2/2)^2  before,     v = sigma^2 + (V (t - t_d))^2  after,  never beyond the picture.
+    v = sigma^2 + (A tau^3/6)^2  before,     v = sigma^2 + (V (t - t_d))^2  after,  never beyond the picture.
 
 So frames in the hand and on the table count for nothing but for this: release and touch do not jump. A table of theta
 or omega alone has rows of one coordinate, no hand and no table.
@@ -30,15 +30,21 @@ GRAVITY: Final = 9.81
 BAD: Final = 0.01
 """Share of clicks that may lie anywhere."""
 
-HAND: Final = (40.0, 1.0)
-"""Acceleration of a hand less gravity [m/s^2], and the standard deviation of its logarithm."""
+HAND: Final = (500.0, 1.5)
+"""Rate at which the acceleration of a hand changes [m/s^3], and the standard deviation of its logarithm."""
+
+PULL: Final = (60.0, 60.0, 300.0)
+"""Standard deviations of a hand's accelerations less those of flight: of C_M [m/s^2], twice, and of theta [rad/s^2]."""
 
 TOUCH: Final = (1.0, 3.0, 10.0)
 """Velocities that a table may take [m/s]; the likeliest is used."""
 
 Quantity = Literal["points", "theta", "omega"]
 
-POINTS: Final = ("release", "theta0", "omega0", "x0", "y0", "vx", "vy", "ax", "ay", "length", "log_noise", "log_hand")
+POINTS: Final = (
+    "release", "theta0", "omega0", "x0", "y0", "vx", "vy", "ax", "ay", "length", "pull_x", "pull_y", "twist",
+    "log_noise", "log_hand",
+)  # fmt: skip
 SPIN: Final = ("release", "theta0", "omega0", "log_noise")
 """Inner parameters of points and of a table of theta or omega; gamma / |omega_0| and e are the outer ones."""
 
@@ -138,7 +144,7 @@ class Likelihood:
         self.two = film.values.shape[2] == 2
         self.index = {name: k for k, name in enumerate(film.names)}
         fixed = [held.release is not None, self.two and held.tilt, self.two and held.scale]
-        self.degrees = (10 if self.two else 3) - sum(fixed)
+        self.degrees = (13 if self.two else 3) - sum(fixed)
 
     # ------------------------------------------------------------------ the model
 
@@ -162,20 +168,26 @@ class Likelihood:
             bend = np.gradient(omega, film.t) if len(tau) > 1 else np.zeros_like(omega)
             slopes[0, :, 0, 0], slopes[0, :, 0, 2] = -bend, w + bend * tau / omega0
             return omega[None, :, None], slopes
+        held = 0.5 * np.minimum(tau, 0.0) ** 2
+        change = np.minimum(tau, 0.0)
+        theta = theta + x[12] * held
+        turn[0] -= x[12] * change
         u = np.column_stack((np.sin(theta), -np.cos(theta)))
         across = np.column_stack((np.cos(theta), np.sin(theta)))
         p, v, a, length = x[3:5], x[5:7], x[7:9], x[9]
-        centre = p + np.outer(tau, v) + 0.5 * np.outer(tau**2, a)
+        centre = p + np.outer(tau, v) + 0.5 * np.outer(tau**2, a) + np.outer(held, x[10:12])
         values = np.array([centre - (length * r)[:, None] * u, centre + (length * (1 - r))[:, None] * u])
         slopes = np.zeros((2, len(tau), 2, len(n)))
         for body, along in enumerate((-r, 1 - r)):
             slope = slopes[body]
             for k in range(3):
                 slope[:, :, k] = length * ((along * turn[k])[:, None] * across - slide[k][:, None] * u)
-            slope[:, :, 0] -= v + np.outer(tau, a)
+            slope[:, :, 0] -= v + np.outer(tau, a) + np.outer(change, x[10:12])
             for d in range(2):
                 slope[:, d, 3 + d], slope[:, d, 5 + d], slope[:, d, 7 + d] = 1.0, tau, 0.5 * tau**2
+                slope[:, d, 10 + d] = held
             slope[:, :, 9] = along[:, None] * u
+            slope[:, :, 12] = length * (along * held)[:, None] * across
         return values, slopes
 
     def variance(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -188,11 +200,11 @@ class Likelihood:
             return np.full(len(t), sigma), slopes
         most = self.area / (2 * np.pi)
         before, hand = np.minimum(t - x[0], 0.0), np.exp(x[n["log_hand"]])
-        pulled, taken = (0.5 * hand * before**2) ** 2, (self.speed * np.maximum(t - self.touch, 0.0)) ** 2
+        pulled, taken = (hand * before**3 / 6) ** 2, (self.speed * np.maximum(t - self.touch, 0.0)) ** 2
         added = pulled + taken
         free = most / (most + added)
         # What exceeds the picture levels off there.
-        slopes[:, 0] = -(hand**2) * before**3 * free**2
+        slopes[:, 0] = -(hand**2) * before**5 / 6 * free**2
         slopes[:, n["log_hand"]] = 2 * pulled * free**2
         return sigma + added * free, slopes
 
@@ -231,11 +243,11 @@ class Likelihood:
 
     def penalty(self, x: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Return cost, gradient and curvature of priors: what is held, and weak ones that keep parameters in reach."""
-        n, held, size = self.index, self.held, len(x)
+        n, held, count = self.index, self.held, len(x)
         rows: list[tuple[float, FloatArray]] = []
 
         def prior(name: str, value: float, deviation: float) -> None:
-            row = np.zeros(size)
+            row = np.zeros(count)
             row[n[name]] = 1.0 / deviation
             rows.append(((x[n[name]] - value) / deviation, row))
 
@@ -248,12 +260,14 @@ class Likelihood:
             prior("log_noise", float(np.log(self.noise)), 3.0)
         if self.two:
             prior("log_hand", float(np.log(HAND[0])), HAND[1])
+            for name, size in zip(("pull_x", "pull_y", "twist"), PULL, strict=True):
+                prior(name, 0.0, size)
             if held.tilt:
                 prior("ax", 0.0, tight)
             if held.scale:
                 a = x[7:9]
                 down = float(np.hypot(*a))
-                row = np.zeros(size)
+                row = np.zeros(count)
                 row[7:9] = a / down / tight
                 rows.append(((down - GRAVITY) / tight, row))
         elif self.film.quantity == "omega":

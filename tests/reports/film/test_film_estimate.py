@@ -48,7 +48,7 @@ def test_the_slope_of_every_value_is_that_of_the_model(poor):
     one = poor[1].estimate
     x = one.fit.x + 1e-3
     _, slopes = one.likelihood.model(one.curve, x)
-    for k in range(10):
+    for k in range(13):
         step = np.zeros(len(x))
         step[k] = 1e-5
         up, down = (one.likelihood.model(one.curve, x + sign * step)[0] for sign in (1, -1))
