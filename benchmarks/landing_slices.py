@@ -52,9 +52,9 @@ def main() -> int:
 
 def _landings(case: Case, count: int = 100) -> str:
     """Return how many landings a second are made of touches that are there."""
-    design = Throws(cases=(replace(case, throws=count),), seed=Size().seed, text="")
+    design = Throws(cases=(replace(case, throws=count),), seed=Size().seed)
     table = Table(height=case.aim.height, restitution=case.restitution, friction=case.friction)
-    touches = [ode_reference.fly(design.point(k).scenario(), table) for k in range(count)]
+    touches = [ode_reference.fly(design.thrown(design.cases[0], k), table) for k in range(count)]
     rates = []
     for slices in ("exclude", "staggered"):
         ode_reference.land(touches[0], table, slices=slices)

@@ -1,11 +1,12 @@
 """Measure what a sweep adds to its solver: processor time of a point beyond ``ode_reference.solve_batch``.
 
-    python benchmarks/sweep_cost.py                      20 000 points of eq8, N = 20
+    python benchmarks/sweep_cost.py                      20 000 points of eq8, N = 5
+    python benchmarks/sweep_cost.py --points 200000 --turns 1
 
 The points go through the whole loop of a sweep: design, batches, pickles there and back, rows, checksums, commits.
 The worker is this process, so that no start of a process and no import is counted; points, batches and answers are
 pickled as for a worker. The solver's own time is measured inside, call by call.
-One line is printed for each of three turns.
+One line is printed for each turn.
 """
 
 from __future__ import annotations
@@ -20,14 +21,13 @@ from pathlib import Path
 from typing import Any
 
 import ode_reference
+from flipproof.frame.store import Store
 from flipproof.sweep.design import read_design
-from flipproof.sweep.run import Workers, run_sweep
-from flipproof.sweep.store import Store
-from flipproof.sweep.work import code_identity
+from flipproof.sweep.loop import fill
 
 DESIGN = """\
 [scenario]
-n_slices = 20
+n_slices = 5
 
 [sweep]
 design = "latin-hypercube"
@@ -73,19 +73,20 @@ def main() -> None:
     """Sweep and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--points", type=int, default=20_000)
+    parser.add_argument("--turns", type=int, default=3)
     options = parser.parse_args()
     solve = ode_reference.solve_batch
-    for points in (128, *[options.points] * 3):
+    for points in (128, *[options.points] * options.turns):
         with tempfile.TemporaryDirectory() as scratch:
             Path(scratch, "sweep.toml").write_text(DESIGN.format(samples=points), encoding="utf-8")
             spent: list[float] = []
             ode_reference.solve_batch = timed(solve, spent)
             design = read_design(Path(scratch, "sweep.toml"))
-            with Store(Path(scratch, "out"), design, code_identity()) as store:
+            with Store(Path(scratch, "sweep.sqlite")) as store:
                 began = time.process_time()
-                run_sweep(store, Workers(executor=Here(), capacity=lambda: 2, died=()), lambda *_: None)
+                fill(store, design.points(), Here(), 2)
                 whole = time.process_time() - began
-                size = store.file.stat().st_size
+            size = Path(scratch, "sweep.sqlite").stat().st_size
         if points == options.points:
             own, each = sum(spent) / points * 1e6, whole / points * 1e6
             print(f"{points} points: {each:.0f} us of processor time each, {own:.0f} in solve_batch, ", end="")

@@ -8,7 +8,6 @@ from contextlib import nullcontext
 from dataclasses import replace
 
 import pytest
-from distributed import LocalCluster
 from made_up import command
 from matplotlib.collections import QuadMesh
 
@@ -36,9 +35,9 @@ from flipproof.frame.run_store import RunStore
 from flipproof.landing.design import Case, Scatter, Share, Throws, aimed, correlation, make_cases, scattered, wilson
 from flipproof.landing.throw import land_throw, told
 from flipproof.landing.upright import make_upright
-from flipproof.landing.work import LANDING, Landed, flown, make_landing, saddle, touch_readings
+from flipproof.landing.work import Landed, flown, make_landing, saddle, touch_readings
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.run import Workers
+from flipproof.sweep.work import keyed
 from ode_reference import fly, land
 from ode_reference.landing_forms import Block
 from slicemodel import Scenario, Table
@@ -60,7 +59,7 @@ SMALL = Size(
 )
 
 
-def quiet(_there, _size):
+def quiet(_size):
     return lambda _points, _without: None
 
 
@@ -194,25 +193,27 @@ def test_throws_that_are_no_pairs_are_independent_samples():
 def design():
     aim = aimed(filled(THROW, 0.5, 4, False), "B")
     cases = (Case(aim=aim, law="together", throws=3), Case(aim=aim, law="in-turn", throws=2, restitution=0.5))
-    return Throws(cases=cases, seed=7, text="a test")
+    return Throws(cases=cases, seed=7)
 
 
-def test_points_are_numbered_case_by_case(design):
-    assert design.size == 5
-    assert design.lines == (range(5),)
-    assert [design.point(k).values for k in range(5)] == [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1)]
-    assert design.point(0).throw == design.point(3).throw  # the same thrower under another law
-    assert design.point(4).settings["restitution"] == 0.5
-    assert len({design.point(k).key("code") for k in range(5)}) == 5
-    engine = replace(design.cases[0], program="mujoco")
-    assert replace(design, cases=(*design.cases, engine)).lines == (range(5), range(5, 8))
+def made(design, number, **changes):
+    """Return the row of the point of that number, with other settings if any are given."""
+    point = list(design.points())[number]
+    return make_landing(point.solver, {**point.settings, **changes}, point.throw)
+
+
+def test_points_come_case_by_case(design):
+    points = list(design.points())
+    assert design.size == len(points) == 5
+    assert points[0].throw == points[3].throw  # the same thrower under another law
+    assert points[4].settings["restitution"] == 0.5
+    assert len({key for key, *_ in keyed(points, "code")}) == 5
 
 
 def test_a_row_is_its_flight_and_its_landing(design):
-    point = design.point(1)
-    row = make_landing(point)
-    table = Table(height=point.settings["height"])
-    touch = fly(point.scenario(), table)
+    row, case = made(design, 1), design.cases[0]
+    table = Table(height=case.aim.height)
+    touch = fly(design.thrown(case, 1), table)
     outcome = land(touch, table, "together")
     assert (row.outcome, row.certified, row.margin, row.slid, row.bounces) == (
         outcome.outcome, outcome.certified, outcome.margin, outcome.slid, outcome.bounces
@@ -249,8 +250,7 @@ def test_energy_at_the_touch_is_that_of_the_throw():
     ],
 )
 def test_a_row_that_cannot_be_has_a_status_and_a_reason(design, changes, status, words):
-    point = design.point(0)
-    row = make_landing(replace(point, settings={**point.settings, **changes}))
+    row = made(design, 0, **changes)
     assert (row.status, row.outcome) == (status, None)
     assert words in row.reason
     assert row.whole is (status == "missed")
@@ -260,12 +260,11 @@ def test_a_row_that_cannot_be_has_a_status_and_a_reason(design, changes, status,
 def test_a_flight_that_was_kept_is_the_flight(design):
     """Laws and tables share it: the same row, whether the flight was just made or is there from another landing."""
     flown.cache_clear()
-    alone = [make_landing(design.point(k)) for k in (0, 3)]
+    alone = {k: made(design, k) for k in (0, 3)}
     assert flown.cache_info().misses == flown.cache_info().hits == 1
-    for row in alone:
+    for k, row in alone.items():
         flown.cache_clear()
-        again = make_landing(design.point(row.number))
-        assert replace(again, seconds=0.0) == replace(row, seconds=0.0)
+        assert made(design, k) == row
 
 
 # ---------------------------------------------------------------------- the study
@@ -378,8 +377,8 @@ def test_the_claim_of_the_bounces_is_judged_by_its_interval(found, of_ice, verdi
 
 def test_the_interval_of_the_mean_bounces_is_that_of_a_mean():
     aim = standing(THROW)
-    rows = [Landed(number=k, status="ok", outcome="lying", bounces=k) for k in (1, 2, 3)]
-    missed = Landed(number=4, status="missed")
+    rows = [Landed(status="ok", outcome="lying", bounces=k) for k in (1, 2, 3)]
+    missed = Landed(status="missed")
     cell = cell_of(aim, [*rows, missed])
     assert (cell.bounces, cell.missed, cell.stood) == (2.0, 1, (False,) * 4)
     assert cell.bounces_band == pytest.approx(1.96 / math.sqrt(3), rel=1e-4, abs=0)
@@ -421,8 +420,7 @@ def swept(tmp_path_factory):
 @pytest.fixture
 def copied(swept, tmp_path, monkeypatch):
     """Return a copy of that study, to be gone on with in this process and without figures, which are drawn there."""
-    here = Workers(executor=Here(), capacity=lambda: 1, died=())
-    monkeypatch.setattr("flipproof.sweep.command.local_workers", lambda _: nullcontext(here))
+    monkeypatch.setattr("flipproof.sweep.command.processes", lambda _: nullcontext(Here()))
     monkeypatch.setattr("flipproof.landing.upright.figures", lambda _: ())
     return shutil.copytree(swept[0], tmp_path / "study")
 
@@ -439,27 +437,17 @@ def test_the_sweep_goes_on(found, copied):
     out = copied
     file = out / "throws" / "sweep.sqlite"
     with sqlite3.connect(file) as rows:
-        rows.execute("DELETE FROM points WHERE number % 3 = 0")
+        rows.execute("DELETE FROM made WHERE rowid % 3 = 0")
     rows.close()
     (out / "upright.csv").unlink()
     make_upright(THROW, SMALL, out, quiet, lambda _: None, jobs=1)
     assert (out / "upright.csv").read_text(encoding="utf-8") == shares_csv(found)
-    with pytest.raises(SweepError, match="holds another design"):
-        make_upright(THROW, replace(SMALL, seed=2), out, quiet, lambda _: None, jobs=1)
-    with sqlite3.connect(file) as rows:
-        names = [row[1] for row in rows.execute("PRAGMA table_info(points)")]
-        outcomes = {row[0] for row in rows.execute("SELECT outcome FROM points")}
-    rows.close()
-    assert set(LANDING) <= set(names)
-    assert outcomes <= {"upright", "lying", "cap", "undecided", None}
 
 
-def test_workers_of_a_scheduler_make_the_same(found, tmp_path, monkeypatch):
+def test_workers_of_an_executor_make_the_same(found, tmp_path, monkeypatch):
     monkeypatch.setattr("flipproof.landing.upright.figures", lambda _: ())
-    with LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0", silence_logs=50
-    ) as cluster:
-        make_upright(THROW, SMALL, tmp_path / "study", quiet, lambda _: None, dask=cluster.scheduler_address)
+    spec = "concurrent.futures:ThreadPoolExecutor"
+    make_upright(THROW, SMALL, tmp_path / "study", quiet, lambda _: None, executor=spec)
     assert (tmp_path / "study" / "upright.csv").read_text(encoding="utf-8") == shares_csv(found)
 
 
@@ -550,7 +538,7 @@ def test_an_outcome_that_no_program_certifies_is_told_with_its_reason():
         (["upright", "--out", "x", "--scatter", "1e-18,0,0"], "the largest at least 1e-6"),
         (["upright", "--out", "x", "--restitution", "2"], "table.restitution = 2.0 is outside [0, 1]"),
         (["upright", "--out", "x", "--map", "1x5"], "is not COLUMNSxROWS"),
-        (["upright", "--out", "x", "--dask", "nonsense"], "is not tcp://HOST:PORT"),
+        (["upright", "--out", "x", "--executor", "nonsense"], "is not MODULE:FACTORY"),
     ],
 )
 def test_bad_input_is_one_line_that_names_it(arguments, words, capsys, monkeypatch, tmp_path):

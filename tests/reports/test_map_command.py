@@ -7,7 +7,6 @@ import subprocess
 import sys
 import time
 from contextlib import closing, nullcontext
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,27 +14,28 @@ import pytest
 from made_up import command as run
 from made_up import study_map
 
-from flipproof.chapters.maps.study import CURVE, LADDER, RUNGS
+from flipproof.chapters.maps.study import CURVE, RUNGS
 from flipproof.chapters.waterfall.study import OBSERVABLES, observe, split_all
 from flipproof.figures.style import Drawing
 from flipproof.frame.pool import Here
 from flipproof.frame.solvers import make
+from flipproof.frame.store import Store
 from flipproof.sweep.design import design_of
 from flipproof.sweep.errors import SweepError
+from flipproof.sweep.loop import fill
 from flipproof.sweep.planned import (
     ENDS,
+    LANDS_AT,
+    READ_OFF,
     MapPlan,
-    design_of_runs,
     map_csv,
     map_facts,
     plan_split,
+    points_of,
     read_runs,
     split_rows,
     waterfall_csv,
 )
-from flipproof.sweep.run import Workers
-from flipproof.sweep.store import Store
-from flipproof.sweep.work import code_identity, make_batch
 from slicemodel import Scenario
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -43,24 +43,18 @@ THROW = Scenario(duration=0.3).with_slices(3)
 AXES = ("gamma", "step", "restitution")
 
 
-# In this process: a worker's start costs more than all of a small map.
-HERE = {"executor": Here(), "capacity": lambda: 1, "died": ()}
-
-
-def fill(store, numbers):
-    """Make some points of a store in this process, as a worker does."""
-    design = store.design
-    points = [design.point(number) for number in numbers]
-    store.add([make_batch(store.code, points, design.trajectories, design.curves)])
+@pytest.fixture
+def here(monkeypatch):
+    """Make every point in this process: a worker's start costs more than all of a small map."""
+    monkeypatch.setattr("flipproof.sweep.command.processes", lambda _: nullcontext(Here()))
 
 
 def by_hand(plan, out):
     """Fill a map's store in this process and return what it reads there."""
     runs = plan.runs()
-    design = design_of_runs(runs, plan.varied(), CURVE, "test")
-    with Store(out, design, code_identity()) as store:
-        fill(store, range(design.size))
-        return plan.study(read_runs(store, runs))
+    with Store(out) as store:
+        fill(store, points_of(runs, CURVE, READ_OFF), Here())
+        return plan.study(read_runs(store, runs, CURVE, READ_OFF))
 
 
 def same(one, other):
@@ -93,17 +87,6 @@ def test_a_throw_of_its_own_keeps_all_its_fields(tmp_path):
     same(by_hand(plan, tmp_path / "out"), study_map(throw, "gamma", plan.fills, plan.values, made, points=None))
 
 
-def test_a_step_map_runs_every_model_once_per_fill_and_joins_equal_grids():
-    plan = MapPlan.of_size(THROW, "step", 2, 3)
-    design = design_of_runs(plan.runs(), plan.varied(), CURVE, "test")
-    names = [entry.name for entry in design.entries]
-    assert [names.count(model) for model in LADDER[1:]] == [1] * len(RUNGS)
-    assert names.count("exact-step") == 3
-    crowded = MapPlan(throw=THROW, axis="step", fills=(0.5, 1.0), values=(0.1, 0.1000001))
-    design = design_of_runs(crowded.runs(), crowded.varied(), CURVE, "test")
-    assert [entry.name for entry in design.entries].count("exact-step") == 1
-
-
 def test_a_map_killed_midway_goes_on_to_the_rows_and_the_picture_of_an_undisturbed_one(tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     options = ["map", "--axis", "gamma", "--size", "5x4", "--slices", "3", "--jobs", "1"]
@@ -119,7 +102,7 @@ def test_a_map_killed_midway_goes_on_to_the_rows_and_the_picture_of_an_undisturb
     assert 0 < there < 20 * 42
     assert not (tmp_path / "killed" / "map.png").exists()
     with monkeypatch.context() as patch:
-        patch.setattr("flipproof.sweep.command.local_workers", lambda _: nullcontext(Workers(**HERE)))
+        patch.setattr("flipproof.sweep.command.processes", lambda _: nullcontext(Here()))
         status, out, _ = run(capsys, *options, "--out", tmp_path / "killed")
         assert status == 0
         assert f"; {there} were there\ncells by largest fair share: " in out
@@ -130,31 +113,29 @@ def test_a_map_killed_midway_goes_on_to_the_rows_and_the_picture_of_an_undisturb
 
 
 def stored(folder):
-    """Return all numbers of a folder's rows, in the order of the design."""
+    """Return all rows of a folder."""
     if not (folder / "sweep.sqlite").exists():
         return []
     with closing(sqlite3.connect(folder / "sweep.sqlite", timeout=10.0)) as connection:
         try:
-            return connection.execute(
-                "SELECT key, plateau, omega_end, theta_end, r_cm_end, curves FROM points ORDER BY number"
-            ).fetchall()
+            return connection.execute("SELECT key, asked, answer FROM made ORDER BY key").fetchall()
         except sqlite3.OperationalError:  # its tables are not there yet
             return []
 
 
+@pytest.mark.usefixtures("here")
 def test_a_finished_map_is_only_drawn_again(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("flipproof.sweep.command.local_workers", lambda _: nullcontext(Workers(**HERE)))
     options = ["map", "--axis", "restitution", "--size", "2x2", "--slices", "2", "--out", tmp_path / "out"]
     assert run(capsys, *options)[0] == 0
     drawn = (tmp_path / "out" / "map.svg").read_bytes()
     (tmp_path / "out" / "map.svg").unlink()
-    monkeypatch.setattr("flipproof.sweep.command.local_workers", None)
+    monkeypatch.setattr("flipproof.sweep.command.processes", lambda _: nullcontext(None))
     status, out, err = run(capsys, *options, "--export", tmp_path / "out" / "rows.csv")
     assert (status, err) == (0, "")
-    assert "; 172 were there" in out
+    assert "; 170 were there" in out
     assert (tmp_path / "out" / "map.svg").read_bytes() == drawn
     assert (tmp_path / "out" / "map.png").read_bytes().startswith(b"\x89PNG")
-    assert len((tmp_path / "out" / "rows.csv").read_text().splitlines()) == 173
+    assert len((tmp_path / "out" / "rows.csv").read_text().splitlines()) == 171
 
 
 def test_table_and_contours_say_what_the_map_holds(tmp_path):
@@ -180,8 +161,8 @@ def test_table_and_contours_say_what_the_map_holds(tmp_path):
         error = shown[contour["of"]]
         assert contour["cells above"] == (error >= contour["level"]).sum()
         for line in contour["lines"]:
-            for fill, value in line:
-                assert study.fills[0] <= fill <= study.fills[-1]
+            for filling, value in line:
+                assert study.fills[0] <= filling <= study.fills[-1]
                 assert study.values[0] <= value <= study.values[-1] * (1 + 1e-12)
     assert any(contour["lines"] for contour in facts["contours"])
 
@@ -189,14 +170,16 @@ def test_table_and_contours_say_what_the_map_holds(tmp_path):
 def test_a_run_that_is_not_whole_leaves_a_reason_in_its_cell(tmp_path):
     plan = MapPlan.of_size(THROW, "gamma", 2, 2)
     runs = plan.runs()
-    design = design_of_runs(runs, plan.varied(), CURVE, "test")
-    with Store(tmp_path / "out", design, code_identity()) as store:
-        fill(store, range(design.size))
-        eq8 = "UPDATE points SET plateau = NULL, curves = NULL, {} WHERE solver = 'eq8' AND fill_fraction = 0.05"
-        store.connection.execute(eq8.format("status = 'stalled', reason = 'stalled: it ends early'"))
-        program = eq8.replace("'eq8'", "'free-flight'").replace("0.05", "1.0")
-        store.connection.execute(program.format("status = 'failed', reason = 'MemoryError: too much'"))
-        study = plan.study(read_runs(store, runs))
+    with Store(tmp_path / "out") as store:
+        fill(store, points_of(runs, CURVE, READ_OFF), Here())
+        rows = read_runs(store, runs, CURVE, READ_OFF)
+    for made, row in rows.items():
+        lost = {"plateau": None, "omega": None}
+        if made.solver == "eq8" and made.scenario.water_mass == 0.05:
+            row.update(lost, status="stalled", reason="stalled: it ends early")
+        if made.solver == "free-flight" and made.scenario.water_mass == 1.0:
+            row.update(lost, status="failed", reason="MemoryError: too much")
+    study = plan.study(rows)
     assert (study.reason == ["eq8: stalled", "free-flight: MemoryError"]).all()
     assert (study.dominant == -1).all()
     assert np.isnan(study.level["eq8"][:, 0]).all()
@@ -205,32 +188,28 @@ def test_a_run_that_is_not_whole_leaves_a_reason_in_its_cell(tmp_path):
     assert json.dumps(map_facts(study, THROW), allow_nan=False)
 
 
-def test_a_plan_that_the_design_misses_is_noticed(tmp_path):
-    plan = MapPlan.of_size(THROW, "gamma", 2, 2)
-    other = MapPlan.of_size(THROW, "gamma", 2, 3)
-    design = design_of_runs(plan.runs(), plan.varied(), CURVE, "test")
-    with Store(tmp_path / "out", design, code_identity()) as store, pytest.raises(KeyError):
-        read_runs(store, other.runs())
+def test_a_run_that_the_store_lacks_is_noticed(tmp_path):
+    plan, other = (MapPlan.of_size(THROW, "gamma", 2, rows) for rows in (2, 3))
+    by_hand(plan, tmp_path / "out")
+    with Store(tmp_path / "out") as store, pytest.raises(KeyError):
+        read_runs(store, other.runs(), CURVE, READ_OFF)
 
 
 @pytest.fixture(scope="module")
 def split(tmp_path_factory):
-    """Return the throw of a waterfall, its runs, and a folder in which half of them were made twice over."""
-    throw = Scenario(duration=0.1).with_slices(2)
-    runs = plan_split(throw)
-    design = design_of_runs(runs, {"omega0": [throw.omega0]}, ENDS, "test")
-    out = tmp_path_factory.mktemp("split") / "out"
-    for part in (range(0, design.size, 2), range(1, design.size, 2)):
-        with Store(out, design, code_identity()) as store:
-            assert sum(store.done()) == part.start * len(range(0, design.size, 2))
-            fill(store, part)
-    return throw, runs, design, out
+    """Return the runs of a waterfall, and the rows of a store in which half of them were made twice over."""
+    runs = plan_split(Scenario(duration=0.1).with_slices(2))
+    file = tmp_path_factory.mktemp("split") / "sweep.sqlite"
+    for part in (runs[::2], runs):
+        with Store(file) as store:
+            _, made = fill(store, points_of(part, ENDS, LANDS_AT), Here())
+            assert made == len(runs[::2]) if part is not runs else len(runs[1::2])
+    with Store(file) as store:
+        return runs, read_runs(store, runs, ENDS, LANDS_AT)
 
 
 def test_a_waterfall_from_rows_is_that_of_direct_runs_to_the_last_bit(split):
-    _, runs, design, out = split
-    with Store(out, design, code_identity()) as store:
-        rows = read_runs(store, runs)
+    runs, rows = split
     direct = split_all(runs[0], {r: observe(make(r).whole) for r in runs})
     assert [part.observable.name for part in direct] == [observable.name for observable in OBSERVABLES]
     assert split_rows(rows) == direct
@@ -238,29 +217,28 @@ def test_a_waterfall_from_rows_is_that_of_direct_runs_to_the_last_bit(split):
 
 
 def test_a_waterfall_s_run_that_is_not_whole_is_named(split):
-    _, runs, design, out = split
-    with Store(out, design, code_identity()) as store:
-        rows = read_runs(store, runs)
+    runs, rows = split
     lost = runs[5]
-    rows[lost] = replace(rows[lost], status="stalled", message="time hardly passes")
+    broken = {**rows, lost: {**rows[lost], "status": "stalled", "message": "time hardly passes"}}
     with pytest.raises(SweepError, match=f"{lost.name}: stalled: time hardly passes"):
-        split_rows(rows)
+        split_rows(broken)
 
 
+@pytest.mark.usefixtures("here")
 def test_the_waterfall_command_draws_every_observable(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("flipproof.sweep.command.local_workers", lambda _: nullcontext(Workers(**HERE)))
     (tmp_path / "throw.toml").write_text("[scenario]\nduration = 0.05\n")
     options = ["waterfall", tmp_path / "throw.toml", "--slices", "1", "--out", tmp_path / "out"]
     status, out, err = run(capsys, *options, "--quiet")
     assert (status, err) == (0, "")
     assert "published program" in out
-    assert "402 points" in out
+    runs = len(plan_split(Scenario(duration=0.05).with_slices(1)))
+    assert f"{runs} points" in out
     for observable in OBSERVABLES:
         assert (tmp_path / "out" / f"waterfall-{observable.name}.png").stat().st_size > 10_000
     drawn = Drawing("<svg/>", b"anew")
     monkeypatch.setattr("flipproof.sweep.planned.draw", lambda _: drawn)
     status, out, _ = run(capsys, *options)
-    assert "; 402 were there" in out
+    assert f"; {runs} were there" in out
     for observable in OBSERVABLES:
         assert (tmp_path / "out" / f"waterfall-{observable.name}.png").read_bytes() == b"anew"
 
@@ -273,7 +251,7 @@ def test_the_waterfall_command_draws_every_observable(capsys, tmp_path, monkeypa
         (["map", "--axis", "gamma", "--size", "20", "--out", "{out}"], "'20' is not COLUMNSxROWS"),
         (["map", "--axis", "gamma", "--size", "1x20", "--out", "{out}"], "each in [2, 1000]"),
         (["map", "nowhere.toml", "--axis", "gamma", "--out", "{out}"], "nowhere.toml: cannot be read"),
-        (["map", "--axis", "gamma", "--out", "{out}", "--export", "rows.xls"], "is neither .csv nor .parquet"),
+        (["map", "--axis", "gamma", "--out", "{out}", "--export", "rows.xls"], "is neither .csv nor .nc"),
         (["waterfall", "--slices", "0", "--out", "{out}"], "'0' is not a whole number of at least 1"),
     ],
 )
@@ -285,13 +263,14 @@ def test_every_mistake_is_one_line_and_status_2(capsys, tmp_path, arguments, wor
     assert not (tmp_path / "out").exists()
 
 
-def test_another_throw_does_not_go_on_in_the_same_folder(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("flipproof.sweep.command.local_workers", lambda _: nullcontext(Workers(**HERE)))
-    options = ["map", "--axis", "step", "--size", "2x2", "--out", tmp_path / "out"]
-    assert run(capsys, *options, "--slices", "1")[0] == 0
-    status, _, err = run(capsys, *options, "--slices", "2")
-    assert status == 2
-    assert "holds another design (scenario.n_slices is 1 there and 2 here)" in err
+@pytest.mark.usefixtures("here")
+def test_another_throw_in_the_same_folder_makes_its_own_rows(capsys, tmp_path):
+    options = ["map", "--axis", "step", "--size", "2x2", "--out", tmp_path / "out", "--slices"]
+    for slices in ("1", "2"):
+        status, out, _ = run(capsys, *options, slices)
+        assert status == 0
+        assert "were there" not in out
+    assert " made in " not in run(capsys, *options, "1")[1]
 
 
 @pytest.mark.parametrize("curves", [1, -5, 2.0, True, "many", 100_000])

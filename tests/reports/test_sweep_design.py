@@ -1,18 +1,19 @@
 """A sweep's file: what it means, and one line for every mistake in it."""
 
-import json
 import math
 import tomllib
+from collections import deque
 from dataclasses import fields
 
 import numpy as np
 import pytest
 
 from flipproof.sweep.axes import KINDS, Choices, Range, read_axes
-from flipproof.sweep.design import MOST_POINTS, design_of, from_parameters, latin_shares, read_design
+from flipproof.sweep.design import MOST_POINTS, design_of, latin_shares, read_design
 from flipproof.sweep.entries import try_entries
 from flipproof.sweep.errors import SweepError
-from slicemodel import Bottle, Scenario, ScenarioError
+from flipproof.sweep.work import scenario_of
+from slicemodel import Bottle, Scenario
 
 GRID = """
 [sweep]
@@ -43,21 +44,21 @@ name = "eq8"
 
 
 def read(text):
-    return design_of(tomllib.loads(text), "sweep.toml", text)
+    return design_of(tomllib.loads(text), "sweep.toml")
 
 
 def test_a_grid_is_every_combination_the_last_field_fastest():
     design = read(GRID)
     assert (design.throws, design.size) == (6, 12)
-    points = [design.point(number) for number in range(design.size)]
-    assert [point.values for point in points[:6]] == [
+    points, values = list(design.points()), [tuple(each.values()) for each in design.swept()]
+    assert values[:6] == [
         (0.25, 0.2), (0.25, 0.25), (0.25, 0.3), (0.5, 0.2), (0.5, 0.25), (0.5, 0.3),
     ]  # fmt: skip
-    assert [point.values for point in points[6:]] == [point.values for point in points[:6]]
+    assert values[6:] == values[:6]
     assert [point.solver for point in points] == ["exact-step"] * 6 + ["eq8"] * 6
     assert points[0].settings == {"steps": 50, "store": "summary"}
     assert points[6].settings == {}
-    assert points[4].scenario() == Scenario(bottle=Bottle(length=0.25), water_mass=0.5)
+    assert scenario_of(points[4].throw) == Scenario(bottle=Bottle(length=0.25), water_mass=0.5)
 
 
 def test_every_field_of_a_throw_can_be_swept():
@@ -71,7 +72,7 @@ def test_every_field_of_a_throw_can_be_swept():
         values = {"whole": [3, 7], "truth": [False, True], "real": [0.6, 0.7]}[KINDS[name]]
         document = {"sweep": {"design": "grid", "fields": {name: values}}, "solvers": [{"name": "eq8"}]}
         for number, value in enumerate(values):
-            throw = design_of(document, "x").point(number).scenario()
+            throw = scenario_of(list(design_of(document, "x").points())[number].throw)
             outer, _, inner = name.partition(".")
             found = getattr(throw, outer)
             if outer == "launch_velocity":
@@ -84,7 +85,7 @@ def test_every_field_of_a_throw_can_be_swept():
 def test_derived_fields_set_what_they_are_made_of():
     text = GRID.replace("bottle.length = {from = 0.2, to = 0.3, count = 3}", "damping_rate = [3.0]\nn_slices = [4, 9]")
     for number in range(read(text).throws):
-        throw = read("[bottle]\ncapacity = 0.8\n" + text).point(number).scenario()
+        throw = scenario_of(list(read("[bottle]\ncapacity = 0.8\n" + text).points())[number].throw)
         assert throw.damping_rate == pytest.approx(3.0, rel=1e-15, abs=0.0)
     assert throw.water_mass == 0.5 * 0.8
     assert throw.n_slices == 9
@@ -113,7 +114,7 @@ def test_a_latin_hypercube_has_one_sample_in_every_part():
 
 def test_a_latin_hypercube_reaches_every_kind_of_field():
     design = read(LATIN)
-    values = [design.point(number).values for number in range(design.size)]
+    values = [tuple(each.values()) for each in design.swept()]
     restitution, drag, slices, frozen = zip(*values, strict=True)
     assert all(0.1 <= e <= 0.9 for e in restitution)
     assert sum(d < 0.1 for d in drag) == 25
@@ -124,31 +125,6 @@ def test_a_latin_hypercube_reaches_every_kind_of_field():
     assert isinstance(design.axes[3], Choices)
 
 
-def test_a_point_is_made_again_from_its_parameters_alone():
-    for point in (read(LATIN).point(17), read(GRID).point(2)):
-        again = from_parameters(json.dumps(point.parameters()))
-        assert again.scenario() == point.scenario()
-        assert (again.solver, again.settings) == (point.solver, point.settings)
-        assert again.key("1") == point.key("1")
-
-
-def test_keys_tell_points_settings_and_code_apart():
-    design = read(GRID)
-    keys = {design.point(number).key("1") for number in range(design.size)}
-    assert len(keys) == design.size
-    assert design.point(0).key("2") not in keys
-    other = read(GRID.replace("0.25, 0.5", "0.25000000000000006, 0.5"))
-    assert other.point(0).key("1") not in keys
-    assert read(GRID.replace("steps = 50", "steps = 51")).point(0).key("1") not in keys
-    assert read("# a comment\n" + GRID).point(0).key("1") in keys
-
-
-def test_an_impossible_throw_is_a_point_and_says_why():
-    design = read(GRID.replace("0.5]", "1.5]"))
-    with pytest.raises(ScenarioError, match=r"water_mass = 1\.5 kg exceeds the bottle's capacity"):
-        design.point(3).scenario()
-
-
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -156,7 +132,6 @@ def test_an_impossible_throw_is_a_point_and_says_why():
         ('design = "grid"', "", ["design = None is unknown", "grid, latin-hypercube"]),
         ('design = "grid"', 'design = "grid"\nseeds = 3', ["[sweep] key 'seeds' is unknown", "'seed'?"]),
         ('design = "grid"', 'design = "grid"\nsamples = 3', ["samples = 3 belongs to design = \"latin-hypercube\""]),
-        ('design = "grid"', 'design = "grid"\ntrajectories = 1', ["trajectories = 1 is neither true nor false"]),
         ('design = "grid"', 'design = "latin-hypercube"', ["count belongs to a grid"]),
         ("[sweep]", "[swoop]\nx = 1\n[sweep]", ["table 'swoop' is unknown", "'sweep'?"]),
         ("[sweep]", "[scenario]\nomega = 2.0\n[sweep]", ["[scenario] key 'omega' is unknown", "'omega0'?"]),
@@ -229,7 +204,7 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path):
 
 def test_the_water_of_the_base_does_not_stand_in_the_way_of_the_swept():
     design = read("[bottle]\ncapacity = 0.4\n" + GRID)
-    assert design.point(0).scenario().water_mass == 0.25 * 0.4
+    assert scenario_of(next(design.points()).throw).water_mass == 0.25 * 0.4
 
 
 @pytest.mark.parametrize(
@@ -259,7 +234,7 @@ def test_a_sweep_may_be_as_large_as_stated_and_costs_nothing_to_state():
     text = text.replace("count = 3", "count = 4")
     design = read(text)
     assert design.size == MOST_POINTS
-    assert design.point(design.size - 1).values == (1.0, 0.3)
+    assert deque(design.values(), maxlen=1)[0] == (1.0, 0.3)
     # Points are counted, not throws: here each of two solvers has fewer than are admissible.
     with pytest.raises(SweepError, match=f"500004 throws by 2 solvers make 1000008 points, more than {MOST_POINTS}"):
         read(text.replace(f"count = {MOST_POINTS // 8}", f"count = {MOST_POINTS // 8 + 1}"))

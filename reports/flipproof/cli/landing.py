@@ -159,7 +159,7 @@ def command_upright(options: argparse.Namespace) -> int:
         if not options.quiet:
             print(f"flipproof: {words}", file=sys.stderr, flush=True)
 
-    return fill(options, lambda begin, where: make_upright(throw, size, options.out, begin, say, **where))
+    return fill(options, lambda begin, where: make_upright(throw, size, options.out, begin, **where | {"say": say}))
 
 
 def _shares(text: str) -> tuple[float, ...]:

@@ -75,19 +75,16 @@ def add_store(command: argparse.ArgumentParser) -> None:
     where = command.add_mutually_exclusive_group()
     where.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
     where.add_argument(
-        "--dask", type=_address, metavar="ADDRESS", help="scheduler whose workers do the work: tcp://127.0.0.1:8786"
-    )
-    command.add_argument(
-        "--export", type=Path, metavar="FILE", help="when complete, write all rows to a .csv or .parquet"
-    )
+        "--executor", type=_executor, metavar="MODULE:FACTORY", help="makes the concurrent.futures.Executor that does "
+        "the work, MODULE:FACTORY@ARGUMENT of an argument; Dask: distributed:Client@tcp://127.0.0.1:8786",
+    )  # fmt: skip
+    command.add_argument("--export", type=Path, metavar="FILE", help="when complete, write all rows to a .csv or .nc")
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
-def _address(text: str) -> str:
-    """Return the address of a scheduler; Dask itself takes twenty seconds and a traceback to refuse a misspelt one."""
-    match = re.fullmatch(r"(?:(?:tcp|tls|ws|wss)://)?[^\s/]+:([0-9]{1,5})", text)
-    if not match or not 1 <= int(match[1]) <= 65535:
-        raise argparse.ArgumentTypeError(f"{text!r} is not tcp://HOST:PORT with a port in [1, 65535]")
+def _executor(text: str) -> str:
+    if not re.fullmatch(r"[\w.]+:\w+(@.+)?", text):
+        raise argparse.ArgumentTypeError(f"{text!r} is not MODULE:FACTORY or MODULE:FACTORY@ARGUMENT")
     return text
 
 
@@ -99,14 +96,13 @@ def fill(options: argparse.Namespace, make: Callable[[Any, dict[str, Any]], str]
 
     stored = [0, 0]
 
-    def begin(there: int, size: int) -> Callable[[int, int], None]:
-        if 0 < there < size and not options.quiet:
-            print(f"flipproof: {there} of {size} points are there; going on", file=sys.stderr)
-        stored[:] = there, size
+    def say(words: str) -> None:
+        print(f"flipproof: {words}", file=sys.stderr, flush=True)
+
+    def begin(size: int) -> Callable[[int, int], None]:
+        stored[:] = 0, size
         hide = options.quiet or None
-        bar = bars.enter_context(
-            tqdm(total=size, initial=there, unit="point", disable=hide, leave=False, smoothing=0.05)
-        )
+        bar = bars.enter_context(tqdm(total=size, unit="point", disable=hide, leave=False, smoothing=0.05))
         without = 0
 
         def progress(points: int, unfinished: int) -> None:
@@ -121,7 +117,7 @@ def fill(options: argparse.Namespace, make: Callable[[Any, dict[str, Any]], str]
 
     try:
         with ExitStack() as bars:
-            where = {"jobs": options.jobs, "dask": options.dask, "export_to": options.export}
+            where = {"jobs": options.jobs, "executor": options.executor, "export_to": options.export, "say": say}
             words = make(begin, where)
     except KeyboardInterrupt:
         there = f"{stored[0]} of {stored[1]} points are stored; " if stored[1] else ""

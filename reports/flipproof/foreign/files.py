@@ -20,7 +20,7 @@ import numpy as np
 from flipproof.foreign.contract import PER_SLICE, Answer, AnswerError, Ask, Traits, answer_of
 from flipproof.foreign.isolated import PATIENCE, PRCTL, accuse, die_with_parent, end, half_of_memory, last_line, start
 from flipproof.foreign.specs import ForeignError, Runner, WaitingError, words_of, written
-from flipproof.sweep.files import write_whole
+from flipproof.output.files import write_whole
 from slicemodel.scenario import unknown_name
 
 

@@ -141,11 +141,11 @@ class RunStore(AbstractContextManager["RunStore"]):
         """Return what was kept under a key, alone in a tuple, or None; note in ``found`` when it was made."""
         if key is None:
             return None
-        content = self._use(lambda store: store.get([key]).get(key))
-        if content is None:
+        kept = self._use(lambda store: store.get([key]).get(key))
+        if kept is None:
             return None
         try:
-            value, made = unpack(content)
+            value, made = unpack(kept[1])
         except Exception:  # written by another program: a class may refuse it in any way
             return None
         self._change(lambda store: store.touch(key))
@@ -156,7 +156,7 @@ class RunStore(AbstractContextManager["RunStore"]):
         if key is None or content is None or len(content) > self.limit or not self._same_program():
             return
         entry = Entry(key, {**shared, "versions": versions_of()}, json.dumps(asked), content)
-        self._change(lambda store: store.put([entry]))
+        self._change(lambda store: store.put([entry], dated=True))
         self._change(lambda store: store.evict(self.limit))
 
     def _same_program(self) -> bool:

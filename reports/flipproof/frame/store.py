@@ -7,7 +7,7 @@
              shared           the row of ``shared`` that belongs to it
              asked            JSON: what was asked for beside that
              answer           what came of it: JSON (a sweep), or a packed value (``packing``, a report)
-             used             when it was made or last read [ms since 1970]
+             used             when it was made or last read [ms since 1970], 0 in a sweep
              checksum         CRC-32 of the other columns but ``used``
 
 Any number of programs may read and write the file at once. An entry that does not agree with its checksum is dropped,
@@ -103,6 +103,7 @@ class Store(AbstractContextManager["Store"]):
         self._lock = threading.RLock()
         self._ids: dict[str, int] = {}
         self._facts: dict[int, bytes] = {}
+        self._mappings: dict[int, Mapping[str, Any]] = {}
         check_own(path)
         try:
             self._rows = _connect(path, through=say is not None)
@@ -122,28 +123,30 @@ class Store(AbstractContextManager["Store"]):
         with self._lock:
             self._rows.close()
 
-    def get(self, keys: Sequence[bytes]) -> dict[bytes, bytes]:
-        """Return the answers of those of at most 32 000 keys that have one; damaged ones are dropped."""
+    def get(self, keys: Sequence[bytes]) -> dict[bytes, tuple[Mapping[str, Any], bytes]]:
+        """Return shared facts and answer of those of at most 32 000 keys that have one; damaged ones are dropped."""
         query = f"SELECT key, shared, asked, answer, checksum FROM made WHERE key IN ({','.join('?' * len(keys))})"
         with self._lock:
             rows = self._rows.execute(query, keys).fetchall()
             if not {shared for _, shared, *_ in rows} <= self._facts.keys():
                 self._facts = dict(self._rows.execute("SELECT id, facts FROM shared"))
-            whole = {row[0]: row[3] for row in rows if _whole(self._facts, *row)}
+                self._mappings.clear()
+            whole = {row[0]: (self._read(row[1]), row[3]) for row in rows if _whole(self._facts, *row)}
             if len(whole) < len(rows):
                 damaged = [(row[0],) for row in rows if row[0] not in whole]
                 self._rows.executemany("DELETE FROM made WHERE key = ?", damaged)
         return whole
 
-    def put(self, entries: Iterable[Entry]) -> None:
-        """Write entries in one transaction; of two under one key the later stays."""
+    def put(self, entries: Iterable[Entry], *, dated: bool = False) -> None:
+        """Write entries in one transaction; of two under one key the later stays. ``dated``: note when."""
         with self._lock:
-            now = _now()
+            now = _now() if dated else 0
             self._rows.execute("BEGIN IMMEDIATE")
             try:
-                rows = []
+                rows, last, facts = [], None, ""
                 for key, shared, asked, answer in entries:
-                    facts = json_of(shared)
+                    if shared is not last:  # many in turn have the same
+                        last, facts = shared, json_of(shared)
                     rows.append((key, self._id(facts), asked, answer, now, _checksum(facts, key, asked, answer)))
                 self._rows.executemany("INSERT OR REPLACE INTO made VALUES (?, ?, ?, ?, ?, ?)", rows)
                 self._rows.execute("COMMIT")
@@ -152,6 +155,12 @@ class Store(AbstractContextManager["Store"]):
                 if self._rows.in_transaction:  # SQLite has rolled back by itself after some errors
                     self._rows.execute("ROLLBACK")
                 raise
+
+    def _read(self, number: int) -> Mapping[str, Any]:
+        """Return shared facts, read from JSON once."""
+        if number not in self._mappings:
+            self._mappings[number] = json.loads(self._facts[number])
+        return self._mappings[number]
 
     def touch(self, key: bytes) -> None:
         """Note that an entry was read now."""

@@ -10,21 +10,18 @@ flight has no table and no scatter.
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from itertools import accumulate, groupby
+from itertools import accumulate
 from statistics import NormalDist
 from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 
-from flipproof.landing.work import LANDING, REFERENCE, Landed, make_landing
-from flipproof.sweep.axes import Axis, Choices
-from flipproof.sweep.design import Point
-from flipproof.sweep.work import LAND
+from flipproof.landing.work import MAKER, REFERENCE, Landed, make_landing
+from flipproof.sweep.work import Point
 from ode_reference import turn
 from slicemodel import Scenario
 from slicemodel.scenario import MOST, _Checks
@@ -43,9 +40,6 @@ SPARE: Final = 1.0
 
 Z: Final = 1.959963984540054
 """Half width of a 95 % interval of the normal distribution, in standard deviations."""
-
-AXES: Final[tuple[Axis, ...]] = (Choices("cell", "whole", ()), Choices("place", "whole", ()))
-"""Columns that say which case a row belongs to, and which of its throws it is."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -253,34 +247,22 @@ class Case:
     throws: int
     stream: int = 0
 
-    def facts(self) -> dict[str, Any]:
-        """Return what tells this case from another."""
-        throw, scatter = self.aim.throw.to_mapping(), [self.scatter.spin, self.scatter.angle, self.scatter.speed]
-        counted = {"throws": self.throws, "stream": self.stream}
-        return {"throw": throw, "scatter": scatter, **counted, **self.settings()}
-
     def settings(self) -> dict[str, Any]:
         """Return what the landing is called with."""
         table = {"height": self.aim.height, "restitution": self.restitution, "friction": self.friction}
-        return {**table, "law": self.law, "program": self.program}
+        return {**table, "law": self.law}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Throws:
-    """Every throw of some cases; a ``flipproof.sweep.design.Plan``.
+    """Every throw of some cases, as points of a sweep.
 
     Throw k of any case of one stream is scattered by the seed (seed, stream, k): water and ice, fillings, laws and
-    tables meet the same throwers. Cases of one program stand together: they make one line. ``text`` is the command.
+    tables meet the same throwers.
     """
 
     cases: tuple[Case, ...]
     seed: int
-    text: str
-
-    trajectories = False
-    curves = 0
-    axes = AXES
-    readings = LANDING
 
     @cached_property
     def ends(self) -> tuple[int, ...]:
@@ -292,32 +274,24 @@ class Throws:
         """Points of all cases."""
         return self.ends[-1] if self.ends else 0
 
-    @property
-    def lines(self) -> tuple[range, ...]:
-        """Numbers of the points of each program."""
-        programs = groupby(self.cases, key=lambda case: case.program)
-        sizes = [sum(case.throws for case in some) for _, some in programs]
-        return tuple(range(end - size, end) for size, end in zip(sizes, accumulate(sizes), strict=True))
+    def points(self) -> Iterator[Point]:
+        """Yield every point, case by case."""
+        for case in self.cases:
+            settings = case.settings()
+            for place in range(case.throws):
+                yield Point(case.program, self.thrown(case, place).to_mapping(), settings, MAKER)
 
-    def point(self, number: int) -> Point:
-        """Return the point of that number in [0, size)."""
-        k = bisect_right(self.ends, number)
-        case = self.cases[k]
-        place = number - (self.ends[k] - case.throws)
-        seed = self.seed, case.stream, place
-        throw = scattered(case.aim.throw, case.scatter, seed).to_mapping()
-        return Point(number, (k, place), throw, LAND, {**case.settings(), "seed": list(seed)})
+    def thrown(self, case: Case, place: int) -> Scenario:
+        """Return the throw of a case at that place in [0, throws)."""
+        return scattered(case.aim.throw, case.scatter, (self.seed, case.stream, place))
 
     def by_case(self, rows: Sequence[Landed]) -> list[list[Landed]]:
         """Return the rows of all points, in their order, case by case."""
         return [list(rows[end - case.throws : end]) for case, end in zip(self.cases, self.ends, strict=True)]
 
-    def facts(self) -> dict[str, Any]:
-        """Return what tells this design from another."""
-        return {"study": "landing", "seed": self.seed, "cases": [case.facts() for case in self.cases]}
-
 
 def make_cases(cases: Sequence[Case], seed: int) -> list[list[Landed]]:
     """Make the throws of some cases in this process, and return their rows, case by case."""
-    design = Throws(cases=tuple(cases), seed=seed, text="")
-    return design.by_case([make_landing(design.point(number)) for number in range(design.size)])
+    design = Throws(cases=tuple(cases), seed=seed)
+    points = design.points()
+    return design.by_case([make_landing(point.solver, point.settings, point.throw) for point in points])

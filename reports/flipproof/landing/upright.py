@@ -18,11 +18,12 @@ from typing import Any, Final
 from flipproof.chapters.landing.figures import figures, map_csv, share_line, shares_csv
 from flipproof.chapters.landing.study import Cases, Rows, Size, aiming, counting, read
 from flipproof.landing.design import Throws
-from flipproof.landing.work import LANDING, Landed
+from flipproof.landing.work import Landed
+from flipproof.output.files import write_whole
 from flipproof.output.folder import MARKER, OutputError, check_own, marker_text
 from flipproof.sweep.command import Begin, completed
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.files import write_whole
+from flipproof.sweep.loop import rows_of
 from slicemodel import Scenario
 
 WAVES: Final = ("aims", "throws")
@@ -54,14 +55,15 @@ def make_upright(
     told = []
 
     def make(wave: str, cases: Cases) -> Rows:
-        design = Throws(cases=tuple(cases.values()), seed=size.seed, text=f"flipproof upright, {wave}")
+        design = Throws(cases=tuple(cases.values()), seed=size.seed)
         say(f"{wave}: {design.size} throws")
         last = export_to if wave == WAVES[-1] else None
-        with completed(design, out / wave, begin, export_to=last, **how) as (store, summary):
+        with completed(design.points, design.size, out / wave, begin, export_to=last, say=say, **how) as (
+            store,
+            summary,
+        ):
             told.append(summary)
-            columns = ("number", "status", "message", "reason", "seconds", *LANDING)
-            rows = store.connection.execute(f"SELECT {', '.join(columns)} FROM points ORDER BY number")
-            return design.by_case([Landed(**dict(zip(columns, row, strict=True))) for row in rows])
+            return design.by_case([Landed(**row) for row in rows_of(store, design.points()) if row is not None])
 
     aims, unaimed = aiming(throw, size)
     throws = counting(throw, size, aims, make("aims", aims))

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import math
-import time
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from functools import lru_cache
-from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 
-from flipproof.sweep.design import Point
+from flipproof.sweep.work import Row, Throw, scenario_of
 from slicemodel import Outcome, Scenario, Table, Touch
 from slicemodel.observables import centre_of_mass, centre_of_mass_at_rest, toppling_angle
 from slicemodel.scenario import ScenarioError
 
 READ: Final = ("touch_time", "touch_theta", "touch_omega", "touch_speed", "touch_energy", "static_margin")
-LANDING: Final = MappingProxyType(
-    {"outcome": "TEXT", **dict.fromkeys((*READ, "certified", "margin", "slid"), "REAL"), "bounces": "INTEGER"}
-)
-"""What a row holds of a landing -> its SQLite type."""
+MAKER: Final = "flipproof.landing.work:make_landings"
+"""What makes the rows of landings."""
 
 REFERENCE: Final = "ode_reference"
 """The program that lands event by event; every other name is an engine's."""
@@ -41,7 +38,6 @@ class Landed:
     status : a key of ``flipproof.sweep.work.OUTCOMES``
     """
 
-    number: int
     outcome: str | None = None
     touch_time: float | None = None
     touch_theta: float | None = None
@@ -56,9 +52,6 @@ class Landed:
     status: str
     message: str = ""
     reason: str = ""
-    seconds: float = 0.0
-    arrays: None = None
-    curves: None = None
 
     @property
     def whole(self) -> bool:
@@ -66,31 +59,33 @@ class Landed:
         return self.outcome not in (None, "undecided") or self.status == "missed"
 
 
-def make_landing(point: Point) -> Landed:
+def make_landings(program: str, settings: Mapping[str, Any], throws: Sequence[Throw]) -> list[Row]:
+    """Return the rows of landings: ``LANDING``, status, message and reason."""
+    return [asdict(make_landing(program, settings, throw)) for throw in throws]
+
+
+def make_landing(program: str, settings: Mapping[str, Any], throw: Throw) -> Landed:
     """Throw and land one bottle; whatever goes wrong becomes its status and reason."""
-    settings = point.settings
-    began = time.perf_counter()
-
-    def ended(status: str, reason: str, **read: Any) -> Landed:
-        return Landed(number=point.number, status=status, reason=reason, seconds=time.perf_counter() - began, **read)
-
+    scenario = scenario_of(throw)
+    if isinstance(scenario, dict):
+        return Landed(**scenario)
     try:
-        scenario = point.scenario()
         table = Table(height=settings["height"], restitution=settings["restitution"], friction=settings["friction"])
     except ScenarioError as error:
-        return ended("impossible", str(error))
+        return Landed(status="impossible", reason=str(error))
     try:
         touch = flown(scenario, table.height)
     except ValueError as error:
-        return ended("missed", str(error))
+        return Landed(status="missed", reason=str(error))
     except Exception as error:
-        return ended("failed", f"{type(error).__name__}: {error}")
+        return Landed(status="failed", reason=f"{type(error).__name__}: {error}")
     try:
-        outcome = landed(touch, table, settings["program"], settings["law"])
+        outcome = landed(touch, table, program, settings["law"])
     except Exception as error:
-        return ended("failed", f"{type(error).__name__}: {error}")
+        return Landed(status="failed", reason=f"{type(error).__name__}: {error}")
     read = {name: getattr(outcome, name) for name in ("outcome", "certified", "margin", "slid", "bounces")}
-    return ended("ok" if outcome.decided else "undecided", outcome.reason, **touch_readings(touch), **read)
+    status = "ok" if outcome.decided else "undecided"
+    return Landed(status=status, reason=outcome.reason, **touch_readings(touch), **read)
 
 
 @lru_cache(maxsize=1024)

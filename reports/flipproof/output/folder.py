@@ -17,7 +17,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.sweep.files import whole_file
+from flipproof.output.files import whole_file
 
 MARKER: Final = ".flipproof"
 VERSION: Final = 1

@@ -60,10 +60,6 @@ class Choices:
         """Return the value at ``share`` in [0, 1): every value has an equal part of it."""
         return self.values[int(share * len(self.values))]
 
-    def facts(self) -> list[Value]:
-        """Return what tells this axis from another."""
-        return list(self.values)
-
 
 @dataclass(frozen=True, slots=True)
 class Range:
@@ -86,17 +82,8 @@ class Range:
         value = min(max(value, self.low), self.high)
         return round(value) if self.kind == "whole" else value
 
-    def facts(self) -> dict[str, Any]:
-        """Return what tells this axis from another."""
-        return {"from": self.low, "to": self.high, "scale": "log" if self.log else "linear"}
-
 
 Axis = Choices | Range
-
-
-def column(name: str) -> str:
-    """Return the name of a field's column in the store: "bottle.length" is ``bottle_length``."""
-    return name.replace(".", "_")
 
 
 def read_axes(table: Mapping[str, Any], where: str, *, grid: bool) -> tuple[Axis, ...]:

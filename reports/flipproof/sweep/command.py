@@ -1,136 +1,135 @@
-"""A sweep from its design to its summary, and its rows as one CSV or Parquet file: what the command line does.
-
-In that file a missing number is an empty cell (CSV) or a null (Parquet), and the column ``reason`` says why. CSV
-writes floats so that they read back to the last bit. The full parameters of a row and its curves stay in the store,
-under its key.
-"""
+"""A sweep from its design to its summary: what the command line does."""
 
 from __future__ import annotations
 
-import csv
+import os
 import sqlite3
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from importlib import import_module
-from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.sweep.design import Plan, read_design
+from flipproof.frame.processes import cores, processes
+from flipproof.frame.store import Store, has_code
+from flipproof.output.files import TEMPORARY, write_whole
+from flipproof.output.folder import MARKER, OutputError, check_own, marker_text
+from flipproof.sweep.design import read_design
 from flipproof.sweep.entries import try_entries
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.files import whole_file
-from flipproof.sweep.run import Progress, dask_workers, local_workers, run_sweep
-from flipproof.sweep.schema import FILE, columns
-from flipproof.sweep.store import Store
-from flipproof.sweep.work import OUTCOMES, code_identity
+from flipproof.sweep.export import check_export, export
+from flipproof.sweep.loop import IN_FLIGHT, Progress, executor_of, fill
+from flipproof.sweep.work import OUTCOMES, Point, code_identity, versions
 
-Begin = Callable[[int, int], Progress]
-"""Called once with points there and points of the design, when the work begins; returns what follows it."""
+FILE: Final = "sweep.sqlite"
+"""Name of the store in a sweep's folder."""
 
-LEFT_OUT: Final = ("parameters", "versions", "curves", "checksum")
+KIND: Final = "sweep"
+
+Begin = Callable[[int], Progress]
+"""Called once with the points of the design, when the work begins; returns what follows it."""
 
 
 def sweep(file: Path, out: Path, begin: Begin, **how: Any) -> str:
-    """Make every point of the design in ``file`` that has no row in ``out``, as ``fill`` does; return its one line."""
+    """Make every point of the design in ``file`` that has no row in ``out``, as ``completed`` does; return its line."""
     design = read_design(file)
     if not (out / FILE).exists():
         # Before the folder knows the design, so that the mended file may have the same folder.
         try_entries(design.entries)
-    return fill(design, out, begin, lambda _, summary: summary, **how)
-
-
-def fill(design: Plan, out: Path, begin: Begin, end: Callable[[Store, str], str], **how: Any) -> str:
-    """Make every point of ``design`` that has no row in ``out``; return lines that tell what is there.
-
-    If the file, the folder, the workers or the disk will not do, a SweepError says so; what was stored is kept.
-
-    Parameters
-    ----------
-    end : callable (complete store, line that tells what is there) -> lines to return
-    how : ``jobs``, ``dask`` and ``export_to`` of ``completed``
-    """
-    with completed(design, out, begin, **how) as (store, summary):
-        return end(store, summary)
+    with completed(design.points, design.size, out, begin, swept=design.swept, **how) as (_, summary):
+        return summary
 
 
 @contextmanager
 def completed(
-    design: Plan,
+    points: Callable[[], Iterable[Point]],
+    size: int,
     out: Path,
     begin: Begin,
     *,
+    say: Callable[[str], object] = lambda _: None,
     jobs: int | None = None,
-    dask: str | None = None,
+    executor: str | None = None,
     export_to: Path | None = None,
+    swept: Callable[[], Iterable[Mapping[str, Any]]] | None = None,
 ) -> Iterator[tuple[Store, str]]:
-    """Give the store in ``out`` when every point of ``design`` has a row, and a line that tells what is there.
+    """Give the store in ``out`` when every point has a row, and a line that tells what is there.
 
     Parameters
     ----------
+    points : callable - yields all ``size`` points, each time in the same order
+    say : callable - gets a line if the file was damaged, or holds rows by other code or made under other versions
     jobs : int or None - worker processes of this machine; None: one per core
-    dask : str or None - address of a Dask scheduler whose workers take their place
+    executor : str or None - who does the work in their place, "MODULE:FACTORY" or "MODULE:FACTORY@ARGUMENT"
     export_to : path or None - file to write all rows to when they are complete
+    swept : callable or None - yields what leads each row there; None: every field of the throw
+
+    Raises
+    ------
+    SweepError
+        If the folder, the workers or the disk will not do; what was stored is kept.
     """
     began = time.perf_counter()
     if export_to:
         check_export(export_to, out)
-    with Store(out, design, code_identity()) as store:
-        there = sum(store.done())
-        progress = begin(there, design.size)
-        made = design.size - there
-        if made:
-            with local_workers(jobs) if dask is None else dask_workers(dask) as workers:
-                run_sweep(store, workers, progress)
+    with _opened(out, say) as store:
+        progress = begin(size)
+        with processes(jobs) if executor is None else executor_of(executor) as workers:
+            in_flight = 2 * (jobs or cores()) if executor is None else IN_FLIGHT
+            with _plainly(out):
+                counts, made = fill(store, points(), workers, in_flight, progress)
         if export_to:
-            export(store, export_to)
-        seconds, counts = time.perf_counter() - began, store.counts()
+            with _plainly(out):
+                export(store, points(), swept and swept(), export_to)
+        seconds = time.perf_counter() - began
         kinds = ", ".join(f"{counts[status]} {status}" for status in OUTCOMES if status in counts)
         rate = f"; {made} made in {seconds:.1f} s ({made / seconds:.0f} per second)" if made else ""
-        known = f"; {there} were there" if there else ""
-        yield store, f"{design.size} points in {store.file}: {kinds}{rate}{known}"
+        known = f"; {size - made} were there" if made < size else ""
+        yield store, f"{size} points in {store.path}: {kinds}{rate}{known}"
 
 
-def check_export(path: Path, out: Path) -> None:
-    """Refuse, before the sweep begins, a file that could not be written after it; the sweep's folder may hold it."""
-    if path.suffix not in (".csv", ".parquet"):
-        raise SweepError(f"--export {path}: the ending {path.suffix!r} is neither .csv nor .parquet")
-    parent = path.resolve().parent
-    if path.is_dir() or not (parent.is_dir() or parent == out.resolve()):
-        raise SweepError(f"--export {path}: {'is a folder' if path.is_dir() else 'its folder does not exist'}")
-    if path.suffix == ".parquet":
-        _pyarrow(path)
-
-
-def export(store: Store, path: Path) -> None:
-    """Write all rows of a store to ``path``; what was there stays until the new file is whole."""
-    types = {name: kind for name, kind in columns(store.design).items() if name not in LEFT_OUT}
+@contextmanager
+def _opened(out: Path, say: Callable[[str], object]) -> Iterator[Store]:
+    """Make or check the folder and give its store; say what of it was made by other code or other versions."""
     try:
-        rows = store.connection.execute(f"SELECT {', '.join(types)} FROM points ORDER BY number")
-        with whole_file(path.resolve()) as part:
-            if path.suffix == ".csv":
-                with part.open("w", encoding="utf-8", newline="") as file:
-                    csv.writer(file, lineterminator="\n").writerows(chain([types], rows))
-            else:
-                _write_parquet(part, types, rows)
-    except OSError as error:
-        words = f"{path} cannot be written ({error.strerror or error}); the rows are in {store.file}"
-        raise SweepError(words) from None
+        if out.exists() and not out.is_dir():
+            raise SweepError(f"{out} is a file; --out names a folder")
+        out.mkdir(parents=True, exist_ok=True)
+        parts = (entry.name for entry in out.iterdir() if entry.name.endswith(TEMPORARY))
+        check_own(out, KIND, ignored=tuple(parts))
+        if not (out / MARKER).exists():
+            write_whole(out / MARKER, marker_text(KIND).encode())
+        store = Store(out / FILE, say=say)
+    except OutputError as error:
+        raise SweepError(str(error)) from None
+    except (OSError, sqlite3.Error) as error:
+        words = getattr(error, "strerror", None) or str(error)
+        raise SweepError(f"{out / FILE} cannot be used ({words}); it is as it was") from None
+    with store:
+        _say_what_differs(store, say)
+        yield store
 
 
-def _write_parquet(path: Path, types: dict[str, str], rows: sqlite3.Cursor) -> None:
-    pyarrow = _pyarrow(path)
-    parquet = import_module("pyarrow.parquet")
-    of_kind = {"REAL": pyarrow.float64(), "INTEGER": pyarrow.int64(), "TEXT": pyarrow.string()}
-    schema = pyarrow.schema([(name, of_kind[kind]) for name, kind in types.items()])
-    with parquet.ParquetWriter(path, schema) as writer:
-        while chunk := rows.fetchmany(10_000):
-            writer.write_table(pyarrow.table(list(map(list, zip(*chunk, strict=True))), schema=schema))
+def _say_what_differs(store: Store, say: Callable[[str], object]) -> None:
+    code, own = code_identity(), versions()
+    codes = sorted({str(facts.get("code")) for facts in store.shared()} - {code})
+    if codes:
+        say(f"{store.path} holds rows by flipproof {', '.join(codes)} too; this is {code} and takes none of them")
+    there = [facts.get("versions", {}) for facts in store.shared() if facts.get("code") == code]
+    for name, version in own.items():
+        others = sorted({str(each[name]) for each in there if each.get(name, version) != version})
+        if others:
+            say(f"{store.path} holds rows made under {name} {', '.join(others)}; this is {version}, and they are kept")
 
 
-def _pyarrow(path: Path) -> Any:
+@contextmanager
+def _plainly(out: Path) -> Iterator[None]:
+    """Turn what a disk or SQLite refuses into one line."""
     try:
-        return import_module("pyarrow")
-    except ModuleNotFoundError:
-        raise SweepError(f"--export {path} needs pyarrow: install flipproof with its extra 'parquet'") from None
+        yield
+    except (OSError, sqlite3.Error) as error:
+        words = getattr(error, "strerror", None) or str(error)
+        if has_code(error, sqlite3.SQLITE_FULL) or isinstance(error, OSError):
+            words += ", is the disk full?" if os.path.lexists(out / FILE) and "full" not in words else ""
+        kept = "the points stored so far are safe, the same command goes on from there"
+        raise SweepError(f"{out} cannot be written ({words}); {kept}") from None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,9 +13,6 @@ from flipproof.foreign.specs import check_asked, content_of
 from flipproof.frame.solvers import Solver, find, solve
 from flipproof.sweep.errors import SweepError, refuse_unknown
 from slicemodel.scenario import Scenario
-
-as_json = json.JSONEncoder(sort_keys=True).encode
-"""Settings or parameters -> JSON, keys in order; it reads back to the last bit."""
 
 
 @dataclass(frozen=True, slots=True)

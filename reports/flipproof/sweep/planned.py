@@ -10,14 +10,14 @@
     DIR/waterfall.csv                    one row per observable and bar
 
 A study of a chapter plans runs and reads what became of them; who makes them, and whether the program died
-in between, is not its business. Here a sweep makes them. A run finds its row by what was computed, solver, scenario
-and settings to the last bit: a design that misses a run of its plan cannot go unnoticed.
+in between, is not its business. Here the loop of a sweep makes them, each once.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -44,47 +44,40 @@ from flipproof.chapters.waterfall.chapter import figure_waterfall
 from flipproof.chapters.waterfall.study import PROGRAM, Waterfall, plan_waterfall, split_all
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import Run
+from flipproof.frame.store import Store
 from flipproof.output.columns import rows_csv
-from flipproof.sweep.axes import DAMPING, FILL, Value
-from flipproof.sweep.command import Begin, fill
-from flipproof.sweep.design import Design, design_of
-from flipproof.sweep.entries import as_json
+from flipproof.output.files import write_whole
+from flipproof.sweep.axes import FILL
+from flipproof.sweep.command import Begin, completed
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.files import write_whole
-from flipproof.sweep.store import Store, read_curves
-from flipproof.sweep.work import CURVES, Outcome
+from flipproof.sweep.loop import rows_of
+from flipproof.sweep.work import FLIGHTS, Point, Row
 from slicemodel import Scenario
 from slicemodel.observables import toppling_angle
-
-COLUMNS: Final = ("status", "message", "reason", "plateau", "omega_end", "theta_end", "r_cm_end", "curves")
 
 STEPS: Final = 1000
 """Points of a scheme's grid where a plan does not say another: the published program's."""
 
 
-def design_of_runs(runs: Sequence[Run], varied: Mapping[str, Sequence[Value]], curves: int, source: str) -> Design:
-    """Return the grid over ``varied`` that makes all ``runs``, every one keeping ``curves`` points of its curves.
-
-    Parameters
-    ----------
-    varied : mapping from field to values - how the scenarios of the runs differ; one value alone sets a field
-    source : str - where the plan comes from, as the store and error messages name it
-    """
-    entries = {(run.solver, as_json(run.settings)): {"name": run.solver, **run.settings} for run in runs}
-    sweep = {"design": "grid", "curves": curves, "fields": {name: list(values) for name, values in varied.items()}}
-    document = {**runs[0].scenario.to_mapping(), "sweep": sweep, "solvers": list(entries.values())}
-    return design_of(document, source, f"# {source}\n")
+def completed_runs(
+    runs: Sequence[Run], out: Path, begin: Begin, curves: int, names: Sequence[str], **how: Any
+) -> AbstractContextManager[tuple[Store, str]]:
+    """Return what ``completed`` gives for runs, the rows of which keep ``names`` of the curves at ``curves`` times."""
+    return completed(lambda: points_of(runs, curves, names), len(runs), out, begin, **how)
 
 
-def read_runs(store: Store, runs: Sequence[Run]) -> dict[Run, Outcome]:
-    """Return what became of every run; raise KeyError if the store's design does not make one."""
-    points = (store.design.point(number) for number in range(store.design.size))
-    numbers = {(point.solver, point.scenario(), as_json(point.settings)): point.number for point in points}
-    rows = {}
-    for number, *cells, curves in store.connection.execute(f"SELECT number, {', '.join(COLUMNS)} FROM points"):
-        known = dict(zip(COLUMNS[:-1], cells, strict=True))
-        rows[number] = Outcome(number=number, **known, curves=read_curves(curves) if curves else None)
-    return {run: rows[numbers[run.solver, run.scenario, as_json(run.settings)]] for run in runs}
+def points_of(runs: Iterable[Run], curves: int, names: Sequence[str]) -> Iterator[Point]:
+    """Yield the points that make runs."""
+    options = {"curves": curves, "names": list(names)}
+    return (Point(run.solver, run.scenario.to_mapping(), run.settings, FLIGHTS, options) for run in runs)
+
+
+def read_runs(store: Store, runs: Sequence[Run], curves: int, names: Sequence[str]) -> dict[Run, Row]:
+    """Return the row of every run; raise KeyError if the store lacks one."""
+    rows = dict(zip(runs, rows_of(store, points_of(runs, curves, names)), strict=True))
+    if missing := [run.name for run, row in rows.items() if row is None]:
+        raise KeyError(missing[0])
+    return {run: row for run, row in rows.items() if row is not None}
 
 
 def _draw(figure: Figure, out: Path, name: str) -> None:
@@ -96,6 +89,9 @@ def _draw(figure: Figure, out: Path, name: str) -> None:
 # ---------------------------------------------------------------------- the map of validity
 
 NAMES: Final = (*LADDER, *EXTRA)
+READ_OFF: Final = ("omega",)
+"""What of the curves of a run a map reads."""
+
 VALUES: Final[Mapping[Axis, str]] = {"gamma": "gamma/omega0", "step": "omega0*dt", "restitution": "restitution"}
 
 
@@ -118,33 +114,22 @@ class MapPlan:
         """Return every run; the output times are the solvers' own, so that a row repeats a run of the command line."""
         return plan_map(self.throw, self.axis, self.fills, self.values, steps=STEPS, points=None)
 
-    def varied(self) -> dict[str, Sequence[Value]]:
-        """Return the fields of a scenario that the cells vary."""
-        if self.axis == "gamma":
-            return {DAMPING: [value * abs(self.throw.omega0) for value in self.values], FILL: self.fills}
-        restitution = {"restitution": self.values} if self.axis == "restitution" else {}
-        return {**restitution, DAMPING: [self.throw.damping_rate], FILL: self.fills}
-
-    def study(self, rows: Mapping[Run, Outcome]) -> ValidityMap:
+    def study(self, rows: Mapping[Run, Row]) -> ValidityMap:
         """Return the map that the rows of its runs make."""
         readings = {run: _reading(row) for run, row in rows.items()}
         return study_readings(self.throw, self.axis, self.fills, self.values, readings, steps=STEPS, points=None)
 
 
 def make_map(plan: MapPlan, out: Path, begin: Begin, **how: Any) -> str:
-    """Make every run of the map that has no row in ``out``, as ``fill`` does, and draw it; return its lines."""
+    """Make every run of the map that has no row in ``out``, as ``completed`` does, and draw it; return its lines."""
     runs = plan.runs()
-
-    def end(store: Store, summary: str) -> str:
-        study = plan.study(read_runs(store, runs))
+    with completed_runs(runs, out, begin, CURVE, READ_OFF, **how) as (store, summary):
+        study = plan.study(read_runs(store, runs, CURVE, READ_OFF))
         _draw(figure_map(study), out, "map")
         write_whole(out / "map.csv", map_csv(study).encode())
         write_whole(out / "map.json", json.dumps(map_facts(study, plan.throw), indent=1, allow_nan=False).encode())
         shares = ", ".join(f"{name} {count}" for name, count in _dominating(study).items() if count)
         return f"{summary}\ncells by largest fair share: {shares or 'none'}; see {out / 'map.png'}"
-
-    source = f"flipproof map --axis {plan.axis} --size {len(plan.fills)}x{len(plan.values)}"
-    return fill(design_of_runs(runs, plan.varied(), CURVE, source), out, begin, end, **how)
 
 
 def map_csv(study: ValidityMap) -> str:
@@ -190,18 +175,19 @@ def _dominating(study: ValidityMap) -> dict[str, int]:
     return {name: int((study.dominant == k).sum()) for k, name in enumerate(RUNGS)}
 
 
-def _reading(row: Outcome) -> Reading:
-    if row.status != "ok":
-        return Reading(problem=word(row.reason) if row.status == "failed" else row.status)
-    assert row.plateau is not None
-    assert row.curves is not None
-    return Reading(level=row.plateau, omega=row.curves[CURVES.index("omega")])
+def _reading(row: Row) -> Reading:
+    if row["status"] != "ok":
+        return Reading(problem=word(row["reason"]) if row["status"] == "failed" else row["status"])
+    return Reading(level=row["plateau"], omega=np.array(row["omega"]))
 
 
 # ---------------------------------------------------------------------- the waterfall
 
 ENDS: Final = 2
 """Points of a row's curves: release and landing. Only v_CM on landing is read there."""
+
+LANDS_AT: Final = ("v_cm",)
+"""What of the curves of a run a waterfall reads."""
 
 
 def plan_split(throw: Scenario) -> list[Run]:
@@ -211,43 +197,37 @@ def plan_split(throw: Scenario) -> list[Run]:
 
 
 def make_split(throw: Scenario, out: Path, begin: Begin, **how: Any) -> str:
-    """Make every run of the waterfall that has no row in ``out``, as ``fill`` does, and draw it; return its table.
+    """Make every run of the waterfall that has no row in ``out``, as ``completed`` does, and draw it; return its table.
 
     A run that is not whole is refused: a split needs all.
     """
     runs = plan_split(throw)
-
-    def end(store: Store, summary: str) -> str:
-        waterfalls = split_rows(read_runs(store, runs))
+    with completed_runs(runs, out, begin, ENDS, LANDS_AT, **how) as (store, summary):
+        waterfalls = split_rows(read_runs(store, runs, ENDS, LANDS_AT))
         for waterfall in waterfalls:
             _draw(figure_waterfall(waterfall), out, f"waterfall-{waterfall.observable.name}")
         write_whole(out / "waterfall.csv", waterfall_csv(waterfalls).encode())
         return f"{_table(waterfalls[0])}\n{summary}"
 
-    return fill(design_of_runs(runs, {"omega0": [throw.omega0]}, ENDS, "flipproof waterfall"), out, begin, end, **how)
 
-
-def split_rows(rows: Mapping[Run, Outcome]) -> tuple[Waterfall, ...]:
+def split_rows(rows: Mapping[Run, Row]) -> tuple[Waterfall, ...]:
     """Split every observable of the rows of ``plan_split``; a run that is not whole is refused."""
     program = next(run for run in rows if run.solver == PROGRAM)
     return split_all(program, {run: _observed(run, row) for run, row in rows.items()})
 
 
-def _observed(run: Run, row: Outcome) -> dict[str, float]:
+def _observed(run: Run, row: Row) -> dict[str, float]:
     throw = run.scenario
-    if row.status != "ok":
-        raise SweepError(f"{run.name}: {row.status}: {row.message or row.reason}; a waterfall needs every run whole")
-    assert row.plateau is not None
-    assert row.omega_end is not None
-    assert row.theta_end is not None
-    assert row.r_cm_end is not None
-    assert row.curves is not None
+    if row["status"] != "ok":
+        raise SweepError(
+            f"{run.name}: {row['status']}: {row['message'] or row['reason']}; a waterfall needs every run whole"
+        )
     return {
-        "plateau": row.plateau,
-        "omega": row.omega_end / throw.omega0,
-        "theta": row.theta_end,
-        "toppling": float(toppling_angle(throw, row.r_cm_end)),
-        "v_cm": float(row.curves[CURVES.index("v_cm"), -1]),
+        "plateau": row["plateau"],
+        "omega": row["omega_end"] / throw.omega0,
+        "theta": row["theta_end"],
+        "toppling": float(toppling_angle(throw, row["r_cm_end"])),
+        "v_cm": row["v_cm"][-1],
     }
 
 

@@ -1,34 +1,37 @@
-"""What a worker does: it makes points, and says by which code and under which versions.
+"""A point of a sweep: what is asked, the key of its row, and how a worker makes some of them together.
 
-Nothing here knows which machine it runs on. A point is made by ``flipproof.frame.solvers.make``, as a run of a report
-is, or with others by ``ode_reference.solve_batch``, which gives the same to the last bit; it depends on nothing but its
-own parameters: batches, workers and resuming cannot change a bit of it.
+A point names its maker, a function "module:name" that returns rows. Flights are made here; a landing's maker is
+``flipproof.landing.work``. Nothing here knows which machine it runs on: a row depends on nothing but its own point, so
+that chunks, workers and resuming cannot change a bit of it.
 """
 
 from __future__ import annotations
 
 import functools
+import hashlib
 import math
-import time
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from importlib import import_module
+from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipproof.foreign.specs import content_of
-from flipproof.frame.keys import fingerprint
-from flipproof.frame.solvers import Run, find, make
+from flipproof.frame.keys import changed_since_import, fingerprint, versions_of
+from flipproof.frame.solvers import Run, find, solve
+from flipproof.frame.store import json_of
 from flipproof.output.provenance import provenance, version_of
-from flipproof.sweep.design import Point
+from flipproof.sweep.errors import SweepError
 from ode_reference.solver import WATERS
 from slicemodel.observables import centre_of_mass_velocity, plateau
-from slicemodel.scenario import Scenario, ScenarioError
+from slicemodel.scenario import Bottle, Scenario, ScenarioError
 from slicemodel.trajectory import STATUSES, FloatArray, Trajectory
 
-if TYPE_CHECKING:
-    from flipproof.landing.work import Landed
+Throw = Mapping[str, Mapping[str, Any]]
+"""{"bottle": {...}, "scenario": {...}}: every field, possible or not."""
+
+Row = dict[str, Any]
+"""What a point gave by name, in SI: numbers, words, lists or None; ``status`` and ``reason`` are always among them."""
 
 WHOLE: Final = ("ok", "escaped")
 """Statuses of a trajectory that reached the end of the flight."""
@@ -43,8 +46,8 @@ OUTCOMES: Final = {
 }
 """Status of a row -> its meaning."""
 
-LAND: Final = "land"
-"""What a point names in the place of a solver if a landing is to be made."""
+FLIGHTS: Final = "flipproof.sweep.work:make_flights"
+"""The maker of flights."""
 
 SOURCES: Final = (
     "slicemodel",
@@ -54,171 +57,211 @@ SOURCES: Final = (
     "flipproof.sweep.work",
     "flipproof.landing.work",
 )
-"""What a point's numbers depend on."""
+"""What a row's numbers depend on."""
 
-TOGETHER: Final = 64
-"""Points of the reference that are solved by one call: enough to share what a call costs, 5 MB of output."""
+TOGETHER: Final = {"ode_reference": 64, "slicemodel": 16, "": 8}
+"""Points of a solver's package, or of a maker's own programs, that go to a worker together; of others, one."""
 
 SHARED: Final = {"times", "rest_speed", "impact_law", "energy"}
-"""Settings of the reference that ``solve_batch`` takes; others are of its slower methods."""
+"""Settings that ``ode_reference.solve_batch`` takes; others are of its slower methods."""
+
+READ: Final = ("plateau", "omega_end", "theta_end", "r_cm_end", "t_end", "impacts", "status", "message", "reason")
+"""What a row holds of a flight."""
 
 CURVES: Final = ("omega", "theta", "r_cm", "v_cm")
-"""What a row's curves show, in their order [rad/s, rad, m, m/s]."""
+"""What a row's curves show [rad/s, rad, m, m/s]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Outcome:
-    """What became of a point. A number that is not known is None, and ``reason`` says why.
-
-    Without slots, as ``Point`` is.
+class Point(NamedTuple):
+    """One throw by one solver, and what is made of it.
 
     Parameters
     ----------
-    plateau, omega_end, theta_end, r_cm_end : float or None
-        Mean of omega / omega_0 over the second half [1]; omega [rad/s], theta [rad] and r_CM [m] at the end of the
-        flight. None unless the flight was whole.
-    t_end : float or None - last time reached [s]
-    impacts : int or None - None where a solver does not count them
-    status : a key of ``OUTCOMES``
-    message : the trajectory's own
-    reason : why a number is missing; empty if none is
-    seconds : what the point took
-    arrays : the flight, if it was asked for and there is one
-    curves : (4, P) - ``curves_of`` the flight, if they were asked for and it was whole
+    solver : str - name of a solver, or of a program that the maker knows
+    throw : {"bottle": {...}, "scenario": {...}} - every field, possible or not
+    settings : mapping - what the solver is called with
+    maker : str - "module:name" of the function (solver, settings, throws, **options) that returns rows
+    options : mapping - what the maker is called with
+    content : str - fingerprint of somebody else's solver; empty for flipproof's own
     """
 
-    number: int
-    plateau: float | None = None
-    omega_end: float | None = None
-    theta_end: float | None = None
-    r_cm_end: float | None = None
-    t_end: float | None = None
-    impacts: int | None = None
-    status: str
-    message: str = ""
-    reason: str = ""
-    seconds: float = 0.0
-    arrays: Mapping[str, NDArray[Any]] | None = None
-    curves: FloatArray | None = None
-
-    @property
-    def whole(self) -> bool:
-        """True if the flight reached its end and its numbers are known."""
-        return self.omega_end is not None
+    solver: str
+    throw: Throw
+    settings: Mapping[str, Any]
+    maker: str = FLIGHTS
+    options: Mapping[str, Any] = {}
+    content: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Returned:
-    """What a worker sends home: code and versions that it ran, the points, and the seconds they took together.
+class Made(NamedTuple):
+    """What a worker returns: the code and versions that it ran, and the rows of its points.
 
-    ``changed`` names somebody else's solver whose files are not those of the design; then there are no points.
+    ``changed`` names somebody else's solver whose files are not those of the points; then there are no rows.
     """
 
     code: str
     versions: Mapping[str, str]
-    outcomes: Sequence[Outcome | Landed]
-    seconds: float
+    rows: Sequence[Row]
     changed: str = ""
+
+
+def point_of(run: Run, **options: Any) -> Point:
+    """Return the point that makes a run of a study; ``options`` are those of ``make_flights``."""
+    return Point(run.solver, run.scenario.to_mapping(), run.settings, options=options)
+
+
+def kind_of(point: Point) -> str:
+    """Return as JSON what a point has in common with those that can be made together with it."""
+    return json_of([point.maker, point.options, point.solver, point.settings, point.content])
+
+
+def keyed(points: Iterable[Point], code: str) -> Iterator[tuple[bytes, str, Point]]:
+    """Yield key, kind and point: the key is 16 bytes of a hash of the point and of the code that makes it."""
+    last: tuple[Any, ...] = ()
+    for point in points:
+        solver, throw, *others = point
+        if not last or any(one is not other for one, other in zip(last, (solver, *others), strict=True)):
+            last, kind = (solver, *others), kind_of(point)
+            begun = hashlib.blake2b(f"{code}\n{kind}\n".encode(), digest_size=16)
+        whole = begun.copy()
+        whole.update(json_of(throw).encode())
+        yield whole.digest(), kind, point
+
+
+def together(point: Point) -> int:
+    """Return how many points like this one go to a worker together."""
+    return 1 if "method" in point.settings else TOGETHER.get(_package(point.solver), 1)
+
+
+@functools.cache
+def _package(solver: str) -> str:
+    try:
+        return find(solver).package
+    except ValueError:  # a program that its maker knows
+        return ""
 
 
 @functools.cache
 def code_identity() -> str:
-    """Return version and fingerprint of the code that makes points, such as "0.1.0+3f2a9c41d0be"."""
+    """Return version and fingerprint of the code that makes points, such as "0.1.0+3f2a9c41d0be".
+
+    A SweepError says that it was changed after this program had read it.
+    """
+    if changed := changed_since_import():
+        raise SweepError(f"{changed} was changed after this program had read it; start the program again")
     return f"{version_of('flipproof')}+{fingerprint(*SOURCES):.12}"
 
 
 @functools.cache
 def versions() -> Mapping[str, str]:
-    """Return what else a point may depend on in its last bits: recorded with every row, not compared."""
-    return {name: fact for name, fact in provenance("").items() if name not in ("command", "made", "flipproof")}
+    """Return what else a row may depend on in its last bits: recorded with every row, not compared."""
+    machine = {name: fact for name, fact in provenance("").items() if name in ("system", "processor")}
+    return {name: version for name, version in versions_of().items() if name != "flipproof"} | machine
 
 
-def make_batch(code: str, points: Sequence[Point], keep: bool, curves: int = 0) -> Returned:
-    """Make points by one process; if the caller's ``code``, or that of the points' solver, is not that here, make none.
+def make_points(code: str, points: Sequence[Point]) -> Made:
+    """Make points of one kind in this process, or none if the caller's ``code``, or the solver's, is another here."""
+    own, first = code_identity(), points[0]
+    if own != code or _changed(first):
+        return Made(own, versions(), (), _changed(first))
+    module, _, name = first.maker.partition(":")
+    throws = [point.throw for point in points]
+    rows = getattr(import_module(module), name)(first.solver, first.settings, throws, **first.options)
+    changed = _changed(first)  # while they were made, too: then nobody knows by which
+    return Made(own, versions(), () if changed else rows, changed)
 
-    ``keep``: return the flights too; ``curves``: points of the curves to return, 0 for none.
+
+def _changed(point: Point) -> str:
+    """Return the name of a solver whose files here are not those that the point is to be made by, or nothing."""
+    try:
+        return "" if not point.content or content_of(point.solver) == point.content else point.solver
+    except ValueError:
+        return point.solver
+
+
+# ---------------------------------------------------------------------- flights
+
+
+def make_flights(
+    solver: str, settings: Mapping[str, Any], throws: Sequence[Throw], *, curves: int = 0, names: Sequence[str] = CURVES
+) -> list[Row]:
+    """Return the rows of flights: ``READ``, and the ``names`` of ``CURVES`` at so many equal times, or None.
+
+    Throws by an equation of the reference are solved by one call, which gives the same to the last bit.
     """
-    began = time.perf_counter()
-    here = code_identity()
-    outcomes = list(_made(points, keep, curves)) if here == code and not _changed(points) else []
-    changed = _changed(points)  # while they were made, too: then nobody knows by which
-    return Returned(here, versions(), () if changed else outcomes, time.perf_counter() - began, changed)
+    flights = _fly(solver, settings, throws, slices=curves > 0 and "v_cm" in names)
+    return [read_flight(flight) | (_curves(flight, curves, names) if curves else {}) for flight in flights]
 
 
-def _made(points: Sequence[Point], keep: bool, curves: int) -> Iterator[Outcome | Landed]:
-    if points and points[0].solver == LAND:
-        from flipproof.landing.work import make_landing
+def _fly(
+    solver: str, settings: Mapping[str, Any], throws: Sequence[Throw], slices: bool = False
+) -> list[Trajectory | Row]:
+    """Return the flight of every throw, with its ``slices`` if asked, or the row that says why there is none."""
+    asked = [scenario_of(throw) for throw in throws]
+    if not slices and _package(solver) == "ode_reference" and solver not in WATERS and settings.keys() <= SHARED:
+        import ode_reference
 
-        yield from map(make_landing, points)
-        return
-    for begin in range(0, len(points), TOGETHER):
-        some = points[begin : begin + TOGETHER]
-        together = None if keep or curves else make_together(some)
-        yield from together or [make_point(point, keep, curves) for point in some]
-
-
-def _changed(points: Sequence[Point]) -> str:
-    """Return the name of a solver whose files here are not those that the points are to be made by, or nothing."""
-    for solver, content in {(point.solver, point.content) for point in points if point.content}:
         try:
-            same = content_of(solver) == content
-        except ValueError:
-            same = False
-        if not same:
-            return solver
-    return ""
+            possible = [throw for throw in asked if isinstance(throw, Scenario)]
+            flights = iter(ode_reference.solve_batch(possible, solver, jobs=1, **settings).flights)
+            return [next(flights) if isinstance(throw, Scenario) else throw for throw in asked]
+        except Exception:  # one of them cannot be solved: alone each says what is wrong with it
+            pass
+    return [_alone(solver, settings, throw) if isinstance(throw, Scenario) else throw for throw in asked]
 
 
-def make_together(points: Sequence[Point]) -> list[Outcome] | None:
-    """Make points of one equation of the reference by one call; None where they must be made one by one."""
-    solver, settings = points[0].solver, points[0].settings
-    if any(point.solver != solver or point.settings != settings for point in points):
-        return None
-    if find(solver).package != "ode_reference" or solver in WATERS or not settings.keys() <= SHARED:
-        return None
-    from ode_reference import solve_batch
-
-    throws: list[Scenario] = []
-    outcomes: dict[int, Outcome] = {}
-    began = time.perf_counter()
-    for point in points:
-        try:
-            throws.append(point.scenario())
-        except ScenarioError as error:
-            outcomes[point.number] = Outcome(number=point.number, status="impossible", reason=str(error))
+def scenario_of(throw: Throw) -> Scenario | Row:
+    """Return the scenario, or the status and reason of a throw that no bottle can make."""
+    fields = dict(throw["scenario"])
+    fields["launch_velocity"] = tuple(fields["launch_velocity"])
     try:
-        flights = solve_batch(throws, solver, jobs=1, **settings).flights
-    except Exception:
-        # One of them cannot be solved: alone each says what is wrong with it.
-        return None
-    seconds = (time.perf_counter() - began) / len(points)
-    possible = (point.number for point in points if point.number not in outcomes)
-    outcomes |= {number: _read(number, flight, seconds) for number, flight in zip(possible, flights, strict=True)}
-    return [outcomes[point.number] for point in points]
-
-
-def make_point(point: Point, keep: bool = False, curves: int = 0) -> Outcome:
-    """Make one point; whatever goes wrong becomes its status and reason."""
-    try:
-        scenario = point.scenario()
+        return Scenario(bottle=Bottle(**throw["bottle"]), **fields)
     except ScenarioError as error:
-        return Outcome(number=point.number, status="impossible", reason=str(error))
-    began = time.perf_counter()
+        return {"status": "impossible", "reason": str(error)}
+
+
+def _alone(solver: str, settings: Mapping[str, Any], throw: Scenario) -> Trajectory | Row:
     try:
-        made = make(Run(point.solver, scenario, point.settings, label=""))
-    except Exception as error:
-        # A sweep of days does not end because one point met a mistake in a solver.
-        seconds = time.perf_counter() - began
-        return Outcome(number=point.number, status="failed", reason=f"{type(error).__name__}: {error}", seconds=seconds)
-    if made.trajectory is None:
-        return Outcome(number=point.number, status="failed", reason=made.reason, seconds=made.seconds)
-    flight = made.trajectory
-    outcome = _read(point.number, flight, made.seconds)
-    return replace(
-        outcome,
-        arrays=_arrays(flight) if keep and len(flight.t) else None,
-        curves=curves_of(flight, curves) if curves and flight.status in WHOLE else None,
-    )
+        return solve(solver, throw, **settings)
+    except Exception as error:  # a sweep of days does not end because one point met a mistake in a solver
+        return {"status": "failed", "reason": f"{type(error).__name__}: {error}"}
+
+
+def read_flight(flight: Trajectory | Row) -> Row:
+    """Return plateau [1], omega [rad/s], theta [rad], r_CM [m] and t [s] at the end, and the impacts counted.
+
+    None where a flight did not reach its end, or where the solver does not give the number; ``reason`` says why.
+    """
+    row: Row = dict.fromkeys(READ) | {"status": "failed", "message": "", "reason": ""}
+    if isinstance(flight, dict):
+        return row | flight
+    if not len(flight.t):
+        return row | {"reason": f"{flight.status}: {flight.message}"}
+    reasons = []
+    if flight.status in WHOLE:
+        # A number out of range is missing with a reason here; it must not also appear as a warning.
+        with np.errstate(all="ignore"):
+            found = {"plateau": plateau(flight.t, flight.omega, flight.scenario.omega0)}
+        found |= {f"{name}_end": float(getattr(flight, name)[-1]) for name in ("omega", "theta", "r_cm")}
+        row |= {name: value if math.isfinite(value) else None for name, value in found.items()}
+        reasons += [f"{name} is not finite" for name in found if row[name] is None]
+        if "r_cm" in flight.diagnostics.get("not_given", ()):
+            row["r_cm_end"] = None
+            reasons.append(f"{flight.method} gives no r_cm")
+    else:
+        reasons.append(f"{flight.status}: the flight ends at t = {flight.t[-1]:.6g} s")
+    if flight.impacts is None:
+        reasons.append(f"{flight.method} counts no impacts")
+    row["impacts"] = None if flight.impacts is None else len(flight.impacts)
+    own = {"t_end": float(flight.t[-1]), "status": flight.status, "message": flight.message}
+    return row | own | {"reason": "; ".join(reasons)}
+
+
+def _curves(flight: Trajectory | Row, points: int, names: Sequence[str]) -> Row:
+    if isinstance(flight, dict) or flight.status not in WHOLE or not len(flight.t):
+        return dict.fromkeys(names)
+    curves = dict(zip(CURVES, curves_of(flight, points), strict=True))
+    return {name: None if np.isnan(curves[name]).any() else curves[name].tolist() for name in names}
 
 
 def curves_of(flight: Trajectory, points: int) -> FloatArray:
@@ -230,41 +273,3 @@ def curves_of(flight: Trajectory, points: int) -> FloatArray:
     kept = len(flight.v) == len(flight.t)
     v_cm = centre_of_mass_velocity(flight.scenario, flight.v) if kept else np.full(len(flight.t), np.nan)
     return np.array([np.interp(times, flight.t, curve) for curve in (flight.omega, flight.theta, flight.r_cm, v_cm)])
-
-
-def _read(number: int, flight: Trajectory, seconds: float) -> Outcome:
-    if len(flight.t) == 0:
-        return Outcome(number=number, status="failed", reason=f"{flight.status}: {flight.message}", seconds=seconds)
-    values: dict[str, Any] = dict.fromkeys(("plateau", "omega_end", "theta_end", "r_cm_end"))
-    reasons = []
-    if flight.status in WHOLE:
-        # A number out of range is missing with a reason here; it must not also appear as a warning.
-        with np.errstate(all="ignore"):
-            found = {
-                "plateau": plateau(flight.t, flight.omega, flight.scenario.omega0),
-                "omega_end": float(flight.omega[-1]),
-                "theta_end": float(flight.theta[-1]),
-                "r_cm_end": float(flight.r_cm[-1]),
-            }
-        values = {name: value if math.isfinite(value) else None for name, value in found.items()}
-        reasons += [f"{name} is not finite" for name, value in values.items() if value is None]
-        if "r_cm" in flight.diagnostics.get("not_given", ()):
-            values["r_cm_end"] = None
-            reasons.append(f"{flight.method} gives no r_cm")
-    else:
-        reasons.append(f"{flight.status}: the flight ends at t = {flight.t[-1]:.6g} s")
-    if flight.impacts is None:
-        reasons.append(f"{flight.method} counts no impacts")
-    return Outcome(
-        number=number, **values, t_end=float(flight.t[-1]),
-        impacts=None if flight.impacts is None else len(flight.impacts), status=flight.status,
-        message=flight.message, reason="; ".join(reasons), seconds=seconds,
-    )  # fmt: skip
-
-
-def _arrays(flight: Trajectory) -> dict[str, NDArray[Any]]:
-    names = ("t", "theta", "omega", "r_cm", "inertia", "r", "v")
-    arrays: dict[str, NDArray[Any]] = {name: np.asarray(getattr(flight, name)) for name in names}
-    if flight.impacts is not None:
-        arrays |= {f"impact_{name}": getattr(flight.impacts, name) for name in flight.impacts.__slots__}
-    return arrays

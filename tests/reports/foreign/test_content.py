@@ -2,19 +2,18 @@
 
 import os
 import py_compile
-import sqlite3
 import sys
-from contextlib import closing
 
 import pytest
 
 from flipproof.foreign.specs import content_of
 from flipproof.frame.solvers import solve
+from flipproof.frame.store import Store
 from flipproof.sweep.command import sweep
 from flipproof.sweep.design import read_design
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.store import Store
-from flipproof.sweep.work import code_identity, make_batch
+from flipproof.sweep.loop import rows_of
+from flipproof.sweep.work import code_identity, make_points
 from slicemodel import Scenario
 
 SPIN = """
@@ -49,58 +48,42 @@ def mine(tmp_path):
 
 
 def swept(folder):
-    return sweep(folder / "sweep.toml", folder / "out", lambda *_: lambda *_: None, jobs=1)
+    return sweep(folder / "sweep.toml", folder / "out", lambda _: lambda *_: None, jobs=1)
 
 
 def rows(folder):
-    with closing(sqlite3.connect(folder / "out" / "sweep.sqlite")) as connection:
-        return connection.execute("SELECT number, omega_end, status FROM points ORDER BY number").fetchall()
+    """Return omega at the end of the rows that the files as they are make of the design, None for those missing."""
+    with Store(folder / "out" / "sweep.sqlite") as store:
+        found = rows_of(store, read_design(folder / "sweep.toml").points())
+        return [None if row is None else row["omega_end"] for row in found]
 
 
-def drop(folder, number):
-    with closing(sqlite3.connect(folder / "out" / "sweep.sqlite")) as connection:
-        connection.execute("DELETE FROM points WHERE number = ?", (number,))
-        connection.commit()
-
-
-def test_a_sweep_goes_on_with_the_files_it_was_begun_with_and_no_others(mine):
-    assert "6 ok" in swept(mine)
+def test_rows_by_other_files_are_made_beside_the_old_ones(mine):
+    assert "6 ok; 6 made" in swept(mine)
     before = rows(mine)
-    assert [omega for _, omega, _ in before][3:] == [7.0] * 3
-    drop(mine, 5)
+    assert before[3:] == [7.0] * 3
     for file, other in (("mine.py", SPIN + "\n# faster\n"), ("spins.py", "SPIN = 8.0\n")):
         old = (mine / file).read_text()
         (mine / file).write_text(other)
-        with pytest.raises(SweepError, match=r"was begun with other code of .*mine\.py:solve; go on with") as caught:
-            swept(mine)
-        assert "\n" not in str(caught.value)
-        assert rows(mine) == before[:5]
+        assert rows(mine) == before[:3] + [None] * 3
         (mine / file).write_text(old)
-    assert "5 were there" in swept(mine)
+    (mine / "spins.py").write_text("SPIN = 8.0\n")
+    assert "3 were there" in swept(mine)
+    assert rows(mine) == before[:3] + [8.0] * 3
+    (mine / "spins.py").write_text("SPIN = 7.0\n")
+    assert "6 were there" in swept(mine)
     assert rows(mine) == before
 
 
-def test_no_row_of_the_old_files_is_saved_for_the_new_ones(mine):
-    swept(mine)
-    (mine / "spins.py").write_text("SPIN = 8.0\n")
-    out = mine / "other"
-    words = sweep(mine / "sweep.toml", out, lambda *_: lambda *_: None, damaged=mine / "out")
-    assert words.startswith("3 of 6 points")  # those of eq8
-    with Store(out, read_design(mine / "sweep.toml"), code_identity()) as store:
-        assert list(store.done()) == [1, 1, 1, 0, 0, 0]
-
-
 def test_a_worker_whose_file_is_another_makes_nothing(mine):
-    design = read_design(mine / "sweep.toml")
-    points = [design.point(number) for number in (3, 4)]
-    batch = make_batch(code_identity(), points, False)
-    assert [one.omega_end for one in batch.outcomes] == [7.0, 7.0]
+    points = list(read_design(mine / "sweep.toml").points())[3:5]
+    assert [row["omega_end"] for row in make_points(code_identity(), points).rows] == [7.0, 7.0]
     (mine / "spins.py").write_text("SPIN = 8.0\n")
-    batch = make_batch(code_identity(), points, False)
-    assert not batch.outcomes
-    assert batch.changed.endswith("mine.py:solve")
+    made = make_points(code_identity(), points)
+    assert not made.rows
+    assert made.changed.endswith("mine.py:solve")
     (mine / "mine.py").unlink()
-    assert make_batch(code_identity(), points, False).changed == batch.changed
+    assert make_points(code_identity(), points).changed == made.changed
 
 
 def test_a_file_that_changes_during_a_sweep_ends_it_in_one_line(mine):
@@ -112,10 +95,12 @@ def test_a_file_that_changes_during_a_sweep_ends_it_in_one_line(mine):
         "        Path(__file__).with_name('spins.py').write_text('SPIN = 8.0\\n')\n"
     )
     (mine / "mine.py").write_text(text)
-    with pytest.raises(SweepError, match="are not those that the sweep was begun with"):
+    with pytest.raises(SweepError, match="are not those that the sweep was begun with") as caught:
         swept(mine)
-    assert {omega for number, omega, _ in rows(mine) if number >= 3} <= {7.0}
-    assert 4 not in [number for number, *_ in rows(mine)]
+    assert "\n" not in str(caught.value)
+    (mine / "spins.py").write_text("SPIN = 7.0\n")
+    assert set(rows(mine)[3:]) <= {7.0, None}
+    assert rows(mine)[4] is None
 
 
 def test_a_changed_file_is_loaded_again_in_a_program_that_goes_on(mine, monkeypatch):

@@ -351,11 +351,11 @@ def _energies(kind: Kind, cases: Cases, rows: Rows, size: Size) -> list[Energy]:
     if wanted not in cases:
         return []
     case, some = cases[wanted], rows[list(cases).index(wanted)]
-    design = Throws(cases=(case,), seed=size.seed, text="")
+    design = Throws(cases=(case,), seed=size.seed)
     table = Table(height=case.aim.height, restitution=case.restitution, friction=case.friction)
     found = []
     for place, row in enumerate(islice(some, 10)):
         if row.outcome not in (None, "undecided"):
-            run = path(fly(design.point(place).scenario(), table), table, case.law, duration=0.45)
+            run = path(fly(design.thrown(case, place), table), table, case.law, duration=0.45)
             found.append(Energy(kind, run.t, run.energy / run.saddle, str(row.outcome)))
     return found
