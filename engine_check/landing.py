@@ -1,61 +1,53 @@
-"""The landing verb of this room: one touch and one table in, one certified outcome of a physics engine out."""
+r"""The landing verb of this room: one touch and one table in, one certified outcome of MuJoCo out.
+
+Contacts are rigid: impulses from the engine's own mass matrix and Jacobians.
+
+The world is that of ``mujoco_world``: a tree of joints with q = (x, y, theta, r_1 .. r_N), whose limits and contacts
+are switched off. A step of Moreau and Jean: places by half a step; there the engine's accelerations (Coriolis, weight
+and drag included), mass matrix M and Jacobian J of the contacts that are closed or overrun; impulses p; velocities;
+places by the other half. With u = J v before and the free velocity f = J (v + a dt),
+
+    u+ = f + J M^-1 J^T p,     0 <= p_n,   u_n+ >= max(-e u_n, 0),   product 0,     |p_t| <= mu p_n
+
+e is the table's for a corner and the water's for a slice. Friction opposes slip. The law "in-turn" finds the impulses
+of the corners first, without the slices, and then those of all contacts from the velocities that they leave.
+
+Overrun gaps are answered at the end of the step in which they close: everything that closes within one step shares its
+impulses, and things sink in by speed times step. Half the step certifies.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
-from types import MappingProxyType
-from typing import Final, Protocol
+from typing import Final
 
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from engine_check.mujoco_log import no_log
+from engine_check.mujoco_setup import verify
+from engine_check.mujoco_world import TUBE, TUBE_DOFS
+from engine_check.mujoco_world import build as release
+from engine_check.readback import differences, matched
 from engine_check.solver import checked_number
+from slicemodel.compiled import compiled, kept_on_disk
 from slicemodel.scenario import Scenario, unknown_name
 from slicemodel.table import ENERGY_RISE, LAWS, LONGEST_LANDING, Outcome, Table, Touch
+from slicemodel.trajectory import FloatArray
 
-
-@dataclass(frozen=True, slots=True)
-class Lander:
-    """An engine that lands bottles: its module, its laws and slices, and why.
-
-    Parameters
-    ----------
-    module : str - has ``build``, which returns a ``Body``, and ``quiet``, within which the engine writes no file
-    dt, ice_dt : float - default steps for water and for ice [s]
-    halvings : int - of the step, after which an outcome that still changes is left undecided
-    rise : float - rise of the energy in an impact beyond which a landing is not certified [E_s]
-    """
-
-    module: str
-    dt: float
-    ice_dt: float
-    halvings: int
-    laws: tuple[str, ...]
-    slices: tuple[str, ...]
-    rise: float
-    reason: str
-
+LANDERS: Final = ("mujoco",)
+"""Engines that land bottles."""
 
 STEP: Final = 2e-5
 ICE_STEP: Final = 1e-4
 """Steps of rigid contacts [s]. Whatever closes within a step strikes at once, which hits in a cascade of water do not:
 with steps of 1e-4 s some 4 % of its touches end otherwise than event by event (docs/landing.md, section 3)."""
 
-LANDERS: Final[Mapping[str, Lander]] = MappingProxyType(
-    {
-        "mujoco": Lander(
-            module="engine_check.landing_mujoco",
-            dt=STEP,
-            ice_dt=ICE_STEP,
-            halvings=4,
-            laws=("together", "in-turn"),
-            slices=("exclude", "staggered"),
-            rise=ENERGY_RISE,
-            reason="impulses from the engine's own mass matrix and Jacobians: rigid contacts under either law",
-        ),
-    }
-)
-"""Engines by name."""
+HALVINGS: Final = 4
+"""Of the step, after which an outcome that still changes is left undecided."""
 
 CHECK_EVERY: Final = 1e-3
 """Time between two looks at the energy [s]."""
@@ -65,6 +57,123 @@ SLICES: Final = ("exclude", "staggered")
 ALOFT: Final = 1e-3
 LANDED: Final = 1e-4
 """Heights of the lowest corner beyond which the bottle is off the table, and below which it is on it again [m]."""
+
+CLOSED: Final = 1e-9
+"""Gap up to which a slice rests or a corner touches [L]."""
+
+SLOWEST_IMPACT: Final = 0.05
+"""Speed at which a corner comes down [m/s] from which on the law "in-turn" takes it for an impact."""
+
+MOST_SWEEPS = 5_000
+CONVERGED = 1e-11
+"""Change of a velocity in a sweep below which the sweeps end [m/s]."""
+
+TOLERATED = 1e-3
+"""The same after the last sweep: on two corners at once friction can be shared in many ways, and the sweeps
+creep towards one of them."""
+
+
+def land(
+    touch: Touch,
+    table: Table,
+    engine: str = "mujoco",
+    dt: float | None = None,
+    *,
+    law: str | None = None,
+    slices: str = "exclude",
+) -> Outcome:
+    """Land a bottle on a table in a rigid-body engine until its outcome is certain.
+
+    Parameters
+    ----------
+    touch : Touch
+    table : Table
+    engine : str
+        A name in ``LANDERS``.
+    dt : float, optional
+        Step [s], in (0, 1e-3]; ``STEP`` for water or ``ICE_STEP`` for ice otherwise. Half of it certifies; where that
+        ends otherwise, or gives energy, the step is halved again, ``HALVINGS`` times in all.
+    law : str, optional
+        A name in ``slicemodel.table.LAWS``; "together" by default. Ice has none.
+    slices : str
+        "exclude" or "staggered". Without effect on ice.
+
+    Returns
+    -------
+    Outcome
+        Certified if the energy falls below the saddle with a step and with half of it, alike, and with the half step
+        never rises by more than ``ENERGY_RISE`` of the saddle in an impact. Its numbers are those of the
+        half step, ``settings["dt"]``; ``diagnostics`` has the outcomes with the steps from ``dt`` on, each half of the
+        one before.
+
+    Raises
+    ------
+    ValueError
+        Naming the argument, its value and the admissible values.
+    SetupError
+        If the engine did not receive what was meant.
+    """
+    if engine not in LANDERS:
+        raise ValueError(unknown_name("engine =", engine, LANDERS))
+    if slices == "overlap":
+        raise ValueError(
+            "slices = 'overlap' is refused: overlapping slices at rest all sink to the base, which puts the centre of "
+            f"mass too low (admissible: {', '.join(SLICES)})"
+        )
+    chosen = "together" if law is None else law
+    if chosen not in LAWS:
+        raise ValueError(unknown_name("law =", chosen, LAWS))
+    if slices not in SLICES:
+        raise ValueError(unknown_name("slices =", slices, SLICES))
+    if touch.scenario.frozen and law is not None:
+        raise ValueError(f"law = {law!r} has no meaning for ice (scenario.frozen): leave it out")
+    default = ICE_STEP if immovable(touch.scenario) else STEP
+    step = default if dt is None else checked_number("dt", dt, 0.0, 1e-3 * (1 + 1e-12), " s")
+
+    def run(step: float) -> Run:
+        with no_log():
+            return landed(World(touch, table, step, chosen, slices), touch.scenario, step)
+
+    fine, reason = run(step), ""
+    outcomes = [fine.outcome]
+    for _ in range(HALVINGS):
+        step, coarse = step / 2, fine
+        fine = run(step)
+        outcomes.append(fine.outcome)
+        reason = _doubt(coarse, fine)
+        if not reason or coarse.reason or fine.reason:
+            break
+    return Outcome(
+        outcome="undecided" if reason else fine.outcome,
+        certified=None if reason else fine.time,
+        margin=None if reason else fine.margin,
+        bounces=fine.bounces,
+        slid=None if reason else fine.slid,
+        reason=reason,
+        solver="engine_check",
+        method=engine,
+        settings={
+            "engine": engine,
+            "law": None if touch.scenario.frozen else chosen,
+            "slices": None if touch.scenario.frozen else slices,
+            "dt": step,
+            "height": table.height,
+            "restitution": table.restitution,
+            "friction": table.friction,
+            **fine.settings,
+        },
+        diagnostics={"energy_rise": fine.rise, "outcomes": outcomes, "setup": dict(fine.setup)},
+    )
+
+
+def _doubt(coarse: Run, fine: Run) -> str:
+    """Return why two runs, the second with half the step, certify no outcome; or nothing."""
+    reason = coarse.reason or fine.reason
+    if not reason and not fine.rise <= ENERGY_RISE:
+        reason = f"the energy rises by {fine.rise:.2g} of the saddle, more than {ENERGY_RISE:g}"
+    if not reason and coarse.outcome != fine.outcome:
+        reason = f"half the step ends {fine.outcome} instead of {coarse.outcome}"
+    return reason
 
 
 @dataclass(slots=True)
@@ -78,7 +187,6 @@ class Watch:
     lean_on_cap: float = field(init=False)
     bounces: int = 0
     aloft: bool = False
-    rise: float = 0.0
 
     def __post_init__(self) -> None:
         bottle, water = self.scenario.bottle, self.scenario.water_mass
@@ -130,25 +238,7 @@ class Run:
     settings: Mapping[str, object]
 
 
-class Body(Protocol):
-    """What ``landed`` asks of an engine's world."""
-
-    setup: Mapping[str, float]
-    settings: Mapping[str, object]
-    ledger: float | None
-    """Largest rise of the energy in an impact [E_s], where the engine lets it be seen; else that between two looks."""
-
-    def advance(self) -> str:
-        """Make one step; return what left its band, or an empty string."""
-
-    def pose(self) -> tuple[float, float, float]:
-        """Return x, y of the middle of the tube [m] and theta [rad]."""
-
-    def energy(self) -> float:
-        """Return the energy over the table [J]."""
-
-
-def landed(body: Body, scenario: Scenario, dt: float) -> Run:
+def landed(body: World, scenario: Scenario, dt: float) -> Run:
     """Step ``body`` until its outcome is certain, a band is left, or the longest landing is over."""
     watch = Watch(scenario)
     x, y, theta = body.pose()
@@ -166,7 +256,6 @@ def landed(body: Body, scenario: Scenario, dt: float) -> Run:
         watch.note(y, theta)
         if k % every == 0:
             energy = body.energy()
-            watch.rise = max(watch.rise, (energy - before) / watch.saddle)
             before = energy
             outcome = watch.outcome(theta, energy)
             if outcome:
@@ -179,118 +268,139 @@ def landed(body: Body, scenario: Scenario, dt: float) -> Run:
         margin=1.0 - before / watch.limit(theta),
         bounces=watch.bounces,
         slid=x + scenario.bottle.length / 2 * math.sin(theta) - origin,
-        rise=watch.rise if body.ledger is None else body.ledger,
+        rise=body.ledger,
         reason=reason,
         setup=body.setup,
         settings=body.settings,
     )
 
 
-def land(
-    touch: Touch,
-    table: Table,
-    engine: str = "mujoco",
-    dt: float | None = None,
-    *,
-    law: str | None = None,
-    slices: str = "exclude",
-) -> Outcome:
-    """Land a bottle on a table in a rigid-body engine until its outcome is certain.
+class World:
+    """One bottle over a table, and what ``landing.landed`` asks of it."""
 
-    Parameters
-    ----------
-    touch : Touch
-    table : Table
-    engine : str
-        A name in ``LANDERS``.
-    dt : float, optional
-        Step [s], in (0, 1e-3]; the engine's own for water or for ice otherwise. Half of it certifies; where that ends
-        otherwise, or gives energy, the step is halved again, ``LANDERS[engine].halvings`` times in all.
-    law : str, optional
-        A name in ``slicemodel.table.LAWS`` that the engine has; "together" by default. Ice has none.
-    slices : str
-        "exclude" or "staggered", as far as the engine has it. Without effect on ice.
+    def __init__(self, touch: Touch, table: Table, dt: float, law: str | None, slices: str) -> None:
+        scenario = touch.scenario
+        self.touch, self.table, self.dt, self.scenario = touch, table, dt, scenario
+        self.in_turn, self.chain = law == "in-turn", slices == "exclude"
+        self.rigid = immovable(scenario)
+        self.ledger, self.saddle = 0.0, Watch(scenario).saddle
+        if not self.rigid:
+            refuse_misplaced(touch, slices)
+        world = release(scenario, dt)
+        setup = verify(world, scenario, dt)
+        self.model, self.data = world.model, world.data
+        bottle = scenario.bottle
+        height = bottle.length / 2 * abs(math.cos(touch.theta)) + bottle.radius * abs(math.sin(touch.theta))
+        self.data.qpos[:TUBE_DOFS] = 0.0, height, touch.theta
+        self.data.qvel[:TUBE_DOFS] = *touch.velocity, touch.omega
+        if not self.rigid:
+            self.data.qpos[TUBE_DOFS:] = touch.r
+            self.data.qvel[TUBE_DOFS:] = touch.v
+        elif scenario.frozen:
+            self._refuse_moved_ice()
+        self.gradient, self.offset = self._gaps()
+        half, radius = bottle.length / 2, bottle.radius
+        self.corners = np.array([[x, y, 0.0] for y in (-half, half) for x in (-radius, radius)])
+        self.jacobian = np.zeros((3, self.model.nv))
+        self.settings: Mapping[str, object] = {"mujoco_version": mujoco.__version__, "method": "Moreau-Jean"}
+        meant = {"lowest_corner": 0.0, "velocity_x": touch.velocity[0], "velocity_y": touch.velocity[1]}
+        mujoco.mj_forward(self.model, self.data)
+        held = {
+            "lowest_corner": float(self._heights().min()),
+            "velocity_x": self._middle_velocity()[0],
+            "velocity_y": self._middle_velocity()[1],
+        }
+        self.setup = setup | matched(held, meant, differences(meant, held, dict.fromkeys(meant, 1.0)))
 
-    Returns
-    -------
-    Outcome
-        Certified if the energy falls below the saddle with a step and with half of it, alike, and with the half step
-        never rises by more than ``LANDERS[engine].rise`` of the saddle in an impact. Its numbers are those of the
-        half step, ``settings["dt"]``; ``diagnostics`` has the outcomes with the steps from ``dt`` on, each half of the
-        one before.
+    def _refuse_moved_ice(self) -> None:
+        """Raise ValueError for ice that is not where it froze: the engine's blocks are where they were at release."""
+        if np.max(np.abs(self.touch.r - self.scenario.initial_positions())) > 1e-9 * self.scenario.bottle.length:
+            raise ValueError("touch.r of a frozen scenario is not where its slices stand at release")
 
-    Raises
-    ------
-    ValueError
-        Naming the argument, its value and the admissible values.
-    SetupError
-        If the engine did not receive what was meant.
-    """
-    if engine not in LANDERS:
-        raise ValueError(unknown_name("engine =", engine, LANDERS))
-    lander = LANDERS[engine]
-    if slices == "overlap":
-        raise ValueError(
-            "slices = 'overlap' is refused: overlapping slices at rest all sink to the base, which puts the centre of "
-            f"mass too low (admissible: {', '.join(lander.slices)})"
-        )
-    for what, name, known, offered in (("law", law, LAWS, lander.laws), ("slices", slices, SLICES, lander.slices)):
-        if name is not None and name not in known:
-            raise ValueError(unknown_name(f"{what} =", name, known))
-        if name is not None and name not in offered:
-            has = ", ".join(offered) or "none"
-            raise ValueError(f"engine = {engine!r} has no {what} = {name!r} (it has: {has})")
-    chosen = law or next(iter(lander.laws), None)
-    if touch.scenario.frozen and law is not None:
-        raise ValueError(f"law = {law!r} has no meaning for ice (scenario.frozen): leave it out")
-    default = lander.ice_dt if immovable(touch.scenario) else lander.dt
-    step = default if dt is None else checked_number("dt", dt, 0.0, 1e-3 * (1 + 1e-12), " s")
-    module = import_module(lander.module)
+    def _middle_velocity(self) -> FloatArray:
+        mujoco.mj_jac(self.model, self.data, self.jacobian, None, self.data.xpos[TUBE], TUBE)
+        return np.asarray(self.jacobian @ self.data.qvel)
 
-    def run(step: float) -> Run:
-        with module.quiet():
-            return landed(module.build(touch, table, step, chosen, slices), touch.scenario, step)
+    def _heights(self) -> FloatArray:
+        """Return the heights of the corners [m]."""
+        return np.asarray(self.data.xpos[TUBE, 1] + self.corners @ self.data.xmat[TUBE, 3:6])
 
-    fine, reason = run(step), ""
-    outcomes = [fine.outcome]
-    for _ in range(lander.halvings):
-        step, coarse = step / 2, fine
-        fine = run(step)
-        outcomes.append(fine.outcome)
-        reason = _doubt(coarse, fine, lander)
-        if not reason or coarse.reason or fine.reason:
-            break
-    return Outcome(
-        outcome="undecided" if reason else fine.outcome,
-        certified=None if reason else fine.time,
-        margin=None if reason else fine.margin,
-        bounces=fine.bounces,
-        slid=None if reason else fine.slid,
-        reason=reason,
-        solver="engine_check",
-        method=engine,
-        settings={
-            "engine": engine,
-            "law": None if touch.scenario.frozen else chosen,
-            "slices": None if touch.scenario.frozen else slices,
-            "dt": step,
-            "height": table.height,
-            "restitution": table.restitution,
-            "friction": table.friction,
-            **fine.settings,
-        },
-        diagnostics={"energy_rise": fine.rise, "outcomes": outcomes, "setup": dict(fine.setup)},
-    )
+    def _corner(self, c: int) -> FloatArray:
+        """Return the rows of a corner's Jacobian upwards and along x, shape (2, nv)."""
+        place = self.data.xpos[TUBE] + self.data.xmat[TUBE].reshape(3, 3) @ self.corners[c]
+        mujoco.mj_jac(self.model, self.data, self.jacobian, None, place, TUBE)
+        return self.jacobian[[1, 0]]
 
+    def _gaps(self) -> tuple[FloatArray, FloatArray]:
+        """Return matrix and vector by which the gaps of the slices [m] follow from q."""
+        n = 0 if self.rigid else self.scenario.n_slices
+        unit = np.eye(self.model.nv)[TUBE_DOFS:]
+        low, high = (np.array(places[:n]) for places in stops(self.scenario))
+        if not self.chain or not n:
+            return np.concatenate([-unit, unit]), np.concatenate([high, -low])
+        between = np.full(n - 1, -self.scenario.slice_height)
+        gradient = np.concatenate([-unit[:1], unit[:-1] - unit[1:], unit[-1:]])
+        return gradient, np.concatenate([high[:1], between, -low[-1:]])
 
-def _doubt(coarse: Run, fine: Run, lander: Lander) -> str:
-    """Return why two runs, the second with half the step, certify no outcome; or nothing."""
-    reason = coarse.reason or fine.reason
-    if not reason and not fine.rise <= lander.rise:
-        reason = f"the energy rises by {fine.rise:.2g} of the saddle, more than {lander.rise:g}"
-    if not reason and coarse.outcome != fine.outcome:
-        reason = f"half the step ends {fine.outcome} instead of {coarse.outcome}"
-    return reason
+    def _contacts(self) -> tuple[FloatArray, FloatArray]:
+        """Return the Jacobian of all contacts, and their kinds: 1 a corner (two rows), 0 a slice (one row)."""
+        slack = CLOSED * self.scenario.bottle.length
+        corners = [self._corner(c) for c in np.flatnonzero(self._heights() <= slack).tolist()]
+        slices = self.gradient[self.gradient @ self.data.qpos + self.offset <= slack]
+        kinds = np.repeat([1, 0], [len(corners), len(slices)])
+        return np.concatenate([*corners, slices]), kinds
+
+    def advance(self) -> str:
+        """Make one step; return what left its band, or an empty string."""
+        model, data, dt = self.model, self.data, self.dt
+        before = data.qvel.copy()
+        data.qpos[:] += before * dt / 2
+        mujoco.mj_forward(model, data)
+        # Coriolis forces at the mean of the velocities: once more, with those that the first evaluation gives.
+        data.qvel[:] = before + data.qacc * dt / 2
+        mujoco.mj_forward(model, data)
+        free = before + data.qacc * dt
+        rows, kinds = self._contacts()
+        if len(kinds):
+            solved = np.zeros_like(rows)
+            mujoco.mj_solveM(model, data, solved, rows)
+            response = rows @ solved.T
+            stages = [(len(rows), kinds)]
+            corners = 2 * int(kinds.sum())
+            restitution = np.full(len(rows), self.scenario.restitution)
+            restitution[:corners] = self.table.restitution
+            # The corners alone take part in an impact of theirs, not in standing or sliding on the table.
+            if self.in_turn and corners and (rows[:corners:2] @ before).min() <= -SLOWEST_IMPACT:
+                stages.insert(0, (corners, kinds[kinds == 1]))
+            for part, chosen in stages:
+                bound = np.maximum(-restitution * (rows @ before), 0.0)[:part]
+                own = np.ascontiguousarray(response[:part, :part])
+                p, ok = impulses(own, (rows @ free)[:part], bound, chosen, self.table.friction)
+                if not ok:
+                    return "the impulses of a step have not converged"
+                change = p @ solved[:part]
+                # The work of impulses: their product with the mean of the velocities before and after.
+                work = p @ (rows[:part] @ (free + change / 2))
+                self.ledger = max(self.ledger, float(work) / self.saddle)
+                free = free + change
+                before = before + change
+        data.qvel[:] = free
+        data.qpos[:] += free * dt / 2
+        return ""
+
+    def pose(self) -> tuple[float, float, float]:
+        """Return x, y of the middle of the tube [m] and theta [rad]."""
+        x, y, theta = self.data.qpos[:TUBE_DOFS]
+        return float(x), float(y), float(theta)
+
+    def energy(self) -> float:
+        """Return the energy over the table [J], from the engine's mass matrix and the places of its bodies."""
+        model, data = self.model, self.data
+        mujoco.mj_forward(model, data)
+        momentum = np.zeros(model.nv)
+        mujoco.mj_mulM(model, data, momentum, data.qvel)
+        height = float(model.body_mass[TUBE:] @ data.xipos[TUBE:, 1])
+        return float(momentum @ data.qvel) / 2 + self.scenario.gravity * height
 
 
 def stops(scenario: Scenario) -> tuple[list[float], list[float]]:
@@ -322,3 +432,62 @@ def refuse_misplaced(touch: Touch, slices: str) -> None:
                 f"touch.r[{k - 1}] - touch.r[{k}] = {touch.r[k - 1] - place:.9g} m is below the length "
                 f"{touch.scenario.slice_height:.9g} m of a rod: take slices = 'staggered'"
             )
+
+
+@kept_on_disk()
+def impulses(
+    response: FloatArray, free: FloatArray, bound: FloatArray, kinds: NDArray[np.int64], friction: float
+) -> tuple[FloatArray, bool]:
+    """Return the impulses, shape (rows,), and whether they converged.
+
+    Contact k takes one row (kind 0: a normal) or two (kind 1: a normal and a tangent). Normals: p >= 0, velocity
+    free + response p >= bound, product 0. Tangents: |p_t| <= friction p_n, and no slip inside that cone.
+    """
+    rows = len(free)
+    p = np.zeros(rows)
+    u = free.copy()
+    largest = 0.0
+    for _ in range(MOST_SWEEPS):
+        largest = 0.0
+        k = 0
+        for kind in kinds:
+            new = max(p[k] + (bound[k] - u[k]) / response[k, k], 0.0)
+            if kind == 1:
+                new, along = with_friction(p, u, bound[k], response, k, friction)
+                change = along - p[k + 1]
+                p[k + 1] = along
+                u += response[:, k + 1] * change
+                largest = max(largest, abs(change) * response[k + 1, k + 1])
+            change = new - p[k]
+            p[k] = new
+            u += response[:, k] * change
+            largest = max(largest, abs(change) * response[k, k])
+            k += 1 + kind
+        if largest < CONVERGED:
+            return p, True
+    return p, largest < TOLERATED
+
+
+@compiled
+def with_friction(
+    p: FloatArray, u: FloatArray, bound: float, response: FloatArray, k: int, friction: float
+) -> tuple[float, float]:
+    """Return normal and tangential impulse of the contact at rows k, k + 1, the others as they are."""
+    nn, nt, tt = response[k, k], response[k, k + 1], response[k + 1, k + 1]
+    normal_free = u[k] - nn * p[k] - nt * p[k + 1]
+    slip_free = u[k + 1] - nt * p[k] - tt * p[k + 1]
+    if normal_free >= bound:
+        return 0.0, 0.0
+    det = nn * tt - nt * nt
+    normal = ((bound - normal_free) * tt + slip_free * nt) / det
+    along = (-slip_free * nn - (bound - normal_free) * nt) / det
+    if abs(along) <= friction * normal:
+        return normal, along
+    # On the edge of the cone; of its two sides friction opposes slip on one at most, for moderate coefficients.
+    for side in (-1.0, 1.0):
+        edge = nn + side * friction * nt
+        if edge > 0.0:
+            normal = (bound - normal_free) / edge
+            if (slip_free + (nt + tt * side * friction) * normal) * side <= 0.0:
+                return normal, side * friction * normal
+    return (bound - normal_free) / nn, 0.0

@@ -8,8 +8,8 @@ import pytest
 
 import engine_check
 import ode_reference
-from engine_check import landing, landing_mujoco
-from engine_check.landing import Run, Watch, landed
+from engine_check import landing
+from engine_check.landing import Run, Watch, World, landed
 from ode_reference.landing import world_of
 from slicemodel import Scenario, Table, Touch
 
@@ -33,7 +33,7 @@ def at_rest(scenario, tilt=0.0, omega=0.0, velocity=(0.0, 0.0), r=None):
 
 def rebound(touch, law="together", slices="exclude", dt=1e-5):
     """Speed of the middle upwards, over that downwards, 1 ms after a flat touch at 2 m/s."""
-    world = landing_mujoco.build(touch, FLAT, dt, law, slices)
+    world = World(touch, FLAT, dt, law, slices)
     heights = []
     for _ in range(round(3e-3 / dt)):
         assert not world.advance()
@@ -124,7 +124,7 @@ def test_a_mirrored_touch_lands_as_its_mirror_image(law):
         found = []
         for side in (1, -1):
             start = at_rest(replace(WATER, n_slices=3), side * tilt, side * omega, (side * velocity[0], velocity[1]))
-            found.append(landed(landing_mujoco.build(start, FLAT, 2e-4, law, "exclude"), start.scenario, 2e-4))
+            found.append(landed(World(start, FLAT, 2e-4, law, "exclude"), start.scenario, 2e-4))
         right, left = found
         assert (left.outcome, left.time) == (right.outcome, right.time)
         assert left.slid == pytest.approx(-right.slid, rel=1e-7, abs=0)
@@ -191,8 +191,8 @@ def test_the_set_up_is_read_back():
 
 
 def test_a_world_that_is_not_the_one_meant_is_refused(monkeypatch):
-    velocity = landing_mujoco.World._middle_velocity
-    monkeypatch.setattr(landing_mujoco.World, "_middle_velocity", lambda self: 1.01 * velocity(self))
+    velocity = World._middle_velocity
+    monkeypatch.setattr(World, "_middle_velocity", lambda self: 1.01 * velocity(self))
     with pytest.raises(engine_check.SetupError, match="velocity_y"):
         engine_check.land(flown(1), FLAT)
 

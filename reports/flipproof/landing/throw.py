@@ -62,11 +62,7 @@ def land_throw(
     for name, bottle in bottles.items():
         touch = ode_reference.fly(bottle, table)
         for program in programs:
-            laws: tuple[str | None, ...] = tuple(LAWS) if program == REFERENCE else LANDERS[program].laws
-            if bottle.frozen or not laws:
-                laws = (None,)
-            elif law is not None:
-                laws = tuple(known for known in laws if known == law)
+            laws = (None,) if bottle.frozen else tuple(LAWS) if law is None else (law,)
             for chosen in laws:
                 outcome = landed(touch, table, program, chosen)
                 rows.append(Row(name=name, touch=touch, program=program, law=chosen, outcome=outcome))
