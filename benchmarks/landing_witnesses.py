@@ -115,7 +115,7 @@ def landed(name: str, found: list[Touch], case: Case, dt: float | None) -> list[
             outcome = ode_reference.land(touch, table, law, slices or "exclude")
         else:
             outcome = engine_check.land(touch, table, name, dt, law=law, slices=slices or "exclude")
-        ends = outcome.diagnostics.get("outcomes") or [outcome.diagnostics[part] for part in ("coarse", "fine")]
+        ends = outcome.diagnostics["outcomes"] if name == REFERENCE else outcome.diagnostics["outcomes"][0]
         seconds = time.process_time() - began
         rows.append(Row(outcome.outcome, outcome.certified, str(ends[0]), str(ends[1]), outcome.reason, seconds))
     return rows

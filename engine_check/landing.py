@@ -12,8 +12,10 @@ places by the other half. With u = J v before and the free velocity f = J (v + a
 e is the table's for a corner and the water's for a slice. Friction opposes slip. The law "in-turn" finds the impulses
 of the corners first, without the slices, and then those of all contacts from the velocities that they leave.
 
-Overrun gaps are answered at the end of the step in which they close: everything that closes within one step shares its
-impulses, and things sink in by speed times step. Half the step certifies.
+Overrun gaps are answered at the end of the step in which they close, and things sink in by speed times step. What
+closes within one step strikes in the order in which it closes, and slices strike one another pair after pair: a cascade
+is micrometres apart, so that hits which share a step are not simultaneous however short the step is. Half the step and
+neighbouring touches certify.
 """
 
 from __future__ import annotations
@@ -46,6 +48,10 @@ ICE_STEP: Final = 1e-4
 """Steps of rigid contacts [s]. Whatever closes within a step strikes at once, which hits in a cascade of water do not:
 with steps of 1e-4 s some 4 % of its touches end otherwise than event by event (docs/landing.md, section 3)."""
 
+TWIN: Final = 0.02
+"""Share by which the touches differ that have to end alike: near an edge between outcomes a halved step may end as the
+step does and both be wrong."""
+
 HALVINGS: Final = 4
 """Of the step, after which an outcome that still changes is left undecided."""
 
@@ -60,6 +66,12 @@ LANDED: Final = 1e-4
 
 CLOSED: Final = 1e-9
 """Gap up to which a slice rests or a corner touches [L]."""
+
+CORNERS: Final = 4
+
+LONGEST_CASCADE: Final = 1000
+SLOWEST_HIT: Final = 1e-6
+"""Hits of slices within one step, and the speed from which on one strikes [m/s]."""
 
 SLOWEST_IMPACT: Final = 0.05
 """Speed at which a corner comes down [m/s] from which on the law "in-turn" takes it for an impact."""
@@ -91,8 +103,8 @@ def land(
     engine : str
         A name in ``LANDERS``.
     dt : float, optional
-        Step [s], in (0, 1e-3]; ``STEP`` for water or ``ICE_STEP`` for ice otherwise. Half of it certifies; where that
-        ends otherwise, or gives energy, the step is halved again, ``HALVINGS`` times in all.
+        Step [s], in (0, 1e-3]; ``STEP`` for water or ``ICE_STEP`` for ice otherwise. Where half of it ends otherwise,
+        or gives energy, the step is halved again, ``HALVINGS`` times in all.
     law : str, optional
         A name in ``slicemodel.table.LAWS``; "together" by default. Ice has none.
     slices : str
@@ -101,10 +113,11 @@ def land(
     Returns
     -------
     Outcome
-        Certified if the energy falls below the saddle with a step and with half of it, alike, and with the half step
-        never rises by more than ``ENERGY_RISE`` of the saddle in an impact. Its numbers are those of the
-        half step, ``settings["dt"]``; ``diagnostics`` has the outcomes with the steps from ``dt`` on, each half of the
-        one before.
+        Certified if the energy falls below the saddle, alike, in six runs: with a step, with half of it, and with the
+        step from four touches that differ by ``TWIN`` (``Touch.twins``); and if with the half step it never rises by
+        more than ``ENERGY_RISE`` of the saddle in an impact. Its numbers are those of the half step,
+        ``settings["dt"]``; ``diagnostics`` has the outcomes with the steps from ``dt`` on, each half of the one
+        before, and those of the twins.
 
     Raises
     ------
@@ -130,18 +143,24 @@ def land(
     default = ICE_STEP if immovable(touch.scenario) else STEP
     step = default if dt is None else checked_number("dt", dt, 0.0, 1e-3 * (1 + 1e-12), " s")
 
-    def run(step: float) -> Run:
+    def run(touch: Touch, step: float) -> Run:
         with no_log():
             return landed(World(touch, table, step, chosen, slices), touch.scenario, step)
 
-    fine, reason = run(step), ""
+    fine = run(touch, step)
     outcomes = [fine.outcome]
     for _ in range(HALVINGS):
         step, coarse = step / 2, fine
-        fine = run(step)
+        fine = run(touch, step)
         outcomes.append(fine.outcome)
         reason = _doubt(coarse, fine)
         if not reason or coarse.reason or fine.reason:
+            break
+    twins = []
+    for twin in touch.twins(TWIN) if not reason else ():
+        twins.append(run(twin, 2 * step).outcome)
+        if twins[-1] != fine.outcome:
+            reason = f"a touch that differs by {TWIN:.0%} ends {twins[-1]} instead of {fine.outcome}"
             break
     return Outcome(
         outcome="undecided" if reason else fine.outcome,
@@ -162,7 +181,7 @@ def land(
             "friction": table.friction,
             **fine.settings,
         },
-        diagnostics={"energy_rise": fine.rise, "outcomes": outcomes, "setup": dict(fine.setup)},
+        diagnostics={"energy_rise": fine.rise, "outcomes": outcomes, "twins": twins, "setup": dict(fine.setup)},
     )
 
 
@@ -305,6 +324,7 @@ class World:
         self.settings: Mapping[str, object] = {"mujoco_version": mujoco.__version__, "method": "Moreau-Jean"}
         meant = {"lowest_corner": 0.0, "velocity_x": touch.velocity[0], "velocity_y": touch.velocity[1]}
         mujoco.mj_forward(self.model, self.data)
+        self.gaps = np.append(self._heights(), self.gradient @ self.data.qpos + self.offset)
         held = {
             "lowest_corner": float(self._heights().min()),
             "velocity_x": self._middle_velocity()[0],
@@ -342,13 +362,42 @@ class World:
         gradient = np.concatenate([-unit[:1], unit[:-1] - unit[1:], unit[-1:]])
         return gradient, np.concatenate([high[:1], between, -low[-1:]])
 
-    def _contacts(self) -> tuple[FloatArray, FloatArray]:
-        """Return the Jacobian of all contacts, and their kinds: 1 a corner (two rows), 0 a slice (one row)."""
+    def _rows(self, chosen: NDArray[np.bool_]) -> FloatArray:
+        """Return the Jacobian of some contacts, corners (two rows each) before slices (one row each)."""
+        corners = [self._corner(c) for c in np.flatnonzero(chosen[:CORNERS]).tolist()]
+        return np.concatenate([*corners, self.gradient[chosen[CORNERS:]]])
+
+    def _stages(self) -> tuple[NDArray[np.bool_], list[NDArray[np.bool_]]]:
+        """Return which contacts are closed at the middle of the step, and those of them that strike together, in order.
+
+        A contact closes where its gap, linear in time since the middle of the step before, is zero.
+        """
         slack = CLOSED * self.scenario.bottle.length
-        corners = [self._corner(c) for c in np.flatnonzero(self._heights() <= slack).tolist()]
-        slices = self.gradient[self.gradient @ self.data.qpos + self.offset <= slack]
-        kinds = np.repeat([1, 0], [len(corners), len(slices)])
-        return np.concatenate([*corners, slices]), kinds
+        now, before = np.append(self._heights(), self.gradient @ self.data.qpos + self.offset), self.gaps
+        self.gaps = now
+        closed = now <= slack
+        arrives = closed & (before > slack)
+        if arrives.sum() < 2:
+            return closed, [closed]
+        share = np.where(arrives, before / np.where(arrives, before - now, 1.0), 0.0)
+        return closed, [closed & (share <= until) for until in np.unique(share[arrives])]
+
+    def _cascade(
+        self, rows: FloatArray, solved: FloatArray, kinds: NDArray[np.int64], velocities: FloatArray
+    ) -> FloatArray:
+        """Return what hits of slices change, pair after pair, the fastest first.
+
+        What closes within a step is micrometres apart: pair after pair is what the limit of small steps does.
+        """
+        change = np.zeros_like(velocities)
+        for _ in range(LONGEST_CASCADE):
+            approach = np.where(kinds == 0, rows @ (velocities + change), 0.0)
+            k = int(np.argmin(approach))
+            if approach[k] > -SLOWEST_HIT:
+                break
+            push = -(1 + self.scenario.restitution) * approach[k] / float(rows[k] @ solved[k])
+            change = change + push * solved[k]
+        return change
 
     def advance(self) -> str:
         """Make one step; return what left its band, or an empty string."""
@@ -360,27 +409,39 @@ class World:
         data.qvel[:] = before + data.qacc * dt / 2
         mujoco.mj_forward(model, data)
         free = before + data.qacc * dt
-        rows, kinds = self._contacts()
-        if len(kinds):
+        closed, stages = self._stages()
+        if closed.any():
+            rows = self._rows(closed)
             solved = np.zeros_like(rows)
             mujoco.mj_solveM(model, data, solved, rows)
             response = rows @ solved.T
-            stages = [(len(rows), kinds)]
-            corners = 2 * int(kinds.sum())
-            restitution = np.full(len(rows), self.scenario.restitution)
-            restitution[:corners] = self.table.restitution
-            # The corners alone take part in an impact of theirs, not in standing or sliding on the table.
-            if self.in_turn and corners and (rows[:corners:2] @ before).min() <= -SLOWEST_IMPACT:
-                stages.insert(0, (corners, kinds[kinds == 1]))
-            for part, chosen in stages:
-                bound = np.maximum(-restitution * (rows @ before), 0.0)[:part]
-                own = np.ascontiguousarray(response[:part, :part])
-                p, ok = impulses(own, (rows @ free)[:part], bound, chosen, self.table.friction)
+            corner = np.arange(len(closed)) < CORNERS
+            kinds = corner[closed].astype(np.int64)
+            restitution = np.where(kinds, self.table.restitution, self.scenario.restitution)
+            first_row = np.cumsum(1 + kinds) - 1 - kinds
+            cascade = self._cascade(rows[first_row], solved[first_row], kinds, before)
+            free, before = free + cascade, before + cascade
+            if self.in_turn:
+                # The corners alone take part in an impact of theirs, not in standing or sliding on the table.
+                approach = np.zeros(len(closed))
+                approach[closed] = rows[first_row] @ before
+                parts = [
+                    [stage & corner, stage] if (approach[stage & corner] <= -SLOWEST_IMPACT).any() else [stage]
+                    for stage in stages
+                ]
+                stages = [part for some in parts for part in some]
+            for stage in stages:
+                taking = stage[closed]
+                chosen = np.repeat(taking, 1 + kinds)
+                bound = np.zeros(len(rows))
+                bound[first_row] = np.maximum(-restitution * (rows[first_row] @ before), 0.0)
+                own = np.ascontiguousarray(response[np.ix_(chosen, chosen)])
+                p, ok = impulses(own, rows[chosen] @ free, bound[chosen], kinds[taking], self.table.friction)
                 if not ok:
                     return "the impulses of a step have not converged"
-                change = p @ solved[:part]
+                change = p @ solved[chosen]
                 # The work of impulses: their product with the mean of the velocities before and after.
-                work = p @ (rows[:part] @ (free + change / 2))
+                work = p @ (rows[chosen] @ (free + change / 2))
                 self.ledger = max(self.ledger, float(work) / self.saddle)
                 free = free + change
                 before = before + change

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -151,6 +151,24 @@ class Touch:
     def tilt(self) -> float:
         """Return the angle from upright, theta modulo 2 pi, in [-pi, pi] [rad]."""
         return math.remainder(self.theta, math.tau)
+
+    def twins(self, shift: float) -> tuple[Touch, ...]:
+        """Return four touches beside this one, by which a landing says whether it is near an edge between outcomes.
+
+        The spin of two is larger and smaller by the share ``shift``, all other velocities of the other two; the tilt
+        of each differs by ``shift`` / 20 [rad], so that a bottle at rest has twins, too.
+        """
+        side = math.copysign(shift / 20, self.tilt)
+        return tuple(
+            replace(
+                self,
+                theta=self.theta + tilt * side,
+                omega=self.omega * (1 + spin * shift),
+                velocity=(self.velocity[0] * (1 + speed * shift), self.velocity[1] * (1 + speed * shift)),
+                v=self.v * (1 + speed * shift),
+            )
+            for spin, speed, tilt in ((1, 0, 1), (-1, 0, -1), (0, 1, -1), (0, -1, 1))
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
