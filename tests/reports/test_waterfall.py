@@ -155,3 +155,20 @@ def test_canonical_sets_make_the_same_equation():
         other = ode_reference.solve(throw, canonical(switches).name)
         np.testing.assert_array_equal(one.omega, other.omega)
     assert canonical(Switches(signs=True, drag_on_centre=True)) == Switches(signs=True, drag_on_centre=True)
+
+
+def test_other_counts_of_what_is_one_change_sum_to_the_same_whole():
+    """What origin and recoil do only together is theirs alone when they count as one; half of what is left is not."""
+    plateau = split(lambda s: 2.0 * s.weightless + 6.0 * (s.origin and s.recoil and s.weightless))[0]
+    whole = sum(bar.average for bar in plateau.bars if bar.name != waterfall.STEP)
+    for shares in plateau.groupings.values():
+        assert sum(shares.values()) == pytest.approx(whole, abs=1e-12)
+    bars = {bar.name: bar.average for bar in plateau.bars}
+    assert bars[NAME_OF["weightless"]] == pytest.approx(4.0)
+    joined = plateau.groupings["origin and recoil as one"]
+    assert joined[NAME_OF["weightless"]] == pytest.approx(5.0)
+    assert joined["origin and recoil"] == pytest.approx(3.0)
+    assert plateau.groupings["two layers"] == {
+        "algebra of Eq. 9": pytest.approx(0.0),
+        "physics of Eq. 8": pytest.approx(8.0),
+    }

@@ -12,7 +12,6 @@ solvers' own errors, and what is no choice of the ladder.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
@@ -22,10 +21,11 @@ from typing import Final
 import numpy as np
 
 from flipproof.chapters.solvers import LIMITS
-from flipproof.chapters.waterfall.study import NAMES, canonical, sets_before
+from flipproof.chapters.waterfall.study import NAMES, canonical
 from flipproof.foreign.checking import ask_of, drive, times_of
 from flipproof.foreign.contract import Answer, Ask, Traits
 from flipproof.foreign.specs import Runner
+from flipproof.frame import shapley
 from flipproof.frame.solvers import solve
 from ode_reference.models import MODELS
 from ode_reference.switches import Switches, are_switches
@@ -264,12 +264,7 @@ def shares(start: Switches, end: Switches, throw: Scenario) -> dict[str, float]:
         found = curve(switches.name, throw, times_of(throw, 1000))
         return plateau(found.t, found.omega, throw.omega0)
 
-    return {name: mean(changes) for name, changes in changes_of(start, end, of).items()}
-
-
-def mean(changes: Sequence[tuple[float, float]]) -> float:
-    """Return the mean of changes, each with its weight."""
-    return math.fsum(weight * change for weight, change in changes)
+    return {name: shapley.mean(changes) for name, changes in changes_of(start, end, of).items()}
 
 
 def changes_of(start: Switches, end: Switches, of: Callable[[Switches], float]) -> dict[str, list[tuple[float, float]]]:
@@ -283,7 +278,4 @@ def changes_of(start: Switches, end: Switches, of: Callable[[Switches], float]) 
     def value(turned: tuple[str, ...]) -> float:
         return once(canonical(replace(start, **{name: getattr(end, name) for name in turned})))
 
-    return {
-        name: [(weight, value((*chosen, name)) - value(chosen)) for chosen, weight in sets_before(name, differing)]
-        for name in differing
-    }
+    return shapley.changes_of(differing, value)

@@ -39,9 +39,10 @@ from flipproof.foreign import contract
 from flipproof.foreign.certify import Certificate, certify
 from flipproof.foreign.checking import effort_of
 from flipproof.foreign.contract import Traits, trajectory_of
-from flipproof.foreign.place import changes_of, mean, name_of, switches_of
+from flipproof.foreign.place import changes_of, name_of, switches_of
 from flipproof.foreign.specs import CSV, Runner, content_of, opened, written
 from flipproof.frame.chapter import Ask, Call, Flights, Missing, Run, Study, attempt
+from flipproof.frame.shapley import mean
 from ode_reference.models import LADDER, MODELS
 from ode_reference.switches import Switches
 from slicemodel import Scenario, Trajectory

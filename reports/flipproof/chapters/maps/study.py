@@ -4,7 +4,7 @@ The mapped error is the difference of the plateau, the mean of omega / omega_0 o
 what the paper reads off a flight, and an average forgives a rebound that comes a little early. The largest difference
 max |d omega| / omega_0 is kept beside it; a single impact that shifts in time saturates it.
 
-An assumption's number on a map is its fair share, the mean over all orders of mending (``waterfall.fair_share``): every
+An assumption's number on a map is its fair share, the mean over all orders of mending (``frame.shapley``): every
 combination of assumptions is flown in every cell.
 """
 
@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipproof.chapters.solvers import FREE, LIMITS, SCHEMES
-from flipproof.chapters.waterfall.study import NAMES, STEP, canonical, fair_share
+from flipproof.chapters.waterfall.study import NAMES, STEP, canonical, mended
+from flipproof.frame.shapley import fair_shares
 from flipproof.frame.solvers import Made, Run, make
 from flipproof.frame.twins import band, twins
 from ode_reference.models import LADDER as MODELS
@@ -230,7 +231,9 @@ def study_readings(
         largest={name: largest[name] for name in (*LADDER, *EXTRA)},
         step_error={scheme: np.abs(level[scheme] - level[LIMITS[scheme]]) for scheme in SCHEMES},
         reason=reason,
-        shares=np.array([level[LADDER[1]] - level[LADDER[0]], *(fair_share(name, of_sets) for name in NAMES)]),
+        shares=np.array(
+            [level[LADDER[1]] - level[LADDER[0]], *fair_shares(NAMES, lambda made: of_sets[mended(made)]).values()]
+        ),
         band=np.array([band(run, levels) for run in free]).reshape(shape) if banded else None,
         thrown=place_of(throw, axis, how.get("steps", 1000)),
     )

@@ -49,10 +49,15 @@ def claim_waterfall(waterfall: Waterfall) -> Finding:
     """From the published program to free flight, split over the assumptions; the bars sum to the whole."""
     largest, observable = waterfall.largest, waterfall.observable
     finer = f", {largest.finer:+.3g} at N = {FINER * waterfall.slices}" if largest.finer is not None else ""
+    counts = (
+        f"{words}: {', '.join(f'{name} {share:+.3g}' for name, share in shares.items())}"
+        for words, shares in waterfall.groupings.items()
+    )
     note = (
         f"largest fair share (mean over all orders): {largest.name}, {largest.average:+.3g} ± "
         f"{largest.average_band:.1g}, from {largest.low:+.3g} to {largest.high:+.3g} in single orders, at "
-        f"N = {waterfall.slices}{finer}; the bars miss the whole by {waterfall.residual:.1g}"
+        f"N = {waterfall.slices}{finer}; the bars miss the whole by {waterfall.residual:.1g}; "
+        f"in other counts of what is one change: {'; '.join(counts)}"
     )
     unit = "" if observable.unit == "1" else observable.unit
     title = f"{observable.words}: free flight minus published program"

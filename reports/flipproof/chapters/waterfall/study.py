@@ -15,18 +15,17 @@ minus free flight is a difference of two models.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
-from itertools import chain, combinations
-from typing import Final, NamedTuple, TypeVar
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import chain
+from typing import Final, NamedTuple
 
+from flipproof.frame.shapley import changes_of, fair_shares, grouped_shares, mean, sets_before
 from flipproof.frame.solvers import Run, finer, make
 from flipproof.frame.twins import band, twins
 from ode_reference.solver import COLUMN
 from ode_reference.switches import Switches
 from slicemodel import Scenario, Trajectory, observables
-from slicemodel.trajectory import FloatArray
 
 PROGRAM: Final = "published-python"
 NAMES: Final[Mapping[str, str]] = {
@@ -39,7 +38,21 @@ NAMES: Final[Mapping[str, str]] = {
 }
 """Switch -> the assumption it mends, in the order of the ladder."""
 
-Value = TypeVar("Value", float, FloatArray)
+GROUPINGS: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
+    "origin and recoil as one": {
+        **{words: (name,) for name, words in NAMES.items() if name not in ("origin", "recoil")},
+        "origin and recoil": ("origin", "recoil"),
+    },
+    "two layers": {
+        "algebra of Eq. 9": ("signs", "roots", "drag_on_centre"),
+        "physics of Eq. 8": ("weightless", "origin", "recoil"),
+    },
+}
+"""Other counts of what is one change.
+
+With recoil and an origin at rest impacts move the tube and the flight between them does not; with the origin alone it
+is the other way round. Momentum is kept in neither. As one change, every state has both or neither.
+"""
 
 STEP: Final = "finite step of the program"
 
@@ -104,7 +117,8 @@ class Waterfall:
     """The split of one observable at ``slices``; ``residual`` is the largest |total - sum of bars| of the splits.
 
     ``column`` is the observable of water that cannot overlap, in the margin of the split; ``finer_end`` that of free
-    flight at ``FINER`` times the slices, None if that was not computed.
+    flight at ``FINER`` times the slices, None if that was not computed. ``groupings`` are fair shares in other counts
+    of what is one change, by the names of ``GROUPINGS``.
     """
 
     observable: Observable
@@ -116,6 +130,7 @@ class Waterfall:
     residual: float
     column: float
     finer_end: float | None = None
+    groupings: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def total(self) -> float:
@@ -197,29 +212,32 @@ def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) 
     bands = {switches: band(run, observed) for switches, run in runs.items()}
     more = {switches: observed[finer(run)] for switches, run in runs.items() if finer(run) in observed}
     start = observed[program]
-    none, everything = Switches(), _with(NAMES)
+    none, everything = Switches(), mended(NAMES)
     step = values[none] - start
     # The same in every order.
     alike = dict.fromkeys(("forward", "backward", "average", "low", "high"), step)
     alike |= dict.fromkeys(("forward_band", "average_band"), bands[none])
     bars = [Bar(name=STEP, finer=more[none] - observed[finer(program)] if more else None, **alike)]
     order = list(NAMES)
-    for k, name in enumerate(order):
-        before, after, sets = order[:k], order[k + 1 :], list(sets_before(name, NAMES))
-        changes = [_change(name, chosen, values) for chosen, _ in sets]
+    finer_shares = fair_shares(NAMES, lambda made: more[mended(made)]) if more else {}
+    for (k, name), changes in zip(
+        enumerate(order), changes_of(NAMES, lambda made: values[mended(made)]).values(), strict=True
+    ):
+        before, after = order[:k], order[k + 1 :]
         bars.append(
             Bar(
                 name=NAMES[name],
-                forward=_change(name, before, values),
-                backward=_change(name, after, values),
-                average=fair_share(name, values),
-                low=min(changes),
-                high=max(changes),
-                forward_band=bands[_with(before)] + bands[_with([*before, name])],
+                forward=values[mended([*before, name])] - values[mended(before)],
+                backward=values[mended([*after, name])] - values[mended(after)],
+                average=mean(changes),
+                low=min(change for _, change in changes),
+                high=max(change for _, change in changes),
+                forward_band=bands[mended(before)] + bands[mended([*before, name])],
                 average_band=sum(
-                    weight * (bands[_with(chosen)] + bands[_with([*chosen, name])]) for chosen, weight in sets
+                    weight * (bands[mended(chosen)] + bands[mended([*chosen, name])])
+                    for chosen, weight in sets_before(name, NAMES)
                 ),
-                finer=fair_share(name, more) if more else None,
+                finer=finer_shares.get(name),
             )
         )
     total = values[everything] - start
@@ -238,29 +256,12 @@ def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) 
         residual=residual,
         column=observed[column_run(program.scenario)],
         finer_end=more[everything] if more else None,
+        groupings={
+            words: grouped_shares(groups, lambda made: values[mended(made)]) for words, groups in GROUPINGS.items()
+        },
     )
 
 
-def _with(names: Iterable[str]) -> Switches:
+def mended(names: Iterable[str]) -> Switches:
+    """Return the switches with these on."""
     return Switches(**dict.fromkeys(names, True))
-
-
-def _change(name: str, others: Iterable[str], values: Mapping[Switches, Value]) -> Value:
-    """Return what switching ``name`` on changes when ``others`` are on."""
-    return values[_with([*others, name])] - values[_with(others)]
-
-
-def sets_before(name: str, names: Collection[str]) -> Iterator[tuple[tuple[str, ...], float]]:
-    """Yield every set of other ``names`` with the share of all orders in which just these come before ``name``."""
-    others = [other for other in names if other != name]
-    n = len(names)
-    for size in range(n):
-        weight = math.factorial(size) * math.factorial(n - size - 1) / math.factorial(n)
-        for chosen in combinations(others, size):
-            yield chosen, weight
-
-
-def fair_share(name: str, values: Mapping[Switches, Value]) -> Value:
-    """Return what switching ``name`` on changes, as the mean over all orders (the Shapley value), of values by set."""
-    shares = [weight * _change(name, chosen, values) for chosen, weight in sets_before(name, NAMES)]
-    return sum(shares[1:], shares[0])
