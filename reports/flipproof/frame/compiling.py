@@ -1,4 +1,4 @@
-"""One line on standard error when functions are compiled, which takes long, and none when they are read from disk."""
+"""One line on a terminal when functions are compiled, which takes long, and none when they are read from disk."""
 
 from __future__ import annotations
 
@@ -20,12 +20,17 @@ class _Once(logging.Handler):
         if record.levelno < logging.WARNING:
             logging.getLogger(record.name).removeHandler(self)
             words = WORDS
-        sys.stderr.write(f"{CLEAR if sys.stderr.isatty() else ''}{words}\n")
+        sys.stderr.write(f"{CLEAR}{words}\n")
         sys.stderr.flush()
 
 
 def announce_compiling() -> None:
-    """Write that line in this process, should it come to compile; calling it again changes nothing."""
+    """Write that line in this process, should it come to compile; calling it again changes nothing.
+
+    Where standard error is no terminal nothing is written: programs that read it expect errors there.
+    """
+    if not sys.stderr.isatty():
+        return
     logger = logging.getLogger("slicemodel.compiled")
     logger.setLevel(logging.INFO)
     if not any(isinstance(handler, _Once) for handler in logger.handlers):
