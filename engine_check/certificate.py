@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from engine_check.refinement import Level, Runs, Verdict, search
+from engine_check.refinement import BENT, DOUBLE, EARLIER, MOVED, SHAKEN, Level, Runs, Verdict, search
 from engine_check.restitution import Rebound, measure_restitution
 from engine_check.solver import DEFAULT_TOLERANCE, ENGINES, checked_number
 from slicemodel.scenario import Scenario, not_whole
@@ -81,7 +81,9 @@ class Certificate:
     richardson : (P,) [rad/s]
         omega(t) extrapolated to dt -> 0; NaN if the run at twice the step is not complete.
     band : (P,)
-        Estimate of |omega - exact| of the certified run, fraction of omega_0; grows with time. NaN as before.
+        Estimate of the largest |omega - exact| of the run, fraction of omega_0; grows with time. NaN as before.
+    band_reason : str
+        Why there is no band, or by what it is wider than the tolerance; empty if neither.
     horizon : float or None
         First output time at which a change exceeds the tolerance [s]; None: the run holds to its end.
     rebounds : tuple of Rebound
@@ -100,6 +102,7 @@ class Certificate:
     extrapolated_at: int
     richardson: FloatArray
     band: FloatArray
+    band_reason: str
     horizon: float | None
     rebounds: tuple[Rebound, ...]
     trajectory: Trajectory
@@ -152,7 +155,7 @@ class Certificate:
             "extrapolated_at": self.extrapolated_at,
             "richardson_omega_end": _plain(end),
             "band": _plain(self.largest_band),
-            "band_reason": "" if math.isfinite(self.largest_band) else NO_PAIR,
+            "band_reason": self.band_reason,
             "horizon": self.horizon,
             "residuals": {name: _plain(value) for name, value in self.residuals.items()},
             "restitution": [rebound.to_mapping() for rebound in self.rebounds],
@@ -195,15 +198,14 @@ def certify(
     --------
     At order 1 a certified run is off by the change from twice the step, thus by less than the tolerance. The band
     is ``SAFETY`` times the largest up to then of the change from 2h, half of that from 4h to 2h (all of it if no
-    order is observed) and what another bottle leaves (``refinement``); and twice the change by iterations. Of a run
-    that is not certified no order may be assumed: its band is ``SAFETY`` times the spread of all runs about it.
+    order is observed), what another bottle leaves and, where hits wait for the grid, what late answers and what slices
+    that begin elsewhere leave (``refinement``); and twice the change by iterations. It may be wider than the tolerance:
+    ``band_reason`` says by what. Of a run that is not certified no order may be assumed: its band is ``SAFETY`` times
+    the spread of all runs about it.
 
-    Known failure: impacts closer than a step, where hits are left to the grid, that change place in none of these runs
-    stay unseen; so does how late a hit in the last step before an output time is answered. Of
-    72 throws in pymunk (N 2 to 50, e 0 to 0.5, three bottles; ``benchmarks/engine_matrix.py``) with hits on the grid,
-    all 36 with drag are certified and within 3e-3 omega_0 of event-driven free flight. Of the 36 without drag 31 are
-    within it and 30 are certified, two of these wrongly: off by 1.0e-2 and 6.6e-3 at 7.8e-6 s (20 and 50 slices; in
-    the first, two slices reach the base 6.4e-6 s apart).
+    Known failure: impacts closer than a step that the engine answers in the wrong order at every step tried, and that
+    change place in none of these runs, stay unseen. ``python benchmarks/engine_bands.py`` holds 64 random throws
+    against event-driven free flight and prints how many lie within their bands.
     """
     tolerance = checked_number("tolerance", tolerance, 0.0, 1.0)
     problem = not_whole("levels", levels, 1, MOST_LEVELS)
@@ -219,6 +221,7 @@ def certify(
     if wrong:
         status, reason = "wrong-restitution", "; ".join(str(rebound) for rebound in wrong)
     order, order_reason = _observed_order(runs, verdict)
+    band, band_reason = _band(runs, verdict, run, order)
     extrapolated_at = 2 if abs(order - 2.0) <= 0.25 else 1
     return Certificate(
         engine=engine,
@@ -230,7 +233,8 @@ def certify(
         order_reason=order_reason,
         extrapolated_at=extrapolated_at,
         richardson=_extrapolated(runs, verdict, run, extrapolated_at),
-        band=_band(runs, verdict, run, order),
+        band=band,
+        band_reason=band_reason,
         horizon=verdict.horizon,
         rebounds=rebounds,
         trajectory=run,
@@ -279,23 +283,36 @@ def _extrapolated(runs: Runs, at: Verdict, run: Trajectory, order: int) -> Float
     return np.asarray(run.omega + (run.omega - coarse.omega) / (2**order - 1))
 
 
-def _band(runs: Runs, at: Verdict, run: Trajectory, order: float) -> FloatArray:
+def _band(runs: Runs, at: Verdict, run: Trajectory, order: float) -> tuple[FloatArray, str]:
+    """Return the band, and why there is none or why it is wide; an empty string if neither."""
     coarsest, coarse = (runs.known(at.dt * factor, at.iterations) for factor in (4.0, 2.0))
     bent = runs.bent(2 * at.dt, at.iterations)
+    nothing = np.full(len(run.t), np.nan)
     if coarse is None or not run.ok:
-        return np.full(len(run.t), np.nan)
+        return nothing, NO_PAIR
     if at.status == "certified" and bent is not None:
-        errors = [runs.apart(coarse, run), bent]
+        causes = {DOUBLE: runs.apart(coarse, run), BENT: bent}
         if coarsest is not None:
             # Half a step is half the error only if an order is observed.
-            errors.append(runs.apart(coarsest, coarse) / (2 if math.isfinite(order) else 1))
-        band = SAFETY * np.max(errors, axis=0)
+            causes[EARLIER] = runs.apart(coarsest, coarse) / (2 if math.isfinite(order) else 1)
+        if runs.movable:
+            for role, asked in (
+                (MOVED, runs.delay(at.dt, at.iterations)),
+                (SHAKEN, runs.shake(2 * at.dt, at.iterations)),
+            ):
+                if isinstance(asked, Trajectory):
+                    return nothing, f"{role}: {asked.message}"
+                causes[role] = asked
+        band = SAFETY * np.max(list(causes.values()), axis=0)
+        widest = max(causes, key=lambda role: float(causes[role].max()))
+        moved = float(causes[widest].max())
+        why = f"the band is wide, by {moved:.2g} omega_0: {widest}" if moved > at.tolerance else ""
     else:
-        band = SAFETY * runs.spread(run, at.iterations)
+        band, why = SAFETY * runs.spread(run, at.iterations), ""
     more = runs.known(at.dt, 2 * at.iterations) if at.iterations is not None else None
     if more is not None:
         band = band + 2 * runs.apart(more, run)
-    return np.asarray(np.maximum.accumulate(np.maximum(band, FLOOR)))
+    return np.asarray(np.maximum.accumulate(np.maximum(band, FLOOR))), why
 
 
 def _plain(value: Any) -> Any:

@@ -98,11 +98,11 @@ class _Flight:
         self, world: World, scenario: Scenario, knobs: PymunkKnobs, angular_momentum: float, exclude: bool
     ) -> None:
         self._world, self._scenario, self._exclude = world, scenario, exclude
-        self._cap_thickness = knobs.cap_thickness
+        self._cap_thickness, self._offset = knobs.cap_thickness, knobs.grid_offset
         self._angular_momentum = angular_momentum
         self._reader = BatchReader(world)
         rows = self._reader.read()
-        self._state = self._centred(0.0, 0.0, rows, rows)
+        self._state = self._centred(0.0, 0.0, rows, rows, 0.0, 0.0)
         self._steps, self._sizes = 0, list[float]()
         self._worst = dict.fromkeys((*watch.BANDS, *(rods.BANDS if exclude else ())), 0.0)
         self._good: list[State] = []
@@ -117,8 +117,9 @@ class _Flight:
         start = self._state.t
         step = (when - start) / count
         if not self._sizes:
-            start_staggered(self._world, step)
+            start_staggered(self._world, step, self._offset * step)
         self._sizes.append(step)
+        lag = self._offset * self._sizes[0]
         # Velocities were started for the first step: a later, different one leaves them ahead by half the change.
         ahead = (self._sizes[0] - step) / 2
         taken = 0
@@ -128,7 +129,7 @@ class _Flight:
             taken += chunk
             self._steps += chunk
             now = when if taken == count else start + taken * step
-            self._state = self._centred(now, now + ahead, before, self._reader.read())
+            self._state = self._centred(now, now + ahead, before, self._reader.read(), lag, step)
             self._cause = self._judge()
             if self._cause:
                 return False
@@ -143,10 +144,16 @@ class _Flight:
         self._world.space.step(step)
         return before
 
-    def _centred(self, now: float, gravity_time: float, before: FloatArray, after: FloatArray) -> State:
+    def _centred(
+        self, now: float, gravity_time: float, before: FloatArray, after: FloatArray, lag: float, step: float
+    ) -> State:
+        """Return the state ``lag`` after a grid point, from before and after the step that ends there."""
         # An exploding run may overflow here; the watch reports it as not finite.
         with np.errstate(over="ignore", invalid="ignore"):
             mean = (before + after) / 2
+            if lag:
+                mean = mean + lag / step * (after - before)
+                after = np.hstack([after[:, :3] + lag * after[:, 3:], after[:, 3:]])
         world = self._world
         return State(
             t=now,

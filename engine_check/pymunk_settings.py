@@ -124,6 +124,10 @@ class PymunkKnobs:
         Seed of a permutation of the order in which slices, and with them their joints, enter the space [1]; 0: none.
         The solver sweeps its constraints in that order, so that the result depends on it: this shows by how much.
         Positions and velocities come back in the order of the slices whatever the seed.
+    grid_offset : float
+        Time of release after the first point of the grid [step], in [0, 0.5]. Hits are answered at points of the grid:
+        this shows by how much the result depends on where in a step they fall. Output times stay where they are:
+        states there lie on the straight line that the engine takes over the step.
     """
 
     collision_bias: float = 1.0
@@ -137,6 +141,7 @@ class PymunkKnobs:
     anchor_distance: float = 10.0
     slice_restitution: float | None = None
     shuffle: int = 0
+    grid_offset: float = 0.0
 
     def __post_init__(self) -> None:
         problems = [
@@ -178,6 +183,7 @@ _RANGES: Final[Mapping[str, tuple[float, float]]] = {
     "anchor_distance": (0.0, math.inf),
     "slice_restitution": (0.0, 1.0),
     "shuffle": (0, 1_000_000),
+    "grid_offset": (0.0, 0.5),
 }
 
 _MAY_BE_LEFT_OUT: Final = ("slice_restitution",)

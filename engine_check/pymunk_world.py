@@ -157,20 +157,21 @@ def _weld(
     return weld
 
 
-def start_staggered(world: World, step: float) -> None:
-    """Advance every velocity to half a step after release; positions stay at t = 0.
+def start_staggered(world: World, step: float, lag: float = 0.0) -> None:
+    """Go to the first point of the grid, ``lag`` before release; velocities stand half a step after it.
 
     Chipmunk moves positions with the velocities left by the step before, then forms the forces at the new
     positions. Its velocities therefore belong half a step *ahead* of its positions (leapfrog), and a run
     that starts from v(0) is off by g dt/2 from the start. Going back by v dt/2 and letting the engine take
-    a half step brings the positions home and leaves v(dt/2), with the engine's own forces.
+    a half step brings the positions home and leaves v(dt/2), with the engine's own forces. With a lag the positions
+    end in x(0) - v(0) lag, the velocities in v(dt/2 - lag).
     """
     for body in (world.tube, *world.slices):
         x, y = body.position
         u, v = body.velocity
         body.position = (x - u * step / 2, y - v * step / 2)
         body.angle -= body.angular_velocity * step / 2
-    world.space.step(step / 2)
+    world.space.step(step / 2 - lag)
 
 
 class BatchReader:

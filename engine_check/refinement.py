@@ -4,6 +4,7 @@ r"""The search for settings that an engine run can be believed at: step and iter
     iterations                |           |       bottle's mass, omega(t) must change by less than the tolerance
                               |          2n       (``LIMITS``), a fraction of omega_0. 4h only shows the order.
     bottle       M_b (1 - d), M_b (1 + d),    d = 2h |omega_0|, its square if hits are located, and twice that
+    grid                  moved by h      moved by h/2       where the engine's grid can be moved
 
 Nothing here knows an engine: runs go through ``engine_check.solve``, and iterations are refined only if the run
 states some.
@@ -17,20 +18,37 @@ order as soon as their times, which are of order 2, tell them apart: there the f
 answers in proportion and cancels in omega(d) + omega(-d) - 2 omega(0); what an exchange of two impacts does, stays. It
 is asked at twice the step, where runs cost half and impacts change places sooner. And what moved omega at the trial
 before by more than an order can make up for has not been resolved since, but hidden.
+
+Nor does halving show by how much hits on the grid are late. All grids have the output times in common, so that a hit in
+the last h before one of them is answered there on every grid, up to h late, and no halving moves it. In general a hit
+that lies u before the next point of the coarsest grid is answered u mod h late, and the halving changes that by 0 or h.
+Half a step beside it another grid answers the same hit h/2 earlier or later. With ``mean``, of the run and of its
+neighbour on that grid, a hit that moves omega by a times its delay gives
+
+    |omega_h - mean_h| = a h/4,     |mean_2h - mean_h| = a h/4 if u mod h < h/2, else 3 a h/4
+
+so that their sum is a h/2 or a h, never less than the error a (u mod h), once all have answered it, 2h later. What is
+smooth and of order 1 cancels in the first and is told by the second. Delays of several hits add up and may cancel there
+as they may anywhere: what the two steps above leave counts too, by half (``Runs.delay``).
+
+A bottle of another mass shifts all impacts by one rule, and may leave two that are answered in the wrong order at every
+step as they are. So the throw is flown again with every slice let go up to one step elsewhere, and up to two, which is
+how well the engine times a hit (``Runs.shake``). Both widen the band of a certified run and do not refuse it: its band
+says what grid and order of impacts leave open.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 
-from engine_check.solver import MOST_ITERATIONS, solve
+from engine_check.solver import ENGINES, MOST_ITERATIONS, solve
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray, Trajectory
 
@@ -41,6 +59,12 @@ DOUBLE: Final = "twice the step"
 EARLIER: Final = "the trial before"
 BENT: Final = "a bottle that differs by a step or two"
 BEND_STEPS: Final = (1.0, 2.0)
+SHAKEN: Final = "slices that begin up to a step or two elsewhere"
+SHAKE_STEPS: Final = (1.0, 1.0, 2.0, 2.0)
+EXCHANGES: Final = 2.0
+"""Factor on what slices that begin elsewhere leave: a few such throws show only some of the exchanges of impacts."""
+
+MOVED: Final = "the grid moved by half a step"
 ITERATED: Final = "twice the iterations"
 
 LARGEST_BEND: Final = 0.01
@@ -85,6 +109,34 @@ class Verdict:
     dt: float
     iterations: int | None
     horizon: float | None
+    tolerance: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Moved(Scenario):
+    """A throw whose slices begin elsewhere by ``moved`` [m]."""
+
+    moved: tuple[float, ...] = ()
+
+    def initial_positions(self) -> FloatArray:
+        """Return the places of the slices, shape (N,) [m from the cap]."""
+        # ``super()`` does not know a class with slots.
+        return np.asarray(Scenario.initial_positions(self) + self.moved)
+
+
+def changed(scenario: Scenario, share: float, places: FloatArray) -> Scenario:
+    """Return the throw with a bottle that is heavier by ``share`` and slices moved by it times ``places`` L/2.
+
+    Slices that would be moved into an end stay: what moves to one side only does not cancel.
+    """
+    bottle = replace(scenario.bottle, mass=scenario.bottle.mass * (1.0 + share))
+    r, reach = scenario.initial_positions(), abs(share) * scenario.bottle.length / 2
+    inside = (r - reach >= scenario.r_min) & (r + reach <= scenario.r_max)
+    moved = np.where(inside, places, 0.0) * share * scenario.bottle.length / 2
+    if not moved.any():
+        return replace(scenario, bottle=bottle)
+    values = {f.name: getattr(scenario, f.name) for f in fields(Scenario)}
+    return Moved(**values | {"bottle": bottle}, moved=tuple(moved.tolist()))
 
 
 class Runs:
@@ -99,6 +151,8 @@ class Runs:
     def __init__(self, scenario: Scenario, engine: str, settings: Mapping[str, Any]) -> None:
         self.scenario, self.engine, self.settings = scenario, engine, settings
         self.history: list[Level] = []
+        self.movable = ENGINES[engine].movable and not scenario.frozen
+        self._moved: dict[tuple[float, int | None], Trajectory] = {}
         self._made: dict[tuple[float, int | None], Trajectory] = {}
         self._bent: dict[tuple[float, int | None], FloatArray] = {}
 
@@ -118,35 +172,73 @@ class Runs:
 
     def bend(self, dt: float, iterations: int | None) -> Trajectory | FloatArray:
         """Return the largest |omega(d) + omega(-d) - 2 omega(0)| at these settings, or a member that diverged."""
-        if (dt, iterations) in self._bent:
-            return self._bent[dt, iterations]
-        bends = []
-        middle = self._made[dt, iterations]
+        if (dt, iterations) not in self._bent:
+            still = np.zeros(self.scenario.n_slices)
+            bends = self._bends(BENT, [(steps, still) for steps in BEND_STEPS], dt, iterations)
+            if isinstance(bends, Trajectory):
+                return bends
+            self._bent[dt, iterations] = bends
+        return self._bent[dt, iterations]
+
+    def shake(self, dt: float, iterations: int | None) -> Trajectory | FloatArray:
+        """Return ``EXCHANGES`` times the same if slices, too, begin a step or two elsewhere."""
+        rng = np.random.default_rng(0)
+        places = [(steps, rng.uniform(-1.0, 1.0, self.scenario.n_slices)) for steps in SHAKE_STEPS]
+        left = self._bends(SHAKEN, places, dt, iterations)
+        return left if isinstance(left, Trajectory) else EXCHANGES * left
+
+    def _bends(
+        self, role: str, changes: Sequence[tuple[float, FloatArray]], dt: float, iterations: int | None
+    ) -> Trajectory | FloatArray:
+        """Return the largest bend by ``changes``: steps, and by how many of them each slice moves."""
+        middle, bends = self._made[dt, iterations], []
         tells = abs(self.scenario.omega0) * dt
         if middle.settings["hits"] == "located":
             tells *= tells
-        for steps in BEND_STEPS:
+        for steps, places in changes:
             share = min(steps * tells, LARGEST_BEND)
             bend = -2.0 * middle.omega
-            for factor in (1.0 + share, 1.0 - share):
-                member = self._with_bottle(factor, dt, iterations)
+            for side in (share, -share):
+                member, cost = self._flown(changed(self.scenario, side, places), dt, iterations)
+                # Its own change says little: what matters is what the two sides leave together.
+                self._note(role, dt, member, cost, None)
                 if not member.ok:
                     return member
                 bend = bend + member.omega
             bends.append(np.abs(bend) / abs(self.scenario.omega0))
-        self._bent[dt, iterations] = np.max(bends, axis=0)
-        return self._bent[dt, iterations]
+        return np.asarray(np.max(bends, axis=0))
 
-    def _with_bottle(self, factor: float, dt: float, iterations: int | None) -> Trajectory:
-        bottle = replace(self.scenario.bottle, mass=self.scenario.bottle.mass * factor)
-        member, cost = self._flown(replace(self.scenario, bottle=bottle), dt, iterations)
-        # Its own change says little: what matters is what the two sides leave together.
-        self._note(BENT, dt, member, cost, None)
-        return member
+    def delay(self, dt: float, iterations: int | None) -> Trajectory | FloatArray:
+        """Return how far off late answers to hits may put the run at these settings, or a run that diverged.
+
+        The runs at these settings and at twice the step must have been made and be complete.
+        """
+        omegas, means = [], []
+        for step in (dt, 2 * dt, 4 * dt):
+            run = self.known(step, iterations)
+            moved = None if run is None else self._off_the_grid(step, iterations, run)
+            if run is None or moved is None or not moved.ok:
+                break
+            omegas.append(run.omega)
+            means.append((run.omega + moved.omega) / 2)
+        if len(means) < 2 and moved is not None:
+            return moved
+        # Half a step is half the delay.
+        levels = zip(omegas, means, means[1:], (1.0, 2.0), strict=False)
+        off = [(np.abs(omega - fine) + np.abs(coarse - fine)) / share for omega, fine, coarse, share in levels]
+        return np.asarray(np.max(off, axis=0) / abs(self.scenario.omega0))
+
+    def _off_the_grid(self, dt: float, iterations: int | None, run: Trajectory) -> Trajectory:
+        if (dt, iterations) not in self._moved:
+            moved, cost = self._flown(self.scenario, dt, iterations, grid_offset=0.5)
+            self._moved[dt, iterations] = moved
+            self._note(MOVED, dt, moved, cost, self.apart(moved, run))
+        return self._moved[dt, iterations]
 
     def spread(self, run: Trajectory, iterations: int | None) -> FloatArray:
         """Return how far any complete run at these iterations, and any bend, lies from ``run``, shape (P,)."""
-        others = [self.apart(run, other) for (_, n), other in self._made.items() if n == iterations and other.ok]
+        made = [*self._made.items(), *self._moved.items()]
+        others = [self.apart(run, other) for (_, n), other in made if n == iterations and other.ok]
         return np.asarray(np.max([*others, *(bent for (_, n), bent in self._bent.items() if n == iterations)], axis=0))
 
     def bent(self, dt: float, iterations: int | None) -> FloatArray | None:
@@ -168,9 +260,9 @@ class Runs:
         both = min(len(one.t), len(other.t))
         return np.asarray(np.abs(one.omega[:both] - other.omega[:both]) / abs(self.scenario.omega0))
 
-    def _flown(self, scenario: Scenario, dt: float, iterations: int | None) -> tuple[Trajectory, float]:
+    def _flown(self, scenario: Scenario, dt: float, iterations: int | None, **more: Any) -> tuple[Trajectory, float]:
         began = time.perf_counter()
-        run = solve(scenario, self.engine, dt, iterations, **self.settings)
+        run = solve(scenario, self.engine, dt, iterations, **{**self.settings, **more})
         return run, time.perf_counter() - began
 
     def _note(self, role: str, dt: float, run: Trajectory, seconds: float, change: FloatArray | None) -> None:
@@ -226,7 +318,7 @@ def _trial(runs: Runs, tolerance: float, dt: float, iterations: int | None) -> t
     run = runs.make("on trial", dt, iterations, against=runs.known(2 * dt, iterations))
 
     def refused(status: str, reason: str, horizon: float) -> Verdict:
-        return Verdict(status=status, reason=reason, dt=dt, iterations=iterations, horizon=horizon)
+        return Verdict(status=status, reason=reason, dt=dt, iterations=iterations, horizon=horizon, tolerance=tolerance)
 
     if not run.ok:
         return refused("diverged", run.message, _reached(run)), RAISE in run.message
@@ -242,7 +334,7 @@ def _trial(runs: Runs, tolerance: float, dt: float, iterations: int | None) -> t
             horizon = float(run.t[beyond.argmax()])
             words = f"{role} moves omega by {found.max():.2g} omega_0, by {limit:g} or more from t = {horizon:.4g} s"
             return refused("not-converged", words, horizon), role == ITERATED
-    return Verdict(status="certified", reason="", dt=dt, iterations=iterations, horizon=None), False
+    return replace(refused("certified", "", 0.0), horizon=None), False
 
 
 def _changed(runs: Runs, role: str, run: Trajectory, dt: float, iterations: int | None) -> Trajectory | FloatArray:

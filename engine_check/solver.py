@@ -21,7 +21,8 @@ class Engine:
     """A physics engine: the module whose ``run`` throws the bottle in it, what it solves and why it is here.
 
     A comparison tests only what the engine does itself (``theirs``); what we hand it (``ours``: an impact law, times of
-    impacts) is on both sides, and agreement says nothing about it. ``contacts`` are those of ``CONTACTS`` that it has.
+    impacts) is on both sides, and agreement says nothing about it. ``contacts`` are those of ``CONTACTS`` that it has;
+    ``movable`` says that it answers hits at points of a grid that its knob ``grid_offset`` moves.
     """
 
     name: str
@@ -31,6 +32,7 @@ class Engine:
     theirs: str
     ours: str
     contacts: tuple[str, ...] = ("overlap",)
+    movable: bool = False
 
     @property
     def words(self) -> str:
@@ -53,6 +55,7 @@ ENGINES: Final[Mapping[str, Engine]] = MappingProxyType(
                 "step's grid",
                 ours="the initial state and the settings",
                 contacts=("overlap", "exclude"),
+                movable=True,
             ),
             Engine(
                 name="mujoco",

@@ -11,7 +11,7 @@ import pytest
 import engine_check
 import ode_reference
 from engine_check import DEFAULT_DT, ENGINES, certificate, certify, engine_pymunk, measure_restitution
-from engine_check.refinement import BENT, COARSEST, DOUBLE, EARLIER, ITERATED, Runs, coarsest_step
+from engine_check.refinement import BENT, COARSEST, DOUBLE, EARLIER, ITERATED, MOVED, SHAKEN, Runs, coarsest_step
 from slicemodel.scenario import Bottle, Scenario
 from slicemodel.trajectory import output_times
 
@@ -45,7 +45,7 @@ def test_a_certificate_confirms_step_iterations_and_order_of_impacts_at_its_own_
         change = np.max(np.abs(engine_check.solve(TEN, times=TIMES, **other).omega - base.omega)) / TEN.omega0
         assert change < of_ten.tolerance
         assert change in [level.change for level in of_ten.history]
-    assert roles(of_ten)[-5:] == [BENT] * 4 + [ITERATED]
+    assert roles(of_ten)[-16:] == [BENT] * 4 + [ITERATED] + [MOVED] * 3 + [SHAKEN] * 8
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -70,7 +70,7 @@ def test_residuals_cost_and_band_are_stated(of_ten):
     assert of_ten.steps == sum(level.steps for level in of_ten.history) > 4 * of_ten.trajectory.diagnostics["steps"]
     assert of_ten.seconds > 0.0
     assert np.all(np.diff(of_ten.band) >= 0.0)
-    assert of_ten.largest_band == of_ten.band[-1] < 2 * of_ten.tolerance
+    assert of_ten.largest_band == of_ten.band[-1] < 10 * of_ten.tolerance
 
 
 def test_the_certificate_is_json_without_nan(of_ten):
@@ -144,6 +144,40 @@ def test_an_exchange_of_impacts_that_half_the_step_does_not_show_is_seen_by_anot
     assert half < 0.6 * np.max(error)
     assert np.max(error) <= 3e-3
     assert np.mean(error <= found.band + band) >= 0.95
+
+
+def test_impacts_that_every_step_answers_in_the_wrong_order_widen_the_band():
+    """Two slices reach the ends 4.5e-5 s apart; all steps from 4e-4 to 2.8e-5 s answer them alike, and wrongly."""
+    bottle = Bottle(length=0.309, radius=0.03, mass=0.043, capacity=1.0)
+    throw = Scenario(bottle=bottle, water_mass=0.35, n_slices=7, drag=0.0, restitution=0.2, omega0=26.8, duration=0.26)
+    times = np.linspace(0.0, 0.26, 201)
+    found = certify(throw, times=times)
+    assert found.ok, found.reason
+    exact = ode_reference.solve(throw, model="free-flight", times=times).omega
+    error = np.abs(found.trajectory.omega - exact) / throw.omega0
+    assert error.max() > 3 * found.tolerance
+    assert np.mean(error <= found.band) >= 0.95
+    assert SHAKEN in found.to_mapping()["band_reason"]
+
+
+def test_a_grid_moved_by_half_a_step_is_as_exact_until_it_answers_a_hit_at_another_time():
+    free = replace(PAIR, drag=0.0, restitution=1.0, duration=0.16)
+    times = np.linspace(0.0, free.duration, 17)
+    exact = ode_reference.solve(free, "free-flight", times)
+    before = times < exact.impacts.time[0]
+    h = times[1] / 52
+    run, moved = (engine_check.solve(free, dt=h, iterations=50, times=times, grid_offset=k) for k in (0.0, 0.5))
+    for one in (run, moved):
+        assert np.all(np.abs(one.omega - exact.omega)[before] < 2e-5 * free.omega0)
+        assert one.diagnostics["angular_momentum_drift"] < 1e-11
+    assert np.all(np.abs(moved.omega - run.omega)[~before] > 1e-4 * free.omega0)
+
+
+def test_a_run_beside_it_that_diverged_leaves_no_band(monkeypatch):
+    monkeypatch.setattr(Runs, "shake", lambda self, *_: replace(self.known(*_), message="it burst"))
+    found = certify(SHORT, times=[0.0, 0.02])
+    assert np.isnan(found.largest_band)
+    assert "it burst" in found.to_mapping()["band_reason"]
 
 
 def test_a_change_that_is_not_a_number_is_not_below_the_tolerance(monkeypatch):

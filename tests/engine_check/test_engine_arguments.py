@@ -128,6 +128,7 @@ def test_the_defaults_are_those_whose_reasons_are_written_down():
         "anchor_distance": 10.0,
         "slice_restitution": None,
         "shuffle": 0,
+        "grid_offset": 0.0,
     }
 
 

@@ -39,8 +39,7 @@ def claims(found: Certificates) -> Claims:
         if settings.get("hits") is not None:
             words.append({"grid": "hits on the step's grid", "located": "hits located by us"}[settings["hits"]])
         words.append(f"order {order:.2f}" if order is not None else f"no order: {certificate['order_reason']}")
-        if certificate["reason"]:
-            words.append(certificate["reason"])
+        words += [certificate[name] for name in ("reason", "band_reason") if certificate[name]]
         id_, title = f"certificate-{name.replace(' ', '-')}", f"{name}: {certificate['status']}, band of ω(t)"
         yield observed(id_, title, certificate["band"], "of ω₀", "; ".join(words))
 
