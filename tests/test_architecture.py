@@ -166,3 +166,102 @@ def test_the_frame_knows_no_subject_and_chapters_are_named_once():
     folders = {file.parent.name for file in (folder_of("flipproof") / "chapters").glob("*/chapter.py")}
     assert sorted(named) == sorted(folders)
     assert len(list(folder_of("flipproof").glob("*.py"))) <= 6
+
+
+FLOORS = (
+    ("figures",),
+    ("frame", "output"),
+    ("foreign", "bounce"),
+    ("sweep",),
+    ("landing", "film"),
+    ("chapters", "paper"),
+    ("page",),
+    ("presets", "animate", "build", "check", "testing", "pytest_plugin"),
+    ("cli", "__main__"),
+)
+"""Rooms of the report package from the ground up: a file imports from its own floor and from those below."""
+
+UPWARD = {
+    "chapters.flights.chapter -> page.motion",
+    "figures.power -> foreign.certify",
+    "figures.power -> foreign.power",
+    "figures.report_pair -> output.columns",
+    "figures.style -> frame.spoken",
+    "film.page -> page.templating",
+    "foreign.checks_basic -> chapters.vectors.published",
+    "foreign.place -> chapters.solvers",
+    "foreign.place -> chapters.waterfall.study",
+    "landing.film -> animate",
+    "output.summary -> page.headlines",
+    "output.summary -> page.lead",
+    "paper.figures -> page.templating",
+}
+"""Imports upward that are there; this list can only become shorter."""
+
+CIRCLES = {
+    frozenset({"bounce.adapter", "bounce.engines"}),
+    frozenset({"foreign.checking", "foreign.files", "foreign.isolated", "foreign.solving", "foreign.specs"}),
+}
+"""Circles of files that are there; this list can only become shorter."""
+
+
+def modules_of_reports() -> dict[str, set[str]]:
+    """Return what every file of the report package imports from it, types alone not counted."""
+    root = folder_of("flipproof")
+    names = {file: ".".join(file.relative_to(root).with_suffix("").parts) for file in files_of("flipproof")}
+    modules = {name.removesuffix(".__init__"): file for file, name in names.items()}
+
+    def imported(node: ast.AST):
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
+                continue
+            if isinstance(child, ast.ImportFrom):
+                yield from (f"{child.module}.{alias.name}" for alias in child.names)
+                yield child.module
+            elif isinstance(child, ast.Import):
+                yield from (alias.name for alias in child.names)
+            yield from imported(child)
+
+    found = {}
+    for name, file in modules.items():
+        given = {module.removeprefix("flipproof.") for module in imported(ast.parse(file.read_text(encoding="utf-8")))}
+        found[name] = {module for module in given & modules.keys() if module != name and module.count(".")}
+        found[name] |= {module for module in given & {"animate", "build"} if module != name}
+    return found
+
+
+def test_no_file_imports_upward():
+    """Nouns, solvers, frame and store, chapters, page, commands: whoever reads a floor needs none above it."""
+    height = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
+    upward = set()
+    for module, imports in modules_of_reports().items():
+        room = module.partition(".")[0]
+        assert room in height or module == "__init__", f"{room} has no floor"
+        upward |= {f"{module} -> {other}" for other in imports if height[other.partition(".")[0]] > height[room]}
+    assert upward - UPWARD == set(), "import what lies below, or move what is shared down"
+    assert UPWARD - upward == set(), "mended: take it off the list"
+
+
+def test_no_circle_of_files():
+    graph = modules_of_reports()
+
+    def reach(module: str) -> set[str]:
+        seen, waiting = set(), set(graph[module])
+        while waiting:
+            other = waiting.pop()
+            seen.add(other)
+            waiting |= graph[other] - seen
+        return seen
+
+    reached = {module: reach(module) for module in graph}
+    on_circles = [module for module in graph if module in reached[module]]
+    circles = {frozenset(o for o in reached[m] if m in reached[o]) for m in on_circles}
+    assert circles - CIRCLES == set(), "two files that need one another are one file, or share a third below them"
+    assert CIRCLES - circles == set(), "mended: take it off the list"
+
+
+def test_the_frame_knows_no_guest_and_output_no_sweep():
+    for room, forbidden in (("frame", ("foreign", "bounce")), ("output", ("sweep",))):
+        for module, imports in modules_of_reports().items():
+            if module.partition(".")[0] == room:
+                assert not {other for other in imports if other.partition(".")[0] in forbidden}, module

@@ -34,8 +34,8 @@ from flipproof.frame.pool import Here
 from flipproof.frame.run_store import RunStore
 from flipproof.landing.design import Case, Scatter, Share, Throws, aimed, correlation, make_cases, scattered, wilson
 from flipproof.landing.throw import land_throw, told
-from flipproof.landing.upright import make_upright
 from flipproof.landing.work import Landed, flown, make_landing, saddle, touch_readings
+from flipproof.presets.upright import make_upright
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.work import keyed
 from ode_reference import fly, land
@@ -421,7 +421,7 @@ def swept(tmp_path_factory):
 def copied(swept, tmp_path, monkeypatch):
     """Return a copy of that study, to be gone on with in this process and without figures, which are drawn there."""
     monkeypatch.setattr("flipproof.sweep.command.processes", lambda _: nullcontext(Here()))
-    monkeypatch.setattr("flipproof.landing.upright.figures", lambda _: ())
+    monkeypatch.setattr("flipproof.presets.upright.figures", lambda _: ())
     return shutil.copytree(swept[0], tmp_path / "study")
 
 
@@ -445,7 +445,7 @@ def test_the_sweep_goes_on(found, copied):
 
 
 def test_workers_of_an_executor_make_the_same(found, tmp_path, monkeypatch):
-    monkeypatch.setattr("flipproof.landing.upright.figures", lambda _: ())
+    monkeypatch.setattr("flipproof.presets.upright.figures", lambda _: ())
     spec = "concurrent.futures:ThreadPoolExecutor"
     make_upright(THROW, SMALL, tmp_path / "study", quiet, lambda _: None, executor=spec)
     assert (tmp_path / "study" / "upright.csv").read_text(encoding="utf-8") == shares_csv(found)

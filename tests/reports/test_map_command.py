@@ -20,10 +20,7 @@ from flipproof.figures.style import Drawing
 from flipproof.frame.pool import Here
 from flipproof.frame.solvers import make
 from flipproof.frame.store import Store
-from flipproof.sweep.design import design_of
-from flipproof.sweep.errors import SweepError
-from flipproof.sweep.loop import fill
-from flipproof.sweep.planned import (
+from flipproof.presets.planned import (
     ENDS,
     LANDS_AT,
     READ_OFF,
@@ -36,6 +33,9 @@ from flipproof.sweep.planned import (
     split_rows,
     waterfall_csv,
 )
+from flipproof.sweep.design import design_of
+from flipproof.sweep.errors import SweepError
+from flipproof.sweep.loop import fill
 from slicemodel import Scenario
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -236,7 +236,7 @@ def test_the_waterfall_command_draws_every_observable(capsys, tmp_path, monkeypa
     for observable in OBSERVABLES:
         assert (tmp_path / "out" / f"waterfall-{observable.name}.png").stat().st_size > 10_000
     drawn = Drawing("<svg/>", b"anew")
-    monkeypatch.setattr("flipproof.sweep.planned.draw", lambda _: drawn)
+    monkeypatch.setattr("flipproof.presets.planned.draw", lambda _: drawn)
     status, out, _ = run(capsys, *options)
     assert f"; {runs} were there" in out
     for observable in OBSERVABLES:

@@ -132,7 +132,7 @@ def command_upright(options: argparse.Namespace) -> int:
     throw = read_scenario(options.scenario, options.slices)
     from flipproof.chapters.landing.study import Size
     from flipproof.landing.design import FAMILIES, Scatter
-    from flipproof.landing.upright import make_upright
+    from flipproof.presets.upright import make_upright
     from flipproof.sweep.errors import refuse_unknown
     from slicemodel import Table
 

@@ -55,7 +55,7 @@ def command_sweep(options: argparse.Namespace) -> int:
 def command_map(options: argparse.Namespace) -> int:
     """Make the runs of a map that have no row yet, and draw it."""
     throw = read_scenario(options.scenario, options.slices)
-    from flipproof.sweep.planned import MapPlan, make_map
+    from flipproof.presets.planned import MapPlan, make_map
 
     plan = MapPlan.of_size(throw, options.axis, *options.size)
     return fill(options, lambda begin, where: make_map(plan, options.out, begin, **where))
@@ -64,7 +64,7 @@ def command_map(options: argparse.Namespace) -> int:
 def command_waterfall(options: argparse.Namespace) -> int:
     """Make the runs of a waterfall that have no row yet, and draw it."""
     throw = read_scenario(options.scenario, options.slices)
-    from flipproof.sweep.planned import make_split
+    from flipproof.presets.planned import make_split
 
     return fill(options, lambda begin, where: make_split(throw, options.out, begin, **where))
 

@@ -17,6 +17,9 @@ from slicemodel.scenario import unknown_name
 FOREIGN = "flipproof.foreign.solving"
 """The module whose ``solve`` takes the spec of somebody else's solver."""
 
+FOREIGN_NAMES = "flipproof.foreign.specs"
+"""The module that knows which names are such specs; both are found by name, as the packages of solvers are."""
+
 REFERENCE: Final = Scenario().with_slices(50)
 """The paper's own throw, on which the regression claims are made."""
 
@@ -64,11 +67,10 @@ def find(name: str) -> Solver:
         return Solver(name, "ode_reference", "model", model.equation, model.reason)
     solvers = catalogue()
     if name not in solvers:
-        from flipproof.foreign.specs import check_spec, is_spec
-
-        if not is_spec(name):
+        others = import_module(FOREIGN_NAMES)
+        if not others.is_spec(name):
             raise ValueError(unknown_name("solver", name, solvers))
-        check_spec(name)
+        others.check_spec(name)
         return Solver(name, FOREIGN, "spec", "", "somebody else's solver")
     return solvers[name]
 
