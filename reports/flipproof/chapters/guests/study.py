@@ -378,5 +378,5 @@ def split(run: Trajectory, start: Switches, flights: Flights) -> Split:
     )
     missed = found.end - found.start - found.rest - sum(found.bars.values())
     if not abs(missed) <= 1e-12 * (1.0 + abs(found.start) + sum(map(abs, found.bars.values()))):
-        raise Missing(f"rest and bars miss the difference to free flight by {missed:.3g}")
+        raise ArithmeticError(f"rest and bars miss the difference to free flight by {missed:.3g}")
     return found
