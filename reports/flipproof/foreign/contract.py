@@ -32,6 +32,10 @@ REFINERS: Final = ("dt", "steps", "rtol")
 """What the effort of a solver may be: a step [s], a number of steps, a relative tolerance."""
 
 
+MAX_NAME: Final = 100
+"""Most characters of a solver's name."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ask:
     """What a solver is asked.
@@ -88,7 +92,7 @@ class Traits:
 
     Parameters
     ----------
-    name : str - printed on every page; without line breaks
+    name : str - printed on every page; without line breaks, of at most ``MAX_NAME`` characters
     equation : str or None
         The equation that it solves: a rung of the ladder ("eq8"), a set of switches ("switches:111100"), or a
         published program ("published-python"). None: flipproof is to find out.
@@ -112,6 +116,8 @@ class Traits:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip() or not self.name.isprintable():
             raise ValueError(f"name = {shown(self.name)} is not a line of text")
+        if len(self.name) > MAX_NAME:
+            raise ValueError(f"name = {shown(self.name)} has more than {MAX_NAME} characters")
         if self.equation is not None:
             check_equation(self.equation)
         if self.refined_by is not None and self.refined_by not in REFINERS:
@@ -154,7 +160,8 @@ def traits_of(solver: object, name: str) -> Traits:
         if f != "name" and (value := getattr(solver, f, None)) is not None and not callable(value)
     }
     own = getattr(solver, "name", None)
-    return Traits(name=own if isinstance(own, str) else name, **given)
+    spec = name if len(name) <= MAX_NAME else f"... {name[4 - MAX_NAME :]}"
+    return Traits(name=own if isinstance(own, str) else spec, **given)
 
 
 def solve_of(solver: object) -> Callable[[Ask], object]:

@@ -195,9 +195,12 @@ class Folder(Runner):
         except (OSError, ValueError, TypeError, RecursionError) as error:
             raise ValueError(f"{index}: is not readable ({error})") from None
         if given or not index.is_file():
-            folder.mkdir(parents=True, exist_ok=True)
             kept = {name: value for name, value in asdict(self.traits).items() if value not in (None, "", {})}
-            write_whole(index, (json.dumps(kept, indent=1) + "\n").encode())
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+                write_whole(index, (json.dumps(kept, indent=1) + "\n").encode())
+            except OSError as error:
+                raise ValueError(f"{folder} cannot be written ({error.strerror or error})") from None
 
     def __call__(self, ask: Ask) -> Answer:
         """Return the answer beside a question; add the question if it is not there."""

@@ -30,6 +30,7 @@ def test_an_ask_starts_at_rest_in_the_water_and_cannot_be_written():
     [
         ({"name": ""}, "name = '' is not a line of text"),
         ({"name": "a\nb"}, "is not a line of text"),
+        ({"name": "a" * 101}, "has more than 100 characters"),
         ({"name": 5}, "name = 5"),
         ({"equation": "eq9"}, "equation = 'eq9'"),
         ({"equation": "switches:12"}, "switches"),

@@ -48,7 +48,7 @@ def test_certify_writes_passport_and_verdicts_and_says_so(folder, capsys, monkey
     monkeypatch.setattr(suite.certify, "__defaults__", (("shape", "start", "ice", "mirror"),))
     status, out, _ = run(capsys, "certify", "mine.py:solve", "--json", "p.json", "--junit", "v.xml")
     assert status == 0
-    assert out.splitlines()[-1] == "4 checks: 4 passed, 0 failed"
+    assert out.splitlines()[-1].startswith("4 checks: 4 passed, 0 failed; asked were N ")
     assert json.loads((folder / "p.json").read_text())["conclusion"] == out.splitlines()[-1]
     assert "<testsuite" in (folder / "v.xml").read_text()
     (folder / "mine.py").write_text("def solve(ask):\n    return 5\n")
@@ -65,7 +65,7 @@ def test_certify_writes_passport_and_verdicts_and_says_so(folder, capsys, monkey
         (("certify", "math:no_such"), "cannot be loaded: AttributeError"),
         (("place", "eq9"), "'eq9'"),
         (("explain", "eq8", "csv:x.csv"), "a curve cannot be asked"),
-        (("grade", "."), "is no kit"),
+        (("certify", "csv:."), "holds something else than questions"),
         (("simulate", "--solver", "mine.py:solve", "--steps", "5"), "is not a scheme"),
         (("simulate", "--solver", "nowhere.py:solve"), "there is no file nowhere.py"),
     ],
@@ -100,20 +100,9 @@ def test_explain_simulate_and_compare_take_a_solver_of_ones_own(capsys, tmp_path
     assert "gravity in Eq. 8" in out
 
 
-def test_kit_and_grade(capsys, tmp_path):
-    status, out, _ = run(capsys, "kit", "--out", tmp_path / "kit", "--refined-by", "dt", "--equation", "eq8")
-    assert status == 0
-    assert "then run: flipproof grade" in out
-    asks = int(out.split()[0])
-    assert asks == len(list((tmp_path / "kit" / "asks").iterdir()))
-    status, out, _ = run(capsys, "grade", tmp_path / "kit")
-    assert status == 1
-    assert f"\n{asks} asks wait for answers in " in out
-
-
 def test_help_names_the_commands(capsys):
-    out = run(capsys, "--help")[1]
-    for command in ("certify", "place", "explain", "kit", "grade", "power"):
+    out = run(capsys, "--help")[1] + run(capsys, "more")[1]
+    for command in ("certify", "place", "explain", "power"):
         assert re.search(rf"^ +{command} ", out, re.MULTILINE)
         assert "usage: flipproof" in run(capsys, command, "--help")[1]
 
@@ -154,14 +143,14 @@ def test_box2d_has_the_threshold_and_the_floor_its_passport_names():
     from flipproof.foreign.power import InProcess
     from flipproof.foreign.specs import load
 
-    names = ["restitution", "precision-floor"]
+    names = ["restitution", "digits", "precision-floor"]
     found = {name: certify(InProcess(load(f"{BOX2D / 'flipproof_box2d.py'}:{name}"), name), names).results
              for name in ("Box2D", "Box2DSI")}  # fmt: skip
     low, high = found["Box2DSI"][0].found.facts["threshold"]
     assert 0.95 <= low <= high <= 1.05
     assert all(abs(e - 0.5) <= 5e-3 for _, _, e in found["Box2D"][0].found.facts["restitution"])
-    for _, floor in found.values():
-        assert floor.found.facts["arithmetic"] == "float32"
+    for _, digits, floor in found.values():
+        assert digits.found.facts["arithmetic"] == "float32"
         assert len(floor.found.facts["changes"]) <= 2
 
 
@@ -203,11 +192,11 @@ def test_a_solver_that_cannot_be_loaded_is_no_solver_off_the_lattice(capsys):
         assert "throws" not in err
 
 
-def test_a_kit_where_no_folder_can_be_made_is_refused_in_words(tmp_path, capsys):
+def test_a_folder_of_questions_that_cannot_be_made_is_refused_in_words(tmp_path, capsys):
     (tmp_path / "file").write_text("theirs")
-    status, _, err = run(capsys, "kit", "--out", str(tmp_path / "file" / "kit"))
+    status, _, err = run(capsys, "certify", f"csv:{tmp_path / 'file' / 'answers'}")
     assert status == 2
-    assert "file/kit cannot be written (Not a directory)" in err
+    assert "answers cannot be written (Not a directory)" in err
     assert "Errno" not in err
 
 
