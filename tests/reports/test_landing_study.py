@@ -49,6 +49,7 @@ SMALL = Size(
     families=("B",),
     throws=6,
     slices=4,
+    cuts=(4,),
     aim_throws=3,
     offsets=(-0.2, 0.0),
     axis_throws=4,
@@ -327,6 +328,31 @@ def test_the_energies_are_those_of_the_throws_over_the_filling(found, found_of_o
             share = each.cell(kind, 0.4).share
             assert len(runs) == share.throws - share.undecided > 0
             assert sum(run.outcome == "upright" for run in runs) == share.upright
+
+
+def test_the_interval_reaches_up_to_what_another_aim_may_have():
+    share = Share(upright=4, undecided=0, throws=20)
+    assert replace(share, rival=0.9).interval == (share.interval[0], 0.9)
+    assert replace(share, rival=0.1).interval == share.interval
+
+
+def test_the_throws_of_a_share_are_dealt_out_to_every_cut():
+    size = replace(SMALL, cuts=(3, 4, 5, 6))
+    aims, _ = aiming(THROW, size)
+    rows = make_cases(aims.values(), size.seed)
+    cases = counting(THROW, size, aims, rows)
+    key = Key("filling", 0.4, "B", 0.4, "together")
+    dealt = {each.cut: case for each, case in cases.items() if each._replace(cut=0) == key}
+    assert {cut: case.throws for cut, case in dealt.items()} == {3: 2, 4: 2, 5: 1, 6: 1}
+    assert all(case.aim.throw.n_slices == cut for cut, case in dealt.items())
+    assert len({case.stream for case in dealt.values()}) == 4
+    of_axes = {case.stream for key, case in cases.items() if key.axis in ("restitution", "friction", "scatter")}
+    assert not of_axes & {case.stream for case in dealt.values()}
+    (rival,) = {case.aim.rival for case in dealt.values()}
+    others = [
+        share_of(some).interval[1] for (k, _), some in zip(aims.items(), rows, strict=True) if k.place == key.place
+    ]
+    assert rival in others
 
 
 def test_throws_that_choose_an_aim_are_not_counted():

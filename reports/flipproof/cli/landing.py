@@ -59,7 +59,9 @@ def add_landing(commands: Any) -> None:
     )
     upright.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     upright.add_argument("--throws", type=count, default=300, metavar="N", help="throws a point (%(default)s)")
-    upright.add_argument("--slices", type=count, default=SLICES, metavar="N", help="slices (%(default)s)")
+    upright.add_argument(
+        "--slices", type=count, metavar="N", help="slices (default: 16 to 25 in turn, whose mean is the share)"
+    )
     upright.add_argument(
         "--fillings", type=_shares, metavar="X,Y,Z", help="fill fractions (default: eight, 0.1 to 0.95)"
     )
@@ -129,7 +131,7 @@ def _film(options: argparse.Namespace, rows: Any, table: Any) -> None:
 
 def command_upright(options: argparse.Namespace) -> int:
     """Make the throws of the study that have no row yet, and write its tables and figures."""
-    throw = read_scenario(options.scenario, options.slices)
+    throw = read_scenario(options.scenario, options.slices or SLICES)
     from flipproof.chapters.landing.study import Size
     from flipproof.landing.design import FAMILIES, Scatter
     from flipproof.presets.upright import make_upright
@@ -146,8 +148,10 @@ def command_upright(options: argparse.Namespace) -> int:
         axis_throws=options.throws,
         aim_throws=max(1, options.throws // 5),
         map_cells=options.map,
-        **{name: getattr(options, name) for name in ("throws", "slices", "restitution", "friction", "seed")},
+        **{name: getattr(options, name) for name in ("throws", "restitution", "friction", "seed")},
     )
+    if options.slices:
+        size = replace(size, slices=options.slices, cuts=(options.slices,))
     if options.fillings:
         middle = min(options.fillings, key=lambda filling: abs(filling - size.axis_filling))
         size = replace(size, fillings=options.fillings, axis_filling=middle)

@@ -44,11 +44,15 @@ Z: Final = 1.959963984540054
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Aim:
-    """A throw and the height of the table [m] on which it touches down at ``time`` [s] with the angle aimed at."""
+    """A throw and the height of the table [m] on which it touches down at ``time`` [s] with the angle aimed at.
+
+    ``rival`` is the largest share upright that another aim may have by the throws that chose this one (95 %).
+    """
 
     throw: Scenario
     height: float
     time: float
+    rival: float = 0.0
 
 
 def aimed(throw: Scenario, family: str, offset: float = 0.0) -> Aim:
@@ -168,11 +172,15 @@ def scattered(throw: Scenario, scatter: Scatter, seed: tuple[int, ...]) -> Scena
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Share:
-    """How many of ``throws`` ended upright, and how many nobody can tell; the 95 % interval counts those both ways."""
+    """How many of ``throws`` ended upright, and how many nobody can tell; the 95 % interval counts those both ways.
+
+    It is an interval of the share at the best aim: it reaches up to ``rival``, what another aim may have.
+    """
 
     upright: int
     undecided: int
     throws: int
+    rival: float = 0.0
 
     @property
     def value(self) -> float:
@@ -185,7 +193,8 @@ class Share:
         """Wilson's interval, 95 %, with the undecided counted as fallen at its low end and as upright at its high."""
         if not self.throws:
             return 0.0, 1.0
-        return wilson(self.upright, self.throws)[0], wilson(self.upright + self.undecided, self.throws)[1]
+        low, high = wilson(self.upright, self.throws)[0], wilson(self.upright + self.undecided, self.throws)[1]
+        return low, max(high, self.rival)
 
     def minus(self, other: Share, phi: float = 0.0) -> tuple[float, float, float]:
         """Return the difference of two shares and its 95 % interval: Newcombe's (1998), of two Wilson intervals.

@@ -51,7 +51,6 @@ def claims(found: Found) -> Iterator[Finding]:
     yield from _water_and_ice(found)
     yield _best_filling(found)
     yield from _static(found)
-    yield _slow_rotation(found)
     yield _bounces(found)
     yield _model_uncertainty(found)
     yield _undecided(found)
@@ -106,18 +105,6 @@ def _static(found: Found) -> Iterator[Finding]:
             note = f"of those with a tilt below it {said.upright} of {said.throws} stand, of those above it "
             note += f"{others.upright} of {others.throws}; {found.assumed}"
             yield observed(id_, words, (said.upright + others.throws - others.upright) / throws, note=note)
-
-
-def _slow_rotation(found: Found) -> Finding:
-    """Return whether bottles that turn more slowly at the touch stand more often (section 6)."""
-    name = "landing-slow-rotation"
-    title = "P(upright) of the slower minus the faster half of the touches, water (section 6: slow rotation helps)"
-    if (found.size.families[-1], "together") not in found.slow:
-        return observed(name, title, None, note="water was not thrown")
-    slow, fast = found.slow[found.size.families[-1], "together"]
-    difference, low, high = slow.minus(fast)
-    note = f"halves of |omega| at the touch within each filling; {_judged(low, high)}; {found.assumed}"
-    return observed(name, title, difference, note=note, band=Band((high - low) / 2, "sample"))
 
 
 def _bounces(found: Found) -> Finding:
@@ -199,7 +186,7 @@ CHAPTER: Final = Chapter(
         "full": Size(
             families=("B",),
             throws=100,
-            aim_throws=20,
+            aim_throws=40,
             offsets=tuple(math.radians(angle) for angle in (-20, -10, 0, 10, 20)),
             axis_throws=50,
             map_cells=(16, 16),

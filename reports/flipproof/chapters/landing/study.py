@@ -52,20 +52,24 @@ OPTIMAL: Final = (0.2, 0.5)
 
 AIMING, COUNTING, MAPPING = range(3)
 AXES: Final = {"restitution": 3, "friction": 4, "scatter": 5}
-"""Streams of seeds: throws that choose an aim are never counted, and every axis has throws of its own."""
+STREAMS: Final = 6
+"""Streams of seeds: throws that choose an aim are never counted, and every axis and every cut has throws of its own."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Size:
     """How much work the study is.
 
-    ``map_cells`` are fillings by values of omega_0; ``axis_throws`` throws for each value of an axis.
+    ``map_cells`` are fillings by values of omega_0; ``axis_throws`` throws for each value of an axis. Throws that are
+    counted are cut into each number of ``cuts`` in turn: a share follows how many slices end on the base, a multiple of
+    1/N, and one N alone is up to 0.05 off. Aims and the map are cut into ``slices``.
     """
 
     fillings: tuple[float, ...] = (0.1, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 0.95)
     families: tuple[str, ...] = ("A", "B")
     throws: int = 300
     slices: int = 20
+    cuts: tuple[int, ...] = tuple(range(16, 26))
     aim_throws: int = 60
     offsets: tuple[float, ...] = tuple(math.radians(angle) for angle in (-30, -20, -10, 0, 10, 20, 30))
     axis_filling: float = 0.4
@@ -94,6 +98,8 @@ class Key(NamedTuple):
     family: str
     filling: float
     kind: Kind
+    cut: int = 0
+    """Slices of the throws that are counted; 0 for all of them together."""
 
     @property
     def place(self) -> Place:
@@ -130,8 +136,14 @@ class Cell:
     bounces_band: float
 
     def minus(self, other: Cell) -> tuple[float, float, float]:
-        """Return the difference of two shares of the same throwers and its 95 % interval, that of paired throws."""
-        return self.share.minus(other.share, correlation(self.stood, other.stood))
+        """Return the difference of two shares of the same throwers and its 95 % interval, that of paired throws.
+
+        Of one aim, another aim plays no part.
+        """
+        one, another = self.share, other.share
+        if self.aim == other.aim:
+            one, another = replace(one, rival=0.0), replace(another, rival=0.0)
+        return one.minus(another, correlation(self.stood, other.stood))
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +174,6 @@ class Found:
     cells : by key - shares over the filling and along the axes
     maps : by kind - outcomes over ``size.map_axes``
     static : (family, kind) -> shares upright of what the static criterion calls upright and of the others, all fillings
-    slow : (family, kind) -> shares upright of the slower and the faster half of the touches, of each filling
     energies : of a few throws at the filling of the axes
     unaimed : (family, filling, frozen) -> why no aim was found
     """
@@ -172,7 +183,6 @@ class Found:
     cells: Mapping[Key, Cell]
     maps: Mapping[Kind, Outcomes]
     static: Mapping[tuple[str, Kind], tuple[Share, Share]]
-    slow: Mapping[tuple[str, Kind], tuple[Share, Share]]
     energies: tuple[Energy, ...]
     unaimed: Mapping[Place, str]
 
@@ -192,7 +202,7 @@ class Found:
         return (
             f"assumed: e_table = {self.size.restitution:g}, friction {self.size.friction:g}, scatter "
             f"{100 * scatter.spin:g} % in omega_0, {math.degrees(scatter.angle):g} degrees in theta_0, "
-            f"{scatter.speed:g} m/s in the launch velocity; {self.size.slices} slices"
+            f"{scatter.speed:g} m/s in the launch velocity; {_cuts_words(self.size.cuts)} slices"
         )
 
 
@@ -228,12 +238,16 @@ def aiming(throw: Scenario, size: Size) -> tuple[Cases, Mapping[Place, str]]:
 
 def counting(throw: Scenario, size: Size, aims: Cases, rows: Rows) -> Cases:
     """Return the throws that are counted, about the aims that stood most often, and the map."""
-    best: dict[Place, tuple[tuple[int, float], Aim]] = {}
+    tried: dict[Place, list[tuple[tuple[int, float], Share, Aim]]] = {}
     for (key, case), some in zip(aims.items(), rows, strict=True):
-        rank = share_of(some).upright, -abs(key.value)  # of equals the least offset
-        if key.place not in best or rank > best[key.place][0]:
-            best[key.place] = rank, case.aim
-    aim_of = {place: aim for place, (_, aim) in best.items()}
+        share = share_of(some)
+        # Of equals the least offset.
+        tried.setdefault(key.place, []).append(((share.upright, -abs(key.value)), share, case.aim))
+    aim_of: dict[Place, Aim] = {}
+    for place, ranked in tried.items():
+        ranked.sort(key=lambda each: each[0])
+        *others, (_, _, aim) = ranked
+        aim_of[place] = replace(aim, rival=max((share.interval[1] for _, share, _ in others), default=0.0))
     asked: dict[Key, Case] = {}
     last = size.families[-1]
     for (family, filling, frozen), aim in aim_of.items():
@@ -241,7 +255,7 @@ def counting(throw: Scenario, size: Size, aims: Cases, rows: Rows) -> Cases:
             continue
         for kind, landing in KINDS.items():
             if landing.frozen == frozen:
-                asked[Key("filling", filling, family, filling, kind)] = _case(size, aim, kind, size.throws)
+                asked |= _cut(size, Key("filling", filling, family, filling, kind), _case(size, aim, kind, size.throws))
     values = {"restitution": size.restitutions, "friction": size.frictions, "scatter": size.scatters}
     for kind, axis in product(AXIS_KINDS, values):
         place = last, size.axis_filling, KINDS[kind].frozen
@@ -250,13 +264,32 @@ def counting(throw: Scenario, size: Size, aims: Cases, rows: Rows) -> Cases:
         for value in values[axis]:
             change: dict[str, Any] = {axis: size.scatter.times(value) if axis == "scatter" else value}
             case = replace(_case(size, aim_of[place], kind, size.axis_throws, AXES[axis]), **change)
-            asked[Key(axis, value, last, size.axis_filling, kind)] = case
+            asked |= _cut(size, Key(axis, value, last, size.axis_filling, kind), case)
     fillings, omegas = size.map_axes
     for kind, fill, omega0 in product(WATER_AND_ICE, fillings.tolist(), omegas.tolist()):
         bottle = replace(filled(throw, fill, size.slices, KINDS[kind].frozen), omega0=omega0)
         case = replace(_case(size, standing(bottle), kind, 1, MAPPING), scatter=size.scatter.times(0.0))
         asked[Key("map", omega0, "", fill, kind)] = case
     return asked
+
+
+def _cut(size: Size, key: Key, case: Case) -> dict[Key, Case]:
+    """Return the throws of a case dealt out to the cuts, each with throwers of its own."""
+    count = len(size.cuts)
+    return {
+        key._replace(cut=slices): replace(
+            case,
+            aim=replace(case.aim, throw=case.aim.throw.with_slices(slices)),
+            throws=case.throws // count + (k < case.throws % count),
+            stream=case.stream + STREAMS * k,
+        )
+        for k, slices in enumerate(size.cuts)
+        if k < case.throws
+    }
+
+
+def _cuts_words(cuts: tuple[int, ...]) -> str:
+    return f"{cuts[0]}" if len(cuts) == 1 else f"mean over {cuts[0]} to {cuts[-1]}"
 
 
 def standing(throw: Scenario) -> Aim:
@@ -292,8 +325,8 @@ def share_of(rows: Sequence[Landed]) -> Share:
 def read(throw: Scenario, size: Size, cases: Cases, rows: Rows, unaimed: Mapping[Place, str]) -> Found:
     """Return what the rows of the second wave say."""
     fillings, omegas = size.map_axes
-    cells: dict[Key, Cell] = {}
     sorts: dict[tuple[str, Kind], tuple[list[Landed], ...]] = {}
+    counted: dict[Key, tuple[Aim, list[Landed]]] = {}
     shape = len(omegas), len(fillings)
     maps: dict[Kind, Outcomes] = {}
     for (key, case), some in zip(cases.items(), rows, strict=True):
@@ -303,22 +336,19 @@ def read(throw: Scenario, size: Size, cases: Cases, rows: Rows, unaimed: Mapping
             found.outcome[at] = some[0].outcome or some[0].status
             found.theta[at] = np.nan if some[0].touch_theta is None else some[0].touch_theta
             continue
-        cells[key] = cell_of(case.aim, some)
+        counted.setdefault(key._replace(cut=0), (case.aim, []))[1].extend(some)
         if key.axis == "filling":
-            said, others, slow, fast = sorts.setdefault((key.family, key.kind), ([], [], [], []))
+            said, others = sorts.setdefault((key.family, key.kind), ([], []))
             decided = [row for row in some if row.outcome not in (None, "undecided")]
             said += [row for row in decided if (row.static_margin or 0.0) > 0.0]
             others += [row for row in decided if not (row.static_margin or 0.0) > 0.0]
-            by_spin = sorted(decided, key=lambda row: abs(row.touch_omega or 0.0))
-            slow += by_spin[: len(by_spin) // 2]
-            fast += by_spin[len(by_spin) - len(by_spin) // 2 :]
+    cells = {key: cell_of(aim, some) for key, (aim, some) in counted.items()}
     return Found(
         throw=throw,
         size=size,
         cells=cells,
         maps=maps,
-        static={name: (share_of(said), share_of(others)) for name, (said, others, _, _) in sorts.items()},
-        slow={name: (share_of(slow), share_of(fast)) for name, (_, _, slow, fast) in sorts.items()},
+        static={name: (share_of(said), share_of(others)) for name, (said, others) in sorts.items()},
         energies=tuple(energy for kind in WATER_AND_ICE for energy in _energies(kind, cases, rows, size)),
         unaimed=unaimed,
     )
@@ -336,7 +366,7 @@ def cell_of(aim: Aim, rows: Sequence[Landed]) -> Cell:
     bounces = known("bounces")
     return Cell(
         aim=aim,
-        share=share_of(rows),
+        share=replace(share_of(rows), rival=aim.rival),
         stood=tuple(row.outcome == "upright" if row.whole else None for row in rows),
         missed=sum(row.status == "missed" for row in rows),
         touch=tuple(map(mean, ("touch_omega", "touch_speed", "touch_energy"))),
@@ -347,7 +377,7 @@ def cell_of(aim: Aim, rows: Sequence[Landed]) -> Cell:
 
 def _energies(kind: Kind, cases: Cases, rows: Rows, size: Size) -> list[Energy]:
     """Follow the energy of the first ten throws counted at the filling of the axes."""
-    wanted = Key("filling", size.axis_filling, size.families[-1], size.axis_filling, kind)
+    wanted = Key("filling", size.axis_filling, size.families[-1], size.axis_filling, kind, size.cuts[0])
     if wanted not in cases:
         return []
     case, some = cases[wanted], rows[list(cases).index(wanted)]
