@@ -397,7 +397,7 @@ def test_the_claim_of_the_bounces_is_judged_by_its_interval(found, of_ice, verdi
         changed[key] = replace(changed[key], bounces=mean, bounces_band=band)
     (finding,) = (each for each in claims(replace(found, cells=changed)) if each.id == "landing-bounces")
     assert finding.value == pytest.approx(of_ice - 1.0)
-    assert finding.band == pytest.approx(0.5)
+    assert finding.band.size == pytest.approx(0.5)
     assert f": {verdict}; assumed" in finding.note
 
 
@@ -419,7 +419,7 @@ def test_the_distance_between_the_laws_has_an_interval_and_says_which(found):
         changed[key] = replace(changed[key], share=share, stood=stood)
     (finding,) = (each for each in claims(replace(found, cells=changed)) if each.id == "landing-laws")
     # Of the same 40 throwers; the interval of independent samples has a half width of 0.1839.
-    assert (finding.value, finding.band) == pytest.approx((0.5, 0.1575), abs=1e-4)
+    assert (finding.value, finding.band.size) == pytest.approx((0.5, 0.1575), abs=1e-4)
     assert "at filling 0.4, water, in turn minus water, together" in finding.note
 
 
