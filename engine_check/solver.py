@@ -21,8 +21,10 @@ class Engine:
     """A physics engine: the module whose ``run`` throws the bottle in it, what it solves and why it is here.
 
     A comparison tests only what the engine does itself (``theirs``); what we hand it (``ours``: an impact law, times of
-    impacts) is on both sides, and agreement says nothing about it. ``contacts`` are those of ``CONTACTS`` that it has;
-    ``movable`` says that it answers hits at points of a grid that its knob ``grid_offset`` moves.
+    impacts) is on both sides, and agreement says nothing about it.
+    ``contacts`` are those of ``CONTACTS`` that it has; ``model`` is the equation of ``ode_reference.MODELS`` that it is
+    held against; ``sweeps`` says that it takes ``iterations`` over its bodies, in their order; ``movable`` that it
+    answers hits at points of a grid that its knob ``grid_offset`` moves.
     """
 
     name: str
@@ -32,7 +34,9 @@ class Engine:
     theirs: str
     ours: str
     contacts: tuple[str, ...] = ("overlap",)
+    model: str = "free-flight"
     movable: bool = False
+    sweeps: bool = False
 
     @property
     def words(self) -> str:
@@ -56,6 +60,7 @@ ENGINES: Final[Mapping[str, Engine]] = MappingProxyType(
                 ours="the initial state and the settings",
                 contacts=("overlap", "exclude"),
                 movable=True,
+                sweeps=True,
             ),
             Engine(
                 name="mujoco",

@@ -88,10 +88,14 @@ def constants_of(scenario: Scenario) -> StepConstants:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scheme:
-    """A named step: its form, the numbers it uses, what it solves and why it is here."""
+    """A named step: its form, the numbers it uses, what it solves and why it is here.
+
+    ``limit`` is the equation it converges to, in words; ``model`` its name in ``ode_reference.MODELS``, if it has one.
+    """
 
     name: str
     form: StepForm
     limit: str
     reason: str
+    model: str = ""
     constants: Callable[[Scenario], StepConstants] = constants_of

@@ -16,6 +16,7 @@ MIDPOINT = Scheme(
     name="midpoint",
     form=EXACT_STEP.form._replace(midpoint=True, in_step=True),
     limit="Eq. 8 as printed: drag against v_CM",
+    model="eq8",
     reason="The exact step with omega, theta, r_CM and v_CM frozen at a predicted mid-step: second order away from "
     "impacts, with rebounds located inside the step.",
 )

@@ -42,6 +42,7 @@ PUBLISHED_PYTHON = Scheme(
         strict=True,
     ),
     limit="v' = (omega^2 - gamma^2) X: no damping at all",
+    model="published-limit",
     reason="The Python program of the supplement. The sinh term of Eq. 9d keeps its typeset plus sign, where the "
     "derivative of Eq. 9c has a minus; centre of mass, inertia and omega lag one step.",
 )

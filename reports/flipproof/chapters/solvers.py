@@ -8,17 +8,11 @@ from typing import Final
 from engine_check.solver import DEFAULT_TOLERANCE, ENGINES
 from flipproof.frame.solvers import Run
 from ode_reference.models import LADDER
-from slicemodel import Scenario
+from slicemodel import Scenario, schemes
 
 ENGINE: Final = "pymunk"
 FREE: Final = LADDER[-1]
-LIMITS: Final = {
-    "published-python": "published-limit",
-    "signs-corrected": "signs-limit",
-    "roots-corrected": "eq8-wall",
-    "exact-step": "eq8",
-    "midpoint": "eq8",
-}
+LIMITS: Final = {name: scheme.model for name, scheme in schemes.SCHEMES.items() if scheme.model}
 """Scheme -> the model it converges to; the others converge to none of the ladder."""
 
 SCHEMES: Final = ("published-python", "exact-step")
@@ -33,10 +27,10 @@ UNCERTIFIED_DT: Final = 1.25e-4
 CERTIFIED: Final[Mapping[str, tuple[str, ...]]] = {"check": (), "quick": (), "full": WITNESSES}
 """Engines whose runs are certified: a certificate costs several runs of all slices."""
 
-FLIGHTS: Final = ("published-python", "published-limit", "exact-step", "eq8", ENGINE, FREE)
+FLIGHTS: Final = (*(name for scheme in SCHEMES for name in (scheme, LIMITS[scheme])), ENGINE, FREE)
 """The solvers whose flights are drawn."""
 
-OTHER_SCHEMES: Final = ("midpoint", "published-matlab", "paper-typeset", "signs-corrected", "roots-corrected")
+OTHER_SCHEMES: Final = tuple(name for name in schemes.SCHEMES if name not in SCHEMES)
 OTHERS: Final = (
     *OTHER_SCHEMES,
     *(model for model in LADDER if model not in FLIGHTS),

@@ -10,8 +10,9 @@ from typing import Final
 
 import numpy as np
 
+from engine_check.solver import ENGINES
 from flipproof.chapters.reference.chapter import witnessed
-from flipproof.chapters.solvers import FREE, WITNESSES
+from flipproof.chapters.solvers import FREE
 from flipproof.frame.chapter import (
     Ask,
     Band,
@@ -28,6 +29,9 @@ from flipproof.frame.chapter import (
 from flipproof.frame.twins import FLOOR, omega_band_call, usual_rest_speed
 from slicemodel import Trajectory
 from slicemodel.trajectory import FloatArray
+
+EQUATIONS: Final = tuple(dict.fromkeys((FREE, *(engine.model for engine in ENGINES.values()), "eq8")))
+"""Free flight, what other engines solve, and Eq. 8."""
 
 SOLVE_IVP: Final = "solve_ivp"
 """Name of the witness: ``scipy.integrate.solve_ivp`` over all 2N + 1 equations (``ode_reference.witness``)."""
@@ -116,7 +120,8 @@ def study(ask: Ask) -> Study[Mapping[str, Agreement]]:
     """
     runs: dict[str, dict[str, Run]] = {}
     coarser: dict[str, Run] = {}
-    for equation, engines in ((FREE, WITNESSES), ("eq8", ())):
+    for equation in EQUATIONS:
+        engines = [name for name, engine in ENGINES.items() if engine.model == equation]
         settings = witnessed(ask.throw, equation)
         coarse = {**settings, "rtol": 1e-9, "atol": 1e-12, "rest_speed": usual_rest_speed(equation)}
         runs[equation] = {

@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
+from engine_check.solver import ENGINES
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, percent, study_difference
 from flipproof.chapters.predictability.chapter import parting_words
 from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, WITNESSES
@@ -20,6 +21,7 @@ from flipproof.frame.chapter import Absent, Ask, Band, Call, Chapter, Claims, Ex
 from flipproof.frame.findings import Rule
 from flipproof.frame.flights import Flights, attempt, known
 from flipproof.frame.solvers import find, finer
+from flipproof.frame.spoken import spoken
 from flipproof.frame.twins import BAND_WORDS, omega_band_call
 from flipproof.output.columns import curves_csv
 from ode_reference.models import LADDER, MODELS, ladder_of
@@ -48,15 +50,17 @@ def ladder_pairs(models: Mapping[str, Model]) -> tuple[tuple[str, str, str], ...
 
 
 PAIRS: Final = (
-    ("finite step of the published program", "published-python", "published-limit"),
-    ("finite step of the exact step", "exact-step", "eq8"),
+    *((f"finite step of the {spoken(scheme)}", scheme, LIMITS[scheme]) for scheme in SCHEMES),
     *ladder_pairs(MODELS),
-    (BY_ENGINE, FREE, ENGINE),
+    *(
+        (BY_ENGINE if name == ENGINE else f"{spoken(engine.model)}, event-driven and by {name}", engine.model, name)
+        for name, engine in ENGINES.items()
+    ),
     (PROGRAM_EQ8, "published-python", "eq8"),
     (EQ8_FREE, "eq8", FREE),
     (TOTAL, "published-python", FREE),
 )
-"""Name, first, second: down the ladder one assumption at a time, then the engine, then several together."""
+"""Name, first, second: down the ladder one assumption at a time, then the engines, then several together."""
 
 LEAST, MOST = 1e-6, 2.0
 """Ends of the axis of the figure, as shares of omega_0."""

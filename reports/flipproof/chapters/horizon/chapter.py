@@ -23,6 +23,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from engine_check.solver import ENGINES
 from flipproof.chapters.differences.study import first_crossing
 from flipproof.chapters.predictability.chapter import (
     HORIZON_BAND,
@@ -32,6 +33,7 @@ from flipproof.chapters.predictability.chapter import (
     fit_growth,
     plan_predictability,
 )
+from flipproof.chapters.solvers import ENGINE, FREE
 from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, observed, regression
 from flipproof.frame.flights import attempt
@@ -50,7 +52,7 @@ LEAST: Final = 1e-16
 class Reach:
     """How much of it: solvers, sizes of the changes (rising), seeds of the order, slices."""
 
-    solvers: tuple[str, ...] = ("pymunk", "mujoco", "free-flight")
+    solvers: tuple[str, ...] = (*ENGINES, FREE)
     sizes: tuple[float, ...] = SIZES
     seeds: tuple[int, ...] = (1, 2, 3, 4)
     slices: int = 20
@@ -152,7 +154,7 @@ def _levels(throw: Scenario, solver: str, reach: Reach) -> list[Level]:
     settings: dict[str, Any] = {"times": np.linspace(0.0, throw.duration, 251)}
     if find(solver).package == "engine_check":
         settings["dt"] = 2e-4
-    sweeps = solver == "pymunk"  # the engine that sweeps over its bodies, and so has an order of them
+    sweeps = solver in ENGINES and ENGINES[solver].sweeps
     if sweeps:
         settings["iterations"] = enough_iterations(throw)
 
@@ -352,5 +354,5 @@ CHAPTER: Final = Chapter(
     claims=claims,
     kind="regression",
     figures=figures,
-    work={"quick": Reach(solvers=("pymunk", "free-flight"), sizes=(1e-6,), seeds=(1,), slices=6), "full": Reach()},
+    work={"quick": Reach(solvers=(ENGINE, FREE), sizes=(1e-6,), seeds=(1,), slices=6), "full": Reach()},
 )

@@ -44,7 +44,6 @@ OWN_LIMIT: Final = "limit of "
 """Leads the name of an equation that no model states: where the scheme itself goes on finer grids."""
 
 EQUATION_OF_SCHEME: Final[Mapping[str, str]] = {**LIMITS, "paper-typeset": AT_REST}
-EQUATION_OF_ENGINES: Final = "free-flight"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,12 +170,12 @@ def _engines(case: Case, effort: Effort) -> Iterator[Contender]:
     duration = case.scenario.duration
     for engine in ENGINES.values():
         # Iterations by rule, where the engine iterates; they depend on the throw, not on dt.
-        iterated = {"iterations": enough_iterations(case.scenario)} if engine.name == "pymunk" else {}
+        iterated = {"iterations": enough_iterations(case.scenario)} if engine.sweeps else {}
         yield Contender(
             name=engine.name,
             family="engine",
             solver=engine.name,
-            equation=EQUATION_OF_ENGINES,
+            equation=engine.model,
             fixed={"times": case.times, **iterated},
             levels=effort.engines.settings(lambda steps: {"dt": duration / steps}),
         )
