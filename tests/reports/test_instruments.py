@@ -41,7 +41,7 @@ def test_every_witness_has_its_certificate(gathered, report, read_page):
     assert tuple(found.certificates) == WITNESSES
     assert all(certificate["status"] == "certified" for certificate in found.certificates.values())
     agreements = gathered.found("agreement")
-    assert set(agreements["free-flight"].names) == {"free-flight", "solve_ivp", "pymunk", "mujoco"}
+    assert set(agreements["free-flight"].names) == {"free-flight", "solve_ivp", *WITNESSES}
     assert set(agreements["eq8"].names) == {"eq8", "solve_ivp"}
     assert not any(agreement.words.startswith("all but") for agreement in agreements.values())
     page = read_page(report.html)
@@ -51,7 +51,7 @@ def test_every_witness_has_its_certificate(gathered, report, read_page):
 def test_an_engine_that_is_not_installed_is_named_with_its_reason(gathered):
     poorer = without(gathered, "mujoco")
     assert "mujoco" not in poorer.found("certificates").certificates
-    assert set(poorer.found("agreement")["free-flight"].names) == {"free-flight", "solve_ivp", "pymunk"}
+    assert set(poorer.found("agreement")["free-flight"].names) == {"free-flight", "solve_ivp", *WITNESSES} - {"mujoco"}
     told = tell(poorer)
     assert "RuntimeError: not installed" in poorer.found("flights").made["mujoco"].reason
     assert not [finding.id for each in told.values() for finding in each.findings if finding.failed]
