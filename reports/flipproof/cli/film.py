@@ -69,8 +69,8 @@ def add_film(commands: Any) -> None:
         "--each", action="store_true", help="every FILE is a film of the same bottle: gamma and restitution are shared"
     )
     fit.add_argument(
-        "--minutes", type=_positive, default=10.0, metavar="M", help="after which intervals are made no narrower, for "
-        "a slow solver such as mine.py:solve (%(default)g)",
+        "--minutes", type=_positive, default=10.0, metavar="M", help="after which a search that has not ended is given "
+        "up, for a slow solver such as mine.py:solve (%(default)g)",
     )  # fmt: skip
     fit.set_defaults(kind="fit")
 

@@ -32,8 +32,8 @@ MAX_RATE: Final = 5.0
 """Largest gamma / |omega_0|: a slice then creeps less than a fifth of its distance from the centre while the bottle
 turns by 2 rad."""
 
-COARSE: Final = (8, 5)
-FINE: Final = (13, 9)
+COARSE: Final = (7, 7)
+FINE: Final = (11, 17)
 """Nodes of the first grid and of the last, along gamma and e."""
 
 FEW: Final = 4
@@ -68,6 +68,7 @@ class Estimate:
     evidence : float - logarithm of the density of the data under this equation
     touched : bool - whether the record goes on after the flight
     flights : int - of the solver
+    complete : bool - whether the time sufficed for the grid to close in
     """
 
     film: Film
@@ -81,6 +82,7 @@ class Estimate:
     evidence: float
     touched: bool
     flights: int
+    complete: bool
 
     @property
     def best(self) -> dict[str, float]:
@@ -100,7 +102,7 @@ class Estimate:
     def flying(self) -> NDArray[np.bool_]:
         """Which frames lie between release and touch, shape (P,)."""
         t = self.film.t
-        return np.asarray((t >= self.fit.x[0] - 1e-9) & (t <= self.likelihood.touch + 1e-9))
+        return np.asarray((t >= self.fit.x[0] - 1e-5) & (t <= self.likelihood.touch + 1e-5))
 
     @property
     def doubted(self) -> NDArray[np.bool_]:
@@ -133,7 +135,7 @@ def estimate(
     ----------
     throw : what is known: bottle, water, gravity; the rest is fitted
     slices : of the equation; ``SLICES`` or the throw's, if fewer, by default
-    seconds : after which the grid is refined no further; intervals are wider then
+    seconds : after which the grid is refined no further; the estimate is not ``complete`` then
     tick : called with the number of flights made
 
     Raises
@@ -154,7 +156,7 @@ def estimate(
     reach = max(1.4 * abs(x[2]) * (likelihood.touch - x[0]) for likelihood, x in starts) + 0.5
     equation = Equation(solver, known, float(np.clip(reach, 2.0, 60.0)), film.quantity == "points", count)
     likelihood, x = starts[0] if len(starts) == 1 else _chosen(starts, equation)
-    likelihood, nodes, curves, fits, cell = _grid(likelihood, equation, x, seconds)
+    likelihood, nodes, curves, fits, cell, complete = _grid(likelihood, equation, x, seconds)
     levels = np.array([fit.evidence for fit in fits])
     best = int(np.argmax(levels))
     prior = np.arcsinh(MAX_RATE / SCALE)
@@ -164,11 +166,11 @@ def estimate(
     rng = np.random.default_rng(1)
     picked = rng.choice(len(times), DRAWS, p=chance / chance.sum())
     draws["touch"] = times[picked] + (times[1] - times[0]) * (rng.random(DRAWS) - 0.5)
-    likelihood = Likelihood(film, held, likelihood.touch, likelihood.noise, likelihood.speed)
+    likelihood = Likelihood(film, likelihood.held, likelihood.touch, likelihood.noise, likelihood.speed)
     return Estimate(
         film=film, throw=known, solver=solver, held=held, likelihood=likelihood, curve=curves[best], fit=fits[best],
         draws=draws, evidence=float(np.logaddexp.reduce(levels) + np.log(cell[0] * cell[1] / prior)),
-        touched=bool(likelihood.touch < film.t[-1]), flights=made,
+        touched=bool(likelihood.touch < film.t[-1]), flights=made, complete=complete,
     )  # fmt: skip
 
 
@@ -185,13 +187,16 @@ def near_flight(film: Film, likelihood: Likelihood, release: float) -> Likelihoo
 
 def _grid(
     likelihood: Likelihood, equation: Equation, x: FloatArray, seconds: float
-) -> tuple[Likelihood, FloatArray, list[Curve], list[Fit], tuple[float, float]]:
-    """Return the likelihood with its touch settled, the last grid's nodes, curves and fits, and the size of a cell."""
+) -> tuple[Likelihood, FloatArray, list[Curve], list[Fit], tuple[float, float], bool]:
+    """Return the likelihood with its touch settled, the last grid's nodes, curves and fits, the size of a cell.
+
+    Last, whether the grid closed in on all that matters.
+    """
     low, high = np.zeros(2), np.array([np.arcsinh(MAX_RATE / SCALE), 1.0])
     seeds, nearest = np.array([[np.nan, np.nan]]), [x]
     shape = COARSE
     film, began = likelihood.film, time.perf_counter()
-    for _ in range(9):
+    for _ in range(12):
         cell = (high - low) / shape
         axes = [low[k] + cell[k] * (np.arange(shape[k]) + 0.5) for k in range(2)]
         nodes = np.array(list(product(*axes)))
@@ -237,7 +242,7 @@ def _grid(
         high = np.minimum(high, nodes[matters].max(axis=0) + pad)
         if np.prod((high - low) / wide) > 0.4:
             shape = FINE
-    return likelihood, nodes, curves, fits, (float(cell[0]), float(cell[1]))
+    return likelihood, nodes, curves, fits, (float(cell[0]), float(cell[1])), shape == FINE
 
 
 def _chosen(starts: list[tuple[Likelihood, FloatArray]], equation: Equation) -> tuple[Likelihood, FloatArray]:

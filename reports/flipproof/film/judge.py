@@ -131,6 +131,11 @@ class Judged:
         """Refuse what cannot be right: raise UnsoundError, one line that says what to click again."""
         one, x = self.estimate, self.estimate.fit.x
         film, held = one.film, one.held
+        if not one.complete:
+            raise UnsoundError(
+                f"{film.label}: {one.solver}: the search did not end in {one.flights} flights: give more --minutes or "
+                "fewer --slices"
+            )
         if len(self.missed) < 8:
             raise UnsoundError(f"{film.label}: {len(self.missed)} sound frames in flight; 8 are needed: click more")
         if one.likelihood.two:
@@ -194,6 +199,9 @@ class Judged:
             if name not in one.draws or (film.quantity == "omega" and name == "theta0"):
                 continue
             if name == "touch" and not (one.touched and one.likelihood.two):
+                continue
+            if name == "release" and one.likelihood.held.release is not None:
+                found.append(f"  {name:12} {one.likelihood.held.release:.6g} s, held")
                 continue
             found.append(f"  {name:12} {self.number(name)}{self._remark(name)}")
         pair = float(np.corrcoef(one.draws["gamma"], one.draws["release"])[0, 1]) if one.held.release is None else 0.0
