@@ -45,8 +45,7 @@ LANDERS: Final = ("mujoco",)
 
 STEP: Final = 2e-5
 ICE_STEP: Final = 1e-4
-"""Steps of rigid contacts [s]. Whatever closes within a step strikes at once, which hits in a cascade of water do not:
-with steps of 1e-4 s some 4 % of its touches end otherwise than event by event (docs/landing.md, section 3)."""
+"""Steps for water and for ice [s]."""
 
 TWIN: Final = 0.02
 """Share by which the touches differ that have to end alike: near an edge between outcomes a halved step may end as the
