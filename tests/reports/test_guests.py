@@ -243,7 +243,8 @@ def test_check_certifies_guests_too_and_fails_with_them(tmp_path, capsys):
     shutil.copy(HOSTILE, tmp_path)
     assert checked(tmp_path, "--with", RK4) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[-3:-1] == [f"PASS  guest-naive-rk4-certify-{name}: 1; threshold 1 to 1" for name in ("shape", "ice")]
+    assert lines[-4:-2] == [f"PASS  guest-naive-rk4-certify-{name}: 1; threshold 1 to 1" for name in ("shape", "ice")]
+    assert lines[-2].startswith("PASS  guest-naive-rk4-flight: ")
     bad = f"{tmp_path / 'hostile.py'}:raises"
     assert checked(tmp_path, "--with", RK4, "--with", bad, "--timeout", "5") == 1
     lines = capsys.readouterr().out.splitlines()
