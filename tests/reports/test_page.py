@@ -6,7 +6,6 @@ from made_up import command, page_of, spoiled
 
 from flipproof import build
 from flipproof.chapters.solvers import FLIGHTS
-from flipproof.chapters.waterfall.study import program_run
 from flipproof.frame.flights import Flights
 from flipproof.frame.gather import Gathered, Stages
 from flipproof.page.render import read_assets, unbroken
@@ -19,7 +18,7 @@ def section_of(page, name):
 
 
 def test_a_failed_solver_and_a_failed_study_stand_where_their_results_would(gathered, report):
-    lost = (gathered.ask.solvers["pymunk"], program_run(gathered.ask.throw, gathered.ask.steps))
+    lost = (gathered.ask.solvers["pymunk"], *(run for run in gathered.flights if run.name == "waterfall, program"))
     broken = spoiled(gathered, lost, "SetupError: the world is <not> the one that was meant", ("flights", "waterfall"))
     page = page_of(broken, report.exhibits[0].drawn)
     flights = section_of(page, "flights")
