@@ -1,12 +1,13 @@
 """The page's words: the answer, its numbers, the bars of the waterfall, and failures where they belong."""
 
 import re
+from dataclasses import replace
 
 from made_up import command, page_of, spoiled
 
 from flipproof import build
 from flipproof.chapters.solvers import FLIGHTS
-from flipproof.frame.flights import Flights
+from flipproof.frame.flights import Flights, Outcome
 from flipproof.frame.gather import Gathered, Stages
 from flipproof.page.render import read_assets, unbroken
 
@@ -18,8 +19,9 @@ def section_of(page, name):
 
 
 def test_a_failed_solver_and_a_failed_study_stand_where_their_results_would(gathered, report):
-    lost = (gathered.ask.solvers["pymunk"], *(run for run in gathered.flights if run.name == "waterfall, program"))
-    broken = spoiled(gathered, lost, "SetupError: the world is <not> the one that was meant", ("flights", "waterfall"))
+    reason = "SetupError: the world is <not> the one that was meant"
+    broken = spoiled(gathered, [gathered.ask.solvers["pymunk"]], reason, ["flights"])
+    broken = replace(broken, outcomes={**broken.outcomes, "waterfall": Outcome(None, reason)})
     page = page_of(broken, report.exhibits[0].drawn)
     flights = section_of(page, "flights")
     row = re.search(r"<tr><th[^>]*>pymunk</th>.*?</tr>", flights, re.S).group()
