@@ -32,7 +32,7 @@ MAX_RATE: Final = 5.0
 """Largest gamma / |omega_0|: a slice then creeps less than a fifth of its distance from the centre while the bottle
 turns by 2 rad."""
 
-COARSE: Final = (7, 7)
+COARSE: Final = (12, 7)
 FINE: Final = (11, 17)
 """Nodes of the first grid and of the last, along gamma and e."""
 

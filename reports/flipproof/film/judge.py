@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final, Literal
 
@@ -20,6 +20,9 @@ Verdict = Literal["told", "bounded above", "bounded below", "cannot tell"]
 
 INDISTINCT: Final = 3.0
 """Difference of the logarithms of evidence up to which two equations are said to do equally well."""
+
+OUTDONE: Final = 20.0
+"""Difference from which on an equation does not explain a film: it leaves to the hand what another takes for flight."""
 
 SCALE_ERROR: Final = 0.03
 """Relative error of g that a stick held beside the plane of the throw may make."""
@@ -38,9 +41,12 @@ class Judged:
     Parameters
     ----------
     estimate : Estimate
+    behind : float
+        By how much the logarithm of its evidence is below that of the best equation fitted to the same film.
     """
 
     estimate: Estimate
+    behind: float = 0.0
 
     @cached_property
     def flying(self) -> NDArray[np.bool_]:
@@ -104,8 +110,17 @@ class Judged:
         return rest if self.estimate.film.quantity == "omega" else math.degrees(rest)
 
     @property
+    def misfit(self) -> str:
+        """The discrepancy as printed: a limit where the noise hides it (two deviations of a mean square)."""
+        left = float(np.mean(self.missed**2)) * 2.0 * math.sqrt(2.0 / max(len(self.missed), 1))
+        limit = math.sqrt(left) if self.estimate.film.quantity == "omega" else math.degrees(math.sqrt(left))
+        return f"{self.discrepancy:.2g}" if self.discrepancy >= limit else f"less than {limit:.1g}"
+
+    @property
     def explained(self) -> bool:
-        """Whether noise alone leaves residuals of this size and order."""
+        """Whether noise alone leaves residuals of this size and order, and no other equation is far likelier."""
+        if self.behind > OUTDONE:
+            return False
         spread = 5.0 / math.sqrt(max(4, len(self.missed)))
         return self.runs > 0.005 and self.noise <= max(self.own_noise, 1e-12) * (1.0 + spread)
 
@@ -234,12 +249,18 @@ class Judged:
         """Whether the equation explains the flight, and what it leaves if not."""
         if self.explained:
             return "noise and nothing else: the equation explains the flight"
+        if self.behind > OUTDONE:
+            return (
+                f"the equation does not explain the film: it takes {int(self.flying.sum())} frames for flight, and "
+                f"another equation makes the film exp({self.behind:.0f}) times as likely; no interval is promised "
+                "to hold the truth"
+            )
         unit = "rad/s" if self.estimate.film.quantity == "omega" else "degrees"
         order = (
             "" if self.runs > 0.005 else f", in waves that chance leaves once in {1 / max(self.runs, 1e-9):.2g} films"
         )
         return (
-            f"the equation does not explain the flight: a misfit of {self.discrepancy:.2g} {unit} that no drag and no "
+            f"the equation does not explain the flight: a misfit of {self.misfit} {unit} that no drag and no "
             f"restitution explains{order}; no interval is promised to hold the truth"
         )
 
@@ -250,8 +271,9 @@ def nearest_turn(angle: FloatArray, near: FloatArray) -> FloatArray:
 
 
 def ranked(all_: Sequence[Judged]) -> list[Judged]:
-    """Return the equations by their evidence, the best first."""
-    return sorted(all_, key=lambda one: -one.estimate.evidence)
+    """Return the equations by their evidence, the best first, each with how far it is behind."""
+    best = max(one.estimate.evidence for one in all_)
+    return sorted((replace(one, behind=best - one.estimate.evidence) for one in all_), key=lambda one: one.behind)
 
 
 def compared(all_: Sequence[Judged]) -> str:
