@@ -177,7 +177,7 @@ def solve(
             rest_speed=rest_speed, impact_law=impact_law, energy=energy, twin=twin,
         )  # fmt: skip
         return replace(run, scenario=scenario, settings={**run.settings, "own_inertia": True})
-    if model in WATERS:
+    if isinstance(model, str) and model in WATERS:
         run = import_module(f"ode_reference.{model}").solve(scenario, rtol, atol, times)
         return cast(Trajectory, run)
     chosen = model_named(model)

@@ -361,9 +361,7 @@ def test_the_real_command(tmp_path, kernels):
         check=False,
     )
     told = [re.fullmatch(r"flipproof: \d+ s: (.+)", line) for line in result.stderr.splitlines()]
-    assert [line and line[1] for line in told] == [
-        "runs, wave 1", "studies", "runs, wave 2", "studies", "figures", "page",
-    ]  # fmt: skip
+    assert [line and line[1] for line in told] == ["runs, wave 1", "runs, wave 2", "figures", "page"]
     assert result.returncode == 0, result.stdout
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
     assert summary["slices"] == 12

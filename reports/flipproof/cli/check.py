@@ -110,7 +110,7 @@ def command_check(options: argparse.Namespace) -> int:
         )  # fmt: skip
     write_junit(options.junit, found.findings, "flipproof check", found.seconds)
     write_json(options.json, {"findings": [one.to_mapping() for one in found.findings], "conclusion": found.conclusion})
-    say(found.conclusion)
+    print(inert(found.conclusion), flush=True)
     return 1 if found.failed else 0
 
 
