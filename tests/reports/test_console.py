@@ -123,6 +123,7 @@ def test_a_missing_engine_is_not_flipproofs_error(monkeypatch, capsys):
 
 def test_an_error_message_is_never_endless():
     assert readable("a\n b  c") == "a b c"
+    assert readable("\x1b[31m\u202ered") == r"\x1b[31m\u202ered"
     long = readable("x = " + "9" * 10_000 + " is outside [0, 1]")
     assert len(long) < 400
     assert long.endswith(" is outside [0, 1]")

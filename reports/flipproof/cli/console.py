@@ -20,8 +20,8 @@ ASCII: Final = {
 
 
 def readable(words: str) -> str:
-    """Return an error message as one line of readable length: a word or a line without end loses its middle."""
-    return _cut(" ".join(_cut(word, 300) for word in words.split()), 2000)
+    """Return an error message as one inert line of readable length: a word or a line without end loses its middle."""
+    return inert(_cut(" ".join(_cut(word, 300) for word in words.split()), 2000))
 
 
 def inert(text: str, *, lines: bool = True) -> str:

@@ -195,10 +195,12 @@ class Store(AbstractContextManager["Store"]):
         with suppress(*UNUSABLE, ValueError), closing(sqlite3.connect(aside)) as old:
             old.text_factory = bytes
             facts = dict(old.execute("SELECT id, facts FROM shared NOT INDEXED"))
-            for row in old.execute("SELECT key, shared, asked, answer, checksum FROM made NOT INDEXED"):
+            columns = "key, shared, asked, answer, checksum, typeof(answer)"
+            for *row, kind in old.execute(f"SELECT {columns} FROM made NOT INDEXED"):
                 if _whole(facts, *row):
                     key, shared, asked, answer, _ = row
-                    some.append(Entry(key, json.loads(facts[shared]), asked.decode(), answer))
+                    said = answer.decode() if kind == b"text" else answer
+                    some.append(Entry(key, json.loads(facts[shared]), asked.decode(), said))
         self.put(some)
         return len(some)
 
