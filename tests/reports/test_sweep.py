@@ -175,6 +175,18 @@ def test_a_file_that_was_cut_short_is_renamed_with_a_line_and_its_rows_are_made_
     assert aside.read_bytes() == path.read_bytes()[:length]
 
 
+def test_what_was_copied_from_a_damaged_file_is_stored_as_before(swept, tmp_path):
+    path, made, rows = swept
+    hurt = tmp_path / "sweep.sqlite"
+    changed = bytearray(path.read_bytes())
+    changed[20] = 0xFF  # of the header: pages lie as they did
+    hurt.write_bytes(changed)
+    found, asked, _ = filled(hurt, made)
+    assert (found, asked) == (rows, 0)
+    with closing(sqlite3.connect(hurt)) as store:
+        assert store.execute("SELECT DISTINCT typeof(asked), typeof(answer) FROM made").fetchall() == [("text", "text")]
+
+
 def test_what_is_no_sweep_is_left_alone(swept, tmp_path):
     _, made, _ = swept
     out = tmp_path / "out"
