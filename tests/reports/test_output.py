@@ -9,7 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from flipproof.output.folder import MARKER, UNFINISHED, OutputError, check_replaceable, replaced_folder, write_text
+from flipproof.output.folder import (
+    MARKER,
+    UNFINISHED,
+    OutputError,
+    check_replaceable,
+    marker_text,
+    replaced_folder,
+    write_text,
+)
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -337,3 +345,28 @@ def test_a_planted_part_file_is_not_written_to(tmp_path):
     assert (tmp_path / "a.txt").read_text() == "new"
     assert not (tmp_path / "a.txt").is_symlink()
     assert victim.read_text() == "years of work"
+
+
+@pytest.mark.parametrize("name", ["new", "old"])
+@pytest.mark.parametrize("planted", ["link", "file", "folder", "stranger"])
+def test_what_was_planted_in_an_unfinished_folder_is_neither_installed_nor_deleted(tmp_path, name, planted):
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "mine.txt").write_text("mine")
+    target = tmp_path / "latest"
+    place = tmp_path / f"latest{UNFINISHED}" / name
+    place.parent.mkdir()
+    if planted == "link":
+        place.symlink_to(elsewhere)
+    elif planted == "file":
+        place.write_text("mine")
+    else:
+        place.mkdir()
+        (place / "mine.txt").write_text("mine")
+        if planted == "stranger":
+            (place / MARKER).write_text(marker_text("report", ["index.html"]))
+    with pytest.raises(OutputError, match=name), replaced_folder(target, "report"):
+        pass
+    assert not target.exists()
+    assert (elsewhere / "mine.txt").read_text() == "mine"
+    assert (place if planted == "file" else place / "mine.txt").read_text() == "mine"

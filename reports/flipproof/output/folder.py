@@ -218,19 +218,20 @@ def replaced_folder(target: Path, kind: str) -> Iterator[Path]:
     beside = target.with_name(f"{target.name}{UNFINISHED}")
     fresh = beside / NEW
     with _plainly(target), _held(beside, target):
-        _clear(beside, target)
+        _clear(beside, target, kind)
         check_replaceable(target, kind)
         fresh.mkdir()
+        (fresh / MARKER).write_text(marker_text(kind), encoding="utf-8")  # whoever dies here leaves a folder of ours
         try:
             yield fresh
-            (fresh / MARKER).write_text(marker_text(kind, files_of(fresh)), encoding="utf-8")
+            (fresh / MARKER).write_text(marker_text(kind, files_of(fresh) - {MARKER}), encoding="utf-8")
             # Again: somebody may have put a file there meanwhile.
             check_replaceable(target, kind)
             if target.exists():
                 os.replace(target, beside / OLD)
             os.replace(fresh, target)
         finally:
-            _clear(beside, target)
+            _clear(beside, target, kind)
 
 
 @contextmanager
@@ -273,9 +274,17 @@ def _remove_empty(folder: Path) -> None:
         folder.rmdir()
 
 
-def _clear(beside: Path, target: Path) -> None:
-    """Put the old folder back if a program died after moving it away; remove what is unfinished or replaced."""
+def _clear(beside: Path, target: Path, kind: str) -> None:
+    """Put the old folder back if a program died after moving it away; remove what is unfinished or replaced.
+
+    Raises OutputError, and leaves everything as it is, if one of the two is a link or is not flipproof's own.
+    """
     new, old = beside / NEW, beside / OLD
+    for place in (new, old):
+        if place.is_symlink() or (place.exists() and not place.is_dir()):
+            raise OutputError(f"{place} is no folder that flipproof made; move it away")
+        if place.exists():
+            check_own(place, kind)
     if old.exists() and not target.exists():
         os.replace(old, target)
     if old.exists() and new.exists():
