@@ -169,6 +169,7 @@ def test_the_frame_knows_no_subject_and_chapters_are_named_once():
 
 
 FLOORS = (
+    ("curves",),
     ("figures",),
     ("frame", "output"),
     ("foreign", "bounce"),

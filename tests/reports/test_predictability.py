@@ -12,11 +12,11 @@ from flipproof.chapters.differences.study import study_difference
 from flipproof.chapters.predictability.chapter import (
     SIZES,
     figure_predictability,
-    fit_growth,
     parting_words,
     plan_predictability,
     study_predictability,
 )
+from flipproof.curves.growth import fit_growth
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import make, solve
 from slicemodel import Impacts, Scenario, Trajectory

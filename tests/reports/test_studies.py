@@ -10,7 +10,7 @@ from made_up import trajectory_of
 
 from flipproof.build import ask_of
 from flipproof.chapters.differences.chapter import band_calls, run_bands
-from flipproof.chapters.differences.study import first_crossing, largest_change, study_difference
+from flipproof.chapters.differences.study import largest_change, study_difference
 from flipproof.chapters.engine_facts.chapter import claim_gravity_cancels
 from flipproof.chapters.ice.chapter import measure
 from flipproof.chapters.reference.chapter import claim_reference_converged, claim_second_method
@@ -23,6 +23,7 @@ from flipproof.chapters.step_size.chapter import (
     plan_step_size,
     study_step_size,
 )
+from flipproof.curves.growth import first_crossing
 from flipproof.frame.findings import Band, Finding
 from flipproof.frame.flights import Flights, Outcome
 from flipproof.frame.solvers import Made, Missing, Run

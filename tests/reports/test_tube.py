@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_up import trajectory_of
 
-from flipproof.chapters.alignment.study import study_tube, tube_around
+from flipproof.chapters.alignment.study import study_tube
+from flipproof.curves.tube import tube_around
 from slicemodel import Scenario, Trajectory
 
 T = np.linspace(0.0, 0.5, 501)

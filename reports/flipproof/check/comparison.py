@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flipproof.chapters.differences.study import PARTING_BAND, first_crossing
+from flipproof.chapters.differences.study import PARTING_BAND
+from flipproof.curves.growth import first_crossing
 from flipproof.frame.findings import Finding, observed, regression
 from flipproof.output.tables import QUANTITIES, Curve
 from slicemodel.observables import plateau

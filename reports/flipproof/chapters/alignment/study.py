@@ -12,21 +12,10 @@ make a plain comparison of keys say more than it knows:
 - Once a slice flies to another end its later keys mean nothing. Where the order of ends of a slice differs, its
   history forks there, and what follows is counted and not aligned. It is no fork, only a missing or an extra impact,
   if leaving that impact out brings all later ones back to within the band.
-
-Beside the impacts stands a tolerance tube in (t, omega): an early bounce stays inside, a wrong level leaves it.
-
-    omega |       ____ upper
-          |  ____/  __
-          |     ___/     lower
-          +-------------------- t
-
-At every time the tube reaches from the smallest to the largest value that the reference takes within dt of it, and
-dy further. A steep flank may so come earlier or later by dt; a level may be off by dy and no more.
 """
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -34,7 +23,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.chapters.differences.study import first_crossing
+from flipproof.curves.events import IndexArray, closest
+from flipproof.curves.tube import hold
 from flipproof.frame.solvers import Missing
 from slicemodel import Impacts, Trajectory
 from slicemodel.trajectory import BASE, FloatArray
@@ -45,7 +35,6 @@ SHIFT_BAND = 1e-3
 LEAST_SPEED = 1e-2
 """Slower impacts are the tail of a slice that comes to rest [m/s]."""
 
-IndexArray = NDArray[np.int64]
 Table = Any
 """A NumPy record array: rows with named columns, such as ``impacts.time``."""
 
@@ -217,29 +206,9 @@ def _pairs(first: FloatArray, second: FloatArray, mine: IndexArray, its: IndexAr
     by_number = np.stack([mine[:few], its[:few]])
     if len(mine) == len(its):
         return by_number
-    by_time = _closest(first, second, mine, its)
+    by_time = closest(first, second, mine, its)
     agreeing = [(np.abs(second[k] - first[j]) <= SHIFT_BAND).sum() for j, k in (by_number, by_time)]
     return by_time if agreeing[1] > agreeing[0] else by_number
-
-
-def _closest(first: FloatArray, second: FloatArray, mine: IndexArray, its: IndexArray) -> IndexArray:
-    """Match as many as possible in order, with the smallest sum of shifts; return indices, shape (2, K)."""
-    if len(mine) > len(its):
-        return _closest(second, first, its, mine)[::-1]
-    shift = np.abs(second[its][np.newaxis, :] - first[mine][:, np.newaxis])
-    # best[i, j]: smallest sum for the first i of mine among the first j of its
-    best = np.full((len(mine) + 1, len(its) + 1), np.inf)
-    best[0] = 0.0
-    for i in range(len(mine)):
-        best[i + 1, 1:] = np.minimum.accumulate(best[i, :-1] + shift[i])
-    chosen = []
-    j = len(its)
-    for i in range(len(mine), 0, -1):
-        while best[i, j - 1] <= best[i, j]:
-            j -= 1
-        j -= 1
-        chosen.append(j)
-    return np.stack([mine, its[chosen[::-1]]])
 
 
 def rest_intervals(run: Trajectory) -> Table:
@@ -280,49 +249,15 @@ def study_tube(reference: Trajectory, run: Trajectory, *, dt: float, dy: float) 
 
     Time grids and lengths may differ; ``dt`` [s] and ``dy`` [rad/s] are not negative.
     """
-    times = reference.t
-    marks = np.concatenate([times, run.t, times - dt, times + dt])
-    t = np.unique(marks[(marks >= times[0]) & (marks <= times[-1])])
-    lower, upper = tube_around(times, reference.omega, t, dt, dy)
-    value = np.interp(t, run.t, run.omega, left=math.nan, right=math.nan)
-    outside = np.maximum(value - upper, lower - value)
-    outside[np.isnan(outside)] = np.inf  # where the run does not exist
-    inside = outside <= 0.0
-    held = np.diff(t) * (inside[:-1] & inside[1:]) + np.diff(t) * (inside[:-1] ^ inside[1:]) / 2
-    share = float(held.sum() / (t[-1] - t[0])) if len(t) > 1 else float(inside[0])
-    first_exit = first_crossing(t, outside, 0.0)
-    largest = float(np.maximum(outside[(t >= run.t[0]) & (t <= run.t[-1])], 0.0).max(initial=0.0))
+    held = hold(reference.t, reference.omega, run.t, run.omega, dt=dt, dy=dy)
     tube = f"the tube of ±{dt * 1e3:g} ms and ±{dy:.3g} around {reference.label} in omega"
-    if first_exit is None:
+    if held.first_exit is None:
         words = f"{run.label} stays in {tube}"
     else:
-        words = f"{run.label} leaves {tube} at {first_exit * 1e3:.1f} ms, "
-        words += f"is inside for {share:.1%} of the time and at most {largest:.3g} outside"
-        words += f"; it ends at {run.t[-1] * 1e3:.1f} ms" if run.t[-1] < times[-1] else ""
-    return Tube(share=share, first_exit=first_exit, largest=largest, words=words)
-
-
-def tube_around(
-    times: FloatArray, values: FloatArray, at: FloatArray, dt: float, dy: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return lower and upper bound of the tube at the times ``at``.
-
-    The reference is linear between its points, so over [t - dt, t + dt] it is extreme at a point within or at an end
-    of that interval; both are taken, and the bounds are exact. Beyond its ends the reference has no values.
-    """
-    left, right = np.maximum(at - dt, times[0]), np.minimum(at + dt, times[-1])
-    edges = np.interp(np.stack([left, right]), times, values)
-    start, stop = np.searchsorted(times, left), np.searchsorted(times, right, side="right")
-    some = stop > start
-    bounds = []
-    for extreme, sign in ((np.minimum, -1.0), (np.maximum, 1.0)):
-        bound = extreme(edges[0], edges[1])
-        # One more value lets reduceat take the interval that ends with the last point.
-        windows = np.stack([start[some], stop[some]], axis=1).ravel()
-        within = extreme.reduceat(np.append(values, values[-1]), windows)[::2]
-        bound[some] = extreme(bound[some], within)
-        bounds.append(bound + sign * dy)
-    return bounds[0], bounds[1]
+        words = f"{run.label} leaves {tube} at {held.first_exit * 1e3:.1f} ms, "
+        words += f"is inside for {held.share:.1%} of the time and at most {held.largest:.3g} outside"
+        words += f"; it ends at {run.t[-1] * 1e3:.1f} ms" if run.t[-1] < reference.t[-1] else ""
+    return Tube(**held._asdict(), words=words)
 
 
 def count_key(impacts: Impacts, index: int, least_speed: float = 0.0) -> int:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flipproof.curves.growth import first_crossing
 from flipproof.frame.findings import Finding, regression
 from flipproof.frame.solvers import Missing
 from slicemodel import Impact, Trajectory
@@ -104,17 +105,6 @@ def study_difference(
         slices=first.scenario.n_slices,
         finer=None if finer is None else (finer[0].scenario.n_slices, study_difference(name, *finer).largest),
     )
-
-
-def first_crossing(t: FloatArray, size: FloatArray, band: float) -> float | None:
-    """Return when ``size`` first exceeds ``band``, linear between points; None if never."""
-    above = np.flatnonzero(size > band)
-    if not len(above):
-        return None
-    if (k := int(above[0])) == 0:
-        return float(t[0])
-    share = (band - size[k - 1]) / (size[k] - size[k - 1])
-    return float(t[k - 1] + share * (t[k] - t[k - 1]))
 
 
 def claim_change(

@@ -24,16 +24,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from engine_check.solver import ENGINES
-from flipproof.chapters.differences.study import first_crossing
 from flipproof.chapters.predictability.chapter import (
     HORIZON_BAND,
     SIZE_LINES,
     SIZES,
-    Growth,
-    fit_growth,
     plan_predictability,
 )
 from flipproof.chapters.solvers import ENGINE, FREE
+from flipproof.curves.growth import Growth, first_crossing, fit_growth
 from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, observed, regression
 from flipproof.frame.flights import attempt

@@ -13,14 +13,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import cycle
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from flipproof.chapters.alignment.study import LEAST_SPEED, count_key, ordinal
-from flipproof.chapters.differences.study import PARTING_BAND, Difference, first_crossing, percent
+from flipproof.chapters.differences.study import PARTING_BAND, Difference, percent
+from flipproof.curves.growth import Growth, first_crossing, fit_growth
 from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, judged, observed
 from flipproof.frame.flights import Outcome, attempt, known
@@ -37,59 +38,6 @@ HORIZON_BAND = 1e-3
 
 GROWTH_WINDOW = 0.05
 """Growth before and after a parting is fitted over this time [s]."""
-
-
-class Growth(NamedTuple):
-    """Exponential growth rate of a difference [1/s] with its standard error; NaN if it cannot be fitted."""
-
-    rate: float = math.nan
-    error: float = math.nan
-
-    @property
-    def clear(self) -> bool:
-        """True if the rate differs from zero by more than three standard errors.
-
-        With as few windows as are fitted, noise does so in 5 of 100 cases.
-        """
-        return abs(self.rate) > 3.0 * self.error
-
-    @property
-    def words(self) -> str:
-        """The growth in words."""
-        if not math.isfinite(self.rate):
-            return "no growth rate (too few points above round-off)"
-        if not self.clear:
-            return f"does not clearly grow ({self.rate:.1f} ± {self.error:.1f} /s)"
-        return f"{'grows' if self.rate > 0 else 'shrinks'} at {abs(self.rate):.1f} ± {self.error:.1f} /s"
-
-
-def fit_growth(t: FloatArray, size: FloatArray, start: float = -math.inf, stop: float = math.inf) -> Growth:
-    """Fit |difference| = A exp(rate t) over [start, stop], robustly.
-
-    A difference changes sign and jumps, so single points and squares of residuals tell little. The interval is divided
-    into twelve windows with the median of log |difference| in each, and the rate is the median of the slopes between
-    all pairs of them (Theil and Sen). Its standard error is that of a straight line whose scatter is the median
-    absolute residual, scaled to a normal distribution. Points below round-off or not finite are left out.
-    """
-    windows, least = 12, 4
-    size = np.abs(size)
-    usable = (t >= start) & (t <= stop) & np.isfinite(size) & (size > 1e-14)
-    times, logs = t[usable], np.log(size[usable])
-    if len(times) < least:
-        return Growth()
-    edges = np.linspace(times[0], times[-1], windows + 1)
-    window = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, windows - 1)
-    filled = np.unique(window)
-    if len(filled) < least:
-        return Growth()
-    x = np.array([times[window == w].mean() for w in filled])
-    y = np.array([np.median(logs[window == w]) for w in filled])
-    i, j = np.triu_indices(len(x), 1)
-    rate = float(np.median((y[j] - y[i]) / (x[j] - x[i])))
-    residual = y - rate * x
-    scatter = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
-    scatter *= math.sqrt(len(x) / (len(x) - 2))
-    return Growth(rate, scatter / math.sqrt(float(((x - x.mean()) ** 2).sum())))
 
 
 def parting_words(difference: Difference, impacts: Impacts | None = None) -> str:

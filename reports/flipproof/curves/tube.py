@@ -1,0 +1,73 @@
+"""The tube around a curve: an early jump stays inside, a wrong level leaves it.
+
+    omega |       ____ upper
+          |  ____/  __
+          |     ___/     lower
+          +-------------------- t
+
+At every time the tube reaches from the smallest to the largest value that the reference takes within dt of it, and
+dy further. A steep flank may so come earlier or later by dt; a level may be off by dy and no more.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from flipproof.curves.growth import first_crossing
+from slicemodel.trajectory import FloatArray
+
+
+class Held(NamedTuple):
+    """A curve held against the tube around another: the share of that one's time at which it is inside.
+
+    It leaves the tube first at ``first_exit``, None if it never does, and is at most ``largest`` outside.
+    """
+
+    share: float
+    first_exit: float | None
+    largest: float
+
+
+def hold(times: FloatArray, values: FloatArray, at: FloatArray, other: FloatArray, *, dt: float, dy: float) -> Held:
+    """Hold a curve (``at``, ``other``) against the tube around (``times``, ``values``), both linear between points.
+
+    ``dt`` and ``dy`` are not negative; where the curve does not exist it is outside.
+    """
+    marks = np.concatenate([times, at, times - dt, times + dt])
+    t = np.unique(marks[(marks >= times[0]) & (marks <= times[-1])])
+    lower, upper = tube_around(times, values, t, dt, dy)
+    value = np.interp(t, at, other, left=math.nan, right=math.nan)
+    outside = np.maximum(value - upper, lower - value)
+    outside[np.isnan(outside)] = np.inf  # where the run does not exist
+    inside = outside <= 0.0
+    held = np.diff(t) * (inside[:-1] & inside[1:]) + np.diff(t) * (inside[:-1] ^ inside[1:]) / 2
+    share = float(held.sum() / (t[-1] - t[0])) if len(t) > 1 else float(inside[0])
+    first_exit = first_crossing(t, outside, 0.0)
+    largest = float(np.maximum(outside[(t >= at[0]) & (t <= at[-1])], 0.0).max(initial=0.0))
+    return Held(share, first_exit, largest)
+
+
+def tube_around(
+    times: FloatArray, values: FloatArray, at: FloatArray, dt: float, dy: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return lower and upper bound of the tube at the times ``at``.
+
+    The reference is linear between its points, so over [t - dt, t + dt] it is extreme at a point within or at an end
+    of that interval; both are taken, and the bounds are exact. Beyond its ends the reference has no values.
+    """
+    left, right = np.maximum(at - dt, times[0]), np.minimum(at + dt, times[-1])
+    edges = np.interp(np.stack([left, right]), times, values)
+    start, stop = np.searchsorted(times, left), np.searchsorted(times, right, side="right")
+    some = stop > start
+    bounds = []
+    for extreme, sign in ((np.minimum, -1.0), (np.maximum, 1.0)):
+        bound = extreme(edges[0], edges[1])
+        # One more value lets reduceat take the interval that ends with the last point.
+        windows = np.stack([start[some], stop[some]], axis=1).ravel()
+        within = extreme.reduceat(np.append(values, values[-1]), windows)[::2]
+        bound[some] = extreme(bound[some], within)
+        bounds.append(bound + sign * dy)
+    return bounds[0], bounds[1]
