@@ -57,11 +57,8 @@ MOST = 1e15
 """Least and largest positive number of a field, in its unit: between them no product of fields leaves the range of
 floating point."""
 
-MOST_ANGLE = 1e6
-"""Largest angle at release [rad]; angles near it are known to 1e-10 rad."""
-
-MOST_FILE_ANGLE = 4 * math.pi
-"""Largest angle at release that a file may state [rad]: what is larger was meant in degrees."""
+MOST_ANGLE = 4 * math.pi
+"""Largest angle at release [rad]: a larger one was meant in degrees."""
 
 MOST_FILE = 2**18
 """Bytes of a scenario file at the most."""
@@ -255,7 +252,7 @@ class Scenario:
         Angular velocity at release [rad/s], its magnitude in [1e-15, 1e15]: a bottle that does not spin has no flip.
         Negative values spin the other way.
     theta0 : float
-        Angle at release [rad], in [-1e6, 1e6].
+        Angle at release [rad], in [-4 pi, 4 pi]; a larger one was meant in degrees.
     duration : float
         Time from release to landing [s], in [1e-15, 1e15].
     gravity : float
@@ -294,7 +291,7 @@ class Scenario:
             "drag": checks.number("drag", self.drag, "kg/s", least=0.0, most=MOST),
             "restitution": checks.number("restitution", self.restitution, "", least=0.0, most=1.0),
             "omega0": checks.number("omega0", self.omega0, "rad/s", least=-MOST, most=MOST),
-            "theta0": checks.number("theta0", self.theta0, "rad", least=-MOST_ANGLE, most=MOST_ANGLE),
+            "theta0": self._checked_angle(checks),
             "duration": checks.number("duration", self.duration, "s", least=LEAST, most=MOST),
             "gravity": checks.number("gravity", self.gravity, "m/s^2", least=0.0, most=MOST),
             "launch_velocity": self._checked_launch_velocity(checks),
@@ -318,6 +315,12 @@ class Scenario:
                 f"(admissible: [{LEAST:g}, {capacity:g}] kg)"
             )
         return water_mass
+
+    def _checked_angle(self, checks: _Checks) -> float | None:
+        angle = checks.number("theta0", self.theta0, "rad", least=-MOST_ANGLE, most=MOST_ANGLE)
+        if angle is None and isinstance(self.theta0, int | float) and MOST_ANGLE < abs(self.theta0) <= 1e6:
+            checks.problems[-1] += f"; radians? {self.theta0:g} degrees are {math.radians(self.theta0):.6g} rad"
+        return angle
 
     def _checked_launch_velocity(self, checks: _Checks) -> tuple[float | None, ...]:
         components = self.launch_velocity
@@ -397,16 +400,10 @@ class Scenario:
         ------
         ScenarioError
             Naming file, table and key: unreadable file, bad TOML, unknown table or key
-            (with the nearest known name), impossible value, an angle at release beyond two turns, which are degrees.
+            (with the nearest known name), impossible value.
         """
         document, _ = read_toml(path, MOST_FILE)
-        scenario = cls.from_mapping(document, source=str(path))
-        if abs(scenario.theta0) > MOST_FILE_ANGLE:
-            raise ScenarioError(
-                f"{path}: [scenario] theta0 = {scenario.theta0!r} rad is outside [-4 pi, 4 pi] rad; radians? "
-                f"{scenario.theta0:g} degrees are {math.radians(scenario.theta0):.6g} rad"
-            )
-        return scenario
+        return cls.from_mapping(document, source=str(path))
 
     @classmethod
     def from_mapping(cls, document: Mapping[str, Any], *, source: str = "scenario") -> Scenario:

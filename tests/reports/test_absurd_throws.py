@@ -28,7 +28,7 @@ CASES = [(name, value) for name, values in ENDS.items() for value in values]
 
 
 TOGETHER = [
-    {"omega0": 1.8e7, "theta0": 1e6, "duration": 5e9, "gravity": 7e-6},
+    {"omega0": 1.8e7, "theta0": MOST_ANGLE, "duration": 5e9, "gravity": 7e-6},
     {"bottle": Bottle(radius=2e11), "water_mass": 1.0},
     {"bottle": Bottle(length=MOST, mass=MOST), "omega0": MOST, "gravity": MOST},
     {"bottle": Bottle(capacity=LEAST), "water_mass": LEAST, "drag": MOST, "duration": MOST},

@@ -50,8 +50,9 @@ def test_simulate_writes_csv(capsys, tmp_path):
 
 
 def test_simulate_says_when_a_run_is_not_whole(capsys):
-    status, _, err = run(capsys, "simulate", "--solver", "published-matlab", "--slices", "20")
-    assert status == 0
+    status, out, err = run(capsys, "simulate", "--solver", "published-matlab", "--slices", "20")
+    assert status == 1
+    assert out.startswith("t,theta,omega")
     assert "published-matlab: " in err
     assert "left the bottle at t = " in err
 

@@ -270,7 +270,10 @@ def _print_report(report: Any, out: Path, seconds: float) -> None:
 
 
 def command_simulate(options: argparse.Namespace) -> int:
-    """Run one solver and write CSV; say on standard error what stopped it, or up to when it may be trusted."""
+    """Run one solver and write CSV; say on standard error what stopped it, or up to when it may be trusted.
+
+    Returns 1 if the flight stopped before its end; what was flown is written all the same.
+    """
     from flipproof.frame.solvers import find, solve
     from flipproof.frame.twins import doubt
     from flipproof.output.folder import write_text
@@ -293,7 +296,7 @@ def command_simulate(options: argparse.Namespace) -> int:
         print(f"flipproof: {solver.name}: {trajectory.status}: {trajectory.message}", file=sys.stderr)
     if words := doubt(trajectory, seconds):
         print(f"flipproof: {words}", file=sys.stderr)
-    return 0
+    return 0 if trajectory.ok else 1
 
 
 if __name__ == "__main__":

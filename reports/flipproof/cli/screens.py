@@ -14,7 +14,8 @@ FIRST: Final = ("report", "compare", "check", "simulate", "sweep", "certify", "t
 EXIT_STATUSES: Final = """\
 exit status:
   0    done; for a report: every claim was evaluated and no regression claim failed
-  1    a regression claim failed; for diff: something moved; for compare: farther apart than --tolerance
+  1    a regression claim failed; for diff: something moved; for compare: farther apart than --tolerance;
+       for simulate: the flight stopped before its end
   2    bad input; one line on standard error says what and where
   3    an error in flipproof itself; FLIPPROOF_TRACEBACK=1 shows where
   130  interrupted; an older report is as it was, a sweep goes on where it stopped"""
