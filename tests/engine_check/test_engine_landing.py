@@ -169,7 +169,7 @@ def test_an_outcome_is_certified_if_half_the_step_and_the_twins_end_alike(monkey
 
 @pytest.mark.parametrize("law", ["together", "in-turn"])
 def test_near_an_edge_between_outcomes_the_engine_certifies_nothing_false(law):
-    """Two thousandths to four hundredths of omega beside the edge of the event-driven landing; at it, nothing at all."""
+    """Certificates 2e-3 to 0.04 of omega beside the edge of the event-driven landing; at it, none at all."""
     start = flown(3)
 
     def truth(factor):
