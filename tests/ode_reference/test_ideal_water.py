@@ -1,0 +1,109 @@
+"""Ideal water in two dimensions: what it keeps, what is known in closed form, and how little the grid matters."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ode_reference import ideal_water
+from slicemodel import Scenario
+
+FILLINGS = (0.1, 0.25, 0.33, 0.5, 0.75, 1.0)
+
+
+def throw(filling, **changes):
+    return replace(Scenario(), water_mass=filling, **changes)
+
+
+def plateau(run):
+    times = np.linspace(0.25, run.t[-1], 401)
+    return float(np.interp(times, run.t, run.omega).mean() / run.omega[0])
+
+
+@pytest.mark.parametrize("suction", [False, True])
+@pytest.mark.parametrize("filling", FILLINGS)
+def test_momenta_are_kept_without_mending(filling, suction):
+    run = ideal_water.solve(throw(filling), cells=8, suction=suction)
+    assert np.abs(run.drift).max() < 1e-10
+    assert run.momentum.max() < 1e-12
+    assert np.isfinite(run.omega).all()
+
+
+@pytest.mark.parametrize("start", ["irrotational", "tilted", "tilted back"])
+def test_momenta_are_kept_from_every_start(start):
+    run = ideal_water.solve(throw(0.5), start, cells=8)
+    assert np.abs(run.drift).max() < 1e-10
+    assert run.momentum.max() < 1e-12
+
+
+def test_water_that_parts_gains_no_energy():
+    run = ideal_water.solve(throw(0.5), cells=8)
+    assert run.energy.max() < 1.001
+    assert 0.9 < run.density[5:].min() <= run.density.max() < 1.1
+
+
+def test_a_full_bottle_turns_on():
+    run = ideal_water.solve(throw(1.0, duration=0.25), cells=8)
+    np.testing.assert_allclose(run.omega, 20.0, rtol=2e-3)
+    np.testing.assert_allclose(run.inertia, run.inertia[0], rtol=1e-3)
+
+
+def test_pressure_in_a_full_bottle_is_that_of_rotating_water():
+    scenario = throw(1.0, duration=0.005)
+    run = ideal_water.solve(scenario, cells=16)
+    bottle = scenario.bottle
+    nx, ny = run.pressure.shape
+    x, y = (np.arange(nx) + 0.5) / nx - 0.5, (np.arange(ny) + 0.5) / ny - 0.5
+    density = bottle.capacity / (bottle.length * 2 * bottle.radius)
+    place = (x[:, None] * bottle.length) ** 2 + (y * 2 * bottle.radius) ** 2
+    expected = density * scenario.omega0**2 * place / 2
+    apart = run.pressure - expected
+    assert np.ptp(apart) < 0.01 * np.ptp(expected)
+
+
+@pytest.mark.parametrize(("filling", "share"), [(1.0, 0.760), (0.5, 0.517)])
+def test_irrotational_water_has_the_inertia_of_its_series(filling, share):
+    run = ideal_water.solve(throw(filling, duration=0.001), "irrotational", cells=16)
+    assert run.angular_momentum[0] / (run.inertia[0] * 20.0) == pytest.approx(share, rel=0.01, abs=0)
+
+
+def test_a_throw_backwards_is_the_mirror_image():
+    forth, back = (ideal_water.solve(throw(0.5, duration=0.03, omega0=omega), cells=8) for omega in (20.0, -20.0))
+    np.testing.assert_allclose(back.omega, -forth.omega, rtol=1e-9)
+    np.testing.assert_allclose(back.inertia, forth.inertia, rtol=1e-9)
+
+
+def test_same_input_same_bits():
+    one, two = (ideal_water.solve(throw(0.33, duration=0.1), cells=8) for _ in range(2))
+    assert one.omega.tobytes() == two.omega.tobytes()
+    assert one.x.tobytes() == two.x.tobytes()
+
+
+def test_suction_holds_water_together_for_a_while():
+    late = []
+    for suction in (False, True):
+        run = ideal_water.solve(throw(0.5, duration=0.2), cells=8, suction=suction)
+        late.append(run.t[np.flatnonzero(run.omega < 15.0)[0]])
+    assert late[1] > 1.3 * late[0]
+
+
+def test_finer_cells_move_the_plateau_little():
+    levels = [plateau(ideal_water.solve(throw(0.5), cells=cells)) for cells in (8, 12)]
+    assert abs(levels[1] - levels[0]) < 0.06
+    assert all(0.15 < level < 0.3 for level in levels)
+
+
+@pytest.mark.parametrize(
+    ("field", "start", "changes"),
+    [
+        ("start", "shaken", {}),
+        ("start", "tilted", {"water_mass": 1.0}),
+        ("cells", "spinning", {"cells": 1}),
+        ("steps", "spinning", {"steps": 0}),
+        ("omega0", "spinning", {"omega0": 0.0}),
+    ],
+)
+def test_what_cannot_be_thrown_is_refused_by_name(field, start, changes):
+    solver = {name: changes.pop(name) for name in ("cells", "steps") if name in changes}
+    with pytest.raises(ValueError, match=field):
+        ideal_water.solve(replace(Scenario(), **changes), start, **solver)
