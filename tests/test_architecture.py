@@ -187,7 +187,6 @@ UPWARD = {
     "figures.power -> foreign.certify",
     "figures.power -> foreign.power",
     "figures.report_pair -> output.columns",
-    "figures.style -> frame.spoken",
     "film.page -> page.templating",
     "foreign.checks_basic -> chapters.vectors.published",
     "foreign.place -> chapters.solvers",
@@ -200,7 +199,6 @@ UPWARD = {
 """Imports upward that are there; this list can only become shorter."""
 
 CIRCLES = {
-    frozenset({"bounce.adapter", "bounce.engines"}),
     frozenset({"foreign.checking", "foreign.files", "foreign.isolated", "foreign.solving", "foreign.specs"}),
 }
 """Circles of files that are there; this list can only become shorter."""

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from flipproof.bounce import exact
-from flipproof.bounce.adapter import Adapter, AdapterError, load
+from flipproof.bounce.adapter import Adapter, AdapterError
 from flipproof.bounce.passport import MEASURES, OF_LINES, passport
+from flipproof.bounce.specs import load
 
 
 def located(height, speed, restitution, gravity, dt, duration):

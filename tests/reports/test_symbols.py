@@ -6,9 +6,9 @@ from xml.etree import ElementTree
 
 import pytest
 
+from flipproof.figures.spoken import SPOKEN, spoken
 from flipproof.figures.style import draw, new_figure
 from flipproof.frame.solvers import catalogue
-from flipproof.frame.spoken import SPOKEN, spoken
 from flipproof.page.equations import equation, mathematics, numbers
 from flipproof.page.glossary import linked
 from flipproof.page.parts import shared

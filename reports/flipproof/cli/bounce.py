@@ -30,8 +30,8 @@ def add_bounce(commands: Any) -> None:
 
 def command_bounce(options: argparse.Namespace) -> int:
     """Measure, print a line a property, write what was asked for; the status is 0 whatever was remarked."""
-    from flipproof.bounce.adapter import load
     from flipproof.bounce.passport import Passport, measure
+    from flipproof.bounce.specs import load
 
     check_outputs(options, "json", "plot")
     if options.plot and options.plot.suffix not in (".png", ".svg"):

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, LogFormatterMathtext
 
-from flipproof.frame.spoken import spoken
+from flipproof.figures.spoken import spoken
 from slicemodel import Trajectory
 
 # One hue per family, so that a scheme and the equation it converges to are seen as a pair (Okabe-Ito colours,

@@ -8,7 +8,7 @@ from typing import Final
 
 from markupsafe import Markup, escape
 
-from flipproof.frame.spoken import spoken
+from flipproof.figures.spoken import spoken
 
 TERMS: Final[Mapping[str, str]] = {
     "ω": "Angular velocity of the bottle: by how many radians it turns in a second.",

@@ -9,8 +9,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from flipproof.figures.spoken import spoken
 from flipproof.frame.exhibit import Touch
-from flipproof.frame.spoken import spoken
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 

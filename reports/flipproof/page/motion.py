@@ -21,8 +21,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flipproof.figures.spoken import spoken
 from flipproof.frame.solvers import Made
-from flipproof.frame.spoken import spoken
 from slicemodel import Scenario, Trajectory
 from slicemodel.trajectory import FloatArray, Impacts
 

@@ -23,9 +23,9 @@ from markupsafe import Markup
 
 from flipproof.chapters.differences.study import PARTING_BAND, percent
 from flipproof.chapters.maps.study import RUNGS, place_of
+from flipproof.figures.spoken import SPOKEN
 from flipproof.figures.style import SUPERSCRIPTS
 from flipproof.frame.findings import finite_or_none
-from flipproof.frame.spoken import SPOKEN
 from flipproof.page.lead import signed
 from slicemodel import Scenario
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from flipproof.frame.spoken import spoken
+from flipproof.figures.spoken import spoken
 from flipproof.page.inline import data_uri, shape
 
 

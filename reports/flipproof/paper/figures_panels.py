@@ -12,9 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
+from flipproof.figures.spoken import SPOKEN
 from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.spoken import SPOKEN
 from flipproof.output.columns import columns_csv
 from flipproof.paper.runs import BANDS, SOLVERS, PaperRuns
 from slicemodel.trajectory import FloatArray

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Final
 
+from flipproof.figures.spoken import SPOKEN
 from flipproof.frame.findings import Band, Finding, regression
-from flipproof.frame.spoken import SPOKEN
 from flipproof.paper import claims_figure_5, claims_figures_6_7, claims_figures_8_9
 from flipproof.paper.claims_figures_8_9 import claim_filling_of_change
 from flipproof.paper.experiment import CAVEAT, FREEDOM, Observation, closest_overall, compare_all, standing

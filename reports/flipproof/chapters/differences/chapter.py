@@ -16,12 +16,12 @@ from flipproof.chapters.differences.study import PARTING_BAND, Difference, perce
 from flipproof.chapters.predictability.chapter import parting_words
 from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, WITNESSES
 from flipproof.chapters.waterfall.study import NAMES
+from flipproof.figures.spoken import spoken
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Absent, Ask, Band, Call, Chapter, Claims, Exhibit, Run, Study, Touch, observed
 from flipproof.frame.findings import Rule
 from flipproof.frame.flights import Flights, attempt, known
 from flipproof.frame.solvers import find, finer
-from flipproof.frame.spoken import spoken
 from flipproof.frame.twins import BAND_WORDS, omega_band_call
 from flipproof.output.columns import curves_csv
 from ode_reference.models import LADDER, MODELS, ladder_of

@@ -12,8 +12,8 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.chapters.maps.study import vary
+from flipproof.figures.spoken import SPOKEN
 from flipproof.frame.chapter import Ask, Made, Run, Study
-from flipproof.frame.spoken import SPOKEN
 from ode_reference.solver import COLUMN, RODS
 from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray
