@@ -72,7 +72,7 @@ MAX_TWIN: Final = 10**9
 
 def solve(
     scenario: Scenario,
-    model: str | Switches = "eq8",
+    model: str | Switches | Model = "eq8",
     times: ArrayLike | None = None,
     *,
     method: str = "taylor",
@@ -90,10 +90,11 @@ def solve(
     Parameters
     ----------
     scenario : Scenario
-    model : str or Switches
+    model : str, Switches or Model
         A name in ``ode_reference.MODELS``, from "published-limit" (what the published program solves as its time
         step goes to zero) by way of "eq8" (Eq. 8 exactly as printed) to "free-flight"; or any ``Switches``, or
-        their name, such as "switches:110000"; or water that cannot overlap: "column", one stretching column
+        their name, such as "switches:110000"; or an equation of your own (``ode_reference.motion.Model``), which
+        "taylor" flies only if its switches make it; or water that cannot overlap: "column", one stretching column
         (``ode_reference.column``), or "rods", infinitely many that do not bounce (``ode_reference.rods``). To these two
         only rtol, atol, ``times`` and ``own_inertia`` apply.
     times : array, shape (P,), optional
@@ -301,8 +302,10 @@ def _twin(number: int) -> int:
     return int(number)
 
 
-def model_named(model: str | Switches) -> Model:
-    """Return the model of that name or of those switches."""
+def model_named(model: str | Switches | Model) -> Model:
+    """Return the model of that name or of those switches, or itself."""
+    if isinstance(model, Model):
+        return model
     if isinstance(model, Switches):
         return model_of(model)
     if are_switches(model):

@@ -22,12 +22,17 @@ THROW = Scenario(n_slices=8)
 TIMES = np.linspace(0.0, 0.5, 201)
 
 
-@pytest.fixture
-def rung():
-    section = HOWTO.read_text(encoding="utf-8").partition("## A rung of the ladder")[2]
+def block_of(title):
+    """Return the names that the first Python block of a section defines."""
+    section = HOWTO.read_text(encoding="utf-8").partition(f"## {title}\n")[2]
     names = {}
     exec(re.search(r"```python\n(.*?)```", section, re.DOTALL)[1], names)
-    return names["RUNG"]
+    return names
+
+
+@pytest.fixture
+def rung():
+    return block_of("A rung of the ladder")["RUNG"]
 
 
 @pytest.fixture
@@ -84,3 +89,21 @@ def test_wherever_the_rung_is_registered_each_pair_of_the_ladder_differs_by_the_
     for assumption, first, second in pairs:
         (switch,) = (name for name, words in NAMES.items() if assumption.startswith(words))
         assert replace(models[first].switches, **{switch: True}) == models[second].switches
+
+
+def test_a_drag_law_of_ones_own_is_flown_without_being_registered_and_never_by_the_switches():
+    names = block_of("A drag law")
+    flight, law = names["flight"], names["LAW"]
+    assert flight.ok
+    free = ode_reference.solve(
+        THROW, replace(law, acceleration=lambda *given: given[3] * given[2] ** 2), method="DOP853"
+    )
+    assert np.abs(flight.omega - free.omega).max() > 0.01 * THROW.omega0  # the law acts
+    # One slice alone, thrown outward: integrated here by another method, before it strikes.
+    one = Scenario(n_slices=1, water_mass=0.05)
+    times = np.linspace(0.0, 0.02, 21)
+    found = ode_reference.solve(one, law, times, method="DOP853")
+    other = ode_reference.solve(one, law, times, method="Radau", rtol=1e-9, max_step=1e-3)
+    np.testing.assert_allclose(found.omega, other.omega, rtol=0, atol=1e-7 * one.omega0)
+    with pytest.raises(ValueError, match="quadratic-drag"):
+        ode_reference.solve(THROW, law)
