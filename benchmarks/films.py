@@ -20,6 +20,7 @@ from typing import Any
 
 import film_simulator
 import numpy as np
+from scipy.stats import beta
 
 from flipproof.film.estimate import estimate
 from flipproof.film.judge import Judged
@@ -55,7 +56,7 @@ def drawn(rng: np.random.Generator, cell: dict[str, Any], slices: int) -> film_s
 
 def coverage(films: int, first: int, slices: int, only: list[int]) -> None:
     """Print for every cell how many intervals hold the truth, and their median width."""
-    total = Counter[str]()
+    total: Counter[tuple[str, str]] = Counter()
     for index, cell in enumerate(cells()):
         if only and cell["fps"] not in only:
             continue
@@ -83,10 +84,16 @@ def coverage(films: int, first: int, slices: int, only: list[int]) -> None:
         ]
         spent = (time.process_time() - began) / films
         print(*cell.values(), "|", "; ".join(words), f"| refused {refused}, {spent:.1f} s a film", flush=True)
+        for name, level in product(NAMES, ("all", *(f"{factor} {value}" for factor, value in cell.items()))):
+            total[name, level] += held[name]
+            total["of " + name, level] += len(widths[name])
+    for level in dict.fromkeys(level for _, level in total):
+        words = []
         for name in NAMES:
-            total[name] += held[name]
-            total["of " + name] += len(widths[name])
-    print("all:", ", ".join(f"{name} {total[name]} of {total['of ' + name]}" for name in NAMES))
+            count, of = total[name, level], total["of " + name, level]
+            low, high = (100 * beta.ppf(q, count + 0.5, of - count + 0.5) for q in (0.025, 0.975))
+            words.append(f"{name} {count}/{of} [{low:.0f}, {high:.0f}] %" if of else f"{name} -")
+        print(level, "|", "; ".join(words))
 
 
 def rough(spoiled: int, noise: int, slices: int) -> None:
