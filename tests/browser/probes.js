@@ -107,5 +107,19 @@ window.probes = (() => {
     unseen: [...window.probes.reached].filter(([, shown]) => !shown).map(([element]) => where(element)),
   });
 
-  return { overflow, overlaps, cut, watchFocus, focusReport };
+  /* Words of the text that begins above a line so many pixels down; drawings and mathematics have none. */
+  const wordsAbove = (line) => {
+    const walker = document.createTreeWalker(document.querySelector("main"), NodeFilter.SHOW_TEXT), place = document.createRange();
+    let count = 0;
+    while (walker.nextNode()) {
+      const text = walker.currentNode;
+      if (text.parentElement.closest("script, style, noscript, svg, math")) continue;
+      place.selectNodeContents(text);
+      const box = place.getBoundingClientRect();
+      if (box.height && box.top + scrollY < line) count += text.textContent.split(/\s+/).filter(Boolean).length;
+    }
+    return count;
+  };
+
+  return { wordsAbove, overflow, overlaps, cut, watchFocus, focusReport };
 })();

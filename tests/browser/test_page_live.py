@@ -213,3 +213,42 @@ def test_sliders_work_from_the_keyboard_and_survive_a_reload(visit):
         visited.page.wait_for_function("() => window.flipproofSliders.drawn().thrown.fill < 0.54")
         assert line(visited, "eq8") == was
         assert json.loads(visited.page.evaluate("JSON.stringify(flipproofSliders.drawn().thrown.slices)")) <= 50
+
+
+def test_the_page_opens_with_a_switch_that_eq8_notices_and_free_flight_does_not(visit):
+    with visit((1280, 800)) as visited:
+        scene = visited.page.locator("#scene-gravity")
+        visited.page.get_by_test_id("gravity").click()
+        visited.page.wait_for_function("() => document.querySelector('#scene-gravity').dataset.moved")
+        eq8, free = map(float, scene.get_attribute("data-moved").split())
+        assert eq8 > 0.1
+        assert free == 0.0
+        assert "free flight by 0 %" in scene.get_by_role("status").inner_text()
+        visited.page.get_by_test_id("gravity").click()
+        assert list(map(float, scene.get_attribute("data-moved").split())) == [0.0, 0.0]
+        assert visited.console == []
+
+
+@pytest.mark.parametrize("name", ["outward", "drag", "weight", "recoil", "overlap"])
+def test_each_drawing_of_the_story_answers_its_slider(visit, name):
+    with visit((390, 844)) as visited:
+        scene = visited.page.locator(f"#scene-{name}")
+        scene.scroll_into_view_if_needed()
+        visited.settle()
+        before = scene.locator("canvas").screenshot()
+        scene.locator("input").focus()
+        for _ in range(3):
+            visited.page.keyboard.press("ArrowLeft")
+        visited.settle()
+        assert scene.locator("canvas").screenshot() != before
+        assert max(map(float, scene.get_attribute("data-moved").split())) > 1e-3
+        assert visited.console == []
+
+
+def test_arrow_keys_move_gravity_by_a_half(visit):
+    with visit(fragment="#live") as visited:
+        slider = visited.page.get_by_test_id("live-g")
+        slider.focus()
+        was = float(slider.input_value())
+        visited.page.keyboard.press("ArrowRight")
+        assert float(slider.input_value()) == pytest.approx(was + 0.5)

@@ -19,7 +19,12 @@ from flipproof.frame.solvers import FINER
 from flipproof.page.glossary import indexed, linked
 
 STORY: Final[Mapping[str, str]] = {
-    "verdict": "What was asked",
+    "verdict": "Two bottles",
+    "outward": "Thrown outward",
+    "drag": "Slowed by drag",
+    "weight": "Weight drops out",
+    "recoil": "The bottle recoils",
+    "overlap-idea": "Water cannot overlap",
     "answer": "The answer",
     "motion-story": "One flight, four ways",
     "live": "Switch gravity off",

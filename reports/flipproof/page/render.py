@@ -80,6 +80,7 @@ def render(
     regressions = [finding for finding in findings if finding.kind == "regression"]
     flown = gathered.found("flights")
     facts = story(summary, {figure.name: figure.table for each in told.values() for figure in each.figures})
+    asked = sliders(gathered.ask.throw)
     context = dict(
         scenario=gathered.ask.scenario,
         throw=gathered.ask.throw,
@@ -99,7 +100,8 @@ def render(
         formulas={term: find(solver).equation for term, solver in EQUATIONS.items()},
         story=facts,
         story_ids=STORY,
-        sliders=sliders(gathered.ask.throw),
+        sliders=asked,
+        slider_of={one.name: one for one in asked},
         live=live_data(gathered.ask.throw),
     )
     parts = sections(gathered, told, templates)

@@ -46,7 +46,8 @@ window.flipproofLive = (() => {
   }
 
   // Omega of Eq. 8, or of free flight, at equal times. A slice slower than `rest` that its end presses on rests there.
-  function flow(thrown, free, points = 1000, parts = free ? 2 : 1, rest = free ? 1e-3 : 1e-5) {
+  // `seen` hears at each of these times the places of the slices, the angle and the centre of mass.
+  function flow(thrown, free, points = 1000, seen = null, parts = free ? 2 : 1, rest = free ? 1e-3 : 1e-5) {
     const { n, m, M, mass, wall, y, v, inertia, momentum, gamma, g, e, theta0, duration } = prepared(thrown);
     const side = y.map((place) => (Math.abs(place) === wall ? Math.sign(place) : 0)), ratio = m / mass, drag = 2 * gamma;
     const rows = () => Array.from({ length: 5 }, () => new Float64Array(n)), [ys, vs, as] = [rows(), rows(), rows()];
@@ -138,8 +139,10 @@ window.flipproofLive = (() => {
       }
     }
 
+    const centred = () => (m * y.reduce((sum, place) => sum + place, 0)) / M;
+    const keep = (k) => { omega[k] = weigh(y, v, theta); seen?.(y, theta, centred()); };
     release();
-    omega[0] = weigh(y, v, theta);
+    keep(0);
     for (let k = 1; k <= (points - 1) * parts; k++) {
       let left = duration / ((points - 1) * parts);
       for (let tries = 0; left > 0 && tries < 1000; tries++) {
@@ -170,7 +173,7 @@ window.flipproofLive = (() => {
         }
         release();
       }
-      if (k % parts === 0) omega[k / parts] = weigh(y, v, theta);
+      if (k % parts === 0) keep(k / parts);
     }
     return omega;
   }

@@ -176,6 +176,16 @@ window.flipproofState = (() => {
     else if (location.hash.startsWith("#findings?")) setFilter(state.linked("findings"));
     reveal();
   });
+  /* A slider finer than a finger wants has a coarser step for the arrow keys. */
+  for (const slider of document.querySelectorAll("input[data-keys]")) {
+    slider.addEventListener("keydown", (event) => {
+      const way = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
+      if (!way) return;
+      event.preventDefault();
+      slider.value = String(Number(slider.value) + way * Number(slider.dataset.keys));
+      slider.dispatchEvent(new Event("input", { bubbles: true }));
+    });
+  }
   document.documentElement.classList.add("ready");
   if (location.hash) reveal();
 

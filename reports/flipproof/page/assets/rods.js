@@ -1,10 +1,9 @@
 // Water as infinitely many rods that cannot overlap and do not bounce (ode_reference/rods.py); joins live.js.
 //   cap | pile p |    free water, x = a A(t) + z(t)    | pile q | base at B from C_M       J omega is constant
 // Below the threshold nothing moves; above it water parts, and stays on the pile that it meets.
-window.flipproofLive.rods = (thrown) => {
-  "use strict";
+window.flipproofLive.rods = (thrown, points = 1000, seen = null) => {
   const { bottle: { length, radius, mass, capacity }, fill, gamma, omega0, duration } = thrown;
-  const points = 1000, dt = duration / (points - 1), drag = 2 * gamma;
+  const dt = duration / (points - 1), drag = 2 * gamma;
   const water = fill * capacity, total = water + mass, depth = fill * length, density = water / depth;
   const below = ((water * depth) / 2 + (mass * length) / 2) / total, above = depth - below;
   const own = mass * (radius * radius / 2 + length * length / 12);
@@ -41,7 +40,15 @@ window.flipproofLive.rods = (thrown) => {
   const room = ([grown, , z]) => z - (1 + grown) * above - piles(grown, z, false).foot + length;
   const omega = new Float64Array(points).fill(omega0), spreads = depth < length && depth > lying(0);
   let y = [0, 0, 0, 0], arrived = false;
-  for (let k = 1; spreads && k < points; k++) {
+  // `seen` hears the piles at base and cap, and where the free water between them begins and ends, from the cap.
+  const keep = (k) => {
+    const [grown, , z] = y, at = piles(grown, z, arrived), a = 1 + grown, top = at.foot - length;
+    if (spreads) omega[k] = spin(grown, z, arrived);
+    if (seen) seen(spreads ? { base: at.base, cap: at.cap, from: z - a * (above - at.cap) - top, to: z + a * (below - at.base) - top } : { base: depth, cap: 0, from: 0, to: 0 }, -top);
+  };
+  keep(0);
+  for (let k = 1; k < points; k++) {
+    if (!spreads) { keep(k); continue; }
     let left = dt, next = step(y, dt, arrived);
     if (!arrived && room(next) < 0) {
       let [low, high] = [0, dt];
@@ -51,7 +58,7 @@ window.flipproofLive.rods = (thrown) => {
       next = step(y, left, true);
     }
     y = next;
-    omega[k] = spin(y[0], y[2], arrived);
+    keep(k);
   }
   return omega;
 };

@@ -1,0 +1,162 @@
+// The bottles of the story: each scene throws one or two of them, solved by live.js, and has one control that changes it.
+(() => {
+  "use strict";
+  const { g, theta0, fill, gamma, e, omega0, ...fixed } = JSON.parse(document.getElementById("live-data").textContent);
+  const start = { ...fixed, g, theta0, fill, gamma, e, omega0 }, chart = window.flipproofChart, live = window.flipproofLive;
+  const NAMES = { eq8: "Eq. 8", free: "free flight", rods: "rods", still: "Eq. 8 without weight" };
+  const COLOURS = { eq8: "eq8", free: "free-flight", rods: "other", still: "eq8" };
+  const FRAMES = 251, SLOW = 9, BOTTLES = 250, CURVES = 110;
+  const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const percent = (share) => `${Number((100 * share).toPrecision(2))} %`;
+
+  // A flight as frames: omega, angle, centre of mass and water, both from the cap.
+  function flight(solver, thrown) {
+    const half = thrown.bottle.length / 2, theta = new Float64Array(FRAMES), centre = [], water = [];
+    if (solver === "rods") {
+      const omega = live.rods(thrown, FRAMES, (piles, place) => { water.push(piles); centre.push(place); });
+      theta[0] = thrown.theta0;
+      for (let k = 1; k < FRAMES; k++) theta[k] = theta[k - 1] + ((omega[k - 1] + omega[k]) / 2) * (thrown.duration / (FRAMES - 1));
+      return { omega, theta, centre, water };
+    }
+    const set = solver === "still" ? { ...thrown, g: 0 } : thrown;
+    const omega = live[solver === "still" ? "eq8" : solver](set, FRAMES, (y, angle, place) => {
+      theta[water.length] = angle;
+      water.push(Float64Array.from(y, (at) => at + half));
+      centre.push(place + half);
+    });
+    return { omega, theta, centre, water };
+  }
+  const farthest = (one, other) => one.reduce((most, value, k) => Math.max(most, Math.abs(value - other[k])), 0);
+
+  function scene(root) {
+    const solvers = root.dataset.bottles.split(" "), usual = { ...start, ...JSON.parse(root.dataset.set ?? "{}") };
+    const canvas = root.querySelector("canvas"), slider = root.querySelector("input"), button = root.querySelector(".gravity");
+    const said = root.querySelector("[role=status]"), pen = canvas.getContext("2d");
+    let thrown = usual, before = null, now = [], frame = FRAMES - 1, playing = 0;
+    const solve = () => { now = solvers.map((solver) => flight(solver, thrown)); };
+
+    function bottle(at, flown, scale, [x, y], k, shade = 1) {
+      const { length, radius } = fixed.bottle, half = radius * scale, tall = length * scale;
+      const height = Math.max(1.5, (thrown.fill * tall) / start.slices);
+      pen.save();
+      pen.translate(x, y);
+      pen.rotate(-flown.theta[k]);
+      pen.translate(0, -flown.centre[k] * scale);
+      pen.fillStyle = style("--water-low");
+      const water = flown.water[k];
+      const block = (from, to, dense) => { pen.globalAlpha = dense * shade; pen.fillRect(1 - half, from * scale, 2 * half - 2, Math.max(0, to - from) * scale); };
+      if (at === "rods") {
+        const free = Math.max(0, thrown.fill * length - water.base - water.cap), room = water.to - water.from;
+        block(0, water.cap, 0.8);
+        block(length - water.base, length, 0.8);
+        if (room > 0) block(water.from, water.to, 0.8 * Math.min(1, free / room));
+      } else {
+        pen.globalAlpha = 0.45 * shade;
+        for (const place of water) pen.fillRect(1 - half, place * scale - height / 2, 2 * half - 2, height);
+      }
+      pen.globalAlpha = shade;
+      pen.strokeStyle = style("--ink");
+      pen.lineWidth = 2;
+      pen.strokeRect(-half, 0, 2 * half, tall);
+      pen.strokeRect(-0.4 * half, -0.3 * half, 0.8 * half, 0.3 * half);
+      pen.restore();
+    }
+    // On its way over the picture, a parabola where there is weight and a straight line where there is none.
+    function place(share, left, wide, reach) {
+      const bent = Math.min(1, thrown.g / 9.81), rise = Math.max(0, BOTTLES - 22 - 1.6 * reach);
+      return [left + reach + share * (wide - 2 * reach), 22 + (BOTTLES - 22) / 2 + bent * rise * (4 * (share - 0.5) ** 2 - 0.5)];
+    }
+    function draw() {
+      const width = canvas.parentElement.clientWidth, height = BOTTLES + CURVES, ratio = window.devicePixelRatio || 1;
+      if (!width) return;
+      [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
+      pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+      const wide = width / solvers.length, scale = Math.min(380, (0.4 * wide) / fixed.bottle.length), reach = 0.85 * fixed.bottle.length * scale;
+      const high = Math.max(...now.flatMap(({ omega }) => [...omega])) * 1.05, down = (value) => height - 18 - (value / high) * (CURVES - 30);
+      const across = (k, left) => left + 8 + (k / (FRAMES - 1)) * (wide - 22);
+      solvers.forEach((solver, j) => {
+        const left = j * wide, flown = now[j], colour = style(`--solver-${COLOURS[solver]}`);
+        pen.strokeStyle = style("--line");
+        pen.lineWidth = 1.5;
+        pen.beginPath();
+        for (let k = 0; k <= 40; k++) pen.lineTo(...place(k / 40, left, wide, reach));
+        pen.moveTo(left + 8, height - 18);
+        pen.lineTo(left + wide - 14, height - 18);
+        pen.stroke();
+        const ghosts = wide < 260 ? 125 : 50;
+        for (let k = 0; k < frame - 20; k += ghosts) bottle(solver, flown, scale, place(k / (FRAMES - 1), left, wide, reach), k, 0.3);
+        bottle(solver, flown, scale, place(frame / (FRAMES - 1), left, wide, reach), frame);
+        const curve = (omega, end, faint) => {
+          pen.globalAlpha = faint ? 0.4 : 1;
+          pen.strokeStyle = faint ? style("--soft") : colour;
+          pen.lineWidth = faint ? 4 : 2;
+          pen.beginPath();
+          for (let k = 0; k <= end; k++) pen.lineTo(across(k, left), down(omega[k]));
+          pen.stroke();
+          pen.globalAlpha = 1;
+        };
+        if (before) curve(before[j].omega, FRAMES - 1, true);
+        curve(flown.omega, frame, false);
+        pen.font = `600 14px ${getComputedStyle(canvas).fontFamily}`;
+        pen.fillStyle = colour;
+        pen.fillText(NAMES[solver], left + 8, 16);
+        pen.font = `12px ${getComputedStyle(canvas).fontFamily}`;
+        pen.fillStyle = style("--soft");
+        pen.fillText(`ω = ${(flown.omega[frame] / thrown.omega0).toFixed(2)} ω₀`, left + 8, height - 3);
+      });
+    }
+    function stop() { cancelAnimationFrame(playing); playing = 0; }
+    function play() {
+      stop();
+      if (matchMedia("(prefers-reduced-motion: reduce)").matches) { frame = FRAMES - 1; draw(); return; }
+      const began = performance.now();
+      const next = (time) => {
+        frame = Math.max(0, Math.min(FRAMES - 1, Math.round(((time - began) / 1000 / SLOW / fixed.duration) * (FRAMES - 1))));
+        draw();
+        playing = frame < FRAMES - 1 ? requestAnimationFrame(next) : 0;
+      };
+      playing = requestAnimationFrame(next);
+    }
+    function told() {
+      if (!before) return;
+      const moved = now.map(({ omega }, j) => farthest(omega, before[j].omega) / thrown.omega0);
+      if (slider) said.textContent = now.map((_, j) => `${NAMES[solvers[j]]}: ω moves by up to ${percent(moved[j])} of ω₀.`).join(" ");
+      else said.textContent = thrown.g
+        ? root.dataset.asked
+        : `Gravity is off. Eq. 8 changes by up to ${percent(moved[0])} of ω₀, free flight by ${percent(moved[1])}. A falling bottle cannot know where down is: so Eq. 8 is not the equation of a flying bottle.`;
+      root.dataset.moved = moved.map((share) => share.toPrecision(6)).join(" ");
+    }
+    function set(change) {
+      before ??= now;
+      thrown = { ...thrown, ...change };
+      solve();
+      told();
+    }
+    button?.addEventListener("click", () => {
+      set({ g: thrown.g ? 0 : usual.g || 9.81 });
+      button.setAttribute("aria-checked", String(thrown.g !== 0));
+      play();
+    });
+    slider?.addEventListener("input", () => {
+      const unit = slider.dataset.unit, value = Number(slider.value);
+      slider.closest("label").querySelector("output").textContent = `${chart.shown(value, Number(slider.dataset.digits))} ${unit}`.trim();
+      stop();
+      frame = FRAMES - 1;
+      set({ [slider.name]: value * (unit === "%" ? 0.01 : 1) });
+      draw();
+    });
+    root.querySelector(".again").addEventListener("click", play);
+    // Solved and thrown once, when it is first seen.
+    new IntersectionObserver((entries, watcher) => {
+      if (!entries.some((entry) => entry.isIntersecting)) return;
+      watcher.disconnect();
+      solve();
+      draw();
+      chart.onWidth(canvas.parentElement, draw);
+      play();
+    }, { threshold: 0.3 }).observe(root);
+    window.addEventListener("beforeprint", () => { stop(); frame = FRAMES - 1; if (!now.length) solve(); draw(); });
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (now.length) draw(); });
+  }
+  for (const root of document.querySelectorAll(".scene")) scene(root);
+})();
