@@ -3,8 +3,8 @@
   "use strict";
   const { g, theta0, fill, gamma, e, omega0, ...fixed } = JSON.parse(document.getElementById("live-data").textContent);
   const start = { ...fixed, g, theta0, fill, gamma, e, omega0 }, chart = window.flipproofChart, live = window.flipproofLive;
-  const NAMES = { eq8: "Eq. 8", free: "free flight", rods: "rods", still: "Eq. 8 without weight" };
-  const COLOURS = { eq8: "eq8", free: "free-flight", rods: "other", still: "eq8" };
+  const NAMES = { eq8: "Eq. 8", free: "free flight", rods: "rods", still: "Eq. 8 without weight", bare: "Eq. 8 without weight and drag" };
+  const COLOURS = { eq8: "eq8", free: "free-flight", rods: "other", still: "eq8", bare: "eq8" };
   const FRAMES = 251, SLOW = 9, BOTTLES = 250, CURVES = 110;
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const percent = (share) => `${Number((100 * share).toPrecision(2))} %`;
@@ -18,8 +18,8 @@
       for (let k = 1; k < FRAMES; k++) theta[k] = theta[k - 1] + ((omega[k - 1] + omega[k]) / 2) * (thrown.duration / (FRAMES - 1));
       return { omega, theta, centre, water };
     }
-    const set = solver === "still" ? { ...thrown, g: 0 } : thrown;
-    const omega = live[solver === "still" ? "eq8" : solver](set, FRAMES, (y, angle, place) => {
+    const bare = solver === "bare", set = bare || solver === "still" ? { ...thrown, g: 0, gamma: bare ? 0 : thrown.gamma } : thrown;
+    const omega = live[set === thrown ? solver : "eq8"](set, FRAMES, (y, angle, place) => {
       theta[water.length] = angle;
       water.push(Float64Array.from(y, (at) => at + half));
       centre.push(place + half);
@@ -29,7 +29,7 @@
   const farthest = (one, other) => one.reduce((most, value, k) => Math.max(most, Math.abs(value - other[k])), 0);
 
   function scene(root) {
-    const solvers = root.dataset.bottles.split(" "), usual = { ...start, ...JSON.parse(root.dataset.set ?? "{}") };
+    const solvers = root.dataset.bottles.split(" "), usual = start;
     const canvas = root.querySelector("canvas"), slider = root.querySelector("input"), button = root.querySelector(".gravity");
     const said = root.querySelector("[role=status]"), pen = canvas.getContext("2d");
     let thrown = usual, before = null, now = [], frame = FRAMES - 1, playing = 0;
@@ -83,7 +83,7 @@
         pen.moveTo(left + 8, height - 18);
         pen.lineTo(left + wide - 14, height - 18);
         pen.stroke();
-        const ghosts = wide < 260 ? 125 : 50;
+        const ghosts = wide < 330 ? 125 : 50;
         for (let k = 0; k < frame - 20; k += ghosts) bottle(solver, flown, scale, place(k / (FRAMES - 1), left, wide, reach), k, 0.3);
         bottle(solver, flown, scale, place(frame / (FRAMES - 1), left, wide, reach), frame);
         const curve = (omega, end, faint) => {
@@ -127,6 +127,7 @@
       root.dataset.moved = moved.map((share) => share.toPrecision(6)).join(" ");
     }
     function set(change) {
+      if (!now.length) solve();
       before ??= now;
       thrown = { ...thrown, ...change };
       solve();
