@@ -109,9 +109,12 @@ def test_a4_pages_cut_nothing_off(visit):
         assert visited.page.locator("nav").is_hidden()
 
 
-def test_the_browser_prints_the_page_on_a4(visit):
+@pytest.mark.parametrize(("opened", "fewest", "most"), [(False, 4, 8), (True, 10, 999)], ids=["story", "all"])
+def test_the_browser_prints_the_story_and_what_is_open_on_a4(visit, opened, fewest, most):
     with visit() as visited:
+        if opened:
+            visited.page.locator(".unfold").click()
         content = visited.page.pdf(prefer_css_page_size=True)
     boxes = re.findall(rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", content)
-    assert len(boxes) >= 10
+    assert fewest <= len(boxes) <= most
     assert {(round(float(width)), round(float(height))) for width, height in boxes} == {(595, 842)}

@@ -133,7 +133,7 @@ window.flipproofState = (() => {
   };
   let closed = [];
   window.addEventListener("beforeprint", () => {
-    closed = [...document.querySelectorAll("details:not([open])")];
+    closed = inner.filter((fold) => !fold.open && !fold.matches("[data-closed], .fold:not(:has(> [open])) *"));
     for (const fold of closed) fold.open = true;
   });
   window.addEventListener("afterprint", () => closed.forEach((fold) => { fold.open = false; }));
