@@ -29,7 +29,8 @@ def screens(page):
     """Return the sections of the story as HTML."""
     wanted = [name for name in STORY if f'<section id="{name}"' in page]
     return {
-        name: re.search(rf'<section id="{name}" class="screen">(.*?)</section>', page, re.S).group(1) for name in wanted
+        name: re.search(rf'<section id="{name}" class="screen[^"]*">(.*?)</section>', page, re.S).group(1)
+        for name in wanted
     }
 
 
