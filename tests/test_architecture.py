@@ -169,9 +169,8 @@ def test_the_frame_knows_no_subject_and_chapters_are_named_once():
 
 
 FLOORS = (
-    ("curves",),
     ("figures",),
-    ("frame", "output"),
+    ("frame", "output", "curves"),
     ("foreign", "bounce"),
     ("sweep",),
     ("landing", "film"),

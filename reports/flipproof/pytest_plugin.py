@@ -1,7 +1,8 @@
 """The pytest plugin, loaded by its entry point in every test run of an environment: it imports nothing until used.
 
 Fixtures: ``flipproof_throw`` (the paper's throw in four slices), ``flipproof_vectors`` (what the published programs
-print), ``flipproof_ice`` (a function of a spec that asserts ice constancy).
+print), ``flipproof_ice`` (a function of a spec that asserts ice constancy), ``flipproof_compare`` (a function of two
+files of curves that asserts that they agree).
 """
 
 from __future__ import annotations
@@ -33,3 +34,11 @@ def flipproof_ice() -> Any:
     from flipproof.testing import assert_ice_constant
 
     return assert_ice_constant
+
+
+@pytest.fixture
+def flipproof_compare() -> Any:
+    """Return a function of two files of curves and the options of ``compare`` that asserts that they agree."""
+    from flipproof.testing import assert_curves_agree
+
+    return assert_curves_agree

@@ -53,3 +53,20 @@ def assert_ice_constant(spec: str) -> None:
     with closing(opened(spec)) as runner:
         (result,) = certify(runner, ["ice"]).results
     assert result.verdict != FAILED, result.line
+
+
+def assert_curves_agree(first: str, second: str, *, twins: Iterable[str] = (), **options: Any) -> None:
+    """Assert that two files of curves do not differ; keywords are those of ``flipproof.curves.compare.compare``."""
+    from flipproof.curves.compare import compare
+    from flipproof.curves.files import read
+
+    columns = options.get("columns")
+    of_second = [read(path, columns) for path in options.pop("twins_of_second", ())]
+    found = compare(
+        read(first, columns),
+        read(second, columns),
+        twins=[read(path, columns) for path in twins],
+        twins_of_second=of_second,
+        **options,
+    )
+    assert found.passed, "\n".join(found.lines)

@@ -136,7 +136,7 @@ def check_outputs(options: argparse.Namespace, *names: str) -> None:
 def refuse_overwriting(options: argparse.Namespace) -> None:
     """Refuse by a ValueError a command that would write over a file that it reads."""
     given = vars(options)
-    written = ("out", "json", "junit", "html", "export", "film")
+    written = ("out", "json", "junit", "html", "export", "film", "plot")
     values = [value if isinstance(value, list) else [value] for name, value in given.items() if name not in written]
     texts = [str(each) for value in values for each in value if isinstance(each, str | Path)]
     for name in written:

@@ -126,7 +126,7 @@ def _groups(text: str) -> tuple[str, ...]:
 
 def add_compare(commands: Any) -> None:
     """Add the command."""
-    compare = add_command(commands, "compare", "Compare two solvers, or two CSV files, in numbers.", command_compare)
+    compare = add_command(commands, "compare", "Compare two solvers, or two files, in numbers.", command_compare)
     compare.add_argument(
         "first", metavar="A", help="a solver's name or spec, or a CSV file with a column t and at least one of omega, "
         "theta and r_cm; empty cells are left out, and of a track.csv the flight is taken",
@@ -138,12 +138,80 @@ def add_compare(commands: Any) -> None:
         "--tolerance", type=tolerance, metavar="X", help="end with status 1 if the largest difference in omega exceeds "
         "X omega_0; without omega in both, in theta X rad; without theta, in r_cm X m",
     )  # fmt: skip
+    compare.add_argument(
+        "--columns", type=_names, metavar="x,y", help="compare these columns of two files (.csv, .parquet, .npz or "
+        ".nc; times in t or time) of any system, each in its own unit; so are files without omega, theta and r_cm",
+    )  # fmt: skip
+    compare.add_argument(
+        "--twin", type=Path, action="append", default=[], metavar="FILE", help="a run that ought to be A: released a "
+        "late digit aside, or by a coarser step; says until when the two can be compared; may be repeated",
+    )  # fmt: skip
+    compare.add_argument(
+        "--twin-of-b", type=Path, action="append", default=[], metavar="FILE", help="a run that ought to be B"
+    )
+    compare.add_argument("--from-twins", action="store_true", help="the twins alone say what may differ")
+    compare.add_argument(
+        "--shift", type=tolerance, default=0.0, metavar="S", help="by how much a jump may be early or late (default: "
+        "one step of the output, and what the twins show)",
+    )  # fmt: skip
+    compare.add_argument("--plot", type=Path, metavar="FILE.png", help="draw files' differences (.png or .svg)")
     add_json(compare, "both curves' differences")
     compare.add_argument("--junit", type=Path, metavar="FILE", help="write that verdict as JUnit XML, too")
 
 
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+
+
+def _of_any_system(options: argparse.Namespace) -> bool:
+    """Return whether two files are to be compared that need not be throws of a bottle."""
+    asked = options.columns or options.twin or options.twin_of_b or options.from_twins or options.plot or options.shift
+    paths = Path(options.first), Path(options.second)
+    if not all(path.is_file() for path in paths):
+        if asked:
+            missing = next(path for path in paths if not path.is_file())
+            raise ValueError(f"{missing} is no file: --columns, --twin, --from-twins, --shift and --plot compare files")
+        return False
+    if asked or any(path.suffix in (".parquet", ".npz", ".nc") for path in paths):
+        return True
+    from flipproof.output.tables import QUANTITIES, read_cells
+
+    return all(path.suffix == ".csv" and not {*QUANTITIES} & {*read_cells(path)[0]} for path in paths)
+
+
+def _compare_curves(options: argparse.Namespace) -> int:
+    """Compare two files of any system; return 1 if they differ, or cannot be compared at any time."""
+    check_outputs(options, "junit", "json", "plot")
+    from flipproof.curves.compare import TOLERANCE, compare
+    from flipproof.curves.files import read
+
+    if options.from_twins and options.tolerance is not None:
+        raise ValueError("--from-twins and --tolerance exclude each other")
+    if options.plot and options.plot.suffix not in (".png", ".svg"):
+        raise ValueError(f"--plot {options.plot} ends neither in .png nor in .svg")
+    first, second = (read(name, options.columns) for name in (options.first, options.second))
+    twins, others = ([read(path, options.columns) for path in paths] for paths in (options.twin, options.twin_of_b))
+    allowed = None if options.from_twins else TOLERANCE if options.tolerance is None else options.tolerance
+    found = compare(
+        first, second, twins=twins, twins_of_second=others, columns=options.columns, tolerance=allowed,
+        shift=options.shift,
+    )  # fmt: skip
+    write_json(options.json, found.to_mapping())
+    write_junit(options.junit, found.findings, "flipproof compare")
+    if options.plot:
+        from flipproof.curves.figure import picture
+
+        drawing = picture(found)
+        options.plot.write_bytes(drawing.png if options.plot.suffix == ".png" else drawing.svg.encode())
+    for line in found.lines:
+        print(inert(line, lines=False))
+    return 0 if found.passed else 1
+
+
 def command_compare(options: argparse.Namespace) -> int:
     """Compare two solvers or files and print the differences; return 1 if they exceed the tolerance."""
+    if _of_any_system(options):
+        return _compare_curves(options)
     if options.junit and options.tolerance is None:
         raise ValueError(f"--junit {options.junit} needs --tolerance: without it no comparison can fail")
     check_outputs(options, "junit", "json")

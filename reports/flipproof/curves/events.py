@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Final, NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from slicemodel.trajectory import FloatArray
 
 IndexArray = NDArray[np.int64]
+
+RATIO: Final = 6.0
+"""A change so many times as fast as those beside it is a jump."""
+
+MAX_EVENTS: Final = 2000
+"""Events of a run that are matched."""
 
 
 def closest(first: FloatArray, second: FloatArray, mine: IndexArray, its: IndexArray) -> IndexArray:
@@ -28,3 +36,73 @@ def closest(first: FloatArray, second: FloatArray, mine: IndexArray, its: IndexA
         j -= 1
         chosen.append(j)
     return np.stack([mine, its[chosen[::-1]]])
+
+
+class Jumps(NamedTuple):
+    """Times of the jumps of a column, the middle of the step in which each lies, and the usual step of its output."""
+
+    time: FloatArray
+    step: float
+
+
+def jumps(t: FloatArray, values: FloatArray, least: float) -> Jumps:
+    """Return where a column jumps: twice given at one time, or changing ``RATIO`` times as fast as its neighbours do.
+
+    Smaller changes than ``least`` are no jumps; nor is a peak of one row, which is two changes beside each other.
+    """
+    h, change = np.diff(t), np.abs(np.diff(values))
+    usual = float(np.median(h[h > 0.0])) if (h > 0.0).any() else 0.0
+    rate = np.divide(change, h, out=np.zeros_like(h), where=h > 0.0)
+    padded = np.pad(rate, 2)
+    beside = np.max([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]], axis=0)
+    found = (change > least) & ((h == 0.0) | ((rate > RATIO * beside) & (h > 0.0)))
+    return Jumps((t[:-1][found] + t[1:][found]) / 2.0, usual)
+
+
+class Matched(NamedTuple):
+    """Events of two runs: ``pairs`` of times, shape (K, 2), and those of one run alone, ``lone``, shape (K, 2).
+
+    A row of ``lone`` is the time and 0 for the first run, 1 for the second.
+    """
+
+    pairs: FloatArray
+    lone: FloatArray
+
+    @property
+    def shift(self) -> FloatArray:
+        """Time in the second minus time in the first."""
+        return np.asarray(self.pairs[:, 1] - self.pairs[:, 0])
+
+    def lines(self, parted: float | None) -> list[str]:
+        """Return how many events agree, and which one comes before the time at which the runs part."""
+        if not len(self.pairs) and not len(self.lone):
+            return []
+        words = f"events: {len(self.pairs)} in both"
+        if len(self.pairs):
+            words += f", at most {np.abs(self.shift).max():.3g} apart"
+        counts = [int((self.lone[:, 1] == which).sum()) for which in (0, 1)]
+        lines = [f"{words}; {counts[0]} in the first alone, {counts[1]} in the second alone"]
+        if parted is None:
+            return lines
+        earlier = [(time, f"that only the {('first', 'second')[int(which)]} run has") for time, which in self.lone]
+        earlier += [(min(pair), f"that is {abs(pair[1] - pair[0]):.3g} apart in the two") for pair in self.pairs]
+        earlier = [event for event in earlier if event[0] <= parted]
+        if earlier:
+            time, which = max(earlier)
+            lines.append(f"they part at t = {parted:.6g}, after the event at t = {time:.6g} {which}")
+        return lines
+
+    def to_mapping(self) -> dict[str, object]:
+        """Return the times as JSON-ready data."""
+        alone = {name: self.lone[self.lone[:, 1] == k, 0].tolist() for k, name in enumerate(("first", "second"))}
+        return {"both": self.pairs.tolist(), **alone}
+
+
+def match(first: FloatArray, second: FloatArray, within: float) -> Matched:
+    """Match events in order, as many as lie ``within`` of each other; of each run the first ``MAX_EVENTS`` are seen."""
+    first, second = first[:MAX_EVENTS], second[:MAX_EVENTS]
+    j, k = closest(first, second, np.arange(len(first)), np.arange(len(second)))
+    near = np.abs(second[k] - first[j]) <= within
+    j, k = j[near], k[near]
+    lone = [(time, 0.0) for time in np.delete(first, j)] + [(time, 1.0) for time in np.delete(second, k)]
+    return Matched(np.stack([first[j], second[k]], axis=1), np.array(sorted(lone)).reshape(-1, 2))

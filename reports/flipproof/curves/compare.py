@@ -1,0 +1,371 @@
+"""Two runs of anything, held against each other up to when their twins let them be.
+
+A twin of a run ought to be the same run: its release differs in a late digit, or its step or tolerance is coarser. What
+a twin changes the run does not know. Up to a time t the band of a comparison is
+
+    band(t) = SAFETY max over t' <= t of (max over twins of A |twin - A| + max over twins of B |twin - B|)
+
+and two runs can be compared at a tolerance while the band is at most half of it. Up to then they differ if
+
+    |B - A| > tolerance + band + error of interpolation
+
+so that a difference of twice the tolerance is seen, as long as both are known within their bands. A jump that both
+have, a moment apart, is no difference: around it, B may take any value that A takes within that moment (``tube``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipproof.curves.events import Matched, jumps, match
+from flipproof.curves.files import Curves
+from flipproof.curves.growth import Growth, first_crossing, fit_growth
+from flipproof.curves.tube import tube_around
+from flipproof.frame.findings import Band, Finding, regression
+from slicemodel.trajectory import FloatArray
+
+SAFETY: Final = 2.0
+"""Ratio of a band to the largest change by a twin."""
+
+TOLERANCE: Final = 1e-3
+"""Difference that is admissible unless another is asked for, in the unit of the column."""
+
+
+def beside(
+    t: FloatArray, values: FloatArray, times: FloatArray, others: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Return common times, the first curve's values, the second's at these, and which are interpolated, (K,) each.
+
+    At an event a curve has a value before it and one after it, and each is compared with its like.
+    """
+    begins, ends = np.diff(t, prepend=-np.inf) > 0, np.diff(t, append=np.inf) > 0
+    kept = (begins | ends) & (t >= times[0]) & (t <= times[-1])
+    t, values, after = t[kept], values[kept], ends[kept]
+    near = 1e-12 * max(abs(times[0]), abs(times[-1]))  # printing and reading a time explains so much
+    before, behind = np.searchsorted(times, t - near, "left"), np.searchsorted(times, t + near, "right") - 1
+    own = before <= behind
+    found = np.where(after, others[behind], others[np.minimum(before, len(times) - 1)])
+    found[~own] = np.interp(t[~own], times, others)
+    return t, values, found, ~own
+
+
+def interpolation_error(t: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray:
+    """Estimate the error of linear interpolation as h^2 / 8 max |y''| of the two ends of the interval."""
+    h = np.diff(t)
+    slope = np.divide(np.diff(values), h, out=np.zeros_like(h), where=h > 0.0)
+    bend = np.zeros(len(t))
+    bend[1:-1] = 2.0 * np.abs(np.diff(slope)) / np.maximum(t[2:] - t[:-2], np.finfo(float).tiny)
+    if len(t) > 2:
+        bend[0], bend[-1] = bend[1], bend[-2]
+    error = h**2 / 8.0 * np.maximum(bend[1:], bend[:-1])
+    return np.asarray(error[np.clip(np.searchsorted(t, at, "right") - 1, 0, len(h) - 1)])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gap:
+    """|second - first| of one column at the common times, (K,); ``error`` is that of interpolation.
+
+    Around jumps that both have within ``shift`` the gap is the distance from the tube of that width.
+    """
+
+    t: FloatArray
+    first: FloatArray
+    second: FloatArray
+    size: FloatArray
+    error: FloatArray
+    interpolated: int
+    matched: Matched
+
+
+def gap(first: Curves, second: Curves, column: str, *, shift: float, least: float) -> Gap:
+    """Return how far two curves are apart in a column; a jump is larger than ``least`` and may be ``shift`` early.
+
+    Raises ValueError if they share fewer than 2 times.
+    """
+    values, others = first.columns[column], second.columns[column]
+    t, mine, its, interpolated = beside(first.t, values, second.t, others)
+    if len(t) < 2:
+        raise ValueError(
+            f"{first.label} ({first.t[0]:g} to {first.t[-1]:g}) has {len(t)} times within those of {second.label} "
+            f"({second.t[0]:g} to {second.t[-1]:g}); at least 2 are needed"
+        )
+    size = np.abs(its - mine)
+    of_first, of_second = jumps(first.t, values, least), jumps(second.t, others, least)
+    matched = match(
+        of_first.time[of_first.time <= t[-1]], of_second.time[of_second.time <= t[-1]], shift + of_first.step
+    )
+    reach = of_first.step + of_second.step
+    for one, other in matched.pairs:
+        around = (t >= min(one, other) - reach) & (t <= max(one, other) + reach)
+        lower, upper = tube_around(first.t, values, t[around], abs(other - one) + reach, 0.0)
+        size[around] = np.maximum(0.0, np.maximum(its[around] - upper, lower - its[around]))
+    error = np.where(interpolated, interpolation_error(second.t, others, t), 0.0)
+    return Gap(
+        t=t, first=mine, second=its, size=size, error=error, interpolated=int(interpolated.sum()), matched=matched
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """One column of a comparison.
+
+    Parameters
+    ----------
+    band : (K,) - of the difference, from twins; zero without any
+    comparable : (K,) - where the band is at most half the tolerance
+    tolerance : in the unit of the column; 0 where the twins alone decide
+    horizon : first time that is not comparable; None: all are
+    growth : of the twins' change, up to where it exceeds the tolerance
+    last_digit : when a change of the first row by one unit in the last place exceeds the tolerance; None: not known
+    parted : first time at which the difference is not admissible; None: never
+    """
+
+    name: str
+    gap: Gap
+    band: FloatArray
+    comparable: NDArray[np.bool_]
+    tolerance: float
+    horizon: float | None
+    growth: Growth
+    last_digit: float | None
+
+    @property
+    def allowed(self) -> FloatArray:
+        """Admissible difference, (K,)."""
+        return self.tolerance + self.band + self.gap.error
+
+    @property
+    def worst(self) -> int | None:
+        """Row of the largest ratio of the difference to what is admissible; None: no row can be compared."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            over = np.nan_to_num(self.gap.size / self.allowed, posinf=np.inf)
+        over[~self.comparable] = -1.0
+        return int(over.argmax()) if self.comparable.any() else None
+
+    @property
+    def parted(self) -> float | None:
+        """First time at which the difference is not admissible; None: never."""
+        apart = np.flatnonzero(self.comparable & (self.gap.size > self.allowed))
+        return float(self.gap.t[apart[0]]) if len(apart) else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """Two runs held against each other; ``events`` are those of both, ``notes`` what was left out."""
+
+    first: str
+    second: str
+    columns: tuple[Column, ...]
+    events: Matched
+    notes: tuple[str, ...]
+
+    @property
+    def passed(self) -> bool:
+        """True if every column could be compared and no difference is inadmissible."""
+        return not any(finding.failed for finding in self.findings)
+
+    @property
+    def horizon(self) -> float | None:
+        """Earliest horizon of a column; None: comparable to the end."""
+        return min((each.horizon for each in self.columns if each.horizon is not None), default=None)
+
+    @property
+    def parted(self) -> float | None:
+        """First time at which a difference is inadmissible; None: never."""
+        return min((each.parted for each in self.columns if each.parted is not None), default=None)
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """One claim a column: its difference is admissible wherever it can be compared."""
+        found = []
+        for each in self.columns:
+            id_, k = f"compare-{_slug(each.name)}", each.worst
+            title = f"difference in {each.name} between {self.first} and {self.second}"
+            if k is None:
+                note = "no time can be compared: the band is wider than half the tolerance"
+                found.append(regression(id_, title, None, "", (0.0, each.tolerance), note))
+                continue
+            note = f"at t = {each.gap.t[k]:.6g}, {int(each.comparable.sum())} of {len(each.gap.t)} times compared"
+            value, allowed = float(each.gap.size[k]), float(each.allowed[k])
+            band = Band(float(each.band[k] + each.gap.error[k]), "twins")
+            found.append(regression(id_, title, value, "", (0.0, allowed), note, band=band))
+        return tuple(found)
+
+    @property
+    def lines(self) -> list[str]:
+        """The comparison in lines of text, the verdict last."""
+        lines = list(self.notes)
+        for each in self.columns:
+            gap, k = each.gap, int(each.gap.size.argmax())
+            words = f"{each.name}: largest difference {gap.size[k]:.3g} at t = {gap.t[k]:.6g}"
+            if gap.interpolated:
+                words += f" ({gap.interpolated} of {len(gap.t)} times interpolated)"
+            if each.band.any():
+                words += f"; the twins' change {each.growth.words.replace('/s', 'per unit of time')}"
+            lines.append(words)
+            if each.last_digit is not None:
+                lines.append(
+                    f"{each.name}: a change by one unit in the last place shows {each.tolerance:g} at "
+                    f"t = {each.last_digit:.3g}"
+                )
+        if (horizon := self.horizon) is not None:
+            at = next(each.tolerance for each in self.columns if each.horizon == horizon)
+            lines.append(f"beyond t = {horizon:.4g} these two cannot be compared at {at:g}")
+        lines += self.events.lines(self.parted)
+        for finding in self.findings:
+            numbers = "" if finding.value is None else f"{finding.value:.3g}, {finding.threshold_text}, "
+            lines.append(f"{'FAIL' if finding.failed else 'PASS'}  {finding.title}: {numbers}{finding.note}")
+        return [line.replace("\n", r"\n") for line in lines]
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the comparison as JSON-ready data, without its curves."""
+        return {
+            "first": self.first,
+            "second": self.second,
+            "passed": self.passed,
+            "horizon": self.horizon,
+            "parted": self.parted,
+            "notes": list(self.notes),
+            "events": self.events.to_mapping(),
+            "columns": [
+                {
+                    "column": each.name,
+                    "largest": float(each.gap.size.max()),
+                    "time": float(each.gap.t[each.gap.size.argmax()]),
+                    "tolerance": each.tolerance,
+                    "horizon": each.horizon,
+                    "growth_rate": _finite(each.growth.rate),
+                    "growth_error": _finite(each.growth.error),
+                    "last_digit_shows_at": each.last_digit,
+                    "times": len(each.gap.t),
+                    "compared": int(each.comparable.sum()),
+                    "interpolated": each.gap.interpolated,
+                }
+                for each in self.columns
+            ],
+            "findings": [finding.to_mapping() for finding in self.findings],
+        }
+
+
+def compare(
+    first: Curves,
+    second: Curves,
+    *,
+    twins: Sequence[Curves] = (),
+    twins_of_second: Sequence[Curves] = (),
+    columns: Sequence[str] | None = None,
+    tolerance: float | Mapping[str, float] | None = TOLERANCE,
+    shift: float = 0.0,
+) -> Comparison:
+    """Hold two runs against each other.
+
+    Parameters
+    ----------
+    twins, twins_of_second : runs that ought to be the first and the second
+    columns : what is compared; None: all columns that every run has
+    tolerance : admissible difference in the unit of the column, or by column; None: the twins alone decide
+    shift : by how much a jump may be early or late, beyond one step of the output and what the twins show
+
+    Raises
+    ------
+    ValueError
+        if the runs share no column or no times, or the twins should decide and there are none
+    """
+    runs = (first, second, *twins, *twins_of_second)
+    if tolerance is None and not twins and not twins_of_second:
+        raise ValueError("the tolerance should come from twins, and there are none")
+    for name in columns or ():
+        if (without := next((run.label for run in runs if name not in run.columns), None)) is not None:
+            raise ValueError(f"{without}: has no column {name!r}")
+    shared = [name for name in columns or first.columns if all(name in run.columns for run in runs)]
+    if not shared:
+        raise ValueError(f"{' and '.join(run.label for run in runs)} have no column in common")
+    notes = [
+        f"{name} is not compared: not every run has it"
+        for name in dict.fromkeys(name for run in runs for name in run.columns)
+        if columns is None and name not in shared
+    ]
+    if first.t[-1] != second.t[-1] or first.t[0] != second.t[0]:
+        common = max(first.t[0], second.t[0]), min(first.t[-1], second.t[-1])
+        notes.append(f"only t = {common[0]:.6g} to {common[1]:.6g} is common to both")
+    made = []
+    for name in shared:
+        allowed = 0.0 if tolerance is None else tolerance[name] if isinstance(tolerance, Mapping) else tolerance
+        made.append(_column(name, first, second, twins, twins_of_second, allowed, shift))
+    return Comparison(
+        first=first.label,
+        second=second.label,
+        columns=tuple(made),
+        events=_events(first, second, made, shift),
+        notes=tuple(notes),
+    )
+
+
+def _column(
+    name: str, first: Curves, second: Curves, twins: Sequence[Curves], others: Sequence[Curves], tolerance: float,
+    shift: float,
+) -> Column:  # fmt: skip
+    least = tolerance or TOLERANCE * float(np.ptp(first.columns[name]))
+    changes = []
+    for run, doubles in ((first, twins), (second, others)):
+        each = [gap(run, twin, name, shift=np.inf, least=least) for twin in doubles]
+        changes.append(each)
+        shift += SAFETY * max((float(np.abs(g.matched.shift).max(initial=0.0)) for g in each), default=0.0)
+    between = gap(first, second, name, shift=shift, least=least)
+    change = sum((_widest(each, between.t) for each in changes), np.zeros(len(between.t)))
+    band = SAFETY * np.maximum.accumulate(change)
+    comparable = np.ones(len(band), bool) if not tolerance else band <= 0.5 * tolerance
+    beyond = np.flatnonzero(~comparable)
+    if tolerance:
+        comparable = comparable & (between.error <= 0.5 * tolerance)
+    seen = np.flatnonzero(change > 0.0)
+    crossing = first_crossing(between.t, np.where(np.isfinite(change), change, np.finfo(float).max), least)
+    stop = math.inf if crossing is None else crossing
+    growth = fit_growth(between.t, change, stop=stop) if len(seen) else Growth()
+    last_digit = None
+    if len(changes[0]) == 1 and crossing is not None and growth.rate > 0.0 and growth.clear:
+        started = changes[0][0].size[0]
+        value = abs(float(first.columns[name][0]))
+        last = float(np.spacing(value))
+        if value > 0.0 and last < started < least:
+            last_digit = crossing + (math.log(started) - math.log(last)) / growth.rate
+    return Column(
+        name=name,
+        gap=between,
+        band=band,
+        comparable=comparable,
+        tolerance=tolerance,
+        horizon=float(between.t[beyond[0]]) if len(beyond) else None,
+        growth=growth,
+        last_digit=last_digit,
+    )
+
+
+def _widest(changes: Sequence[Gap], t: FloatArray) -> FloatArray:
+    """Return the largest change by a twin at the times ``t``; infinite where a twin does not exist."""
+    sizes = [np.interp(t, each.t, each.size, left=np.inf, right=np.inf) for each in changes]
+    return np.max(sizes, axis=0) if sizes else np.zeros(len(t))
+
+
+def _events(first: Curves, second: Curves, columns: Sequence[Column], shift: float) -> Matched:
+    """Match the events that both runs list, or else the jumps of all columns."""
+    if first.t_events is not None and second.t_events is not None:
+        step = max(float(np.median(np.diff(run.t))) for run in (first, second))
+        until = min(first.t[-1], second.t[-1])
+        times = [run.t_events[run.t_events <= until] for run in (first, second) if run.t_events is not None]
+        return match(times[0], times[1], shift + step)
+    return max((each.gap.matched for each in columns), key=lambda found: len(found.pairs) + len(found.lone))
+
+
+def _slug(name: str) -> str:
+    return "".join(c if c.isascii() and c.isalnum() else "-" for c in name)
+
+
+def _finite(number: float) -> float | None:
+    return number if math.isfinite(number) else None
