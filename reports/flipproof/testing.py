@@ -18,7 +18,8 @@ from contextlib import closing
 from typing import Any
 
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, certify
-from flipproof.foreign.specs import Runner, opened
+from flipproof.foreign.contract import Runner
+from flipproof.foreign.solving import opened
 
 
 def _check(name: str, runner: Callable[[], Runner]) -> None:

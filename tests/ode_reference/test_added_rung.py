@@ -12,7 +12,7 @@ import pytest
 
 import ode_reference
 from flipproof.chapters.differences.chapter import ladder_pairs
-from flipproof.chapters.waterfall.study import NAMES
+from flipproof.frame.equations import NAMES
 from ode_reference import MODELS, Switches
 from ode_reference.models import ladder_of
 from slicemodel import Scenario

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import slicemodel
-from flipproof.chapters.waterfall.study import NAMES, STEP, column_run, observe, plan_waterfall, split_all
+from flipproof.chapters.waterfall.study import STEP, column_run, observe, plan_waterfall, split_all
+from flipproof.frame.equations import NAMES
 from flipproof.frame.solvers import make
 from flipproof.frame.twins import twins
 from ode_reference import combinations, contact, motion, witness

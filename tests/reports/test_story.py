@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from flipproof.chapters.waterfall.study import NAMES
+from flipproof.frame.equations import NAMES
 from flipproof.frame.gather import tell
 from flipproof.page.glossary import TERMS, anchor, linked
 from flipproof.page.live import sliders

@@ -22,8 +22,9 @@ from flipproof.chapters.maps.study import (
     study_readings,
     vary,
 )
-from flipproof.chapters.waterfall.study import NAMES, STEP
+from flipproof.chapters.waterfall.study import STEP
 from flipproof.figures.style import draw
+from flipproof.frame.equations import NAMES
 from flipproof.frame.flights import Outcome
 from flipproof.frame.solvers import Made, Run, make
 from slicemodel import Scenario

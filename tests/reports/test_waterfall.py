@@ -10,16 +10,9 @@ import ode_reference
 from flipproof.build import ask_of
 from flipproof.chapters.waterfall import study as waterfall
 from flipproof.chapters.waterfall.chapter import claim_overlap, figure_waterfall, study
-from flipproof.chapters.waterfall.study import (
-    NAMES,
-    OBSERVABLES,
-    canonical,
-    observe,
-    plan_finer,
-    plan_waterfall,
-    split_all,
-)
+from flipproof.chapters.waterfall.study import OBSERVABLES, observe, plan_finer, plan_waterfall, split_all
 from flipproof.frame import twins
+from flipproof.frame.equations import NAMES, canonical
 from flipproof.frame.flights import Flights, Outcome
 from flipproof.frame.solvers import Missing, make
 from ode_reference.switches import Switches

@@ -117,7 +117,8 @@ def _add_spec(command: argparse.ArgumentParser) -> None:
 
 def _opened(options: argparse.Namespace, **given: Any) -> Any:
     """Return the runner of ``options.spec``, with its limits."""
-    from flipproof.foreign.specs import offered, opened
+    from flipproof.foreign.solving import opened
+    from flipproof.foreign.specs import offered
     from flipproof.frame.solvers import catalogue
 
     if options.spec in catalogue() and options.spec in offered():
@@ -142,7 +143,7 @@ def _watched() -> Iterator[None]:
             came = signal.sigtimedwait({signal.SIGTERM}, 0.2)
             if came is None:
                 continue
-            from flipproof.foreign.isolated import ACCUSED, is_solver
+            from flipproof.foreign.processes import ACCUSED, is_solver
 
             if is_solver(came.si_pid):
                 ACCUSED.add("SIGTERM")
@@ -225,8 +226,8 @@ def _print_again(lines: Sequence[str], before: int | None) -> None:
 
 def command_place(options: argparse.Namespace) -> int:
     """Print where a solver stands; return 1 if it is off the lattice."""
+    from flipproof.foreign.contract import ForeignError
     from flipproof.foreign.place import place
-    from flipproof.foreign.specs import ForeignError
 
     with closing(_opened(options)) as runner:
         _ = runner.traits  # loads the solver: one that cannot be loaded is an error, not off the lattice
@@ -243,7 +244,7 @@ def command_place(options: argparse.Namespace) -> int:
 def command_explain(options: argparse.Namespace) -> int:
     """Print why two solvers differ."""
     from flipproof.foreign.place import explain
-    from flipproof.foreign.specs import opened
+    from flipproof.foreign.solving import opened
 
     throw = read_scenario(options.scenario, options.slices)
     with closing(opened(options.first)) as one, closing(opened(options.second)) as other:

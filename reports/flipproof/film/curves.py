@@ -15,7 +15,8 @@ from typing import Final
 
 import numpy as np
 
-from flipproof.frame.solvers import FOREIGN, catalogue, find, solve
+from flipproof.frame.others import OTHERS
+from flipproof.frame.solvers import catalogue, find, solve
 from ode_reference.solver import WATERS
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
@@ -153,7 +154,7 @@ class Equation:
                 one = solve_batch([replace(throw, duration=float(t[-1]))], self.solver, fine * (count - 1) + 1)
                 found.append((one.theta[0, ::fine], one.omega[0, ::fine], one.r_cm[0, ::fine]))
             return found
-        from flipproof.foreign.specs import ForeignError
+        from flipproof.foreign.contract import ForeignError
 
         flown: list[Flown | None] = [None] * len(throws)
         for k, (throw, t) in enumerate(zip(throws, times, strict=True)):
@@ -173,6 +174,6 @@ def package_of(solver: str) -> str:
     if package == "engine_check":
         able = [name for name, other in catalogue().items() if other.package != package]
         raise ValueError(f"model = {solver!r} is a physics engine, too slow to fit with; choose from {', '.join(able)}")
-    if package == FOREIGN:
+    if package in OTHERS:
         check_asked(solver)
     return package

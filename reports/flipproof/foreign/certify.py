@@ -11,8 +11,7 @@ from typing import Any, Final
 
 from flipproof.foreign import checks_basic, checks_measured, elsewhere
 from flipproof.foreign.checking import Check, Found, NotApplicableError, drive
-from flipproof.foreign.contract import Answer, Ask, Traits
-from flipproof.foreign.specs import ForeignError, Runner, WaitingError
+from flipproof.foreign.contract import Answer, Ask, ForeignError, Runner, Traits, WaitingError
 from flipproof.frame.findings import Finding, observed, regression
 from flipproof.output.columns import json_ready
 from flipproof.output.provenance import version_of

@@ -12,8 +12,7 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from flipproof.foreign.contract import Answer, Ask, Traits
-from flipproof.foreign.specs import ForeignError, WaitingError
+from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, WaitingError
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 

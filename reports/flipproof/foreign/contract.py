@@ -351,3 +351,27 @@ def trajectory_of(ask: Ask, answer: Answer, traits: Traits) -> Trajectory:
         settings={"spec": traits.name, "effort": ask.effort, **ask.options},
         diagnostics={"not_given": [name for name in PER_TIME if getattr(answer, name) is None]},
     )
+
+
+# ---------------------------------------------------------------------- who answers
+
+
+class ForeignError(ValueError):
+    """A foreign solver gave no answer; the message says in one line what happened."""
+
+
+class WaitingError(ForeignError):
+    """An answer that somebody is to write is not there yet."""
+
+
+class Runner:
+    """A solver that can be asked, wherever it runs; ``traits`` is what it says of itself."""
+
+    traits: Traits
+
+    def __call__(self, ask: Ask) -> Answer:
+        """Return its checked answer; raise ForeignError if there is none."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """End what runs for it, if anything does."""

@@ -24,9 +24,8 @@ import numpy as np
 
 import ode_reference
 from flipproof.foreign.checking import THROW, Found, Making, NotApplicableError, effort_of
-from flipproof.foreign.contract import Answer, Ask, Traits, started
+from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, started
 from flipproof.foreign.place import name_of, placing, switches_of
-from flipproof.foreign.specs import ForeignError
 from flipproof.frame.twins import usual_rest_speed
 from ode_reference.switches import Switches
 from slicemodel import Bottle, Scenario, Trajectory

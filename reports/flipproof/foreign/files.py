@@ -17,9 +17,19 @@ from typing import Any, Final
 
 import numpy as np
 
-from flipproof.foreign.contract import PER_SLICE, Answer, AnswerError, Ask, Traits, answer_of
-from flipproof.foreign.isolated import PATIENCE, PRCTL, accuse, die_with_parent, end, half_of_memory, last_line, start
-from flipproof.foreign.specs import ForeignError, Runner, WaitingError, words_of, written
+from flipproof.foreign.contract import (
+    PER_SLICE,
+    Answer,
+    AnswerError,
+    Ask,
+    ForeignError,
+    Runner,
+    Traits,
+    WaitingError,
+    answer_of,
+)
+from flipproof.foreign.processes import KEPT, PATIENCE, accuse, end, half_of_memory, last_line, start
+from flipproof.foreign.specs import words_of, written
 from flipproof.output.files import write_whole
 from slicemodel.scenario import unknown_name
 
@@ -158,8 +168,7 @@ class Command(Runner):
         with tempfile.TemporaryFile() as said:
             try:
                 null = subprocess.DEVNULL
-                bound = die_with_parent if PRCTL else None
-                process = start(words, self.memory, stdin=null, stdout=null, stderr=said, preexec_fn=bound)
+                process = start(words, self.memory, stdin=null, stdout=null, stderr=said)
             except OSError as error:
                 raise ForeignError(f"{words[0]} cannot be started ({error.strerror or error})") from None
             try:
@@ -171,7 +180,7 @@ class Command(Runner):
             finally:
                 end(process)
             if status:
-                said.seek(max(0, said.seek(0, 2) - 4096))
+                said.seek(max(0, said.seek(0, 2) - KEPT))
                 last = last_line(said.read())
                 raise ForeignError(f"{words[0]} ended with status {status}{f': {last}' if last else ''}")
 

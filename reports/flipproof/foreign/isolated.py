@@ -8,116 +8,28 @@ flipproof keeps the end.
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import functools
 import io
-import itertools
 import json
 import math
 import os
-import select
 import selectors
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Mapping
-from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from flipproof.foreign import contract
-from flipproof.foreign.contract import IMPACT, Answer, AnswerError, Ask, Traits, answer_of
-from flipproof.foreign.specs import ForeignError, Runner, distribution_of, is_foreign, load
+from flipproof.foreign.contract import IMPACT, Answer, AnswerError, Ask, ForeignError, Runner, Traits, answer_of
+from flipproof.foreign.processes import KEPT, PATIENCE, accuse, end, half_of_memory, last_line, start
+from flipproof.foreign.specs import distribution_of, is_foreign, load
 from slicemodel import Scenario
 from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
-
-PRCTL: Final = ctypes.CDLL(None).prctl if sys.platform == "linux" else None
-PR_SET_PDEATHSIG: Final = 1
-
-PATIENCE: Final = 2
-"""Runs in a row without an answer in time after which a solver is not asked again."""
-
-
-def start(words: list[str], memory: float, **pipes: Any) -> subprocess.Popen[bytes]:
-    """Start a program in a session of its own, in which it may take ``memory`` bytes of data (Linux)."""
-    mark = f"{os.getpid()}-{next(_COUNT)}"
-    environment = {**os.environ, MARK: mark}
-    process = subprocess.Popen(words, start_new_session=True, bufsize=0, env=environment, **pipes)
-    _MARKS[process.pid] = mark
-    if sys.platform == "linux":
-        import resource
-
-        with contextlib.suppress(OSError, ValueError):
-            soft, hard = resource.prlimit(process.pid, resource.RLIMIT_DATA)
-            least = min(int(memory), *(x for x in (soft, hard) if x != resource.RLIM_INFINITY), int(memory))
-            resource.prlimit(process.pid, resource.RLIMIT_DATA, (least, hard))
-    return process
-
-
-KEPT: Final = 4096
-"""Bytes of what a solver prints that are kept, from the end."""
-
-MARK: Final = "FLIPPROOF_SOLVER"
-"""Environment variable of a solver's process, by which what it leaves behind is known."""
-
-_MARKS: Final[dict[int, str]] = {}
-_COUNT: Final = itertools.count()
-
-ACCUSED: Final[set[str]] = set()
-"""Names of the signals that a solver has sent to this process."""
-
-
-def half_of_memory() -> float:
-    """Return half of the machine's memory [bytes]."""
-    try:
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 2
-    except (AttributeError, ValueError, OSError):
-        return 8.0 * 2**30
-
-
-def end(process: subprocess.Popen[bytes]) -> None:
-    """End a process that leads a group, and whatever it started, also in other groups, as far as that is marked."""
-    if os.name == "posix":
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(process.pid, signal.SIGKILL)
-    process.kill()
-    process.wait()
-    mark = f"{MARK}={_MARKS.pop(process.pid, '')}".encode()
-    for path in Path("/proc").glob("[0-9]*/environ"):
-        with contextlib.suppress(OSError):
-            if mark in path.read_bytes().split(b"\0"):
-                os.kill(int(path.parent.name), signal.SIGKILL)
-
-
-def is_solver(number: int) -> bool:
-    """Return whether a process is that of a solver of this process, or was started by one."""
-    with contextlib.suppress(OSError):
-        return f"\0{MARK}={os.getpid()}-".encode() in b"\0" + Path(f"/proc/{number}/environ").read_bytes()
-    return False
-
-
-def accuse() -> None:
-    """Raise ForeignError if a solver has sent a signal to this process."""
-    if ACCUSED:
-        names = ", ".join(sorted(ACCUSED))
-        ACCUSED.clear()
-        raise ForeignError(f"it sent {names} to flipproof")
-
-
-def die_with_parent() -> None:
-    """Let the kernel end this process when the thread that started it ends, whatever it does (Linux only)."""
-    if PRCTL is not None:
-        PRCTL(PR_SET_PDEATHSIG, signal.SIGKILL)
-
-
-def last_line(printed: bytes) -> str:
-    """Return the last line that says something."""
-    said = [line for line in printed.decode(errors="replace").splitlines() if line.strip()]
-    return " ".join(said[-1].split()) if said else ""
 
 
 class Isolated(Runner):
@@ -266,7 +178,6 @@ def refuse_built_in(name: str) -> None:
 
 def serve() -> None:
     """Call one solver for the asks that come in, and send its checked answers, until the other side goes away."""
-    _end_with_other_side()
     inbox = os.fdopen(os.dup(0), "rb")
     outbox = os.fdopen(os.dup(1), "wb")
     empty = os.open(os.devnull, os.O_RDONLY)
@@ -278,6 +189,7 @@ def serve() -> None:
         import resource
 
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    sys.dont_write_bytecode = True  # a copy of a file that is edited in the same second would be taken for it
     spec = receive(inbox, 0)[0]["spec"]
     try:
         solver = load(spec)
@@ -318,29 +230,6 @@ def _reason(error: BaseException) -> str:
     except Exception:
         words = "a message that cannot be shown"
     return f"answer: {words}" if isinstance(error, AnswerError) else f"{type(error).__name__}: {words}"
-
-
-def _end_with_other_side() -> None:
-    """Let this process and all that it starts end with flipproof's; a solver that never returns must not outlive it.
-
-    A process beside this one waits for the other end of standard input to close: a thread of this one would wait for
-    a solver that never lets another run.
-    """
-    if os.name != "posix":
-        threading.Thread(target=_watch, args=(os.getppid(),), daemon=True).start()
-    elif not os.fork():
-        os.closerange(1, 256)
-        closed = select.poll()
-        closed.register(0, 0)  # a pipe that the other side has closed is told without being asked for
-        while not closed.poll():
-            pass
-        os.killpg(0, signal.SIGKILL)
-
-
-def _watch(parent: int) -> None:
-    while os.getppid() == parent:
-        time.sleep(0.5)
-    os._exit(1)
 
 
 # ---------------------------------------------------------------------- frames

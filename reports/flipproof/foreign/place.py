@@ -20,17 +20,16 @@ from typing import Final
 
 import numpy as np
 
-from flipproof.chapters.solvers import LIMITS
-from flipproof.chapters.waterfall.study import NAMES, canonical
 from flipproof.foreign.checking import ask_of, drive, times_of
-from flipproof.foreign.contract import Answer, Ask, Traits
-from flipproof.foreign.specs import Runner
+from flipproof.foreign.contract import Answer, Ask, Runner, Traits
 from flipproof.frame import shapley
+from flipproof.frame.equations import NAMES, canonical
 from flipproof.frame.solvers import solve
 from ode_reference.models import MODELS
 from ode_reference.switches import Switches, are_switches
 from slicemodel import Scenario
 from slicemodel.observables import plateau
+from slicemodel.schemes import SCHEMES
 from slicemodel.trajectory import FloatArray
 
 
@@ -124,7 +123,8 @@ def name_of(switches: Switches) -> str:
 
 def switches_of(equation: str) -> Switches:
     """Return the switches of an equation, or of the one a scheme converges to; if that is none, raises ValueError."""
-    equation = LIMITS.get(equation, equation)
+    if equation in SCHEMES:
+        equation = SCHEMES[equation].model or equation
     if are_switches(equation):
         return Switches.from_name(equation)
     if equation not in MODELS:

@@ -11,10 +11,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from flipproof.foreign.certify import CHECKS, FAILED, certify
-from flipproof.foreign.contract import Answer, AnswerError, Ask, answer_of, traits_of
+from flipproof.foreign.contract import Answer, AnswerError, Ask, ForeignError, Runner, answer_of, traits_of
 from flipproof.foreign.heldout import HELD_OUT
 from flipproof.foreign.mistakes import MISTAKES
-from flipproof.foreign.specs import ForeignError, Runner
 from flipproof.foreign.subject import Subject
 from flipproof.frame.findings import Finding, regression
 from flipproof.output.columns import rows_csv
@@ -35,8 +34,6 @@ class InProcess(Runner):
             return answer_of(ask, self.solver.solve(ask))
         except AnswerError as error:
             raise ForeignError(f"answer: {error}") from None
-        except (ArithmeticError, ValueError, LookupError) as error:
-            raise ForeignError(f"{type(error).__name__}: {error}") from None
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,17 +4,35 @@ from __future__ import annotations
 
 import atexit
 import math
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 
 from flipproof.foreign.checking import effort_of
-from flipproof.foreign.contract import Answer, Ask, Traits, answer_of, started, trajectory_of
-from flipproof.foreign.specs import ForeignError, Runner, content_of, opened
+from flipproof.foreign.contract import Answer, Ask, ForeignError, Runner, Traits, answer_of, started, trajectory_of
+from flipproof.foreign.files import Command, File, Folder
+from flipproof.foreign.isolated import Isolated
+from flipproof.foreign.specs import (
+    COMMAND,
+    OBJECT,
+    check_asked,
+    check_spec,
+    content_of,
+    is_folder,
+    is_foreign,
+    is_spec,
+    locate,
+    written,
+)
 from flipproof.frame import solvers
 from ode_reference.solver import WATERS
 from slicemodel import Scenario, Trajectory
 from slicemodel.trajectory import FloatArray, output_times
+
+__all__ = ["Own", "check_spec", "is_spec", "opened", "solve"]
 
 
 def solve(
@@ -37,6 +55,37 @@ def solve(
         return trajectory_of(ask, runner(ask), runner.traits)
     except ForeignError as error:
         raise type(error)(f"{spec}: {error}") from None
+
+
+def opened(
+    spec: str,
+    timeout: float | None = None,
+    *,
+    curves: bool = False,
+    memory: float | None = None,
+    given: Mapping[str, Any] = MappingProxyType({}),
+) -> Runner:
+    """Return the solver that a spec names, ready to be asked; raises ValueError if it names nothing.
+
+    A run may take ``timeout`` seconds, or what the solver says, and ``memory`` bytes, or half of the machine's.
+    ``given`` are traits of a program or a folder, which cannot say them. With ``curves`` a curve in a file will do,
+    which answers one throw at its own times and nothing else.
+    """
+    if not is_foreign(spec):
+        return Own(solvers.find(spec))
+    how, held = written(spec)
+    if how != OBJECT:
+        if how == COMMAND:
+            return Command(spec, timeout, memory, given)
+        if is_folder(held):
+            return Folder(Path(held), given)
+        if not curves:
+            check_asked(spec)
+        return File(spec)
+    if given:
+        raise ValueError(f"solver {spec!r}: says itself what it is: {', '.join(given)} cannot be given")
+    locate(spec)
+    return Isolated(spec, timeout, memory)
 
 
 _RUNNERS: Final[dict[str, tuple[str, Runner]]] = {}

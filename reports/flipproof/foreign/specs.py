@@ -11,68 +11,34 @@
 An object is a callable, an object with ``solve(ask)``, or a class of such objects without arguments. Specs are
 strings, so that they can be sent to other processes; each process resolves them for itself.
 
-The same spec may name other code tomorrow, so what it stands for has a fingerprint: a file counts with the modules
-beside it that it imports, a module of a package with the whole package, a program with the files that its command
-names, a curve with its file. What code reads or imports from elsewhere is not seen.
+The same spec may name other code tomorrow, so runs are kept under a hash of what it names: of a file that file alone,
+of a module of a package the whole package, of a program the files that its command names, of a curve its file. What
+code reads or imports from elsewhere is not seen, nor are the modules beside a file.
 """
 
 from __future__ import annotations
 
-import ast
 import hashlib
 import importlib
 import os
 import shlex
 import sys
-from collections.abc import Iterator, Mapping
-from functools import cache
-from importlib.abc import PathEntryFinder
-from importlib.machinery import (
-    EXTENSION_SUFFIXES,
-    SOURCE_SUFFIXES,
-    ExtensionFileLoader,
-    FileFinder,
-    PathFinder,
-    SourceFileLoader,
-)
+from collections.abc import Iterator
+from importlib.machinery import PathFinder
 from importlib.metadata import EntryPoint, entry_points
-from importlib.util import find_spec, module_from_spec, spec_from_file_location
+from importlib.util import find_spec
 from pathlib import Path
-from types import CodeType, MappingProxyType
-from typing import TYPE_CHECKING, Any, Final
+from types import ModuleType
+from typing import Final
 
 from flipproof.frame.keys import files_in
-from flipproof.frame.solvers import catalogue, find
+from flipproof.frame.solvers import catalogue
 from ode_reference.switches import are_switches
 from slicemodel.scenario import unknown_name
-
-if TYPE_CHECKING:
-    from flipproof.foreign.contract import Answer, Ask, Traits
 
 CSV: Final = "csv"
 COMMAND: Final = "cmd"
 OBJECT: Final = "object"
-
-
-class ForeignError(ValueError):
-    """A foreign solver gave no answer; the message says in one line what happened."""
-
-
-class WaitingError(ForeignError):
-    """An answer that somebody is to write is not there yet."""
-
-
-class Runner:
-    """A solver that can be asked, wherever it runs; ``traits`` is what it says of itself."""
-
-    traits: Traits
-
-    def __call__(self, ask: Ask) -> Answer:
-        """Return its checked answer; raise ForeignError if there is none."""
-        raise NotImplementedError
-
-    def close(self) -> None:
-        """End what runs for it, if anything does."""
 
 
 def offered() -> dict[str, EntryPoint]:
@@ -118,43 +84,6 @@ def is_folder(held: str) -> bool:
     return Path(held).is_dir() or not (Path(held).exists() or Path(held).suffix)
 
 
-def opened(
-    spec: str,
-    timeout: float | None = None,
-    *,
-    curves: bool = False,
-    memory: float | None = None,
-    given: Mapping[str, Any] = MappingProxyType({}),
-) -> Runner:
-    """Return the solver that a spec names, ready to be asked; raises ValueError if it names nothing.
-
-    A run may take ``timeout`` seconds, or what the solver says, and ``memory`` bytes, or half of the machine's.
-    ``given`` are traits of a program or a folder, which cannot say them. With ``curves`` a curve in a file will do,
-    which answers one throw at its own times and nothing else.
-    """
-    if not is_foreign(spec):
-        from flipproof.foreign.solving import Own
-
-        return Own(find(spec))
-    how, held = written(spec)
-    if how != OBJECT:
-        from flipproof.foreign.files import Command, File, Folder
-
-        if how == COMMAND:
-            return Command(spec, timeout, memory, given)
-        if is_folder(held):
-            return Folder(Path(held), given)
-        if not curves:
-            check_asked(spec)
-        return File(spec)
-    if given:
-        raise ValueError(f"solver {spec!r}: says itself what it is: {', '.join(given)} cannot be given")
-    locate(spec)
-    from flipproof.foreign.isolated import Isolated
-
-    return Isolated(spec, timeout, memory)
-
-
 def locate(spec: str) -> EntryPoint | tuple[str, str]:
     """Return the entry point that a spec names, or its module or file and the object's name; nothing is imported.
 
@@ -194,48 +123,18 @@ def load(spec: str) -> object:
     return solver() if isinstance(solver, type) else solver
 
 
-class _FromSource(SourceFileLoader):
-    """Compiles what a file holds now, and keeps nothing.
-
-    Python would take a compiled copy for that of its file if the file is of the same length and second as it was then.
-    """
-
-    def get_code(self, fullname: str) -> CodeType:
-        path = self.get_filename(fullname)
-        return self.source_to_code(self.get_data(path), path)
-
-
-@cache
-def _compile_anew(folder: Path) -> None:
-    """Let modules in a folder, and in packages there, be compiled from what their files hold now."""
-    find_in = FileFinder.path_hook((ExtensionFileLoader, EXTENSION_SUFFIXES), (_FromSource, SOURCE_SUFFIXES))
-
-    def hook(path: str) -> PathEntryFinder:
-        place = Path(path).resolve()
-        installed = "site-packages" in place.parts or place.is_relative_to(sys.base_prefix)
-        if installed or not place.is_relative_to(folder):
-            raise ImportError(f"{path} is not in {folder}")
-        return find_in(path)
-
-    sys.path_hooks.insert(0, hook)
-    sys.path_importer_cache.clear()
-
-
 def _module(place: str) -> object:
+    """Import a module by its name, or run a file as one: from what it holds now, never from a compiled copy."""
     if not place.endswith(".py"):
-        _compile_anew(Path.cwd())
         if "" not in sys.path:
             sys.path.insert(0, "")
         return importlib.import_module(place)
     path = Path(place).resolve()
     sys.path.insert(0, str(path.parent))  # a file may import its neighbours
-    _compile_anew(path.parent)
-    spec = spec_from_file_location(path.stem, path, loader=_FromSource(path.stem, str(path)))
-    if spec is None or spec.loader is None:
-        raise ImportError(f"{place} cannot be imported")
-    module = module_from_spec(spec)
+    module = ModuleType(path.stem)
+    module.__file__ = str(path)
     sys.modules[path.stem] = module
-    spec.loader.exec_module(module)
+    exec(compile(path.read_bytes(), path, "exec"), module.__dict__)
     return module
 
 
@@ -276,7 +175,7 @@ def files_of(spec: str) -> Iterator[tuple[str, Path]]:
     found = locate(spec)
     place = found.module if isinstance(found, EntryPoint) else found[0]
     if place.endswith(".py"):
-        yield from _with_neighbours(Path(place))
+        yield Path(place).name, Path(place)
     else:
         yield from _of_module(place.partition(".")[0])
 
@@ -292,35 +191,4 @@ def _of_module(name: str) -> Iterator[tuple[str, Path]]:
     for folder in map(Path, spec.submodule_search_locations or ()):
         yield from ((file.relative_to(folder).as_posix(), file) for file in files_in(folder))
     if not spec.submodule_search_locations and spec.origin is not None and Path(spec.origin).is_file():
-        yield from _with_neighbours(Path(spec.origin))
-
-
-def _with_neighbours(file: Path) -> Iterator[tuple[str, Path]]:
-    """Yield a file, and the modules and packages in its folder that it imports, and those that they import."""
-    waiting, seen = [file], {file}
-    while waiting:
-        file = waiting.pop()
-        yield file.name, file
-        for name in _imported(file):
-            module, package = file.with_name(f"{name}.py"), file.with_name(name)
-            if package.is_dir() and package not in seen:
-                seen.add(package)
-                yield from ((f"{name}/{each.relative_to(package).as_posix()}", each) for each in files_in(package))
-            elif module.is_file() and module not in seen:
-                seen.add(module)
-                waiting.append(module)
-
-
-def _imported(file: Path) -> set[str]:
-    """Return the first parts of the names of all modules that a file imports; none if it is no Python."""
-    try:
-        tree = ast.parse(file.read_bytes())
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return set()
-    names = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            names |= {alias.name.partition(".")[0] for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names.add(node.module.partition(".")[0])
-    return names
+        yield Path(spec.origin).name, Path(spec.origin)

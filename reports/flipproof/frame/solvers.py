@@ -11,14 +11,9 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.frame.beside import beside
+from flipproof.frame.others import OTHERS
 from slicemodel import Scenario, Trajectory
 from slicemodel.scenario import unknown_name
-
-FOREIGN = "flipproof.foreign.solving"
-"""The module whose ``solve`` takes the spec of somebody else's solver."""
-
-FOREIGN_NAMES = "flipproof.foreign.specs"
-"""The module that knows which names are such specs; both are found by name, as the packages of solvers are."""
 
 REFERENCE: Final = Scenario().with_slices(50)
 """The paper's own throw, on which the regression claims are made."""
@@ -55,7 +50,7 @@ def catalogue() -> dict[str, Solver]:
 def find(name: str) -> Solver:
     """Return the solver of that name; "switches:110000" and its like are combinations of the ladder's rungs.
 
-    Other names with a colon, and entry points, are specs of somebody else's solver (``flipproof.foreign.specs``).
+    Other names are asked of the modules in ``OTHERS``: specs of somebody else's solver.
     A name that no solver has raises a ValueError, which names the nearest.
     """
     from ode_reference.switches import Switches, are_switches
@@ -67,11 +62,11 @@ def find(name: str) -> Solver:
         return Solver(name, "ode_reference", "model", model.equation, model.reason)
     solvers = catalogue()
     if name not in solvers:
-        others = import_module(FOREIGN_NAMES)
-        if not others.is_spec(name):
-            raise ValueError(unknown_name("solver", name, solvers))
-        others.check_spec(name)
-        return Solver(name, FOREIGN, "spec", "", "somebody else's solver")
+        for module in OTHERS:
+            if (others := import_module(module)).is_spec(name):
+                others.check_spec(name)
+                return Solver(name, module, "spec", "", "somebody else's solver")
+        raise ValueError(unknown_name("solver", name, solvers))
     return solvers[name]
 
 
@@ -171,7 +166,7 @@ def solve(name: str, scenario: Scenario, **settings: Any) -> Trajectory:
         # Without step and tolerance an engine would certify each run, at several times its cost; the report's own
         # refinement (``chapters.differences``) says what its runs are worth.
         settings = {"dt": package.DEFAULT_DT, **settings}
-    if solver.package == FOREIGN:  # waits for a process, which signals interrupt
+    if solver.package in OTHERS:  # waits for a process, which signals interrupt
         foreign: Trajectory = package.solve(scenario, **settings)
         return foreign
     trajectory: Trajectory = beside(package.solve, scenario, **settings)

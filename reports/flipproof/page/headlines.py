@@ -20,7 +20,8 @@ from flipproof.chapters.differences.chapter import BY_ENGINE, EQ8_FREE, PROGRAM_
 from flipproof.chapters.differences.study import Difference
 from flipproof.chapters.finite_step.chapter import EVERYTHING, HELD, LOCATED, StepCosts
 from flipproof.chapters.solvers import FREE
-from flipproof.chapters.waterfall.study import NAMES, STEP, Bar, Waterfall
+from flipproof.chapters.waterfall.study import STEP, Bar, Waterfall
+from flipproof.frame.equations import NAMES
 from flipproof.frame.gather import Gathered
 from flipproof.frame.solvers import FINER
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from flipproof.chapters.differences.study import PARTING_BAND, moved, percent
-from flipproof.chapters.waterfall.study import NAMES
+from flipproof.frame.equations import NAMES
 from flipproof.page.headlines import Headline
 
 NOTHING = 1e-6

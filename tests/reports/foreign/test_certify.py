@@ -11,12 +11,13 @@ import pytest
 import ode_reference
 from flipproof.foreign import checks_measured
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, WEAK, certify, findings_of
-from flipproof.foreign.contract import Ask, started
+from flipproof.foreign.contract import Ask, ForeignError, started
 from flipproof.foreign.elsewhere import SEED, drawn
 from flipproof.foreign.heldout import HELD_OUT
 from flipproof.foreign.mistakes import MISTAKES
 from flipproof.foreign.power import CLEAN, Caught, InProcess, claim_power, matrix_csv
-from flipproof.foreign.specs import ForeignError, load, opened
+from flipproof.foreign.solving import opened
+from flipproof.foreign.specs import load
 from flipproof.foreign.subject import Subject
 from flipproof.frame.solvers import solve
 from flipproof.output.junit import junit_text
@@ -381,3 +382,12 @@ def test_the_first_check_that_fails_is_the_one_that_tells(mistake, check):
     names = [name for name in CHECKS if name not in LONG]
     found = certify(InProcess(HELD_OUT[mistake](), mistake), names[: names.index(check) + 1])
     assert [r.check for r in found.failed] == [check]
+
+
+def test_a_bug_in_what_is_planted_is_no_failure_of_a_check():
+    class Broken(Subject):
+        def solve(self, _):
+            return {}["omega"]
+
+    with pytest.raises(KeyError, match="omega"):
+        certify(InProcess(Broken(), "broken"), ["shape"])

@@ -15,7 +15,7 @@ from flipproof.foreign.certify import FAILED, IDLE, PASSED, WEAK, certify
 from flipproof.foreign.checks_basic import ask_of_vector
 from flipproof.foreign.contract import Ask, Traits
 from flipproof.foreign.files import Folder
-from flipproof.foreign.specs import opened
+from flipproof.foreign.solving import opened
 from slicemodel import Scenario
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "foreign"

@@ -14,9 +14,9 @@ import pytest
 
 from flipproof.foreign.certify import FAILED, certify
 from flipproof.foreign.checking import THROW, times_of
-from flipproof.foreign.contract import Ask
+from flipproof.foreign.contract import Ask, ForeignError
 from flipproof.foreign.isolated import Isolated
-from flipproof.foreign.specs import ForeignError, load
+from flipproof.foreign.specs import load
 from flipproof.frame.solvers import solve
 
 HERE = Path(__file__).resolve().parent
@@ -264,3 +264,53 @@ def test_output_that_a_solver_truncates_is_printed_again(leaves):
     _, out, passport = certified(leaves, "truncates")
     assert "\0" not in out
     assert all(sum(check["check"] in line for line in out.splitlines()) >= 1 for check in passport["checks"])
+
+
+LINGERS = """
+import pathlib, subprocess, sys, time
+here = pathlib.Path(__file__)
+def solve(ask):
+    child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"], start_new_session=True)
+    here.with_suffix(".pid").write_text(f"{child.pid}\\n")
+    time.sleep(600)
+if __name__ == "__main__":
+    solve(None)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are found by /proc")
+@pytest.mark.parametrize("how", ["{file}:solve", "cmd:{python} {file} {{out}}", "cmd:sh -c '{python} {file}; {{out}}'"])
+def test_nothing_that_a_solver_started_outlives_a_killed_flipproof(tmp_path, how):
+    """Neither the program, nor what a shell started for it, nor what moved into a session of its own."""
+    file = tmp_path / "lingers.py"
+    file.write_text(LINGERS)
+    spec = how.format(file=file, python=sys.executable)
+    words = [sys.executable, "-m", "flipproof", "certify", spec]
+    process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    note = file.with_suffix(".pid")
+    for _ in range(1200):
+        if note.exists() and note.read_text().endswith("\n"):
+            break
+        time.sleep(0.1)
+    family = [int(note.read_text()), *_children(process.pid)]
+    process.kill()
+    process.wait()
+    for _ in range(200):
+        if not any(map(_runs, family)):
+            return
+        time.sleep(0.05)
+    pytest.fail("something still runs")
+
+
+def _children(number):
+    """Return the numbers of all processes below one."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            above = int(path.read_text().rpartition(")")[2].split()[1])
+        except OSError:
+            continue
+        if above == number:
+            child = int(path.parent.name)
+            found += [child, *_children(child)]
+    return found

@@ -10,10 +10,12 @@ import pytest
 
 from flipproof.foreign import specs
 from flipproof.foreign.checking import THROW, times_of
-from flipproof.foreign.contract import Ask
+from flipproof.foreign.contract import Ask, ForeignError
 from flipproof.foreign.isolated import BrokenFrameError, receive, send
-from flipproof.foreign.specs import ForeignError, is_foreign, is_spec, load, locate, opened
-from flipproof.frame.solvers import FOREIGN, Run, find, make, solve
+from flipproof.foreign.solving import opened
+from flipproof.foreign.specs import is_foreign, is_spec, load, locate
+from flipproof.frame.others import OTHERS
+from flipproof.frame.solvers import Run, find, make, solve
 
 ASK = Ask.of(THROW, times_of(THROW, 5), 0.25)
 PROGRAM = """
@@ -64,7 +66,7 @@ def test_nothing_is_imported_to_find_or_list_a_solver(monkeypatch, tmp_path):
     (folder / "entry_points.txt").write_text("[flipproof.solvers]\nboom-solver = boom:solve\n")
     monkeypatch.syspath_prepend(tmp_path)
     assert "boom-solver" in specs.offered()
-    assert find("boom-solver").package == FOREIGN
+    assert find("boom-solver").package in OTHERS
     assert specs.distribution_of("boom-solver") == "boom 1.0"
     assert locate("boom-solver").value == "boom:solve"
     assert "boom" not in sys.modules

@@ -15,10 +15,10 @@ from engine_check.solver import ENGINES
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, percent, study_difference
 from flipproof.chapters.predictability.chapter import parting_words
 from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, WITNESSES
-from flipproof.chapters.waterfall.study import NAMES
 from flipproof.figures.spoken import spoken
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Absent, Ask, Band, Call, Chapter, Claims, Exhibit, Run, Study, Touch, observed
+from flipproof.frame.equations import NAMES
 from flipproof.frame.findings import Rule
 from flipproof.frame.flights import Flights, attempt, known
 from flipproof.frame.solvers import find, finer

@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from flipproof.chapters.differences.study import Difference
 from flipproof.chapters.guests.study import Guest, Guests, Split, study
 from flipproof.chapters.waterfall.chapter import DOWN, UP, WHOLE
-from flipproof.chapters.waterfall.study import NAMES
 from flipproof.figures.style import ASSUMPTIONS, MARKERS, new_figure, shared_legend, solver_style, styled
 from flipproof.foreign.certify import findings_of
 from flipproof.frame.chapter import Absent, Band, Chapter, Exhibit, Finding, Kind, observed, regression
+from flipproof.frame.equations import NAMES
 from flipproof.output.columns import curves_csv, rows_csv
 from flipproof.output.tables import trajectory_csv
 from slicemodel import Trajectory

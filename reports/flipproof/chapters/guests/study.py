@@ -38,9 +38,10 @@ from flipproof.chapters.waterfall.study import equation_run
 from flipproof.foreign import contract
 from flipproof.foreign.certify import Certificate, certify
 from flipproof.foreign.checking import effort_of
-from flipproof.foreign.contract import Traits, trajectory_of
+from flipproof.foreign.contract import Runner, Traits, trajectory_of
 from flipproof.foreign.place import changes_of, name_of, switches_of
-from flipproof.foreign.specs import CSV, Runner, content_of, opened, written
+from flipproof.foreign.solving import opened
+from flipproof.foreign.specs import CSV, content_of, written
 from flipproof.frame.chapter import Ask, Call, Flights, Missing, Run, Study, attempt
 from flipproof.frame.shapley import mean
 from ode_reference.models import LADDER, MODELS

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipproof.chapters.solvers import FREE, LIMITS, SCHEMES
-from flipproof.chapters.waterfall.study import NAMES, STEP, canonical, mended
+from flipproof.chapters.waterfall.study import STEP, mended
+from flipproof.frame.equations import NAMES, canonical
 from flipproof.frame.shapley import fair_shares
 from flipproof.frame.solvers import Made, Run, make
 from flipproof.frame.twins import band, twins

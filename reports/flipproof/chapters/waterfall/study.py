@@ -16,10 +16,11 @@ minus free flight is a difference of two models.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import chain
 from typing import Final, NamedTuple
 
+from flipproof.frame.equations import NAMES, canonical
 from flipproof.frame.shapley import changes_of, fair_shares, grouped_shares, mean, sets_before
 from flipproof.frame.solvers import Run, finer, make
 from flipproof.frame.twins import band, twins
@@ -28,16 +29,6 @@ from ode_reference.switches import Switches
 from slicemodel import Scenario, Trajectory, observables
 
 PROGRAM: Final = "published-python"
-NAMES: Final[Mapping[str, str]] = {
-    "signs": "signs of Eq. 9d: no damping",
-    "roots": "roots of Eq. 9a: γ ≪ ω",
-    "drag_on_centre": "drag against C_M",
-    "weightless": "gravity in Eq. 8",
-    "origin": "origin at rest, drag on the tube",
-    "recoil": "no recoil in impacts",
-}
-"""Switch -> the assumption it mends, in the order of the ladder."""
-
 GROUPINGS: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
     "origin and recoil as one": {
         **{words: (name,) for name, words in NAMES.items() if name not in ("origin", "recoil")},
@@ -157,12 +148,6 @@ class Waterfall:
         """The bar that leads furthest away from free flight in the order of the ladder; None if none does."""
         bars = [bar for bar in self.bars if bar.forward * self.total < 0.0]
         return max(bars, key=lambda bar: abs(bar.forward), default=None)
-
-
-def canonical(switches: Switches) -> Switches:
-    """Return the one set that stands for all that make its equation: ``drag_on_centre`` off where it has no effect."""
-    idle = switches.origin or not switches.signs
-    return replace(switches, drag_on_centre=False) if idle else switches
 
 
 def program_run(throw: Scenario, steps: int) -> Run:

@@ -1,0 +1,150 @@
+"""Programs of other people as processes: each leads a session of its own, and none outlives flipproof.
+
+A keeper process reads from a pipe whose other end this process alone holds. It is told of every program that starts
+and ends; when the pipe closes, because this process ended in whatever way, it ends the programs that are left and all
+that they started.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import itertools
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, Final
+
+from flipproof.foreign.contract import ForeignError
+
+MARK: Final = "FLIPPROOF_SOLVER"
+"""Environment variable of a solver's process, by which what it leaves behind is known."""
+
+KEPT: Final = 4096
+"""Bytes of what a solver prints that are kept, from the end."""
+
+PATIENCE: Final = 2
+"""Runs in a row without an answer in time after which a solver is not asked again."""
+
+ACCUSED: Final[set[str]] = set()
+"""Names of the signals that a solver has sent to this process."""
+
+_MARKS: Final[dict[int, str]] = {}
+_COUNT: Final = itertools.count()
+_KEEPERS: Final[dict[int, subprocess.Popen[bytes]]] = {}
+"""The keeper of this process, by the number of the process: one that was forked from it has its own."""
+
+KEEPER: Final = """
+import glob, os, signal, sys
+groups, mark = set(), sys.argv[1].encode()
+for line in sys.stdin.buffer:
+    (groups.add if int(line) > 0 else groups.discard)(abs(int(line)))
+def end(kill, number):
+    try:
+        kill(number, getattr(signal, "SIGKILL", signal.SIGTERM))
+    except OSError:
+        pass
+for group in groups:
+    end(getattr(os, "killpg", os.kill), group)
+for path in glob.glob("/proc/[0-9]*/environ"):
+    try:
+        with open(path, "rb") as file:
+            marked = any(word.startswith(mark) for word in file.read().split(b"\\0"))
+    except OSError:
+        continue
+    if marked:
+        end(os.kill, int(path.split("/")[2]))
+"""
+"""What the keeper runs; its argument is how the marks of this process begin."""
+
+
+def start(words: list[str], memory: float, **pipes: Any) -> subprocess.Popen[bytes]:
+    """Start a program in a session of its own, in which it may take ``memory`` bytes of data (Linux)."""
+    mark = f"{os.getpid()}-{next(_COUNT)}"
+    environment = {**os.environ, MARK: mark}
+    _keeper()
+    process = subprocess.Popen(words, start_new_session=True, bufsize=0, env=environment, **pipes)
+    _tell(process.pid)
+    _MARKS[process.pid] = mark
+    if sys.platform == "linux":
+        import resource
+
+        with contextlib.suppress(OSError, ValueError):
+            soft, hard = resource.prlimit(process.pid, resource.RLIMIT_DATA)
+            least = min(int(memory), *(x for x in (soft, hard) if x != resource.RLIM_INFINITY), int(memory))
+            resource.prlimit(process.pid, resource.RLIMIT_DATA, (least, hard))
+    return process
+
+
+def end(process: subprocess.Popen[bytes]) -> None:
+    """End a process that leads a group, and whatever it started, also in other groups, as far as that is marked."""
+    if os.name == "posix":
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
+    process.kill()
+    process.wait()
+    _tell(-process.pid)
+    mark = f"{MARK}={_MARKS.pop(process.pid, '')}".encode()
+    for path in Path("/proc").glob("[0-9]*/environ"):
+        with contextlib.suppress(OSError):
+            if mark in path.read_bytes().split(b"\0"):
+                os.kill(int(path.parent.name), signal.SIGKILL)
+
+
+def _keeper() -> subprocess.Popen[bytes]:
+    """Return the keeper of this process; start it, also anew if somebody ended it."""
+    mine = os.getpid()
+    if mine not in _KEEPERS or _KEEPERS[mine].poll() is not None:
+        null = subprocess.DEVNULL
+        words = [sys.executable, "-I", "-S", "-c", KEEPER, f"{MARK}={mine}-"]
+        _KEEPERS[mine] = keeper = subprocess.Popen(
+            words, stdin=subprocess.PIPE, stdout=null, stderr=null, start_new_session=True, bufsize=0, cwd=os.sep
+        )
+        for number in _MARKS:
+            os.write(keeper.stdin.fileno(), b"%d\n" % number)  # type: ignore[union-attr]
+    return _KEEPERS[mine]
+
+
+def _tell(number: int) -> None:
+    """Tell the keeper of a process that leads a group, or by its negative number of its end."""
+    with contextlib.suppress(OSError):
+        os.write(_keeper().stdin.fileno(), b"%d\n" % number)  # type: ignore[union-attr]
+
+
+@atexit.register
+def _dismiss() -> None:
+    keeper = _KEEPERS.pop(os.getpid(), None)
+    if keeper is not None:
+        keeper.stdin.close()  # type: ignore[union-attr]
+        keeper.wait()
+
+
+def half_of_memory() -> float:
+    """Return half of the machine's memory [bytes]."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 2
+    except (AttributeError, ValueError, OSError):
+        return 8.0 * 2**30
+
+
+def is_solver(number: int) -> bool:
+    """Return whether a process is that of a solver of this process, or was started by one."""
+    with contextlib.suppress(OSError):
+        return f"\0{MARK}={os.getpid()}-".encode() in b"\0" + Path(f"/proc/{number}/environ").read_bytes()
+    return False
+
+
+def accuse() -> None:
+    """Raise ForeignError if a solver has sent a signal to this process."""
+    if ACCUSED:
+        names = ", ".join(sorted(ACCUSED))
+        ACCUSED.clear()
+        raise ForeignError(f"it sent {names} to flipproof")
+
+
+def last_line(printed: bytes) -> str:
+    """Return the last line that says something."""
+    said = [line for line in printed.decode(errors="replace").splitlines() if line.strip()]
+    return " ".join(said[-1].split()) if said else ""
