@@ -10,7 +10,7 @@ import engine_check
 import ode_reference
 from engine_check import landing
 from engine_check.landing import Run, Watch, World, landed
-from ode_reference.landing import world_of
+from ode_reference.landing import path, world_of
 from slicemodel import Scenario, Table, Touch
 
 WATER = Scenario(n_slices=6, drag=0.0, water_mass=0.4)
@@ -243,3 +243,19 @@ def test_ice_has_no_law_and_overlapping_slices_no_room():
         engine_check.land(at_rest(ICE), FLAT, law="together")
     with pytest.raises(ValueError, match=r"touch\.r\[1\] = .* is outside"):
         engine_check.land(at_rest(WATER, r=np.full(6, WATER.r_max)), FLAT)
+
+
+@pytest.mark.parametrize("law", ["together", "in-turn"])
+def test_a_slice_that_strikes_the_base_of_a_bottle_that_stands_on_its_rim_rebounds_as_newton_says(law):
+    """The table holds the tube: relative to it the slice leaves with e times its speed, in both programs."""
+    throw = Scenario(water_mass=0.2, n_slices=1, restitution=0.5, drag=0.0)
+    standing = replace(at_rest(throw, tilt=0.05, r=np.array([0.24])), v=np.array([1.0]))  # 12 mm over the base
+    world, before = World(standing, FLAT, STEP, law, "exclude"), 1.0
+    while world.data.qvel[-1] > 0.0:
+        before = world.data.qvel[-1]
+        assert world.advance() == ""
+    assert world.data.qvel[-1] == pytest.approx(-0.5 * before, rel=0, abs=2e-3)
+    located = path(standing, FLAT, law, dt=STEP, every=STEP, duration=0.02)
+    k = int(np.argmax(located.v[:, 0] < 0.0))
+    assert located.v[k, 0] == pytest.approx(world.data.qvel[-1], rel=0, abs=2e-3)
+    assert located.omega[k] == pytest.approx(world.data.qvel[2], rel=0, abs=0.02)  # what two steps of weight change
