@@ -97,7 +97,7 @@ def estimate_band(flight: Trajectory, *, twins: int = TWINS) -> Band:
         return Band(flight.t, flight.t, 0)
     own = {name: settings[name] for name in ("method", "rtol", "atol", "max_step") if name in settings}
     try:
-        require_own_switches(model_named(settings["model"]))
+        require_own_switches(model_named(settings["model"]), flight.scenario)
         own = {"method": TAYLOR}
     except ValueError:
         pass

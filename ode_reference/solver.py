@@ -200,7 +200,7 @@ def solve(
                 f"{name} = {value!r} cannot be asked of method 'taylor', whose series are exact to rounding: "
                 f"leave it out, or choose a method that has it: {', '.join(INTEGRATORS)}"
             )
-    require_own_switches(chosen)
+    require_own_switches(chosen, scenario)
     from ode_reference.flow import api
 
     return api.fly(scenario, moments, chosen.switches, _settings(chosen, speed, impact_law, energy, twin))
@@ -260,7 +260,8 @@ def solve_batch(
         if not isinstance(throw, Scenario):
             raise ValueError(f"throws[{k}] = {throw!r} is not a slicemodel.Scenario")
     chosen = model_named(model)
-    require_own_switches(chosen)
+    for throw in throws:
+        require_own_switches(chosen, throw)
     known_name("impact_law", impact_law, LAWS)
     energy, states = true_or_false("energy", energy), true_or_false("states", states)
     given = None if times is None else times_given(times)

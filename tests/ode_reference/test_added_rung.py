@@ -68,6 +68,27 @@ def test_switches_of_another_equation_are_refused(rung, register, switches):
     assert ode_reference.solve(THROW, name, TIMES[:20], method="DOP853").ok
 
 
+def wrong(where, throw, theta, s):
+    """Return a term that is there in some throws only [m/s^2]."""
+    if where == "far round":
+        return 50.0 if abs(theta) > 4.01 else 0.0
+    if where == "elsewhere than on the earth":
+        return (9.81 - throw.gravity) * np.cos(theta)
+    return 0.0 if len(s) == 6 else 0.5 * s
+
+
+@pytest.mark.parametrize("where", ["far round", "elsewhere than on the earth", "but with six slices"])
+def test_an_equation_that_is_wrong_in_the_throw_alone_is_refused_there(rung, register, where):
+    def acceleration(throw, theta, omega, s, v, free):
+        return rung.acceleration(throw, theta, omega, s, v, free) + wrong(where, throw, theta, s)
+
+    name = register(replace(rung, acceleration=acceleration))
+    throw = replace(THROW, gravity=1.62)
+    for solve, given in ((ode_reference.solve, throw), (ode_reference.solve_batch, [throw])):
+        with pytest.raises(ValueError, match="model = 'undamped'"):
+            solve(given, name)
+
+
 @pytest.mark.parametrize(
     "broken",
     [lambda *given: given[3] * np.nan, lambda *_: 0.0],
