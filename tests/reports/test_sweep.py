@@ -367,3 +367,44 @@ def test_a_point_s_key_is_of_all_that_decides_its_row():
     assert len(set(keys)) == len(others)
     assert [key for key, _, _ in work.keyed([Point(*point)], "code")] == keys[:1]
     assert [key for key, _, _ in work.keyed([point], "other")] != keys[:1]
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "DROP TABLE made; CREATE TABLE made (x)",
+        "ALTER TABLE made RENAME COLUMN shared TO shares",
+        "UPDATE shared SET facts = facts || 'x'",
+    ],
+)
+def test_a_file_of_another_shape_is_renewed_at_once(swept, tmp_path, statement):
+    path, made, rows = swept
+    hurt = tmp_path / "sweep.sqlite"
+    hurt.write_bytes(path.read_bytes())
+    with closing(sqlite3.connect(hurt)) as store:
+        store.executescript(statement)
+    for _ in range(2):
+        found, _, _ = filled(hurt, made)
+        assert found == rows
+
+
+@pytest.mark.parametrize("end", ["-journal", "-wal", "-shm"])
+@pytest.mark.parametrize("planted", ["fifo", "link", "notes"])
+def test_what_was_planted_beside_the_file_is_refused_and_left_alone(swept, tmp_path, end, planted):
+    path, made, _ = swept
+    (tmp_path / "sweep.sqlite").write_bytes(path.read_bytes())
+    beside, mine = tmp_path / f"sweep.sqlite{end}", tmp_path / "mine.txt"
+    mine.write_text("notes, long enough for a header")
+    if planted == "fifo":
+        os.mkfifo(beside)
+    elif planted == "link":
+        beside.symlink_to(mine)
+    else:
+        beside.write_bytes(mine.read_bytes())
+    if (end, planted) == ("-shm", "notes"):
+        filled(tmp_path / "sweep.sqlite", made)  # an index of the log, which SQLite makes anew
+        return
+    with pytest.raises(OSError, match=f"sweep.sqlite{end} beside it"):
+        filled(tmp_path / "sweep.sqlite", made)
+    assert beside.exists()
+    assert mine.read_text() == "notes, long enough for a header"

@@ -42,6 +42,16 @@ TABLES: Final = (
     "CREATE TABLE IF NOT EXISTS made (key BLOB PRIMARY KEY, shared INTEGER NOT NULL REFERENCES shared (id), "
     "asked TEXT NOT NULL, answer NOT NULL, used INTEGER NOT NULL, checksum INTEGER NOT NULL)",
 )
+OBJECTS: Final = {(statement.split()[5], statement.replace(" IF NOT EXISTS", "")) for statement in TABLES}
+"""Name and statement of all that the file's schema holds, but indices that SQLite makes by itself."""
+
+BESIDE: Final = {
+    "-journal": (b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7", bytes(8)),
+    "-wal": (b"\x37\x7f\x06\x82", b"\x37\x7f\x06\x83"),
+    "-shm": (b"",),
+}
+"""Files that SQLite keeps beside a database, and how each begins unless it is empty."""
+
 APPLICATION: Final = 0x464C4950
 """SQLite's ``application_id`` of the file ("FLIP")."""
 
@@ -174,8 +184,12 @@ class Store(AbstractContextManager["Store"]):
 
     def shared(self) -> list[dict[str, Any]]:
         """Return what entries have in common, each once."""
+        some: list[dict[str, Any]] = []
         with self._lock:
-            return [json.loads(facts) for (facts,) in self._rows.execute("SELECT facts FROM shared ORDER BY id")]
+            for (facts,) in self._rows.execute("SELECT facts FROM shared ORDER BY id"):
+                with suppress(ValueError):  # damaged: its entries do not agree with their checksums, and are made again
+                    some.append(json.loads(facts))
+        return [facts for facts in some if isinstance(facts, dict)]
 
     def patience(self, seconds: float) -> None:
         """Wait so long for another program that writes, from now on."""
@@ -211,6 +225,15 @@ def check_own(path: Path) -> None:
     folder = path.parent.stat()
     if os.path.lexists(path) and not stat.S_ISREG(path.lstat().st_mode):
         raise OSError("it is not a regular file")
+    for end, starts in BESIDE.items():
+        beside = path.with_name(path.name + end)
+        if not os.path.lexists(beside):
+            continue
+        if not stat.S_ISREG(beside.lstat().st_mode):
+            raise OSError(f"{beside.name} beside it is not a regular file")
+        with suppress(FileNotFoundError), beside.open("rb") as file:  # another program may have ended just now
+            if (begins := file.read(8)) and not begins.startswith(starts):
+                raise OSError(f"{beside.name} beside it is not a file of SQLite's; move it away")
     if sys.platform == "win32":
         return
     if folder.st_uid != os.geteuid() or (path.exists() and path.stat().st_uid != os.geteuid()):
@@ -238,10 +261,11 @@ def _connect(path: Path, through: bool = False) -> sqlite3.Connection:
         ((problem,),) = rows.execute("PRAGMA integrity_check(1)").fetchall() if through else ((b"ok",),)
         if problem != b"ok":
             raise _damage(problem.decode(errors="replace").replace("*** in database main ***", "").strip())
-        tables = {name for (name,) in rows.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+        schema_rows = rows.execute("SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL").fetchall()
+        tables = {(name.decode(), sql.decode()) for name, sql in schema_rows}
         ((application,),) = rows.execute("PRAGMA application_id").fetchall()
         ((schema,),) = rows.execute("PRAGMA user_version").fetchall()
-        own = (application, schema) == (APPLICATION, SCHEMA), tables == {b"made", b"shared"}
+        own = (application, schema) == (APPLICATION, SCHEMA), tables == OBJECTS
         if tables and own != (True, True):
             if any(own):
                 raise _damage("its schema is not that of a store")
