@@ -140,7 +140,7 @@ def _binary(path: Path) -> dict[str, Any]:
         with np.load(path, allow_pickle=False) as arrays:
             return dict(arrays)
     if path.suffix == ".parquet":
-        import pandas  # type: ignore[import-untyped, unused-ignore]
+        import pandas
 
         return {str(name): values.to_numpy() for name, values in pandas.read_parquet(path).items()}
     import xarray
