@@ -1,6 +1,7 @@
 """Curves of any system: horizon, jumps, differences, hostile files."""
 
 import json
+import sys
 
 import curves as benchmark
 import numpy as np
@@ -140,11 +141,19 @@ def test_what_is_wrong_with_a_table_is_named(table, named):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("name", ["x.npz", "x.parquet", "x.nc"])
-def test_a_file_that_is_not_what_its_name_says_is_refused(tmp_path, name):
+@pytest.mark.parametrize(("name", "needs"), [("x.npz", "numpy"), ("x.parquet", "pandas"), ("x.nc", "xarray")])
+def test_a_file_that_is_not_what_its_name_says_is_refused(tmp_path, name, needs):
+    pytest.importorskip(needs)
     (tmp_path / name).write_bytes(b"no such thing")
     with pytest.raises(ValueError, match="cannot be read"):
         read(tmp_path / name)
+
+
+def test_a_reader_that_is_not_installed_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    (tmp_path / "x.parquet").write_bytes(b"any")
+    with pytest.raises(ValueError, match="needs pandas, which is missing"):
+        read(tmp_path / "x.parquet")
 
 
 def test_the_fixture_asserts(tmp_path, flipproof_compare):

@@ -154,7 +154,10 @@ def _read_by(texts: Sequence[str]) -> Iterator[Path]:
             yield Path(text)
         with suppress(ValueError):  # what is no spec is told by the command itself
             if is_spec(text):
-                yield from (file for _, file in files_of(text) if file.is_file())
+                for file in (file for _, file in files_of(text) if file.is_file()):
+                    yield file
+                    if file.suffix == ".py":  # a solver may import whatever lies beside it
+                        yield from file.parent.glob("*.py")
 
 
 def add_json(command: argparse.ArgumentParser, what: str) -> None:
