@@ -83,7 +83,7 @@ def flipproof(*arguments):
 
 def written(folder, summary):
     folder.mkdir()
-    (folder / "summary.json").write_text(summary_text(summary), encoding="utf-8")
+    (folder / "summary.json").write_text(summary_text(summary), encoding="utf-8", errors="backslashreplace")
     return folder
 
 
@@ -230,7 +230,7 @@ def with_curves(folder, factor=1.0, name="eq8", rows=5):
 def test_the_page_shows_both_curves_and_needs_nothing_else(sound, tmp_path):
     other = copy.deepcopy(sound)
     other["findings"][0]["value"], other["findings"][0]["band"] = 7.0, 0.1
-    other["findings"][0]["title"] = "<script>alert(1)</script>"
+    other["findings"][0]["title"] = "<script>alert(1)</script>\u202e\x9b\udcff"
     old, new = (
         with_curves(written(tmp_path / "old", sound)),
         with_curves(written(tmp_path / "new", other), 1.01, rows=9),
@@ -240,6 +240,7 @@ def test_the_page_shows_both_curves_and_needs_nothing_else(sound, tmp_path):
     assert f"{len(sound['findings'])} findings compared: 1 differ" in page
     assert sound["findings"][0]["id"] in page
     assert "<script" not in page
+    assert "&lt;/script&gt;\\u202e\\x9b\\udcff" in page  # nothing hidden, nothing that no page can hold
     assert not re.search(r'(?:src|href)="(?!data:)', page)
     assert page.count('<img src="data:image/svg+xml,') == 1
     assert "Left: angular velocity ω relative to its initial value ω₀ over the\ntime t since the release" in page

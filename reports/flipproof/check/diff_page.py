@@ -12,6 +12,7 @@ import numpy as np
 
 from flipproof.check.diff import HEADINGS, Comparison
 from flipproof.figures.report_pair import differences, figure_report_pair
+from flipproof.figures.spoken import inert
 from flipproof.figures.style import draw
 from flipproof.output.columns import Curves
 from flipproof.page.templating import environment
@@ -32,7 +33,14 @@ def diff_page(old: Path, new: Path, before: Mapping[str, Any], after: Mapping[st
         missing.append("The two reports have no curve of the same solver.")
     titles = {finding["id"]: finding["title"] for finding in (*before["findings"], *after["findings"])}
     rows = [
-        (heading, [(titles[change.id], change.id, change.words) for change in found.changes if change.kind == kind])
+        (
+            heading,
+            [
+                tuple(_shown(words) for words in (titles[change.id], change.id, change.words))
+                for change in found.changes
+                if change.kind == kind
+            ],
+        )
         for kind, heading in HEADINGS.items()
     ]
     return environment().get_template("diff.html.j2").render(
@@ -45,6 +53,11 @@ def diff_page(old: Path, new: Path, before: Mapping[str, Any], after: Mapping[st
         missing=missing,
         alone=sorted(set(curves[0]) ^ set(curves[1])) if len(curves) == 2 else [],
     )  # fmt: skip
+
+
+def _shown(words: str) -> str:
+    """Return words of somebody's summary with what a page would hide, or could not hold, written as escapes."""
+    return inert(words, lines=False).encode("utf-8", "backslashreplace").decode()
 
 
 def read_curves(path: Path) -> Curves:

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from flipproof.cli.arguments import add_command, add_json, check_outputs, number, write_json
-from flipproof.cli.console import inert
 from flipproof.cli.progress import progress_bar
+from flipproof.figures.spoken import inert
 
 
 def add_bounce(commands: Any) -> None:

@@ -24,7 +24,7 @@ from flipproof.cli.arguments import (
     write_json,
     write_junit,
 )
-from flipproof.cli.console import inert
+from flipproof.figures.spoken import inert
 
 tolerance = reader("a finite number of at least 0", float, lambda value: 0.0 <= value < math.inf)
 

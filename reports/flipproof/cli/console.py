@@ -8,6 +8,8 @@ import sys
 import unicodedata
 from typing import Any, Final
 
+from flipproof.figures.spoken import inert
+
 ASCII: Final = {
     "≤": "<=", "≥": ">=", "≠": "!=", "≈": "~", "≪": "<<", "≫": ">>", "±": "+-", "∓": "-+", "−": "-", "–": "-", "—": "-",
     "→": "->", "←": "<-", "↔": "<->", "⇒": "=>", "·": "*", "×": "x", "√": "sqrt", "∞": "inf", "∂": "d", "Δ": "Delta",
@@ -22,18 +24,6 @@ ASCII: Final = {
 def readable(words: str) -> str:
     """Return an error message as one inert line of readable length: a word or a line without end loses its middle."""
     return inert(_cut(" ".join(_cut(word, 300) for word in words.split()), 2000))
-
-
-def inert(text: str, *, lines: bool = True) -> str:
-    r"""Return text for a terminal with control and formatting characters written as escapes, as \x1b.
-
-    ``lines`` says that the text may have several; a text that has one cannot forge another.
-    """
-    hidden = {"Cc", "Cf", "Zl", "Zp"}
-    return "".join(
-        c.encode("unicode_escape").decode() if unicodedata.category(c) in hidden and not (lines and c == "\n") else c
-        for c in text
-    )
 
 
 def _cut(text: str, most: int) -> str:

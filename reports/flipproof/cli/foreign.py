@@ -27,7 +27,7 @@ from flipproof.cli.arguments import (
     write_json,
     write_junit,
 )
-from flipproof.cli.console import inert
+from flipproof.figures.spoken import inert
 
 SPEC_HELP = (
     "a name that flipproof models lists, package.module:name, file.py:name, "

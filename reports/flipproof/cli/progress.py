@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Final, Self
 
-from flipproof.cli.console import inert
+from flipproof.figures.spoken import inert
 
 COSTS: Final[dict[str, Mapping[str, float]]] = {
     "full": {"runs, wave 1": 37.0, "runs, wave 2": 33.0, "runs, wave 3": 6.0, "figures": 6.0, "page": 1.0},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Mapping
 from typing import Final
 
@@ -33,3 +34,15 @@ _NAME: Final = re.compile(
 def spoken(text: str) -> str:
     """Return text with every solver under its spoken name."""
     return _NAME.sub(lambda found: SPOKEN[found.group()], text)
+
+
+def inert(text: str, *, lines: bool = True) -> str:
+    r"""Return somebody's text with control and formatting characters written as escapes, as \x1b.
+
+    ``lines`` says that the text may have several; a text that has one cannot forge another.
+    """
+    hidden = {"Cc", "Cf", "Zl", "Zp"}
+    return "".join(
+        c.encode("unicode_escape").decode() if unicodedata.category(c) in hidden and not (lines and c == "\n") else c
+        for c in text
+    )
