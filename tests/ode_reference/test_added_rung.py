@@ -68,6 +68,12 @@ def test_switches_of_another_equation_are_refused(rung, register, switches):
     assert ode_reference.solve(THROW, name, TIMES[:20], method="DOP853").ok
 
 
+def test_an_equation_of_the_ladder_under_switches_of_another_is_refused(register):
+    name = register(replace(MODELS["eq8"], name="mine", switches=MODELS["eq8-weightless"].switches))
+    with pytest.raises(ValueError, match="model = 'mine'"):
+        ode_reference.solve(THROW, name)
+
+
 def wrong(where, throw, theta, s):
     """Return a term that is there in some throws only [m/s^2]."""
     if where == "far round":
