@@ -385,6 +385,7 @@ class World:
         self,
         rows: FloatArray,
         solved: FloatArray,
+        response: FloatArray,
         first_row: NDArray[np.int64],
         kinds: NDArray[np.int64],
         velocities: FloatArray,
@@ -406,9 +407,9 @@ class World:
             chosen = np.repeat(taking, 1 + kinds)
             bound = np.zeros(len(rows))
             bound[first_row[k]] = -self.scenario.restitution * approach[k]
-            response = np.ascontiguousarray(rows[chosen] @ solved[chosen].T)
+            own = np.ascontiguousarray(response[np.ix_(chosen, chosen)])
             p, ok = impulses(
-                response, rows[chosen] @ (velocities + change), bound[chosen], kinds[taking], self.table.friction
+                own, rows[chosen] @ (velocities + change), bound[chosen], kinds[taking], self.table.friction
             )
             if not ok:
                 return change, False
@@ -435,7 +436,7 @@ class World:
             kinds = corner[closed].astype(np.int64)
             restitution = np.where(kinds, self.table.restitution, self.scenario.restitution)
             first_row = np.cumsum(1 + kinds) - 1 - kinds
-            cascade, ok = self._cascade(rows, solved, first_row, kinds, before)
+            cascade, ok = self._cascade(rows, solved, response, first_row, kinds, before)
             if not ok:
                 return "the impulses of a step have not converged"
             free, before = free + cascade, before + cascade

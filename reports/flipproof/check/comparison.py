@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flipproof.chapters.differences.study import PARTING_BAND
+from flipproof.curves.compare import beside
 from flipproof.curves.growth import first_crossing
 from flipproof.frame.findings import Finding, observed, regression
 from flipproof.output.tables import QUANTITIES, Curve
@@ -97,18 +98,10 @@ def _apart(quantity: str, first: Curve, second: Curve) -> Apart:
     scale = float(values[0]) if quantity == "omega" else 1.0
     if scale == 0.0:
         raise ValueError(f"{first.label}: omega is 0 at the first time; differences are taken relative to it")
-    # At an event a curve has a value before it and one after it, and each is compared with its like.
-    begins, ends = np.diff(t, prepend=-np.inf) > 0, np.diff(t, append=np.inf) > 0
-    kept = (begins | ends) & (t >= times[0]) & (t <= times[-1])
-    if kept.sum() < 2:
-        raise ValueError(f"{first.label} has {kept.sum()} times within those of {second.label}; at least 2 are needed")
-    t, values, after = t[kept], values[kept], ends[kept]
-    near = 1e-12 * max(abs(times[0]), abs(times[-1]))  # printing and reading a time explains so much
-    before, behind = np.searchsorted(times, t - near, "left"), np.searchsorted(times, t + near, "right") - 1
-    own = before <= behind
-    found = np.where(after, others[behind], others[np.minimum(before, len(times) - 1)])
-    found[~own] = np.interp(t[~own], times, others)
-    return Apart(quantity=quantity, t=t, first=values, second=found, scale=scale, interpolated=int((~own).sum()))
+    t, values, found, interpolated = beside(t, values, times, others)
+    if len(t) < 2:
+        raise ValueError(f"{first.label} has {len(t)} times within those of {second.label}; at least 2 are needed")
+    return Apart(quantity=quantity, t=t, first=values, second=found, scale=scale, interpolated=int(interpolated.sum()))
 
 
 def table(found: Comparison) -> str:

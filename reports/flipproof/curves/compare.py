@@ -123,7 +123,6 @@ class Column:
     horizon : first time that is not comparable; None: all are
     growth : of the twins' change, up to where it exceeds the tolerance
     last_digit : when a change of the first row by one unit in the last place exceeds the tolerance; None: not known
-    parted : first time at which the difference is not admissible; None: never
     """
 
     name: str
