@@ -20,7 +20,7 @@ ROOT = HERE.parent
 PAGES = {
     "README.md": "Start", "docs/tutorial.md": "A lesson", "docs/theory.md": "Theory", "docs/water.md": "Water",
     "docs/landing.md": "The landing", "docs/own-solver.md": "Your own solver", "docs/bounce.md": "Bounces",
-    "docs/compare.md": "Compare",
+    "docs/compare.md": "Compare", "docs/events.md": "Problems with events",
     "docs/film.md": "Films", "docs/commands.md": "Commands", "docs/sweeps.md": "Sweeps",
     "docs/howto.md": "How to add a thing", "docs/house.md": "The house",
     "docs/dependencies.md": "Dependencies",

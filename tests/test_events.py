@@ -1,0 +1,92 @@
+"""The frozen problems with events: files as their checksums say, made again within their bands, scored by adapters."""
+
+import hashlib
+import json
+import sys
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+EVENTS = Path(__file__).resolve().parent.parent / "examples" / "events"
+sys.path.insert(0, str(EVENTS))
+
+import make  # noqa: E402
+import score  # noqa: E402
+
+PROBLEMS = {problem["name"]: problem for problem in score.load()}
+SOLVE = score.adapter(EVENTS / "scipy_ivp.py")
+
+
+def test_the_files_are_those_of_the_checksums_and_say_the_same():
+    for line in (EVENTS / "SHA256SUMS").read_text().splitlines():
+        digest, name = line.split()
+        assert hashlib.sha256((EVENTS / name).read_bytes()).hexdigest() == digest
+    with np.load(EVENTS / "problems.npz") as arrays:
+        for name, problem in PROBLEMS.items():
+            for key in ("t", "omega", "omega_band", "r", "until"):
+                assert np.array_equal(arrays[f"{name}/{key}"], problem[key])
+            for key, values in problem["impacts"].items():
+                assert np.array_equal(arrays[f"{name}/impact_{key}"], values)
+    assert list(PROBLEMS) == list(make.PROBLEMS)
+    assert len(PROBLEMS) == 20
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_a_problem_made_again_is_the_frozen_one_within_its_bands(name):
+    frozen, made = PROBLEMS[name], make.problem(name)
+    assert {key: made[key] for key in ("beads", "until", "duration", "what")} == {
+        key: frozen[key] for key in ("beads", "until", "duration", "what")
+    }
+    for problem in (frozen, made):
+        assert problem["omega_band"][-1] <= 1e-6 * abs(frozen["omega"][0])
+    assert np.all(np.abs(np.subtract(made["omega"], frozen["omega"])) <= frozen["omega_band"][-1])
+    theirs = frozen["impacts"]
+    rows = list(zip(*(made["impacts"][key] for key in ("time", "slice", "end")), strict=True))
+    found = score.score({**frozen, "impacts": theirs}, lambda _: (rows, made["omega"]))
+    assert found.matched == found.impacts == found.answered
+    assert found.time <= max([1e-12, *theirs["time_band"]])
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_solve_ivp_finds_every_impact_and_no_other(name):
+    found = score.score(PROBLEMS[name], SOLVE, 1e-12)
+    assert found.matched == found.impacts == found.answered
+    assert found.time < 1e-7
+    assert found.omega < 1e-6
+
+
+@pytest.mark.parametrize("name", ["simultaneous-7", "grazing-3", "zeno-1", "resting-3", "chaotic-1"])
+def test_heyoka_finds_every_impact_within_a_picosecond_or_two(name):
+    pytest.importorskip("heyoka")
+    found = score.score(PROBLEMS[name], score.adapter(EVENTS / "heyoka_taylor.py"), 1e-15)
+    assert found.matched == found.impacts == found.answered
+    assert found.time < 1e-11
+
+
+@pytest.mark.parametrize("name", ["grazing-1", "grazing-3"])
+def test_a_solver_that_looks_only_between_steps_misses_the_faint_hit(name):
+    found = score.score(PROBLEMS[name], partial(SOLVE, turns=False), 1e-13)
+    assert found.matched < found.impacts
+
+
+def test_answers_that_are_wrong_lose_their_points():
+    problem = PROBLEMS["hit-2"]
+    rows, omega = SOLVE(problem, 1e-10)
+    late = [(t + 2e-6, *rest) for t, *rest in rows]
+    turned = [(t, bead, -end, *speeds) for t, bead, end, *speeds in rows]
+    assert score.score(problem, lambda _: (late, omega)).matched == 0
+    assert score.score(problem, lambda _: (turned, omega)).matched == 0
+    assert score.score(problem, lambda _: (rows[1:], omega)).matched < len(rows)
+    assert score.score(problem, lambda _: (rows, np.array(omega) * (1 + 1e-3))).omega > 1e-4
+
+
+def test_the_table_of_the_page_is_that_of_the_files():
+    page = (EVENTS.parent.parent / "docs" / "events.md").read_text(encoding="utf-8")
+    version = json.loads((EVENTS / "problems.json").read_text(encoding="utf-8"))["version"]
+    assert f"Version {version}" in page
+    for name, problem in PROBLEMS.items():
+        (line,) = (line for line in page.splitlines() if line.startswith(f"| {name} |"))
+        assert line.split(" | ")[1] == problem["what"]
+        assert line.split(" | ")[4] == str(len(problem["impacts"]["time"]))
