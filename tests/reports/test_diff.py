@@ -384,6 +384,7 @@ def test_what_is_no_summary_is_refused_in_one_line(tmp_path, text, words):
         ({"value": True}, "value = True"),
         ({"value": 10**400}, "value = 1000"),
         ({"band": [1]}, "band = "),
+        ({"band": -0.1}, "band = -0.1, must be at least 0"),
         ({"admissible": [0]}, "admissible = "),
         ({"id": 7}, "which is no text"),
     ],

@@ -137,6 +137,8 @@ def _problem(summary: Any) -> str:
         for name in ("value", "band"):
             if not _readable(finding[name]):
                 return f"finding {finding['id']!r}: {name} = {finding[name]!r} is neither a number nor null"
+        if (number(finding["band"]) or 0.0) < 0.0:
+            return f"finding {finding['id']!r}: band = {finding['band']!r}, must be at least 0"
         bounds = finding["admissible"]
         if not (isinstance(bounds, list) and len(bounds) == 2 and all(map(_readable, bounds))):
             return f"finding {finding['id']!r}: admissible = {bounds!r} is not two numbers or nulls"
@@ -200,7 +202,7 @@ def _bands(*findings: Mapping[str, Any]) -> list[float]:
 
 def bands(*findings: Mapping[str, Any]) -> float:
     """Return the sum of the bands; one that is missing or not finite adds nothing."""
-    return sum(abs(band) for band in _bands(*findings))
+    return sum(_bands(*findings))
 
 
 def within(old: float, new: float, allowed: float) -> bool:

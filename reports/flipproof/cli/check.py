@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -216,7 +215,8 @@ def command_compare(options: argparse.Namespace) -> int:
         raise ValueError(f"--junit {options.junit} needs --tolerance: without it no comparison can fail")
     check_outputs(options, "junit", "json")
     from flipproof.check.comparison import claims, compare, table
-    from flipproof.frame.solvers import find, solve
+    from flipproof.frame.solvers import find
+    from flipproof.frame.timing import solve_timed
     from flipproof.frame.twins import TRUSTED, doubt
     from flipproof.output.tables import Curve, read_curve
 
@@ -228,9 +228,7 @@ def command_compare(options: argparse.Namespace) -> int:
         path = Path(name)
         if path.is_file() or ((path.suffix or "/" in name) and ":" not in name):
             return read_curve(path)
-        began = time.perf_counter()
-        run = solve(find(name).name, scenario)
-        seconds = time.perf_counter() - began
+        run, seconds = solve_timed(find(name).name, scenario)
         if len(run.t) < 2:
             raise ValueError(f"{name} has nothing to compare on this throw: {run.status}: {run.message}")
         words = doubt(run, seconds, TRUSTED if options.tolerance is None else options.tolerance)

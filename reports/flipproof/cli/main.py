@@ -274,7 +274,8 @@ def command_simulate(options: argparse.Namespace) -> int:
 
     Returns 1 if the flight stopped before its end; what was flown is written all the same.
     """
-    from flipproof.frame.solvers import find, solve
+    from flipproof.frame.solvers import find
+    from flipproof.frame.timing import solve_timed
     from flipproof.frame.twins import doubt
     from flipproof.output.folder import write_text
     from flipproof.output.tables import trajectory_csv
@@ -284,9 +285,8 @@ def command_simulate(options: argparse.Namespace) -> int:
     if options.steps is not None and solver.package != "slicemodel":
         raise ValueError(f"--steps {options.steps}: {solver.name} is not a scheme and chooses its own steps")
     check_outputs(options, "out")
-    began = time.perf_counter()
-    trajectory = solve(solver.name, scenario, **({} if options.steps is None else {"steps": options.steps}))
-    seconds = time.perf_counter() - began
+    settings = {} if options.steps is None else {"steps": options.steps}
+    trajectory, seconds = solve_timed(solver.name, scenario, **settings)
     table = trajectory_csv(trajectory)
     if options.out:
         write_text(options.out, table)

@@ -5,7 +5,7 @@ import pytest
 
 import ode_reference
 from flipproof.cli.main import main
-from flipproof.frame import twins
+from flipproof.frame import timing, twins
 from flipproof.frame.findings import RULES, Band, observed
 from flipproof.frame.solvers import Missing, Run
 from slicemodel import Scenario
@@ -62,3 +62,18 @@ def test_a_slow_flight_is_not_flown_nine_times_more_unasked():
     assert "no band was estimated" in twins.doubt(flight, 11.0)
     assert twins.doubt(ode_reference.solve(THROW, "column"), 0.1) == ""
     assert "at no time" in twins.doubt(flight, 0.1, -1.0)
+
+
+def test_compiling_is_no_part_of_what_a_flight_took(monkeypatch):
+    clock, flown = [0.0], []
+
+    def solve(name, scenario, **settings):
+        clock[0] += 0.5 if flown else 30.0  # the first flight compiles
+        flown.append((name, scenario.duration))
+        return name
+
+    monkeypatch.setattr(timing, "solve", solve)
+    monkeypatch.setattr(timing.time, "perf_counter", lambda: clock[0])
+    assert timing.solve_timed("eq8", THROW) == ("eq8", 0.5)
+    assert timing.solve_timed("exact-step", THROW) == ("exact-step", 0.5)
+    assert flown == [("eq8", 1e-3 * THROW.duration), ("eq8", THROW.duration), ("exact-step", THROW.duration)]
