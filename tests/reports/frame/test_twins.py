@@ -67,7 +67,7 @@ def test_a_slow_flight_is_not_flown_nine_times_more_unasked():
 def test_compiling_is_no_part_of_what_a_flight_took(monkeypatch):
     clock, flown = [0.0], []
 
-    def solve(name, scenario, **settings):
+    def solve(name, scenario):
         clock[0] += 0.5 if flown else 30.0  # the first flight compiles
         flown.append((name, scenario.duration))
         return name
