@@ -414,7 +414,9 @@ def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[Likelihood, Fl
     for _, curve, end, spin in [one for one in found if one[0] > 0.4 * most][:: max(1, len(found) // 40)]:
         x, noise = _placed(film, curve, spin, end, length)
         likelihood = Likelihood(film, held, end if held.touch is None else held.touch, max(noise, 1e-5))
-        tried.append(_better(likelihood, curve, x))
+        better = _better(likelihood, curve, x)
+        if better[2][8] < 0.0:  # what accelerates upwards is no flight
+            tried.append(better)
     # The turning late in a flight looks like one of its own: releases far apart are tried with every curve.
     tried.sort(key=lambda one: one[0])
     apart_by: list[tuple[float, Likelihood, FloatArray]] = []
