@@ -91,7 +91,7 @@ def _parabola(rows: FloatArray, seen: FloatArray, noise: float) -> tuple[FloatAr
         matrix = np.vstack((rows * weight[:, None], known))
         x = np.linalg.lstsq(matrix, np.concatenate((seen * weight, known @ [0, 0, 0, 0, 0, -GRAVITY])), rcond=None)[0]
         weight = 1.0 / np.sqrt(1.0 + ((seen - rows @ x) / (3.0 * noise)) ** 2)
-    return x, noise**2 * np.linalg.inv(matrix.T @ matrix)
+    return np.asarray(x), np.asarray(noise**2 * np.linalg.inv(matrix.T @ matrix))
 
 
 def _share(
