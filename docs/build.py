@@ -122,7 +122,7 @@ def build(out: Path, report: Path | None = None) -> None:
         target = out / f"{Path(file).stem}.html"
         target.write_text(page_of(ROOT / file, file, report is not None), encoding="utf-8")
     shutil.copyfile(out / "README.html", out / "index.html")
-    for picture in HERE.glob("*.png"):
+    for picture in HERE.glob("*.svg"):
         shutil.copyfile(picture, out / picture.name)
     for page in out.glob("*.html"):
         for target in re.findall(r'(?:href|src)="([^"#:]+)"', page.read_text(encoding="utf-8")):

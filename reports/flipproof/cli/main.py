@@ -42,6 +42,7 @@ from flipproof.cli.foreign import add_foreign, add_models
 from flipproof.cli.landing import add_landing
 from flipproof.cli.paper import add_paper
 from flipproof.cli.progress import ReportProgress
+from flipproof.cli.scene import add_scene
 from flipproof.cli.screens import FirstScreen, commands_of, second_screen
 from flipproof.cli.sweeps import add_sweeps
 from flipproof.frame.compiling import announce_compiling
@@ -193,6 +194,7 @@ def parser() -> argparse.ArgumentParser:
     add_landing(commands)
     add_foreign(commands)
     add_bounce(commands)
+    add_scene(commands)
     add_models(commands)
     add_command(commands, "more", "List every other command, and the exit statuses.", command_more)
     return top

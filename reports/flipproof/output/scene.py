@@ -1,0 +1,82 @@
+"""A throw as a scene of other engines, with the exact answers beside it.
+
+    x, y, theta (slide, slide, hinge)        slice_i: a slide joint along the bottle, from the cap,
+    tube ---- centre of mass at the origin   damped by alpha, limited to [h/2N, L - h/2N]
+
+Joints, masses, moments of inertia and the keyframe ``release`` are exact. A point has no moment of inertia, which most
+engines refuse: a slice gets ``SLICE_INERTIA``. Restitution cannot be said in MJCF: the limits are the engine's own.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Final
+
+import ode_reference
+from flipproof.output.columns import json_ready
+from flipproof.output.folder import write_text
+from flipproof.output.tables import trajectory_csv
+from slicemodel.scenario import Scenario
+
+SLICE_INERTIA: Final = 1e-12
+"""Moment of inertia of a slice about its own centre [kg m^2]: 1e-9 of that of the paper's bottle."""
+
+
+def write_scene(throw: Scenario, folder: Path) -> None:
+    """Write scene.xml, scene.json (masses, inertias, release, impacts), answers.csv and readback.py into a folder.
+
+    The answers are free flight by ``ode_reference``. Raises ValueError for ice, whose slices have no joints, and
+    OSError if the folder cannot be written.
+    """
+    if throw.frozen:
+        raise ValueError("frozen = true: the slices of a scene move")
+    flight, bottle = ode_reference.solve(throw, "free-flight"), throw.bottle
+    across = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)  # Eq. 11a
+    bodies = {"tube": [bottle.mass, across, bottle.mass * bottle.radius**2, across]}
+    bodies |= {f"slice_{i}": [throw.slice_mass, *[SLICE_INERTIA] * 3] for i in range(throw.n_slices)}
+    off = bottle.length / 2 - float(flight.r_cm[0])
+    sine, cosine, (drift_x, drift_y) = math.sin(throw.theta0), math.cos(throw.theta0), throw.launch_velocity
+    qpos = [off * sine, -off * cosine, throw.theta0, *throw.initial_positions().tolist()]
+    qvel = [drift_x + throw.omega0 * off * cosine, drift_y + throw.omega0 * off * sine, throw.omega0]
+    qvel += [0.0] * throw.n_slices
+    impacts = [asdict(hit) for hit in flight.impacts or ()]
+    facts = {"scenario": throw.to_mapping(), "bodies": bodies, "qpos": qpos, "qvel": qvel, "impacts": impacts}
+    folder.mkdir(parents=True, exist_ok=True)
+    write_text(folder / "scene.xml", _mjcf(throw, bodies, qpos, qvel))
+    write_text(folder / "scene.json", json.dumps(json_ready(facts), indent=1) + "\n")
+    write_text(folder / "answers.csv", trajectory_csv(flight))
+    write_text(folder / "readback.py", Path(__file__).with_name("scene_readback.py").read_text(encoding="utf-8"))
+
+
+def _mjcf(throw: Scenario, bodies: dict[str, list[float]], qpos: list[float], qvel: list[float]) -> str:
+    def numbers(*values: float) -> str:
+        return " ".join(map(repr, values))  # to the last digit
+
+    half, radius, unseen = throw.bottle.length / 2, throw.bottle.radius, 'contype="0" conaffinity="0" mass="0"'
+    inertial = {
+        name: f'<inertial pos="0 0 0" mass="{mass!r}" diaginertia="{numbers(*moments)}"/>'
+        for name, (mass, *moments) in bodies.items()
+    }
+    slices = [
+        f'   <body name="slice_{i}" pos="0 {half!r} 0">{inertial[f"slice_{i}"]}\n'
+        f'    <joint name="r_{i}" type="slide" axis="0 -1 0" damping="{throw.drag!r}" limited="true" '
+        f'range="{numbers(throw.r_min, throw.r_max)}"/><geom type="sphere" size="{radius / 4!r}" {unseen}/></body>\n'
+        for i in range(throw.n_slices)
+    ]
+    return f"""\
+<mujoco model="flipproof">
+ <compiler angle="radian" inertiafromgeom="false" autolimits="false"/>
+ <option timestep="1e-4" integrator="RK4" gravity="0 {-throw.gravity!r} 0"/>
+ <worldbody>
+  <body name="tube" pos="0 0 0">{inertial["tube"]}
+   <joint name="x" type="slide" axis="1 0 0"/><joint name="y" type="slide" axis="0 1 0"/>
+   <joint name="theta" type="hinge" axis="0 0 1"/>
+   <geom type="cylinder" fromto="0 {half!r} 0 0 {-half!r} 0" size="{radius!r}" {unseen}/>
+{"".join(slices)}  </body>
+ </worldbody>
+ <keyframe><key name="release" qpos="{numbers(*qpos)}" qvel="{numbers(*qvel)}"/></keyframe>
+</mujoco>
+"""

@@ -1,0 +1,42 @@
+"""Read scene.xml beside this file into an engine and compare masses and moments of inertia with scene.json.
+
+    python readback.py mujoco        (or pinocchio, or newton, which holds single precision)
+
+Prints the largest relative difference; the exit status is 1 if it is above 1e-6. Needs the engine and NumPy.
+"""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+HERE = Path(__file__).resolve().parent
+
+
+def held(engine: str, scene: str) -> Any:
+    """Return mass and three principal moments of inertia of every body, as the engine holds them, shape (N + 1, 4)."""
+    if engine == "mujoco":
+        import mujoco
+
+        model = mujoco.MjModel.from_xml_path(scene)
+        return np.column_stack([model.body_mass, model.body_inertia])[1:]
+    if engine == "pinocchio":
+        import pinocchio
+
+        bodies = list(pinocchio.buildModelFromMJCF(scene).inertias)[1:]
+        return np.array([[body.mass, *np.diag(body.inertia)] for body in bodies])
+    import newton
+
+    builder = newton.ModelBuilder()
+    builder.add_mjcf(scene)
+    return np.column_stack([builder.body_mass, [np.diag(np.reshape(body, (3, 3))) for body in builder.body_inertia]])
+
+
+if __name__ == "__main__":
+    meant = np.array(list(json.loads((HERE / "scene.json").read_text(encoding="utf-8"))["bodies"].values()))
+    found = held(sys.argv[1], str(HERE / "scene.xml"))
+    apart = float(np.abs(found / meant - 1).max()) if found.shape == meant.shape else np.inf
+    print(f"{sys.argv[1]}: {len(found)} bodies of {len(meant)}, masses and inertias within {apart:.1e}")
+    sys.exit(not apart <= 1e-6)

@@ -1,0 +1,72 @@
+"""A throw as a scene of other engines: what MuJoCo holds, and how it flies, is what was meant."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from flipproof.cli.main import main
+from flipproof.output.scene import write_scene
+from slicemodel import Scenario
+
+THROW = Scenario(omega0=-12.0, theta0=0.7).with_slices(4)
+
+
+def read_back(folder):
+    return subprocess.run([sys.executable, str(folder / "readback.py"), "mujoco"], capture_output=True, text=True)
+
+
+def test_mujoco_reads_every_mass_and_inertia_back(tmp_path):
+    pytest.importorskip("mujoco")
+    write_scene(THROW, tmp_path)
+    done = read_back(tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "5 bodies" in done.stdout
+
+
+@pytest.mark.parametrize("name", ["mass", "diaginertia"])
+def test_the_read_back_sees_a_scene_that_is_off_by_two_parts_in_a_million(name, tmp_path):
+    pytest.importorskip("mujoco")
+    write_scene(THROW, tmp_path)
+    text = (tmp_path / "scene.xml").read_text()
+    head, _, rest = text.partition(f' {name}="')
+    value, _, tail = rest.partition('"')
+    wrong = " ".join(repr(float(number) * 1.000002) for number in value.split())
+    (tmp_path / "scene.xml").write_text(f'{head} {name}="{wrong}"{tail}')
+    assert read_back(tmp_path).returncode == 1
+
+
+def test_the_scene_flies_as_the_answers_say_up_to_the_first_impact(tmp_path):
+    mujoco = pytest.importorskip("mujoco")
+    write_scene(THROW, tmp_path)
+    facts = json.loads((tmp_path / "scene.json").read_text())
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml"))
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)  # soft: the slice at rest would sink in
+    model.dof_armature[3] = 1e9
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    assert np.array_equal(data.qpos, facts["qpos"])
+    assert np.array_equal(data.qvel, facts["qvel"])
+    table = np.genfromtxt(tmp_path / "answers.csv", delimiter=",", names=True)
+    end = table[table["t"] < facts["impacts"][0]["time"]][-1]
+    assert end["omega"] > THROW.omega0 * 0.99
+    model.opt.timestep = end["t"] / 500
+    for _ in range(500):
+        mujoco.mj_step(model, data)
+    assert data.qpos[2] == pytest.approx(end["theta"], rel=0, abs=1e-6)
+    assert data.qvel[2] == pytest.approx(end["omega"], rel=1e-6, abs=0)
+    assert data.qpos[4:] == pytest.approx([end[f"r_{i}"] for i in range(1, 4)], rel=0, abs=1e-7)
+
+
+def test_the_command_writes_the_folder_and_refuses_ice(tmp_path, capsys):
+    throw = tmp_path / "throw.toml"
+    throw.write_text(THROW.to_toml())
+    assert main(["scene", str(throw), "--slices", "3", "--out", str(tmp_path / "scene")]) == 0
+    assert {path.name for path in (tmp_path / "scene").iterdir()} == {
+        "scene.xml", "scene.json", "answers.csv", "readback.py",
+    }  # fmt: skip
+    throw.write_text("[scenario]\nfrozen = true\n")
+    assert main(["scene", str(throw), "--out", str(tmp_path / "ice")]) == 2
+    assert "frozen" in capsys.readouterr().err
