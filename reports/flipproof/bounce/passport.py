@@ -163,14 +163,17 @@ def restitution(adapter: Adapter, dt: float) -> Measurement:
     dead = [v for k, v in enumerate(SPEEDS) if not bounces[2:, k].any()]
     fast = [v for k, v in enumerate(SPEEDS) if bounces[2:, k].all()]
     threshold = math.nan
-    counted = np.ones(len(SPEEDS), dtype=bool)
-    if dead and fast and max(dead) < min(v for v in fast if v > max(dead)):
-        threshold = _threshold(adapter, max(dead), min(v for v in fast if v > max(dead)), dt)
-        remarks.append(f"nothing rebounds below {threshold:.3g} m/s")
-        counted = np.array([v > max(dead) for v in SPEEDS])
+    counted = np.ones(off.shape[:2], dtype=bool)
+    if dead and max(fast, default=0.0) > max(dead):
+        slow, threshold = (_threshold(adapter, e, dt) for e in (0.5, 0.8))
+        # Some engines drop impacts that are slow, others rebounds that would be.
+        of_rebound = abs(0.5 * slow / (0.8 * threshold) - 1) < abs(slow / threshold - 1)
+        threshold *= 0.8 if of_rebound else 1.0
+        remarks.append(f"{'no rebound is slower than' if of_rebound else 'nothing rebounds below'} {threshold:.3g} m/s")
+        counted = np.multiply.outer(RESTITUTIONS if of_rebound else np.ones(len(RESTITUTIONS)), SPEEDS) > threshold
     elif dead:
         remarks.append(f"nothing rebounds at {', '.join(f'{v:.2g}' for v in dead)} m/s")
-    seen = off * counted[None, :, None]
+    seen = off * counted[..., None]
     k, s, p = (int(index) for index in np.unravel_index(int(np.argmax(seen)), seen.shape))
     worst = float(seen[k, s, p])
     if not worst <= OFF:
@@ -178,7 +181,7 @@ def restitution(adapter: Adapter, dt: float) -> Measurement:
             f"restitution is off by up to {worst:.2g} (asked {RESTITUTIONS[k]:g}, got {table[k, s, p]:.4g} at "
             f"{SPEEDS[s]:.2g} m/s)"
         )
-    spread = float((table.max(2) - table.min(2))[:, counted].max())
+    spread = float((table.max(2) - table.min(2))[counted].max())
     if not spread <= OFF:
         remarks.append(f"the rebound hangs on the phase of the step by up to {spread:.2g}")
     return Measurement(
@@ -198,11 +201,12 @@ def restitution(adapter: Adapter, dt: float) -> Measurement:
     )
 
 
-def _threshold(adapter: Adapter, low: float, high: float, dt: float) -> float:
-    """Return the speed between two from which on a body rebounds, to 1 %."""
+def _threshold(adapter: Adapter, restitution: float, dt: float) -> float:
+    """Return the speed of impact from which on a body rebounds, to 1 %."""
+    low, high = SPEEDS[0], SPEEDS[-1]
     while high > 1.01 * low:
         middle = math.sqrt(low * high)
-        if ratio(adapter, middle, 0.8, dt, 0.5) > 0.4:
+        if ratio(adapter, middle, restitution, dt, 0.5) > restitution / 2:
             high = middle
         else:
             low = middle
