@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from flipproof.film.curves import SLICES, Curve, Equation
-from flipproof.film.likelihood import HAND, TOUCH, Film, Fit, Held, Likelihood
+from flipproof.film.likelihood import GRAVITY, HAND, TOUCH, Film, Fit, Held, Likelihood
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
@@ -153,7 +153,7 @@ def estimate(
         tick(flights)
 
     starts = _start(film, known, held)
-    reach = max(1.4 * abs(x[2]) * (likelihood.touch - x[0]) for likelihood, x in starts) + 0.5
+    reach = max(1.4 * abs(x[2]) * (film.t[-1] - x[0]) for _, x in starts) + 0.5  # the touch may turn out later
     equation = Equation(solver, known, float(np.clip(reach, 2.0, 60.0)), film.quantity == "points", count)
     likelihood, x = starts[0] if len(starts) == 1 else _chosen(starts, equation)
     likelihood, nodes, curves, fits, cell, complete = _grid(likelihood, equation, x, seconds)
@@ -417,6 +417,8 @@ def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[Likelihood, Fl
         better = _better(likelihood, curve, x)
         if better[2][8] < 0.0:  # what accelerates upwards is no flight
             tried.append(better)
+    near = [one for one in tried if 0.75 * GRAVITY < math.hypot(one[2][7], one[2][8]) < GRAVITY / 0.75]
+    tried = near or tried  # a clock or a stick that is far off is found all the same
     # The turning late in a flight looks like one of its own: releases far apart are tried with every curve.
     tried.sort(key=lambda one: one[0])
     apart_by: list[tuple[float, Likelihood, FloatArray]] = []

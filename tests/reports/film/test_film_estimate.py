@@ -83,6 +83,32 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     assert min(held.values()) >= count - 3, held
 
 
+HARD = {
+    "a table that looks like a flight upwards": (
+        [11, 9000],
+        {"fps": 60, "noise": 3e-3, "tilt": 3.0, "bad": 2, "filling": 0.25},
+    ),
+    "a first guess that ends 0.2 s early": ([13, 7200], {"fps": 240, "noise": 0.5e-3, "bad": 2, "missing": 3}),
+    "a first guess with another gravity": (
+        [1, 9002],
+        {"fps": 30, "noise": 0.5e-3, "tilt": 3.0, "bad": 2, "missing": 3},
+    ),
+}
+
+
+@pytest.mark.parametrize(("seed", "options"), HARD.values(), ids=HARD)
+def test_a_film_that_was_once_read_wrongly_is_read_rightly(seed, options):
+    rng = np.random.default_rng(seed)
+    truth = {"gamma": rng.uniform(2, 10), "e": rng.uniform(0.1, 0.8), "omega0": rng.uniform(14, 22)}
+    made = film_simulator.film(rng, slices=6, **options, **truth)
+    judged = Judged(estimate(film_of(made), replace(THROW, water_mass=options.get("filling", 0.5))))
+    judged.check()
+    assert judged.explained
+    for name in ASKED:
+        low, high = judged.estimate.interval(name, 0.999)
+        assert low <= made.truth[name] <= high, name
+
+
 def test_a_bad_click_before_the_release_changes_nothing():
     made = clip(1, fps=60)
     spoiled = clip(1, fps=60)
