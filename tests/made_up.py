@@ -67,8 +67,8 @@ def spoiled(gathered: Gathered, broken: Iterable[Run], reason: str, chapters: It
     return replace(gathered, flights=Flights(made), outcomes={**gathered.outcomes, **again.outcomes})
 
 
-def page_of(gathered: Gathered, picture: Drawing) -> str:
-    """Return the page of a report with one picture in the place of every figure: to draw them takes longer."""
+def page_of(gathered: Gathered, picture: Drawing) -> dict[str, str]:
+    """Return the pages of a report with one picture in the place of every figure: to draw them takes longer."""
     told = {
         name: replace(each, figures=tuple(replace(figure, drawn=picture) for figure in each.figures))
         for name, each in tell(gathered).items()

@@ -1,4 +1,4 @@
-"""From a scenario to a report folder: findings, figures, page, summary, verdicts for CI systems, and tables."""
+"""From a scenario to a report folder: findings, figures, two pages, summary, verdicts for CI systems, and tables."""
 
 from __future__ import annotations
 
@@ -31,12 +31,13 @@ SLICES: Final = 50
 class Report:
     """A finished report in memory; ``tables`` maps paths in its folder to the text of files.
 
+    ``pages`` are the files ``index.html``, the story, and ``evidence.html``, by their names.
     ``seconds`` are wall times [s]: of every claim, by its finding's id; ``whole`` is that of everything.
     """
 
     findings: tuple[Finding, ...]
     exhibits: tuple[Exhibit, ...]
-    html: str
+    pages: Mapping[str, str]
     summary: dict[str, Any]
     tables: dict[str, str]
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -86,7 +87,7 @@ def build(
     *,
     png: bool = False,
 ) -> Report:
-    """Evaluate every claim, draw every figure and write the page, all in memory.
+    """Evaluate every claim, draw every figure and write both pages, all in memory.
 
     Figures are drawn by the workers of ``pool``, or in this process, and reported to ``progress``; ``png`` says whether
     as PNG, too.
@@ -100,13 +101,13 @@ def build(
     told = {name: replace(each, figures=tuple(islice(rest, len(each.figures)))) for name, each in told.items()}
     summary = summarise(gathered, told, provenance)
     with gathered.stages.lap("page"):
-        html = render(gathered, told, provenance, summary)
+        pages = render(gathered, told, provenance, summary)
     summary["stages"]["page"] = round(gathered.stages.seconds["page"], 3)
     made = [each for each in told.values() if each.found is not None]
     return Report(
         findings=tuple(finding for each in told.values() for finding in each.findings),
         exhibits=exhibits,
-        html=html,
+        pages=pages,
         summary=summary,
         tables={path: text for each in made for path, text in each.chapter.tables(each.found).items()},
         seconds={id_: seconds for each in told.values() for id_, seconds in each.seconds.items()},
@@ -117,7 +118,7 @@ def build(
 def write(report: Report, folder: Path) -> None:
     """Write a finished report into an empty folder."""
     files: dict[str, str | bytes | None] = {
-        "index.html": report.html,
+        **report.pages,
         "summary.json": summary_text(report.summary),
         SCHEMA_NAME: schema_text(),
         "junit.xml": junit_text(report.findings, seconds=report.seconds, whole=report.whole),

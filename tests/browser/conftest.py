@@ -88,10 +88,10 @@ class Visit:
 
 @pytest.fixture(scope="package")
 def visit(browser, folder) -> Callable[..., Iterator[Visit]]:
-    """Open the report: ``with visit(size, scheme) as visited``."""
+    """Open a page of the report: ``with visit(size, scheme, "evidence.html#ice") as visited``."""
 
     @contextmanager
-    def opened(size=WIDE, scheme="light", fragment="", **options) -> Iterator[Visit]:
+    def opened(size=WIDE, scheme="light", at="index.html", **options) -> Iterator[Visit]:
         context = browser.new_context(
             viewport={"width": size[0], "height": size[1]}, color_scheme=scheme, reduced_motion="reduce", **options
         )
@@ -101,7 +101,7 @@ def visit(browser, folder) -> Callable[..., Iterator[Visit]]:
         page.on("console", lambda message: visited.console.append(f"{message.type}: {message.text}"))
         page.on("pageerror", lambda error: visited.console.append(f"uncaught: {error}"))
         page.on("request", lambda request: visited.requests.append(request.url[:200]))
-        page.goto((folder / "index.html").as_uri() + fragment, wait_until="load")
+        page.goto(f"{folder.as_uri()}/{at}", wait_until="load")
         page.wait_for_function("() => [...document.images].every(image => image.src && image.complete)")
         page.evaluate((HERE / "probes.js").read_text(encoding="utf-8"))
         visited.settle()

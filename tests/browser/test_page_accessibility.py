@@ -6,13 +6,20 @@ WIDE, PHONE = (1440, 900), (390, 844)
 
 
 @pytest.mark.parametrize(
-    ("size", "scheme", "unfolded"),
-    [(WIDE, "light", "false"), *((size, scheme, "true") for size in (WIDE, PHONE) for scheme in ("light", "dark"))],
-    ids=["as-it-opens", "wide-light", "wide-dark", "phone-light", "phone-dark"],
+    ("file", "size", "scheme", "unfolded"),
+    [
+        ("evidence.html", WIDE, "light", "false"),
+        *(
+            (file, size, scheme, "true")
+            for file in ("index.html", "evidence.html")
+            for size in (WIDE, PHONE)
+            for scheme in ("light", "dark")
+        ),
+    ],
 )
-def test_axe_reports_nothing_serious(axe, visit, size, scheme, unfolded):
+def test_axe_reports_nothing_serious(axe, visit, file, size, scheme, unfolded):
     """As the page opens, and with everything unfolded; what is seen folded is seen unfolded, too."""
-    with visit(size, scheme) as visited:
+    with visit(size, scheme, file) as visited:
         visited.page.evaluate(f"document.querySelectorAll('details').forEach(fold => {{ fold.open ||= {unfolded}; }})")
         visited.page.evaluate(axe)
         result = visited.page.evaluate("axe.run(document, {resultTypes: ['violations', 'incomplete']})")
@@ -28,7 +35,7 @@ def test_axe_reports_nothing_serious(axe, visit, size, scheme, unfolded):
 
 def test_pass_and_fail_are_told_by_sign_and_word(visit):
     """Colour is never alone: what is coloured as a verdict begins with its sign."""
-    with visit() as visited:
+    with visit(at="evidence.html") as visited:
         words = visited.page.evaluate(
             "[...document.querySelectorAll('.pass, .fail')].filter(element => element.matches('span, td, strong'))"
             ".map(element => [element.classList.contains('pass'), element.textContent.trim()])"

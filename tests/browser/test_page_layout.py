@@ -16,14 +16,18 @@ PAPER = (695, 1013)
 @pytest.fixture(
     scope="module",
     params=[
-        ((1440, 900), "light"), ((1440, 900), "dark"), ((390, 844), "light"), ((390, 844), "dark"),
-        ((820, 1180), "light"),
+        (file, size, scheme)
+        for file in ("index.html", "evidence.html")
+        for size, scheme in (
+            ((1440, 900), "light"), ((1440, 900), "dark"), ((390, 844), "light"), ((390, 844), "dark"),
+            ((820, 1180), "light"),
+        )
     ],
-    ids=["wide-light", "wide-dark", "phone-light", "phone-dark", "tablet-light"],
+    ids=lambda params: f"{params[0].partition('.')[0]}-{params[1][0]}-{params[2]}",
 )  # fmt: skip
 def opened(request, visit):
-    size, scheme = request.param
-    with visit(size, scheme) as visited:
+    file, size, scheme = request.param
+    with visit(size, scheme, file) as visited:
         visited.page.evaluate("document.querySelectorAll('details').forEach(details => { details.open = true; })")
         visited.settle()
         yield visited
@@ -48,8 +52,7 @@ def brightness(picture):
 
 
 def test_figures_are_dark_in_the_dark_and_light_on_paper(visit):
-    with visit(scheme="dark") as visited:
-        visited.page.evaluate("location.hash = '#figure-slices'")
+    with visit(scheme="dark", at="evidence.html#figure-slices") as visited:
         visited.page.wait_for_function("() => document.querySelector('#flights > details').open")
         body = visited.page.evaluate("getComputedStyle(document.body).backgroundColor")
         assert max(map(int, re.findall(r"\d+", body))) < 40
@@ -58,13 +61,13 @@ def test_figures_are_dark_in_the_dark_and_light_on_paper(visit):
         assert largest > 180
         visited.page.emulate_media(media="print", color_scheme="dark")
         assert brightness(visited.page.locator("#figure-slices .plate").screenshot())[0] > 200
-    with visit(fragment="#figure-slices") as visited:
+    with visit(at="evidence.html#figure-slices") as visited:
         assert brightness(visited.page.locator("#figure-slices .plate").screenshot())[0] > 200
 
 
 def test_letters_of_figures_can_be_read_on_a_phone(visit, report):
     """As wide as its smallest letters need, a figure scrolls inside its own plate."""
-    with visit((390, 844)) as visited:
+    with visit((390, 844), at="evidence.html") as visited:
         visited.page.evaluate("document.querySelectorAll('details').forEach(details => { details.open = true; })")
         widths = dict(
             visited.page.evaluate(
@@ -81,7 +84,7 @@ def test_letters_of_figures_can_be_read_on_a_phone(visit, report):
 
 
 def test_on_a_phone_the_contents_fold_into_a_bar_that_stays(visit):
-    with visit((390, 844)) as visited:
+    with visit((390, 844), at="evidence.html") as visited:
         button, first = visited.page.locator(".rail button"), visited.page.locator("#contents a").first
         assert button.is_visible()
         assert first.is_hidden()
@@ -97,8 +100,9 @@ def test_on_a_phone_the_contents_fold_into_a_bar_that_stays(visit):
         assert visited.page.locator(".here").inner_text() == "Errata of the paper"
 
 
-def test_a4_pages_cut_nothing_off(visit):
-    with visit(PAPER) as visited:
+@pytest.mark.parametrize("file", ["index.html", "evidence.html"])
+def test_a4_pages_cut_nothing_off(visit, file):
+    with visit(PAPER, at=file) as visited:
         visited.page.emulate_media(media="print")
         assert visited.probe("overflow") == []
         assert visited.probe("overlaps") == []
@@ -109,10 +113,12 @@ def test_a4_pages_cut_nothing_off(visit):
         assert visited.page.locator("nav").is_hidden()
 
 
-@pytest.mark.parametrize(("opened", "fewest", "most"), [(False, 4, 8), (True, 10, 999)], ids=["story", "all"])
-def test_the_browser_prints_the_story_and_what_is_open_on_a4(visit, opened, fewest, most):
-    with visit() as visited:
-        if opened:
+@pytest.mark.parametrize(
+    ("file", "fewest", "most"), [("index.html", 4, 8), ("evidence.html", 10, 999)], ids=["story", "evidence"]
+)
+def test_the_browser_prints_the_story_and_what_is_open_on_a4(visit, file, fewest, most):
+    with visit(at=file) as visited:
+        if file == "evidence.html":
             visited.page.locator(".unfold").click()
         content = visited.page.pdf(prefer_css_page_size=True)
     boxes = re.findall(rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", content)

@@ -7,7 +7,7 @@ POSITIONS = "Object.values(flipproofMotion.positions()).map(bottle => bottle.pix
 
 @pytest.fixture(scope="module")
 def opened(visit):
-    with visit(fragment="#motion") as visited:
+    with visit(at="evidence.html#motion") as visited:
         yield Player(visited)
 
 

@@ -8,7 +8,7 @@ import pytest
 @pytest.fixture
 def chart(visit):
     """The angular velocity in the evidence, unfolded and drawn."""
-    with visit((1280, 900), fragment="#figure-omega") as visited:
+    with visit((1280, 900), at="evidence.html#figure-omega") as visited:
         visited.page.wait_for_selector("#figure-omega .chart-touched [data-line=eq8]")
         visited.page.locator("#figure-omega .chart-touched").scroll_into_view_if_needed()
         yield visited
@@ -81,7 +81,7 @@ def test_buttons_say_the_spoken_names(chart):
 @pytest.mark.parametrize("g", [9.81, 0.0])
 def test_the_chart_of_the_sliders_tells_its_values_at_a_cursor(visit, g):
     """By mouse and by keys, also of the curves that a slider has just moved; faint curves tell none."""
-    with visit((1280, 900), fragment="#live") as visited:
+    with visit((1280, 900), at="index.html#live") as visited:
         page = visited.page
         page.wait_for_function("() => flipproofSliders.drawn().thrown")
         page.evaluate("g => { flipproofSliders.set({ g }); }", g)
@@ -93,11 +93,11 @@ def test_the_chart_of_the_sliders_tells_its_values_at_a_cursor(visit, g):
         page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 100)
         time = float(page.locator("#sliders .chart-tools > .soft").text_content().split()[4])
         assert 0.1 < time < 0.4
-        curves = page.evaluate("flipproofSliders.drawn().curves.eq8.length") - 1
         for name in ("published-python", "eq8", "free-flight", "column", "rods"):
             at = page.evaluate(
-                "([name, k]) => flipproofSliders.drawn().curves[name][k] / flipproofSliders.drawn().thrown.omega0",
-                [name, round(time / 0.5 * curves)],
+                "([name, share]) => { const { curves, thrown } = flipproofSliders.drawn(), curve = curves[name];"
+                " return curve[Math.round(share * (curve.length - 1))] / thrown.omega0; }",
+                [name, time / 0.5],
             )
             assert float(page.locator(f"#sliders [data-toggle='{name}'] output").inner_text()) == pytest.approx(
                 at, abs=5e-3
@@ -108,21 +108,8 @@ def test_the_chart_of_the_sliders_tells_its_values_at_a_cursor(visit, g):
         assert visited.console == []
 
 
-def test_the_story_has_one_cursor_for_curves_and_water(visit):
-    with visit((1280, 900), fragment="#motion-story") as visited:
-        slider, svg = visited.page.get_by_test_id("ride-time"), visited.page.get_by_test_id("ride-omega")
-        svg.focus()
-        visited.page.keyboard.press("Home")
-        assert slider.input_value() == "0"
-        slider.focus()
-        visited.page.keyboard.press("End")
-        values = visited.page.locator("#ride output").all_inner_texts()
-        assert len(values) >= 4
-        assert "t = 0.500 s" in values
-
-
 def test_on_paper_the_figure_stands_in_place_of_the_chart(visit):
-    with visit((1280, 900), fragment="#figure-omega") as visited:
+    with visit((1280, 900), at="evidence.html#figure-omega") as visited:
         plate = visited.page.locator("#figure-omega .plate")
         assert plate.is_hidden()
         visited.page.emulate_media(media="print")

@@ -44,7 +44,7 @@ def test_every_witness_has_its_certificate(gathered, report, read_page):
     assert set(agreements["free-flight"].names) == {"free-flight", "solve_ivp", *WITNESSES}
     assert set(agreements["eq8"].names) == {"eq8", "solve_ivp"}
     assert not any(agreement.words.startswith("all but") for agreement in agreements.values())
-    page = read_page(report.html)
+    page = read_page(report.pages["evidence.html"])
     assert {"engines", "work-precision", "figure-stability", "figure-horizon", "figure-overlap"} <= set(page.ids)
 
 

@@ -57,9 +57,9 @@ def test_a_report_that_is_given_a_measurement_has_a_section_of_it(held, monkeypa
     monkeypatch.setattr("flipproof.film.measured.hold", known)
     ask, contents = ask_of(THROW, "quick"), (part_measured(measurement),)
     report = build(gather_report(ask, pool=Here(), contents=contents), provenance("flipproof report"))
-    assert '<section id="measured" class="fold">' in report.html
-    assert '<figure id="figure-measured">' in report.html
-    assert "Your measurement is nearest to free flight" in report.html
+    assert '<section id="measured" class="fold">' in report.pages["evidence.html"]
+    assert '<figure id="figure-measured">' in report.pages["evidence.html"]
+    assert "Your measurement is nearest to free flight" in report.pages["index.html"]
     assert [figure["section"] for figure in report.summary["figures"]] == ["measured"]
     assert {finding.id for finding in report.findings} == {f"measured-fit-{name}" for name in HELD}
 

@@ -1,4 +1,4 @@
-"""The page's words: the answer, its numbers, the bars of the waterfall, and failures where they belong."""
+"""The words of both pages: failures where they belong, and the end of a report."""
 
 import re
 from dataclasses import replace
@@ -22,19 +22,20 @@ def test_a_failed_solver_and_a_failed_study_stand_where_their_results_would(gath
     reason = "SetupError: the world is <not> the one that was meant"
     broken = spoiled(gathered, [gathered.ask.solvers["pymunk"]], reason, ["flights"])
     broken = replace(broken, outcomes={**broken.outcomes, "waterfall": Outcome(None, reason)})
-    page = page_of(broken, report.exhibits[0].drawn)
+    pages = page_of(broken, report.exhibits[0].drawn)
+    story, page = pages["index.html"], pages["evidence.html"]
     flights = section_of(page, "flights")
     row = re.search(r"<tr><th[^>]*>pymunk</th>.*?</tr>", flights, re.S).group()
     assert "✗ failed" in row
     assert "SetupError: the world is &lt;not&gt; the one that was meant" in row
     assert "trajectories/pymunk/" not in page
-    assert "solvers failed on this throw" in section_of(page, "answer")
+    assert "solvers failed on this throw" in section_of(story, "answer")
     assert "the world is &lt;not&gt;" in section_of(page, "assumptions")
-    assert 'id="shares"' not in page
+    assert 'id="shares"' not in story
 
 
 def test_the_flights_of_a_sound_report_are_all_marked_ok(report):
-    flights = section_of(report.html, "flights")
+    flights = section_of(report.pages["evidence.html"], "flights")
     assert [name for name in FLIGHTS if f">{name}</th>" not in flights] == []
     assert "✗ failed" not in flights
 

@@ -72,7 +72,7 @@ def test_every_claim_is_evaluated_and_holds(gathered):
 
 
 def test_the_page_is_whole_and_stands_alone(report, read_page):
-    page = read_page(report.html)
+    page = read_page(report.pages["evidence.html"])
     assert len(page.images) == len(report.exhibits) >= 8
     assert len(page.captions) >= len(report.exhibits)
     by_alt = {image["alt"]: image for image in page.images}
@@ -85,7 +85,7 @@ def test_the_page_is_whole_and_stands_alone(report, read_page):
         assert not link.startswith(("http:", "https:", "//", "/"))
         if link.startswith("#"):
             assert link[1:] in page.ids
-    words = re.sub(r'src="data:[^"]*"', "", report.html)
+    words = re.sub(r'src="data:[^"]*"', "", "".join(report.pages.values()))
     assert "://" not in words.replace("http://www.w3.org/2000/svg", "")  # the name of a vocabulary, not an address
     assert not re.search(r"\b(nan|None)\b", words)
 

@@ -251,8 +251,7 @@ def command_report(options: argparse.Namespace) -> int:
 
 
 def _print_report(report: Any, out: Path, seconds: float) -> None:
-    from flipproof.page.headlines import Headline
-    from flipproof.page.lead import answer
+    from flipproof.page.verdict import Headline, answer
 
     print("Largest |difference in omega| / omega_0:")
     for finding in report.findings:

@@ -21,8 +21,7 @@ from typing import Any, Final
 from flipproof.check.diff import read_summary
 from flipproof.output.folder import replaced_folder
 from flipproof.output.summary import SCHEMA_NAME, SUMMARY_VERSION, summary_text
-from flipproof.page.headlines import Headline
-from flipproof.page.lead import answered, percent_at, shares_said
+from flipproof.page.verdict import Headline, lines
 
 PLACE: Final = Path(__file__).resolve().parents[2] / "snapshot"
 
@@ -60,18 +59,12 @@ def take(report: Path, place: Path = PLACE) -> None:
 
 
 def front_page(summary: Mapping[str, Any]) -> str:
-    """Return what the README says that was found, from a summary alone: an answer a line, and the largest shares."""
+    """Return what the README says that was found, from a summary alone: a question and its answer a line."""
     found = [Headline.from_mapping(mapping) for mapping in summary["headlines"]]
-    slices = sorted({n for h in found for n in (h.slices, h.finer_slices) if n is not None})
-    items: list[str] = []
-    for question, verdict, pair, headline in answered(found):
-        sizes = ", ".join(f"{percent_at(headline, n)} at N = {n}" for n in slices)
-        if question:
-            items.append(f"- **{question}** {verdict} {pair[0].upper()}{pair[1:]}: {sizes}")
-        else:
-            items[-1] += f"; {pair}: {sizes}"
-    items += [f"- {' '.join(shares[:2])}"] if (shares := list(shares_said(found))) else []
-    return "\n".join(fill(_plain(item), 118, subsequent_indent="  ") for item in items) + "\n"
+    return (
+        "\n".join(fill(_plain(f"- **{asked}** {words}"), 118, subsequent_indent="  ") for asked, words in lines(found))
+        + "\n"
+    )
 
 
 def _plain(text: str) -> str:

@@ -12,8 +12,7 @@ from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.gather import Gathered, Told
 from flipproof.frame.solvers import Made
 from flipproof.output.columns import json_ready
-from flipproof.page.headlines import headlines
-from flipproof.page.lead import lead_words
+from flipproof.page.verdict import headlines, lead
 
 SUMMARY_VERSION: Final = 2
 """Rises when a reader of the last version would misread the next."""
@@ -44,7 +43,7 @@ def summarise(gathered: Gathered, told: Mapping[str, Told], provenance: Mapping[
         "scenario": gathered.ask.scenario.to_mapping(),
         "slices": gathered.ask.throw.n_slices,
         "size": gathered.ask.size,
-        "lead": lead_words(verdict),
+        "lead": lead(verdict),
         "headlines": [headline.to_mapping() for headline in verdict],
         "findings": [finding.to_mapping() for finding in findings],
         "differences": [],

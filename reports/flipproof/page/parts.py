@@ -1,4 +1,4 @@
-"""The order of the page: the screens of its story, one section for each part of the report, and what stands behind."""
+"""The order of both pages: the screens of the story; the parts of the report, and what stands behind them."""
 
 from __future__ import annotations
 
@@ -25,12 +25,11 @@ STORY: Final[Mapping[str, str]] = {
     "weight": "Weight drops out",
     "recoil": "The bottle recoils",
     "overlap-idea": "Water cannot overlap",
-    "answer": "The answer",
-    "motion-story": "One flight, four ways",
-    "live": "Switch gravity off",
-    "shares": "Which assumption costs what",
+    "answer": "Is Eq. 8 right?",
+    "live": "Throw it yourself",
+    "shares": "Why the program is off",
+    "bottles": "Other bottles",
     "survives": "What survives",
-    "bottles": "For which bottles",
     "sure": "How sure we are",
 }
 """Screen of the story -> its name in the contents, in the order of the page."""
@@ -38,7 +37,7 @@ STORY: Final[Mapping[str, str]] = {
 BEHIND: Final[Mapping[str, tuple[str, str]]] = {
     "findings": ("All findings", "Every claim and every observation of this report, to search and to link to."),
     "solvers": ("Every solver", "What each solver solves, how it ended on this throw, and why what failed did."),
-    "glossary": ("Glossary", "Every name and symbol of this page in one plain sentence."),
+    "glossary": ("Glossary", "Every name and symbol of this report in one plain sentence."),
     "provenance": (
         "Settings and provenance",
         "What was thrown, with which versions, on which machine; files for machines.",
@@ -62,7 +61,7 @@ PLAIN: Final = """{{ draw(figures) }}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """One section of the page: anchor, heading, in one sentence what it shows, and its content without these.
+    """One section of the evidence: anchor, heading, in one sentence what it shows, and its content without these.
 
     Of its findings those that must hold come first; ``figure`` is the name of its first figure, "" if it has none.
     """

@@ -1,4 +1,4 @@
-"""The page: one self-contained HTML file, made from a template and nothing fetched."""
+"""The pages: two self-contained HTML files, the story and its evidence, made from templates and nothing fetched."""
 
 from __future__ import annotations
 
@@ -14,12 +14,10 @@ from flipproof.frame.gather import Gathered, Told
 from flipproof.frame.solvers import find
 from flipproof.page.equations import equation, mathematics, numbers, typeset
 from flipproof.page.glossary import EQUATIONS, TERMS, anchor, symbols
-from flipproof.page.headlines import headlines
-from flipproof.page.lead import answer, answers, lead_words
 from flipproof.page.live import live_data, sliders, touch_data
 from flipproof.page.parts import STORY, behind, sections, shared
-from flipproof.page.story import story
 from flipproof.page.templating import environment
+from flipproof.page.verdict import answer, headlines, lead, signed, story
 
 
 def unbroken(text: str) -> str:
@@ -66,27 +64,28 @@ def read_assets() -> dict[str, Markup]:
 
 def render(
     gathered: Gathered, told: Mapping[str, Told], provenance: Mapping[str, str], summary: Mapping[str, Any]
-) -> str:
-    """Return the whole page; ``summary``, which its story is told from, is that of the report."""
+) -> dict[str, str]:
+    """Return the pages by the names of their files; ``summary``, which the story prints from, is that of the report."""
     templates = environment()
     templates.filters |= {
         "typeset": typeset, "unbroken": unbroken, "amount": amount, "percent": percent, "touch_data": touch_data,
         "short": short, "restitution_error": restitution_error, "term_anchor": anchor, "equation": equation,
-        "shared": shared, "symbols": symbols, "mathematics": mathematics, "numbers": numbers,
+        "shared": shared, "symbols": symbols, "mathematics": mathematics, "numbers": numbers, "signed": signed,
     }  # fmt: skip
     templates.globals["assets"] = read_assets()
     verdict = headlines(gathered)
     findings = [finding for each in told.values() for finding in each.findings]
+    figures = {figure.name: figure for each in told.values() for figure in each.figures}
     regressions = [finding for finding in findings if finding.kind == "regression"]
     flown = gathered.found("flights")
-    facts = story(summary, {figure.name: figure.table for each in told.values() for figure in each.figures})
+    facts = story(summary, {name: figure.table for name, figure in figures.items()})
     asked = sliders(gathered.ask.throw)
     context = dict(
         scenario=gathered.ask.scenario,
         throw=gathered.ask.throw,
         answer=answer(verdict),
-        lead=lead_words(verdict),
-        answers=tuple(answers(verdict)),
+        lead=lead(verdict),
+        headlines=verdict,
         regressions=regressions,
         failed=[finding for finding in regressions if finding.failed],
         solvers=flown.rows if flown is not None else [],
@@ -99,15 +98,17 @@ def render(
         terms=TERMS,
         formulas={term: find(solver).equation for term, solver in EQUATIONS.items()},
         story=facts,
-        story_ids=STORY,
+        omega=figures.get("omega"),
         sliders=asked,
         slider_of={one.name: one for one in asked},
         live=live_data(gathered.ask.throw),
     )
     parts = sections(gathered, told, templates)
-    body = (*parts, *behind(parts, templates, context))
-    left_out = {"motion-story": not context["motion"], "shares": not facts.shares, "bottles": not facts.map}
+    left_out = {"shares": not facts.shares, "bottles": not facts.map}
     screens = [(id_, words) for id_, words in STORY.items() if not left_out.get(id_)]
-    return templates.get_template("report.html.j2").render(
-        context, contents=[*screens, *((section.id, section.title) for section in body)], sections=body
-    )
+    body = (*parts, *behind(parts, templates, context))
+    rest = [("evidence", "The verdict in numbers"), *((section.id, section.title) for section in body)]
+    return {
+        "index.html": templates.get_template("story.html.j2").render(context, contents=screens),
+        "evidence.html": templates.get_template("evidence.html.j2").render(context, contents=rest, sections=body),
+    }

@@ -35,7 +35,7 @@ def test_an_added_chapter_stands_in_report_summary_and_junit(tmp_path):
     folder = tmp_path / "out"
     folder.mkdir()
     write(report, folder)
-    page = (folder / "index.html").read_text(encoding="utf-8")
+    page = (folder / "evidence.html").read_text(encoding="utf-8")
     assert '<section id="turns" class="fold">' in page
     assert '<figure id="figure-turns">' in page
     assert (folder / "figures" / "turns.svg").exists()

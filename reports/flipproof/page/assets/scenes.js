@@ -139,11 +139,11 @@
       play();
     });
     slider?.addEventListener("input", () => {
-      const unit = slider.dataset.unit, value = Number(slider.value);
-      slider.closest("label").querySelector("output").textContent = `${chart.shown(value, Number(slider.dataset.digits))} ${unit}`.trim();
+      const { unit, digits } = slider.dataset, value = Number(slider.value);
+      slider.closest("label").querySelector("output").textContent = `${chart.shown(value, Number(digits))}${unit === "°" ? "" : " "}${unit}`.trim();
       stop();
       frame = FRAMES - 1;
-      set({ [slider.name]: value * (unit === "%" ? 0.01 : 1) });
+      set({ [slider.name]: value * ({ "%": 0.01, "°": Math.PI / 180 }[unit] ?? 1) });
       draw();
     });
     root.querySelector(".again").addEventListener("click", play);

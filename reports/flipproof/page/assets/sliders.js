@@ -1,4 +1,4 @@
-// The sliders of "Switch gravity off": what they say is solved by live.js and drawn at once; the address keeps it.
+// The sliders of "Throw it yourself": what they say is solved by live.js and drawn at once; the address keeps it.
 (() => {
   "use strict";
   const root = document.getElementById("sliders");
@@ -11,8 +11,9 @@
   const names = { "published-python": "program", eq8: "Eq. 8", "free-flight": "free flight", column: "column", rods: "rods" };
   let thrown = { ...start }, drawn = {}, waiting = false, touched = null;
 
-  const solvers = { "published-python": program, eq8, "free-flight": free, column, rods };
-  const flown = (set) => Object.fromEntries(Object.entries(solvers).map(([name, solve]) => [name, solve({ ...fixed, ...set })]));
+  // The program makes its 1000 steps; of the equations as many points as a frame of 16 ms allows.
+  const solvers = { "published-python": [program, 1000], eq8: [eq8, 251], "free-flight": [free, 251], column: [column, 251], rods: [rods, 251] };
+  const flown = (set) => Object.fromEntries(Object.entries(solvers).map(([name, [solve, points]]) => [name, solve({ ...fixed, ...set }, points)]));
   // The throw with the gravity of the report is solved anew when something else than gravity is changed.
   let usual = { key: "", curves: null };
   function unchanged(set) {
@@ -20,16 +21,20 @@
     if (usual.key !== key) usual = { key, curves: flown(set) };
     return usual.curves;
   }
+  // Of curves with more and with fewer points, at the times of the one with fewer.
   const percent = (one, other) => {
-    const most = one.reduce((far, value, k) => Math.max(far, Math.abs(value - other[k])), 0) / thrown.omega0;
+    const at = (curve, share) => curve[Math.round(share * (curve.length - 1))], last = Math.min(one.length, other.length) - 1;
+    let most = 0;
+    for (let k = 0; k <= last; k++) most = Math.max(most, Math.abs(at(one, k / last) - at(other, k / last)) / thrown.omega0);
     return `${Number((100 * most).toPrecision(2))} %`;
   };
 
   function draw() {
     const began = performance.now(), changed = thrown.g !== start.g, before = unchanged({ ...thrown, g: start.g });
     // Free flight, column and rods are solved again too: that they do not change is what is to be seen.
-    const now = changed ? flown(thrown) : before, x = Array.from(now.eq8, (_, k) => (k * fixed.duration) / (now.eq8.length - 1));
-    const lines = (curves, look) => Object.keys(names).map((name) => ({ name, x, y: Array.from(curves[name], (value) => value / thrown.omega0), ...look(name) }));
+    const now = changed ? flown(thrown) : before;
+    const line = (name, omega) => ({ name, x: Array.from(omega, (_, k) => (k * fixed.duration) / (omega.length - 1)), y: Array.from(omega, (value) => value / thrown.omega0) });
+    const lines = (curves, look) => Object.keys(names).map((name) => ({ ...line(name, curves[name]), ...look(name) }));
     const plot = { behind: changed ? lines(before, () => ({ faint: true })) : [], lines: lines(now, (name) => ({ label: names[name] })) };
     const high = [...plot.behind, ...plot.lines].reduce((most, { y }) => Math.max(most, ...y.filter(Number.isFinite)), 1);
     const y = { low: 0, high: Math.min(3, high), label: "angular velocity ω / ω₀ [1]" };
@@ -41,10 +46,10 @@
       input.previousElementSibling.querySelector("output").textContent = text;
       input.setAttribute("aria-valuetext", text);
     }
-    find("weightless").textContent = thrown.g === 0 ? "Gravity on" : "Gravity off";
+    const apart = (from) => Object.keys(names).filter((name) => now[name] !== from(name)).map((name) => `${names[name]} ${percent(now[name], from(name))}`);
     find("said").textContent = changed
-      ? `With g = ${chart.shown(thrown.g, 2)} instead of ${chart.shown(start.g, 2)} m/s², ω moves by up to ${percent(now.eq8, before.eq8)} of ω₀ by Eq. 8, ${percent(now["published-python"], before["published-python"])} by the program, ${percent(now.column, before.column)} for the column, ${percent(now.rods, before.rods)} for rods, and ${percent(now["free-flight"], before["free-flight"])} in free flight.`
-      : `Eq. 8 and free flight differ by up to ${percent(now.eq8, now["free-flight"])} of ω₀, the program and free flight by ${percent(now["published-python"], now["free-flight"])}, the column and free flight by ${percent(now.column, now["free-flight"])}, rods and free flight by ${percent(now.rods, now["free-flight"])}. Now switch gravity off.`;
+      ? `With g = ${chart.shown(thrown.g, 2)} instead of ${chart.shown(start.g, 2)} m/s², ω moves at worst, as a share of ω₀: ${apart((name) => before[name]).join(", ")}.`
+      : `At worst off free flight, as a share of ω₀: ${apart(() => now["free-flight"]).join(", ")}.`;
     drawn = { thrown: { ...fixed, ...thrown }, curves: now, before, milliseconds: performance.now() - began };
   }
   function set(change, remember = true) {
@@ -54,7 +59,6 @@
     waiting = true;
   }
   for (const input of inputs) input.addEventListener("input", () => set({ [input.name]: Number(input.value) * (scale[input.name] ?? 1) }));
-  find("weightless").addEventListener("click", () => set({ g: thrown.g === 0 ? start.g || 9.81 : 0 }));
   find("reset").addEventListener("click", () => set(start));
   function recall() {
     const asked = Object.entries(window.flipproofState.linked("live")).map(([name, text]) => [name, Number(text)]);
@@ -62,6 +66,17 @@
   }
   window.addEventListener("hashchange", () => { if (location.hash.startsWith("#live?")) recall(); });
   window.addEventListener("load", () => setTimeout(recall, 0));
+
+  // A slider finer than a finger wants has a coarser step for the arrow keys.
+  for (const slider of document.querySelectorAll("input[data-keys]")) {
+    slider.addEventListener("keydown", (event) => {
+      const way = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
+      if (!way) return;
+      event.preventDefault();
+      slider.value = String(Number(slider.value) + way * Number(slider.dataset.keys));
+      slider.dispatchEvent(new Event("input", { bubbles: true }));
+    });
+  }
 
   // What a test, or a curious reader at the console, may ask.
   window.flipproofSliders = { drawn: () => drawn, set: (change) => { thrown = { ...thrown, ...change }; draw(); return drawn; } };

@@ -1,92 +1,9 @@
-// The two pictures of the story that move: omega(t) with the water under one cursor, and the map that tells its numbers.
+// The map of bottles, which tells the numbers of a cell.
 (() => {
   "use strict";
   const chart = window.flipproofChart;
   const find = (id) => document.querySelector(`[data-testid="${id}"]`);
-  const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  const names = { "published-python": "program", eq8: "Eq. 8", "free-flight": "free flight", pymunk: "engine" };
-
-  function ride() {
-    const source = document.getElementById("motion-data");
-    if (!source || !document.getElementById("ride")) return;
-    const data = JSON.parse(source.textContent), flights = data.flights.map((flight) => ({
-      ...flight, omega: chart.numbers(flight.omega, Float32Array), r_cm: chart.numbers(flight.r_cm, Float32Array),
-      r: chart.numbers(flight.r, Int16Array),
-    }));
-    const svg = find("ride-omega"), canvas = find("ride-bottles"), slider = find("ride-time"), button = find("ride-play");
-    const time = (k) => (k * data.duration) / (data.frames - 1);
-    const high = flights.reduce((most, { omega }) => omega.reduce((a, b) => Math.max(a, b), most), 0) / data.omega0;
-    let playing = 0;
-    const touched = window.flipproofTouch.touch(svg, 330, {
-      x: { low: 0, high: data.duration, label: "time t [s]" },
-      y: { low: 0, high: Math.min(3, Math.max(1, high)), label: "angular velocity ω / ω₀ [1]" },
-      right: 84,
-      lines: flights.map(({ name, omega }) => ({
-        name, label: names[name] ?? name, x: Array.from(omega, (_, k) => time(k)), y: Array.from(omega, (value) => value / data.omega0),
-      })),
-    }, (at) => {
-      slider.value = String(Math.round((at / data.duration) * (data.frames - 1)));
-      tell();
-    });
-
-    function drawBottles(k) {
-      const width = canvas.clientWidth, height = 330, ratio = window.devicePixelRatio || 1;
-      if (canvas.width !== Math.round(width * ratio)) [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
-      const pen = canvas.getContext("2d"), cell = width / flights.length, top = 40, tall = height - top - 12;
-      pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-      pen.clearRect(0, 0, width, height);
-      pen.font = `600 12px ${getComputedStyle(canvas).fontFamily}`;
-      pen.textAlign = "center";
-      flights.forEach((flight, j) => {
-        const at = Math.min(k, flight.reached - 1), wide = Math.min(64, cell - 14), left = (j + 0.5) * cell - wide / 2;
-        const down = (place) => top + place * tall, thick = Math.max(1.5, (data.slice_height / data.length) * tall * 0.75);
-        pen.fillStyle = style(`--solver-${flight.name}`) || style("--ink");
-        pen.fillText(names[flight.name] ?? flight.name, left + wide / 2, 14);
-        pen.fillText(`ω ${(flight.omega[at] / data.omega0).toFixed(2)} ω₀`, left + wide / 2, 30);
-        pen.globalAlpha = 0.55;
-        pen.fillStyle = style("--water-low");
-        const n = flight.drawn.length;
-        for (let i = 0; i < n; i++) pen.fillRect(left + 3, down(flight.r[at * n + i] * data.position_step) - thick / 2, wide - 6, thick);
-        pen.globalAlpha = 1;
-        pen.strokeStyle = style("--glass");
-        pen.lineWidth = 2;
-        pen.strokeRect(left, top, wide, tall);
-        const centre = down(flight.r_cm[at] / data.length);
-        pen.strokeStyle = style("--ink");
-        pen.beginPath();
-        pen.moveTo(left - 5, centre);
-        pen.lineTo(left + wide + 5, centre);
-        pen.stroke();
-      });
-    }
-
-    function tell() {
-      const k = Number(slider.value), said = `t = ${time(k).toFixed(3)} s`;
-      drawBottles(k);
-      find("ride-said").textContent = said;
-      slider.setAttribute("aria-valuetext", said);
-    }
-    function show() {
-      touched.put(time(Number(slider.value)));
-      tell();
-    }
-    slider.addEventListener("input", show);
-    button.addEventListener("click", () => {
-      if (playing) { cancelAnimationFrame(playing); playing = 0; button.textContent = "Play"; return; }
-      if (slider.value === slider.max) slider.value = "0";
-      const from = Number(slider.value), began = performance.now();
-      const next = (now) => {
-        slider.value = String(Math.min(data.frames - 1, Math.round(from + ((now - began) / 1000 / data.slow / data.duration) * (data.frames - 1))));
-        show();
-        if (slider.value === slider.max) { playing = 0; button.textContent = "Play"; } else playing = requestAnimationFrame(next);
-      };
-      button.textContent = "Pause";
-      playing = requestAnimationFrame(next);
-    });
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", show);
-    chart.onWidth(canvas, tell);
-    show();
-  }
+  const names = { "published-python": "program", eq8: "Eq. 8", "free-flight": "free flight" };
 
   function map() {
     const source = document.getElementById("map-data");
@@ -198,5 +115,5 @@
     tell(...here);
   }
 
-  window.addEventListener("load", () => setTimeout(() => { ride(); map(); }, 0));
+  window.addEventListener("load", () => setTimeout(map, 0));
 })();

@@ -1,0 +1,502 @@
+"""The verdict: its numbers, the answer and five lines that follow from them, and what the story prints.
+
+The numbers, called headlines, are fractions of omega_0 and of two kinds:
+
+    largest   max |omega_b - omega_a| / omega_0 of one pair of solvers during the flight
+    share     fair share of one assumption in the mean of omega over the second half: the mean over all orders
+
+The story prints a number with the place in ``summary.json`` that it comes from:
+
+::
+
+    headlines/eq8-free/value                                  keys, and entries of a list by their id or name
+    count findings verdict pass                               entries of a list whose field has, or lists, a value;
+                                                              vectors-* is any text that begins so
+    length paper/experiment                                   entries of a list
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from types import SimpleNamespace
+from typing import Any, Final, Literal
+
+from markupsafe import Markup
+
+from flipproof.chapters.differences.chapter import BY_ENGINE, EQ8_FREE, PROGRAM_EQ8, TOTAL, Differences
+from flipproof.chapters.differences.study import PARTING_BAND, percent
+from flipproof.chapters.finite_step.chapter import EVERYTHING, LOCATED, StepCosts
+from flipproof.chapters.maps.study import RUNGS, place_of
+from flipproof.chapters.solvers import FREE
+from flipproof.chapters.waterfall.study import STEP, Waterfall
+from flipproof.figures.spoken import SPOKEN
+from flipproof.figures.style import SUPERSCRIPTS
+from flipproof.frame.equations import NAMES as RUNG_NAMES
+from flipproof.frame.findings import finite_or_none
+from flipproof.frame.gather import Gathered
+from flipproof.frame.solvers import FINER
+from slicemodel import Scenario
+
+Measure = Literal["largest", "share"]
+
+NOTHING = 1e-6
+"""Fraction of omega_0 below which two solvers are said to agree."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Headline:
+    """One number of the verdict, a fraction of omega_0.
+
+    Parameters
+    ----------
+    id, what, measure : what it answers, which pair or assumption, and what number it is, see above
+    value : signed if a share; computed at so many ``slices``
+    finer, finer_slices : the same at another number of slices
+    band : numerical uncertainty
+    time : when the largest difference occurs [s]
+    low, high : range over single orders, of a share
+    note : what limits it, "" if nothing does
+    """
+
+    id: str
+    what: str
+    measure: Measure
+    value: float
+    slices: int
+    finer: float | None = None
+    finer_slices: int | None = None
+    band: float | None = None
+    time: float | None = None
+    low: float | None = None
+    high: float | None = None
+    note: str = ""
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the headline for ``summary.json``."""
+        return asdict(self)
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any]) -> Headline:
+        """Return the headline that ``to_mapping`` wrote; "nan" and "inf" are numbers again."""
+        known: dict[str, Any] = {field.name: mapping[field.name] for field in fields(cls)}
+        for name in ("value", "finer", "band", "time", "low", "high"):
+            known[name] = None if known[name] is None else float(known[name])
+        return cls(**known)
+
+
+# ---------------------------------------------------------------------- the numbers
+
+
+def headlines(gathered: Gathered) -> tuple[Headline, ...]:
+    """Return the numbers of the verdict that could be computed."""
+    differences: Differences | None = gathered.found("differences")
+    waterfalls: tuple[Waterfall, ...] = gathered.found("waterfall") or ()
+    costs: StepCosts | None = gathered.found("finite-step")
+    return (
+        *(_pairs(differences) if differences is not None else ()),
+        *(_shares(waterfalls[0]) if waterfalls else ()),
+        *(_steps(costs) if costs is not None else ()),
+    )
+
+
+def _pairs(differences: Differences) -> Iterator[Headline]:
+    named = {difference.name: difference for difference in differences.pairs}
+    rungs = [named[name] for name in RUNG_NAMES.values() if name in named]
+    wanted = {"whole": TOTAL, "program-eq8": PROGRAM_EQ8, "eq8-free": EQ8_FREE, "engine": BY_ENGINE}
+    chosen = {id_: named[name] for id_, name in wanted.items() if name in named}
+    if rungs:
+        chosen["pair"] = max(rungs, key=lambda difference: difference.largest)
+    for id_, pair in chosen.items():
+        finer_slices, finer = pair.finer or (None, None)
+        yield Headline(
+            id=id_,
+            what=pair.name,
+            measure="largest",
+            value=pair.largest,
+            slices=pair.slices,
+            finer=finer,
+            finer_slices=finer_slices,
+            band=pair.band,
+            time=pair.largest_time,
+            note=differences.ended if FREE in (pair.first, pair.second) else "",
+        )
+
+
+def _shares(waterfall: Waterfall) -> Iterator[Headline]:
+    bars = [bar for bar in waterfall.bars if bar.name != STEP]
+    for k, bar in enumerate(sorted(bars, key=lambda bar: -abs(bar.average)), start=1):
+        yield Headline(
+            id="share" if k == 1 else f"share-{k}",
+            what=bar.name,
+            measure="share",
+            value=bar.average,
+            slices=waterfall.slices,
+            finer=bar.finer,
+            finer_slices=None if bar.finer is None else FINER * waterfall.slices,
+            band=bar.average_band,
+            low=bar.low,
+            high=bar.high,
+        )
+
+
+def _steps(found: StepCosts) -> Iterator[Headline]:
+    costs = {cost.way.name: cost for cost in found.costs}
+    finer = {cost.way.name: cost for cost in found.more}
+    for id_, name in {"held": LOCATED, "step": EVERYTHING}.items():
+        cost, more = costs[name], finer.get(name)
+        yield Headline(
+            id=id_,
+            what=cost.way.words,
+            measure="largest",
+            value=cost.flight,
+            slices=found.slices,
+            finer=None if more is None else more.flight,
+            finer_slices=None if more is None else FINER * found.slices,
+            note=f"{cost.steps} steps",
+        )
+
+
+# ---------------------------------------------------------------------- the words
+
+
+def answer(headlines: Sequence[Headline]) -> str:
+    """Return the verdict in two sentences: step, algebra and physics; and which equation to take instead.
+
+    Each holds if no curve of omega moves by more than PARTING_BAND of omega_0; weight is named if no other rung of the
+    ladder moves it further.
+    """
+    found = {headline.id: headline for headline in headlines}
+    if not {"step", "eq8-free"} <= set(found):
+        return "No verdict: what it needs could not be computed. The evidence gives the reasons."
+    within = percent(PARTING_BAND)
+    weight = "pair" in found and found["pair"].what == RUNG_NAMES["weightless"]
+    solved = "program-eq8" not in found or found["program-eq8"].value <= PARTING_BAND
+    physics = "Eq. 8 lets weight push the water" if weight else "Eq. 8 is not free flight"
+    instead = "For slices, use free flight; for water, rods."
+    return {
+        (True, False): "Not as it stands: its steps are short enough, but "
+        f"{'' if solved else 'its formulas do not solve Eq. 8, and '}{physics}. {instead}",
+        (True, True): f"On this throw the steps are short enough. Eq. 8 is free flight within {within} of ω₀.",
+        (False, True): f"On this throw the steps are too long. Eq. 8 is free flight within {within} of ω₀.",
+        (False, False): f"On this throw the steps are too long, and Eq. 8 is not free flight. {instead}",
+    }[found["step"].value <= PARTING_BAND, found["eq8-free"].value <= PARTING_BAND]
+
+
+def lines(headlines: Sequence[Headline]) -> Iterator[tuple[str, str]]:
+    """Yield five questions with their answers, each one sentence; fewer if numbers are missing, none if all agree."""
+    found = {headline.id: headline for headline in headlines}
+    values = [found[id_].value for id_ in ("whole", "program-eq8", "pair") if id_ in found]
+    if values and max(values) < NOTHING:
+        return
+    steps = found["step"].note if "step" in found else "the steps"
+    also = f", but only {_amount(found['whole'])} off free flight" if _nearer_to_free(found) else ""
+    asked = {
+        "held": ("May ω be held constant over a step?", "{}, if rebounds keep their own times"),
+        "step": (f"Are {steps} enough?", "{} off what shorter steps approach"),
+        "program-eq8": ("Does the program solve Eq. 8?", f"{{}} off{also}"),
+        "eq8-free": ("Is Eq. 8 free flight?", "{} apart"),
+        "engine": ("Does a physics engine agree with free flight?", "{} off, by pymunk"),
+    }
+    for id_, (question, words) in asked.items():
+        if id_ in found:
+            headline = found[id_]
+            until = f" {headline.note}" if headline.note and id_ not in ("held", "step") else ""
+            yes = "Yes" if headline.value <= PARTING_BAND else "No"
+            yield question, f"{yes}: at worst {words.format(_amount(headline))}{until}."
+
+
+def _nearer_to_free(found: Mapping[str, Headline]) -> bool:
+    pair = [found[id_].value for id_ in ("whole", "program-eq8") if id_ in found]
+    return len(pair) == 2 and pair[0] < pair[1] and pair[1] > PARTING_BAND
+
+
+def lead(headlines: Sequence[Headline]) -> str:
+    """Return answer and lines as plain text."""
+    return " ".join([answer(headlines), *(f"{question} {words}" for question, words in lines(headlines))])
+
+
+def _amount(headline: Headline) -> str:
+    """Return a number with that of another number of slices, as in "13 % (N = 100: 12 %)"."""
+    if headline.finer is None or headline.finer_slices is None:
+        return percent(headline.value)
+    return f"{percent(headline.value)} (N = {headline.finer_slices}: {percent(headline.finer)})"
+
+
+def signed(share: float) -> str:
+    """Return a fraction with its sign, two digits."""
+    return f"{'+' if share >= 0 else '−'}{percent(abs(share))}"
+
+
+def small(value: float) -> str:
+    """Return a fraction in percent, a tiny one as a power of ten."""
+    if value >= 1e-5 or value == 0.0:
+        return percent(value)
+    digit, _, exponent = f"{100 * value:.0e}".partition("e")
+    return f"{digit} × 10{str(int(exponent)).translate(SUPERSCRIPTS)} %"
+
+
+def _shown(form: str) -> Callable[[float], str]:
+    """Return what prints a number in a form, with a sign of its own length."""
+    return lambda value: form.format(value).replace("-", "−")
+
+
+plain, rounded, degrees = _shown("{:.3g}"), _shown("{:.2f}"), _shown("{:.0f}°")
+
+
+# ---------------------------------------------------------------------- what the story prints
+
+NAMES: Final[Mapping[str, str]] = {name: SPOKEN[name] for name in ("published-python", "eq8", "free-flight")} | {
+    "pymunk": "engine (pymunk)"
+}
+"""Solver -> its name on the story's charts."""
+
+CHANGES: Final[Mapping[str, str]] = {
+    "signs of Eq. 9d: no damping": "Eq. 9d has the wrong sign in two terms, and the program in one: its drag does "
+    "not damp.",
+    "roots of Eq. 9a: γ ≪ ω": "Eq. 9a holds for small drag (γ ≪ ω); at the end of the flight drag is not small.",
+    "drag against C_M": "Eq. 8 measures drag against the centre of mass; water rubs on the wall of the bottle.",
+    "gravity in Eq. 8": "Eq. 8 lets weight push water along the bottle; a falling bottle feels none.",
+    "origin at rest, drag on the tube": "Eq. 8 leaves out that the centre of mass accelerates along the bottle, and "
+    "that drag pulls the bottle.",
+    "no recoil in impacts": "Water that strikes an end kicks the bottle; with Eq. 8 the bottle is not kicked.",
+}
+"""Assumption that is changed -> what it means, in one sentence."""
+
+SHARES: Final[Mapping[str, str]] = {
+    "step": "headlines/step/value",
+    "program_eq8": "headlines/program-eq8/value",
+    "eq8_free": "headlines/eq8-free/value",
+    "whole": "headlines/whole/value",
+    "engine": "headlines/engine/value",
+    "mean_program": "solvers/published-python/plateau",
+    "mean_eq8": "solvers/eq8/plateau",
+    "mean_free": "solvers/free-flight/plateau",
+    "agreement": "findings/agreement/value",
+    "overlap": "findings/overlap-full-bottle/value",
+    "engine_gravity": "findings/engine-gravity/value",
+    "second_eq8": "findings/reference-eq8/value",
+    "second_free": "findings/reference-free-flight/value",
+    "exact": "findings/exact-cases-free-flight/value",
+    "weight": "differences/gravity in Eq. 8/largest",
+    "origin": "differences/origin at rest, drag on the tube/largest",
+    "recoil": "differences/no recoil in impacts/largest",
+}
+"""Name -> source of a number that is printed in percent of omega_0."""
+
+PLAIN: Final[Mapping[str, str]] = {
+    "slices": "slices",
+    "regressions": "count findings kind regression",
+    "vectors": "count findings id vectors-*",
+    "experiments": "length paper/experiment",
+    "telling": "count paper/experiment discriminates True",
+    "gravity": "scenario/scenario/gravity",
+}
+"""Name -> source of a number that is printed as it is."""
+
+WATER: Final = {
+    f"{name}_{word}": f"water/{place}"
+    for word, filling in (("half", "0.5"), ("three", "0.75"))
+    for name, place in {
+        "low": f"fluids/{filling}/low",
+        "high": f"fluids/{filling}/high",
+        "rods": f"equations/rods/fillings/{filling}/plateau",
+        "free": f"equations/free-flight/fillings/{filling}/plateau",
+    }.items()
+}
+"""Name -> source of a plateau over omega_0."""
+
+EXPERIMENTS: Final = {"minimum": "minimum", "change": "change-of-behaviour", "landing": "landing-angle"}
+
+
+def story(content: Mapping[str, Any], tables: Mapping[str, str | None]) -> SimpleNamespace:
+    """Return what the template of the story draws from: ``content`` is the summary, ``tables`` the figures' CSV.
+
+    What is missing in the summary is None or empty.
+    """
+    summary = Summary(content)
+    numbers = {name: summary.number(source, small) for name, source in SHARES.items()}
+    numbers |= {name: summary.number(source, plain) for name, source in PLAIN.items()}
+    numbers["threshold"] = summary.number("findings/paper-toppling-peak-geometry/value", _shown("{:.4f}"))
+    # The agreement on free flight is told as that of both engines; a quick report certifies neither.
+    if not all(engine in (summary.at("findings/agreement/title") or "") for engine in ("pymunk", "mujoco")):
+        numbers["agreement"] = None
+    return SimpleNamespace(
+        n=SimpleNamespace(**numbers),
+        layers=_layers(summary, numbers),
+        shares=_bars(summary),
+        experiments={name: _experiment(summary, id_) for name, id_ in EXPERIMENTS.items()},
+        nearest=_nearest(summary),
+        water=_water(summary),
+        map=_map(tables.get("map-gamma"), content),
+        names=NAMES,
+    )
+
+
+def _layers(summary: Summary, numbers: Mapping[str, Number | None]) -> list[SimpleNamespace]:
+    """Return the three layers of the answer: id, name, question, section of the evidence, and number with verdict."""
+    steps = summary.at("headlines/step/note") or "the steps"
+    asked = {
+        "step": ("The time step", "steps", f"Are {steps} enough?"),
+        "program-eq8": ("The algebra of Eq. 9", "errata", "Do the program’s formulas, Eq. 9, solve Eq. 8?"),
+        "eq8-free": (
+            "The physics of Eq. 8",
+            "assumptions",
+            "Does Eq. 8 describe slices in a bottle that flies freely?",
+        ),
+    }
+    layers = []
+    for id_, (name, section, question) in asked.items():
+        number = numbers[id_.replace("-", "_")]
+        if number is not None:
+            beside = {"finer": percent, "finer_slices": plain, "band": small}
+            more = {field: summary.number(f"headlines/{id_}/{field}", shown) for field, shown in beside.items()}
+            within = number.value <= PARTING_BAND
+            layers.append(
+                SimpleNamespace(
+                    id=id_, name=name, section=section, question=question, number=number, within=within, **more
+                )
+            )
+    return layers
+
+
+def _bars(summary: Summary) -> list[SimpleNamespace]:
+    """Return the fair share of each change: the mean over all orders, and the least and the largest of them."""
+    bars = []
+    for headline in summary.at("headlines") or ():
+        if headline["measure"] == "share":
+            places = {"mean": "value", "low": "low", "high": "high"}
+            numbers = {n: summary.number(f"headlines/{headline['id']}/{p}", signed) for n, p in places.items()}
+            if all(numbers.values()):
+                words = CHANGES.get(headline["what"], "")
+                bars.append(SimpleNamespace(name=headline["what"], words=words, **numbers))
+    return bars
+
+
+def _experiment(summary: Summary, id_: str) -> SimpleNamespace | None:
+    shown = {"landing-angle": degrees, "change-of-behaviour": _shown("{:.3f}")}.get(id_, rounded)
+    place = f"paper/experiment/{id_}/equations"
+    if summary.at(f"paper/experiment/{id_}") is None:
+        return None
+    equations = {solver: summary.number(f"{place}/{solver}/value", shown) for solver in NAMES if solver != "pymunk"}
+    verdicts = {solver: summary.at(f"{place}/{solver}/verdict") for solver in equations}
+    return SimpleNamespace(values=equations, verdicts=verdicts)
+
+
+def _water(summary: Summary) -> SimpleNamespace | None:
+    """Return the plateaus of fluids, rods and free flight, half and three quarters full; None if any is missing."""
+    numbers = {name: summary.number(source, percent) for name, source in WATER.items()}
+    for name, solver in (("rods", "rods"), ("free", "free-flight")):
+        numbers[f"{name}_off"] = summary.number(f"findings/water-{solver}/value", small)
+    return SimpleNamespace(**numbers) if all(numbers.values()) else None
+
+
+def _nearest(summary: Summary) -> list[SimpleNamespace]:
+    """Return for each equation how many statements about the experiment it agrees with and is nearest to."""
+    if not summary.at("paper/experiment"):
+        return []
+    found = [
+        SimpleNamespace(
+            name=("the " if solver in ("published-python", "column") else "") + SPOKEN.get(solver, solver),
+            agrees=summary.number(f"count paper/experiment equations/{solver}/verdict holds", plain),
+            nearest=summary.number(f"count paper/experiment closest {solver}", plain),
+        )
+        for solver in ("rods", "free-flight", "published-python", "column", "eq8")
+    ]
+    return sorted(found, key=lambda one: (-one.agrees.value, -one.nearest.value))
+
+
+def _map(table: str | None, content: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Return the map over filling and damping for the script, from the CSV of its figure; None without one.
+
+    ``thrown`` is the place of the report's throw on it and ``here`` the largest fair share in the cell next to it;
+    ``numbers`` are those of the assumptions in the figure.
+    """
+    if not table:
+        return None
+    rows = list(csv.DictReader(io.StringIO(table)))
+    plateau = "plateau of omega/omega_0 {} [1]"
+    solvers = [name for name in NAMES if plateau.format(name) in rows[0]]
+    fill, damping = (name for name in list(rows[0])[:2])
+
+    def mean(row: Mapping[str, str], solver: str) -> float | None:
+        text = row[plateau.format(solver)]
+        return finite_or_none(float(text)) if text else None
+
+    x, y = place_of(Scenario.from_mapping(content["scenario"]), "gamma", 1000)
+    nearest = min(rows, key=lambda row: (abs(float(row[fill]) - x), abs(float(row[damping]) - y)))
+    return {
+        "fills": sorted({float(row[fill]) for row in rows}),
+        "dampings": sorted({float(row[damping]) for row in rows}),
+        "numbers": {name: k for k, name in enumerate(RUNGS, start=1)},
+        "thrown": (x, y),
+        "here": nearest.get("largest fair share", ""),
+        "solvers": solvers,
+        "cells": [
+            {
+                "x": float(row[fill]),
+                "y": float(row[damping]),
+                "which": row.get("largest fair share", ""),
+                "mean": [mean(row, name) for name in solvers],
+            }
+            for row in rows
+        ],
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number as it is printed; as HTML it keeps its value and its source beside the text."""
+
+    value: float
+    text: str
+    source: str
+
+    def __html__(self) -> str:
+        return Markup('<data value="{!r}" data-source="{}">{}</data>').format(self.value, self.source, self.text)
+
+    def __str__(self) -> str:
+        return self.text
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """The content of ``summary.json``, asked by places."""
+
+    content: Mapping[str, Any]
+
+    def at(self, place: str) -> Any:
+        """Return what stands at a place, or None if nothing does."""
+        found: Any = self.content
+        for key in place.split("/"):
+            if isinstance(found, Mapping):
+                found = found.get(key)
+            elif isinstance(found, list):
+                found = next((entry for entry in found if key in (entry.get("id"), entry.get("name"))), None)
+            else:
+                return None
+        return found
+
+    def evaluate(self, source: str) -> float | None:
+        """Return the value of a source, or None if something of it is missing or no number."""
+        kind, *words = source.split(" ", 3)
+        if kind == "length":
+            return len(self.at(words[0]) or ())
+        if kind == "count":
+            entries, field, wanted = self.at(words[0]) or (), words[1], words[2]
+            return sum(_has(Summary(entry).at(field), wanted) for entry in entries)
+        found = self.at(source)
+        return float(found) if isinstance(found, (int, float)) else None
+
+    def number(self, source: str, shown: Callable[[float], str]) -> Number | None:
+        """Return the number at a source with its text, or None."""
+        value = self.evaluate(source)
+        return None if value is None else Number(value, shown(value), source)
+
+
+def _has(found: Any, wanted: str) -> bool:
+    if isinstance(found, list):
+        return wanted in found
+    return str(found).startswith(wanted[:-1]) if wanted.endswith("*") else str(found) == wanted
