@@ -145,12 +145,6 @@ def test_a_fault_in_the_column_is_seen(browser, right, wrong):
     assert not apart(curve, ode_reference.solve(scenario, model="column").omega, scenario) < 100 * COLUMN
 
 
-def test_solvers_and_sliders_can_be_read_in_one_sitting():
-    count = {name: str(read_assets()[name]).count("\n") for name in ("live.js", "sliders.js", "column.js")}
-    assert count["live.js"] + count["sliders.js"] <= 250
-    assert count["column.js"] <= 30
-
-
 def test_a_wrong_sign_in_the_script_is_seen(browser):
     """The comparison has teeth: a script whose weight points the wrong way is not within the band."""
     page = browser.new_page()

@@ -201,8 +201,8 @@ def test_the_contents_mark_the_section_in_view(visit):
     with visit(at="evidence.html#errata") as visited:
         visited.page.wait_for_selector('nav a[aria-current="location"][href="#errata"]')
         assert visited.page.locator("nav a[aria-current]").count() == 1
-        visited.page.evaluate("document.getElementById('glossary').scrollIntoView()")
-        visited.page.wait_for_selector('nav a[aria-current="location"][href="#glossary"]')
+        visited.page.evaluate("document.getElementById('evidence').scrollIntoView()")
+        visited.page.wait_for_selector('nav a[aria-current="location"][href="#evidence"]')
 
 
 def test_both_pages_are_whole_without_scripts(browser, folder):

@@ -96,7 +96,8 @@ def test_the_chart_of_the_sliders_tells_its_values_at_a_cursor(visit, g):
         for name in ("published-python", "eq8", "free-flight", "column", "rods"):
             at = page.evaluate(
                 "([name, share]) => { const { curves, thrown } = flipproofSliders.drawn(), curve = curves[name];"
-                " return curve[Math.round(share * (curve.length - 1))] / thrown.omega0; }",
+                " const at = share * (curve.length - 1), k = Math.floor(at);"
+                " return (curve[k] + (at - k) * (curve[k + 1] - curve[k])) / thrown.omega0; }",
                 [name, time / 0.5],
             )
             assert float(page.locator(f"#sliders [data-toggle='{name}'] output").inner_text()) == pytest.approx(

@@ -3,7 +3,7 @@
 //   cap  y = -wall |------ o -- o - C_M ---- o -- o -| y = +wall  base     y = r - L/2; a slice at rest has side = +1, -1
 window.flipproofLive = (() => {
   "use strict";
-  const PART = [1 / 2, 1 / 2, 1, 0], WEIGHT = [1 / 6, 1 / 3, 1 / 3, 1 / 6]; // of Runge and Kutta
+  const PART = [1 / 2, 1 / 2, 1, 0], WEIGHT = [1 / 6, 1 / 3, 1 / 3, 1 / 6], ENDS = [1, -1]; // of Runge and Kutta; base and cap
 
   // What stays the same in a flight, and its beginning. A throw: {bottle, slices, fill, gamma = alpha / (2 m), ...}, SI.
   function prepared(thrown) {
@@ -51,10 +51,13 @@ window.flipproofLive = (() => {
     const { n, m, M, mass, wall, y, v, inertia, momentum, gamma, g, e, theta0, duration } = prepared(thrown);
     const side = y.map((place) => (Math.abs(place) === wall ? Math.sign(place) : 0)), ratio = m / mass, drag = 2 * gamma;
     const rows = () => Array.from({ length: 5 }, () => new Float64Array(n)), [ys, vs, as] = [rows(), rows(), rows()];
-    const omega = new Float64Array(points), y1 = ys[4], v1 = vs[4], every = [...y.keys()];
-    let theta = theta0, spin = 0, began = 0, spring = 0, centre = 0, push = 0;
+    const omega = new Float64Array(points), y1 = ys[4], v1 = vs[4];
+    // Omega, and the acceleration (y - centre) spring + push - drag v of all free slices: kept in one object, since a browser
+    // makes a new number at every change of a variable that functions share.
+    const felt = { spin: 0.5, spring: 0.5, centre: 0.5, push: 0.5, began: 0.5 }, hits = [];
+    let theta = theta0;
 
-    // Sets omega, and the acceleration (y - centre) spring + push - drag v of all free slices, from sums over all slices.
+    // Sets what is felt, from sums over all slices; returns omega.
     function weigh(at, speeds, angle) {
       let first = 0, second = 0, speed = 0, resting = 0, sides = 0;
       for (let i = 0; i < n; i++) {
@@ -65,20 +68,22 @@ window.flipproofLive = (() => {
         sides += side[i];
       }
       const body = mass + m * resting;
-      spin = momentum / inertia(first, second, (m * first) / M);
-      spring = spin * spin;
-      centre = free ? (m * wall * sides) / body : (m * first) / M;
-      push = free ? (-drag * m * speed) / body : g * Math.cos(angle) + (drag * m * speed) / M;
+      const spin = momentum / inertia(first, second, (m * first) / M);
+      felt.spin = spin;
+      felt.spring = spin * spin;
+      felt.centre = free ? (m * wall * sides) / body : (m * first) / M;
+      felt.push = free ? (-drag * m * speed) / body : g * Math.cos(angle) + (drag * m * speed) / M;
       return spin;
     }
-    const pressure = (end) => end * (spring * (end * wall - centre) + push);
+    const pressure = (end) => end * (felt.spring * (end * wall - felt.centre) + felt.push);
     // Writes places and speeds after a time h to y1 and v1; returns the angle.
     function step(h) {
       let angle = theta;
       for (let k = 0; k < 4; k++) {
         const at = k ? ys[k] : y, speeds = k ? vs[k] : v, a = as[k], nextY = ys[k + 1], nextV = vs[k + 1], part = PART[k] * h;
-        angle += WEIGHT[k] * h * weigh(at, speeds, k ? theta + PART[k - 1] * h * spin : theta);
-        if (!k) began = spin;
+        angle += WEIGHT[k] * h * weigh(at, speeds, k ? theta + PART[k - 1] * h * felt.spin : theta);
+        if (!k) felt.began = felt.spin;
+        const { spring, centre, push } = felt;
         for (let i = 0; i < n; i++) {
           a[i] = side[i] ? 0 : spring * (at[i] - centre) + push - drag * speeds[i];
           nextY[i] = y[i] + part * speeds[i];
@@ -94,7 +99,7 @@ window.flipproofLive = (() => {
     // When, as a share x of h, slice i first is beyond its end on the cubic y + x (b + x (c2 + x c3)); 2 if never.
     function crossing(i, h) {
       const end = Math.sign(y1[i]), from = end * y[i] - wall, to = end * y1[i] - wall, b = h * end * v[i], d = h * end * v1[i];
-      if (side[i] || (to <= 0 && !(b > 0 && d < 0))) return 2;
+      if (to <= 0 && !(b > 0 && d < 0)) return 2;
       const c2 = 3 * (to - from) - 2 * b - d, c3 = b + d - 2 * (to - from), beyond = (x) => from + x * (b + x * (c2 + x * c3)) > 0;
       // Who turns back within the step is farthest out where its speed is zero.
       let low = 0, high = to > 0 ? 1 : Math.min(1, b / (Math.sqrt(Math.max(0, c2 * c2 - 3 * c3 * b)) - c2));
@@ -108,34 +113,41 @@ window.flipproofLive = (() => {
       return high < 1e-9 && Math.abs(b) < 1e-9 * wall ? 1 : high;
     }
     // Slices that touch one end together rebound; the tube gains V toward it, and takes along who rests on the other end.
-    function rebound(hits, end) {
+    function rebound(end) {
       const speed = (i) => Math.abs(v[i]);
-      let sum = 0, weight = 1 + ratio * every.filter((i) => side[i] === -end).length, loose = 0;
-      for (const i of hits.sort((i, j) => speed(j) - speed(i))) {
-        if (free && (1 + e) * speed(i) * weight > ratio * sum) [sum, weight] = [sum + (1 + e) * speed(i), weight + ratio];
+      let sum = 0, weight = 1, loose = 0, body = 1;
+      for (let i = 0; i < n; i++) if (side[i] === -end) weight += ratio;
+      if (hits.length > 1) hits.sort((i, j) => speed(j) - speed(i));
+      for (const i of hits) {
+        if (!free || (1 + e) * speed(i) * weight <= ratio * sum) continue;
+        sum += (1 + e) * speed(i);
+        weight += ratio;
       }
       const V = (ratio * sum) / weight;
-      for (const i of every) {
+      for (let i = 0; i < n; i++) {
         if (hits.includes(i)) v[i] = -end * ((1 + e) * speed(i) > V ? e * speed(i) : V - speed(i));
         else if (!side[i]) v[i] -= end * V;
-        else if (side[i] === end && V) [side[i], v[i]] = [0, -end * V];
+        else if (side[i] === end && V) { side[i] = 0; v[i] = -end * V; }
       }
       // Who is slow and pressed on comes to rest, at the expense of the tube.
       weigh(y, v, theta);
-      for (const i of every) {
-        if (side[i] || Math.abs(y[i]) !== wall || Math.abs(v[i]) >= rest || pressure(Math.sign(y[i])) < 0) continue;
-        loose += v[i];
-        [side[i], v[i]] = [Math.sign(y[i]), 0];
+      for (let i = 0; i < n; i++) {
+        if (!side[i] && Math.abs(y[i]) === wall && Math.abs(v[i]) < rest && pressure(Math.sign(y[i])) >= 0) {
+          loose += v[i];
+          side[i] = Math.sign(y[i]);
+          v[i] = 0;
+        }
+        if (side[i]) body += ratio;
       }
-      const share = free ? (ratio * loose) / (1 + ratio * every.filter((i) => side[i]).length) : 0;
-      for (const i of every) if (!side[i]) v[i] -= share;
+      const share = free ? (ratio * loose) / body : 0;
+      if (share) for (let i = 0; i < n; i++) if (!side[i]) v[i] -= share;
     }
     // Slices at rest leave when their end would have to pull them.
     function release() {
-      for (const end of [1, -1]) {
+      for (const end of ENDS) {
         if (!side.includes(end)) continue;
         weigh(y, v, theta);
-        if (pressure(end) < 0) for (const i of every) if (side[i] === end) side[i] = 0;
+        if (pressure(end) < 0) for (let i = 0; i < n; i++) if (side[i] === end) side[i] = 0;
       }
     }
 
@@ -146,30 +158,34 @@ window.flipproofLive = (() => {
     for (let k = 1; k <= (points - 1) * parts; k++) {
       let left = duration / ((points - 1) * parts);
       for (let tries = 0; left > 0 && tries < 1000; tries++) {
-        const ends = [1, -1].filter((end) => side.includes(end));
+        const ends = ENDS.filter((end) => side.includes(end));
         if (ends.length) weigh(y, v, theta);
-        const pressed = ends.map(pressure), angle = step(left), turn = began * left;
+        const pressed = ends.map(pressure), angle = step(left), turn = felt.began * left;
         let when = 1, struck = -1;
         if (ends.length) weigh(y1, v1, angle);
         ends.forEach((end, k) => {
           if (pressure(end) < 0) when = Math.min(when, pressed[k] / (pressed[k] - pressure(end)) + 1e-6);
         });
         for (let i = 0; i < n; i++) {
+          if (side[i] || (Math.abs(y1[i]) <= wall && v[i] * v1[i] > 0)) continue;
           const here = crossing(i, left);
-          if (here < when || (here === when && struck < 0)) [when, struck] = [here, i];
+          if (here < when || (here === when && struck < 0)) { when = here; struck = i; }
         }
-        for (let i = 0; i < n; i++) {
+        for (let i = 0; i < n && when < 1; i++) {
           const way = y1[i] - y[i], b = left * v[i], d = left * v1[i], c2 = 3 * way - 2 * b - d, c3 = b + d - 2 * way;
           v[i] = (b + when * (2 * c2 + 3 * when * c3)) / left;
           y[i] += when * (b + when * (c2 + when * c3));
         }
+        if (when === 1) { y.set(y1); v.set(v1); }
         theta += when * (turn + when * (angle - theta - turn));
         left -= when * left;
-        for (const end of struck < 0 ? [] : [1, -1]) {
-          const touches = (i) => end * y[i] > 0 && (i === struck || (!side[i] && end * y[i] >= wall * (1 - 1e-9) && end * v[i] > 0));
-          const hits = every.filter(touches);
+        for (const end of struck < 0 ? [] : ENDS) {
+          hits.length = 0;
+          for (let i = 0; i < n; i++) {
+            if (end * y[i] > 0 && (i === struck || (!side[i] && end * y[i] >= wall * (1 - 1e-9) && end * v[i] > 0))) hits.push(i);
+          }
           for (const i of hits) y[i] = end * wall;
-          if (hits.length) rebound(hits, end);
+          if (hits.length) rebound(end);
         }
         release();
       }
