@@ -32,8 +32,8 @@ def test_a_quick_report_says_what_it_does_not_certify(gathered, report):
     found = gathered.found("certificates")._replace(uncertified=("pymunk", "mujoco"))
     outcome = dataclasses.replace(gathered.outcomes["certificates"], found=found)
     quick = dataclasses.replace(gathered, outcomes={**gathered.outcomes, "certificates": outcome})
-    html = page_of(quick, report.exhibits[0].drawn)
-    assert "pymunk and MuJoCo: not certified in a quick report" in html
+    page = page_of(quick, report.exhibits[0].drawn)["evidence.html"]
+    assert "pymunk and MuJoCo: not certified in a quick report" in page
 
 
 def test_every_witness_has_its_certificate(gathered, report, read_page):

@@ -209,10 +209,10 @@ def test_the_folder_holds_everything(monkeypatch, capsys, tmp_path, gathered, re
     out = capsys.readouterr().out
     assert "regression claims hold." in out
     assert str(folder / "index.html") in out
-    page = read_page((folder / "index.html").read_text(encoding="utf-8"))
-    for link in page.links:
-        if not link.startswith("#"):
-            assert (folder / link).is_file(), link
+    for file in ("index.html", "evidence.html"):
+        page = read_page((folder / file).read_text(encoding="utf-8"))
+        for link in page.links:
+            assert (folder / (link.partition("#")[0] or file)).is_file(), link
     for tag in (*FLIGHTS, *OTHER_SCHEMES):
         header = (folder / "trajectories" / tag / "data.csv").read_text().splitlines()[0]
         assert header.startswith("t,theta,omega,r_cm,inertia,r_0")
@@ -251,7 +251,7 @@ def test_a_solver_that_fails_is_shown_in_place(monkeypatch, capsys, tmp_path, ga
     broken = spoiled(gathered, runs, reason, chapters)
     folder = tmp_path / "latest"
     assert run_report(monkeypatch, broken, folder) == 1
-    page = (folder / "index.html").read_text(encoding="utf-8")
+    page = (folder / "evidence.html").read_text(encoding="utf-8")
     assert "Runs and studies that failed" in page
     assert reason in page
     assert "FAIL  pymunk: free flight is the same with g = 0" in capsys.readouterr().out
