@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Mapping
+from html.parser import HTMLParser
 from typing import Final
 
 from markupsafe import Markup, escape
@@ -82,7 +84,6 @@ _PLACES: Final = {
 _WORD: Final = re.compile(
     r"(?<![\w₀])(" + "|".join(re.escape(term) for term in sorted(TERMS, key=len, reverse=True)) + r")(?![\w₀-])"
 )
-_TAG: Final = re.compile(r"(<script.*?</script>|<style.*?</style>|<[^>]*>)", re.DOTALL)
 _PLAIN: Final = {"omega_0": "ω₀", "theta_0": "θ₀"}
 _SYMBOL: Final = re.compile(
     r"(?<![A-Za-z_/.])(?:(?P<plain>omega_0|theta_0)|e\^\((?P<power>[^()]*)\)"
@@ -91,7 +92,7 @@ _SYMBOL: Final = re.compile(
 )
 """A symbol with its index, or a power of e, in plain text."""
 
-_AS_IT_IS: Final = frozenset(("svg", "math", "code", "pre", "noscript", "select"))
+_AS_IT_IS: Final = frozenset(("svg", "math", "code", "pre", "noscript", "select", "script", "style"))
 """Elements whose text is not typeset."""
 
 _CLOSED: Final = frozenset(
@@ -106,36 +107,83 @@ def anchor(term: str) -> str:
     return "term-" + _PLACES.get(term, re.sub(r"\W+", "-", term))
 
 
+class _Typesetter(HTMLParser):
+    """Writes HTML as it reads it, its symbols typeset; with ``links``, too, outside of tables with spoken names."""
+
+    def __init__(self, html: str, links: bool) -> None:
+        super().__init__(convert_charrefs=False)
+        self._links, self._seen, self._open = links, set[str](), Counter[str]()
+        self._text, self._written = "", list[str]()
+        self.feed(html)
+        self.close()
+        self._flush()
+
+    @property
+    def written(self) -> Markup:
+        return Markup("".join(self._written))
+
+    def _flush(self) -> None:
+        text, self._text = self._text, ""
+        inside = self._open.keys()
+        if inside & _AS_IT_IS:
+            self._written.append(text)
+            return
+        end = 0
+        if self._links:
+            text = text if "table" in inside else spoken(text)
+            for found in () if inside & _CLOSED else _WORD.finditer(text):
+                self._written += (_typeset(text[end : found.start()]), self._link(found.group()))
+                end = found.end()
+        self._written.append(_typeset(text[end:]))
+
+    def _link(self, term: str) -> str:
+        if term in self._seen:
+            return _typeset(term)
+        self._seen.add(term)
+        return f'<a class="term" href="#{anchor(term)}" title="{escape(TERMS[term])}">{_typeset(term)}</a>'
+
+    def _tag(self, tag: str, written: str, step: int) -> None:
+        self._flush()
+        self._written.append(written)
+        if tag in _AS_IT_IS | _CLOSED | {"table"}:
+            self._open[tag] += step
+            self._open = +self._open
+
+    def handle_starttag(self, tag: str, _attrs: object) -> None:
+        self._tag(tag, self.get_starttag_text() or "", 1)
+
+    def handle_startendtag(self, tag: str, _attrs: object) -> None:
+        self._tag(tag, self.get_starttag_text() or "", 0)
+
+    def handle_endtag(self, tag: str) -> None:
+        self._tag(tag, f"</{tag}>", -1)
+
+    def handle_data(self, data: str) -> None:
+        self._text += data
+
+    def handle_entityref(self, name: str) -> None:
+        self._text += f"&{name};"
+
+    def handle_charref(self, name: str) -> None:
+        self._text += f"&#{name};"
+
+
 def linked(html: str) -> Markup:
     """Return a section with its symbols typeset and a link to the glossary where a term appears first.
 
     Outside of tables solvers have their spoken names.
     """
-    return Markup("".join(_linked(html, set())))
+    return _Typesetter(html, links=True).written
 
 
-def _linked(html: str, seen: set[str]) -> Iterator[str]:
-    depth = kept = tables = 0
-    for piece in _TAG.split(html):
-        if piece.startswith("<"):
-            name = piece.strip("</> ").split(" ", 1)[0].split("\n", 1)[0].lower()
-            if not piece.endswith(("/>", "</script>", "</style>")):
-                step = -1 if piece.startswith("</") else 1
-                depth += step * (name in _CLOSED)
-                kept += step * (name in _AS_IT_IS)
-                tables += step * (name == "table")
-            yield piece
-        elif kept:
-            yield piece
-        else:
-            piece = piece if tables else spoken(piece)
-            yield from _typeset(piece if depth else _WORD.sub(lambda found: _link(found.group(), seen), piece))
+def indexed(html: str) -> Markup:
+    """Return a section with its symbols typeset, without links: the glossary itself."""
+    return _Typesetter(html, links=False).written
 
 
-def _typeset(html: str) -> Iterator[str]:
-    """Yield text, which may have links, with its symbols typeset: r_CM as r with a lower index."""
-    for piece in _TAG.split(html):
-        yield piece if piece.startswith("<") else _SYMBOL.sub(_indexed, piece)
+def _typeset(text: str) -> str:
+    """Return text with its symbols typeset: r_CM as r with a lower index."""
+    return _SYMBOL.sub(_indexed, text)
 
 
 def _indexed(found: re.Match[str]) -> str:
@@ -146,18 +194,6 @@ def _indexed(found: re.Match[str]) -> str:
     return f"{found['d']}<i>{found['letter']}</i>{found['primes']}<sub>{found['index']}</sub>"
 
 
-def indexed(html: str) -> Markup:
-    """Return a section with its symbols typeset, without links: the glossary itself."""
-    return Markup("".join(_typeset(html)))
-
-
 def symbols(text: str) -> Markup:
     """Return plain text as HTML with its symbols typeset."""
-    return indexed(escape(text))
-
-
-def _link(term: str, seen: set[str]) -> str:
-    if term in seen:
-        return term
-    seen.add(term)
-    return f'<a class="term" href="#{anchor(term)}" title="{escape(TERMS[term])}">{term}</a>'
+    return Markup(_typeset(escape(text)))
