@@ -190,7 +190,11 @@ def test_nothing_is_said_of_ice_or_of_nothing():
 @pytest.mark.parametrize(
     ("step", "equation", "words"),
     [
-        (0.005, 0.55, "Not as it stands: its steps are short enough, but Eq. 8 is not free flight. " + INSTEAD),
+        (
+            0.005,
+            0.55,
+            "Not as it stands: the program’s steps are short enough, but Eq. 8 is not free flight. " + INSTEAD,
+        ),
         (0.01, 0.01, "On this throw the steps are short enough. Eq. 8 is free flight within 1 % of ω₀."),
         (0.02, 0.001, "On this throw the steps are too long. Eq. 8 is free flight within 1 % of ω₀."),
         (0.02, 0.55, "On this throw the steps are too long, and Eq. 8 is not free flight. " + INSTEAD),

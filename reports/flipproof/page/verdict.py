@@ -177,7 +177,7 @@ def answer(headlines: Sequence[Headline]) -> str:
     physics = "Eq. 8 lets weight push the water" if weight else "Eq. 8 is not free flight"
     instead = "For slices, use free flight; for water, rods."
     return {
-        (True, False): "Not as it stands: its steps are short enough, but "
+        (True, False): "Not as it stands: the program’s steps are short enough, but "
         f"{'' if solved else 'its formulas do not solve Eq. 8, and '}{physics}. {instead}",
         (True, True): f"On this throw the steps are short enough. Eq. 8 is free flight within {within} of ω₀.",
         (False, True): f"On this throw the steps are too long. Eq. 8 is free flight within {within} of ω₀.",
