@@ -240,8 +240,8 @@ def command_report(options: argparse.Namespace) -> int:
     for guest in guests.guests if guests is not None else ():
         found = guest.visit.certificate
         print(f"{guest.label}: {found.conclusion if found else '; '.join(guest.visit.problems.values())}")
-    _print_report(report, options.out, time.perf_counter() - began)
     print(f"Cache: {store.whereabouts()}")
+    _print_report(report, options.out, time.perf_counter() - began)
     if options.open:
         import webbrowser
 
@@ -265,9 +265,10 @@ def _print_report(report: Any, out: Path, seconds: float) -> None:
         if finding.id.startswith("measured-fit-"):
             print(f"{finding.title}: {finding.value_text} root mean square")
     page = out / "index.html"
-    print(answer([Headline.from_mapping(mapping) for mapping in report.summary.get("headlines", ())]))
     print(f"{len(regressions) - len(report.failed)} of {len(regressions)} regression claims hold.")
-    print(f"Report: {page} ({seconds:.0f} s); open {page.resolve().as_uri()}")
+    print(f"Report: {page} ({seconds:.0f} s)")
+    print(answer([Headline.from_mapping(mapping) for mapping in report.summary.get("headlines", ())]))
+    print(f"Open {page.resolve().as_uri()}")
 
 
 def command_simulate(options: argparse.Namespace) -> int:

@@ -123,7 +123,7 @@
       if (slider) said.textContent = now.map((_, j) => `${NAMES[solvers[j]]}: ω moves by up to ${percent(moved[j])} of ω₀.`).join(" ");
       else said.textContent = thrown.g
         ? root.dataset.asked
-        : `Gravity is off. Eq. 8 changes by up to ${percent(moved[0])} of ω₀, free flight by ${percent(moved[1])}. A falling bottle cannot know where down is: so Eq. 8 is not the equation of a flying bottle.`;
+        : `Gravity is off. By Eq. 8 the spin changes by up to ${percent(moved[0])} of what it was at release, in free flight by ${percent(moved[1])}. A falling bottle cannot know where down is: Eq. 8 is not the equation of a flying bottle.`;
       root.dataset.moved = moved.map((share) => share.toPrecision(6)).join(" ");
     }
     function set(change) {
