@@ -4,6 +4,7 @@ window.flipproofChart ??= (() => {
   const NAMESPACE = "http://www.w3.org/2000/svg";
   const DASHES = {
     "published-python": "9 3", "eq8": "9 3 2 3", "free-flight": "", "pymunk": "2 3", "published-limit": "4 2", "exact-step": "12 2 1 2",
+    rods: "5 5", column: "14 4",
   };
   const OTHER_DASHES = ["5 5", "", "9 3", "2 3"], TINTS = 8;
   const MARGIN = { left: 46, right: 10, top: 22, bottom: 36 };

@@ -4,7 +4,7 @@
   const { g, theta0, fill, gamma, e, omega0, ...fixed } = JSON.parse(document.getElementById("live-data").textContent);
   const start = { ...fixed, g, theta0, fill, gamma, e, omega0 }, chart = window.flipproofChart, live = window.flipproofLive;
   const NAMES = { eq8: "Eq. 8", free: "free flight", rods: "rods", still: "Eq. 8, no weight", bare: "Eq. 8, no weight, no drag" };
-  const COLOURS = { eq8: "eq8", free: "free-flight", rods: "other", still: "eq8", bare: "eq8" };
+  const COLOURS = { eq8: "eq8", free: "free-flight", rods: "rods", still: "eq8", bare: "eq8" };
   const FRAMES = 251, SLOW = 9, BOTTLES = 250, CURVES = 110;
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const percent = (share) => `${Number((100 * share).toPrecision(2))} %`;

@@ -83,7 +83,7 @@ window.flipproofTouch = (() => {
 
     function show() {
       if (!scales) return;
-      when.textContent = `Values at t = ${chart.shown(at, 3)} s. A part of the time is enlarged by the buttons, or by dragging a mouse over it.`;
+      when.textContent = `Values at t = ${chart.shown(at, 3)} s. Drag across the chart, or press a button, to zoom.`;
       scales.cursor.setAttribute("visibility", at >= low && at <= high ? "visible" : "hidden");
       scales.cursor.firstChild.setAttribute("transform", `translate(${scales.x(at)} 0)`);
       for (const line of plot.lines) told.get(line.name).textContent = hidden.has(line.name) ? "" : text(valueAt(line, at));
