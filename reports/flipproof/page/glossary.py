@@ -131,9 +131,9 @@ class _Typesetter(HTMLParser):
         end = 0
         if self._links:
             text = text if "table" in inside else spoken(text)
-            for found in () if inside & _CLOSED else _WORD.finditer(text):
-                self._written += (_typeset(text[end : found.start()]), self._link(found.group()))
-                end = found.end()
+            for match in () if inside & _CLOSED else _WORD.finditer(text):
+                self._written += (_typeset(text[end : match.start()]), self._link(match.group()))
+                end = match.end()
         self._written.append(_typeset(text[end:]))
 
     def _link(self, term: str) -> str:
@@ -186,12 +186,12 @@ def _typeset(text: str) -> str:
     return _SYMBOL.sub(_indexed, text)
 
 
-def _indexed(found: re.Match[str]) -> str:
-    if found["plain"]:
-        return _PLAIN[found["plain"]]
-    if found["power"]:
-        return f"<i>e</i><sup>{found['power']}</sup>"
-    return f"{found['d']}<i>{found['letter']}</i>{found['primes']}<sub>{found['index']}</sub>"
+def _indexed(match: re.Match[str]) -> str:
+    if match["plain"]:
+        return _PLAIN[match["plain"]]
+    if match["power"]:
+        return f"<i>e</i><sup>{match['power']}</sup>"
+    return f"{match['d']}<i>{match['letter']}</i>{match['primes']}<sub>{match['index']}</sub>"
 
 
 def symbols(text: str) -> Markup:

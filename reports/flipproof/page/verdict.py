@@ -81,10 +81,10 @@ class Headline:
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> Headline:
         """Return the headline that ``to_mapping`` wrote; "nan" and "inf" are numbers again."""
-        known: dict[str, Any] = {field.name: mapping[field.name] for field in fields(cls)}
+        values: dict[str, Any] = {field.name: mapping[field.name] for field in fields(cls)}
         for name in ("value", "finer", "band", "time", "low", "high"):
-            known[name] = None if known[name] is None else float(known[name])
-        return cls(**known)
+            values[name] = None if values[name] is None else float(values[name])
+        return cls(**values)
 
 
 # ---------------------------------------------------------------------- the numbers
@@ -142,9 +142,9 @@ def _shares(waterfall: Waterfall) -> Iterator[Headline]:
         )
 
 
-def _steps(found: StepCosts) -> Iterator[Headline]:
-    costs = {cost.way.name: cost for cost in found.costs}
-    finer = {cost.way.name: cost for cost in found.more}
+def _steps(study: StepCosts) -> Iterator[Headline]:
+    costs = {cost.way.name: cost for cost in study.costs}
+    finer = {cost.way.name: cost for cost in study.more}
     for id_, name in {"held": LOCATED, "step": EVERYTHING}.items():
         cost, more = costs[name], finer.get(name)
         yield Headline(
@@ -152,9 +152,9 @@ def _steps(found: StepCosts) -> Iterator[Headline]:
             what=cost.way.words,
             measure="largest",
             value=cost.flight,
-            slices=found.slices,
+            slices=study.slices,
             finer=None if more is None else more.flight,
-            finer_slices=None if more is None else FINER * found.slices,
+            finer_slices=None if more is None else FINER * study.slices,
             note=f"{cost.steps} steps",
         )
 
@@ -168,12 +168,12 @@ def answer(headlines: Sequence[Headline]) -> str:
     Each holds if no curve of omega moves by more than PARTING_BAND of omega_0; weight is named if no other rung of the
     ladder moves it further.
     """
-    found = {headline.id: headline for headline in headlines}
-    if not {"step", "eq8-free"} <= set(found):
+    by_id = {headline.id: headline for headline in headlines}
+    if not {"step", "eq8-free"} <= set(by_id):
         return "No verdict: what it needs could not be computed. The evidence gives the reasons."
     within = percent(PARTING_BAND)
-    weight = "pair" in found and found["pair"].what == RUNG_NAMES["weightless"]
-    solved = "program-eq8" not in found or found["program-eq8"].value <= PARTING_BAND
+    weight = "pair" in by_id and by_id["pair"].what == RUNG_NAMES["weightless"]
+    solved = "program-eq8" not in by_id or by_id["program-eq8"].value <= PARTING_BAND
     physics = "Eq. 8 lets weight push the water" if weight else "Eq. 8 is not free flight"
     instead = "For slices, use free flight; for water, rods."
     return {
@@ -182,17 +182,17 @@ def answer(headlines: Sequence[Headline]) -> str:
         (True, True): f"On this throw the steps are short enough. Eq. 8 is free flight within {within} of ω₀.",
         (False, True): f"On this throw the steps are too long. Eq. 8 is free flight within {within} of ω₀.",
         (False, False): f"On this throw the steps are too long, and Eq. 8 is not free flight. {instead}",
-    }[found["step"].value <= PARTING_BAND, found["eq8-free"].value <= PARTING_BAND]
+    }[by_id["step"].value <= PARTING_BAND, by_id["eq8-free"].value <= PARTING_BAND]
 
 
 def lines(headlines: Sequence[Headline]) -> Iterator[tuple[str, str]]:
     """Yield five questions with their answers, each one sentence; fewer if numbers are missing, none if all agree."""
-    found = {headline.id: headline for headline in headlines}
-    values = [found[id_].value for id_ in ("whole", "program-eq8", "pair") if id_ in found]
+    by_id = {headline.id: headline for headline in headlines}
+    values = [by_id[id_].value for id_ in ("whole", "program-eq8", "pair") if id_ in by_id]
     if values and max(values) < NOTHING:
         return
-    steps = found["step"].note if "step" in found else "the steps"
-    also = f", but only {_amount(found['whole'])} off free flight" if _nearer_to_free(found) else ""
+    steps = by_id["step"].note if "step" in by_id else "the steps"
+    also = f", but only {_amount(by_id['whole'])} off free flight" if _nearer_to_free(by_id) else ""
     asked = {
         "held": ("May ω be held constant over a step?", "{}, if rebounds keep their own times"),
         "step": (f"Are {steps} enough?", "{} off what shorter steps approach"),
@@ -201,15 +201,15 @@ def lines(headlines: Sequence[Headline]) -> Iterator[tuple[str, str]]:
         "engine": ("Does a physics engine agree with free flight?", "{} off, by pymunk"),
     }
     for id_, (question, words) in asked.items():
-        if id_ in found:
-            headline = found[id_]
+        if id_ in by_id:
+            headline = by_id[id_]
             until = f" {headline.note}" if headline.note and id_ not in ("held", "step") else ""
             yes = "Yes" if headline.value <= PARTING_BAND else "No"
             yield question, f"{yes}: at worst {words.format(_amount(headline))}{until}."
 
 
-def _nearer_to_free(found: Mapping[str, Headline]) -> bool:
-    pair = [found[id_].value for id_ in ("whole", "program-eq8") if id_ in found]
+def _nearer_to_free(by_id: Mapping[str, Headline]) -> bool:
+    pair = [by_id[id_].value for id_ in ("whole", "program-eq8") if id_ in by_id]
     return len(pair) == 2 and pair[0] < pair[1] and pair[1] > PARTING_BAND
 
 
@@ -320,7 +320,7 @@ def story(content: Mapping[str, Any], tables: Mapping[str, str | None]) -> Simpl
     numbers = {name: summary.number(source, small) for name, source in SHARES.items()}
     numbers |= {name: summary.number(source, plain) for name, source in PLAIN.items()}
     numbers["threshold"] = summary.number("findings/paper-toppling-peak-geometry/value", _shown("{:.4f}"))
-    # The agreement on free flight is told as that of both engines; a quick report certifies neither.
+    # The agreement on free flight counts as that of both engines; a quick report certifies neither.
     if not all(engine in (summary.at("findings/agreement/title") or "") for engine in ("pymunk", "mujoco")):
         numbers["agreement"] = None
     return SimpleNamespace(
@@ -397,7 +397,7 @@ def _nearest(summary: Summary) -> list[SimpleNamespace]:
     """Return for each equation how many statements about the experiment it agrees with and is nearest to."""
     if not summary.at("paper/experiment"):
         return []
-    found = [
+    equations = [
         SimpleNamespace(
             name=("the " if solver in ("published-python", "column") else "") + SPOKEN.get(solver, solver),
             agrees=summary.number(f"count paper/experiment equations/{solver}/verdict holds", plain),
@@ -405,7 +405,7 @@ def _nearest(summary: Summary) -> list[SimpleNamespace]:
         )
         for solver in ("rods", "free-flight", "published-python", "column", "eq8")
     ]
-    return sorted(found, key=lambda one: (-one.agrees.value, -one.nearest.value))
+    return sorted(equations, key=lambda one: (-one.agrees.value, -one.nearest.value))
 
 
 def _map(table: str | None, content: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -469,15 +469,15 @@ class Summary:
 
     def at(self, place: str) -> Any:
         """Return what stands at a place, or None if nothing does."""
-        found: Any = self.content
+        value: Any = self.content
         for key in place.split("/"):
-            if isinstance(found, Mapping):
-                found = found.get(key)
-            elif isinstance(found, list):
-                found = next((entry for entry in found if key in (entry.get("id"), entry.get("name"))), None)
+            if isinstance(value, Mapping):
+                value = value.get(key)
+            elif isinstance(value, list):
+                value = next((entry for entry in value if key in (entry.get("id"), entry.get("name"))), None)
             else:
                 return None
-        return found
+        return value
 
     def evaluate(self, source: str) -> float | None:
         """Return the value of a source, or None if something of it is missing or no number."""
@@ -487,8 +487,8 @@ class Summary:
         if kind == "count":
             entries, field, wanted = self.at(words[0]) or (), words[1], words[2]
             return sum(_has(Summary(entry).at(field), wanted) for entry in entries)
-        found = self.at(source)
-        return float(found) if isinstance(found, (int, float)) else None
+        value = self.at(source)
+        return float(value) if isinstance(value, (int, float)) else None
 
     def number(self, source: str, shown: Callable[[float], str]) -> Number | None:
         """Return the number at a source with its text, or None."""
@@ -496,7 +496,7 @@ class Summary:
         return None if value is None else Number(value, shown(value), source)
 
 
-def _has(found: Any, wanted: str) -> bool:
-    if isinstance(found, list):
-        return wanted in found
-    return str(found).startswith(wanted[:-1]) if wanted.endswith("*") else str(found) == wanted
+def _has(value: Any, wanted: str) -> bool:
+    if isinstance(value, list):
+        return wanted in value
+    return str(value).startswith(wanted[:-1]) if wanted.endswith("*") else str(value) == wanted

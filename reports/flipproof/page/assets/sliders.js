@@ -24,9 +24,9 @@
   // Of curves with more and with fewer points, at the times of the one with fewer.
   const percent = (one, other) => {
     const at = (curve, share) => curve[Math.round(share * (curve.length - 1))], last = Math.min(one.length, other.length) - 1;
-    let most = 0;
-    for (let k = 0; k <= last; k++) most = Math.max(most, Math.abs(at(one, k / last) - at(other, k / last)) / thrown.omega0);
-    return `${Number((100 * most).toPrecision(2))} %`;
+    let worst = 0;
+    for (let k = 0; k <= last; k++) worst = Math.max(worst, Math.abs(at(one, k / last) - at(other, k / last)) / thrown.omega0);
+    return `${Number((100 * worst).toPrecision(2))} %`;
   };
 
   function draw() {
