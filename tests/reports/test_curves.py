@@ -10,6 +10,7 @@ import pytest
 from flipproof.cli import main as cli
 from flipproof.curves.compare import compare
 from flipproof.curves.files import Curves, curves, read
+from flipproof.curves.order import observed_order
 
 T = np.linspace(0.0, 10.0, 1001)
 
@@ -141,7 +142,7 @@ def test_what_is_wrong_with_a_table_is_named(table, named):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(("name", "needs"), [("x.npz", "numpy"), ("x.parquet", "pandas"), ("x.nc", "xarray")])
+@pytest.mark.parametrize(("name", "needs"), [("x.npz", "numpy"), ("x.parquet", "pyarrow"), ("x.nc", "xarray")])
 def test_a_file_that_is_not_what_its_name_says_is_refused(tmp_path, name, needs):
     pytest.importorskip(needs)
     (tmp_path / name).write_bytes(b"no such thing")
@@ -162,3 +163,17 @@ def test_the_fixture_asserts(tmp_path, flipproof_compare):
     flipproof_compare(a, b, twins=[b], tolerance=None)
     with pytest.raises(AssertionError, match="FAIL  difference in x"):
         flipproof_compare(a, b)
+
+
+def test_an_order_across_events_is_that_of_the_mean_square_over_phases():
+    """An event on the grid: the error is the step times where in it the event falls, times a constant."""
+    steps = 1e-3 / 2.0 ** np.arange(4)
+    falls = np.array([step * (np.arange(16) / 16 + 1 / 37) for step in steps])
+    assert observed_order(steps, falls) == pytest.approx((1.0, 0.0), rel=0, abs=1e-12)
+    luck = np.array([[falls[k, 15 - 5 * k]] for k in range(4)])
+    assert abs(observed_order(steps, luck)[0] - 1.0) > 0.3
+    fourth, error = observed_order(steps[:, None], (steps**4 * [1.0, 1.1, 0.9, 1.0])[:, None], floor=0.0)
+    assert fourth == pytest.approx(4.0, rel=0, abs=0.2)
+    assert 0.0 < error < 0.2
+    assert np.isnan(observed_order(steps[:2], falls[:2])).all()
+    assert np.isnan(observed_order(steps, 1e-11 * falls)).all()

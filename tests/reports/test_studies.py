@@ -19,11 +19,11 @@ from flipproof.chapters.step_size.chapter import (
     PHASES,
     before_first_impact,
     claim_order,
-    observed_order,
     plan_step_size,
     study_step_size,
 )
 from flipproof.curves.growth import first_crossing
+from flipproof.curves.order import observed_order
 from flipproof.frame.findings import Band, Finding
 from flipproof.frame.flights import Flights, Outcome
 from flipproof.frame.solvers import Made, Missing, Run

@@ -11,6 +11,7 @@ import numpy as np
 
 from flipproof.bounce import exact
 from flipproof.bounce.adapter import Adapter, AdapterError, FloatArray
+from flipproof.curves.order import observed_order
 
 SPEEDS: Final = tuple(float(v) for v in np.geomspace(0.02, 10.0, 12))
 """Speeds of impact [m/s]."""
@@ -291,7 +292,7 @@ def convergence(errors: list[float]) -> float:
     """Return the slope of log error over log step; infinity where every error is of the size of rounding."""
     if max(errors) < 1e-6:
         return math.inf
-    return float(np.polyfit(np.log(STEPS), np.log(np.maximum(errors, 1e-300)), 1)[0])
+    return observed_order(STEPS, np.maximum(errors, 1e-300), floor=0.0)[0]
 
 
 def _of_order(slope: float) -> str:

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from flipproof.curves.order import observed_order
 from flipproof.foreign.checking import SMOOTH, THROW, Found, Making, NotApplicableError, ask_of, shift
 from flipproof.foreign.contract import Answer, Ask, Traits
 from slicemodel import Scenario
@@ -154,7 +155,7 @@ def check_order_across(traits: Traits) -> Making:
     errors = np.sqrt(np.mean(squares, axis=0).reshape(len(LEVELS), -1).mean(axis=1))
     if errors[-1] < max(ROUNDOFF, 64 * traits.epsilon):
         raise NotApplicableError(f"changes under refinement are round-off, {errors[0]:.2g} of omega_0")
-    order = -float(np.polyfit(LEVELS, np.log2(np.maximum(errors, 1e-300)), 1)[0])
+    order, _ = observed_order(np.exp2(-np.array(LEVELS)), np.maximum(errors, 1e-300), floor=0.0)
     low = min(declared, 1.0) - 0.5
     located = order < low and errors[-1] <= LOCATED
     limited = f"; a tolerance of event location limits it at {errors[-1]:.1g}" if located else ""

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from flipproof.chapters.solvers import ENGINE
+from flipproof.curves.order import observed_order
 from flipproof.figures.style import STYLES, new_figure, shared_legend, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged, regression
 from flipproof.output.columns import curves_csv
@@ -83,7 +84,7 @@ def claim_welded_order(*runs: Trajectory) -> Finding:
     printed = runs[0].diagnostics["weld_order"]
     dt = [run.settings.get("step", np.nan) for run in runs]
     sizes = np.array([measure("", run).largest for run in runs])
-    order = float(np.polyfit(np.log(dt), np.log(sizes), 1)[0]) if np.all(sizes > 0) else float("nan")
+    order, _ = observed_order(dt, sizes)
     title = "ice: drift of the welded engine falls with Δt at its printed order"
     note = "drift " + ", ".join(f"{size:.2g} at Δt = {step:.2g} s" for step, size in zip(dt, sizes, strict=True))
     return regression("ice-welded-order", title, order, "", (printed - 0.3, printed + 0.3), note)

@@ -20,7 +20,8 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq, least_squares
 from scipy.stats import f as f_distribution
 
-from flipproof.chapters.step_size.chapter import ROUND_OFF, errors_of, plan_step_size
+from flipproof.chapters.step_size.chapter import errors_of, plan_step_size
+from flipproof.curves.order import ROUND_OFF
 from flipproof.frame.chapter import Ask, Band, Chapter, Claims, Finding, Study, judged, observed
 from flipproof.frame.flights import Call, Outcome, attempt, known
 from flipproof.frame.solvers import Run

@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from flipproof.chapters.solvers import LIMITS, SCHEMES
+from flipproof.curves.order import ROUND_OFF, observed_order
 from flipproof.figures.style import MARKERS, STYLES, new_figure, shared_legend, solver_style, styled
 from flipproof.frame.chapter import (
     Ask,
@@ -41,9 +42,6 @@ from slicemodel.trajectory import FloatArray
 
 PHASES = 8
 """Members of the ensemble at each step size."""
-
-ROUND_OFF = 1e-13
-"""Errors below this fraction of omega_0 are not the step's."""
 
 LEAST_COMMON = 8
 """Common times, less one, that a run and its reference must share at the least."""
@@ -126,22 +124,6 @@ def errors_of(reference: Trajectory, runs: Sequence[Sequence[Trajectory]]) -> tu
 
     dt = np.array([[run.settings["dt"] for run in level] for level in runs])
     return dt, np.array([[error(run) for run in level] for level in runs])
-
-
-def observed_order(dt: FloatArray, error: FloatArray) -> tuple[float, float]:
-    """Fit log(rms error) = p log(dt) + c over the levels; return p and its standard error.
-
-    NaN for both if an error is not finite, or if errors reach ROUND_OFF, where an order means nothing.
-    """
-    if not np.all(np.isfinite(error)) or error.min() < ROUND_OFF or len(dt) < 3:
-        return math.nan, math.nan
-    x = np.log(dt).mean(axis=1)
-    y = 0.5 * np.log((error**2).mean(axis=1))
-    x = x - x.mean()
-    slope = float((x @ y) / (x @ x))
-    residual = y - y.mean() - slope * x
-    variance = float(residual @ residual) / (len(x) - 2)
-    return slope, float(np.sqrt(variance / (x @ x)))
 
 
 def before_first_impact(scenario: Scenario, reference: Trajectory) -> Scenario | None:

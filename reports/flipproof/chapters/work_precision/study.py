@@ -27,8 +27,8 @@ from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
-from flipproof.chapters.step_size.chapter import ROUND_OFF, observed_order
 from flipproof.chapters.work_precision.contenders import AT_REST, Case, Contender, Effort, contenders
+from flipproof.curves.order import ROUND_OFF, observed_order
 from flipproof.frame.solvers import Made, Run
 from flipproof.frame.timing import at_times
 from flipproof.frame.twins import usual_rest_speed
@@ -332,7 +332,7 @@ def _curve(
         reason = "refinement hardly changes the cost: events set it"
     else:
         step = np.array([[1.0 / point.work] for point in used])
-        slope, slope_error = observed_order(step, np.array([[point.error] for point in used]))
+        slope, slope_error = observed_order(step, [point.error for point in used])
         if slope_error > 0.25 * max(1.0, abs(slope)):
             reason = f"errors fall by no law of cost: {slope:.1f} ± {slope_error:.1f}"
             slope = slope_error = math.nan
