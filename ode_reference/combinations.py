@@ -27,12 +27,13 @@ the velocity that the tube gains, between impacts nobody knows of the tube.
 from __future__ import annotations
 
 import math
-from dataclasses import fields
+from collections.abc import Iterable, Iterator
+from dataclasses import fields, replace
 from functools import lru_cache
 
 import numpy as np
 
-from ode_reference.motion import Acceleration, Model, Throw
+from ode_reference.motion import Acceleration, Model, Throw, accelerated
 from ode_reference.switches import Switches
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray
@@ -45,6 +46,9 @@ SAME = 1e-9
 
 STATES = 24
 """States of a throw in which a model is compared with its switches."""
+
+FLOWN = 257
+"""Times of a flight at which a model of somebody else's is compared with its switches."""
 
 
 def model_of(switches: Switches) -> Model:
@@ -87,42 +91,73 @@ def require_own_switches(model: Model, scenario: Scenario) -> None:
     """Check that a model's acceleration is the one that its switches make: the reduced flow knows only the switches.
 
     The two are compared in ``STATES`` states of ``SAMPLE``, in which no term vanishes, with all, some and none of the
-    slices at rest; and in as many of the throw itself, at angles within what it can turn through, unless the
-    acceleration is one of this package, which is the same formula in every throw.
+    slices at rest. An acceleration that this package does not define, which may be anything elsewhere, is compared in
+    as many states of the throw itself, and in those at ``FLOWN`` times of the flight that the switches make. A term
+    that acts in none of these states is not seen.
 
     Raises
     ------
     ValueError
         If they differ by more than ``SAME``.
     """
-    own = (model.acceleration.__module__ or "").partition(".")[0] == __name__.partition(".")[0]
-    for thrown in (SAMPLE,) if own else (SAMPLE, scenario):
-        if not _same_in_states(model, thrown):
-            raise ValueError(
-                f"model = {model.name!r}: its acceleration is not that of its switches, {model.switches.name!r}, which "
-                "method 'taylor' solves: register the model with the switches that make its equation "
-                "(ode_reference/combinations.py), or, if none do, choose another method, such as 'DOP853'"
-            )
+    if is_ours(model):
+        same = _same_in_sample(model)
+    else:
+        same = all(_same(model, thrown, _drawn(thrown)) for thrown in (SAMPLE, scenario))
+        same = same and _same(model, scenario, _flown(model, scenario))
+    if not same:
+        raise ValueError(
+            f"model = {model.name!r}: its acceleration is not that of its switches, {model.switches.name!r}, which "
+            "method 'taylor' solves: register the model with the switches that make its equation "
+            "(ode_reference/combinations.py), or, if none do, choose another method, such as 'DOP853'"
+        )
+
+
+def is_ours(model: Model) -> bool:
+    """Return whether a model's acceleration is defined in this package."""
+    names = getattr(model.acceleration, "__globals__", {})  # which functools.wraps leaves alone, unlike __module__
+    return str(names.get("__name__")).partition(".")[0] == __name__.partition(".")[0]
+
+
+State = tuple[float, FloatArray, FloatArray, FloatArray]
+"""theta [rad], r [m], v [m/s] and which slices are free (1.0), the last three of shape (N,)."""
 
 
 @lru_cache(maxsize=4096)
-def _same_in_states(model: Model, scenario: Scenario) -> bool:
-    throw, wanted, n = Throw.of(scenario), acceleration_of(model.switches), scenario.n_slices
+def _same_in_sample(model: Model) -> bool:
+    return _same(model, SAMPLE, _drawn(SAMPLE))
+
+
+def _same(model: Model, scenario: Scenario, states: Iterable[State]) -> bool:
+    throw, by_switches = Throw.of(scenario), replace(model, acceleration=acceleration_of(model.switches))
+    for theta, r, v, free in states:
+        wanted = accelerated(by_switches, throw, theta, r, v, free)[1]
+        if not np.abs(accelerated(model, throw, theta, r, v, free)[1] - wanted).max() <= SAME * np.abs(wanted).max():
+            return False
+    return True
+
+
+def _drawn(scenario: Scenario) -> Iterator[State]:
+    """Yield ``STATES`` states without a pattern, the same on every machine: sines of whole numbers."""
+    throw, n = Throw.of(scenario), scenario.n_slices
     # No bottle turns faster than by its own inertia alone.
     turn = abs(throw.angular_momentum) / throw.bottle_inertia * scenario.duration
-    # Sines of whole numbers: places, speeds and angles without a pattern, the same on every machine.
     numbers = np.sin(np.arange(1.0, 1.0 + STATES * (2 * n + 1))).reshape(STATES, 2 * n + 1)
     for state, row in enumerate(numbers):
         free = np.where(np.arange(n) < math.ceil(n * (1.0 - state / (STATES - 1))), 1.0, 0.0)
-        r = throw.half_length * (1.0 + 0.9 * row[:n])
-        v = 2.0 * row[n : 2 * n] * free
-        _, s, inertia = throw.about_centre_of_mass(r)
         theta = scenario.theta0 + min(max(4.0, turn), 1e3) * float(row[2 * n])
-        place = throw, theta, throw.angular_momentum / inertia
-        own, by_switches = (f(*place, s.copy(), v.copy(), free.copy()) for f in (model.acceleration, wanted))
-        if np.shape(own) != (n,) or not np.abs(own - by_switches).max() <= SAME * np.abs(by_switches).max():
-            return False
-    return True
+        speed = (0.2, 2.0, 20.0)[state % 3]
+        yield theta, throw.half_length * (1.0 + row[:n]), speed * row[n : 2 * n] * free, free
+
+
+def _flown(model: Model, scenario: Scenario) -> Iterator[State]:
+    """Yield the states of the flight that a model's switches make, at ``FLOWN`` times."""
+    from ode_reference.flow import api  # it is not needed to name an equation
+
+    settings = {"model": model.name, "rest_speed": 1e-6, "impact_law": "wall", "energy": False}
+    flight = api.fly(scenario, np.linspace(0.0, scenario.duration, FLOWN), model.switches, settings)
+    for theta, r, v in zip(flight.theta, flight.r, flight.v, strict=True):
+        yield float(theta), r, v, np.where((v == 0.0) & ((r <= scenario.r_min) | (r >= scenario.r_max)), 0.0, 1.0)
 
 
 def _origin(

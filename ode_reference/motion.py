@@ -106,7 +106,7 @@ class Model:
     name : str
     equation : str - in one line, as tables print it
     reason : str - why this equation is here
-    acceleration : callable (throw, theta, omega, s, v, free) -> array, shape (N,) [m/s^2]
+    acceleration : callable (throw, theta, omega, s, v, free) -> new array of floats, shape (N,) [m/s^2]
         For a free slice r_i''; for a held slice the acceleration relative to the bottle at which contact and
         drag apart it would leave its end: m times it is what the end presses back with. Its sign decides rest and
         release: a slice rests on the base while it is >= 0, on the cap while it is <= 0. ``s`` and ``v`` have shape
@@ -119,6 +119,27 @@ class Model:
     reason: str
     acceleration: Acceleration
     switches: Switches = PUBLISHED
+
+
+def accelerated(
+    model: Model, throw: Throw, theta: float, r: FloatArray, v: FloatArray, free: FloatArray
+) -> tuple[float, FloatArray]:
+    """Return omega [rad/s] and a model's acceleration of every slice, free (1.0) or held, shape (N,) [m/s^2].
+
+    Raises
+    ------
+    ValueError
+        If the model returns anything but N real numbers, or writes to what it is given.
+    """
+    _, s, inertia = throw.about_centre_of_mass(r)
+    omega = throw.angular_momentum / inertia
+    v = v.view()
+    v.flags.writeable = s.flags.writeable = False  # a right-hand side in place would change the integrator's state
+    a = model.acceleration(throw, theta, omega, s, v, free)
+    if not (isinstance(a, np.ndarray) and a.shape == r.shape and a.dtype.kind == "f"):
+        words = f"an array {a.shape} of {a.dtype}" if isinstance(a, np.ndarray) else repr(a)
+        raise ValueError(f"model = {model.name!r}: its acceleration is {words}, must be an array {r.shape} of floats")
+    return omega, a
 
 
 class Motion:
@@ -149,10 +170,7 @@ class Motion:
     def acceleration(self, y: FloatArray, free: FloatArray) -> tuple[float, FloatArray]:
         """Return omega [rad/s] and the model's acceleration of every slice, free (1.0) or held, shape (N,) [m/s^2]."""
         self.evaluations += 1
-        n = self.n
-        _, s, inertia = self.throw.about_centre_of_mass(y[1 : n + 1])
-        omega = self.throw.angular_momentum / inertia
-        return omega, self.model.acceleration(self.throw, float(y[0]), omega, s, y[n + 1 :], free)
+        return accelerated(self.model, self.throw, float(y[0]), y[1 : self.n + 1], y[self.n + 1 :], free)
 
     def __call__(self, t: float, y: FloatArray) -> FloatArray:
         """Return dy/dt, shape (2N + 1,); the equations do not depend on ``t`` itself."""

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ode_reference.arguments import known_name, number_within, true_or_false
-from ode_reference.combinations import model_of, require_own_switches
+from ode_reference.combinations import is_ours, model_of, require_own_switches
 from ode_reference.impacts import LAWS
 from ode_reference.models import MODELS
 from ode_reference.motion import Model
@@ -304,8 +304,10 @@ def _twin(number: int) -> int:
 
 
 def model_named(model: str | Switches | Model) -> Model:
-    """Return the model of that name or of those switches, or itself."""
+    """Return the model of that name or of those switches, or itself, if its name is not that of another equation."""
     if isinstance(model, Model):
+        if (are_switches(model.name) and not is_ours(model)) or MODELS.get(model.name, model) != model:
+            raise ValueError(f"model.name = {model.name!r} is the name of another equation: choose one of its own")
         return model
     if isinstance(model, Switches):
         return model_of(model)

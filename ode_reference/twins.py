@@ -22,7 +22,7 @@ from typing import Final
 
 import numpy as np
 
-from slicemodel.scenario import Scenario
+from slicemodel.scenario import LEAST, MOST, Scenario
 from slicemodel.trajectory import FloatArray
 
 CHANGE: Final = 3e-11
@@ -46,7 +46,11 @@ def twin_of(scenario: Scenario, number: int) -> tuple[Scenario, FloatArray]:
     moved = signs[2:] * np.where(gap > TOUCHING * bottle.length, np.minimum(CHANGE * bottle.length, ROOM * gap), 0.0)
     if scenario.fill_fraction == 1.0:
         moved = (moved - moved[::-1]) / 2
-    mass = bottle.mass * (1.0 + CHANGE * signs[1])
-    return replace(
-        scenario, omega0=scenario.omega0 * (1.0 + CHANGE * signs[0]), bottle=replace(bottle, mass=mass)
-    ), moved
+    omega0, mass = _changed(scenario.omega0, signs[0]), _changed(bottle.mass, signs[1])
+    return replace(scenario, omega0=omega0, bottle=replace(bottle, mass=mass)), moved
+
+
+def _changed(value: float, sign: float) -> float:
+    """Return a value changed by its last digits, the other way where it would leave what a scenario admits."""
+    changed = value * (1.0 + CHANGE * sign)
+    return changed if LEAST <= abs(changed) <= MOST else value * (1.0 - CHANGE * sign)

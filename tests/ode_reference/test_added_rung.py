@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import wraps
 from pathlib import Path
 from types import MappingProxyType
 
@@ -93,6 +94,68 @@ def test_an_equation_that_is_wrong_in_the_throw_alone_is_refused_there(rung, reg
     for solve, given in ((ode_reference.solve, throw), (ode_reference.solve_batch, [throw])):
         with pytest.raises(ValueError, match="model = 'undamped'"):
             solve(given, name)
+
+
+HIDDEN = {
+    "in fast slices": lambda _, s, v: 500.0 * np.sign(v) * (np.abs(v) > 2.0) + 0.0 * s,
+    "beside the ends": lambda _, s, v: -3e3 * np.sign(s) * (np.abs(s) > 0.97 * np.abs(s).max()) + 0.0 * v,
+    "at high spin": lambda omega, s, v: (-50.0 * v if omega > 16.0 else 0.0) + 0.0 * s,
+}
+
+
+@pytest.mark.parametrize("term", HIDDEN.values(), ids=HIDDEN)
+def test_a_term_that_acts_in_few_states_is_found_in_the_flight(rung, term):
+    @wraps(MODELS["eq8"].acceleration)  # which makes it look like the package's own
+    def acceleration(throw, theta, omega, s, v, free):
+        return rung.acceleration(throw, theta, omega, s, v, free) + term(omega, s, v)
+
+    with pytest.raises(ValueError, match="model = 'undamped'"):
+        ode_reference.solve(THROW, replace(rung, acceleration=acceleration))
+
+
+def test_a_right_hand_side_with_a_parameter_is_compared_each_time(rung):
+    class Drag:
+        rate = 0.0
+
+        def __call__(self, throw, theta, omega, s, v, free):
+            return rung.acceleration(throw, theta, omega, s, v, free) - self.rate * v
+
+    drag = Drag()
+    model = replace(rung, acceleration=drag)
+    assert ode_reference.solve(THROW, model).ok
+    drag.rate = 10.0
+    with pytest.raises(ValueError, match="model = 'undamped'"):
+        ode_reference.solve(THROW, model)
+
+
+@pytest.mark.parametrize("name", ["eq8", "free-flight", "switches:roots"])
+@pytest.mark.parametrize("method", ["taylor", "DOP853"])
+def test_the_name_of_another_equation_is_refused(rung, name, method):
+    with pytest.raises(ValueError, match=f"model.name = '{name}' is the name of another equation"):
+        ode_reference.solve(THROW, replace(rung, name=name), method=method)
+
+
+def in_place(*given):
+    s = given[3]
+    s *= 2.0
+    return s
+
+
+@pytest.mark.parametrize(
+    ("broken", "words"),
+    [
+        (lambda *given: given[3][:1], "an array \\(1,\\) of float64, must be an array"),
+        (lambda *given: given[3] * 1j, "of complex128"),
+        (lambda *given: given[3].astype(int), "of int64"),
+        (lambda *given: list(given[3]), "must be an array"),
+        (in_place, "read-only"),
+    ],
+    ids=["one number", "complex", "integers", "a list", "in place"],
+)
+@pytest.mark.parametrize("method", ["taylor", "DOP853"])
+def test_a_right_hand_side_of_another_kind_is_refused_by_every_method(rung, broken, words, method):
+    with pytest.raises(ValueError, match=words):
+        ode_reference.solve(THROW, replace(rung, acceleration=broken), method=method)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import ode_reference
 import slicemodel
 from ode_reference.bands import SAFETY, TWINS, estimate_band
 from ode_reference.twins import CHANGE, twin_of
-from slicemodel.scenario import Scenario
+from slicemodel.scenario import Bottle, Scenario
 
 THROW = Scenario().with_slices(6)
 NEAR_FULL = replace(
@@ -126,3 +126,9 @@ def test_a_flight_without_twins_is_refused():
 def test_further_twins_and_other_units_of_time_lie_within_the_band(monkeypatch):
     monkeypatch.setattr("sys.argv", ["last_digits", "--throws", "10", "--near-full", "500", "--seed", "3"])
     assert last_digits.main() == 0
+
+
+@pytest.mark.parametrize("change", [{"bottle": Bottle(mass=1e15)}, {"omega0": -1e15}, {"omega0": 1e-15}], ids=str)
+def test_a_throw_at_the_limit_of_what_is_admitted_has_twins(change):
+    flight = ode_reference.solve(replace(Scenario(n_slices=3), **change), "eq8", [0.0, 1e-3])
+    assert estimate_band(flight).flights == TWINS + 1

@@ -267,6 +267,21 @@ def test_a_killed_process_costs_one_chunk(swept, tmp_path):
         assert list(rows_of(store, made.points())) == rows
 
 
+def test_a_folder_that_is_moved_while_it_is_filled_is_no_success(swept, tmp_path):
+    _, made, _ = swept
+
+    def begin(_):
+        shutil.move(tmp_path / "out", tmp_path / "elsewhere")
+        return lambda *_: None
+
+    executor = "concurrent.futures:ThreadPoolExecutor"
+    with (
+        pytest.raises(SweepError, match="was moved or replaced"),
+        sweeping.completed(made.points, made.size, tmp_path / "out", begin, executor=executor),
+    ):
+        pass
+
+
 def test_workers_with_other_code_make_no_row(swept, tmp_path, monkeypatch):
     _, made, _ = swept
     monkeypatch.setattr("flipproof.sweep.loop.code_identity", lambda: "0.0+other")

@@ -15,6 +15,7 @@ import os
 import time
 import traceback
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
@@ -119,7 +120,8 @@ def _words_of(error: OSError) -> str:
 
 
 def _complain(words: str, status: int) -> int:
-    print(f"flipproof: error: {readable(words)}", file=sys.stderr)
+    with suppress(OSError):  # the status says it where standard error does not take it
+        print(f"flipproof: error: {readable(words)}", file=sys.stderr, flush=True)
     return status
 
 

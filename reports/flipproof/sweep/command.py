@@ -73,7 +73,7 @@ def completed(
     if export_to:
         check_export(export_to, out)
     with _opened(out, say) as store:
-        progress = begin(size)
+        opened, progress = store.path.stat(), begin(size)
         with processes(jobs) if executor is None else executor_of(executor) as workers:
             in_flight = 2 * (jobs or cores()) if executor is None else IN_FLIGHT
             with _plainly(out):
@@ -81,6 +81,11 @@ def completed(
         if export_to:
             with _plainly(out):
                 export(store, points(), swept and swept(), export_to)
+        if not (store.path.exists() and os.path.samestat(opened, store.path.stat())):
+            raise SweepError(
+                f"{store.path} was moved or replaced while the sweep went on, and rows may be in no file; run it again "
+                "where the folder is now"
+            )
         seconds = time.perf_counter() - began
         kinds = ", ".join(f"{counts[status]} {status}" for status in OUTCOMES if status in counts)
         rate = f"; {made} made in {seconds:.1f} s ({made / seconds:.0f} per second)" if made else ""
