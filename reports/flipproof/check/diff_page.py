@@ -14,7 +14,7 @@ from flipproof.check.diff import HEADINGS, Comparison
 from flipproof.figures.report_pair import differences, figure_report_pair
 from flipproof.figures.spoken import inert
 from flipproof.figures.style import draw
-from flipproof.output.columns import Curves
+from flipproof.output.columns import Series
 from flipproof.page.templating import environment
 
 
@@ -60,7 +60,7 @@ def _shown(words: str) -> str:
     return inert(words, lines=False).encode("utf-8", "backslashreplace").decode()
 
 
-def read_curves(path: Path) -> Curves:
+def read_curves(path: Path) -> Series:
     """Return the curves of a report's table by solver; raises OSError or ValueError if the table cannot be read."""
     with path.open(encoding="utf-8", newline="") as file:
         header, *lines = list(csv.reader(file)) or [[]]

@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from flipproof.figures.style import new_figure, shared_legend, styled
-from flipproof.output.columns import Curves
+from flipproof.output.columns import Series
 from slicemodel.trajectory import FloatArray
 
 
-def differences(old: Curves, new: Curves) -> dict[str, tuple[FloatArray, FloatArray]]:
+def differences(old: Series, new: Series) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Return new minus old by the curves' names, at the old curve's times up to where the shorter of the two ends.
 
     The new curve is linear between its times.
@@ -26,7 +26,7 @@ def differences(old: Curves, new: Curves) -> dict[str, tuple[FloatArray, FloatAr
 
 
 @styled
-def figure_report_pair(old: Curves, new: Curves, apart: Mapping[str, tuple[FloatArray, FloatArray]]) -> Figure:
+def figure_report_pair(old: Series, new: Series, apart: Mapping[str, tuple[FloatArray, FloatArray]]) -> Figure:
     """One row per curve that both have: left both of them, right new minus old on its own scale."""
     figure, grid = new_figure(len(apart), 2, size=(8.0, 1.1 + 1.7 * len(apart)), sharex=True, squeeze=False)
     for (left, right), (name, (t, difference)) in zip(grid, apart.items(), strict=True):

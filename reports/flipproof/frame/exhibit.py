@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from flipproof.figures.style import Drawing, draw
 from flipproof.frame.flights import chapter_errors
-from flipproof.output.columns import Curves
+from flipproof.output.columns import Series
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +28,7 @@ class Touch:
     """
 
     label: str
-    curves: Curves
+    curves: Series
     shown: tuple[str, ...] = ()
     digits: int = 3
     limits: tuple[float, float] | None = None

@@ -15,7 +15,7 @@ from slicemodel.trajectory import FloatArray
 
 TIME: Final = "t [s]"
 
-Curves = Mapping[str, tuple[FloatArray, FloatArray]]
+Series = Mapping[str, tuple[FloatArray, FloatArray]]
 """Header -> times [s] and values, of equal length."""
 
 
@@ -36,7 +36,7 @@ def columns_csv(columns: Mapping[str, Iterable[Any]]) -> str:
     return rows_csv(list(columns), zip_longest(*columns.values()))
 
 
-def curves_csv(curves: Curves) -> str:
+def curves_csv(curves: Series) -> str:
     """Return curves over time: those on the same times share a column of them, every other brings its own.
 
     A curve that ends early on the times of a longer one shares that one's column.

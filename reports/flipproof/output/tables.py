@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from flipproof.output.columns import Series
 from slicemodel import Trajectory
 from slicemodel.scenario import UnsuitableFileError, read_text, shortened
 from slicemodel.trajectory import FloatArray
@@ -49,7 +49,7 @@ class Curve:
     """
 
     label: str
-    series: Mapping[str, tuple[FloatArray, FloatArray]]
+    series: Series
     notes: tuple[str, ...] = ()
 
     @classmethod
