@@ -4,12 +4,14 @@ import os
 import signal
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 from flipproof.frame import pool
-from flipproof.frame.pool import TRIES, make_all, workers
+from flipproof.frame.flights import Call
+from flipproof.frame.pool import COSTS, TRIES, make_all, workers
 from flipproof.frame.processes import WorkerDiedError
 from flipproof.frame.solvers import Run
 from slicemodel import Scenario
@@ -64,3 +66,22 @@ def test_a_script_whose_workers_would_begin_it_anew_is_told_so(tmp_path):
     ended = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=120, check=False)
     assert ended.returncode == 1
     assert 'begin its work below `if __name__ == "__main__":`' in ended.stderr.splitlines()[-1]
+
+
+def test_progress_counts_calls_that_are_done_while_runs_are_still_made():
+    """Calls are heard when they end, not with the next run; what is planned is what all of it costs."""
+    shown = []
+    calls = [Call(pow, (2, k), f"call {k}") for k in range(3)]
+    with ThreadPoolExecutor(1) as threads:
+        make_all(threads, [Run("exact-step", Scenario(n_slices=2))], lambda *report: shown.append(report), calls)
+    assert [planned for _, planned, _ in shown] == [3 * COSTS["call"] + COSTS["quick"]] * 4
+    assert sorted(label for *_, label in shown) == ["call 0", "call 1", "call 2", "exact-step"]
+    assert [done for done, *_ in shown] == sorted(done for done, *_ in shown)
+    assert shown[-1][0] == shown[-1][1]
+
+
+def test_progress_moves_without_any_run():
+    shown = []
+    with ThreadPoolExecutor(1) as threads:
+        make_all(threads, [], lambda *report: shown.append(report), [Call(pow, (2, 3), "power")])
+    assert shown == [(COSTS["call"], COSTS["call"], "power")]

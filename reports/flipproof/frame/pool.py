@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor, Future, as_completed, wait
 from contextlib import AbstractContextManager
-from typing import Any
+from typing import Any, Final
 
 from flipproof.frame.flights import Call, Outcome, attempt, chapter_errors
 from flipproof.frame.processes import WorkerDiedError, processes
@@ -14,7 +14,10 @@ from flipproof.frame.solvers import Made, Run, find, make
 from slicemodel import Scenario
 
 Progress = Callable[[int, int, str], None]
-"""Called with runs and calls made, those planned, and the last one's name."""
+"""Called with the work that is done, the work that is planned, and the name of what was made last."""
+
+COSTS: Final = {"call": 40, "slow": 50, "quick": 1}
+"""Measured mean time of a call, of a run that has a job of its own, and of another run, in times of the last."""
 
 GROUP = 8
 """Runs of a group: sending a quick one away alone would cost as much as making it."""
@@ -40,13 +43,19 @@ def make_all(
     died = f"the worker process died {TRIES} times with this"
     keeping = store.remembering(pool)
     pending_calls = {call: (pool if call.timed else keeping).submit(call.function, *call.arguments) for call in calls}
-
-    def tell(label: str) -> None:
-        done = len(made) + sum(answer.done() for answer in pending_calls.values())
-        progress(done, len(runs) + len(pending_calls), label)
-
     made: dict[Run, Made] = {run: found for run in runs if (found := store.find(run)) is not None}
     jobs = _jobs([run for run in runs if run not in made])
+    costs = {run: COSTS["quick" if _is_quick(run) else "slow"] for job in jobs for run in job}
+    planned, done = sum(costs.values()) + COSTS["call"] * len(pending_calls), 0
+
+    def tell(label: str) -> None:
+        progress(done + COSTS["call"] * sum(answer.done() for answer in pending_calls.values()), planned, label)
+
+    def answered(label: str) -> Callable[[Future[Any]], None]:
+        return lambda _: tell(label)
+
+    for call, answer in pending_calls.items():
+        answer.add_done_callback(answered(call.label))
     while jobs:
         pending = {pool.submit(make_each, job): job for job in jobs}
         jobs = []
@@ -63,6 +72,7 @@ def make_all(
             for result in results:
                 store.keep(result)
                 made[result.run] = result
+                done += costs[result.run]
                 tell(result.run.name)
     called: dict[Call, Outcome[Any]] = {}
     for call, answer in pending_calls.items():
@@ -71,7 +81,6 @@ def make_all(
                 called[call] = attempt(answer.result)
         except WorkerDiedError as error:
             called[call] = Outcome(None, f"{call.label}: {died} call ({error})")
-        tell(call.label)
     # In the order asked, whichever worker was faster: what is read off this table must not depend on load.
     return {run: made[run] for run in runs}, called
 
@@ -86,16 +95,15 @@ def compile_kernels(pool: Executor) -> None:
 
 
 def _jobs(runs: list[Run]) -> list[list[Run]]:
-    """Return runs by jobs: each that may be slow alone, and these first; the others in groups.
+    """Return runs by jobs: each that may be slow alone, and these first; the others in groups."""
+    quick = [run for run in runs if _is_quick(run)]
+    slow = [[run] for run in runs if not _is_quick(run)]
+    return [*slow, *(quick[k : k + GROUP] for k in range(0, len(quick), GROUP))]
 
-    Runs of schemes and of equations take milliseconds, but for those by a ``method`` of SciPy's.
-    """
-    quick: list[Run] = []
-    slow: list[Run] = []
-    for run in runs:
-        fast = find(run.solver).package in ("slicemodel", "ode_reference") and "method" not in run.settings
-        (quick if fast else slow).append(run)
-    return [*([run] for run in slow), *(quick[k : k + GROUP] for k in range(0, len(quick), GROUP))]
+
+def _is_quick(run: Run) -> bool:
+    """Return whether a run takes milliseconds: of a scheme or an equation, but not by a ``method`` of SciPy's."""
+    return find(run.solver).package in ("slicemodel", "ode_reference") and "method" not in run.settings
 
 
 def make_each(runs: Iterable[Run]) -> list[Made]:
