@@ -16,8 +16,8 @@ from slicemodel import Scenario
 Progress = Callable[[int, int, str], None]
 """Called with the work that is done, the work that is planned, and the name of what was made last."""
 
-COSTS: Final = {"call": 40, "slow": 50, "quick": 1}
-"""Measured mean time of a call, of a run that has a job of its own, and of another run, in times of the last."""
+COSTS: Final = {"certificate": 4000, "call": 20, "slow": 20, "quick": 1}
+"""Ratios of measured mean times: a certified run, a call, another run with a job of its own, any other run."""
 
 GROUP = 8
 """Runs of a group: sending a quick one away alone would cost as much as making it."""
@@ -45,7 +45,7 @@ def make_all(
     pending_calls = {call: (pool if call.timed else keeping).submit(call.function, *call.arguments) for call in calls}
     made: dict[Run, Made] = {run: found for run in runs if (found := store.find(run)) is not None}
     jobs = _jobs([run for run in runs if run not in made])
-    costs = {run: COSTS["quick" if _is_quick(run) else "slow"] for job in jobs for run in job}
+    costs = {run: COSTS[_kind(run)] for job in jobs for run in job}
     planned, done = sum(costs.values()) + COSTS["call"] * len(pending_calls), 0
 
     def tell(label: str) -> None:
@@ -96,14 +96,19 @@ def compile_kernels(pool: Executor) -> None:
 
 def _jobs(runs: list[Run]) -> list[list[Run]]:
     """Return runs by jobs: each that may be slow alone, and these first; the others in groups."""
-    quick = [run for run in runs if _is_quick(run)]
-    slow = [[run] for run in runs if not _is_quick(run)]
+    quick = [run for run in runs if _kind(run) == "quick"]
+    slow = [[run] for run in runs if _kind(run) != "quick"]
     return [*slow, *(quick[k : k + GROUP] for k in range(0, len(quick), GROUP))]
 
 
-def _is_quick(run: Run) -> bool:
-    """Return whether a run takes milliseconds: of a scheme or an equation, but not by a ``method`` of SciPy's."""
-    return find(run.solver).package in ("slicemodel", "ode_reference") and "method" not in run.settings
+def _kind(run: Run) -> str:
+    """Return what a run costs, in the words of COSTS: those of schemes and of equations take milliseconds.
+
+    Exceptions are those by a ``method`` of SciPy's; and a ``tolerance`` asks an engine for a certificate.
+    """
+    if find(run.solver).package in ("slicemodel", "ode_reference") and "method" not in run.settings:
+        return "quick"
+    return "certificate" if "tolerance" in run.settings else "slow"
 
 
 def make_each(runs: Iterable[Run]) -> list[Made]:

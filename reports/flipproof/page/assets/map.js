@@ -29,11 +29,11 @@
       here = [i, j];
       const cell = at(i, j);
       if (!cell) return;
-      const value = (mean) => (mean === null ? "not computed" : mean.toFixed(3));
+      const value = (mean) => (mean === null ? "not computed" : `${Math.round(100 * mean)} %`);
       const means = data.solvers.map((name, k) => `${names[name]} ${value(cell.mean[k])}`).join(", ");
       const far = off(cell);
-      said.textContent = `Filling ${Number(cell.x.toPrecision(3))}, γ/ω₀ = ${Number(cell.y.toPrecision(2))}: mean ω/ω₀ of the second half: ${means}. `
-        + `${names[choice.value]} is off by ${Number.isFinite(far) ? `${Number((100 * far).toPrecision(2))} %` : "an unknown part"} of ω₀. Largest fair share from the published program to free flight: ${cell.which || "unknown"}.`;
+      said.textContent = `Filling ${Number(cell.x.toPrecision(3))}, γ/ω₀ = ${Number(cell.y.toPrecision(2))}: late spin, of ω₀: ${means}. `
+        + `Off free flight: ${names[choice.value]} by ${Number.isFinite(far) ? `${Number((100 * far).toPrecision(2))} %` : "an unknown part"}. Largest fair share: ${cell.which || "unknown"}.`;
       const box = svg.querySelector(".map-here");
       box?.setAttribute("transform", svg.querySelector(`[data-cell="${i} ${j}"]`).dataset.place);
     }
