@@ -177,3 +177,10 @@ def test_an_order_across_events_is_that_of_the_mean_square_over_phases():
     assert 0.0 < error < 0.2
     assert np.isnan(observed_order(steps[:2], falls[:2])).all()
     assert np.isnan(observed_order(steps, 1e-11 * falls)).all()
+
+
+def test_names_in_quotes_are_read_as_modelica_tools_write_them(tmp_path):
+    path = tmp_path / "quoted.csv"
+    path.write_text('"time","body.r[1,2]", "v"\n0,1.5,0\n0.5,"1.25",-1\n')
+    found = read(path)
+    assert dict(found.columns) == {"body.r[1,2]": pytest.approx([1.5, 1.25]), "v": pytest.approx([0.0, -1.0])}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 from dataclasses import dataclass
 from pathlib import Path
@@ -146,15 +147,20 @@ def read_cells(path: Path) -> tuple[list[str], Rows]:
     numbered = [(n, line) for n, line in enumerate(lines, start=1) if line.strip() and not line.startswith("#")]
     if not numbered:
         raise ValueError(f"{path}: is empty")
-    names = [name.strip() for name in numbered[0][1].split(",")]
+    names = [name.strip() for name in _split(numbered[0][1])]
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise ValueError(f"{path}: line {numbered[0][0]} names the column {twice!r} twice")
-    rows = [(n, line.split(",")) for n, line in numbered[1:]]
+    rows = [(n, _split(line)) for n, line in numbered[1:]]
     for n, cells in rows:
         if len(cells) != len(names):
             raise ValueError(f"{path}: line {n} has {len(cells)} cells, the header has {len(names)}")
     return names, rows
+
+
+def _split(line: str) -> list[str]:
+    """Return the cells of a line; a quoted one may hold commas, as names of Modelica do."""
+    return next(csv.reader([line], skipinitialspace=True)) if '"' in line else line.split(",")
 
 
 def number_of(path: Path, line: int, column: str, cell: str) -> float:
