@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import _thread
 import argparse
 import json
-import os
-import signal
-import stat
 import sys
 import textwrap
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -127,47 +121,8 @@ def _opened(options: argparse.Namespace, **given: Any) -> Any:
     return opened(options.spec, options.timeout, memory=memory, given=given)
 
 
-@contextmanager
-def _watched() -> Iterator[None]:
-    """Take a SIGTERM that comes from a solver for its failure; one from anybody else is what it always is.
-
-    To be entered before NumPy is imported: its threads inherit that the signal is blocked.
-    """
-    if sys.platform != "linux":
-        yield
-        return
-    done = threading.Event()
-
-    def watch() -> None:
-        while not done.is_set():
-            came = signal.sigtimedwait({signal.SIGTERM}, 0.2)
-            if came is None:
-                continue
-            from flipproof.foreign.processes import ACCUSED, is_solver
-
-            if is_solver(came.si_pid):
-                ACCUSED.add("SIGTERM")
-            else:
-                _thread.interrupt_main(signal.SIGTERM)
-
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
-    watcher = threading.Thread(target=watch, daemon=True)
-    watcher.start()
-    try:
-        yield
-    finally:
-        done.set()
-        watcher.join()
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
-
-
 def command_certify(options: argparse.Namespace) -> int:
     """Print one line a check; return 1 if one failed, or if answers are missing."""
-    with _watched():
-        return _certified(options)
-
-
-def _certified(options: argparse.Namespace) -> int:
     from flipproof.foreign.certify import certify, findings_of
     from flipproof.foreign.contract import check_equation
     from flipproof.foreign.elsewhere import SEED
@@ -178,12 +133,9 @@ def _certified(options: argparse.Namespace) -> int:
     check_outputs(options, "json", "junit")
     names = ("name", "refined_by", "precision", "order")
     given = {name: value for name in names if (value := getattr(options, name)) is not None}
-    lines: list[str] = []
-    before = _appended()
 
     def say(line: str) -> None:
-        lines.append(inert(line, lines=False))
-        print(lines[-1], flush=True)
+        print(inert(line, lines=False), flush=True)
 
     seed = SEED if options.seed is None else options.seed
     with closing(_opened(options, **given)) as runner:
@@ -196,32 +148,7 @@ def _certified(options: argparse.Namespace) -> int:
         questions = "1 question waits" if waiting == 1 else f"{waiting} questions wait"
         say(f"{questions} for answer.csv (columns t, theta, omega; r_0 to r_(N-1), v_0 to v_(N-1) if you have them)")
         say(f"in {runner.folder}; certify again when they are there")
-    _print_again(lines, before)
     return 1 if found.failed or waiting else 0
-
-
-def _appended() -> int | None:
-    """Let standard output, if it is a file, be written at its end whatever becomes of it; return its length [bytes]."""
-    try:
-        sys.stdout.flush()
-        there = os.fstat(sys.stdout.fileno())
-        if not stat.S_ISREG(there.st_mode):
-            return None
-        import fcntl
-
-        fcntl.fcntl(sys.stdout.fileno(), fcntl.F_SETFL, fcntl.fcntl(sys.stdout.fileno(), fcntl.F_GETFL) | os.O_APPEND)
-        return there.st_size
-    except (ImportError, OSError, ValueError):
-        return None
-
-
-def _print_again(lines: Sequence[str], before: int | None) -> None:
-    """Print all lines once more if the file that they were printed to has lost some."""
-    if before is None:
-        return
-    sys.stdout.flush()
-    if os.fstat(sys.stdout.fileno()).st_size < before + sum(len(line) + 1 for line in lines):
-        print("what was printed was cut off from outside; once more:", *lines, sep="\n", flush=True)
 
 
 def command_place(options: argparse.Namespace) -> int:

@@ -28,7 +28,7 @@ from flipproof.foreign.contract import (
     WaitingError,
     answer_of,
 )
-from flipproof.foreign.processes import KEPT, PATIENCE, accuse, end, half_of_memory, last_line, start
+from flipproof.foreign.processes import KEPT, PATIENCE, end, ending, half_of_memory, last_line, start
 from flipproof.foreign.specs import words_of, written
 from flipproof.output.files import write_whole
 from slicemodel.scenario import unknown_name
@@ -158,7 +158,6 @@ class Command(Runner):
             for name, value in values.items():
                 words = [word.replace(f"{{{name}}}", value) for word in words]
             self._run([word.replace("{{", "{").replace("}}", "}") for word in words])
-            accuse()
             out = Path(values["out"])
             if not out.is_file():
                 raise ForeignError(f"{self.words[0]} ended without writing {{out}}")
@@ -182,7 +181,7 @@ class Command(Runner):
             if status:
                 said.seek(max(0, said.seek(0, 2) - KEPT))
                 last = last_line(said.read())
-                raise ForeignError(f"{words[0]} ended with status {status}{f': {last}' if last else ''}")
+                raise ForeignError(f"{words[0]} {ending(status)}{f': {last}' if last else ''}")
 
 
 class Folder(Runner):

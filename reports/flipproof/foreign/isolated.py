@@ -14,7 +14,6 @@ import json
 import math
 import os
 import selectors
-import signal
 import subprocess
 import sys
 import time
@@ -25,7 +24,7 @@ import numpy as np
 
 from flipproof.foreign import contract
 from flipproof.foreign.contract import IMPACT, Answer, AnswerError, Ask, ForeignError, Runner, Traits, answer_of
-from flipproof.foreign.processes import KEPT, PATIENCE, accuse, end, half_of_memory, last_line, start
+from flipproof.foreign.processes import KEPT, PATIENCE, end, ending, half_of_memory, last_line, start
 from flipproof.foreign.specs import distribution_of, is_foreign, load
 from slicemodel import Scenario
 from slicemodel.scenario import shortened
@@ -61,7 +60,6 @@ class Isolated(Runner):
         most = 8 * (len(ask.times) * (5 + 2 * ask.scenario.n_slices) + 5 * 10_000_000)
         header, arrays = self._exchange(header, {"times": ask.times, "start": ask.start}, limit, most)
         self._late = 0
-        accuse()
         if "reason" in header:
             raise ForeignError(str(header["reason"]))
         fields: dict[str, Any] = {name: array for name, array in arrays.items() if "." not in name}
@@ -160,11 +158,7 @@ class Isolated(Runner):
             while part := os.read(self._process.stderr.fileno(), 65536):  # type: ignore[union-attr]
                 self._printed = (self._printed + part)[-KEPT:]
         said = last_line(self._printed)
-        how = f"ended with status {status}"
-        if status < 0:
-            known = [each.name for each in signal.Signals if each == -status]
-            how = f"was ended by {known[0] if known else f'signal {-status}'}"
-        return f"the process {how} before it answered{f'; last line printed: {said}' if said else ''}"
+        return f"the process {ending(status)} before it answered{f'; last line printed: {said}' if said else ''}"
 
 
 def refuse_built_in(name: str) -> None:
@@ -183,12 +177,6 @@ def serve() -> None:
     empty = os.open(os.devnull, os.O_RDONLY)
     os.dup2(empty, 0)
     os.dup2(2, 1)
-    if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
-    with contextlib.suppress(ImportError, ValueError, OSError):
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     sys.dont_write_bytecode = True  # a copy of a file that is edited in the same second would be taken for it
     spec = receive(inbox, 0)[0]["spec"]
     try:

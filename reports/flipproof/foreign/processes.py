@@ -1,4 +1,7 @@
-"""Programs of other people as processes: each leads a session of its own, and none outlives flipproof.
+"""Programs of other people as processes: each runs in a session of its own, and none outlives flipproof.
+
+Its parent is a shell that waits for it (POSIX): a signal that it sends to its parent ends that shell, and so its run,
+and what it does to its parent's files it does to its own pipes.
 
 A keeper process reads from a pipe whose other end this process alone holds. It is told of every program that starts
 and ends; when the pipe closes, because this process ended in whatever way, it ends the programs that are left and all
@@ -9,15 +12,15 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import errno
 import itertools
 import os
+import shutil
 import signal
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any, Final
-
-from flipproof.foreign.contract import ForeignError
 
 MARK: Final = "FLIPPROOF_SOLVER"
 """Environment variable of a solver's process, by which what it leaves behind is known."""
@@ -27,9 +30,6 @@ KEPT: Final = 4096
 
 PATIENCE: Final = 2
 """Runs in a row without an answer in time after which a solver is not asked again."""
-
-ACCUSED: Final[set[str]] = set()
-"""Names of the signals that a solver has sent to this process."""
 
 _MARKS: Final[dict[int, str]] = {}
 _COUNT: Final = itertools.count()
@@ -60,22 +60,33 @@ for path in glob.glob("/proc/[0-9]*/environ"):
 """What the keeper runs; its argument is how the marks of this process begin."""
 
 
+SHELL: Final = 'ulimit -c 0; ulimit -d "$0"; "$@"; exit $?'
+"""What the shell runs; $0 is the memory [kB] that the program may take, the rest are its words."""
+
+
 def start(words: list[str], memory: float, **pipes: Any) -> subprocess.Popen[bytes]:
-    """Start a program in a session of its own, in which it may take ``memory`` bytes of data (Linux)."""
+    """Start a program in a session of its own, in which it may take ``memory`` bytes of data; raises OSError."""
+    if shutil.which(words[0]) is None:
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
     mark = f"{os.getpid()}-{next(_COUNT)}"
     environment = {**os.environ, MARK: mark}
+    if os.name == "posix":
+        import resource
+
+        limits = [x for x in resource.getrlimit(resource.RLIMIT_DATA) if x != resource.RLIM_INFINITY]
+        words = ["/bin/sh", "-c", SHELL, str(min(int(memory), *limits, int(memory)) // 1024), *words]
     _keeper()
     process = subprocess.Popen(words, start_new_session=True, bufsize=0, env=environment, **pipes)
     _tell(process.pid)
     _MARKS[process.pid] = mark
-    if sys.platform == "linux":
-        import resource
-
-        with contextlib.suppress(OSError, ValueError):
-            soft, hard = resource.prlimit(process.pid, resource.RLIMIT_DATA)
-            least = min(int(memory), *(x for x in (soft, hard) if x != resource.RLIM_INFINITY), int(memory))
-            resource.prlimit(process.pid, resource.RLIMIT_DATA, (least, hard))
     return process
+
+
+def ending(status: int) -> str:
+    """Return how a program ended, in words; a shell says 128 and the signal where one ended it."""
+    number = -status if status < 0 else status - 128
+    known = [each.name for each in signal.Signals if each == number]
+    return f"was ended by {known[0]}" if known else f"ended with status {status}"
 
 
 def end(process: subprocess.Popen[bytes]) -> None:
@@ -127,21 +138,6 @@ def half_of_memory() -> float:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 2
     except (AttributeError, ValueError, OSError):
         return 8.0 * 2**30
-
-
-def is_solver(number: int) -> bool:
-    """Return whether a process is that of a solver of this process, or was started by one."""
-    with contextlib.suppress(OSError):
-        return f"\0{MARK}={os.getpid()}-".encode() in b"\0" + Path(f"/proc/{number}/environ").read_bytes()
-    return False
-
-
-def accuse() -> None:
-    """Raise ForeignError if a solver has sent a signal to this process."""
-    if ACCUSED:
-        names = ", ".join(sorted(ACCUSED))
-        ACCUSED.clear()
-        raise ForeignError(f"it sent {names} to flipproof")
 
 
 def last_line(printed: bytes) -> str:
