@@ -11,7 +11,7 @@ from flipproof.chapters.vectors.published import Vector, load_all
 from flipproof.foreign import elsewhere
 from flipproof.foreign.checking import SMOOTH, THROW, Found, Making, NotApplicableError, ask_of, shift, when
 from flipproof.foreign.contract import Ask, Traits
-from flipproof.foreign.place import THROWS, curve, name_of, placing, switches_of
+from flipproof.foreign.place import SETTLED, THROWS, curve, name_of, placing, switches_of
 from slicemodel.observables import centre_of_mass, moment_of_inertia
 
 
@@ -218,7 +218,8 @@ def check_gravity(traits: Traits) -> Making:
     if not place.on_lattice or place.equation != name_of(switches_of(traits.equation)):
         raise NotApplicableError("told by the check of the equation")
     light, without = (replace(THROW, gravity=g) for g in (THROW.gravity / 2, 0.0))
-    levels = (3, 2) if traits.refined_by else (0,)
+    settled = place.change is not None and place.change <= SETTLED
+    levels = ((1, 0) if settled else (3, 2)) if traits.refined_by else (0,)
     one, other, *coarser = yield [ask_of(traits, throw, level) for level in levels for throw in (light, without)]
     exact = [curve(traits.equation, throw, one.t).omega / THROW.omega0 for throw in (light, without)]
     measured = (one.omega - other.omega) / THROW.omega0

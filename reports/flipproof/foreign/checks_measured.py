@@ -175,11 +175,12 @@ def check_floor(traits: Traits) -> Making:
     if traits.refined_by is None:
         raise NotApplicableError("refined_by is not declared")
     stride, deepest = (1, 6) if traits.refined_by == "rtol" else (2, 8)  # level 8 is 250 000 steps
-    coarse, fine = yield [ask_of(traits, SMOOTH, level) for level in (0, stride)]
+    start = -4 if (traits.order or 0.0) > 2 else 0
+    coarse, fine = yield [ask_of(traits, SMOOTH, level) for level in (start, start + stride)]
     changes = [shift(coarse, fine, SMOOTH.omega0)]
     noises: list[float] = []
     stopped = changes[0] <= 16 * traits.epsilon
-    for level in range(2 * stride, deepest + 1, stride):
+    for level in range(start + 2 * stride, deepest + 1, stride):
         if stopped:
             break
         # By steps shorter by a sixteenth a change as large as by steps a quarter as long is noise. With another

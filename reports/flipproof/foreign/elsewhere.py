@@ -16,7 +16,8 @@ paper's throw or back to it, until one of them tells right from wrong.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Final
 
@@ -49,8 +50,11 @@ WEAK: Final = 0.01
 STRAY: Final = 0.03
 """Share of the values of v that may be off: a slice turns round at an impact, and an output time may lie beside it."""
 
-LEVELS: Final = (3, 2.4, 1.7)
-"""Levels of refinement; no step of one is a multiple of another's, so that none shares the luck of its grid."""
+LEVELS: Final = ((-1.3, -1.9, -2.6), (1, 0.4, -0.3), (3, 2.4, 1.7))
+"""Levels of refinement, finer ones where coarser ones leave an own error that counts.
+
+No step of one is a multiple of another's, so that none shares the luck of its grid.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -266,18 +270,26 @@ def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, un
     )
 
 
-Judging = Generator[Sequence[Ask], Sequence[Answer], Judged]
+Judging = Generator[Sequence[Ask], Sequence[Answer], list[Judged]]
 
 
-def judging(traits: Traits, knobs: Knobs, seed: int, equation: str, unrefined: float) -> Judging:
-    """Ask for one throw, at three levels if the solver can be refined, and judge it."""
-    plain = knobs.ask(seed)
-    levels = LEVELS if traits.refined_by else LEVELS[:1]
-    try:
-        answers = yield [replace(plain, effort=effort_of(traits, plain.scenario, level)) for level in levels]
-    except ForeignError as error:
-        return Judged(wrong={"answer": (1.0, 1e-3, 0.0)}, error=str(error))
-    return judge(traits, plain, answers, equation, unrefined)
+def judging(traits: Traits, throws: Sequence[Knobs], seed: int, equation: str, unrefined: float) -> Judging:
+    """Ask for throws, at three levels if the solver can be refined and at finer ones if need be, and judge each."""
+    asks, judged = [knobs.ask(seed) for knobs in throws], {}
+    left = list(range(len(asks)))
+    for levels in LEVELS if traits.refined_by else ((0,),):
+        refined = {
+            k: [replace(asks[k], effort=effort_of(traits, asks[k].scenario, level)) for level in levels] for k in left
+        }
+        with suppress(ForeignError):
+            yield [ask for each in refined.values() for ask in each]  # all at once, where somebody writes the answers
+        for k, each in refined.items():
+            try:
+                judged[k] = judge(traits, asks[k], (yield each), equation, unrefined)
+            except ForeignError as error:
+                judged[k] = Judged(wrong={"answer": (1.0, 1e-3, 0.0)}, error=str(error))
+        left = [k for k in left if not judged[k].error and OWN * judged[k].own > FLOOR]
+    return [judged[k] for k in range(len(asks))]
 
 
 def check_elsewhere(traits: Traits, seed: int = SEED) -> Making:
@@ -287,12 +299,8 @@ def check_elsewhere(traits: Traits, seed: int = SEED) -> Making:
     if not found.on_lattice or found.equation != name_of(switches_of(equation)):
         raise NotApplicableError("needs an equation that the solver is found to solve")
     unrefined = min(0.01 + 4 * found.distance, 0.018)  # as far off as where it was placed, and not blurred
-    flights = []
-    for knobs in drawn(seed):
-        judged = yield from judging(traits, knobs, seed, equation, unrefined)
-        flights.append((knobs, judged))
-        if judged.error:  # and may do so again and again, each time as late as it may be
-            break
+    throws = drawn(seed)
+    flights = list(zip(throws, (yield from judging(traits, throws, seed, equation, unrefined)), strict=True))
     wrong = [(knobs, judged) for knobs, judged in flights if judged.wrong]
     own = max((judged.own for _, judged in flights if not judged.error), default=0.0)
     facts = {
@@ -319,24 +327,22 @@ def bisected(
     traits: Traits, knobs: Knobs, judged: Judged, seed: int, equation: str, unrefined: float
 ) -> Generator[Sequence[Ask], Sequence[Answer], tuple[str, str]]:
     """Return the sentence that tells right from wrong by one knob, and what to look at."""
-    how: Callable[[Knobs], Judging] = lambda one: judging(traits, one, seed, equation, unrefined)  # noqa: E731
+    how: Callable[[Sequence[Knobs]], Judging] = lambda all: judging(traits, all, seed, equation, unrefined)  # noqa: E731
     lost = _wrong_words(judged)
-    if (base := (yield from how(PAPER))).wrong:
+    names = [name for name in WORDS if getattr(knobs, name) != getattr(PAPER, name)]
+    (base,) = yield from how([PAPER])
+    if base.wrong:
         return f"{_wrong_words(base)} on the paper's throw, too", _field_advice(base)
-    names = [f.name for f in fields(Knobs) if getattr(knobs, f.name) != getattr(PAPER, f.name)]
-    names = [name for name in WORDS if name in names]
-    alone: dict[str, Judged] = {}
-    for name in names:
-        if (one := (yield from how(replace(PAPER, **{name: getattr(knobs, name)})))).wrong:
-            alone[name] = one
+    turned = yield from how([replace(PAPER, **{name: getattr(knobs, name)}) for name in names])
+    alone = {name: one for name, one in zip(names, turned, strict=True) if one.wrong}
     if alone:
         name = max(alone, key=lambda each: alone[each].excess)
         return (
             f"right at {said(PAPER, name)}, wrong at {said(knobs, name)}: {_wrong_words(alone[name])}",
             f"{WORDS[name][1]}{_field_advice(alone[name], '; ')}",
         )
-    for name in names:
-        back = yield from how(replace(knobs, **{name: getattr(PAPER, name)}))
+    turned = yield from how([replace(knobs, **{name: getattr(PAPER, name)}) for name in names])
+    for name, back in zip(names, turned, strict=True):
         if not back.wrong and back.share > 0.3:
             return (
                 f"right at {said(PAPER, name)}, wrong at {said(knobs, name)} where other things are changed, too: "
@@ -355,12 +361,10 @@ def simplified(traits: Traits, equation: str) -> Generator[Sequence[Ask], Sequen
         "impacts": replace(whole, angle=1.0),
         "all": replace(whole, gravity=0.0, damping=0.0, angle=1.0),
     }
-    if not (yield from judging(traits, whole, 0, equation, 0.003)).wrong:
+    first, *others = yield from judging(traits, [whole, *simpler.values()], 0, equation, 0.003)
+    if not first.wrong:
         return ""
-    right = set()
-    for name, knobs in simpler.items():
-        if not (yield from judging(traits, knobs, 0, equation, 0.003)).wrong:
-            right.add(name)
+    right = {name for name, judged in zip(simpler, others, strict=True) if not judged.wrong}
     if {"weight", "impacts"} <= right:
         return "right without weight, and without impacts: look at when slices rest on an end and weight lifts them; "
     if "weight" in right:

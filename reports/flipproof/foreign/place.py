@@ -47,6 +47,13 @@ SURE: Final = 4.0
 """A solver is off the lattice if its distance to every equation exceeds ``_room``: this many times its change."""
 
 
+LEVELS: Final = ((-1, -2, -3), (1, 0, -1), (3, 2, 1))
+"""Levels of refinement, finer ones where coarser ones are not ``SETTLED``."""
+
+SETTLED: Final = 2e-5
+"""Change under refinement, fraction of omega_0, below which finer steps tell nothing more."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
     """Where a solver stands.
@@ -153,18 +160,22 @@ def place(runner: Runner) -> Place:
 
 
 def placing(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], Place]:
-    """Yield the asks by which a solver is placed, at its finest level and two before it; return its place."""
-    levels = (3, 2, 1) if traits.refined_by is not None else (3,)
-    answers = yield [ask_of(traits, throw, level) for level in levels for throw in THROWS]
-    relative = [answer.omega / throw.omega0 for answer, throw in zip(answers, THROWS * len(levels), strict=True)]
-    curves, *coarser = (tuple(relative[k : k + len(THROWS)]) for k in range(0, len(relative), len(THROWS)))
+    """Yield the asks by which a solver is placed, at three levels and at finer ones if need be; return its place."""
+    changes: list[float | None] = [None] * len(THROWS)
+    for levels in LEVELS if traits.refined_by is not None else ((0,),):
+        answers = yield [ask_of(traits, throw, level) for level in levels for throw in THROWS]
+        relative = [answer.omega / throw.omega0 for answer, throw in zip(answers, THROWS * len(levels), strict=True)]
+        curves, *coarser = (tuple(relative[k : k + len(THROWS)]) for k in range(0, len(relative), len(THROWS)))
+        steps = [_apart(a, b) for a, b in pairwise([curves, *coarser])]
+        if steps:
+            changes = [max(of_throw) for of_throw in zip(*steps, strict=True)]
+            if max(map(max, steps)) <= SETTLED:
+                break
     references = lattice()
     distances = {s: max(_apart(curves, reference)) for s, reference in references.items()}
     nearest = min(distances, key=lambda s: (distances[s], s.name))
     following = min((s for s in distances if s != nearest), key=lambda s: (distances[s], s.name))
     moved = max(float(np.max(np.abs(c - 1.0))) for c in curves)
-    steps = [_apart(a, b) for a, b in pairwise([curves, *coarser])]
-    changes = [max(of_throw) for of_throw in zip(*steps, strict=True)] if steps else [None] * len(curves)
     rooms = [_room(each, distances[following], traits.epsilon) for each in changes]
     distance, change, room = max(
         zip(_apart(curves, references[nearest]), changes, rooms, strict=True), key=lambda found: found[0] / found[2]

@@ -13,6 +13,7 @@ cap). It shares no code with ``ode_reference``.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
@@ -188,14 +189,19 @@ class Subject:
             new = self.advance(y, h)
             if self.frozen or not self.struck(new).any():
                 return self.let_go(new)
-            low, high = 0.0, h
+            between, low, high = self.cubic(y, new, h), 0.0, h
             for _ in range(42):
                 middle = (low + high) / 2
-                low, high = (low, middle) if self.struck(self.advance(y, middle)).any() else (middle, high)
+                low, high = (low, middle) if self.struck(between(middle)).any() else (middle, high)
             self.impacts += 1
-            at = self.advance(y, high)
-            y, h = self.meet(at, self.struck(at)), h - high
+            y, h = self.meet(self.advance(y, high), self.struck(between(high))), h - high
         return self.advance(y, h)
+
+    def cubic(self, y: FloatArray, new: FloatArray, h: float) -> Callable[[float], FloatArray]:
+        """Return the states between two that lie ``h`` apart, by the cubic with their slopes."""
+        first, last, mean = self.slope(y), self.slope(new), (new - y) / h
+        square, cube = (3 * mean - 2 * first - last) / h, (first + last - 2 * mean) / h**2
+        return lambda t: y + t * (first + t * (square + t * cube))
 
     def steps(self, span: float, dt: float) -> int:
         """Return the steps that lead over ``span`` [s]."""
