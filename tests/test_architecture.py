@@ -183,8 +183,6 @@ FLOORS = (
 
 UPWARD = {
     "chapters.flights.chapter -> page.motion",
-    "figures.power -> foreign.certify",
-    "figures.power -> foreign.power",
     "figures.report_pair -> output.columns",
     "film.page -> page.templating",
     "foreign.checks_basic -> chapters.vectors.published",

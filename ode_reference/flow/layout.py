@@ -94,8 +94,9 @@ def prepare(
     now.tolerance = TOLERANCE * scenario.bottle.length
     now.origin, now.drag_on_centre, now.recoil = switches.origin, switches.drag_on_centre, switches.recoil
     now.sequential = settings["impact_law"] == "sequential" and switches.recoil
+    stacked = type(scenario).initial_positions is Scenario.initial_positions  # else let go elsewhere than Eq. 3a says
     # Nothing tells the ends of a full bottle apart if no weight pulls along it and impacts do not come one by one.
-    now.mirrored = scenario.fill_fraction == 1.0 and now.gravity == 0.0 and not now.sequential
+    now.mirrored = stacked and scenario.fill_fraction == 1.0 and now.gravity == 0.0 and not now.sequential
     now.ledger, now.step_limit, now.watch = settings["energy"], STEP_LIMIT, WATCH
     now.impact_limit = messages.max_impacts(n)
     now.theta, now.A, now.dB = scenario.theta0, 1.0, 1.0
@@ -103,7 +104,7 @@ def prepare(
     # A full bottle is mirror symmetric to the last digit: its stack is as high as the tube is long.
     empty = (1.0 - scenario.fill_fraction) * scenario.bottle.length / 2
     points[PLACE] = empty + ((n - 1) / 2 - np.arange(n, dtype=np.float64)) * scenario.slice_height
-    if type(scenario).initial_positions is not Scenario.initial_positions:  # let go elsewhere than Eq. 3a says
+    if not stacked:
         points[PLACE] = scenario.initial_positions() - scenario.bottle.length / 2
     points[PLACE] += moved
     return flight, points, marks

@@ -1,4 +1,4 @@
-"""The commands of ``flipproof`` about solvers, its own and anybody's: models, certify, place, explain, power."""
+"""The commands of ``flipproof`` about solvers, its own and anybody's: models, certify, place, explain."""
 
 from __future__ import annotations
 
@@ -58,12 +58,6 @@ def add_foreign(commands: Any) -> None:
     explain.add_argument("second", metavar="B", help="the same")
     explain.add_argument("--scenario", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     explain.add_argument("--slices", type=count, default=10, metavar="N", help="slices of the throw (default 10)")
-
-    power = add_command(
-        commands, "power", "Plant known mistakes in a good solver; which checks see them?", command_power
-    )
-    power.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
-    power.add_argument("--out", type=Path, metavar="DIR", help="also write power.csv, .svg, .png and junit.xml there")
 
 
 def add_models(commands: Any) -> None:
@@ -177,37 +171,3 @@ def command_explain(options: argparse.Namespace) -> int:
     with closing(opened(options.first)) as one, closing(opened(options.second)) as other:
         print(inert(explain(one, other, throw).text))
     return 0
-
-
-def command_power(options: argparse.Namespace) -> int:
-    """Print a line a mistake; return 1 if one is caught by no check, or the clean solver by any."""
-    from flipproof.foreign.heldout import HELD_OUT
-    from flipproof.foreign.mistakes import MISTAKES
-    from flipproof.foreign.power import CLEAN, claim_power, detect, matrix_csv
-    from flipproof.frame.pool import workers
-    from flipproof.output.folder import check_replaceable, replaced_folder, write_text
-
-    if options.out is not None:
-        check_replaceable(options.out, "power")
-    found = []
-    with workers(options.jobs) as pool:
-        for caught in pool.map(detect, [CLEAN, *MISTAKES, *HELD_OUT]):
-            seen = ", ".join(caught.checks) or "no check"
-            print(f"{caught.mistake:22} {caught.words} Seen by: {seen}", flush=True)
-            found.append(caught)
-    claims = claim_power(found)
-    if options.out is not None:
-        from flipproof.figures.power import figure_power
-        from flipproof.figures.style import draw
-
-        drawing = draw(figure_power(found))
-        with replaced_folder(options.out, "power") as folder:
-            write_text(folder / "power.csv", matrix_csv(found))
-            write_text(folder / "power.svg", drawing.svg)
-            (folder / "power.png").write_bytes(drawing.png)
-            write_junit(folder / "junit.xml", claims, "flipproof power")
-    for claim in claims:
-        verdict = "FAIL" if claim.failed else "PASS"
-        print(f"{verdict}  {claim.title}: {claim.value:g} {claim.unit} {claim.note}".rstrip())
-    sys.stdout.flush()
-    return 1 if any(claim.failed for claim in claims) else 0

@@ -184,13 +184,14 @@ def certify(
     *,
     equation: str | None = None,
     seed: int = elsewhere.SEED,
+    until_failed: bool = False,
     say: Callable[[Result], object] = lambda _: None,
 ) -> Certificate:
     """Make the checks of a solver, one after the other.
 
-    It is held to ``equation``, if given, instead of the one that it declares; ``seed`` draws the throws of
-    "elsewhere"; ``say`` is given each result as it comes. Raises ForeignError if the solver cannot be loaded or
-    declares the failure of a check that there is not.
+    It is held to ``equation``, if given, instead of the one that it declares; ``seed`` draws the throws of "elsewhere";
+    with ``until_failed`` the first failure is the last check; ``say`` is given each result as it comes. Raises
+    ForeignError if the solver cannot be loaded or declares the failure of a check that there is not.
     """
     declared = runner.traits if equation is None else replace(runner.traits, equation=equation)
     traits = declared
@@ -202,6 +203,8 @@ def certify(
     for name in names:
         results.append(_result(name, made[name], traits, asked))
         say(results[-1])
+        if until_failed and results[-1].verdict == FAILED:
+            return Certificate(traits=declared, results=tuple(results), domain=asked.domain)
         if name == "digits" and results[-1].verdict == WEAK and results[-1].found is not None:
             traits = replace(traits, precision=results[-1].found.facts["precision"])
     if names == tuple(CHECKS):

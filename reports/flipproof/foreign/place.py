@@ -21,7 +21,7 @@ from typing import Final
 import numpy as np
 
 from flipproof.foreign.checking import ask_of, drive, times_of
-from flipproof.foreign.contract import Answer, Ask, Runner, Traits
+from flipproof.foreign.contract import Answer, Ask, ForeignError, Runner, Traits
 from flipproof.frame import shapley
 from flipproof.frame.equations import NAMES, canonical
 from flipproof.frame.solvers import solve
@@ -163,7 +163,12 @@ def placing(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], Place]
     """Yield the asks by which a solver is placed, at three levels and at finer ones if need be; return its place."""
     changes: list[float | None] = [None] * len(THROWS)
     for levels in LEVELS if traits.refined_by is not None else ((0,),):
-        answers = yield [ask_of(traits, throw, level) for level in levels for throw in THROWS]
+        try:
+            answers = yield [ask_of(traits, throw, level) for level in levels for throw in THROWS]
+        except ForeignError:  # at long steps, perhaps
+            if levels in (LEVELS[-1], (0,)):
+                raise
+            continue
         relative = [answer.omega / throw.omega0 for answer, throw in zip(answers, THROWS * len(levels), strict=True)]
         curves, *coarser = (tuple(relative[k : k + len(THROWS)]) for k in range(0, len(relative), len(THROWS)))
         steps = [_apart(a, b) for a, b in pairwise([curves, *coarser])]

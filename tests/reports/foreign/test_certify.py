@@ -7,18 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from planted import InProcess, patches
+from planted.asked import ASKED
+from planted.ours import MISTAKES
+from planted.subject import Subject
 
 import ode_reference
 from flipproof.foreign import checks_measured
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, WEAK, certify, findings_of
 from flipproof.foreign.contract import Ask, ForeignError, started
 from flipproof.foreign.elsewhere import SEED, drawn
-from flipproof.foreign.heldout import HELD_OUT
-from flipproof.foreign.mistakes import MISTAKES
-from flipproof.foreign.power import CLEAN, Caught, InProcess, claim_power, matrix_csv
 from flipproof.foreign.solving import opened
 from flipproof.foreign.specs import load
-from flipproof.foreign.subject import Subject
 from flipproof.frame.solvers import solve
 from flipproof.output.junit import junit_text
 from slicemodel import Scenario
@@ -97,7 +97,7 @@ def variant(name):
 
 
 LONG = ("restitution", "order-across-impacts", "equation", "gravity", "elsewhere", "published-vectors")
-"""Checks that ``flipproof power`` makes of the good solver, and ``test_our_own_solvers_pass`` of faster ones."""
+"""Checks that ``benchmarks/power.py`` makes of the good solver, and ``test_our_own_solvers_pass`` of faster ones."""
 
 
 @pytest.mark.parametrize("check", [name for name in CHECKS if name not in LONG])
@@ -257,6 +257,9 @@ def test_throws_are_drawn_anew_by_a_seed():
     assert drawn(1) == drawn(1) != drawn(2)
     for seed in range(20):
         throws = [knobs.ask(seed) for knobs in drawn(seed)]
+        assert {len(ask.times) for ask in throws} == {1, 60}
+        fillings = [ask.scenario.fill_fraction for ask in throws]
+        assert min(fillings) < 0.05 < 1.0 == max(fillings)
         assert {0.0, 1.0} < {ask.scenario.restitution for ask in throws}
         assert {1, 2, 9} < {ask.scenario.n_slices for ask in throws}
         assert max(ask.scenario.n_slices for ask in throws) > 64
@@ -346,42 +349,46 @@ def test_the_good_solver_is_free_flight():
     np.testing.assert_allclose(found.omega, solve("free-flight", throw, times=t).omega, rtol=1e-9)
 
 
-def test_there_are_at_least_twenty_mistakes_and_each_says_what_it_is():
-    assert len(MISTAKES) + len(HELD_OUT) >= 50
-    assert not set(MISTAKES) & set(HELD_OUT)
-    assert all(kind.__doc__.endswith(".") for kind in [*MISTAKES.values(), *HELD_OUT.values()])
-    table = matrix_csv([Caught("none", "no mistake", ()), Caught("x", "y", ("ice",))]).splitlines()
-    assert table[0] == "mistake," + ",".join(CHECKS)
-    assert table[2].split(",").count("1") == 1
+def test_there_are_at_least_120_mistakes_and_each_says_what_it_is():
+    first = patches("first")
+    assert len(MISTAKES) + len(ASKED) + len(first) >= 120
+    assert not set(MISTAKES) & set(ASKED)
+    assert all(kind.__doc__.endswith(".") for kind in [*MISTAKES.values(), *ASKED.values()])
+    for mistake in first.values():
+        assert mistake.words.endswith(".")
+        assert callable(mistake.solver())
 
 
-def test_a_mistake_that_nobody_sees_and_a_clean_solver_that_is_accused_fail():
-    good = [Caught(CLEAN, "no mistake", ()), Caught("Weight", "y", ("ice",)), Caught("OmegaAbs", "z", ("mirror",))]
-    assert not any(claim.failed for claim in claim_power(good))
-    missed, held_out, accused = claim_power(
-        [Caught(CLEAN, "no mistake", ("ice",)), Caught("Weight", "y", ()), Caught("OmegaAbs", "z", ())]
-    )
-    assert missed.failed
-    assert (missed.note, held_out.note) == ("not seen: Weight", "not seen: OmegaAbs")
-    assert held_out.failed
-    assert accused.failed
-
-
-HELD_OUT_FIRST = {
+ASKED_FIRST = {
     "ThetaFromZero": "start",
     "OmegaLate": "angle",
     "CentreFromMiddle": "definitions",
     "FourDigits": "digits",
     "EffortFloor": "refinement",
 }
-"""Some mistakes of the second list, and the check that is to name them first."""
+"""Some mistakes of what is asked and answered, and the check that is to name them first."""
 
 
-@pytest.mark.parametrize(("mistake", "check"), HELD_OUT_FIRST.items())
+@pytest.mark.parametrize(("mistake", "check"), ASKED_FIRST.items())
 def test_the_first_check_that_fails_is_the_one_that_tells(mistake, check):
     names = [name for name in CHECKS if name not in LONG]
-    found = certify(InProcess(HELD_OUT[mistake](), mistake), names[: names.index(check) + 1])
+    found = certify(InProcess(ASKED[mistake](), mistake), names[: names.index(check) + 1])
     assert [r.check for r in found.failed] == [check]
+
+
+@pytest.mark.parametrize(
+    ("mistake", "check", "advice"),
+    [
+        ("theta0_ignored", "start", "begin at scenario.theta0"),
+        ("cached_by_number_of_slices", "determinism", "keep nothing under a part of the throw"),
+        ("flight_ends_at_half_a_second", "angle", "fly to the last of ask.times"),
+    ],
+)
+def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, advice):
+    solver = patches("first")[mistake].solver()
+    found = certify(InProcess(solver, mistake), until_failed=True)
+    assert [r.check for r in found.failed] == [check]
+    assert advice in found.results[-1].line
 
 
 def test_a_bug_in_what_is_planted_is_no_failure_of_a_check():

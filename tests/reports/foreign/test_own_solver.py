@@ -4,12 +4,11 @@ import json
 import re
 import subprocess
 import sys
-from contextlib import contextmanager
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from made_up import command as run
+from planted import InProcess
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = (ROOT / "docs" / "own-solver.md").read_text(encoding="utf-8")
@@ -102,7 +101,7 @@ def test_explain_simulate_and_compare_take_a_solver_of_ones_own(capsys, tmp_path
 
 def test_help_names_the_commands(capsys):
     out = run(capsys, "--help")[1] + run(capsys, "more")[1]
-    for command in ("certify", "place", "explain", "power"):
+    for command in ("certify", "place", "explain"):
         assert re.search(rf"^ +{command} ", out, re.MULTILINE)
         assert "usage: flipproof" in run(capsys, command, "--help")[1]
 
@@ -140,7 +139,6 @@ def test_the_passports_of_box2d_say_what_was_found():
 def test_box2d_has_the_threshold_and_the_floor_its_passport_names():
     pytest.importorskip("Box2D")
     from flipproof.foreign.certify import certify
-    from flipproof.foreign.power import InProcess
     from flipproof.foreign.specs import load
 
     names = ["restitution", "digits", "precision-floor"]
@@ -152,35 +150,6 @@ def test_box2d_has_the_threshold_and_the_floor_its_passport_names():
     for _, digits, floor in found.values():
         assert digits.found.facts["arithmetic"] == "float32"
         assert len(floor.found.facts["changes"]) <= 2
-
-
-def test_power_replaces_only_what_it_wrote_and_refuses_the_rest_before_the_work(tmp_path, monkeypatch, capsys):
-    from flipproof.foreign.power import CLEAN, Caught
-
-    def detect(mistake):
-        asked.append(mistake)
-        return Caught(mistake, "words.", () if mistake == CLEAN else ("ice",))
-
-    @contextmanager
-    def workers(_jobs):
-        yield SimpleNamespace(map=map)
-
-    asked = []
-    monkeypatch.setattr("flipproof.foreign.power.detect", detect)
-    monkeypatch.setattr("flipproof.frame.pool.workers", workers)
-    theirs, file, out = tmp_path / "theirs", tmp_path / "file", tmp_path / "out"
-    theirs.mkdir()
-    (theirs / "junit.xml").write_text("theirs")
-    file.write_text("theirs")
-    for place, words in ((theirs, "holds junit.xml"), (file, "is a file; --out names a folder")):
-        status, _, err = run(capsys, "power", "--out", str(place))
-        assert status == 2
-        assert words in err
-    assert not asked
-    assert (theirs / "junit.xml").read_text() == file.read_text() == "theirs"
-    for _ in range(2):
-        assert run(capsys, "power", "--out", str(out))[0] == 0
-    assert {entry.name for entry in out.iterdir()} == {".flipproof", "power.csv", "power.svg", "power.png", "junit.xml"}
 
 
 @pytest.mark.usefixtures("folder")

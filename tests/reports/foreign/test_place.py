@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from planted import InProcess
+from planted.ours import MISTAKES
 
 from flipproof.chapters.solvers import LIMITS
 from flipproof.foreign.contract import ForeignError
-from flipproof.foreign.mistakes import MISTAKES
 from flipproof.foreign.place import explain, lattice, name_of, place, shares, switches_of
-from flipproof.foreign.power import InProcess
 from flipproof.foreign.solving import opened
 from flipproof.frame.solvers import catalogue
 from ode_reference.switches import Switches

@@ -185,7 +185,7 @@ class Subject:
 
     def step(self, y: FloatArray, h: float) -> FloatArray:
         """Return the state after a step with all its rebounds, each at its own time."""
-        while self.impacts < 500:  # after that it flies on without; a mistake may cause impacts without end
+        while self.impacts < 500 + 100 * self.n:  # a mistake may cause impacts without end
             new = self.advance(y, h)
             if self.frozen or not self.struck(new).any():
                 return self.let_go(new)

@@ -1,7 +1,6 @@
 """Mistakes written by somebody who had read the contract alone and no check, planted in the good solver.
 
-Each changes what the solver is asked, or what it answers; the equation inside stays right. The second list of
-``flipproof power``: the first one (``mistakes``) shares its authors with the checks.
+Each changes what the solver is asked, or what it answers; the equation inside stays right.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.foreign.contract import Ask
-from flipproof.foreign.subject import Subject
+from planted.subject import Subject
 from slicemodel import Scenario
 
 Fields = dict[str, Any]
@@ -126,5 +125,5 @@ _KINDS: Final = (
     ),
 )
 
-HELD_OUT: Final[Mapping[str, type[Subject]]] = MappingProxyType({kind.__name__: kind for kind in _KINDS})
-"""Every mistake of the second list by name; its docstring says what it is."""
+ASKED: Final[Mapping[str, type[Subject]]] = MappingProxyType({kind.__name__: kind for kind in _KINDS})
+"""Every mistake of the list by name; its docstring says what it is."""

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.foreign.contract import Ask
-from flipproof.foreign.subject import Subject
+from planted.subject import Subject
 
 
 def _spoiled(name: str, words: str, **parts: Any) -> Any:

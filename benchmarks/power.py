@@ -1,0 +1,84 @@
+"""Plant known mistakes in right solvers, and print which check of ``flipproof certify`` names each of them first.
+
+    python benchmarks/power.py                 # all of them, and right solvers, which no check may accuse
+    python benchmarks/power.py recoil theta    # those whose name or words hold one of these
+
+``ours`` are by those who wrote the checks. All others are by people who had read the contract and none of the checks:
+they say what the first list cannot, how many mistakes pass that nobody here thought of. Exit status 1 if a mistake is
+missed that is not known to be, or a right solver is accused.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from typing import Any, Final
+
+from planted import InProcess, patches
+from planted.asked import ASKED
+from planted.ours import MISTAKES
+from planted.right import RIGHT
+
+from flipproof.foreign.certify import FAILED, certify
+
+LISTS: Final[dict[str, dict[str, Any]]] = {
+    "ours": dict(MISTAKES),
+    "asked": dict(ASKED),
+    "first": patches("first"),
+    "second": patches("second"),
+    "right": dict(RIGHT),
+}
+"""Mistakes by list and name, and solvers without one."""
+
+MISSED: Final[dict[str, str]] = {}
+"""Mistakes known to be missed, and why."""
+
+
+def words_of(planted: Any) -> str:
+    """Return what is wrong, or what a right solver is."""
+    return str(getattr(planted, "words", None) or (planted.__doc__ or "").partition("\n")[0])
+
+
+def judged(place: tuple[str, str]) -> tuple[str, str, float]:
+    """Return the first check that fails because of one mistake, its line, and the processor time that this took [s]."""
+    group, name = place
+    planted, began = LISTS[group][name], time.process_time()
+    solver = planted.solver() if hasattr(planted, "solver") else planted()
+    found = certify(InProcess(solver, name), until_failed=True)
+    first = next((result for result in found.results if result.verdict == FAILED), None)
+    check, line = (first.check, first.words) if first else ("", "")
+    return check, line, time.process_time() - began
+
+
+def main() -> int:
+    """Print a line a mistake and the rate of each list."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("words", nargs="*")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    options = parser.parse_args()
+    places = [
+        (group, name)
+        for group, planted in LISTS.items()
+        for name, one in planted.items()
+        if not options.words or any(word in f"{name} {words_of(one)}" for word in options.words)
+    ]
+    seen: dict[str, list[bool]] = {group: [] for group in LISTS}
+    wrong = 0
+    with ProcessPoolExecutor(options.jobs) as pool:
+        for (group, name), (check, line, seconds) in zip(places, pool.map(judged, places), strict=True):
+            seen[group].append(bool(check))
+            wrong += bool(check) if group == "right" else not check and name not in MISSED
+            said = line or MISSED.get(name, "no check")
+            print(f"{group:6} {name}: {words_of(LISTS[group][name])}\n       {seconds:.1f} s  {check or '-'}: {said}")
+            sys.stdout.flush()
+    for group, each in seen.items():
+        verdict = "solvers accused" if group == "right" else "mistakes caught"
+        print(f"{group:6} {verdict}: {sum(each)} of {len(each)}")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
