@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
@@ -23,6 +24,7 @@ from planted.ours import MISTAKES
 from planted.right import RIGHT
 
 from flipproof.foreign.certify import FAILED, certify
+from flipproof.foreign.contract import Answer, Ask, ForeignError
 
 LISTS: Final[dict[str, dict[str, Any]]] = {
     "ours": dict(MISTAKES),
@@ -37,6 +39,25 @@ MISSED: Final[dict[str, str]] = {}
 """Mistakes known to be missed, and why."""
 
 
+class Limited(InProcess):
+    """A solver in this process that may take 20 s for an answer (POSIX): a mistake may make it run for ever."""
+
+    def __call__(self, ask: Ask) -> Answer:
+        """Return the checked answer."""
+
+        def late(*_: object) -> None:
+            raise ForeignError("no answer within 20 s")
+
+        if hasattr(signal, "setitimer"):
+            signal.signal(signal.SIGALRM, late)
+            signal.setitimer(signal.ITIMER_REAL, 20.0)
+        try:
+            return super().__call__(ask)
+        finally:
+            if hasattr(signal, "setitimer"):
+                signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
 def words_of(planted: Any) -> str:
     """Return what is wrong, or what a right solver is."""
     return str(getattr(planted, "words", None) or (planted.__doc__ or "").partition("\n")[0])
@@ -47,7 +68,7 @@ def judged(place: tuple[str, str]) -> tuple[str, str, float]:
     group, name = place
     planted, began = LISTS[group][name], time.process_time()
     solver = planted.solver() if hasattr(planted, "solver") else planted()
-    found = certify(InProcess(solver, name), until_failed=True)
+    found = certify(Limited(solver, name), until_failed=True)
     first = next((result for result in found.results if result.verdict == FAILED), None)
     check, line = (first.check, first.words) if first else ("", "")
     return check, line, time.process_time() - began

@@ -141,7 +141,8 @@ class _Flight:
         self.immobile = scenario.frozen or self.ends.high - self.ends.low <= self.ends.reach
         # Nothing tells the ends of a full bottle apart if no weight pulls along it and impacts do not come one by one.
         weightless = model.switches.weightless or scenario.gravity == 0.0
-        self.mirrored = scenario.fill_fraction == 1.0 and weightless and self.law is not LAWS["sequential"]
+        stacked = type(scenario).initial_positions is Scenario.initial_positions
+        self.mirrored = stacked and scenario.fill_fraction == 1.0 and weightless and self.law is not LAWS["sequential"]
         self.t = 0.0
         self.y = np.concatenate([[scenario.theta0], scenario.initial_positions() + moved, np.zeros(n)])
         self.resting: SideArray = np.zeros(n, dtype=np.int64)

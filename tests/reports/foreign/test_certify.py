@@ -16,7 +16,7 @@ import ode_reference
 from flipproof.foreign import checks_measured
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, WEAK, certify, findings_of
 from flipproof.foreign.contract import Ask, ForeignError, started
-from flipproof.foreign.elsewhere import SEED, drawn
+from flipproof.foreign.elsewhere import PAPER, SEED, drawn
 from flipproof.foreign.solving import opened
 from flipproof.foreign.specs import load
 from flipproof.frame.solvers import solve
@@ -275,6 +275,13 @@ def test_the_reference_begins_where_it_is_asked_to():
         one, other = (ode_reference.solve(started(ask), "eq8", ask.times, method=m) for m in ("taylor", "DOP853"))
         np.testing.assert_allclose(one.r, other.r, atol=1e-6 * ask.scenario.bottle.length)
         np.testing.assert_allclose(one.omega, other.omega, rtol=1e-6)
+
+
+def test_a_full_bottle_need_not_begin_as_its_own_mirror_image():
+    ask = replace(PAPER, filling=1.0, start="scattered", gravity=0.0, angle=3.0).ask(0)
+    one, other = (ode_reference.solve(started(ask), "free-flight", ask.times, method=m) for m in ("taylor", "DOP853"))
+    assert one.ok
+    np.testing.assert_allclose(one.r, other.r, atol=1e-6 * ask.scenario.bottle.length)
 
 
 def test_expected_failures_count_for_themselves():
