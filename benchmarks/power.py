@@ -40,17 +40,17 @@ MISSED: Final[dict[str, str]] = {}
 
 
 class Limited(InProcess):
-    """A solver in this process that may take 20 s for an answer (POSIX): a mistake may make it run for ever."""
+    """A solver in this process that may take a minute for an answer (POSIX): a mistake may make it run for ever."""
 
     def __call__(self, ask: Ask) -> Answer:
         """Return the checked answer."""
 
         def late(*_: object) -> None:
-            raise ForeignError("no answer within 20 s")
+            raise ForeignError("no answer within 60 s")
 
         if hasattr(signal, "setitimer"):
             signal.signal(signal.SIGALRM, late)
-            signal.setitimer(signal.ITIMER_REAL, 20.0)
+            signal.setitimer(signal.ITIMER_REAL, 60.0)
         try:
             return super().__call__(ask)
         finally:

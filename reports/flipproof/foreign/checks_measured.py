@@ -12,7 +12,7 @@ import numpy as np
 
 from flipproof.curves.order import observed_order
 from flipproof.foreign.checking import SMOOTH, THROW, Found, Making, NotApplicableError, ask_of, shift
-from flipproof.foreign.contract import Answer, Ask, Traits
+from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
@@ -187,7 +187,10 @@ def check_floor(traits: Traits) -> Making:
         # tolerance a solver takes other steps altogether: there, a change next to none says nothing.
         near = [level + math.log2(17 / 16)] if level < deepest and traits.refined_by != "rtol" else []
         coarse = fine
-        fine, *beside = yield [ask_of(traits, SMOOTH, each) for each in (level, *near)]
+        try:
+            fine, *beside = yield [ask_of(traits, SMOOTH, each) for each in (level, *near)]
+        except ForeignError:  # so many steps may take longer than a run may
+            break
         changes.append(shift(coarse, fine, SMOOTH.omega0))
         here = [shift(fine, each, SMOOTH.omega0) for each in beside]
         noises += here

@@ -240,6 +240,16 @@ def test_one_knob_tells_right_from_wrong_elsewhere(kind, said):
     assert "N 1 to " in found.conclusion
 
 
+def test_a_solver_too_slow_for_the_finest_steps_is_not_accused():
+    class Slow(Subject):
+        def solve(self, ask):
+            if ask.effort < 2e-5:
+                raise ForeignError("no answer within 60 s")
+            return super().solve(ask)
+
+    assert result_of("precision-floor", Slow, order=2.0).verdict == PASSED
+
+
 def test_slices_that_jump_have_no_speed_and_break_no_check():
     class Staircase(Subject):
         """Answers are those of the last hundredth of the flight."""
@@ -388,6 +398,7 @@ def test_the_first_check_that_fails_is_the_one_that_tells(mistake, check):
     [
         ("theta0_ignored", "start", "begin at scenario.theta0"),
         ("cached_by_number_of_slices", "determinism", "keep nothing under a part of the throw"),
+        ("ice_starts_at_zero", "ice", "let theta go on from theta_0"),
         ("flight_ends_at_half_a_second", "angle", "fly to the last of ask.times"),
     ],
 )
