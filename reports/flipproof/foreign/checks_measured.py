@@ -114,8 +114,9 @@ def check_order_before(traits: Traits) -> Making:
     """Before the first impact the error of every field falls with the step at the declared order, or faster."""
     declared = _order_of(traits)
     # Few and long steps: at short ones an order of 4 and more drowns in round-off. Low orders show at short ones only.
-    coarsest = -8 if declared > 2 else -4
-    answers = yield [ask_of(traits, SMOOTH, coarsest + level, points=3) for level in LEVELS]
+    # The theory is of short ones: the best of the ratios counts.
+    levels = range(-8, -2) if declared > 2 else range(-4, 0)
+    answers = yield [ask_of(traits, SMOOTH, level, points=3) for level in levels]
     orders: dict[str, float] = {}
     floor = max(ROUNDOFF, 64 * traits.epsilon)
     for name in FIELDS:
