@@ -41,15 +41,25 @@ class Patch:
     base: str
     changes: tuple[tuple[str, str], ...]
 
-    def solver(self) -> Any:
-        """Return the solver with the mistake; raises ValueError if what it replaces does not stand there once."""
-        text = (HERE / "solvers" / f"{self.base}.py").read_text(encoding="utf-8")
-        for old, new in self.changes:
+    def text(self) -> str:
+        """Return the solver with the mistake; raises ValueError if what it replaces does not stand there once.
+
+        The base is a file of ``solvers``, or one of ``right.diff``.
+        """
+        file = HERE / "solvers" / f"{self.base}.py"
+        text = file.read_text(encoding="utf-8") if file.is_file() else patches("right")[self.base].text()
+        for old, _ in self.changes:
             if text.count(old) != 1:
-                raise ValueError(f"{self.base}.py holds {text.count(old)} times, not once:\n{old}")
-            text = text.replace(old, new)
+                raise ValueError(f"{self.base} holds {text.count(old)} times, not once:\n{old}")
+        for old, new in sorted(self.changes, key=lambda change: -text.index(change[0])):
+            at = text.index(old)
+            text = text[:at] + new + text[at + len(old) :]
+        return text
+
+    def solver(self) -> Any:
+        """Return its function of one ask."""
         module = ModuleType(self.base)
-        exec(compile(text, f"{self.base}.py", "exec"), module.__dict__)
+        exec(compile(self.text(), self.base, "exec"), module.__dict__)
         return module.solve
 
 
