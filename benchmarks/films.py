@@ -2,7 +2,7 @@
 
     python benchmarks/films.py [--films 20] [--first 0] [--slices 6]      coverage, one line a cell
     python benchmarks/films.py --spoiled 500 --noise 200                  spoiled and random films: no traceback
-    python benchmarks/films.py --ends 20                                  late releases and early touches that are seen
+    python benchmarks/films.py --late 20                                  late releases, seen without an equation
 
 Frames per second and noise of a click, three levels each, are crossed; tilt, bad clicks, missing points and filling run
 through their levels by an orthogonal fraction of 18 cells.
@@ -24,7 +24,7 @@ import numpy as np
 from scipy.stats import beta
 
 from flipproof.film.estimate import estimate
-from flipproof.film.fall import beyond
+from flipproof.film.fall import before
 from flipproof.film.judge import Judged
 from flipproof.film.likelihood import Film
 from slicemodel import Scenario
@@ -119,29 +119,28 @@ def rough(spoiled: int, noise: int, slices: int) -> None:
     print(dict(outcome))
 
 
-def ends(films: int) -> None:
-    """Print how many late releases and early touches are seen without an equation; 0 ms is the truth."""
-    for fps, by in product((30, 60, 240), (0, 40, 80, 150)):
-        late = early = total = 0
+def releases(films: int) -> None:
+    """Print how many late releases are seen without an equation; 0 ms is the truth."""
+    for fps, late in product((30, 60, 240), (0, 40, 80, 150)):
+        seen = total = 0
         for (index, cell), k in product(enumerate(cells()), range(films)):
             if cell["fps"] == fps:
                 made = drawn(np.random.default_rng([index, k]), cell, 6)
-                film, release, touch = film_of(made), made.truth["release"], made.truth["touch"]
-                hand, _ = beyond(film, release + by / 1e3, touch, cell["noise"])
-                _, table = beyond(film, release, touch - by / 1e3, cell["noise"])
-                total, late, early = total + 1, late + bool(hand and hand.falls), early + bool(table and table.falls)
-        print(f"{fps} fps, {by} ms: release {late}/{total}, touch {early}/{total}")
+                release, touch = made.truth["release"] + late / 1e3, made.truth["touch"]
+                hand = before(film_of(made), release, touch, cell["noise"])
+                total, seen = total + 1, seen + bool(hand and hand.falls)
+        print(f"{fps} fps, {late} ms late: {seen} of {total}")
 
 
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parent))
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name, default in (("films", 20), ("first", 0), ("slices", 6), ("spoiled", 0), ("noise", 0), ("ends", 0)):
+    for name, default in (("films", 20), ("first", 0), ("slices", 6), ("spoiled", 0), ("noise", 0), ("late", 0)):
         parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--fps", type=int, nargs="*", default=[], help="cells of these frame rates alone")
     options = parser.parse_args()
-    if options.ends:
-        ends(options.ends)
+    if options.late:
+        releases(options.late)
     elif options.spoiled or options.noise:
         rough(options.spoiled, options.noise, options.slices)
     else:

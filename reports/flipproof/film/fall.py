@@ -1,13 +1,13 @@
-"""Whether a bottle falls freely before its release or after its touch, seen without an equation of its water.
+"""Whether a bottle falls freely before its release already, seen without an equation of its water.
 
 Whatever the water does along the bottle, n . cap = n . base = n . C_M, n being the direction across it; and in flight
-C_M goes along a parabola. So what is clicked across the bottle between release and touch says how it goes on:
+C_M goes along a parabola. So what is clicked across the bottle between release and touch says how it went before:
 
     n . (cap + base) / 2 = n . (p + v s + a s^2/2)       s = t - (t_r + t_d)/2;  p, v, a by robust least squares
 
-A hand that carries the bottle gives it g beyond its fall, g tau^2/2 upwards at a time tau before the release; a table
-takes the velocity, or what of it is vertical. The share of this that the clicks show, with its standard error, is 1 or
-more in a hand or on a table, and 0 where the bottle falls on: a release is then too late, or a touch too early.
+A hand that carries the bottle gives it g beyond its fall, g tau^2/2 upwards at a time tau before the release. The share
+of this that the clicks show, with its standard error, is 1 or more in a hand, and 0 where the bottle falls already: the
+release is then too late. Of a touch the same cannot be said: a bottle may go on over the rim that stands.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ ERROR: Final = 0.12
 """Standard error with which a share is read: from as many frames as that takes."""
 
 FALLS: Final = 0.3
-"""Share below which neither a hand nor a table is at work: two standard errors and a half."""
+"""Share below which no hand is at work: two standard errors and a half."""
 
 FAR: Final = 0.2
-"""Seconds from release or touch up to which frames are looked at; no hand and no table is alike for longer."""
+"""Seconds before the release up to which frames are looked at: no hand is alike for longer."""
 
 
 class Share(NamedTuple):
-    """What the frames beyond an end of the flight show of a hand or a table.
+    """What the frames before a release show of a hand.
 
-    ``seconds`` is how far they reach, ``share`` what they show of carrying or stopping, ``error`` its standard error,
-    ``misfit`` the mean square of what a free fall leaves, in its variances.
+    ``seconds`` is how far they reach, ``share`` what they show of carrying, ``error`` its standard error, ``misfit``
+    the mean square of what a free fall leaves, in its variances.
     """
 
     seconds: float
@@ -47,8 +47,8 @@ class Share(NamedTuple):
         return self.share < FALLS and self.misfit < 4.0
 
 
-def beyond(film: Film, release: float, touch: float, noise: float) -> tuple[Share | None, Share | None]:
-    """Return what is seen of a hand before the release and of a table after the touch; None where nothing can be.
+def before(film: Film, release: float, touch: float, noise: float) -> Share | None:
+    """Return what is seen of a hand before the release; None where the frames do not suffice.
 
     Parameters
     ----------
@@ -64,22 +64,12 @@ def beyond(film: Film, release: float, touch: float, noise: float) -> tuple[Shar
     seen = (across * (cap + base) / 2).sum(axis=1)
     s = t - (release + touch) / 2
     rows = np.hstack((across, across * s[:, None], across * s[:, None] ** 2 / 2))
-    inside = (t >= release) & (t <= touch)
+    inside, hand = (t >= release) & (t <= touch), (t < release) & (t > release - FAR)
     if inside.sum() < 8:
-        return None, None
+        return None
     x, covariance = _parabola(rows[inside], seen[inside], noise)
-    hand, table = release - t, t - touch
-    lost = -across * (x[2:4] + x[4:6] * (touch - release) / 2)
-    # A table may take all of the velocity or, if the bottle slides, what is vertical: the less that shows the better.
-    stopped = min((lost.sum(axis=1), lost[:, 1]), key=lambda one: float(np.abs(one[(table > 0) & (table < FAR)]).sum()))
-    patterns = 0.5 * GRAVITY * hand**2 * across[:, 1], stopped * table
-    left = seen - rows @ x
-    shares = []
-    for away, pattern in zip((hand, table), patterns, strict=True):
-        near = np.flatnonzero((away > 0) & (away < FAR))
-        near = near[np.argsort(away[near])]
-        shares.append(_share(away[near], pattern[near], left[near], rows[near], covariance, noise))
-    return shares[0], shares[1]
+    away, left, up = release - t[hand][::-1], (seen - rows @ x)[hand][::-1], across[hand, 1][::-1]
+    return _share(away, 0.5 * GRAVITY * away**2 * up, left, rows[hand][::-1], covariance, noise)
 
 
 def _parabola(rows: FloatArray, seen: FloatArray, noise: float) -> tuple[FloatArray, FloatArray]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.stats import gaussian_kde, norm
 
 from flipproof.film.estimate import DRAWS, MAX_RATE, SCALE, UNITS, Estimate, shortest, third_differences
-from flipproof.film.fall import beyond
+from flipproof.film.fall import before
 from flipproof.film.likelihood import GRAVITY
 from slicemodel.trajectory import FloatArray
 
@@ -173,26 +173,21 @@ class Judged:
                     f"{film.label}: no flight fits better than {1e3 * self.noise:.2g} mm: are cap and base exchanged, "
                     "or other things clicked?"
                 )
-            self._check_ends()
+            self._check_release()
         if film.quantity != "omega":
             self._check_rates()
 
-    def _check_ends(self) -> None:
-        """Refuse a release before which the bottle falls freely already, and a touch after which it still does."""
+    def _check_release(self) -> None:
+        """Refuse a release before which the bottle falls freely already."""
         one = self.estimate
-        release, touch = one.interval("release")[0], one.interval("touch")[1]
-        hand, table = beyond(one.film, release, touch, max(self.own_noise, 1e-6))
-        ends = (
-            (hand, "before the release", release, "begins earlier"),
-            (table, "after the touch", touch, "ends later"),
-        )
-        for share, words, at, wrong in ends:
-            if share is not None and share.falls:
-                raise UnsoundError(
-                    f"{one.film.label}: {1e3 * share.seconds:.0f} ms {words} at {at:.3f} s the bottle falls freely by "
-                    f"its clicks alone: the flight {wrong}, and no fit was found that says so: click the frames there "
-                    "again, or give --release and --landing"
-                )
+        release = one.interval("release")[0]
+        hand = before(one.film, release, one.likelihood.touch, max(self.own_noise, 1e-6))
+        if hand is not None and hand.falls:
+            raise UnsoundError(
+                f"{one.film.label}: {1e3 * hand.seconds:.0f} ms before the release at {release:.3f} s the bottle falls "
+                "freely by its clicks alone: the flight begins earlier, and no fit was found that says so: click the "
+                "frames there again, or give --release"
+            )
 
     def _check_rates(self) -> None:
         """Refuse an omega_0 that is not the slope of the clicked angle, and a plateau above it."""
