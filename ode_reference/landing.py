@@ -28,6 +28,11 @@ DEFAULT_DT: Final = 4e-4
 EDGE: Final = 8.0
 """Share by which the touches differ that have to end alike, over the step [1/s]."""
 
+TOUCHING: Final = 1e-9
+TWINS_TOUCHING: Final = (2e-10, 1e-9, 1e-9, 1e-6)
+"""Gap below which two things touch, and that of the four twins [L]: whether a slice strikes a stack that lies on the
+base or one that hangs an atom's width above it changes what comes after, and no outcome may hang on that."""
+
 REFINED: Final = (8, 64)
 SHORTEST: Final = 5e-6
 """How many times smaller the steps are that follow where one leaves the outcome open, and the shortest of them [s]."""
@@ -100,8 +105,9 @@ def land(
     -------
     Outcome
         Certified if the energy falls below the saddle, no impact raises it by more than 1e-6 of the saddle, and four
-        touches that differ by ``EDGE`` times the step (``Touch.twins``) end alike with twice the step. Where they do
-        not, step and difference are made ``REFINED`` times smaller, down to ``SHORTEST``.
+        touches that differ by ``EDGE`` times the step (``Touch.twins``) and in what counts as touching
+        (``TWINS_TOUCHING``) end alike with twice the step. Where they do not, step and difference are made ``REFINED``
+        times smaller, down to ``SHORTEST``.
 
     Raises
     ------
@@ -120,7 +126,8 @@ def land(
     world = world_of(touch, table, chosen, slices)
     for step in (dt, *(dt / k for k in REFINED if dt / k >= SHORTEST)):
         # From the twins with the step, from the touch with half of it: what both leave open is refined.
-        runs = [_run(touch, world, step / 2), *(_run(twin, world, step) for twin in touch.twins(EDGE * step))]
+        twins = zip(touch.twins(EDGE * step), TWINS_TOUCHING, strict=True)
+        runs = [_run(touch, world, step / 2), *(_run(twin, world._replace(touching=gap), step) for twin, gap in twins)]
         if len({run.code for run in runs}) == 1:
             break
     settings = {
@@ -190,6 +197,7 @@ def world_of(touch: Touch, table: Table, law: str, slices: str) -> World:
         upright=math.atan2(bottle.radius, rest),
         cap=math.pi - math.atan2(bottle.radius, upside_down),
         cap_saddle=scenario.total_mass * scenario.gravity * math.hypot(bottle.radius, upside_down),
+        touching=TOUCHING,
     )
 
 

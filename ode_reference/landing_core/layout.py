@@ -6,9 +6,6 @@ from typing import NamedTuple
 
 from slicemodel.trajectory import FloatArray
 
-TOUCHING = 1e-9
-"""Gap below which two things touch [L]; a located impact leaves 1e-12."""
-
 LOCATED = 1e-10
 """Gap at which the search for an impact ends [L]."""
 
@@ -32,6 +29,7 @@ UPRIGHT, LYING, CAP, TIMEOUT, BROKEN, TOUCHED = range(6)
 class World(NamedTuple):
     """What does not change during a landing (SI). ``chain``: slices meet each other; else each has its own two stops.
 
+    ``touching`` is the gap below which two things touch [L]; a located impact leaves 1e-12.
     ``low`` and ``high`` are those stops, from the tube's middle. ``saddle`` is E_s, ``upright`` and ``cap`` are the
     tilts that part the basins [rad], ``cap_saddle`` is the saddle out of the basin of the cap.
     """
@@ -57,6 +55,7 @@ class World(NamedTuple):
     upright: float
     cap: float
     cap_saddle: float
+    touching: float
 
 
 class Landing(NamedTuple):

@@ -18,7 +18,6 @@ from ode_reference.landing_core.layout import (
     STILL,
     TIMEOUT,
     TOUCHED,
-    TOUCHING,
     UPRIGHT,
     Landing,
 )
@@ -41,7 +40,7 @@ def land(q, s, w, dt, longest, fly, world, every, record):
     free, target, work = np.empty(2), np.empty(4), np.empty((3, n + 1))
     x, y, pn, pt = np.empty(n), np.empty(n), np.empty(4), np.empty(4)
     q1, s1, w1 = np.empty(6), np.empty(n), np.empty(n)
-    near = TOUCHING * 2 * world.half
+    near = world.touching * 2 * world.half
     found = LOCATED * 2 * world.half
     t, rise = 0.0, 0.0
     steps, impacts, unresolved, bounces = 0, 0, 0, 0
