@@ -61,6 +61,13 @@ def test_a_jump_may_be_a_moment_early_and_a_missing_one_is_named():
     assert any("4.005 that only the first run has" in line for line in lost.lines)
 
 
+def test_rows_between_the_first_and_the_last_of_one_time_are_named():
+    t = np.array([0.0, 0.0, 0.0, 1.0])
+    one, other = (Curves(name, t, {"x": np.array([1.0, inner, 3.0, 4.0])}) for name, inner in (("a", 2.0), ("b", 20.0)))
+    words = [f"{name}: 1 rows between the first and the last of one time are not compared" for name in "ab"]
+    assert compare(one, other).lines[:2] == words
+
+
 def test_a_twin_says_how_early_a_jump_may_be():
     base, twin = of((T > 3.005).astype(float)), of((T > 3.055).astype(float))
     assert not compare(base, of((T > 2.955).astype(float))).passed

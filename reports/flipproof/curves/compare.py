@@ -293,6 +293,10 @@ def compare(
     if first.t[-1] != second.t[-1] or first.t[0] != second.t[0]:
         common = max(first.t[0], second.t[0]), min(first.t[-1], second.t[-1])
         notes.append(f"only t = {common[0]:.6g} to {common[1]:.6g} is common to both")
+    for run in (first, second):
+        again = np.diff(run.t) == 0.0
+        if between := np.count_nonzero(again[1:] & again[:-1]):
+            notes.append(f"{run.label}: {between} rows between the first and the last of one time are not compared")
     made = []
     for name in shared:
         allowed = 0.0 if tolerance is None else tolerance[name] if isinstance(tolerance, Mapping) else tolerance

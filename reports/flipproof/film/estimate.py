@@ -196,7 +196,7 @@ def _grid(
     seeds, nearest = np.array([[np.nan, np.nan]]), [x]
     shape = COARSE
     film, began = likelihood.film, time.perf_counter()
-    for _ in range(12):
+    for turn in range(12):
         cell = (high - low) / shape
         axes = [low[k] + cell[k] * (np.arange(shape[k]) + 0.5) for k in range(2)]
         nodes = np.array(list(product(*axes)))
@@ -226,8 +226,10 @@ def _grid(
             best = int(order[0])
         pad = cell
         if (levels > levels[best] - NEGLIGIBLE).sum() <= FEW:
-            # What matters is smaller than a cell: descents from several nodes say where it is.
-            for k in order[:3]:
+            # What matters is smaller than a cell: descents from several nodes say where it is. The first are from the
+            # best of each row of e, across which one rebound more or less folds the likelihood.
+            _, first = np.unique(nodes[order, 1], return_index=True)
+            for k in order[first] if turn == 0 else order[:3]:
                 more = _descent(likelihood, equation, nodes[k], fits[k].x, cell, (low, high))
                 nodes = np.concatenate((nodes, [one[0] for one in more]))
                 curves += [one[1] for one in more]

@@ -89,6 +89,7 @@ HARD = {
         {"fps": 60, "noise": 3e-3, "tilt": 3.0, "bad": 2, "filling": 0.25},
     ),
     "a first guess that ends 0.2 s early": ([13, 7200], {"fps": 240, "noise": 0.5e-3, "bad": 2, "missing": 3}),
+    "two rebounds that look nearly alike": ([6, 9002], {"fps": 60, "noise": 0.5e-3, "tilt": 3.0, "missing": 3}),
     "a first guess with another gravity": (
         [1, 9002],
         {"fps": 30, "noise": 0.5e-3, "tilt": 3.0, "bad": 2, "missing": 3},
