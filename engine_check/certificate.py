@@ -27,7 +27,7 @@ from slicemodel.trajectory import FloatArray, Trajectory, output_times
 DEFAULT_LEVELS: Final = 5
 """Settings tried at the most: steps from 1.25e-4 s to 7.8e-6 s, if iterations need no refining."""
 
-MOST_LEVELS: Final = 20
+MAX_LEVELS: Final = 20
 
 SAFETY: Final = 1.25
 """Factor on an error that three levels estimate (that of the grid convergence index)."""
@@ -209,7 +209,7 @@ def certify(
     more, against event-driven free flight; of all output times 99.3 %.
     """
     tolerance = checked_number("tolerance", tolerance, 0.0, 1.0)
-    problem = not_whole("levels", levels, 1, MOST_LEVELS)
+    problem = not_whole("levels", levels, 1, MAX_LEVELS)
     if problem:
         raise ValueError(problem)
     moments = output_times(scenario, times)

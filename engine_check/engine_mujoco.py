@@ -42,7 +42,7 @@ LONGEST_LOOK: Final = 0.01
 APPROACH: Final = 0.5
 """Share of the time to the nearest end, at present speeds, that is stepped without a look."""
 
-MOST_EVENTS: Final = 10_000
+MAX_EVENTS: Final = 10_000
 """Impacts within one step beyond which time is said not to pass [1]."""
 
 BANDS: Final[Mapping[str, Band]] = MappingProxyType(
@@ -229,7 +229,7 @@ class _Flight:
             else:
                 continue
             events += 1
-            if events > MOST_EVENTS:
+            if events > MAX_EVENTS:
                 raise _StalledError(f"{events} impacts within one step of {h:.3g} s; reduce dt or raise rest_flight")
 
     def _first_hit(self, start: tuple[FloatArray, FloatArray], out: IntArray, h: float) -> float:

@@ -80,7 +80,7 @@ FASTEST_REST: Final = 1e-3
 SLOWEST_IMPACT: Final = 0.05
 """Speed at which a corner comes down [m/s] from which on the law "in-turn" takes it for an impact."""
 
-MOST_SWEEPS = 5_000
+MAX_SWEEPS = 5_000
 CONVERGED = 1e-11
 """Change of a velocity in a sweep below which the sweeps end [m/s]."""
 
@@ -539,7 +539,7 @@ def impulses(
     p = np.zeros(rows)
     u = free.copy()
     largest = 0.0
-    for _ in range(MOST_SWEEPS):
+    for _ in range(MAX_SWEEPS):
         largest = 0.0
         k = 0
         for kind in kinds:

@@ -58,7 +58,7 @@ PLACEHOLDER_INERTIA: Final = 1.0
 CLUTCH: Final = 1e20
 """Armature of a resting slice in slice masses [1]: its position then does not change by one bit in a run."""
 
-MOST_FLIGHT: Final = 1e3
+MAX_FLIGHT: Final = 1e3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,8 +77,8 @@ class MujocoKnobs:
 
     def __post_init__(self) -> None:
         # Written as "not inside", because NaN passes every "outside" test.
-        if not 0.0 < self.rest_flight <= MOST_FLIGHT:
-            raise ValueError(f"rest_flight = {self.rest_flight!r} is outside (0, {MOST_FLIGHT:g}]")
+        if not 0.0 < self.rest_flight <= MAX_FLIGHT:
+            raise ValueError(f"rest_flight = {self.rest_flight!r} is outside (0, {MAX_FLIGHT:g}]")
 
     @classmethod
     def from_overrides(cls, overrides: Mapping[str, float]) -> MujocoKnobs:

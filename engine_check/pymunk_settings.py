@@ -19,13 +19,13 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Final
 
-from engine_check.solver import MOST_ITERATIONS
+from engine_check.solver import MAX_ITERATIONS
 from slicemodel.scenario import Scenario, unknown_name
 
 CAP_ELASTICITY: Final = 1.0
 """The engine multiplies the elasticities of the two partners [1] (default 0): slices carry e, so caps carry 1."""
 
-LEAST_ITERATIONS: Final = 50
+MIN_ITERATIONS: Final = 50
 ITERATIONS_MARGIN: Final = 1.0
 """Twice the measured threshold of 0.4-0.5 (see ``enough_iterations``)."""
 
@@ -51,12 +51,12 @@ def enough_iterations(scenario: Scenario) -> int:
     """
     mass_ratio = scenario.water_mass / scenario.bottle.mass
     enough = ITERATIONS_MARGIN * mass_ratio * math.sqrt(scenario.n_slices)
-    if enough > MOST_ITERATIONS:
+    if enough > MAX_ITERATIONS:
         raise ValueError(
             f"water_mass / bottle.mass = {mass_ratio:.3g} needs {enough:.3g} iterations of the engine per step, "
-            f"more than {MOST_ITERATIONS}"
+            f"more than {MAX_ITERATIONS}"
         )
-    return max(LEAST_ITERATIONS, math.ceil(enough))
+    return max(MIN_ITERATIONS, math.ceil(enough))
 
 
 def restitution_between_slices(scenario: Scenario, knobs: PymunkKnobs, slices: str) -> float | None:

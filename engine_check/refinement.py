@@ -48,7 +48,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine_check.solver import ENGINES, MOST_ITERATIONS, solve
+from engine_check.solver import ENGINES, MAX_ITERATIONS, solve
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray, Trajectory
 
@@ -344,7 +344,7 @@ def _changed(runs: Runs, role: str, run: Trajectory, dt: float, iterations: int 
     if role == EARLIER:
         return runs.earlier(dt, iterations)
     if role == ITERATED and iterations is not None:
-        other = runs.make(role, dt, min(2 * iterations, MOST_ITERATIONS), against=run)
+        other = runs.make(role, dt, min(2 * iterations, MAX_ITERATIONS), against=run)
     else:
         other = runs.make(role, 2 * dt, iterations, against=run)
     return runs.apart(run, other) if other.ok else other

@@ -87,11 +87,11 @@ ICE_MODELS: Final = ("rigid", "welded")
 CONTACTS: Final = ("overlap", "exclude")
 """What two slices do when they meet: pass through each other as in the paper, or collide as rods of length h/N."""
 
-MOST_ITERATIONS: Final = 1_000_000
-MOST_DRIFT: Final = 5e3
+MAX_ITERATIONS: Final = 1_000_000
+MAX_DRIFT: Final = 5e3
 """Largest launch velocity of an engine's throw [|omega0| L]."""
 
-MOST_SLICES: Final = 5_000
+MAX_SLICES: Final = 5_000
 """Slices at the most; an engine's sweep costs their number times its iterations, 2e6 constraints a step at 5 000."""
 
 
@@ -192,12 +192,12 @@ def solve(
             raise ValueError(unknown_name(f"{what} =", name, known))
         if name not in offered:
             raise ValueError(f"engine = {engine!r} has no {what} = {name!r} (it has: {', '.join(offered)})")
-    if scenario.n_slices > MOST_SLICES:
-        raise ValueError(f"n_slices = {scenario.n_slices} is outside [1, {MOST_SLICES}] for an engine; cut it coarser")
+    if scenario.n_slices > MAX_SLICES:
+        raise ValueError(f"n_slices = {scenario.n_slices} is outside [1, {MAX_SLICES}] for an engine; cut it coarser")
     fastest, spin = math.hypot(*scenario.launch_velocity), abs(scenario.omega0) * scenario.bottle.length
-    if fastest > MOST_DRIFT * spin:
+    if fastest > MAX_DRIFT * spin:
         raise ValueError(
-            f"launch_velocity = {fastest:g} m/s is outside [0, {MOST_DRIFT * spin:g}] m/s, {MOST_DRIFT:g} |omega0| L:"
+            f"launch_velocity = {fastest:g} m/s is outside [0, {MAX_DRIFT * spin:g}] m/s, {MAX_DRIFT:g} |omega0| L:"
             " an engine works in the lab frame, where the spin would be lost in round-off; take a smaller one"
         )
     if dt is None and iterations is None:
@@ -233,6 +233,6 @@ def _checked_iterations(iterations: object) -> int | None:
     if iterations is None:
         return None
     whole = isinstance(iterations, numbers.Integral) and not isinstance(iterations, bool)
-    if not whole or not 1 <= int(iterations) <= MOST_ITERATIONS:  # type: ignore[call-overload]
-        raise ValueError(f"iterations = {iterations!r} is not a whole number in [1, {MOST_ITERATIONS}]")
+    if not whole or not 1 <= int(iterations) <= MAX_ITERATIONS:  # type: ignore[call-overload]
+        raise ValueError(f"iterations = {iterations!r} is not a whole number in [1, {MAX_ITERATIONS}]")
     return int(iterations)  # type: ignore[call-overload, no-any-return]

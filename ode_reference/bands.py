@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ode_reference.combinations import require_own_switches
-from ode_reference.solver import LEAST_REST_SPEED, TAYLOR, model_named, solve
+from ode_reference.solver import MIN_REST_SPEED, TAYLOR, model_named, solve
 from slicemodel.scenario import not_whole
 from slicemodel.trajectory import FloatArray, Trajectory
 
@@ -103,7 +103,7 @@ def estimate_band(flight: Trajectory, *, twins: int = TWINS) -> Band:
         pass
     speed, how = settings["rest_speed"], {"impact_law": settings["impact_law"], **own}
     asked = [{"twin": k, "rest_speed": speed} for k in range(1, twins + 1)]
-    asked.append({"rest_speed": max(speed / CUT, LEAST_REST_SPEED)})
+    asked.append({"rest_speed": max(speed / CUT, MIN_REST_SPEED)})
     if own["method"] != settings["method"]:
         asked.append({"rest_speed": speed})
     omega = np.full((len(asked), len(flight.t)), np.inf)

@@ -11,7 +11,7 @@ from ode_reference.landing import DEFAULT_DT, land
 from slicemodel.scenario import not_whole
 from slicemodel.table import Outcome, Table, Touch
 
-MOST_JOBS: Final = 1024
+MAX_JOBS: Final = 1024
 """Threads at the most."""
 
 
@@ -46,7 +46,7 @@ def land_batch(
         As ``land``, of the first touch that cannot be landed.
     """
     if jobs is not None:
-        problem = not_whole("jobs", jobs, 1, MOST_JOBS)
+        problem = not_whole("jobs", jobs, 1, MAX_JOBS)
         if problem:
             raise ValueError(problem)
 

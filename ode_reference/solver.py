@@ -63,7 +63,7 @@ REST_SPEED: Final = 1e-5
 REST_SPEED_WITH_RECOIL: Final = 1e-3
 """The same with recoil [m/s]."""
 
-LEAST_REST_SPEED: Final = 1e-8
+MIN_REST_SPEED: Final = 1e-8
 """Lowest rest speed that may be asked for [m/s]."""
 
 MAX_TWIN: Final = 10**9
@@ -293,7 +293,7 @@ def _rest_speed(given: float | None, model: Model) -> float:
     """Return the rest speed of a run [m/s]."""
     if given is None:
         return REST_SPEED_WITH_RECOIL if model.switches.recoil else REST_SPEED
-    return number_within("rest_speed", given, LEAST_REST_SPEED, 0.1, unit=" m/s")
+    return number_within("rest_speed", given, MIN_REST_SPEED, 0.1, unit=" m/s")
 
 
 def _twin(number: int) -> int:

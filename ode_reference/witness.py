@@ -57,9 +57,9 @@ STEP_LIMIT: Final = 1_000_000
 """Most steps of one run, as ``max_step`` may ask for."""
 
 WATCH: Final = 200_000
-"""Evaluations of the right-hand side in which the time must advance by ``LEAST_ADVANCE`` of the duration."""
+"""Evaluations of the right-hand side in which the time must advance by ``MIN_ADVANCE`` of the duration."""
 
-LEAST_ADVANCE: Final = 1e-7
+MIN_ADVANCE: Final = 1e-7
 
 PARTS: Final = 4
 """Parts of one step between which a leg is looked through; a slice that turns twice within one part is not seen."""
@@ -212,7 +212,7 @@ class _Flight:
         """Return dy/dt; stop the run if time has ceased to pass."""
         count, since = self.watched
         if self.motion.evaluations - count >= WATCH:
-            if t - since < LEAST_ADVANCE * self.scenario.duration or self.motion.evaluations > 16 * STEP_LIMIT:
+            if t - since < MIN_ADVANCE * self.scenario.duration or self.motion.evaluations > 16 * STEP_LIMIT:
                 raise _StandstillError
             self.watched = (self.motion.evaluations, t)
         return self.motion(t, y)

@@ -18,7 +18,7 @@ from slicemodel.trajectory import STATES_LIMIT, FloatArray, Trajectory
 if TYPE_CHECKING:
     from slicemodel.kernel import Record, Run
 
-MOST_JOBS = 1024
+MAX_JOBS = 1024
 
 PARTS_PER_JOB = 16
 """Parts the work of a thread is dealt out in: few enough to cost nothing, enough to even out throws of unlike size."""
@@ -122,7 +122,7 @@ def solve_batch(
     chosen, form, steps = checked(scheme, steps, rebound)
     throws = _throws(scenarios)
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    problem = not_whole("jobs", jobs, 1, MOST_JOBS) if jobs is not None else ""
+    problem = not_whole("jobs", jobs, 1, MAX_JOBS) if jobs is not None else ""
     if problem:
         raise ValueError(f"{problem} (threads)")
     size = 32 * len(throws) * steps

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-MOST_SLICES = 10_000_000
+MAX_SLICES = 10_000_000
 """Slices of a throw at the most; the paper uses 500."""
 
 
@@ -57,13 +57,13 @@ MOST = 1e15
 """Least and largest positive number of a field, in its unit: between them no product of fields leaves the range of
 floating point."""
 
-MOST_ANGLE = 4 * math.pi
+MAX_ANGLE = 4 * math.pi
 """Largest angle at release [rad]: a larger one was meant in degrees."""
 
-MOST_FILE = 2**18
+MAX_FILE = 2**18
 """Bytes of a scenario file at the most."""
 
-MOST_SHOWN = 60
+MAX_SHOWN = 60
 """Characters of a value that an error message shows."""
 
 
@@ -140,8 +140,8 @@ def not_whole(name: str, value: object, least: int, most: int) -> str:
 def shown(value: object) -> str:
     """Return how an error message shows a value: as Python writes it, the middle of a long one left out."""
     text = repr(value)
-    half = MOST_SHOWN // 2
-    return text if len(text) <= MOST_SHOWN else f"{text[:half]} ... {text[-half:]}"
+    half = MAX_SHOWN // 2
+    return text if len(text) <= MAX_SHOWN else f"{text[:half]} ... {text[-half:]}"
 
 
 class UnsuitableFileError(ValueError):
@@ -287,7 +287,7 @@ class Scenario:
             raise ScenarioError(f"bottle = {shown(self.bottle)} is not a Bottle")
         checked: dict[str, object] = {
             "water_mass": self._checked_water_mass(checks),
-            "n_slices": checks.whole("n_slices", self.n_slices, least=1, most=MOST_SLICES),
+            "n_slices": checks.whole("n_slices", self.n_slices, least=1, most=MAX_SLICES),
             "drag": checks.number("drag", self.drag, "kg/s", least=0.0, most=MOST),
             "restitution": checks.number("restitution", self.restitution, "", least=0.0, most=1.0),
             "omega0": checks.number("omega0", self.omega0, "rad/s", least=-MOST, most=MOST),
@@ -317,8 +317,8 @@ class Scenario:
         return water_mass
 
     def _checked_angle(self, checks: _Checks) -> float | None:
-        angle = checks.number("theta0", self.theta0, "rad", least=-MOST_ANGLE, most=MOST_ANGLE)
-        if angle is None and isinstance(self.theta0, int | float) and MOST_ANGLE < abs(self.theta0) <= 1e6:
+        angle = checks.number("theta0", self.theta0, "rad", least=-MAX_ANGLE, most=MAX_ANGLE)
+        if angle is None and isinstance(self.theta0, int | float) and MAX_ANGLE < abs(self.theta0) <= 1e6:
             checks.problems[-1] += f"; radians? {self.theta0:g} degrees are {math.radians(self.theta0):.6g} rad"
         return angle
 
@@ -381,7 +381,7 @@ class Scenario:
 
     def with_slices(self, n_slices: int) -> Scenario:
         """Return the same throw cut into ``n_slices`` slices, damping rate alpha/2m unchanged."""
-        problem = not_whole("n_slices", n_slices, 1, MOST_SLICES)
+        problem = not_whole("n_slices", n_slices, 1, MAX_SLICES)
         if problem:
             raise ScenarioError(problem)
         try:
@@ -402,7 +402,7 @@ class Scenario:
             Naming file, table and key: unreadable file, bad TOML, unknown table or key
             (with the nearest known name), impossible value.
         """
-        document, _ = read_toml(path, MOST_FILE)
+        document, _ = read_toml(path, MAX_FILE)
         return cls.from_mapping(document, source=str(path))
 
     @classmethod
@@ -455,7 +455,7 @@ def unknown_name(what: str, given: object, known: Iterable[str]) -> str:
     ``what`` leads to the name, such as "scheme =" or "throw.toml: [bottle] key".
     """
     by_lower_case = {name.lower(): name for name in known}
-    nearest = get_close_matches(str(given)[:MOST_SHOWN].lower(), by_lower_case, n=1)
+    nearest = get_close_matches(str(given)[:MAX_SHOWN].lower(), by_lower_case, n=1)
     advice = (
         f"did you mean {by_lower_case[nearest[0]]!r}?" if nearest else f"known: {', '.join(by_lower_case.values())}"
     )

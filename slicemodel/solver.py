@@ -13,10 +13,10 @@ from slicemodel.trajectory import FloatArray, Impacts, Trajectory, check_states
 if TYPE_CHECKING:
     from slicemodel.kernel import Record, Run
 
-MOST_STEPS = 1_000_000_000
+MAX_STEPS = 1_000_000_000
 
 SURELY_LISTED = 1024
-MOST_LISTED = 1 << 22
+MAX_LISTED = 1 << 22
 """Rebounds there is room for at first: one for every fourth slice and step, as memory that is not touched costs
 nothing; a run with more of them is repeated with room for all."""
 
@@ -87,7 +87,7 @@ def solve(
 
     shape = (steps if store == "full" else 0, scenario.n_slices)
     record = kernel.Record(np.empty((4, steps)), np.empty(shape), np.empty(shape))
-    rebounds = np.empty((min(steps * scenario.n_slices // 4 + SURELY_LISTED, MOST_LISTED), 4))
+    rebounds = np.empty((min(steps * scenario.n_slices // 4 + SURELY_LISTED, MAX_LISTED), 4))
     t = grid(scenario.duration, steps)
     constants = chosen.constants(scenario)
     run = advance(scenario, form, constants, t, record, rebounds)
@@ -110,7 +110,7 @@ def checked(scheme: str, steps: int, rebound: Rebound | None) -> tuple[Scheme, S
     """Return the scheme, its form with ``rebound`` and the points of the grid, or raise ValueError (see ``solve``)."""
     if scheme not in SCHEMES:
         raise ValueError(unknown_name("scheme =", scheme, SCHEMES))
-    problem = not_whole("steps", steps, 2, MOST_STEPS)
+    problem = not_whole("steps", steps, 2, MAX_STEPS)
     if problem:
         raise ValueError(f"{problem} (points of the grid)")
     if rebound is not None and rebound not in get_args(Rebound):

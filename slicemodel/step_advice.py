@@ -23,7 +23,7 @@ SAFETY = 1.5
 REFINEMENT = 32
 """The scheme's own limit is taken from a run this many times finer than the octave under trial."""
 
-MOST_STEPS = 1 << 20
+MAX_STEPS = 1 << 20
 """Steps beyond which no answer is looked for."""
 
 
@@ -68,7 +68,7 @@ def required_steps(
         raise ValueError(unknown_name("scheme =", scheme, SCHEMES))
     octave = 1
     good: int | None = None
-    while octave * BASE <= MOST_STEPS:
+    while octave * BASE <= MAX_STEPS:
         worst = _worst_of_octave(scenario, scheme, rebound, octave)
         if worst * SAFETY <= tolerance:
             if good is not None:
@@ -78,7 +78,7 @@ def required_steps(
             good = None
         octave *= 2
     raise ValueError(
-        f"tolerance = {tolerance:g} needs more than {MOST_STEPS} steps of {scheme} "
+        f"tolerance = {tolerance:g} needs more than {MAX_STEPS} steps of {scheme} "
         f"(error {worst:.2g} at {octave * BASE // 2} steps); a scheme of second order is 'midpoint'"
     )
 

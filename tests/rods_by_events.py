@@ -39,7 +39,7 @@ from slicemodel.trajectory import BASE, CAP, FloatArray, Impacts, Trajectory, ou
 
 BoolArray = NDArray[np.bool_]
 
-MOST_EVENTS: Final = 100_000
+MAX_EVENTS: Final = 100_000
 """Events of one run at the most; a rebound that takes twice its rest speed to end costs about ten."""
 
 TOUCHING: Final = 1e-12
@@ -203,10 +203,10 @@ class _Flight:
         if not self.immobile:
             self._meet()
         while self.t < self.scenario.duration:
-            if self.counts["events"] >= MOST_EVENTS:
+            if self.counts["events"] >= MAX_EVENTS:
                 self.status = "stalled"
                 self.message = (
-                    f"{MOST_EVENTS} events by t = {self.t:.9g} s; raise rest_speed (now {self.rest_speed:g} m/s)"
+                    f"{MAX_EVENTS} events by t = {self.t:.9g} s; raise rest_speed (now {self.rest_speed:g} m/s)"
                 )
                 break
             kept += self._leg(moments)

@@ -20,7 +20,7 @@ TIE = 1e-9
 PASSES = 1000
 """Most binary impacts per touching slice of one instant in the sequential law."""
 
-MOST_PIECES = 200
+MAX_PIECES = 200
 """Most steps to the zero of f: from any place twenty halvings and as many of Newton's are ample."""
 
 
@@ -36,7 +36,7 @@ def simultaneous(now, points, row, e):
     which rises and is linear between the corners s_i (1 + e) x_i: Newton's step from the piece of the zero is exact.
     """
     gained, low, high = 0.0, -math.inf, math.inf
-    for _ in range(MOST_PIECES):
+    for _ in range(MAX_PIECES):
         total = pushed = 0.0
         for k in range(now.hits):
             end, x = points[END, k], points[row, k]

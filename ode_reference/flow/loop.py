@@ -14,7 +14,7 @@ from ode_reference.flow.search import find, flock_is_clear, gather
 from ode_reference.flow.series import MOST, ROWS, expand, state_at
 from slicemodel.compiled import inner, kept_on_disk
 
-LEAST_ADVANCE = 1e-7
+MIN_ADVANCE = 1e-7
 """Of the duration: what time must advance by in as many steps as ``watch`` says."""
 
 
@@ -67,7 +67,7 @@ def step(now, points, marks, table, moments, rows, r, v):
     """Advance to the next event, or as far as the map, the series or the duration let it."""
     now.steps += 1
     if now.steps % now.watch == 0:
-        if now.t - now.watched_from < LEAST_ADVANCE * now.duration or now.steps >= now.step_limit:
+        if now.t - now.watched_from < MIN_ADVANCE * now.duration or now.steps >= now.step_limit:
             now.status = STALLED
             return
         now.watched_from = now.t

@@ -24,7 +24,7 @@ POLYNOMIAL = ROWS
 NONE = 2.0
 """What a search returns if there is no zero in the step."""
 
-MOST_PARABOLAS = 1000
+MAX_PARABOLAS = 1000
 """Parabolas of one search, of which some ten are needed; a flight that needs more is stalled."""
 
 MARGIN = 1e-13
@@ -47,7 +47,7 @@ def first_zero(now, table, order):
     x = bend = 0.0
     for k in range(2, order + 1):
         bend += k * (k - 1) * abs(table[POLYNOMIAL, k])
-    for _ in range(MOST_PARABOLAS):
+    for _ in range(MAX_PARABOLAS):
         gap, rate = value(table, POLYNOMIAL, order, x)
         if gap <= 0.0 and rate <= 0.0:
             return x

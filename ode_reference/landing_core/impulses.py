@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ode_reference.landing_core.layout import CREEPING, MOST_POOLS, MOST_SWEEPS
+from ode_reference.landing_core.layout import CREEPING, MAX_POOLS, MAX_SWEEPS
 from ode_reference.landing_core.pools import pool_chain, pool_stops
 from slicemodel.compiled import merged
 
@@ -50,7 +50,7 @@ def respond(x, tube, start, s1, s2, sine, cosine, angle, closed, target, world, 
         corners += closed[c]
     axial, across, torque = 0.0, 0.0, 0.0
     expected = 0.0
-    for outer in range(MOST_POOLS):
+    for outer in range(MAX_POOLS):
         if world.rigid:
             at, pooled = tube + axial / m_all, m_all
         elif world.chain:
@@ -63,7 +63,7 @@ def respond(x, tube, start, s1, s2, sine, cosine, angle, closed, target, world, 
             return at, v_t, omega, True
         v_r = start + at
         largest = 0.0
-        for _ in range(MOST_SWEEPS):
+        for _ in range(MAX_SWEEPS):
             largest = 0.0
             for c in range(4):
                 if not closed[c]:

@@ -12,13 +12,13 @@ LOCATED = 1e-10
 STILL = 1e-11
 """Speed that counts as none [m/s]."""
 
-MOST_TRIALS = 60
-MOST_SWEEPS = 500
+MAX_TRIALS = 60
+MAX_SWEEPS = 500
 CREEPING = 1e-3
 """Change of a velocity in the last sweep that is tolerated [m/s]: two corners can share their friction in many ways."""
 
-MOST_POOLS = 100
-MOST_ROUNDS = 100
+MAX_POOLS = 100
+MAX_ROUNDS = 100
 
 ALOFT, LANDED = 1e-3, 1e-4
 """Heights of the lowest corner beyond which the bottle is off the table, and below which it is on it again [m]."""

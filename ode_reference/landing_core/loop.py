@@ -14,7 +14,7 @@ from ode_reference.landing_core.layout import (
     LANDED,
     LOCATED,
     LYING,
-    MOST_TRIALS,
+    MAX_TRIALS,
     STILL,
     TIMEOUT,
     TOUCHED,
@@ -113,7 +113,7 @@ def land(q, s, w, dt, longest, fly, world, every, record):
                 break
             # Newton's method for the first gap to close, from the parabola through its ends, kept inside what is known.
             low, high, h = 0.0, h, until
-            for _ in range(MOST_TRIALS):
+            for _ in range(MAX_TRIALS):
                 steps += 1
                 step(q, s, w, h, closed, world, free, target, work, x, y, pn, pt, q1, s1, w1)
                 gaps(s1, q1, world, late)

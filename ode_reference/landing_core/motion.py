@@ -6,7 +6,7 @@ import math
 
 from ode_reference.landing_core.contacts import rates
 from ode_reference.landing_core.impulses import respond
-from ode_reference.landing_core.layout import MOST_ROUNDS, STILL
+from ode_reference.landing_core.layout import MAX_ROUNDS, STILL
 from slicemodel.compiled import merged
 
 
@@ -125,7 +125,7 @@ def impact(q, s, w, touching, taking, closed, world, free, target, work, x, y, p
             taking[k] = touching[k] and k < 4
         if not strike(q, s, w, taking, closed, world, free, target, work, x, y, pn, pt, rate):
             return False
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         rates(w, q, world, rate)
         approach = 0.0
         for k in range(count):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ode_reference.landing_core.layout import MOST_POOLS
+from ode_reference.landing_core.layout import MAX_POOLS
 from slicemodel.compiled import merged
 
 
@@ -80,7 +80,7 @@ def pool_stops(x, tube, closed, world, y):
     n = world.n
     below, above = -np.inf, np.inf
     at, pooled = tube, world.tube
-    for _ in range(MOST_POOLS):
+    for _ in range(MAX_POOLS):
         mass, momentum = world.tube, world.tube * tube
         for i in range(n):
             if (closed[4 + i] and x[i] > at) or (closed[4 + n + i] and x[i] < at):

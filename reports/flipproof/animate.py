@@ -35,7 +35,7 @@ from slicemodel.trajectory import FloatArray
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-MOST_FRAMES: Final = 3000
+MAX_FRAMES: Final = 3000
 """Frames of a film at the most; a GIF holds them all in memory."""
 
 HOLD: Final = 1.0
@@ -70,8 +70,8 @@ def plan_film(throw: Scenario, slow: float, fps: int) -> FloatArray:
     """
     check_pace(slow, fps)
     frames = throw.duration * slow * fps + 1
-    if frames > MOST_FRAMES:
-        raise FilmError(f"--slow {slow:g} at --fps {fps} makes {frames:.4g} frames (admissible: at most {MOST_FRAMES})")
+    if frames > MAX_FRAMES:
+        raise FilmError(f"--slow {slow:g} at --fps {fps} makes {frames:.4g} frames (admissible: at most {MAX_FRAMES})")
     return np.linspace(0.0, throw.duration, max(round(frames), 2))
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from slicemodel.compiled import compiled, merged
 from slicemodel.kernel.closed_form import Map, growth_rate_squared, moved
 
-MOST_STEPS = 32
+MAX_STEPS = 32
 """Steps after which a flock is gathered anew."""
 
 FEWEST_STEPS = 4
@@ -121,9 +121,9 @@ def room_for(form, constants, one):
     """
     k_squared = growth_rate_squared(form, constants, one.omega)
     force = k_squared * (one.reach + abs(one.centre))
-    steps = int(min(math.sqrt(2.0 * PUSHED * one.reach / force) / one.dt, MOST_STEPS))
+    steps = int(min(math.sqrt(2.0 * PUSHED * one.reach / force) / one.dt, MAX_STEPS))
     if steps < FEWEST_STEPS or form.cosh_sign < 0.0:
-        return MOST_STEPS, math.inf, -math.inf, 0.0
+        return MAX_STEPS, math.inf, -math.inf, 0.0
     horizon = steps * one.dt * (1.0 + CLEAR)
     # What cosh(k horizon) is at most, and a tenth more; the centre of repulsion and omega change on the way, for which
     # some room is left. A slice at ``high`` is then carried from the centre to ``room``.

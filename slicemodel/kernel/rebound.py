@@ -21,7 +21,7 @@ from slicemodel.trajectory import FloatArray
 REST_SPEED = 1e-6
 """In-step rebounds: a slice slower than this that its end pushes back stays there [m/s]; it would hop 1e-14 m."""
 
-MOST_HITS = 1000
+MAX_HITS = 1000
 """In-step rebounds of one slice in one step after which it is left at the end it hit."""
 
 
@@ -114,7 +114,7 @@ def bounced(form, constants, one, watched, j, log, count):
     """
     y, v, y_end, v_end = watched.y[j], watched.v[j], watched.y_new[j], watched.v_new[j]
     elapsed = 0.0
-    for _ in range(MOST_HITS):
+    for _ in range(MAX_HITS):
         if at_rest(one, y, v):
             return y, 0.0, count
         x, left = y - one.centre, one.dt - elapsed

@@ -118,7 +118,7 @@ def test_overflow_is_named_and_nothing_is_returned_beyond_it(method):
 
 def test_a_run_in_which_time_stops_passing_is_stalled(monkeypatch):
     monkeypatch.setattr(ode_reference.witness, "WATCH", 200)
-    monkeypatch.setattr(ode_reference.witness, "LEAST_ADVANCE", 0.1)
+    monkeypatch.setattr(ode_reference.witness, "MIN_ADVANCE", 0.1)
     found = solve(SMALL, method="DOP853")
     assert found.status == "stalled"
     assert re.search(r"time hardly passes after \d+ evaluations at t = 0\.\d+ s", found.message)

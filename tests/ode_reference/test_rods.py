@@ -192,7 +192,7 @@ def test_ice_is_ice_and_output_times_are_met():
 
 
 def test_too_many_events_are_a_stall(monkeypatch):
-    monkeypatch.setattr(by_events, "MOST_EVENTS", 5)
+    monkeypatch.setattr(by_events, "MAX_EVENTS", 5)
     run = by_events.solve(Scenario().with_slices(2), times=TIMES)
     assert run.status == "stalled"
     assert "raise rest_speed" in run.message

@@ -8,7 +8,7 @@ import pytest
 from flipproof.frame.solvers import catalogue, solve
 from ode_reference.flow import layout
 from slicemodel import Bottle, Scenario
-from slicemodel.scenario import LEAST, MOST, MOST_ANGLE
+from slicemodel.scenario import LEAST, MAX_ANGLE, MOST
 
 THROW = Scenario(n_slices=3, duration=0.05)
 TINY = 5e-324
@@ -18,7 +18,7 @@ ENDS = {
     "drag": (TINY, 1e-300, MOST),
     "restitution": (TINY, 1e-300, 1.0 - 2**-53),
     "omega0": (LEAST, MOST, -LEAST, -MOST),
-    "theta0": (TINY, MOST_ANGLE, -MOST_ANGLE),
+    "theta0": (TINY, MAX_ANGLE, -MAX_ANGLE),
     "duration": (LEAST, MOST),
     "gravity": (TINY, 1e-300, MOST),
     "launch_velocity": (TINY, MOST),
@@ -28,7 +28,7 @@ CASES = [(name, value) for name, values in ENDS.items() for value in values]
 
 
 TOGETHER = [
-    {"omega0": 1.8e7, "theta0": MOST_ANGLE, "duration": 5e9, "gravity": 7e-6},
+    {"omega0": 1.8e7, "theta0": MAX_ANGLE, "duration": 5e9, "gravity": 7e-6},
     {"bottle": Bottle(radius=2e11), "water_mass": 1.0},
     {"bottle": Bottle(length=MOST, mass=MOST), "omega0": MOST, "gravity": MOST},
     {"bottle": Bottle(capacity=LEAST), "water_mass": LEAST, "drag": MOST, "duration": MOST},

@@ -13,7 +13,7 @@ from made_up import trajectory_of
 from flipproof.frame.solvers import Made, Run
 from flipproof.page.motion import (
     FRAMES,
-    MOST_SLICES,
+    MAX_SLICES,
     POSITION_STEP,
     cap_and_base,
     drawn_slices,
@@ -129,10 +129,10 @@ def test_a_slice_far_outside_is_drawn_at_the_farthest_place():
     assert r.max() * POSITION_STEP == pytest.approx(3.0)
 
 
-@pytest.mark.parametrize("n", [1, 2, MOST_SLICES, MOST_SLICES + 1, 500])
+@pytest.mark.parametrize("n", [1, 2, MAX_SLICES, MAX_SLICES + 1, 500])
 def test_first_and_last_slice_are_always_drawn(n):
     drawn = drawn_slices(n)
-    assert len(drawn) == min(n, MOST_SLICES)
+    assert len(drawn) == min(n, MAX_SLICES)
     assert drawn[0] == 0
     assert drawn[-1] == n - 1
     assert len(set(drawn.tolist())) == len(drawn)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flipproof.sweep.axes import KINDS, Choices, Range, read_axes
-from flipproof.sweep.design import MOST_POINTS, design_of, latin_shares, read_design
+from flipproof.sweep.design import MAX_POINTS, design_of, latin_shares, read_design
 from flipproof.sweep.entries import try_entries
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.work import scenario_of
@@ -230,14 +230,14 @@ def test_settings_in_range_are_tried_without_their_cost():
 
 
 def test_a_sweep_may_be_as_large_as_stated_and_costs_nothing_to_state():
-    text = GRID.replace("[0.25, 0.5]", f"{{from = 0.1, to = 1.0, count = {MOST_POINTS // 8}}}")
+    text = GRID.replace("[0.25, 0.5]", f"{{from = 0.1, to = 1.0, count = {MAX_POINTS // 8}}}")
     text = text.replace("count = 3", "count = 4")
     design = read(text)
-    assert design.size == MOST_POINTS
+    assert design.size == MAX_POINTS
     assert deque(design.values(), maxlen=1)[0] == (1.0, 0.3)
     # Points are counted, not throws: here each of two solvers has fewer than are admissible.
-    with pytest.raises(SweepError, match=f"500004 throws by 2 solvers make 1000008 points, more than {MOST_POINTS}"):
-        read(text.replace(f"count = {MOST_POINTS // 8}", f"count = {MOST_POINTS // 8 + 1}"))
+    with pytest.raises(SweepError, match=f"500004 throws by 2 solvers make 1000008 points, more than {MAX_POINTS}"):
+        read(text.replace(f"count = {MAX_POINTS // 8}", f"count = {MAX_POINTS // 8 + 1}"))
 
 
 @pytest.mark.parametrize(("low", "high", "log"), [(0.2, 0.9, False), (0.1, 1.1, True), (0.1, 3.3, True)])

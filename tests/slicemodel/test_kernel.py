@@ -95,7 +95,7 @@ def test_every_rebound_is_listed_however_many(monkeypatch):
     """A run with more rebounds than expected is repeated with room for all."""
     scenario = Scenario(n_slices=40, drag=0.1)
     expected = slicemodel.solve(scenario, steps=800, store="summary")
-    monkeypatch.setattr("slicemodel.solver.MOST_LISTED", 3)
+    monkeypatch.setattr("slicemodel.solver.MAX_LISTED", 3)
     again = slicemodel.solve(scenario, steps=800, store="summary")
     assert len(expected.impacts) == expected.diagnostics["rebounds"] > 300
     for name in ("time", "slice", "end", "speed_before"):

@@ -26,7 +26,7 @@ def test_a_scheme_whose_slices_escape_has_no_answer():
 
 
 def test_a_tolerance_out_of_reach_is_said_so(monkeypatch):
-    monkeypatch.setattr("slicemodel.step_advice.MOST_STEPS", 256)
+    monkeypatch.setattr("slicemodel.step_advice.MAX_STEPS", 256)
     with pytest.raises(ValueError, match=r"more than 256 steps of exact-step .* second order is .midpoint."):
         required_steps(SMALL, 1e-9)
 

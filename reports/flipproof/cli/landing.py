@@ -114,7 +114,7 @@ def command_land(options: argparse.Namespace) -> int:
 
 
 def _film(options: argparse.Namespace, rows: Any, table: Any) -> None:
-    from flipproof.animate import MOST_FRAMES, FilmError, check_pace, write_pictures
+    from flipproof.animate import MAX_FRAMES, FilmError, check_pace, write_pictures
     from flipproof.landing.film import draw_landing, film_times, shown
     from flipproof.landing.work import REFERENCE
 
@@ -122,8 +122,8 @@ def _film(options: argparse.Namespace, rows: Any, table: Any) -> None:
     chosen = [row for row in rows if row.program == REFERENCE] or list(rows)
     bottles = [shown(row, table) for row in chosen]
     times = film_times(bottles, options.slow, options.fps)
-    if len(times) > MOST_FRAMES:
-        raise FilmError(f"--slow {options.slow:g} makes {len(times)} frames (admissible: at most {MOST_FRAMES})")
+    if len(times) > MAX_FRAMES:
+        raise FilmError(f"--slow {options.slow:g} makes {len(times)} frames (admissible: at most {MAX_FRAMES})")
     with progress_bar("drawing", "frame", quiet=options.quiet) as step:
         write_pictures(draw_landing(bottles, times, options.slow), len(times), options.fps, options.film, step)
     print(f"{options.film}: {len(times)} frames, {len(bottles)} bottles ({options.slow:g} times slower)")

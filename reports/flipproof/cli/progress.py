@@ -21,8 +21,8 @@ COSTS: Final[dict[str, Mapping[str, float]]] = {
 }
 """Measured seconds of the stages of a report by its size, on two cores with an empty store; their ratio counts."""
 
-LEAST_SHARE: Final = 0.05
-LEAST_SECONDS: Final = 3.0
+MIN_SHARE: Final = 0.05
+MIN_SECONDS: Final = 3.0
 """Share that must be done, and time that must have passed, before the time that is left is told."""
 
 WIDTH: Final = 20
@@ -37,7 +37,7 @@ def time_left(share: float, seconds: float) -> str:
     share : float - what is done, in [0, 1]
     seconds : float - time that it took [s]
     """
-    if not LEAST_SHARE <= share < 1.0 or seconds < LEAST_SECONDS:
+    if not MIN_SHARE <= share < 1.0 or seconds < MIN_SECONDS:
         return ""
     left = seconds * (1.0 - share) / share
     if left < 90.0:

@@ -14,7 +14,7 @@ from flipproof.frame.exhibit import Touch
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
-MOST_SLICES: Final = 50
+MAX_SLICES: Final = 50
 """Slices of a throw that a browser solves while a slider moves."""
 
 POINTS: Final = 500
@@ -61,7 +61,7 @@ def live_data(throw: Scenario) -> dict[str, Any]:
     """Return the throw as the script takes it, in SI units."""
     return {
         "bottle": asdict(throw.bottle),
-        "slices": min(throw.n_slices, MOST_SLICES),
+        "slices": min(throw.n_slices, MAX_SLICES),
         "duration": throw.duration,
         "g": throw.gravity,
         "theta0": throw.theta0,

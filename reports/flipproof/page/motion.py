@@ -32,7 +32,7 @@ FLOWN: Final = ("published-python", "eq8", "free-flight", "pymunk")
 FRAMES: Final = 301
 """Frames of a flight on the page."""
 
-MOST_SLICES: Final = 50
+MAX_SLICES: Final = 50
 """Slices of one bottle that are drawn at the most."""
 
 POSITION_STEP: Final = 1e-4
@@ -88,8 +88,8 @@ def flight_of(trajectory: Trajectory, times: FloatArray) -> Flight:
 
 
 def drawn_slices(n_slices: int) -> NDArray[np.int64]:
-    """Return the numbers of the slices that are drawn: all, or MOST_SLICES of them with the first and the last."""
-    return np.rint(np.linspace(0, n_slices - 1, min(n_slices, MOST_SLICES))).astype(np.int64)
+    """Return the numbers of the slices that are drawn: all, or MAX_SLICES of them with the first and the last."""
+    return np.rint(np.linspace(0, n_slices - 1, min(n_slices, MAX_SLICES))).astype(np.int64)
 
 
 def release_point(scenario: Scenario, r_cm: float) -> FloatArray:

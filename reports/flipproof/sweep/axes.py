@@ -19,7 +19,7 @@ from slicemodel.scenario import Bottle, Scenario, not_whole, shortened
 Kind = Literal["real", "whole", "truth"]
 Value = float | int | bool
 
-MOST_VALUES: Final = 1_000_000
+MAX_VALUES: Final = 1_000_000
 """Values of one axis at the most."""
 
 FILL: Final = "fill_fraction"
@@ -126,7 +126,7 @@ def _axis(name: str, given: object, where: str, grid: bool) -> Axis:
     axis = Range(name, kind, float(low), float(high), scale == "log")
     if not grid:
         return axis
-    refuse(not_whole(f"{where} count", given["count"], 2, MOST_VALUES))
+    refuse(not_whole(f"{where} count", given["count"], 2, MAX_VALUES))
     last = given["count"] - 1
     return _distinct(Choices(name, kind, tuple(axis.at(k / last) for k in range(last + 1))), where)
 
@@ -146,8 +146,8 @@ def _value(given: object, kind: Kind, where: str) -> Value:
 def _distinct(axis: Choices, where: str) -> Choices:
     if not axis.values:
         raise SweepError(f"{where} = [] holds no value")
-    if len(axis.values) > MOST_VALUES:
-        raise SweepError(f"{where} holds {len(axis.values)} values, more than {MOST_VALUES}")
+    if len(axis.values) > MAX_VALUES:
+        raise SweepError(f"{where} holds {len(axis.values)} values, more than {MAX_VALUES}")
     seen: set[Value] = set()
     for value in axis.values:
         if value in seen:

@@ -40,7 +40,7 @@ from flipproof.sweep.work import FLIGHTS, Point
 from slicemodel.scenario import Scenario, ScenarioError, not_whole, read_toml
 from slicemodel.trajectory import FloatArray
 
-MOST_POINTS: Final = 1_000_000
+MAX_POINTS: Final = 1_000_000
 """Points of a sweep at the most, all solvers together: a minute of bookkeeping, 100 MB of memory, 250 MB of rows."""
 
 GRID: Final = "grid"
@@ -159,10 +159,10 @@ def design_of(document: Mapping[str, Any], source: str) -> Design:
         shares=shares,
         curves=int(curves),
     )
-    if design.size > MOST_POINTS:
+    if design.size > MAX_POINTS:
         raise SweepError(
             f"{source}: {design.throws} throws by {len(entries)} solvers make {design.size} points, more than "
-            f"{MOST_POINTS}; take fewer values, or a Latin hypercube"
+            f"{MAX_POINTS}; take fewer values, or a Latin hypercube"
         )
     return design
 
@@ -176,7 +176,7 @@ def _shares(table: Mapping[str, Any], where: str, axes: tuple[Axis, ...], *, gri
         return None
     samples: Any = table.get("samples")
     seed = table.get("seed", 0)
-    refuse(not_whole(f"{where} samples", samples, 1, MOST_POINTS) or not_whole(f"{where} seed", seed, 0, 2**63 - 1))
+    refuse(not_whole(f"{where} samples", samples, 1, MAX_POINTS) or not_whole(f"{where} seed", seed, 0, 2**63 - 1))
     if not any(isinstance(axis, Range) and axis.kind == "real" for axis in axes):
         raise SweepError(
             f'{where} design = "{LATIN}" needs a field {{from = ..., to = ...}} of real numbers in [sweep.fields]; '

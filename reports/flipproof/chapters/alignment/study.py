@@ -32,7 +32,7 @@ from slicemodel.trajectory import BASE, FloatArray
 SHIFT_BAND = 1e-3
 """Impacts further apart in time than this are shifted [s]."""
 
-LEAST_SPEED = 1e-2
+MIN_SPEED = 1e-2
 """Slower impacts are the tail of a slice that comes to rest [m/s]."""
 
 Table = Any
@@ -119,7 +119,7 @@ class Alignment:
             )
         else:
             words += f"none of {self.n_slices} slices strikes different ends in the two flights"
-        words += f"; {self.tail[0]} and {self.tail[1]} impacts slower than {LEAST_SPEED:g} m/s are not compared"
+        words += f"; {self.tail[0]} and {self.tail[1]} impacts slower than {MIN_SPEED:g} m/s are not compared"
         return words + (f"; {self.undecided} come too near the end of the flight to tell" if self.undecided else "")
 
 
@@ -171,8 +171,8 @@ def _fast_impacts(run: Trajectory, until: float) -> tuple[Table, int]:
         raise Missing(f"{run.label} keeps no record of impacts")
     early = impacts.time <= until
     order = np.lexsort((impacts.slice, impacts.time))
-    at = order[(early & (impacts.speed_before >= LEAST_SPEED / 2.0))[order]]
-    fast = impacts.speed_before[at] >= LEAST_SPEED
+    at = order[(early & (impacts.speed_before >= MIN_SPEED / 2.0))[order]]
+    fast = impacts.speed_before[at] >= MIN_SPEED
     columns = np.broadcast_arrays(impacts.time[at], impacts.slice[at], impacts.end[at], 0, fast, -1, False)
     names = "time,slice,end,k,kept,partner,after"
     return np.rec.fromarrays(columns, formats="f8,i8,i8,i8,?,i8,?", names=names), int(early.sum())

@@ -36,7 +36,7 @@ ORDER_TOLERANCE: Final = 0.25
 PHASE_FACTOR: Final = 2.0
 """Impact phases alone change the error of a single run by up to this factor, up or down."""
 
-LEAST_LEVELS: Final = 4
+MIN_LEVELS: Final = 4
 """Step sizes that a fit of three parameters needs at the least."""
 
 
@@ -104,8 +104,8 @@ def _refusal(dt: FloatArray, error: FloatArray, members: int) -> tuple[Verdict, 
     """Return why these errors, the coarsest level's first, have no fit, or None."""
     if not np.all(np.isfinite(error)):
         return "failure", f"the error at Δt = {dt[~np.isfinite(error)][0]:.2g} s is not finite"
-    if len(np.unique(dt)) < LEAST_LEVELS:
-        return "undecided", f"{len(np.unique(dt))} step sizes; {LEAST_LEVELS} are needed for C, p and F"
+    if len(np.unique(dt)) < MIN_LEVELS:
+        return "undecided", f"{len(np.unique(dt))} step sizes; {MIN_LEVELS} are needed for C, p and F"
     if error.min() < ROUND_OFF:
         return "undecided", f"errors reach round-off ({error.min():.1g}), where an order means nothing"
     # What impact phases may do to the quotient of two levels, less the more members are averaged.

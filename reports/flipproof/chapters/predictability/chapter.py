@@ -19,7 +19,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from flipproof.chapters.alignment.study import LEAST_SPEED, count_key, ordinal
+from flipproof.chapters.alignment.study import MIN_SPEED, count_key, ordinal
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, percent
 from flipproof.curves.growth import Growth, first_crossing, fit_growth
 from flipproof.figures.style import new_figure, solver_style, styled
@@ -43,7 +43,7 @@ GROWTH_WINDOW = 0.05
 def parting_words(difference: Difference, impacts: Impacts | None = None) -> str:
     """Return when two flights part, the impact that this follows, and how their difference grows before and after.
 
-    ``impacts`` is the record of the run whose impacts the parting is set against; those slower than ``LEAST_SPEED`` are
+    ``impacts`` is the record of the run whose impacts the parting is set against; those slower than ``MIN_SPEED`` are
     passed over, because near rest there is always one. Growth is fitted over ``GROWTH_WINDOW`` seconds.
     """
     pair, band, time = f"{difference.first} and {difference.second}", percent(PARTING_BAND), difference.parting_time
@@ -51,9 +51,9 @@ def parting_words(difference: Difference, impacts: Impacts | None = None) -> str
         return f"{pair} never differ by more than {band} of ω₀"
     words = f"{pair} differ by more than {band} of ω₀ from {time * 1e3:.1f} ms on"
     if impacts is not None:
-        fast = np.flatnonzero((impacts.time <= time) & (impacts.speed_before >= LEAST_SPEED))
+        fast = np.flatnonzero((impacts.time <= time) & (impacts.speed_before >= MIN_SPEED))
         if len(fast):
-            impact, k = impacts[int(fast[-1])], count_key(impacts, int(fast[-1]), LEAST_SPEED)
+            impact, k = impacts[int(fast[-1])], count_key(impacts, int(fast[-1]), MIN_SPEED)
             words += (
                 f", {(time - impact.time) * 1e3:.1f} ms after the {ordinal(k)} impact of slice {impact.slice} on the "
                 f"{impact.end}"

@@ -43,7 +43,7 @@ from slicemodel.trajectory import FloatArray
 PHASES = 8
 """Members of the ensemble at each step size."""
 
-LEAST_COMMON = 8
+MIN_COMMON = 8
 """Common times, less one, that a run and its reference must share at the least."""
 
 
@@ -109,7 +109,7 @@ def errors_of(reference: Trajectory, runs: Sequence[Sequence[Trajectory]]) -> tu
     """Return step [s] and max |omega - omega_reference| / omega_0 of every run, shape (levels, members).
 
     The error is NaN where a run is not complete. The reference is on uniform times, the runs are as ``plan_step_size``
-    plans them; one that shares fewer than LEAST_COMMON intervals with the reference raises Missing.
+    plans them; one that shares fewer than MIN_COMMON intervals with the reference raises Missing.
     """
 
     def error(run: Trajectory) -> float:
@@ -117,7 +117,7 @@ def errors_of(reference: Trajectory, runs: Sequence[Sequence[Trajectory]]) -> tu
             return math.nan
         fine, coarse = len(run.t) - 1, len(reference.t) - 1
         common = math.gcd(fine, coarse)
-        if common < LEAST_COMMON:
+        if common < MIN_COMMON:
             raise Missing(f"{fine} steps and {coarse} reference intervals share only {common} intervals")
         difference = run.omega[:: fine // common] - reference.omega[:: coarse // common]
         return float(np.abs(difference).max() / abs(reference.scenario.omega0))

@@ -123,7 +123,7 @@ def column_name(heading: str) -> tuple[str, str]:
 
 # ---------------------------------------------------------------------- bytes, lines and cells
 
-MOST_BYTES: Final = 50_000_000
+MAX_BYTES: Final = 50_000_000
 """Larger files are no export: an hour at 240 frames/s with ten columns holds about this."""
 
 EXPORT: Final = "in Tracker use File > Export > Data File"
@@ -184,13 +184,13 @@ def read_lines(path: Path) -> tuple[list[Line], str]:
     try:
         refuse_devices(path)
         with path.open("rb") as file:
-            content = file.read(MOST_BYTES + 1)
+            content = file.read(MAX_BYTES + 1)
     except UnsuitableFileError as error:
         raise TrackFileError(f"{path}: {error}; {EXPORT}") from None
     except OSError as error:
         raise TrackFileError(f"{path}: cannot be read ({error.strerror or error})") from None
-    if len(content) > MOST_BYTES:
-        raise TrackFileError(f"{path}: has more than {MOST_BYTES // 1_000_000} MB and is no table of tracks")
+    if len(content) > MAX_BYTES:
+        raise TrackFileError(f"{path}: has more than {MAX_BYTES // 1_000_000} MB and is no table of tracks")
     if content.startswith(b"PK\x03\x04"):
         raise TrackFileError(f"{path}: is a zip archive (a Tracker project or a spreadsheet), not text; {EXPORT}")
 
