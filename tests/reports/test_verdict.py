@@ -18,7 +18,7 @@ from flipproof.cli.snapshot import BEGIN, END, PLACE, README, front_page, write_
 from flipproof.frame.solvers import FINER
 from flipproof.page.verdict import Headline, Measure, answer, headlines, lead, lines
 
-INSTEAD = "For slices, use free flight; for water, rods."
+INSTEAD = "For slices, use free flight; for water, rods that cannot overlap."
 
 PAIRS = {"whole": TOTAL, "program-eq8": PROGRAM_EQ8, "eq8-free": EQ8_FREE, "engine": BY_ENGINE}
 
@@ -213,10 +213,10 @@ def test_the_answer_follows_from_step_and_equation(step, equation, words):
         (
             0.42,
             "gravity in Eq. 8",
-            "but its formulas do not solve Eq. 8, and Eq. 8 lets weight push the water.",
+            "but its formulas do not solve Eq. 8, and Eq. 8 lets gravity push the water.",
         ),
         (0.42, "no recoil in impacts", "but its formulas do not solve Eq. 8, and Eq. 8 is not free flight."),
-        (0.01, "gravity in Eq. 8", "but Eq. 8 lets weight push the water."),
+        (0.01, "gravity in Eq. 8", "but Eq. 8 lets gravity push the water."),
     ],
 )
 def test_the_answer_names_the_algebra_and_the_weight_where_they_matter(algebra, largest, words):

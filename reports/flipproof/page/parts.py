@@ -22,7 +22,7 @@ STORY: Final[Mapping[str, str]] = {
     "verdict": "Two bottles",
     "outward": "Thrown outward",
     "drag": "Slowed by drag",
-    "weight": "Weight drops out",
+    "weight": "Gravity drops out",
     "recoil": "The bottle recoils",
     "overlap-idea": "Water cannot overlap",
     "answer": "Is Eq. 8 right?",

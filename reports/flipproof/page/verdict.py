@@ -174,8 +174,8 @@ def answer(headlines: Sequence[Headline]) -> str:
     within = percent(PARTING_BAND)
     weight = "pair" in by_id and by_id["pair"].what == RUNG_NAMES["weightless"]
     solved = "program-eq8" not in by_id or by_id["program-eq8"].value <= PARTING_BAND
-    physics = "Eq. 8 lets weight push the water" if weight else "Eq. 8 is not free flight"
-    instead = "For slices, use free flight; for water, rods."
+    physics = "Eq. 8 lets gravity push the water" if weight else "Eq. 8 is not free flight"
+    instead = "For slices, use free flight; for water, rods that cannot overlap."
     return {
         (True, False): "Not as it stands: the program’s steps are short enough, but "
         f"{'' if solved else 'its formulas do not solve Eq. 8, and '}{physics}. {instead}",
@@ -258,7 +258,7 @@ CHANGES: Final[Mapping[str, str]] = {
     "not damp.",
     "roots of Eq. 9a: γ ≪ ω": "Eq. 9a holds for small drag (γ ≪ ω); at the end of the flight drag is not small.",
     "drag against C_M": "Eq. 8 measures drag against the centre of mass; water rubs on the wall of the bottle.",
-    "gravity in Eq. 8": "Eq. 8 lets weight push water along the bottle; a falling bottle feels none.",
+    "gravity in Eq. 8": "Eq. 8 lets gravity push water along the bottle; a falling bottle does not feel it.",
     "origin at rest, drag on the tube": "Eq. 8 leaves out that the centre of mass accelerates along the bottle, and "
     "that drag pulls the bottle.",
     "no recoil in impacts": "Water that strikes an end kicks the bottle; with Eq. 8 the bottle is not kicked.",

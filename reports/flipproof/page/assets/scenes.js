@@ -3,7 +3,7 @@
   "use strict";
   const { g, theta0, fill, gamma, e, omega0, ...fixed } = JSON.parse(document.getElementById("live-data").textContent);
   const start = { ...fixed, g, theta0, fill, gamma, e, omega0 }, chart = window.flipproofChart, live = window.flipproofLive;
-  const NAMES = { eq8: "Eq. 8", free: "free flight", rods: "rods", still: "Eq. 8, no weight", bare: "Eq. 8, no weight, no drag" };
+  const NAMES = { eq8: "Eq. 8", free: "free flight", rods: "rods", still: "Eq. 8, no gravity", bare: "Eq. 8, no gravity, no drag" };
   const COLOURS = { eq8: "eq8", free: "free-flight", rods: "rods", still: "eq8", bare: "eq8" };
   const FRAMES = 251, SLOW = 9, BOTTLES = 250, CURVES = 110;
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -102,7 +102,7 @@
         pen.fillText(NAMES[solver], left + 8, 16);
         pen.font = `12px ${getComputedStyle(canvas).fontFamily}`;
         pen.fillStyle = style("--soft");
-        pen.fillText(`ω = ${(flown.omega[frame] / thrown.omega0).toFixed(2)} ω₀`, left + 8, height - 3);
+        pen.fillText(`spin: ${(100 * flown.omega[frame] / thrown.omega0).toFixed(0)} % of the start`, left + 8, height - 6);
       });
     }
     function stop() { cancelAnimationFrame(playing); playing = 0; }
