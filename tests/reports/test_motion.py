@@ -176,7 +176,7 @@ def test_every_control_that_the_script_looks_for_is_in_the_template():
 def test_nothing_in_the_assets_asks_the_network():
     for file in sorted(ASSETS.iterdir()):
         text = file.read_text(encoding="utf-8").replace("http://www.w3.org/2000/svg", "")
-        assert not re.search(r"https?:|fetch\(|XMLHttpRequest|import\s|@import|url\(|</script", text), name
+        assert not re.search(r"https?:|fetch\(|XMLHttpRequest|import\s|@import|url\(|</script", text), file.name
 
 
 def test_another_bottle_is_drawn_with_its_own_size():
