@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from flipproof.frame.solvers import Made, Missing, Run, find, make, solve
 from slicemodel import Scenario, Trajectory
+from slicemodel.scenario import LEAST
 from slicemodel.trajectory import FloatArray
 
 SAME_TIME: Final = 1e-9
@@ -27,7 +28,7 @@ SAME_TIME: Final = 1e-9
 def solve_timed(name: str, scenario: Scenario, **settings: Any) -> tuple[Trajectory, float]:
     """Run the named solver; return its flight and the wall time it took [s], without compiling ``ode_reference``."""
     if find(name).package == "ode_reference":
-        solve(name, replace(scenario, duration=1e-3 * scenario.duration), **settings)
+        solve(name, _begun(scenario), **settings)
     began = time.perf_counter()
     flight = solve(name, scenario, **settings)
     return flight, time.perf_counter() - began
@@ -71,9 +72,14 @@ def _kind(run: Run) -> tuple[Any, ...]:
     return run.solver, run.settings.get("method"), run.settings.get("frame")
 
 
+def _begun(scenario: Scenario) -> Scenario:
+    """Return the first fiftieth of a throw, or all of one that is as short as throws may be."""
+    return replace(scenario, duration=max(LEAST, 0.02 * scenario.duration))
+
+
 def _short(run: Run) -> Run:
     """Return the first fiftieth of a flight, which warms its solver up."""
-    scenario = replace(run.scenario, duration=0.02 * run.scenario.duration)
+    scenario = _begun(run.scenario)
     settings = {name: value for name, value in run.settings.items() if name not in ("times", "max_step")}
     few: dict[str, Any] = {"steps": 16} if "steps" in settings else {"times": [scenario.duration]}
     return replace(run, scenario=scenario, settings=settings | few)

@@ -1,5 +1,7 @@
 """The band of a run, by its twins."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -76,4 +78,9 @@ def test_compiling_is_no_part_of_what_a_flight_took(monkeypatch):
     monkeypatch.setattr(timing.time, "perf_counter", lambda: clock[0])
     assert timing.solve_timed("eq8", THROW) == ("eq8", 0.5)
     assert timing.solve_timed("exact-step", THROW) == ("exact-step", 0.5)
-    assert flown == [("eq8", 1e-3 * THROW.duration), ("eq8", THROW.duration), ("exact-step", THROW.duration)]
+    assert flown == [("eq8", 0.02 * THROW.duration), ("eq8", THROW.duration), ("exact-step", THROW.duration)]
+
+
+def test_a_throw_as_short_as_one_may_be_is_timed():
+    flight, _ = timing.solve_timed("eq8", replace(THROW, duration=1e-15))
+    assert flight.ok
