@@ -1,9 +1,11 @@
 """A report's runs made by worker processes that may die."""
 
+import multiprocessing
 import os
 import signal
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -12,7 +14,7 @@ import pytest
 from flipproof.frame import pool
 from flipproof.frame.flights import Call
 from flipproof.frame.pool import COSTS, TRIES, make_all, workers
-from flipproof.frame.processes import WorkerDiedError
+from flipproof.frame.processes import Processes, WorkerDiedError
 from flipproof.frame.solvers import Run
 from slicemodel import Scenario
 
@@ -42,6 +44,20 @@ def test_a_call_whose_worker_died_once_is_made_again(tmp_path):
 
 def _always_die():
     os.kill(os.getpid(), signal.SIGKILL)
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="interrupts cannot be held back here")
+def test_a_worker_that_still_starts_does_not_die_of_an_interrupt():
+    # A terminal interrupts every process of its group, those that still import among them.
+    with Processes(1) as processes:
+        future = processes.submit(os.getpid)
+        while not (children := multiprocessing.active_children()):
+            time.sleep(0.001)
+        for _ in range(10):
+            os.kill(children[-1].pid, signal.SIGINT)
+            time.sleep(0.01)
+        assert future.result(timeout=60) == children[-1].pid
+        assert processes.submit(signal.pthread_sigmask, signal.SIG_BLOCK, ()).result(timeout=60) == set()
 
 
 def test_only_the_run_that_kills_its_worker_is_lost_and_the_order_stays(monkeypatch):

@@ -17,6 +17,7 @@ import traceback
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any
@@ -159,7 +160,8 @@ class _Worker:
         self.ready = False
         self.pipe, far = context.Pipe()
         self.process = context.Process(target=_answer_calls, args=(far, announcing), daemon=True)
-        self.process.start()
+        with _interrupts_held():
+            self.process.start()
         # Only the worker holds the far end now, so that its death ends the pipe.
         far.close()
 
@@ -176,9 +178,28 @@ class _Worker:
         return self.process.exitcode
 
 
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Hold back SIGINT from this thread and from a process that it starts, which inherits the mask.
+
+    A terminal interrupts every process of its group. One that still imports would die of it with a traceback.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # it lets interrupts in again when it starts
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _answer_calls(pipe: Connection, announcing: bool) -> None:
     """Live as a worker: answer calls until the pipe or the parent ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(signal, "pthread_sigmask"):  # what a worker starts can be interrupted again
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if announcing:
         announce_compiling()
