@@ -1,4 +1,4 @@
-"""The plateau of every equation over the filling, beside what two crude fluids gave in the same bottle."""
+"""The plateau of every equation over the filling, beside what three fluids gave in the same bottle."""
 
 from __future__ import annotations
 
@@ -20,6 +20,9 @@ from slicemodel.trajectory import FloatArray
 
 FILLS: Final = (0.05, 0.1, 0.15, 0.2, 0.25, 0.33, 0.4, 0.5, 0.6, 0.75, 0.9, 1.0)
 """Fillings of the curves; those of the fluids are among them."""
+
+OWN_CELLS: Final = 16
+"""Cells across of the coarsest grid whose plateaus count."""
 
 DISCS: Final = "rods as discs, no drag"
 """Rods with the inertia of discs and without drag, as the fluids have none."""
@@ -45,23 +48,65 @@ def name_of(equation: str) -> str:
 @cache
 def fluids() -> Mapping[str, Any]:
     """Return what was recorded of the fluids."""
-    text = resources.files("flipproof.chapters.water").joinpath("fluids.json").read_text(encoding="utf-8")
-    recorded: Mapping[str, Any] = json.loads(text)
-    return recorded
+    return _read("fluids.json")
 
 
-def fluid_band() -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the fillings of the fluids, and the lowest and the highest plateau of any fluid there, shape (F,)."""
+@cache
+def own_fluid() -> Mapping[str, Any]:
+    """Return the flights of ``ode_reference.ideal_water`` that its benchmark recorded."""
+    return _read("own_fluid.json")
+
+
+def _read(name: str) -> Mapping[str, Any]:
+    text = resources.files("flipproof.chapters.water").joinpath(name).read_text(encoding="utf-8")
+    content: Mapping[str, Any] = json.loads(text)
+    return content
+
+
+def own_flights(*, start: str | None = None, suction: bool | None = None) -> list[Mapping[str, Any]]:
+    """Return the flights of our own fluid on its two finest grids, those asked for."""
+    return [
+        flight
+        for flight in own_fluid()["flights"]
+        if flight["cells"] >= OWN_CELLS and start in (None, flight["start"]) and suction in (None, flight["suction"])
+    ]
+
+
+def recorded_band() -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the fillings of the recorded fluids, and the lowest and the highest plateau of any there, shape (F,)."""
     recorded = fluids()
     levels = np.array([fluid["plateau"] for fluid in recorded["fluids"]], dtype=float)
     return np.array(recorded["fillings"]), np.nanmin(levels, axis=0), np.nanmax(levels, axis=0)
 
 
+def own_band() -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the same fillings and edges of our own fluid, with suction and without; NaN where it was not thrown."""
+    fills = np.array(fluids()["fillings"])
+    flights = own_flights(start="spinning")
+    levels = [[flight["plateau"] for flight in flights if flight["filling"] == fill] or [np.nan] for fill in fills]
+    return fills, np.array([min(level) for level in levels]), np.array([max(level) for level in levels])
+
+
+def fluid_band() -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the fillings of the fluids, and the lowest and the highest plateau of any fluid there, shape (F,)."""
+    fills, *recorded = recorded_band()
+    _, *own = own_band()
+    return fills, np.fmin(recorded[0], own[0]), np.fmax(recorded[1], own[1])
+
+
 def start_band() -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return two fillings, and the lowest and the highest plateau of one fluid over the starts of its water there."""
+    """Return two fillings, and the lowest and the highest plateau there of any start of the water in two fluids."""
     starts = fluids()["starts"]
     levels = np.array(list(starts["plateau"].values()), dtype=float)
+    ours = np.array([[f["plateau"] for f in own_flights() if f["filling"] == fill] for fill in starts["fillings"]]).T
+    levels = np.concatenate([levels, ours])
     return np.array(starts["fillings"]), levels.min(axis=0), levels.max(axis=0)
+
+
+def late_fluid() -> Mapping[float, Mapping[str, Any]]:
+    """Return by filling, from a quarter on, the flight of our own fluid with suction on its finest grid."""
+    flights = sorted(own_flights(start="spinning", suction=True), key=lambda flight: flight["cells"])
+    return {flight["filling"]: flight for flight in flights if flight["filling"] >= 0.25}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +118,7 @@ class Water:
     slices : of the equations that have any
     level : equation -> plateau of omega / omega_0; NaN where a run failed
     early : equation -> time to 0.75 omega_0 [s]; NaN where it is not reached
-    apart : equation -> filling -> r.m.s. difference in omega(t) from the fluid with suction, in omega_0
+    apart : equation -> filling -> r.m.s. difference in omega(t) from our own fluid with suction, in omega_0
     own_inertia : equation -> by how much the inertia of discs moves the plateau of the half-full bottle
     """
 
@@ -120,7 +165,7 @@ def study(ask: Ask) -> Study[Water]:
     )
     apart = {
         equation: {
-            float(f): _apart(flights[runs[equation, float(f)]], curve) for f, curve in fluids()["curves"].items()
+            fill: _apart(flights[runs[equation, fill]], flight["omega"]) for fill, flight in late_fluid().items()
         }
         for equation in EQUATIONS
     }
