@@ -65,6 +65,16 @@ def test_heyoka_finds_every_impact_within_a_picosecond_or_two(name):
     assert found.time < 1e-11
 
 
+@pytest.mark.parametrize(
+    ("name", "whole"), [("simultaneous-7", True), ("resting-3", True), ("zeno-1", True), ("grazing-1", False)]
+)
+def test_diffrax_finds_simultaneous_hits_and_misses_a_faint_one(name, whole):
+    pytest.importorskip("diffrax")
+    found = score.score(PROBLEMS[name], score.adapter(EVENTS / "diffrax_event.py"), 1e-13)
+    assert (found.matched == found.impacts == found.answered) is whole
+    assert found.time < 1e-8
+
+
 @pytest.mark.parametrize("name", ["grazing-1", "grazing-3"])
 def test_a_solver_that_looks_only_between_steps_misses_the_faint_hit(name):
     found = score.score(PROBLEMS[name], partial(SOLVE, turns=False), 1e-13)

@@ -1,5 +1,7 @@
 """Bullet by pybullet, for ``flipproof bounce examples/bounce/bullet.py:default examples/bounce/bullet.py:tuned``."""
 
+from importlib.metadata import version
+
 import numpy as np
 import pybullet as bullet
 
@@ -14,7 +16,7 @@ class Engine:
 
     def __init__(self, world, body):
         self.world, self.body = world, body
-        self.settings = {"API version": bullet.getAPIVersion(), **world, **body}
+        self.settings = {"version": version("pybullet"), **world, **body}
 
     def drop(self, height, speed, restitution, gravity, dt, duration):
         """Return t [s], y [m] and v [m/s] at every step."""

@@ -270,3 +270,49 @@ def test_the_command_takes_files_and_programs(tmp_path):
     spoken = load(f"cmd:{sys.executable} {program} {words}").drop(1.0, 0.0, 0.5, 9.81, 0.01, 0.3)
     silent = load(f"{program}:drop").drop(1.0, 0.0, 0.5, 9.81, 0.01, 0.3)
     assert all(np.array_equal(a, b) for a, b in zip(spoken, silent, strict=True))
+
+
+KEPT = """
+import sys
+flights = 0
+print("# version = 3.1")
+for line in sys.stdin:
+    height, speed, restitution, gravity, dt, duration = map(float, line.split())
+    flights += 1
+    print("t,y,v")
+    for k in range(round(duration / dt) + 1):
+        print(k * dt, height, flights, sep=",")
+    print(flush=True)
+"""
+
+
+def test_a_program_that_names_no_places_is_started_once_and_asked_line_by_line(tmp_path):
+    program = tmp_path / "kept.py"
+    program.write_text(KEPT)
+    adapter = load(f"cmd:{sys.executable} {program}")
+    for flight in (1, 2):
+        t, y, v = adapter.drop(1 / 3, 0.0, 0.5, 9.81, 0.01, 0.1)
+        assert np.array_equal(t, 0.01 * np.arange(11))
+        assert (y == 1 / 3).all()
+        assert (v == flight).all()
+    assert adapter.settings == {"version": "3.1"}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("print(flush=True)", "sys.exit('no license')"), "exit status 1.*no license"),
+        (("for line", "sys.exit(0)\nfor line"), "exit status 0.*version = 3.1"),
+        (("print(flush=True)", "sys.stdin.read()"), "is the output flushed"),
+        (("t,y,v", "t,x,v"), "first line is 't,x,v'"),
+        (("range(round(duration / dt) + 1)", "()"), "nothing follows"),
+    ],
+)
+def test_a_kept_program_that_does_not_answer_is_named_in_one_line(tmp_path, monkeypatch, change, words):
+    if "flushed" in words:
+        monkeypatch.setattr("flipproof.bounce.specs.TIMEOUT", 1.0)
+    program = tmp_path / "kept.py"
+    program.write_text(KEPT.replace(*change))
+    with pytest.raises(AdapterError, match=words) as error:
+        load(f"cmd:{sys.executable} {program}").drop(1.0, 0.0, 0.5, 9.81, 0.01, 0.1)
+    assert "\n" not in str(error.value)

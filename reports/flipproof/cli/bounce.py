@@ -19,7 +19,7 @@ def add_bounce(commands: Any) -> None:
         nargs="+",
         metavar="ADAPTER",
         help="pymunk, mujoco, box2d, file.py:name, package.module:name or cmd:'program {height} {speed} {restitution} "
-        "{gravity} {dt} {duration}'; it runs with your rights",
+        "{gravity} {dt} {duration}', or cmd:'program' that reads them line by line; it runs with your rights",
     )
     bounce.add_argument("--dt", type=number, default=1e-3, metavar="S", help="step in seconds (default 0.001)")
     add_json(bounce, "the passports")
@@ -39,12 +39,12 @@ def command_bounce(options: argparse.Namespace) -> int:
     passports = []
     for adapter in map(load, options.adapter):
         print(inert(adapter.name) + f", step {options.dt:g} s")
-        print(inert("".join(f"  {name} = {value}\n" for name, value in adapter.settings.items())), end="")
         made = []
         with progress_bar(adapter.name, "measurement") as progress:
             for measurement in measure(adapter, options.dt):
                 made.append(measurement)
                 progress(len(made), max(len(made) + 1, 9), measurement.name)
+        print(inert("".join(f"  {name} = {value}\n" for name, value in adapter.settings.items())), end="")
         for measurement in made:
             print(inert(f"{'!' if measurement.remark else ' '} {measurement.name:<14} {measurement.sentence}"))
             if measurement.remark:
