@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
-from planted import Patch, patches
+from planted import HERE, Patch, patches
 from planted.subject import Subject
 
-RIGHT: Final[Mapping[str, Any]] = MappingProxyType(
-    {
-        "Subject": Subject,
-        "eq8": Patch("Eq. 8 by RK4, impacts located.", "eq8", ()),
-        "midpoint": Patch("Eq. 8 by the midpoint rule, impacts by reflection.", "midpoint", ()),
-        "free_flight": Patch("Free flight by RK4, impacts located.", "free_flight", ()),
-        **patches("right"),
+
+def _files() -> dict[str, Patch]:
+    """Return every file of ``solvers`` without a change; its words are the first line of its docstring."""
+    docs = {
+        file.stem: ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or file.stem
+        for file in sorted((HERE / "solvers").glob("*.py"))
     }
-)
+    return {name: Patch(text.partition("\n")[0], name, ()) for name, text in docs.items()}
+
+
+RIGHT: Final[Mapping[str, Any]] = MappingProxyType({"Subject": Subject, **_files(), **patches("right")})
 """Every right solver by name."""

@@ -29,6 +29,7 @@ CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
         "digits": checks_measured.check_digits,
         "determinism": checks_basic.check_determinism,
         "start": checks_basic.check_start,
+        "inputs": checks_basic.check_inputs,
         "refinement": checks_measured.check_refinement,
         "ice": checks_basic.check_ice,
         "angle": checks_basic.check_angle,
@@ -217,7 +218,7 @@ def _result(name: str, check: Check, traits: Traits, asked: _Asked) -> Result:
     result = partial(Result, check=name, title=(CHECKS[name].__doc__ or "").partition("\n")[0])
     known = traits.expected_failures.get(name)
     try:
-        found = drive(check(traits), asked.again if name == "determinism" else asked)
+        found = drive(check(traits), asked.again if name in ("determinism", "inputs") else asked)
     except (NotApplicableError, WaitingError) as why:
         return result(verdict=IDLE, reason=str(why))
     except ForeignError as error:

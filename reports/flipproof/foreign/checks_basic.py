@@ -8,12 +8,12 @@ from typing import Final
 
 import numpy as np
 
-from flipproof.chapters.vectors.published import Vector, load_all
 from flipproof.foreign import elsewhere
 from flipproof.foreign.checking import SMOOTH, THROW, Found, Making, NotApplicableError, ask_of, shift, when
 from flipproof.foreign.contract import Ask, Traits
 from flipproof.foreign.place import SETTLED, THROWS, curve, name_of, placing, switches_of
 from slicemodel.observables import centre_of_mass, moment_of_inertia
+from slicemodel.vectors import Vector, load_all
 
 
 def check_shape(traits: Traits) -> Making:
@@ -78,6 +78,43 @@ def check_determinism(traits: Traits) -> Making:
     )
 
 
+def check_inputs(traits: Traits) -> Making:
+    """Whatever part of the question is changed alone, the answer changes."""
+    bottle, start = THROW.bottle, THROW.initial_positions()
+    throws = {
+        "another water_mass": replace(THROW, water_mass=0.9 * THROW.water_mass),
+        "another theta0": replace(THROW, theta0=THROW.theta0 + 0.3),
+        "another omega0": replace(THROW, omega0=1.1 * THROW.omega0),
+        "another restitution": replace(THROW, restitution=0.6),
+        "another drag": replace(THROW, drag=1.5 * THROW.drag),
+        **{
+            f"another {name} of the bottle": replace(
+                THROW, bottle=replace(bottle, **{name: 1.1 * float(getattr(bottle, name))})
+            )
+            for name in ("mass", "length", "radius", "capacity")
+        },
+    }
+    ask = ask_of(traits, THROW, -2)
+    others = {words: replace(ask_of(traits, throw, -2), start=start) for words, throw in throws.items()}
+    others["another start"] = replace(ask, start=start[::-1] - np.linspace(0.2, 0.1, len(start)) * bottle.length)
+    others["other times"] = replace(ask, times=ask.times**2 / ask.times[-1])
+    # The first throw comes again before each: whatever is kept of the last throw alone is kept of that one.
+    asks = [one for other in others.values() for one in (ask, other)]
+    answers = yield asks
+    same = [
+        words
+        for words, one, other in zip(others, answers[::2], answers[1::2], strict=True)
+        if all(np.array_equal(getattr(one, name), getattr(other, name)) for name in ("theta", "omega"))
+    ]
+    return Found(
+        holds=not same,
+        expected="other numbers for another question",
+        came=f"the same numbers to the last bit with {' and with '.join(same)}" if same else "other numbers each time",
+        where=f"{len(others)} parts of the question, each changed alone after the throw of most checks",
+        advice="read it from the question, and keep no answer under a part of the question",
+    )
+
+
 def check_ice(traits: Traits) -> Making:
     """With frozen water omega stays what it was, theta goes with it, and no slice moves."""
     ask = ask_of(traits, replace(THROW, frozen=True))
@@ -89,12 +126,17 @@ def check_ice(traits: Traits) -> Making:
     }
     if answer.r is not None:
         off["r"] = np.max(np.abs(answer.r - ask.start), axis=1) / THROW.bottle.length
-    bound = max(1e-6, 16 * traits.epsilon)  # an engine's constraints drift so far; formulas keep omega to 1e-12
-    worst = next((name for name in off if not off[name].max() <= bound), "omega")
+    # An engine's constraints drift so far; formulas keep omega to 1e-12. A thousand steps in single precision round
+    # theta as often, and all the same way.
+    bounds = dict.fromkeys(off, max(1e-6, 16 * traits.epsilon))
+    if traits.precision == "float32":
+        bounds["theta"] = 1000 * traits.epsilon / 2
+    expected = {"omega": "omega constant", "theta": "theta = theta_0 + omega_0 t", "r": "r constant"}
+    worst = next((name for name in off if not off[name].max() <= bounds[name]), "omega")
     return Found(
-        holds=float(off[worst].max()) <= bound,
-        expected=f"omega constant within {bound:.1g}",
-        came=f"{worst} changed by {off[worst].max():.2g}",
+        holds=float(off[worst].max()) <= bounds[worst],
+        expected=f"{expected[worst]} within {bounds[worst]:.1g}",
+        came=f"{worst} off by {off[worst].max():.2g}",
         where=f"scenario.frozen = True, {when(ask.times, off[worst])}",
         advice="hold every slice where it is when scenario.frozen is true, and let theta go on from theta_0",
         facts={"drift": float(off["omega"].max())},
@@ -112,7 +154,9 @@ def check_angle(traits: Traits) -> Making:
     *sizes, slow = [float(off.max()) for off in offs]
     # With impacts between the times the rule leaves 2e-4 rad per rad of the flight.
     bound = max(2e-4, 64 * traits.epsilon) * max(1.0, float(np.ptp(answers[0].theta)))
-    holds = sizes[0] <= bound or (_falls(sizes) and sizes[-1] <= 100 * bound)
+    # Of order 2 or more, omega has a kink at an impact and theta none: what falls with the step alone is lost time.
+    enough = 8.0 if (traits.order or 0.0) >= 2.0 and sizes[-1] > bound else 3.0
+    holds = sizes[0] <= bound or (_falls(sizes, enough) and sizes[-1] <= 100 * bound)
     stops = holds and (slow > 100 * max(bound, sizes[0]) or late.theta[-1] == late.theta[-2])
     return Found(
         holds=holds and not stops,
@@ -121,7 +165,8 @@ def check_angle(traits: Traits) -> Making:
         where=f"flight of {SLOW.duration:g} s" if stops else when(asks[0].times, offs[0]),
         advice="fly to the last of ask.times, however late that is"
         if stops
-        else "theta is in radians and advances by omega dt, omega of the same instant",
+        else "theta is in radians and advances by omega dt, omega of the same instant, also over the rest of a step "
+        "with an impact",
         facts={"angle": sizes},
     )
 
@@ -174,6 +219,10 @@ def check_velocity(traits: Traits) -> Making:
     )
 
 
+LOCATED: Final = 10.0
+"""Times its bound up to which a drift is a weakness: slices that had passed an end are put back on it."""
+
+
 def check_momentum(traits: Traits) -> Making:
     """J omega is J_0 omega_0 at all times, with J by its definition from the positions of the slices."""
     asks = _refined(traits)
@@ -185,8 +234,10 @@ def check_momentum(traits: Traits) -> Making:
     changes = [np.abs(j * a.omega / start - 1.0) for j, a in zip(inertias, answers, strict=True) if j is not None]
     sizes = [float(change.max()) for change in changes]
     bound = max(1e-6, 64 * traits.epsilon)  # as well as an engine conserves it
+    falls = _falls(sizes)
     return Found(
-        holds=sizes[0] <= bound or _falls(sizes),
+        holds=sizes[0] <= LOCATED * bound or falls,
+        weak=f"J omega is kept to {sizes[0]:.1g} only, whatever the step" if sizes[0] > bound and not falls else "",
         expected=f"J omega constant within {bound:.1g}, or a change that falls with refinement",
         came=f"changed by {sizes[0]:.2g}{_at_a_quarter(sizes)}",
         where=when(asks[0].times, changes[0]),
@@ -201,9 +252,9 @@ def _refined(traits: Traits, points: int = 61) -> list[Ask]:
     return [ask_of(traits, THROW, level, points) for level in ((0, 2) if traits.refined_by else (0,))]
 
 
-def _falls(sizes: Sequence[float]) -> bool:
-    """Return whether a change falls by 3 or more in two levels of refinement: then it is a step's own error."""
-    return len(sizes) > 1 and sizes[-1] * 3.0 <= sizes[0]
+def _falls(sizes: Sequence[float], enough: float = 3.0) -> bool:
+    """Return whether a change falls by ``enough`` in two levels of refinement: then it is a step's own error."""
+    return len(sizes) > 1 and sizes[-1] * enough <= sizes[0]
 
 
 def _at_a_quarter(sizes: Sequence[float], unit: str = "") -> str:

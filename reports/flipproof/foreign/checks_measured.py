@@ -13,6 +13,7 @@ import numpy as np
 from flipproof.curves.order import observed_order
 from flipproof.foreign.checking import SMOOTH, THROW, Found, Making, NotApplicableError, ask_of, shift
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
+from flipproof.foreign.place import curve, name_of, placing, switches_of
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
@@ -76,23 +77,51 @@ def check_refinement(traits: Traits) -> Making:
     """What the solver is told to refine by changes its answer."""
     if traits.refined_by is None:
         raise NotApplicableError("refined_by is not declared")
-    levels = (-6, -2, 0, 2)
-    answers = yield [ask_of(traits, THROW, level) for level in levels]
-    changes = [max(shift(a, b, THROW.omega0), _apart(a, b, "theta")) for a, b in pairwise(answers)]
-    *_, before, last = changes
-    ended = last == 0.0 and before > 1000 * traits.epsilon
+    levels: tuple[int, ...] = (-6, -2, 0, 2)
+    answers = list((yield [ask_of(traits, THROW, level) for level in levels]))
+    if traits.refined_by == "rtol" and _change(*answers[-2:]) == 0.0:
+        # A step that may be no longer than it is meets one tolerance as well as the next, until they are very small.
+        levels += (4, 6)
+        answers += yield [ask_of(traits, THROW, level) for level in levels[-2:]]
+    changes = [_change(a, b) for a, b in pairwise(answers)]
+    moved = [change for change in changes if change > 0.0]
+    ended = changes[-1] == 0.0 and max(moved, default=0.0) > 1000 * traits.epsilon
+    holds, weak = bool(moved) and not ended, ""
+    if not holds and traits.refined_by == "rtol":
+        error = yield from _error(traits, answers[-1])
+        if error is not None and error <= max(ACCURATE, 1024 * traits.epsilon):
+            holds, weak = True, f"{error:.1g} of omega_0 off, whatever rtol is: something else limits the step"
     came = f"changes of {', '.join(f'{c:.2g}' for c in changes)} of omega_0 from level to level"
-    if max(changes) == 0.0:
-        came = f"the same answer to the last bit at {len(levels)} levels of {traits.refined_by}: ask.effort is ignored"
-    elif ended:
-        came += ": steps grow no shorter, ask.effort is ignored from there on"
+    if not moved:
+        came = f"the same answer to the last bit at {len(levels)} levels of {traits.refined_by}"
+    if not holds:
+        came += ": steps grow no shorter, ask.effort is ignored from there on" if moved else ": ask.effort is ignored"
     return Found(
-        holds=max(changes) > 0.0 and not ended,
+        holds=holds,
         expected=f"an answer that changes with {traits.refined_by}",
         came=came,
         where="0.3 s with impacts",
         advice=f"use ask.effort as {traits.refined_by}, or declare no refined_by",
+        weak=weak,
     )
+
+
+ACCURATE: Final = 1e-10
+"""Error, fraction of omega_0, that is left to a solver that changes nothing for the finest tolerances."""
+
+
+def _error(traits: Traits, answer: Answer) -> Generator[Sequence[Ask], Sequence[Answer], float | None]:
+    """Return how far omega is from that of the equation that the solver solves; None if that is not known."""
+    place = yield from placing(traits)
+    equation = traits.equation or place.equation
+    if not place.on_lattice or place.equation != name_of(switches_of(equation)):
+        return None
+    return shift(answer, curve(equation, THROW, answer.t), THROW.omega0)
+
+
+def _change(one: Answer, other: Answer) -> float:
+    """Return the largest difference of omega and theta, each as a fraction of its scale."""
+    return max(shift(one, other, THROW.omega0), _apart(one, other, "theta"))
 
 
 def _apart(one: Answer, other: Answer, name: str) -> float:

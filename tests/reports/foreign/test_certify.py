@@ -3,6 +3,7 @@
 import json
 import xml.etree.ElementTree as ET
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ import ode_reference
 from flipproof.foreign import checks_measured
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, WEAK, certify, findings_of
 from flipproof.foreign.contract import Ask, ForeignError, started
-from flipproof.foreign.elsewhere import PAPER, SEED, drawn
+from flipproof.foreign.elsewhere import COUNT, FACTORS, PAPER, SEED, designed, drawn
 from flipproof.foreign.solving import opened
 from flipproof.foreign.specs import load
 from flipproof.frame.solvers import solve
@@ -63,6 +64,14 @@ class WeightBelowNine(Subject):
         return float(-self.g * np.cos(y[0])) if self.g < 9 else 0.0
 
 
+class IceForward(Subject):
+    """Ice turns the positive way."""
+
+    def solve(self, ask):
+        found = super().solve(ask)
+        return found | {name: np.abs(found[name]) for name in ("omega",) if ask.scenario.frozen}
+
+
 class AlwaysHalf(Subject):
     """The restitution is 0.5, whatever the throw's is."""
 
@@ -70,12 +79,13 @@ class AlwaysHalf(Subject):
         return 0.5
 
 
-MINE = (InitialOmega, EffortIgnored, InertiaAboutTheCap, HalfSpeed, WeightBelowNine, AlwaysHalf)
+MINE = (InitialOmega, EffortIgnored, InertiaAboutTheCap, HalfSpeed, WeightBelowNine, AlwaysHalf, IceForward)
 
 SEES = {
     "digits": "SinglePrecision",
     "start": "LateStart",
     "determinism": "Noise",
+    "inputs": "AlwaysHalf",
     "refinement": "EffortIgnored",
     "ice": "IceMoves",
     "angle": "Degrees",
@@ -229,7 +239,11 @@ def test_a_tolerance_inside_that_no_step_refines_is_a_weakness_with_its_number()
 
 @pytest.mark.parametrize(
     ("kind", "said"),
-    [(AlwaysHalf, "right at e = 0.5, wrong at e = "), (HalfSpeed, "omega is right, v not")],
+    [
+        (AlwaysHalf, "right at e = 0.5, wrong at e = "),
+        (HalfSpeed, "omega is right, v not"),
+        (IceForward, "in ice right at omega_0 = 20 rad/s, wrong at omega_0 = -"),
+    ],
 )
 def test_one_knob_tells_right_from_wrong_elsewhere(kind, said):
     found = certify(InProcess(kind(), "x"), ["elsewhere"])
@@ -268,17 +282,35 @@ def test_slices_that_jump_have_no_speed_and_break_no_check():
 
 def test_throws_are_drawn_anew_by_a_seed():
     assert drawn(1) == drawn(1) != drawn(2)
-    for seed in range(20):
-        throws = [knobs.ask(seed) for knobs in drawn(seed)]
-        assert {len(ask.times) for ask in throws} == {1, 60}
-        fillings = [ask.scenario.fill_fraction for ask in throws]
-        assert min(fillings) < 0.05 < 1.0 == max(fillings)
-        assert {0.0, 1.0} < {ask.scenario.restitution for ask in throws}
-        assert {1, 2, 9} < {ask.scenario.n_slices for ask in throws}
+    for seed in range(10):
+        flown, ice = drawn(seed)[:COUNT], drawn(seed)[COUNT:]
+        assert ice == tuple(replace(knobs, frozen=True) for knobs in flown)
+        throws = [knobs.ask(seed) for knobs in flown]
         assert max(ask.scenario.n_slices for ask in throws) > 64
         for ask in throws:
-            assert ask.times[0] > 0.0
             assert ask.scenario.r_min <= ask.start.min() <= ask.start.max() <= ask.scenario.r_max
+            assert 0.0 <= ask.times[0] <= ask.times[-1] <= ask.scenario.duration * (1 + 1e-12)
+
+
+def test_pairs_of_levels_occur_together():
+    for seed in range(5):
+        rows = designed(np.random.default_rng(seed))
+        sizes = [len(levels) for levels in FACTORS.values()]
+        pairs = list(combinations(range(len(sizes)), 2))
+        met = {(i, j, row[i], row[j]) for row in rows for i, j in pairs}
+        assert len(met) > 0.85 * sum(sizes[i] * sizes[j] for i, j in pairs)
+        assert all({row[k] for row in rows} == set(range(size)) for k, size in enumerate(sizes))
+
+
+def test_water_moves_in_every_throw():
+    """A throw in which nothing moves asks nothing; slices that all begin on the ends once were such a throw."""
+    for seed in (SEED, 1, 2, 3):
+        for knobs in drawn(seed)[:COUNT]:
+            ask = replace(knobs, times="even from 0").ask(seed)
+            for equation in ("eq8", "free-flight"):
+                flown = ode_reference.solve(started(ask), equation, ask.times)
+                assert np.abs(flown.r - ask.start).max() > 0.02 * knobs.length
+                assert len(flown.impacts.time) < 110 + 2 * knobs.slices
 
 
 def test_the_reference_begins_where_it_is_asked_to():
@@ -323,8 +355,8 @@ def test_what_declares_nothing_is_not_certified():
             return {"t": ask.times, "theta": ask.scenario.theta0 + omega * ask.times, "omega": omega}
 
     found = certify(InProcess(Still(), "still"))
-    assert [r.check for r in found.failed] == ["enough"]
-    assert "declare equation, refined_by and order" in found.failed[0].line
+    assert [r.check for r in found.failed] == ["inputs", "enough"]
+    assert "declare equation, refined_by and order" in found.failed[-1].line
 
 
 def test_what_a_solver_does_not_say_is_not_held_against_it():
@@ -338,6 +370,17 @@ def test_what_a_solver_does_not_say_is_not_held_against_it():
     undeclared = type("Undeclared", (Subject,), {"equation": None, "order": None})
     found = certify(InProcess(undeclared(), "x"), ["order-before-impacts", "gravity"])
     assert [r.reason.partition(";")[0] for r in found.results] == ["no order is declared", "no equation is declared"]
+
+
+@pytest.mark.parametrize(("drift", "verdict"), [(2e-6, WEAK), (5e-5, FAILED)])
+def test_a_small_drift_of_angular_momentum_that_no_step_mends_is_a_weakness(drift, verdict):
+    class Drifting(Subject):
+        def solve(self, ask):
+            found = super().solve(ask)
+            return found | {"omega": found["omega"] * (1.0 + drift * ask.times / ask.scenario.duration)}
+
+    (result,) = certify(InProcess(Drifting(), "x"), ["angular-momentum"]).results
+    assert result.verdict == verdict
 
 
 def test_an_equation_can_be_asked_for_and_what_spoils_it_is_named():
@@ -403,13 +446,25 @@ def test_the_first_check_that_fails_is_the_one_that_tells(mistake, check):
         ("cached_by_number_of_slices", "determinism", "keep nothing under a part of the throw"),
         ("ice_starts_at_zero", "ice", "let theta go on from theta_0"),
         ("flight_ends_at_half_a_second", "angle", "fly to the last of ask.times"),
+        ("rest_of_step_lost", "angle", "over the rest of a step"),
+        ("answers_cached_without_start", "inputs", "keep no answer under a part of the question"),
+        ("restitution_hardcoded", "inputs", "with another restitution"),
+        ("tolerance_of_the_module", "refinement", "or declare no refined_by"),
     ],
 )
 def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, advice):
-    solver = patches("first")[mistake].solver()
+    solver = (patches("first") | patches("second"))[mistake].solver()
     found = certify(InProcess(solver, mistake), until_failed=True)
     assert [r.check for r in found.failed] == [check]
     assert advice in found.results[-1].line
+
+
+@pytest.mark.parametrize(
+    ("name", "check"),
+    [("dop853_between_events", "refinement"), ("dormand_prince_capped", "refinement"), ("single_precision", "ice")],
+)
+def test_a_cap_on_the_step_and_declared_precision_are_no_mistakes(name, check):
+    assert not certify(InProcess(patches("right")[name].solver(), name), [check]).failed
 
 
 def test_a_bug_in_what_is_planted_is_no_failure_of_a_check():

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flipproof.chapters.vectors.published import load_all
 from flipproof.cli.main import main
 from flipproof.foreign.certify import FAILED, IDLE, PASSED, WEAK, certify
 from flipproof.foreign.checks_basic import ask_of_vector
@@ -17,6 +16,7 @@ from flipproof.foreign.contract import Ask, Traits
 from flipproof.foreign.files import Folder
 from flipproof.foreign.solving import opened
 from slicemodel import Scenario
+from slicemodel.vectors import load_all
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "foreign"
 GOOD = {"equation": "eq8", "refined_by": "steps", "order": 2.0}
