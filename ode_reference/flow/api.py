@@ -25,17 +25,17 @@ STATUSES: Final = {OK: "ok", OVERFLOW: "overflow", STALLED: "stalled", EXHAUSTED
 
 
 def fly(
-    scenario: Scenario, moments: FloatArray, switches: Switches, settings: Mapping[str, Any], *, states: bool = True
+    scenario: Scenario, t_out: FloatArray, switches: Switches, settings: Mapping[str, Any], *, states: bool = True
 ) -> Trajectory:
     """Fly one scenario.
 
     Parameters
     ----------
-    moments : array, shape (P,) - output times [s]
+    t_out : array, shape (P,) - output times [s]
     settings : mapping - "model", the name of the equation; "rest_speed" [m/s], "impact_law", "energy"
     states : bool - whether r and v are kept
     """
-    half, points = scenario.bottle.length / 2, len(moments)
+    half, points = scenario.bottle.length / 2, len(t_out)
     thrown, moved = twin_of(scenario, settings.get("twin", 0))
     rows, (y, v) = np.empty((3, points)), np.empty((2, points * states, scenario.n_slices))
     # Overflow is a result here, reported as a status: it must not also appear as a warning.
@@ -43,17 +43,17 @@ def fly(
         flight, places, marks = layout.prepare(thrown, switches, settings, moved)
         now = flight[0]
         if scenario.frozen or 2 * (scenario.r_max - half) <= now.tolerance:
-            hits = _hold(now, places[layout.PLACE], moments, rows)
+            hits = _hold(now, places[layout.PLACE], t_out, rows)
             y[:], v[:] = places[layout.PLACE], 0.0
         else:
             from ode_reference.flow.loop import fly as loop
 
-            hits = loop(flight, places, marks, moments, rows, y, v)
+            hits = loop(flight, places, marks, t_out, rows, y, v)
         reached, hits = int(now.recorded), hits[: int(now.impacts)]
         theta, inertia, y_cm = rows[:, :reached]
         omega = now.momentum / inertia
     r = np.clip(half + y[:reached], scenario.r_min, scenario.r_max)
-    if len(r) and moments[0] == 0.0:
+    if len(r) and t_out[0] == 0.0:
         r[0] = scenario.initial_positions() + moved  # to the last digit, as output at release
     # Impacts of one instant in the order of the slices.
     impacts = Impacts(*hits[np.lexsort((hits[:, 2], hits[:, 0]))].T[1:])
@@ -70,7 +70,7 @@ def fly(
         scenario=scenario,
         solver="ode_reference",
         method=settings["model"],
-        t=moments[:reached],
+        t=t_out[:reached],
         theta=theta,
         omega=omega,
         r=r,
@@ -86,15 +86,15 @@ def fly(
     )
 
 
-def _hold(now: Any, y: FloatArray, moments: FloatArray, rows: FloatArray) -> FloatArray:
+def _hold(now: Any, y: FloatArray, t_out: FloatArray, rows: FloatArray) -> FloatArray:
     """Write the flight of a bottle in which nothing moves: theta is linear; return its impacts, none."""
     y_cm = now.slice_mass * y.sum() / now.total_mass
     inertia = now.bottle_inertia + now.slice_mass * y.dot(y) - now.total_mass * y_cm * y_cm
     omega = now.momentum / inertia
-    rows[0], rows[1], rows[2] = now.theta + omega * moments, inertia, y_cm
+    rows[0], rows[1], rows[2] = now.theta + omega * t_out, inertia, y_cm
     now.initial = now.final = now.momentum * omega / 2
     finite = np.isfinite(now.initial) and np.isfinite(rows).all()
-    now.recorded, now.status = (len(moments), OK) if finite else (0, OVERFLOW)
+    now.recorded, now.status = (len(t_out), OK) if finite else (0, OVERFLOW)
     return np.empty((0, 6))
 
 
@@ -158,18 +158,18 @@ class Batch(Sequence[Trajectory]):
         return self.flights[k]
 
 
-def fly_all(throws: Sequence[Scenario], moments: FloatArray, jobs: int | None, *ask: Any, states: bool) -> Batch:
+def fly_all(throws: Sequence[Scenario], t_out: FloatArray, jobs: int | None, *ask: Any, states: bool) -> Batch:
     """Fly all throws by so many threads, one per core if not said.
 
     Parameters
     ----------
-    moments : array, shape (K, P) - output times of each [s]
+    t_out : array, shape (K, P) - output times of each [s]
     ask, states - as of ``fly``
     """
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     with ThreadPoolExecutor(jobs or cores) as pool:
-        flights = tuple(pool.map(lambda *throw: fly(*throw, *ask, states=states), throws, moments))
-    theta, omega = np.full(moments.shape, np.nan), np.full(moments.shape, np.nan)
+        flights = tuple(pool.map(lambda *throw: fly(*throw, *ask, states=states), throws, t_out))
+    theta, omega = np.full(t_out.shape, np.nan), np.full(t_out.shape, np.nan)
     for k, flight in enumerate(flights):
         theta[k, : len(flight.t)], omega[k, : len(flight.t)] = flight.theta, flight.omega
-    return Batch(flights, moments, theta, omega, tuple(flight.status for flight in flights))
+    return Batch(flights, t_out, theta, omega, tuple(flight.status for flight in flights))

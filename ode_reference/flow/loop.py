@@ -19,7 +19,7 @@ MIN_ADVANCE = 1e-7
 
 
 @kept_on_disk()
-def fly(flight, points, marks, moments, rows, r, v):
+def fly(flight, points, marks, t_out, rows, r, v):
     """Advance a flight to its duration, or to where it must stop; return its impacts, more rows than there are.
 
     The columns of an impact: number of the step, time, slice, end, speed before and after.
@@ -27,7 +27,7 @@ def fly(flight, points, marks, moments, rows, r, v):
     Parameters
     ----------
     flight, points, marks - as ``layout.prepare`` makes them
-    moments : array, shape (P,) - output times [s]
+    t_out : array, shape (P,) - output times [s]
     rows : array, shape (3, P) - here go theta, J and y_CM up to the last output time that the flight reaches
     r, v : array, shape (P, N) - here go y, infinite at rest, and y' [m], [m/s]; (0, N) if they are not asked for
     """
@@ -52,9 +52,9 @@ def fly(flight, points, marks, moments, rows, r, v):
             if now.impacts >= now.impact_limit:
                 now.status = EXHAUSTED
                 break
-        if now.duration - now.t <= 4.0 * 2.3e-16 * now.duration:
+        if is_over(now, now.t):
             break
-        step(now, points, marks, table, moments, rows, r, v)
+        step(now, points, marks, table, t_out, rows, r, v)
     if now.status == 0:
         rebase(now, points, marks)
         now.t = now.duration
@@ -63,7 +63,13 @@ def fly(flight, points, marks, moments, rows, r, v):
 
 
 @inner
-def step(now, points, marks, table, moments, rows, r, v):
+def is_over(now, t):
+    """Return whether no more than a rounding is left of the flight at t."""
+    return now.duration - t <= 4.0 * 2.3e-16 * now.duration
+
+
+@inner
+def step(now, points, marks, table, t_out, rows, r, v):
     """Advance to the next event, or as far as the map, the series or the duration let it."""
     now.steps += 1
     if now.steps % now.watch == 0:
@@ -88,9 +94,13 @@ def step(now, points, marks, table, moments, rows, r, v):
         return
     find(now, table, points, marks)
     x = min(now.root, 1.0)
-    end = now.duration if x == 1.0 and h >= left else now.t + x * h
-    while now.recorded < len(moments) and moments[now.recorded] <= end:
-        record(now, table, points, marks, (moments[now.recorded] - now.t) / h, rows, r, v)
+    end = now.t + x * h
+    if is_over(
+        now, end
+    ):  # so that an output time at the very end is answered, although a hit comes a rounding before it
+        end = now.duration
+    while now.recorded < len(t_out) and t_out[now.recorded] <= end:
+        record(now, table, points, marks, (t_out[now.recorded] - now.t) / h, rows, r, v)
     if now.ledger:
         book_step(now, table, x)
     now.theta, now.A, now.B, z, now.dA, now.dB, now.dy_mean = state_at(now, table, x)

@@ -399,3 +399,15 @@ def test_a_batch_names_the_throw_that_cannot_be():
     with pytest.raises(ValueError, match=r"times has shape \(1, 2\); 2 throws need"):
         solve_batch([HALF, HALF], times=[[0.1, 0.2]])
     assert len(solve_batch([])) == 0
+
+
+@pytest.mark.parametrize("model", ["free-flight", "eq8"])
+def test_a_flight_that_ends_on_an_impact_answers_its_last_output_time(model):
+    """A hit is located to a rounding: found just before the end, it must not swallow the row at the end."""
+    throw = Scenario(n_slices=6, drag=0.0, restitution=1.0, omega0=6.0)
+    hits = solve(throw, model).impacts.time
+    assert len(hits) > 3
+    for duration in (near for hit in hits[:20] for near in (hit, np.nextafter(hit, 1.0))):
+        flight = solve(replace(throw, duration=float(duration)), model, times=np.linspace(0.0, duration, 7))
+        assert flight.ok
+        assert len(flight.t) == 7
