@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from engine_check.certificate import Certificate, certify
+    from engine_check.engines import DEFAULT_DT, ENGINES, SetupError
     from engine_check.landing import LANDERS, land
     from engine_check.pymunk_settings import PymunkKnobs
     from engine_check.restitution import measure_restitution
-    from engine_check.solver import DEFAULT_DT, ENGINES, SetupError, solve
+    from engine_check.solver import solve
 
 __all__ = [
     "DEFAULT_DT",
@@ -29,11 +30,11 @@ __all__ = [
 
 _HOMES = {
     "Certificate": "engine_check.certificate",
-    "DEFAULT_DT": "engine_check.solver",
-    "ENGINES": "engine_check.solver",
+    "DEFAULT_DT": "engine_check.engines",
+    "ENGINES": "engine_check.engines",
     "LANDERS": "engine_check.landing",
     "PymunkKnobs": "engine_check.pymunk_settings",
-    "SetupError": "engine_check.solver",
+    "SetupError": "engine_check.engines",
     "certify": "engine_check.certificate",
     "land": "engine_check.landing",
     "measure_restitution": "engine_check.restitution",

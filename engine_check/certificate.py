@@ -18,11 +18,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from engine_check.engines import ENGINES, checked_number
 from engine_check.refinement import BENT, DOUBLE, EARLIER, MOVED, SHAKEN, Level, Runs, Verdict, search
 from engine_check.restitution import Rebound, measure_restitution
-from engine_check.solver import DEFAULT_TOLERANCE, ENGINES, checked_number
 from slicemodel.scenario import Scenario, not_whole
 from slicemodel.trajectory import FloatArray, Trajectory, output_times
+
+DEFAULT_TOLERANCE: Final = 2e-3
+"""Change of omega under refinement below which a run is certified, fraction of omega_0."""
 
 DEFAULT_LEVELS: Final = 5
 """Settings tried at the most: steps from 1.25e-4 s to 7.8e-6 s, if iterations need no refining."""
@@ -212,8 +215,8 @@ def certify(
     problem = not_whole("levels", levels, 1, MAX_LEVELS)
     if problem:
         raise ValueError(problem)
-    moments = output_times(scenario, times)
-    runs = Runs(scenario, engine, {"times": moments, "ice": ice, "slices": slices, **knobs})
+    t_out = output_times(scenario, times)
+    runs = Runs(scenario, engine, {"times": t_out, "ice": ice, "slices": slices, **knobs})
     verdict = search(runs, tolerance, levels)
     run = runs.make("on trial", verdict.dt, verdict.iterations)
     rebounds = () if scenario.frozen else measure_restitution(engine, slices=slices, knobs=knobs)

@@ -19,8 +19,8 @@ from typing import Any, Final
 import numpy as np
 
 from engine_check import watch
+from engine_check.engines import Order
 from engine_check.mujoco_settings import DISABLED, MujocoKnobs
-from engine_check.solver import Order
 from engine_check.watch import Band, State
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray, Trajectory
@@ -104,7 +104,7 @@ def _fly(scenario: Scenario, order: Order, settings: MujocoKnobs) -> Trajectory:
     world = build(scenario, order.dt)
     setup = verify(world, scenario, order.dt)
     flight = _Flight(world, scenario, Contacts(world, scenario.restitution, settings.rest_flight * order.dt), setup)
-    for when, count in order.legs():
+    for when, count in order.intervals():
         if not flight.advance(when, count):
             break
     return flight.trajectory(

@@ -18,6 +18,7 @@ import pymunk
 
 from engine_check import pymunk_rods as rods
 from engine_check import watch
+from engine_check.engines import Order
 from engine_check.pymunk_settings import (
     CAP_ELASTICITY,
     PymunkKnobs,
@@ -26,7 +27,6 @@ from engine_check.pymunk_settings import (
 )
 from engine_check.pymunk_setup import verify
 from engine_check.pymunk_world import BatchReader, World, build, start_staggered
-from engine_check.solver import Order
 from engine_check.watch import State
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray, Trajectory
@@ -66,7 +66,7 @@ def run(scenario: Scenario, order: Order) -> Trajectory:
     setup = verify(world, scenario, settings, iterations, ice, order.slices)
     flight = _Flight(world, scenario, settings, setup["angular_momentum"], order.slices == "exclude")
 
-    for when, count in order.legs():
+    for when, count in order.intervals():
         if count == 0:
             flight.record()
         elif not flight.advance(when, count):

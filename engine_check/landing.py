@@ -29,12 +29,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from engine_check.engines import checked_number
 from engine_check.mujoco_log import no_log
 from engine_check.mujoco_setup import verify
 from engine_check.mujoco_world import TUBE, TUBE_DOFS
 from engine_check.mujoco_world import build as release
 from engine_check.readback import differences, matched
-from engine_check.solver import checked_number
 from slicemodel.compiled import compiled, kept_on_disk
 from slicemodel.scenario import Scenario, unknown_name
 from slicemodel.table import ENERGY_RISE, LAWS, LONGEST_LANDING, Outcome, Table, Touch

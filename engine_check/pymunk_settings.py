@@ -19,7 +19,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Final
 
-from engine_check.solver import MAX_ITERATIONS
+from engine_check.engines import MAX_ITERATIONS
 from slicemodel.scenario import Scenario, unknown_name
 
 CAP_ELASTICITY: Final = 1.0

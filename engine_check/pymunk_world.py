@@ -54,7 +54,7 @@ def build(scenario: Scenario, knobs: PymunkKnobs, iterations: int, ice: str, sli
     ice : str
         "rigid" or "welded"; used if ``scenario.frozen``.
     slices : str
-        "overlap" or "exclude" (``engine_check.solver.CONTACTS``); used if not.
+        "overlap" or "exclude" (``engine_check.engines.CONTACTS``); used if not.
     """
     space = pymunk.Space()
     space.iterations = iterations

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
-from engine_check.solver import SetupError
+from engine_check.engines import SetupError
 
 ROUND_OFF: Final = 1e-12
 """Largest relative difference between meant and built: sums of N terms in a different order, nothing more."""

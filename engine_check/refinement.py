@@ -48,7 +48,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine_check.solver import ENGINES, MAX_ITERATIONS, solve
+from engine_check.engines import ENGINES, MAX_ITERATIONS, run_engine
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray, Trajectory
 
@@ -262,7 +262,7 @@ class Runs:
 
     def _flown(self, scenario: Scenario, dt: float, iterations: int | None, **more: Any) -> tuple[Trajectory, float]:
         began = time.perf_counter()
-        run = solve(scenario, self.engine, dt, iterations, **{**self.settings, **more})
+        run = run_engine(scenario, self.engine, dt, iterations, **{**self.settings, **more})
         return run, time.perf_counter() - began
 
     def _note(self, role: str, dt: float, run: Trajectory, seconds: float, change: FloatArray | None) -> None:

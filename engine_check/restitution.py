@@ -19,7 +19,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine_check.solver import solve
+from engine_check.engines import run_engine
 from slicemodel.scenario import Bottle, Scenario
 from slicemodel.trajectory import FloatArray
 
@@ -130,7 +130,7 @@ def _rebound(engine: str, end: str, e: float, dt: float, settings: Mapping[str, 
     side = 1.0 if end == "base" else -1.0
     throw = _throw(e, side)
     times = np.linspace(0.0, DURATION, round(DURATION / STEP) + 1)
-    run = solve(throw, engine, dt, times=times, **settings)
+    run = run_engine(throw, engine, dt, times=times, **settings)
     nothing = Rebound(end=end, asked=e, measured=math.nan, speed_in=math.nan, speed_out=math.nan)
     if not run.ok:
         return replace(nothing, reason=run.message)

@@ -1,122 +1,13 @@
-"""The public verb of this package, and the register of engines."""
+"""The public verb of this package: the bottle thrown in an engine, certified unless its step is given."""
 
 from __future__ import annotations
 
-import math
-import numbers
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from importlib import import_module
-from types import MappingProxyType
-from typing import Final
-
 from numpy.typing import ArrayLike
 
-from slicemodel.scenario import Scenario, unknown_name
-from slicemodel.trajectory import FloatArray, Trajectory, output_times
-
-
-@dataclass(frozen=True, slots=True)
-class Engine:
-    """A physics engine: the module whose ``run`` throws the bottle in it, what it solves and why it is here.
-
-    A comparison tests only what the engine does itself (``theirs``); what we hand it (``ours``: an impact law, times of
-    impacts) is on both sides, and agreement says nothing about it.
-    ``contacts`` are those of ``CONTACTS`` that it has; ``model`` is the equation of ``ode_reference.MODELS`` that it is
-    held against; ``sweeps`` says that it takes ``iterations`` over its bodies, in their order; ``movable`` that it
-    answers hits at points of a grid that its knob ``grid_offset`` moves.
-    """
-
-    name: str
-    module: str
-    equation: str
-    reason: str
-    theirs: str
-    ours: str
-    contacts: tuple[str, ...] = ("overlap",)
-    model: str = "free-flight"
-    movable: bool = False
-    sweeps: bool = False
-
-    @property
-    def words(self) -> str:
-        """What is the engine's and what is ours, in one sentence each."""
-        return f"The engine's: {self.theirs}. Ours: {self.ours}."
-
-
-ENGINES: Final[Mapping[str, Engine]] = MappingProxyType(
-    {
-        engine.name: engine
-        for engine in (
-            Engine(
-                name="pymunk",
-                module="engine_check.engine_pymunk",
-                equation="free flight: Newton's equations of a rigid tube and N point masses in the lab frame",
-                reason="Bodies, joints and contacts of the engine in the lab frame: no equation of motion and no law "
-                "of impact of ours enters, so that the moving origin and the recoil of the tube follow from the engine "
-                "alone. A hit on an end is answered at the next step of the grid.",
-                theirs="the motion, the law of impact, the recoil, rests, and the times of hits, which wait for the "
-                "step's grid",
-                ours="the initial state and the settings",
-                contacts=("overlap", "exclude"),
-                movable=True,
-                sweeps=True,
-            ),
-            Engine(
-                name="mujoco",
-                module="engine_check.engine_mujoco",
-                equation="free flight: a tree of joints in generalised coordinates, in the lab frame",
-                reason="The engine's equations of motion in generalised coordinates, by Runge-Kutta steps: the masses "
-                "cannot leave the axis. Impacts are ours: our simultaneous law, solved with the engine's mass matrix "
-                "at times that we locate.",
-                theirs="the motion between impacts, and the mass matrix that impacts are solved with",
-                ours="the simultaneous law of impact, the times and the order of impacts, rests and releases",
-            ),
-        )
-    }
-)
-"""Every engine by name. A new engine is one file and one entry here."""
-
-DEFAULT_DT: Final = 1e-4
-"""Upper bound of the step when iterations are given and the step is not [s]."""
-
-DEFAULT_TOLERANCE: Final = 2e-3
-"""Change of omega under refinement below which a run is certified, fraction of omega_0."""
-
-ICE_MODELS: Final = ("rigid", "welded")
-CONTACTS: Final = ("overlap", "exclude")
-"""What two slices do when they meet: pass through each other as in the paper, or collide as rods of length h/N."""
-
-MAX_ITERATIONS: Final = 1_000_000
-MAX_DRIFT: Final = 5e3
-"""Largest launch velocity of an engine's throw [|omega0| L]."""
-
-MAX_SLICES: Final = 5_000
-"""Slices at the most; an engine's sweep costs their number times its iterations, 2e6 constraints a step at 5 000."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Order:
-    """What an engine is asked to build and how to step it, checked; knobs are the engine's own to check."""
-
-    dt: float
-    iterations: int | None
-    times: FloatArray
-    ice: str = "rigid"
-    slices: str = "overlap"
-    knobs: Mapping[str, float]
-
-    def legs(self) -> Iterator[tuple[float, int]]:
-        """Yield each output time with the number of equal steps that lead to it."""
-        before = 0.0
-        for when in self.times.tolist():
-            # A hair less than the quotient: 0.5 s / 1e-4 s must not become 5001 steps by rounding.
-            yield when, math.ceil((when - before) / self.dt * (1.0 - 1e-12))
-            before = when
-
-
-class SetupError(RuntimeError):
-    """The world that the engine holds is not the one that was meant; the message names each difference."""
+from engine_check.certificate import DEFAULT_TOLERANCE, certified
+from engine_check.engines import check_asked, run_engine
+from slicemodel.scenario import Scenario
+from slicemodel.trajectory import Trajectory
 
 
 def solve(
@@ -180,59 +71,8 @@ def solve(
     See ``engine_pymunk``: order 2 in ``dt`` in free flight without drag, order 1 with drag or contacts on the grid.
     Status "diverged" if an invariant leaves its band (``watch``).
     """
-    if engine not in ENGINES:
-        raise ValueError(unknown_name("engine =", engine, ENGINES))
-    has = ENGINES[engine]
-    asked = (
-        ("ice", ice, ICE_MODELS, ICE_MODELS),
-        ("slices", slices, CONTACTS, has.contacts),
-    )
-    for what, name, known, offered in asked:
-        if name not in known:
-            raise ValueError(unknown_name(f"{what} =", name, known))
-        if name not in offered:
-            raise ValueError(f"engine = {engine!r} has no {what} = {name!r} (it has: {', '.join(offered)})")
-    if scenario.n_slices > MAX_SLICES:
-        raise ValueError(f"n_slices = {scenario.n_slices} is outside [1, {MAX_SLICES}] for an engine; cut it coarser")
-    fastest, spin = math.hypot(*scenario.launch_velocity), abs(scenario.omega0) * scenario.bottle.length
-    if fastest > MAX_DRIFT * spin:
-        raise ValueError(
-            f"launch_velocity = {fastest:g} m/s is outside [0, {MAX_DRIFT * spin:g}] m/s, {MAX_DRIFT:g} |omega0| L:"
-            " an engine works in the lab frame, where the spin would be lost in round-off; take a smaller one"
-        )
-    if dt is None and iterations is None:
-        certified = import_module("engine_check.certificate").certified
-        settings = {"times": times, "tolerance": tolerance, "ice": ice, "slices": slices}
-        certified_run: Trajectory = certified(scenario, engine, **settings, **knobs)
-        return certified_run
-    run = import_module(has.module).run
-    order = Order(
-        dt=checked_number("dt", DEFAULT_DT if dt is None else dt, 0.0, math.inf, " s"),
-        iterations=_checked_iterations(iterations),
-        times=output_times(scenario, times),
-        ice=ice,
-        slices=slices,
-        knobs=knobs,
-    )
-    trajectory: Trajectory = run(scenario, order)
-    return trajectory
-
-
-def checked_number(name: str, value: object, above: float, below: float, unit: str = "") -> float:
-    """Return ``value`` as float if it is a number in (above, below); else raise ValueError with the range."""
-    admissible = f"({above:g}, {below:g}){unit}"
-    if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise ValueError(f"{name} = {value!r} is not a number (admissible: {admissible})")
-    # Written as "not inside", because NaN passes every "outside" test.
-    if not above < float(value) < below:
-        raise ValueError(f"{name} = {float(value)!r}{unit} is outside {admissible}")
-    return float(value)
-
-
-def _checked_iterations(iterations: object) -> int | None:
-    if iterations is None:
-        return None
-    whole = isinstance(iterations, numbers.Integral) and not isinstance(iterations, bool)
-    if not whole or not 1 <= int(iterations) <= MAX_ITERATIONS:  # type: ignore[call-overload]
-        raise ValueError(f"iterations = {iterations!r} is not a whole number in [1, {MAX_ITERATIONS}]")
-    return int(iterations)  # type: ignore[call-overload, no-any-return]
+    if dt is not None or iterations is not None:
+        return run_engine(scenario, engine, dt, iterations, times, ice=ice, slices=slices, **knobs)
+    check_asked(scenario, engine, ice, slices)
+    settings = {"times": times, "tolerance": tolerance, "ice": ice, "slices": slices}
+    return certified(scenario, engine, **settings, **knobs)

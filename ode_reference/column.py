@@ -121,10 +121,10 @@ def solve(
     """
     rtol = number_within("rtol", RTOL if rtol is None else rtol, 1e-13, 1e-2)
     atol = number_above("atol", ATOL if atol is None else atol, 0.0, 1e-2)
-    moments = output_times(scenario, times)
-    check_states(scenario.n_slices, len(moments), "cut it coarser, or ask for fewer times")
+    t_out = output_times(scenario, times)
+    check_states(scenario.n_slices, len(t_out), "cut it coarser, or ask for fewer times")
     column = Column(scenario)
-    states, diagnostics = _states(scenario, column, moments, rtol, atol)
+    states, diagnostics = _states(scenario, column, t_out, rtol, atol)
     theta, h, speed, _ = states
     n = scenario.n_slices
     share = (np.arange(n) + 0.5) / n
@@ -135,7 +135,7 @@ def solve(
         scenario=scenario,
         solver="ode_reference",
         method=NAME,
-        t=moments,
+        t=t_out,
         theta=theta,
         omega=column.angular_momentum / inertia,
         r=column.length - np.outer(h, share),
@@ -149,11 +149,11 @@ def solve(
 
 
 def _states(
-    scenario: Scenario, column: Column, moments: FloatArray, rtol: float, atol: float
+    scenario: Scenario, column: Column, t_out: FloatArray, rtol: float, atol: float
 ) -> tuple[FloatArray, dict[str, Any]]:
-    """Return (theta, h, h', energy lost to drag) at ``moments``, shape (4, P), and what was measured."""
+    """Return (theta, h, h', energy lost to drag) at ``t_out``, shape (4, P), and what was measured."""
     y = np.array([scenario.theta0, column.start, 0.0, 0.0])
-    states = np.tile(y[:, np.newaxis], len(moments))
+    states = np.tile(y[:, np.newaxis], len(t_out))
     diagnostics: dict[str, Any] = {
         "spreads": column.spreads,
         "stop_time": None,
@@ -175,11 +175,11 @@ def _states(
         if run.status < 0:
             raise ArithmeticError(f"column: {run.message} at t = {run.t[-1]:.9g} s")
         y, end = run.y[:, -1].copy(), float(run.t[-1])
-        moving = moments <= end
+        moving = t_out <= end
         path = run.sol
         assert path is not None  # asked for with dense_output
         if moving.any():
-            states[:, moving] = path(moments[moving])
+            states[:, moving] = path(t_out[moving])
         before = float(column.energy(column.start, 0.0))
         kept = column.energy(run.y[1], run.y[2]) + run.y[3]
         diagnostics["energy_residual"] = float(np.max(np.abs(kept / before - 1.0)))
@@ -187,7 +187,7 @@ def _states(
         if run.status == 1:
             diagnostics |= {"stop_time": end, "lost_at_stop": float(column.mass * y[2] ** 2 / 2)}
             y[1:3] = column.length, 0.0
-    after = moments > end if column.spreads else moments >= end
+    after = t_out > end if column.spreads else t_out >= end
     states[:, after] = y[:, np.newaxis]
-    states[0, after] += column.angular_momentum / float(column.inertia(y[1])) * (moments[after] - end)
+    states[0, after] += column.angular_momentum / float(column.inertia(y[1])) * (t_out[after] - end)
     return states, diagnostics

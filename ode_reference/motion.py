@@ -143,13 +143,13 @@ def accelerated(
 
 
 class Motion:
-    """The right-hand side of a leg: one model, one throw, and the slices that are held at present.
+    """The right-hand side of a segment: one model, one throw, and the slices that are held at present.
 
     Parameters
     ----------
     throw : Throw
     model : Model
-    held : array, shape (N,) of bool - slices that do not move. Changed by ``hold``, and only between two legs:
+    held : array, shape (N,) of bool - slices that do not move. Changed by ``hold``, and only between two segments:
         within one the right-hand side must be smooth.
     """
 

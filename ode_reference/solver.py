@@ -185,13 +185,13 @@ def solve(
     known_name("impact_law", impact_law, LAWS)
     known_name("method", method, (TAYLOR, *INTEGRATORS))
     speed, twin = _rest_speed(rest_speed, chosen), _twin(twin)
-    moments = output_times(scenario, times)
-    check_states(scenario.n_slices, len(moments), "cut it coarser, or ask for fewer times")
+    t_out = output_times(scenario, times)
+    check_states(scenario.n_slices, len(t_out), "cut it coarser, or ask for fewer times")
     if method != TAYLOR:
         from ode_reference import witness
 
         return witness.integrate(
-            scenario, chosen, moments, method=method, rtol=rtol, atol=atol, max_step=max_step, rest_speed=speed,
+            scenario, chosen, t_out, method=method, rtol=rtol, atol=atol, max_step=max_step, rest_speed=speed,
             impact_law=impact_law, energy=energy, twin=twin,
         )  # fmt: skip
     for name, value in (("rtol", rtol), ("atol", atol), ("max_step", max_step)):
@@ -203,7 +203,7 @@ def solve(
     require_own_switches(chosen, scenario)
     from ode_reference.flow import api
 
-    return api.fly(scenario, moments, chosen.switches, _settings(chosen, speed, impact_law, energy, twin))
+    return api.fly(scenario, t_out, chosen.switches, _settings(chosen, speed, impact_law, energy, twin))
 
 
 def with_own_inertia(scenario: Scenario) -> Scenario:
@@ -273,12 +273,12 @@ def solve_batch(
             rows.append(output_times(throw, given[k] if given is not None and given.ndim == 2 else given))
         except ValueError as error:
             raise ValueError(f"throws[{k}]: {error}") from None
-    moments = np.array(rows).reshape(len(throws), len(rows[0]) if rows else 0)
+    t_out = np.array(rows).reshape(len(throws), len(rows[0]) if rows else 0)
     if states:
         slices = sum(throw.n_slices for throw in throws)
-        check_states(slices, moments.shape[1], "leave out states, or solve fewer throws at a time")
+        check_states(slices, t_out.shape[1], "leave out states, or solve fewer throws at a time")
     settings = _settings(chosen, _rest_speed(rest_speed, chosen), impact_law, energy, _twin(twin))
-    return api.fly_all(throws, moments, jobs, chosen.switches, settings, states=states)
+    return api.fly_all(throws, t_out, jobs, chosen.switches, settings, states=states)
 
 
 def _settings(model: Model, rest_speed: float, impact_law: str, energy: bool, twin: int) -> dict[str, Any]:

@@ -1,18 +1,18 @@
 r"""The witness: ``scipy.integrate.solve_ivp`` over the 2N + 1 equations, stopped at every contact and started again.
 
-    |------------------ solve_ivp ------------------x            x: the terminal event that ends the leg.
+    |------------------ solve_ivp ------------------x            x: the terminal event that ends the segment.
     t_0   y = [theta, r_0..r_N-1, v_0..v_N-1]       t_x          There ``contact.resolve`` makes the new state,
-                                                    |------ ...  and the next leg starts.
+                                                    |------ ...  and the next segment starts.
 
-Four events end a leg: the foremost free slice passes the base or the cap, or the push on the slices that rest on the
-base or on the cap changes sign. Four things ``solve_ivp`` does not do, and what is done about each:
+Four events end a segment: the foremost free slice passes the base or the cap, or the push on the slices that rest on
+the base or on the cap changes sign. Four things ``solve_ivp`` does not do, and what is done about each:
 
 - It reports only the first of simultaneous events: at each stop every slice is tested for contact.
-- A leg that starts on a wall finds that wall again at its first instant: a slice that has just left an end at t_0 is
-  watched by (distance beyond the end) / (t - t_0), which has the same sign, no zero at t_0, and there the value v.
-- An event that comes and goes within one step is missed: when a leg is done, its dense output is looked through
-  (``_first_missed``), and the leg is cut at the first contact that no event reported.
-- Its ``t_eval`` drops the end of a leg: output is taken from the dense output.
+- A segment that starts on a wall finds that wall again at its first instant: a slice that has just left an end at t_0
+  is watched by (distance beyond the end) / (t - t_0), which has the same sign, no zero at t_0, and there the value v.
+- An event that comes and goes within one step is missed: when a segment is done, its dense output is looked through
+  (``_first_missed``), and the segment is cut at the first contact that no event reported.
+- Its ``t_eval`` drops the end of a segment: output is taken from the dense output.
 
 The program shares with the seven reduced equations the scenario, the trajectory and ``Throw``, and no other code.
 """
@@ -62,7 +62,7 @@ WATCH: Final = 200_000
 MIN_ADVANCE: Final = 1e-7
 
 PARTS: Final = 4
-"""Parts of one step between which a leg is looked through; a slice that turns twice within one part is not seen."""
+"""Parts of one step between which a segment is looked through; a slice that turns twice within one part is not seen."""
 
 EPS, LEAST = float(np.finfo(np.float64).eps), float(np.finfo(np.float64).tiny)
 
@@ -70,7 +70,7 @@ EPS, LEAST = float(np.finfo(np.float64).eps), float(np.finfo(np.float64).tiny)
 def integrate(
     scenario: Scenario,
     model: Model,
-    moments: FloatArray,
+    t_out: FloatArray,
     *,
     method: str,
     rtol: float | None,
@@ -105,7 +105,7 @@ def integrate(
     thrown, moved = twin_of(scenario, twin)
     # Overflow is a result here, reported as a status: it must not also appear as a warning.
     with np.errstate(all="ignore"):
-        flight = _Flight(thrown, model, settings, moments, moved)
+        flight = _Flight(thrown, model, settings, t_out, moved)
         flight.integrate()
         return replace(flight.trajectory(), scenario=scenario)
 
@@ -113,7 +113,7 @@ def integrate(
 Event = Callable[[float, FloatArray], float]
 
 Found = tuple[str, int]
-"""What ends a leg: "wall" or "release", and the end."""
+"""What ends a segment: "wall" or "release", and the end."""
 
 
 class _StandstillError(Exception):
@@ -128,12 +128,12 @@ class _Flight:
         scenario: Scenario,
         model: Model,
         settings: Mapping[str, Any],
-        moments: FloatArray,
+        t_out: FloatArray,
         moved: FloatArray | float = 0.0,
     ) -> None:
         n = scenario.n_slices
         recoil = model.switches.recoil
-        self.scenario, self.settings, self.moments, self.n = scenario, settings, moments, n
+        self.scenario, self.settings, self.t_out, self.n = scenario, settings, t_out, n
         self.motion = Motion(Throw.of(scenario), model, np.zeros(n, dtype=bool))
         self.law = LAWS[settings["impact_law"]] if recoil else immovable
         self.ends = Ends.of(scenario, recoil=recoil)
@@ -174,30 +174,30 @@ class _Flight:
     def _leg(self) -> None:
         """Integrate up to the first event, the duration or a failure, and resolve the event."""
         watch = self._events()
-        leg = self._solved([event for _, event in watch])
-        if leg is None:
+        segment = self._solved([event for _, event in watch])
+        if segment is None:
             return
-        path = leg.sol
-        self.counts["steps"] += len(leg.t) - 1
-        found = [name for (name, _), times in zip(watch, leg.t_events, strict=True) if len(times)]
-        end, y = float(leg.t[-1]), leg.y[:, -1].copy()
-        missed = self._first_missed(leg.t, path)
+        path = segment.sol
+        self.counts["steps"] += len(segment.t) - 1
+        found = [name for (name, _), times in zip(watch, segment.t_events, strict=True) if len(times)]
+        end, y = float(segment.t[-1]), segment.y[:, -1].copy()
+        missed = self._first_missed(segment.t, path)
         if missed is not None:
             end, found = missed[0], [missed[1]]
             y = path(end)
         self._record(end, path)
         if self.ledger is not None:
-            for begin, stop in zip(leg.t[:-1], np.minimum(leg.t[1:], end), strict=True):
+            for begin, stop in zip(segment.t[:-1], np.minimum(segment.t[1:], end), strict=True):
                 if stop > begin:
                     self.ledger.smooth(begin, stop, path(nodes(begin, stop)))
         self.t, self.y = end, self._mirrored(y) if self.mirrored else y
         if found:
             self._meet(self._struck(found), *(side for kind, side in found if kind == "release"))
-        elif leg.status < 0 and not self._overflowed():
-            self._stall(leg.message)
+        elif segment.status < 0 and not self._overflowed():
+            self._stall(segment.message)
 
     def _solved(self, events: list[Event]) -> Any:
-        """Return what ``solve_ivp`` makes of a leg that starts now, or None if it cannot go on."""
+        """Return what ``solve_ivp`` makes of a segment that starts now, or None if it cannot go on."""
         options = {name: self.settings[name] for name in ("method", "rtol", "atol", "max_step")}
         span = self.t, self.scenario.duration
         try:
@@ -231,7 +231,7 @@ class _Flight:
     # ------------------------------------------------------------------ events
 
     def _events(self) -> list[tuple[Found, Event]]:
-        """Return what ends a leg that starts now: what it is called, and a function that changes sign there."""
+        """Return what ends a segment that starts now: what it is called, and a function that changes sign there."""
         events: list[tuple[Found, Event]] = []
         for side in (BASE, CAP):
             events.append((("wall", side), self._foremost(side)))
@@ -278,7 +278,7 @@ class _Flight:
         return struck
 
     def _first_missed(self, t: FloatArray, path: Callable[[Any], FloatArray]) -> tuple[float, Found] | None:
-        """Return time and name of the first passage or release in this leg that no event reported, or None.
+        """Return time and name of the first passage or release in this segment that no event reported, or None.
 
         ``solve_ivp`` looks at events where its steps end. A slice that passes an end and is back inside by then, or
         behind which another passes, shows between: it is beyond the end where one part of a step ends, or it turns
@@ -375,7 +375,7 @@ class _Flight:
 
     def _record(self, until: float, path: Callable[[Any], FloatArray] | None) -> None:
         """Keep the states at the output times up to ``until``; without a path the present state."""
-        chosen = self.moments[len(self.states) : np.searchsorted(self.moments, until, side="right")]
+        chosen = self.t_out[len(self.states) : np.searchsorted(self.t_out, until, side="right")]
         if len(chosen):
             self.states += [self.y] * len(chosen) if path is None else list(path(chosen).T)
 
@@ -414,7 +414,7 @@ class _Flight:
             scenario=self.scenario,
             solver="ode_reference",
             method=self.motion.model.name,
-            t=self.moments[: len(states)],
+            t=self.t_out[: len(states)],
             theta=states[:, 0],
             omega=throw.angular_momentum / inertia,
             r=states[:, 1 : n + 1],

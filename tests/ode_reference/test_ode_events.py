@@ -29,7 +29,8 @@ BLUR = 1e-14
 def flight_of(*polynomials, stop, parts=1, on_base=False):
     """A run whose slices move as polynomials in t, lowest power first, between ends at 0.1 and 0.9.
 
-    The tube is too heavy to feel them, so that the angle is the time; the first leg is tried in ``parts`` equal steps.
+    The tube is too heavy to feel them, so that the angle is the time; the first segment is tried in ``parts`` equal
+    steps.
     """
     n = len(polynomials)
     curvature = [np.polynomial.Polynomial(p).deriv(2) for p in polynomials]
@@ -57,13 +58,13 @@ def flight_of(*polynomials, stop, parts=1, on_base=False):
 
 
 def first_leg(flight):
-    """Fly the first leg by steps that are as long as they may be."""
+    """Fly the first segment by steps that are as long as they may be."""
     with patch.object(ode_reference.witness, "solve_ivp", partial(solve_ivp, first_step=flight.settings["max_step"])):
         flight._leg()
 
 
 def first_wall(*polynomials, stop, parts=1):
-    """Time and slice of what ends the first leg, or NEVER."""
+    """Time and slice of what ends the first segment, or NEVER."""
     flight = flight_of(*polynomials, stop=stop, parts=parts)
     with np.errstate(all="ignore"):
         first_leg(flight)

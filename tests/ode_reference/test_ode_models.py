@@ -60,6 +60,7 @@ def by_hand(model, scenario, theta, r, v, held=()):
             for x, u in zip(r, v, strict=True)
         ]
     else:
+        assert model in ("accelerating-origin", "free-flight"), f"work {model} out by hand"
         # Newton's law for every free slice and for the body in the frame of C_M, then the difference.
         body_mass = empty + m * len(held)
         body_centre = (empty * length / 2 + m * sum((Fraction(r[i]) for i in held), Fraction(0))) / body_mass

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import slicemodel
-from flipproof.chapters.vectors import published as vectors
+from slicemodel import vectors
 
 VECTORS = {vector.name: vector for vector in vectors.load_all()}
 PYTHON = [name for name in VECTORS if name.startswith("python")]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from flipproof.chapters.vectors.published import Vector, deviations, load_all
 from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Made, Run, Study, judged, regression
 from slicemodel import Trajectory
+from slicemodel.vectors import Vector, deviations, load_all
 
 
 def study(ask: Ask) -> Study[list[tuple[Vector, Made]]]:

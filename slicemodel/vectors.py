@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from slicemodel import Scenario, Trajectory
-from slicemodel.trajectory import FloatArray
+from slicemodel.scenario import Scenario
+from slicemodel.trajectory import FloatArray, Trajectory
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +33,11 @@ class Vector:
 def folder() -> Path:
     """Return where the vectors are: inside the installed package, or beside it in a checkout."""
     here = Path(__file__).resolve().parent
-    for place in (here / "vectors", here.parents[3] / "tests" / "vectors"):
+    for place in (here / "published", here.parent / "tests" / "vectors"):
         if place.is_dir():
             return place
     raise FileNotFoundError(
-        f"the published vectors are neither in {here / 'vectors'} nor in a checkout's tests/vectors"
+        f"the published vectors are neither in {here / 'published'} nor in a checkout's tests/vectors"
     )
 
 
