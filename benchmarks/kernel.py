@@ -30,8 +30,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import slicemodel
-from flipproof.chapters.vectors import published as vectors
-from slicemodel import Scenario
+from slicemodel import Scenario, vectors
 
 ROOT = Path(__file__).resolve().parent.parent
 REPETITIONS = 9

@@ -45,7 +45,7 @@ name = "eq8"
 """
 
 
-class Here(Executor):
+class SerialExecutor(Executor):
     """A worker that is this process."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
@@ -84,7 +84,7 @@ def main() -> None:
             design = read_design(Path(scratch, "sweep.toml"))
             with Store(Path(scratch, "sweep.sqlite")) as store:
                 began = time.process_time()
-                fill(store, design.points(), Here(), 2)
+                fill(store, design.points(), SerialExecutor(), 2)
                 whole = time.process_time() - began
             size = Path(scratch, "sweep.sqlite").stat().st_size
         if points == options.points:

@@ -12,7 +12,7 @@ from flipproof.build import Report, ask_of, build, gather_report
 from flipproof.chapters.solvers import WITNESSES
 from flipproof.chapters.work_precision.contenders import Asked, Effort, Grids
 from flipproof.frame.gather import Gathered
-from flipproof.frame.pool import Here
+from flipproof.frame.pool import SerialExecutor
 from flipproof.output.provenance import provenance
 from slicemodel import Scenario
 
@@ -66,7 +66,7 @@ def gathered() -> Gathered:
     """Gathered once per process."""
     ask = replace(ask_of(Scenario(), "quick", 20, WITNESSES), reference=Scenario().with_slices(20))
     # In this process: test_report.py has a report made by workers, whose start costs a fifth of all of it.
-    return gather_report(ask, work={"work-precision": WORK}, pool=Here())
+    return gather_report(ask, work={"work-precision": WORK}, pool=SerialExecutor())
 
 
 @pytest.fixture(scope="session")

@@ -11,12 +11,13 @@ from flipproof.chapters.maps.study import read_flight, study_readings
 from flipproof.cli import main as cli
 from flipproof.figures.style import Drawing
 from flipproof.frame.flights import Flights
-from flipproof.frame.gather import Gathered, gather, tell
-from flipproof.frame.pool import Here, make_each
+from flipproof.frame.gather import Gathered, evaluate, gather
+from flipproof.frame.pool import SerialExecutor, make_each
 from flipproof.frame.solvers import Made, Run
 from flipproof.output.provenance import provenance
 from flipproof.output.summary import summarise
 from flipproof.page.render import render
+from flipproof.page.verdict import verdict
 from slicemodel import Scenario, Trajectory
 
 
@@ -54,9 +55,9 @@ class Answers(Executor):
 
     def submit(self, fn, /, *args, **kwargs) -> Future:
         if fn is not make_each:
-            return Here().submit(fn, *args, **kwargs)
+            return SerialExecutor().submit(fn, *args, **kwargs)
         self.asked += args[0]
-        return Here().submit(lambda: [self.of(run) for run in args[0]])
+        return SerialExecutor().submit(lambda: [self.of(run) for run in args[0]])
 
 
 def spoiled(gathered: Gathered, broken: Iterable[Run], reason: str, chapters: Iterable[str]) -> Gathered:
@@ -71,10 +72,10 @@ def page_of(gathered: Gathered, picture: Drawing) -> dict[str, str]:
     """Return the pages of a report with one picture in the place of every figure: to draw them takes longer."""
     told = {
         name: replace(each, figures=tuple(replace(figure, drawn=picture) for figure in each.figures))
-        for name, each in tell(gathered).items()
+        for name, each in evaluate(gathered).items()
     }
     made_by = provenance("flipproof report")
-    return render(gathered, told, made_by, summarise(gathered, told, made_by))
+    return render(gathered, told, made_by, summarise(gathered, told, made_by, verdict(gathered)))
 
 
 def study_map(throw, axis, fills, values, made, **how):

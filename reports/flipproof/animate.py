@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from flipproof.figures.style import solver_style, styled
 from flipproof.output.files import whole_file
-from flipproof.page.motion import Flight, cap_and_base, flight_of, parabola, release_point
+from flipproof.output.motion import Flight, cap_and_base, flight_of, parabola, release_point
 from slicemodel import Scenario, Trajectory
 from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray

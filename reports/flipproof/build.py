@@ -15,16 +15,17 @@ from flipproof.chapters.solvers import CERTIFIED, solver_runs
 from flipproof.frame.chapter import Ask, Part, Size
 from flipproof.frame.exhibit import Exhibit, drawn
 from flipproof.frame.findings import Finding
-from flipproof.frame.gather import Gathered, Stages, gather, tell
-from flipproof.frame.pool import Here, Progress, compile_kernels, workers
+from flipproof.frame.gather import Gathered, Stages, evaluate, gather
+from flipproof.frame.pool import Progress, SerialExecutor, compile_kernels, workers
 from flipproof.frame.run_store import RunStore
 from flipproof.output.junit import junit_text
 from flipproof.output.summary import SCHEMA_NAME, schema_text, summarise, summary_text
 from flipproof.page.render import render
+from flipproof.page.verdict import verdict
 from slicemodel import Scenario
 
 SLICES: Final = 50
-"""Slices at which solvers are compared, unless told otherwise."""
+"""Slices at which solvers are compared, unless results otherwise."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,25 +93,28 @@ def build(
     Figures are drawn by the workers of ``pool``, or in this process, and reported to ``progress``; ``png`` says whether
     as PNG, too.
     """
-    told = tell(gathered)
+    results = evaluate(gathered)
     with gathered.stages.lap("figures"):
         exhibits = drawn(
-            [figure for each in told.values() for figure in each.figures], pool or Here(), progress, png=png
+            [figure for each in results.values() for figure in each.figures],
+            pool or SerialExecutor(),
+            progress,
+            png=png,
         )
     rest = iter(exhibits)
-    told = {name: replace(each, figures=tuple(islice(rest, len(each.figures)))) for name, each in told.items()}
-    summary = summarise(gathered, told, provenance)
+    results = {name: replace(each, figures=tuple(islice(rest, len(each.figures)))) for name, each in results.items()}
+    summary = summarise(gathered, results, provenance, verdict(gathered))
     with gathered.stages.lap("page"):
-        pages = render(gathered, told, provenance, summary)
+        pages = render(gathered, results, provenance, summary)
     summary["stages"]["page"] = round(gathered.stages.seconds["page"], 3)
-    made = [each for each in told.values() if each.found is not None]
+    made = [each for each in results.values() if each.found is not None]
     return Report(
-        findings=tuple(finding for each in told.values() for finding in each.findings),
+        findings=tuple(finding for each in results.values() for finding in each.findings),
         exhibits=exhibits,
         pages=pages,
         summary=summary,
         tables={path: text for each in made for path, text in each.chapter.tables(each.found).items()},
-        seconds={id_: seconds for each in told.values() for id_, seconds in each.seconds.items()},
+        seconds={id_: seconds for each in results.values() for id_, seconds in each.seconds.items()},
         whole=sum(gathered.stages.seconds.values()),
     )
 

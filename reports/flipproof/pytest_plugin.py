@@ -23,7 +23,7 @@ def flipproof_throw() -> Any:
 @pytest.fixture
 def flipproof_vectors() -> Any:
     """Return every published run: its throw, its scheme and its printed columns."""
-    from flipproof.chapters.vectors.published import load_all
+    from slicemodel.vectors import load_all
 
     return load_all()
 

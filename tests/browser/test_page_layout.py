@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flipproof.page.inline import LETTERS, SIZE
+from flipproof.output.inline import LETTERS, SIZE
 
 PAPER = (695, 1013)
 """A4 within the margins of the style sheet, in pixels."""

@@ -24,7 +24,7 @@ from flipproof.animate import (
     write_film,
 )
 from flipproof.cli.animate import add_animate, chosen_solvers
-from flipproof.page.motion import FLOWN
+from flipproof.output.motion import FLOWN
 from slicemodel import Scenario
 
 THROW = Scenario().with_slices(4)

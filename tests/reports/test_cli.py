@@ -1,5 +1,6 @@
 """The command line as people meet it: help, results, and one line for every mistake."""
 
+import argparse
 import os
 import re
 import shlex
@@ -11,6 +12,7 @@ import pytest
 from made_up import command as run
 
 from flipproof.cli import main as cli
+from flipproof.cli.arguments import check_outputs
 from flipproof.cli.screens import commands_of
 
 
@@ -185,7 +187,11 @@ def test_closed_output_a_full_disk_a_removed_folder_and_a_pipe(tmp_path):
     def shell(command):
         flipproof = f"{shlex.quote(sys.executable)} -m flipproof"
         ran = subprocess.run(
-            ["bash", "-c", command.replace("flipproof", flipproof)], cwd=tmp_path, capture_output=True, text=True
+            ["bash", "-c", command.replace("flipproof", flipproof)],
+            cwd=tmp_path,
+            env={name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"},
+            capture_output=True,
+            text=True,
         )
         return ran.returncode, ran.stdout, ran.stderr
 
@@ -201,3 +207,11 @@ def test_closed_output_a_full_disk_a_removed_folder_and_a_pipe(tmp_path):
     status, out, err = shell(f"flipproof compare {one} {one}")
     assert (status, err) == (0, "")
     assert "apart: never" in out
+
+
+def test_an_option_that_a_command_writes_spares_what_it_reads(tmp_path):
+    """Whatever it is called: ``check_outputs`` is told its name."""
+    throw = tmp_path / "throw.toml"
+    throw.write_text("[scenario]\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"--count .* is a file that this command reads"):
+        check_outputs(argparse.Namespace(scenario=str(throw), count=throw), "count")

@@ -17,14 +17,15 @@ from flipproof.chapters.overlap.chapter import Amount
 from flipproof.chapters.stability.study import Layout
 from flipproof.check.diff import Change, change_of, compare_summaries, read_summary, scenario_changes, within
 from flipproof.check.diff_page import read_curves
+from flipproof.check.report_pair import differences, figure_report_pair
 from flipproof.cli.check import add_checks
-from flipproof.figures.report_pair import differences, figure_report_pair
 from flipproof.frame import pool, solvers
 from flipproof.frame.findings import Band, Finding
-from flipproof.frame.gather import gather, tell
+from flipproof.frame.gather import evaluate, gather
 from flipproof.output.columns import curves_csv
 from flipproof.output.provenance import provenance
 from flipproof.output.summary import summarise, summary_text
+from flipproof.page.verdict import verdict
 from slicemodel import Scenario, schemes
 from slicemodel import solver as slice_solver
 
@@ -49,8 +50,8 @@ def summary_of_a_run(make=solvers.make):
         reference = dataclasses.replace(Scenario().with_slices(5), duration=0.3)
         ask = dataclasses.replace(ask_of(THROW, "quick", certified=()), reference=reference)
         # In this process: a fault that is seeded here is seeded for all.
-        found = gather(parts(), ask, pool.Here(), work=WORK)
-        made = summarise(found, tell(found), provenance("flipproof report"))
+        found = gather(parts(), ask, pool.SerialExecutor(), work=WORK)
+        made = summarise(found, evaluate(found), provenance("flipproof report"), verdict(found))
     return json.loads(summary_text(made))
 
 

@@ -32,8 +32,8 @@ from flipproof.foreign.contract import Traits
 from flipproof.foreign.specs import content_of, load
 from flipproof.frame.exhibit import drawn
 from flipproof.frame.flights import Call, Flights
-from flipproof.frame.gather import gather, tell
-from flipproof.frame.pool import Here, make_all, workers
+from flipproof.frame.gather import evaluate, gather
+from flipproof.frame.pool import SerialExecutor, make_all, workers
 from flipproof.frame.run_store import RunStore
 from flipproof.frame.solvers import Made, Missing, solve
 from flipproof.output.summary import summary_text
@@ -139,7 +139,7 @@ def test_energy_falls_in_free_flight_and_is_that_of_turning_in_ice():
 
 
 def test_every_figure_is_drawn_with_its_numbers(studied):
-    exhibits = drawn(tuple(draw_guests(studied)), Here())
+    exhibits = drawn(tuple(draw_guests(studied)), SerialExecutor())
     assert [exhibit.name for exhibit in exhibits] == [
         "guests-omega", "guests-differences", "guests-convergence", "guests-ice-energy",
     ]  # fmt: skip
@@ -196,7 +196,7 @@ def test_a_guest_is_asked_anew_though_the_store_has_the_ladder(tmp_path):
         file.write_text(file.read_text().replace("naive RK4" if name == "one" else "one", name))
         with RunStore(tmp_path / "runs.sqlite", slow=0.0) as store:
             work = {"guests": ((f"{file}:Eq8",), None)}
-            found = gather(chapters_named("guests"), ask, Here(), work=work, store=store).found("guests")
+            found = gather(chapters_named("guests"), ask, SerialExecutor(), work=work, store=store).found("guests")
             labels += [guest.label for guest in found.guests]
             kept.append(len(store.found))
     assert labels == ["one", "other"]
@@ -204,8 +204,8 @@ def test_a_guest_is_asked_anew_though_the_store_has_the_ladder(tmp_path):
 
 
 def test_a_report_without_guests_has_no_such_chapter():
-    gathered = gather(chapters_named("guests"), ask_of(THROW, "quick", certified=()), Here())
-    assert not tell(gathered)
+    gathered = gather(chapters_named("guests"), ask_of(THROW, "quick", certified=()), SerialExecutor())
+    assert not evaluate(gathered)
 
 
 def test_a_dead_worker_costs_its_guest(ladder):
@@ -285,7 +285,7 @@ def test_check_refuses_a_guest_that_is_a_curve_or_named_twice(tmp_path, capsys):
 def test_a_report_splits_what_leads_from_a_guest_to_free_flight():
     specs = (RK4, RK4.replace(":Eq8", ":Weightless"))
     ask = ask_of(THROW, "quick", certified=())
-    found = gather(chapters_named("guests"), ask, Here(), work={"guests": (specs, None)}).found("guests")
+    found = gather(chapters_named("guests"), ask, SerialExecutor(), work={"guests": (specs, None)}).found("guests")
     eq8, weightless = (guest.split for guest in found.guests)
     assert set(eq8.bars) == {"weightless", "origin", "recoil"}
     assert set(weightless.bars) == {"origin", "recoil"}

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from flipproof.figures.style import draw
-from flipproof.page.inline import DIGITS, compact_svg, data_uri, shape
+from flipproof.output.inline import DIGITS, compact_svg, data_uri, shape
 
 
 @pytest.fixture(scope="module")

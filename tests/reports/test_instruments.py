@@ -4,9 +4,9 @@ import dataclasses
 
 from made_up import page_of, spoiled
 
-from engine_check.solver import DEFAULT_TOLERANCE
+from engine_check.certificate import DEFAULT_TOLERANCE
 from flipproof.chapters.solvers import CERTIFIED, UNCERTIFIED_DT, WITNESSES, solver_runs
-from flipproof.frame.gather import tell
+from flipproof.frame.gather import evaluate
 from flipproof.frame.solvers import REFERENCE
 
 ENGINES = ("flights", "differences", "certificates", "agreement")
@@ -52,9 +52,9 @@ def test_an_engine_that_is_not_installed_is_named_with_its_reason(gathered):
     poorer = without(gathered, "mujoco")
     assert "mujoco" not in poorer.found("certificates").certificates
     assert set(poorer.found("agreement")["free-flight"].names) == {"free-flight", "solve_ivp", *WITNESSES} - {"mujoco"}
-    told = tell(poorer)
+    results = evaluate(poorer)
     assert "RuntimeError: not installed" in poorer.found("flights").made["mujoco"].reason
-    assert not [finding.id for each in told.values() for finding in each.findings if finding.failed]
+    assert not [finding.id for each in results.values() for finding in each.findings if finding.failed]
 
 
 def test_without_any_engine_the_equations_are_held_against_the_witness(gathered):
@@ -64,6 +64,6 @@ def test_without_any_engine_the_equations_are_held_against_the_witness(gathered)
         "free-flight": ("free-flight", "solve_ivp"),
         "eq8": ("eq8", "solve_ivp"),
     }
-    findings = {finding.id: finding for each in tell(poorest).values() for finding in each.findings}
+    findings = {finding.id: finding for each in evaluate(poorest).values() for finding in each.findings}
     assert findings["agreement-eq8"].value < 1e-9
     assert findings["agreement"].value < 3e-3

@@ -29,8 +29,8 @@ from flipproof.chapters.landing.study import (
 )
 from flipproof.cli.main import main
 from flipproof.frame.exhibit import drawn
-from flipproof.frame.gather import tell
-from flipproof.frame.pool import Here
+from flipproof.frame.gather import evaluate
+from flipproof.frame.pool import SerialExecutor
 from flipproof.frame.run_store import RunStore
 from flipproof.landing.design import Case, Scatter, Share, Throws, aimed, correlation, make_cases, scattered, wilson
 from flipproof.landing.throw import land_throw, told
@@ -369,7 +369,7 @@ def test_every_finding_and_figure_says_what_is_assumed(found):
         if "P(upright)" in finding.title:
             assert "e_table = 0.3" in finding.note
             assert "scatter 5 %" in finding.note
-    exhibits = drawn(figures(found), Here(), png=False)
+    exhibits = drawn(figures(found), SerialExecutor(), png=False)
     assert len({exhibit.name for exhibit in exhibits}) == len(exhibits) == 6
     for exhibit in exhibits:
         assert exhibit.drawing.svg.startswith("<?xml")
@@ -446,7 +446,7 @@ def swept(tmp_path_factory):
 @pytest.fixture
 def copied(swept, tmp_path, monkeypatch):
     """Return a copy of that study, to be gone on with in this process and without figures, which are drawn there."""
-    monkeypatch.setattr("flipproof.sweep.command.processes", lambda _: nullcontext(Here()))
+    monkeypatch.setattr("flipproof.sweep.command.processes", lambda _: nullcontext(SerialExecutor()))
     monkeypatch.setattr("flipproof.presets.upright.figures", lambda _: ())
     return shutil.copytree(swept[0], tmp_path / "study")
 
@@ -479,7 +479,11 @@ def test_workers_of_an_executor_make_the_same(found, tmp_path, monkeypatch):
 
 def gathered(throw, store=None):
     return gather_report(
-        ask_of(throw, "full"), store=store, pool=Here(), contents=chapters_named("landing"), work={"landing": SMALL}
+        ask_of(throw, "full"),
+        store=store,
+        pool=SerialExecutor(),
+        contents=chapters_named("landing"),
+        work={"landing": SMALL},
     )
 
 
@@ -503,11 +507,11 @@ def test_calls_hold_every_case_once_and_are_worth_keeping():
 
 
 def test_a_throw_that_cannot_land_fails_nothing():
-    told = tell(gathered(replace(THROW, gravity=0.0)))["landing"]
+    told = evaluate(gathered(replace(THROW, gravity=0.0)))["landing"]
     assert told.found.cells == {}
     assert not [finding for finding in told.findings if finding.failed]
     assert {finding.kind for finding in told.findings if finding.id == "landing-undecided"} == {"observation"}
-    assert all(figure.drawing.svg.startswith("<?xml") for figure in drawn(told.figures, Here(), png=False))
+    assert all(figure.drawing.svg.startswith("<?xml") for figure in drawn(told.figures, SerialExecutor(), png=False))
 
 
 def test_a_folder_that_is_not_the_studys_is_refused(tmp_path):

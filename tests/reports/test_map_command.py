@@ -17,7 +17,7 @@ from made_up import study_map
 from flipproof.chapters.maps.study import CURVE, RUNGS
 from flipproof.chapters.waterfall.study import OBSERVABLES, observe, split_all
 from flipproof.figures.style import Drawing
-from flipproof.frame.pool import Here
+from flipproof.frame.pool import SerialExecutor
 from flipproof.frame.solvers import make
 from flipproof.frame.store import Store
 from flipproof.presets.planned import (
@@ -46,14 +46,14 @@ AXES = ("gamma", "step", "restitution")
 @pytest.fixture
 def here(monkeypatch):
     """Make every point in this process: a worker's start costs more than all of a small map."""
-    monkeypatch.setattr("flipproof.sweep.command.processes", lambda _: nullcontext(Here()))
+    monkeypatch.setattr("flipproof.sweep.command.processes", lambda _: nullcontext(SerialExecutor()))
 
 
 def by_hand(plan, out):
     """Fill a map's store in this process and return what it reads there."""
     runs = plan.runs()
     with Store(out) as store:
-        fill(store, points_of(runs, CURVE, READ_OFF), Here())
+        fill(store, points_of(runs, CURVE, READ_OFF), SerialExecutor())
         return plan.study(read_runs(store, runs, CURVE, READ_OFF))
 
 
@@ -102,7 +102,7 @@ def test_a_map_killed_midway_goes_on_to_the_rows_and_the_picture_of_an_undisturb
     assert 0 < there < 20 * 42
     assert not (tmp_path / "killed" / "map.png").exists()
     with monkeypatch.context() as patch:
-        patch.setattr("flipproof.sweep.command.processes", lambda _: nullcontext(Here()))
+        patch.setattr("flipproof.sweep.command.processes", lambda _: nullcontext(SerialExecutor()))
         status, out, _ = run(capsys, *options, "--out", tmp_path / "killed")
         assert status == 0
         assert f"; {there} were there\ncells by largest fair share: " in out
@@ -171,7 +171,7 @@ def test_a_run_that_is_not_whole_leaves_a_reason_in_its_cell(tmp_path):
     plan = MapPlan.of_size(THROW, "gamma", 2, 2)
     runs = plan.runs()
     with Store(tmp_path / "out") as store:
-        fill(store, points_of(runs, CURVE, READ_OFF), Here())
+        fill(store, points_of(runs, CURVE, READ_OFF), SerialExecutor())
         rows = read_runs(store, runs, CURVE, READ_OFF)
     for made, row in rows.items():
         lost = {"plateau": None, "omega": None}
@@ -202,7 +202,7 @@ def split(tmp_path_factory):
     file = tmp_path_factory.mktemp("split") / "sweep.sqlite"
     for part in (runs[::2], runs):
         with Store(file) as store:
-            _, made = fill(store, points_of(part, ENDS, LANDS_AT), Here())
+            _, made = fill(store, points_of(part, ENDS, LANDS_AT), SerialExecutor())
             assert made == len(runs[::2]) if part is not runs else len(runs[1::2])
     with Store(file) as store:
         return runs, read_runs(store, runs, ENDS, LANDS_AT)

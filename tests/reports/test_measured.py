@@ -7,7 +7,7 @@ import ode_reference
 from flipproof.build import ask_of, build, gather_report
 from flipproof.cli.main import main
 from flipproof.film.measured import HELD, hold, part_measured, read_measured
-from flipproof.frame.pool import Here
+from flipproof.frame.pool import SerialExecutor
 from flipproof.output.provenance import provenance
 from flipproof.output.tables import trajectory_csv
 from slicemodel import Scenario
@@ -56,7 +56,7 @@ def test_a_report_that_is_given_a_measurement_has_a_section_of_it(held, monkeypa
 
     monkeypatch.setattr("flipproof.film.measured.hold", known)
     ask, contents = ask_of(THROW, "quick"), (part_measured(measurement),)
-    report = build(gather_report(ask, pool=Here(), contents=contents), provenance("flipproof report"))
+    report = build(gather_report(ask, pool=SerialExecutor(), contents=contents), provenance("flipproof report"))
     assert '<section id="measured" class="fold">' in report.pages["evidence.html"]
     assert '<figure id="figure-measured">' in report.pages["evidence.html"]
     assert "Your measurement is nearest to free flight" in report.pages["index.html"]

@@ -11,7 +11,7 @@ import pytest
 from made_up import trajectory_of
 
 from flipproof.frame.solvers import Made, Run
-from flipproof.page.motion import (
+from flipproof.output.motion import (
     FRAMES,
     MAX_SLICES,
     POSITION_STEP,
@@ -20,7 +20,7 @@ from flipproof.page.motion import (
     flight_of,
     motion_data,
 )
-from flipproof.page.templating import environment
+from flipproof.output.templating import environment
 from slicemodel import Bottle, Scenario
 from slicemodel.trajectory import Impacts
 

@@ -12,7 +12,7 @@ from flipproof.chapters import chapters_named
 from flipproof.frame.flights import Flights as Answers
 from flipproof.frame.flights import Outcome
 from flipproof.frame.solvers import Made, Missing, Run, make
-from flipproof.page.templating import environment
+from flipproof.output.templating import environment
 from flipproof.paper import claims_figures_6_7, observe
 from flipproof.paper import claims_figures_8_9 as landing
 from flipproof.paper.cases import FAMILIES, all_cases, family, numbers, paper_throw

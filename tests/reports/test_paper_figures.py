@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from flipproof.cli import paper as cli_paper
-from flipproof.frame.pool import Here
+from flipproof.frame.pool import SerialExecutor
 from flipproof.output.folder import OutputError
 from flipproof.paper import figures as paper_figures
 from flipproof.paper.cases import HALF_FULL, family
@@ -32,7 +32,9 @@ COSTS = tuple(
 
 @pytest.fixture(scope="module")
 def runs():
-    return replace(paper_figures.gather_figures([name for name in ORDER if name not in TIMED], Here()), costs=COSTS)
+    return replace(
+        paper_figures.gather_figures([name for name in ORDER if name not in TIMED], SerialExecutor()), costs=COSTS
+    )
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import slicemodel
-from flipproof.chapters.vectors import published as vectors
 from flipproof.paper import cases, runs
 from flipproof.paper.cases import (
     CHOSEN,
@@ -23,7 +22,7 @@ from flipproof.paper.cases import (
     paper_throw,
 )
 from flipproof.paper.runs import PUBLISHED, SOLVERS, Planned, plan_figures
-from slicemodel import Scenario
+from slicemodel import Scenario, vectors
 from slicemodel.observables import centre_of_mass_at_rest
 
 EXAMPLE_FOLDER = Path(__file__).resolve().parents[2] / "examples"

@@ -39,6 +39,10 @@ def members(law, **options):
     ]
 
 
+def horizons(study):
+    return [spread.horizon for spread in study.spreads]
+
+
 @pytest.mark.parametrize("rate", [-20.0, 3.0, 40.0])
 def test_an_exponential_has_its_rate(rate):
     growth = fit_growth(T, 1e-6 * np.exp(rate * T))
@@ -103,10 +107,10 @@ def test_a_smooth_flight_has_a_horizon_for_each_size_and_for_round_off():
     study = study_predictability(flight(), members(lambda size: size * np.exp(40 * T)))
     expected = [math.log(1e-3 / size) / 40 for size in SIZES]
     assert study.sizes == pytest.approx(SIZES, rel=1e-6, abs=0.0)
-    assert study.horizons == pytest.approx(expected, abs=1e-3)
+    assert horizons(study) == pytest.approx(expected, abs=1e-3)
     assert study.horizon == pytest.approx(expected[-1], abs=1e-3)
     assert study.amplification == pytest.approx(math.exp(20), rel=1e-4, abs=0.0)
-    assert study.growth.rate == pytest.approx(40, rel=1e-3, abs=0.0)
+    assert study.spreads[0].growth.rate == pytest.approx(40, rel=1e-3, abs=0.0)
     assert study.round_off_horizon is None
     assert study.rough_from is None
     steep = study_predictability(flight(), members(lambda size: size * np.exp(60 * T)))
@@ -115,10 +119,10 @@ def test_a_smooth_flight_has_a_horizon_for_each_size_and_for_round_off():
 
 def test_a_flight_without_growth_is_predictable_to_the_end():
     study = study_predictability(flight(), members(lambda size: size))
-    assert study.horizons == (None,) * 4
+    assert horizons(study) == [None] * 4
     assert study.horizon is None
     assert "none of these changes moves ω by 0.001 of ω₀" in study.words
-    assert study.spread.shape == (4, len(T))
+    assert [spread.width.shape for spread in study.spreads] == [T.shape] * 4
 
 
 def test_a_jump_that_does_not_care_for_the_size_is_said_so():
@@ -133,17 +137,17 @@ def test_a_member_that_ends_early_is_a_horizon_and_not_a_cut():
     short = T[:401]
     levels[0][1] = replace(flight(1e-9, t=short, status="diverged"), scenario=levels[0][1].scenario)
     study = study_predictability(flight(), levels)
-    assert len(study.t) == len(T)
-    assert study.horizons[0] == pytest.approx(short[-1])
-    assert study.horizons[1:] == (None,) * 3
-    assert np.isinf(study.spread[0, -1])
-    assert np.isfinite(study.growth.rate)
+    assert len(study.spreads[0].t) == len(T)
+    assert horizons(study)[0] == pytest.approx(short[-1])
+    assert horizons(study)[1:] == [None] * 3
+    assert np.isinf(study.spreads[0].width[-1])
+    assert np.isfinite(study.spreads[0].growth.rate)
 
 
 def test_a_base_that_ends_early_says_so():
     base = flight(t=T[:401], status="diverged")
     study = study_predictability(base, members(lambda size: size))
-    assert study.ended == pytest.approx(0.2)
+    assert study.spreads[0].ended == pytest.approx(0.2)
     assert "the run ends at 200.0 ms" in study.words
 
 
@@ -151,7 +155,7 @@ def test_eq8_is_smooth_and_ice_amplifies_nothing():
     for solver, throw, most in (("eq8", Scenario().with_slices(8), 100), ("midpoint", Scenario(frozen=True), 1.001)):
         levels = [[make(run).trajectory for run in level] for level in plan_predictability(throw, solver, (1e-7, 1e-6))]
         study = study_predictability(solve(solver, throw), levels)
-        assert study.spread[:, 0] == pytest.approx(study.sizes, rel=1e-6, abs=0.0)
+        assert [spread.width[0] for spread in study.spreads] == pytest.approx(study.sizes, rel=1e-6, abs=0.0)
         assert study.amplification.min() > 0.999
         assert study.amplification.max() < most
         assert study.horizon is None

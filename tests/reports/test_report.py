@@ -33,7 +33,7 @@ from flipproof.cli import main as cli
 from flipproof.figures.style import Drawing, draw
 from flipproof.frame import pool
 from flipproof.frame.exhibit import drawn
-from flipproof.frame.gather import tell
+from flipproof.frame.gather import evaluate
 from flipproof.frame.pool import make_all, workers
 from flipproof.frame.solvers import Run, make
 from flipproof.output.folder import MARKER, marker_text
@@ -44,11 +44,11 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def findings_of(gathered):
-    return [finding for each in tell(gathered).values() for finding in each.findings]
+    return [finding for each in evaluate(gathered).values() for finding in each.findings]
 
 
 def exhibits_of(gathered):
-    return [figure for each in tell(gathered).values() for figure in each.figures]
+    return [figure for each in evaluate(gathered).values() for figure in each.figures]
 
 
 def flights_of(gathered):
@@ -69,7 +69,7 @@ def test_every_claim_is_evaluated_and_holds(gathered):
         assert needed in ids
     assert sum(f.id.startswith("difference-") for f in findings) == len(PAIRS)
     assert sum(f.id.startswith("erratum-") for f in findings) >= 20
-    assert [note for each in tell(gathered).values() for note in each.notes] == []
+    assert [note for each in evaluate(gathered).values() for note in each.notes] == []
 
 
 def test_the_page_is_whole_and_stands_alone(report, read_page):

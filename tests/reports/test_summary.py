@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from flipproof.frame.findings import Band, Finding, regression
-from flipproof.frame.gather import Told
+from flipproof.frame.gather import ChapterResult
 from flipproof.output.columns import columns_csv, curves_csv, rows_csv
 from flipproof.output.junit import junit_text
 from flipproof.output.summary import SUMMARY_VERSION, json_ready, schema_text, summarise, summary_text
@@ -138,9 +138,9 @@ def test_a_suite_without_observations_has_no_empty_properties():
 
 def test_two_findings_may_not_share_an_id():
     twice = (FINDINGS[0], replace(FINDINGS[1], id=FINDINGS[0].id))
-    told = Told(chapter=None, found=None, findings=twice, figures=(), notes=())
+    told = ChapterResult(chapter=None, found=None, findings=twice, figures=(), notes=())
     with pytest.raises(ValueError, match="share an id: ice-eq8"):
-        summarise(None, {"ice": told}, {"flipproof": "0"})
+        summarise(None, {"ice": told}, {"flipproof": "0"}, {})
 
 
 # ---------------------------------------------------------------------- CSV

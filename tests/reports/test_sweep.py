@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from made_up import command
 
-from flipproof.frame.pool import Here
+from flipproof.frame.pool import SerialExecutor
 from flipproof.frame.processes import Processes, processes
 from flipproof.frame.solvers import solve
 from flipproof.frame.store import Store
@@ -42,7 +42,7 @@ name = "eq8"
 """
 
 
-class Counting(Here):
+class Counting(SerialExecutor):
     """Works in this process, and counts the points that it is given."""
 
     points = 0
@@ -230,7 +230,7 @@ def test_a_worker_that_dies_costs_its_chunk_and_a_point_that_kills_is_given_up(s
     assert filled(tmp_path / "once.sqlite", made, Deadly()) == (rows, made.size + 64, [])
     poison = list(made.points())[70].throw
 
-    class Poisoned(Here):
+    class Poisoned(SerialExecutor):
         points = 0
 
         def submit(self, fn, /, *args, **kwargs):
@@ -246,7 +246,7 @@ def test_a_worker_that_dies_costs_its_chunk_and_a_point_that_kills_is_given_up(s
 def test_workers_that_die_whatever_they_are_given_end_the_sweep(swept, tmp_path):
     _, made, _ = swept
 
-    class Dead(Here):
+    class Dead(SerialExecutor):
         def submit(self, *_, **__):
             return super().submit(lambda: (_ for _ in ()).throw(OSError("gone")))
 
@@ -286,7 +286,7 @@ def test_workers_with_other_code_make_no_row(swept, tmp_path, monkeypatch):
     _, made, _ = swept
     monkeypatch.setattr("flipproof.sweep.loop.code_identity", lambda: "0.0+other")
     with Store(tmp_path / "sweep.sqlite") as store, pytest.raises(SweepError, match="install the same in both"):
-        fill(store, made.points(), Here())
+        fill(store, made.points(), SerialExecutor())
 
 
 def test_any_executor_makes_the_rows(swept, tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from flipproof.build import ask_of, build, gather_report
 from flipproof.chapters import parts
 from flipproof.chapters.overlap.chapter import Amount
-from flipproof.frame.pool import Here
+from flipproof.frame.pool import SerialExecutor
 from flipproof.output.provenance import provenance
 from slicemodel import Scenario
 
@@ -46,7 +46,7 @@ def test_unusual_throws_have_a_report_too(name, read_page):
     ask = replace(ask_of(Scenario(**values), "quick", certified=()), reference=reference)
     contents = tuple(replace(p, chapters=tuple(c for c in p.chapters if c.name not in WITHOUT)) for p in parts())
     # In this process: to start workers for it, twice, takes a third of the time of all of it.
-    gathered = gather_report(ask, work=SMALL, pool=Here(), contents=contents)
+    gathered = gather_report(ask, work=SMALL, pool=SerialExecutor(), contents=contents)
     report = build(gathered, provenance("flipproof report"))
     assert [(f.id, f.value, f.note) for f in report.failed] == []
     json.dumps(report.summary, allow_nan=False)

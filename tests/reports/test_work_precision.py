@@ -10,7 +10,7 @@ from conftest import WORK as QUICK
 from made_up import trajectory_of
 
 import slicemodel
-from engine_check.solver import ENGINES
+from engine_check.engines import ENGINES
 from flipproof.build import ask_of
 from flipproof.chapters import chapters_named
 from flipproof.chapters.work_precision.chapter import claims, figures, summarise_work_precision, tabulate
@@ -38,7 +38,7 @@ from flipproof.chapters.work_precision.study import (
     work_of,
 )
 from flipproof.frame.gather import gather
-from flipproof.frame.pool import Here
+from flipproof.frame.pool import SerialExecutor
 from flipproof.frame.solvers import Made, Missing, Run, make
 from flipproof.frame.timing import at_times, batches, make_timed, sampled
 from ode_reference.models import MODELS
@@ -72,7 +72,10 @@ def smooth():
 @pytest.fixture(scope="module")
 def quick():
     return gather(
-        chapters_named("work-precision"), ask_of(Scenario(), "quick", 6), Here(), work={"work-precision": QUICK}
+        chapters_named("work-precision"),
+        ask_of(Scenario(), "quick", 6),
+        SerialExecutor(),
+        work={"work-precision": QUICK},
     ).found("work-precision")
 
 

@@ -34,7 +34,7 @@ CONTENTS: Final[tuple[tuple[str, str, str, tuple[str, ...]], ...]] = (
      "What each physics engine computes by itself, how far its result can be trusted, and where it fails.",
      ("certificates", "agreement", "stability", "engine_facts", "horizon", "overlap")),
     ("water", "Which equation comes nearest to water",
-     "Every equation beside two crude fluids in the same bottle, by filling, and what may be concluded.", ("water",)),
+     "Every equation beside three crude fluids in the same bottle, by filling, and what may be concluded.", ("water",)),
     ("landing", "Does it stand?",
      "Scattered throws of water and of ice are landed on a table, and the share that ends upright is counted.",
      ("landing",)),

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from engine_check.solver import DEFAULT_TOLERANCE, ENGINES
+from engine_check.certificate import DEFAULT_TOLERANCE
+from engine_check.engines import ENGINES
 from flipproof.frame.solvers import Run
 from ode_reference.models import LADDER
 from slicemodel import Scenario, schemes

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from flipproof.check.diff import HEADINGS, Comparison
-from flipproof.figures.report_pair import differences, figure_report_pair
+from flipproof.check.report_pair import differences, figure_report_pair
 from flipproof.figures.spoken import inert
 from flipproof.figures.style import draw
 from flipproof.output.columns import Series
-from flipproof.page.templating import environment
+from flipproof.output.templating import environment
 
 
 def diff_page(old: Path, new: Path, before: Mapping[str, Any], after: Mapping[str, Any], found: Comparison) -> str:

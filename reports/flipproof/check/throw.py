@@ -25,8 +25,8 @@ from flipproof.build import ask_of
 from flipproof.chapters import chapters_named, parts
 from flipproof.check.diff import LEAST, ROUND_OFF, TOLERANCE, bands, number, read_summary, scenario_changes
 from flipproof.frame.findings import Finding, interval_text
-from flipproof.frame.gather import gather, tell
-from flipproof.frame.pool import Here
+from flipproof.frame.gather import evaluate, gather
+from flipproof.frame.pool import SerialExecutor
 from flipproof.frame.run_store import RunStore
 from slicemodel import Scenario
 
@@ -172,5 +172,5 @@ def findings_of(group: str, throw: Scenario, store: RunStore | None = None, work
     chapters = groups()[group] if work is None else (group,)
     ask = ask_of(throw, "check", throw.n_slices)
     amounts = None if work is None else {group: work}
-    for each in tell(gather(chapters_named(*chapters), ask, Here(), work=amounts, store=store)).values():
+    for each in evaluate(gather(chapters_named(*chapters), ask, SerialExecutor(), work=amounts, store=store)).values():
         yield from each.findings

@@ -33,7 +33,7 @@ def command_animate(options: argparse.Namespace) -> int:
     scenario = read_scenario(options.scenario)
     throw = scenario.with_slices(options.slices or min(SLICES, scenario.n_slices))
     from flipproof.animate import check_target, film_of, plan_film, write_film
-    from flipproof.page.motion import FLOWN
+    from flipproof.output.motion import FLOWN
 
     check_target(options.out)
     times = plan_film(throw, options.slow, options.fps)

@@ -115,11 +115,16 @@ count = reader("a whole number of at least 1", digits, lambda value: value >= 1)
 number = reader("a number in (-1e6, 1e6)", float, lambda value: abs(value) < 1e6)
 
 
+WRITTEN: Final = ("out", "json", "junit", "html", "export", "film", "plot")
+"""Options that name what a command writes, whichever command it is."""
+
+
 def check_outputs(options: argparse.Namespace, *names: str) -> None:
     """Refuse by a ValueError, before the work begins, files of options that could not be written after it.
 
-    Two options must not name one file; a device or a pipe takes both.
+    Two options must not name one file, nor one that the command reads; a device or a pipe takes both.
     """
+    refuse_overwriting(options, *names)
     taken: dict[Path, str] = {}
     for name in names:
         path = getattr(options, name)
@@ -133,10 +138,13 @@ def check_outputs(options: argparse.Namespace, *names: str) -> None:
                 raise ValueError(f"--{name} {path} is the file of --{other}, too; name another")
 
 
-def refuse_overwriting(options: argparse.Namespace) -> None:
-    """Refuse by a ValueError a command that would write over a file that it reads."""
+def refuse_overwriting(options: argparse.Namespace, *names: str) -> None:
+    """Refuse by a ValueError a command that would write over a file that it reads.
+
+    It writes those of ``WRITTEN`` and of ``names``.
+    """
     given = vars(options)
-    written = ("out", "json", "junit", "html", "export", "film", "plot")
+    written = dict.fromkeys((*WRITTEN, *names))
     values = [value if isinstance(value, list) else [value] for name, value in given.items() if name not in written]
     texts = [str(each) for value in values for each in value if isinstance(each, str | Path)]
     for name in written:

@@ -107,7 +107,18 @@ def entry() -> NoReturn:
         sys.stdout.flush()
         signals.end()
     signals.ignore()  # the command is done, whatever comes while Python ends
+    _let_go()
     sys.exit(status)
+
+
+def _let_go() -> None:
+    """Send to nowhere what a stream holds and cannot write: Python's end would try again, and end with 120."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError, AttributeError):  # full or gone; closed; never there
+            with suppress(OSError, ValueError, AttributeError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _words_of(error: OSError) -> str:

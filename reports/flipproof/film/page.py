@@ -16,7 +16,7 @@ from flipproof.film.estimate import UNITS
 from flipproof.film.judge import SHOWN, Judged, compared
 from flipproof.output.columns import rows_csv
 from flipproof.output.folder import write_text
-from flipproof.page.templating import environment
+from flipproof.output.templating import environment
 from slicemodel.trajectory import FloatArray
 
 MEASURED: Final = {"color": "#000000", "marker": ".", "linestyle": "none", "markersize": 3.0, "zorder": 5}

@@ -56,8 +56,8 @@ class Gathered:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Told:
-    """What a chapter tells: findings, figures, and ``notes``, each what is missing in its place and why.
+class ChapterResult:
+    """Findings and figures of a chapter, and ``notes``: what is missing, each with the reason.
 
     ``seconds`` are the wall times that its claims took to evaluate [s], by the findings' ids.
     """
@@ -129,13 +129,15 @@ def _advance(name: str, study: Any, flights: Flights | None, waiting: dict[str, 
         waiting[name] = (study, value)
 
 
-def tell(gathered: Gathered) -> dict[str, Told]:
-    """Return what every chapter tells, by its name; no figure is drawn yet."""
+def evaluate(gathered: Gathered) -> dict[str, ChapterResult]:
+    """Return the findings and figures of every chapter, by its name; no figure is drawn yet."""
     chapters = {chapter.name: chapter for part in gathered.parts for chapter in part.chapters}
-    return {name: _told(each, gathered.outcomes[name]) for name, each in chapters.items() if name in gathered.outcomes}
+    return {
+        name: _evaluated(each, gathered.outcomes[name]) for name, each in chapters.items() if name in gathered.outcomes
+    }
 
 
-def _told(chapter: Chapter[Any], outcome: Outcome[Any]) -> Told:
+def _evaluated(chapter: Chapter[Any], outcome: Outcome[Any]) -> ChapterResult:
     said: list[Finding | Absent] = []
     drawn: list[Exhibit] = []
     seconds: dict[str, float] = {}
@@ -153,7 +155,7 @@ def _told(chapter: Chapter[Any], outcome: Outcome[Any]) -> Told:
         figures = attempt(lambda: drawn.extend(chapter.figures(outcome.value)))
     if reason := claims.reason or figures.reason:
         said.append(Absent(f"chapter-{chapter.name}", chapter.title, reason, chapter.kind))
-    return Told(
+    return ChapterResult(
         chapter=chapter,
         found=outcome.found,
         findings=tuple(each.finding if isinstance(each, Absent) else each for each in said),

@@ -121,8 +121,8 @@ def workers(jobs: int | None) -> AbstractContextManager[Executor]:
     return processes(jobs, tries=TRIES)
 
 
-class Here(Executor):
-    """Makes every call at once, in this process."""
+class SerialExecutor(Executor):
+    """An executor that makes every call when it is submitted, in this process."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Return what came of the call."""

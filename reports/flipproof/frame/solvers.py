@@ -35,7 +35,7 @@ class Solver:
 
 def catalogue() -> dict[str, Solver]:
     """Return every solver by name: the schemes, the models of the reference, the engines."""
-    from engine_check.solver import ENGINES
+    from engine_check.engines import ENGINES
     from ode_reference.models import MODELS
     from ode_reference.solver import WATERS
     from slicemodel.schemes import SCHEMES

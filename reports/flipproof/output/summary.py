@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from flipproof.frame.exhibit import Exhibit
-from flipproof.frame.gather import Gathered, Told
+from flipproof.frame.gather import ChapterResult, Gathered
 from flipproof.frame.solvers import Made
 from flipproof.output.columns import json_ready
-from flipproof.page.verdict import headlines, lead
 
 SUMMARY_VERSION: Final = 2
 """Rises when a reader of the last version would misread the next."""
@@ -25,17 +24,18 @@ def schema_text() -> str:
     return (Path(__file__).resolve().parent / "schema" / SCHEMA_NAME).read_text(encoding="utf-8")
 
 
-def summarise(gathered: Gathered, told: Mapping[str, Told], provenance: Mapping[str, str]) -> dict[str, Any]:
-    """Return everything that a report found as JSON-ready data.
+def summarise(
+    gathered: Gathered, results: Mapping[str, ChapterResult], provenance: Mapping[str, str], verdict: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return everything that a report found as JSON-ready data; ``verdict`` holds its lead and its headlines.
 
     A number that is not finite is one of the words "nan", "inf", "-inf": JSON has no such numbers, and to leave it out
     would hide that something was computed and came to nothing. Raises ValueError if two findings share an id.
     """
-    findings = [finding for each in told.values() for finding in each.findings]
+    findings = [finding for each in results.values() for finding in each.findings]
     ids = Counter(finding.id for finding in findings)
     if len(ids) < len(findings):
         raise ValueError(f"findings share an id: {', '.join(sorted(name for name, n in ids.items() if n > 1))}")
-    verdict = headlines(gathered)
     summary: dict[str, Any] = {
         "$schema": SCHEMA_NAME,
         "flipproof": provenance["flipproof"],
@@ -43,26 +43,25 @@ def summarise(gathered: Gathered, told: Mapping[str, Told], provenance: Mapping[
         "scenario": gathered.ask.scenario.to_mapping(),
         "slices": gathered.ask.throw.n_slices,
         "size": gathered.ask.size,
-        "lead": lead(verdict),
-        "headlines": [headline.to_mapping() for headline in verdict],
+        **verdict,
         "findings": [finding.to_mapping() for finding in findings],
         "differences": [],
         "solvers": [],
         "paper": None,
         "work_precision": {},
         "runs": [_run_mapping(made) for made in gathered.flights.values()],
-        "problems": dict(note for each in told.values() for note in each.notes),
+        "problems": dict(note for each in results.values() for note in each.notes),
         "figures": [
             _figure_mapping(exhibit, part.id)
             for part in gathered.parts
             for chapter in part.chapters
-            if chapter.name in told
-            for exhibit in told[chapter.name].figures
+            if chapter.name in results
+            for exhibit in results[chapter.name].figures
         ],
         "stages": {name: round(seconds, 3) for name, seconds in gathered.stages.seconds.items()},
         "provenance": dict(provenance),
     }
-    for each in told.values():
+    for each in results.values():
         if each.found is not None:
             summary |= each.chapter.summary(each.found)
     return {name: json_ready(value) for name, value in summary.items()}

@@ -14,7 +14,7 @@ from markupsafe import Markup
 from flipproof.frame.chapter import Part
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import RULES, Finding
-from flipproof.frame.gather import Gathered, Told
+from flipproof.frame.gather import ChapterResult, Gathered
 from flipproof.frame.solvers import FINER
 from flipproof.page.glossary import indexed, linked
 
@@ -92,10 +92,10 @@ class Section:
         return ", ".join(f"{n} {one if n == 1 else many}" for n, one, many in there)
 
 
-def sections(gathered: Gathered, told: Mapping[str, Told], templates: Environment) -> tuple[Section, ...]:
+def sections(gathered: Gathered, results: Mapping[str, ChapterResult], templates: Environment) -> tuple[Section, ...]:
     """Return every part that has a chapter in this report, in order."""
 
-    def section(part: Part, chapters: Sequence[Told]) -> Section:
+    def section(part: Part, chapters: Sequence[ChapterResult]) -> Section:
         findings = [finding for each in chapters for finding in each.findings]
         return Section(
             id=part.id,
@@ -106,22 +106,22 @@ def sections(gathered: Gathered, told: Mapping[str, Told], templates: Environmen
             figure=next((figure.name for each in chapters for figure in each.figures), ""),
         )
 
-    there = ((part, [told[each.name] for each in part.chapters if each.name in told]) for part in gathered.parts)
+    there = ((part, [results[each.name] for each in part.chapters if each.name in results]) for part in gathered.parts)
     return tuple(section(part, chapters) for part, chapters in there if chapters)
 
 
-def _chapter(gathered: Gathered, told: Told, templates: Environment) -> Markup:
+def _chapter(gathered: Gathered, result: ChapterResult, templates: Environment) -> Markup:
     """Return a chapter's part: what is missing and why, then its own template, or its figures alone."""
-    chapter = told.chapter
+    chapter = result.chapter
     text = PLAIN if chapter.template is None else chapter.template.read_text(encoding="utf-8")
-    body = "" if told.found is None else text
-    extra: dict[str, Any] = {} if told.found is None else dict(chapter.page(told.found))
+    body = "" if result.found is None else text
+    extra: dict[str, Any] = {} if result.found is None else dict(chapter.page(result.found))
     return Markup(
         templates.from_string(f"{MACROS}{{{{ missing(notes) }}}}\n{body}").render(
-            found=told.found,
-            figures=told.figures,
-            findings=told.findings,
-            notes=told.notes,
+            found=result.found,
+            figures=result.figures,
+            findings=result.findings,
+            notes=result.notes,
             finer=FINER,
             throw=gathered.ask.throw,
             **extra,

@@ -10,13 +10,13 @@ from typing import Any
 from markupsafe import Markup
 
 from flipproof.chapters.differences.study import Difference, moved, percent
-from flipproof.frame.gather import Gathered, Told
+from flipproof.frame.gather import ChapterResult, Gathered
 from flipproof.frame.solvers import find
+from flipproof.output.templating import environment
 from flipproof.page.equations import equation, mathematics, numbers, typeset
 from flipproof.page.glossary import EQUATIONS, TERMS, anchor, symbols
 from flipproof.page.live import live_data, sliders, touch_data
 from flipproof.page.parts import STORY, behind, sections, shared
-from flipproof.page.templating import environment
 from flipproof.page.verdict import answer, headlines, lead, signed, story
 
 
@@ -63,7 +63,7 @@ def read_assets() -> dict[str, Markup]:
 
 
 def render(
-    gathered: Gathered, told: Mapping[str, Told], provenance: Mapping[str, str], summary: Mapping[str, Any]
+    gathered: Gathered, results: Mapping[str, ChapterResult], provenance: Mapping[str, str], summary: Mapping[str, Any]
 ) -> dict[str, str]:
     """Return the pages by the names of their files; ``summary``, which the story prints from, is that of the report."""
     templates = environment()
@@ -74,8 +74,8 @@ def render(
     }  # fmt: skip
     templates.globals["assets"] = read_assets()
     verdict = headlines(gathered)
-    findings = [finding for each in told.values() for finding in each.findings]
-    figures = {figure.name: figure for each in told.values() for figure in each.figures}
+    findings = [finding for each in results.values() for finding in each.findings]
+    figures = {figure.name: figure for each in results.values() for figure in each.figures}
     regressions = [finding for finding in findings if finding.kind == "regression"]
     flown = gathered.found("flights")
     facts = story(summary, {name: figure.table for name, figure in figures.items()})
@@ -90,7 +90,7 @@ def render(
         failed=[finding for finding in regressions if finding.failed],
         solvers=flown.rows if flown is not None else [],
         problems=[made for made in gathered.flights.values() if made.trajectory is None],
-        notes=[note for each in told.values() for note in each.notes],
+        notes=[note for each in results.values() for note in each.notes],
         motion=flown.motion if flown is not None else None,
         measured=gathered.found("measured"),
         provenance=provenance,
@@ -103,7 +103,7 @@ def render(
         slider_of={one.name: one for one in asked},
         live=live_data(gathered.ask.throw),
     )
-    parts = sections(gathered, told, templates)
+    parts = sections(gathered, results, templates)
     left_out = {"shares": not facts.shares, "bottles": not facts.map}
     screens = [(id_, words) for id_, words in STORY.items() if not left_out.get(id_)]
     body = (*parts, *behind(parts, templates, context))

@@ -218,6 +218,12 @@ def lead(headlines: Sequence[Headline]) -> str:
     return " ".join([answer(headlines), *(f"{question} {words}" for question, words in lines(headlines))])
 
 
+def verdict(gathered: Gathered) -> dict[str, Any]:
+    """Return what a summary holds of the verdict: its lead and its headlines, JSON-ready."""
+    numbers = headlines(gathered)
+    return {"lead": lead(numbers), "headlines": [headline.to_mapping() for headline in numbers]}
+
+
 def _amount(headline: Headline) -> str:
     """Return a number with that of another number of slices, as in "13 % (N = 100: 12 %)"."""
     if headline.finer is None or headline.finer_slices is None:
@@ -254,14 +260,12 @@ NAMES: Final[Mapping[str, str]] = {name: SPOKEN[name] for name in ("published-py
 """Solver -> its name on the story's charts."""
 
 CHANGES: Final[Mapping[str, str]] = {
-    "signs of Eq. 9d: no damping": "Eq. 9d has the wrong sign in two terms, and the program in one: its drag does "
-    "not damp.",
-    "roots of Eq. 9a: γ ≪ ω": "Eq. 9a holds for small drag (γ ≪ ω); at the end of the flight drag is not small.",
-    "drag against C_M": "Eq. 8 measures drag against the centre of mass; water rubs on the wall of the bottle.",
-    "gravity in Eq. 8": "Eq. 8 lets gravity push water along the bottle; a falling bottle does not feel it.",
-    "origin at rest, drag on the tube": "Eq. 8 leaves out that the centre of mass accelerates along the bottle, and "
-    "that drag pulls the bottle.",
-    "no recoil in impacts": "Water that strikes an end kicks the bottle; with Eq. 8 the bottle is not kicked.",
+    "signs of Eq. 9d: no damping": "Eq. 9d has two wrong signs, the program one: its drag does not damp.",
+    "roots of Eq. 9a: γ ≪ ω": "Eq. 9a holds for small drag; late in the flight drag is not small.",
+    "drag against C_M": "Water rubs on the wall; Eq. 8 has it rub on the centre of mass.",
+    "gravity in Eq. 8": "Eq. 8 lets gravity push the water; a falling bottle does not feel it.",
+    "origin at rest, drag on the tube": "The centre of mass accelerates along the bottle, and drag pulls the bottle.",
+    "no recoil in impacts": "Water that strikes an end kicks the bottle; in Eq. 8 it does not.",
 }
 """Assumption that is changed -> what it means, in one sentence."""
 

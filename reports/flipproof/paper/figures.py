@@ -16,7 +16,7 @@ from flipproof.frame.pool import Progress, workers
 from flipproof.frame.run_store import RunStore
 from flipproof.output.columns import rows_csv
 from flipproof.output.folder import check_replaceable, replaced_folder
-from flipproof.page.templating import environment
+from flipproof.output.templating import environment
 from flipproof.paper import figures_bottle, figures_curves, figures_levels
 from flipproof.paper.cases import HEADER, family, paper_throw, parameter_rows
 from flipproof.paper.runs import PaperRuns, cost_calls, group_calls, plan_figures

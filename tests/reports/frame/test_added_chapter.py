@@ -9,7 +9,7 @@ import pytest
 from flipproof import chapters
 from flipproof.build import ask_of, build, gather_report, write
 from flipproof.check.throw import check, groups
-from flipproof.frame.pool import Here
+from flipproof.frame.pool import SerialExecutor
 from flipproof.output.provenance import provenance
 from slicemodel import Scenario
 
@@ -31,7 +31,9 @@ def turns(tmp_path, monkeypatch):
 
 @pytest.mark.usefixtures("turns")
 def test_an_added_chapter_stands_in_report_summary_and_junit(tmp_path):
-    report = build(gather_report(ask_of(Scenario(n_slices=3), "quick"), pool=Here()), provenance("flipproof report"))
+    report = build(
+        gather_report(ask_of(Scenario(n_slices=3), "quick"), pool=SerialExecutor()), provenance("flipproof report")
+    )
     folder = tmp_path / "out"
     folder.mkdir()
     write(report, folder)

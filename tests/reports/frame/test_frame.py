@@ -11,8 +11,8 @@ from flipproof.frame.chapter import Chapter, Part, judged
 from flipproof.frame.exhibit import Exhibit, drawn
 from flipproof.frame.findings import Finding
 from flipproof.frame.flights import Call, ChapterError, attempt
-from flipproof.frame.gather import gather, tell
-from flipproof.frame.pool import Here
+from flipproof.frame.gather import evaluate, gather
+from flipproof.frame.pool import SerialExecutor
 from flipproof.frame.solvers import Made, Missing, Run
 from slicemodel import Scenario, Trajectory
 
@@ -99,30 +99,30 @@ def test_equal_runs_are_made_once_whoever_asks_for_them(gathered):
 
 
 def test_what_is_missing_is_not_evaluated_and_stands_in_its_own_place(gathered):
-    told = tell(gathered[1])
-    assert [(f.id, f.verdict, f.failed) for f in told["lost"].findings] == [
+    results = evaluate(gathered[1])
+    assert [(f.id, f.verdict, f.failed) for f in results["lost"].findings] == [
         ("the first", "pass", False),
         ("the-lost-one", "not evaluated", True),
     ]
-    assert told["lost"].notes == (("the lost one", "the lost one: RuntimeError: no luck"),)
+    assert results["lost"].notes == (("the lost one", "the lost one: RuntimeError: no luck"),)
 
 
 def test_a_study_that_breaks_is_a_note_and_an_observation_and_stops_no_other(gathered):
-    told = tell(gathered[1])
-    (finding,) = told["broken"].findings
+    results = evaluate(gathered[1])
+    (finding,) = results["broken"].findings
     assert (finding.id, finding.verdict, finding.failed) == ("chapter-broken", "not evaluated", False)
-    assert told["broken"].notes == (("broken", "no sense in it"),)
-    assert [finding.value for finding in told["waves"].findings] == [10.0, 7.0]
+    assert results["broken"].notes == (("broken", "no sense in it"),)
+    assert [finding.value for finding in results["waves"].findings] == [10.0, 7.0]
 
 
 def test_a_study_of_regressions_that_breaks_fails_the_report():
     must = dataclasses.replace(CHAPTERS[2], kind="regression")
-    (told,) = tell(gather((Part("one", "One", "", (must,)),), ASK, Answers(fly))).values()
-    assert told.findings[0].failed
+    (results,) = evaluate(gather((Part("one", "One", "", (must,)),), ASK, Answers(fly))).values()
+    assert results.findings[0].failed
 
 
 def test_a_size_that_a_chapter_does_not_name_leaves_it_out_and_order_is_that_of_the_parts(gathered):
-    assert list(tell(gathered[1])) == ["waves", "lost", "broken"]
+    assert list(evaluate(gathered[1])) == ["waves", "lost", "broken"]
 
 
 def test_what_was_not_asked_for_is_missing(gathered):
@@ -182,7 +182,10 @@ def exhibit(_):
 )
 def test_a_mistake_of_the_program_is_no_evidence_that_is_missing(part, place):
     with pytest.raises(ChapterError, match=f"^{place}: KeyError: 'OMEGA'$"):
-        drawn(next(iter(tell(gather((Part("one", "One", "", (part,)),), ASK, Answers(fly))).values())).figures, Here())
+        drawn(
+            next(iter(evaluate(gather((Part("one", "One", "", (part,)),), ASK, Answers(fly))).values())).figures,
+            SerialExecutor(),
+        )
 
 
 def test_figures_or_claims_that_break_are_noted():
@@ -194,6 +197,6 @@ def test_figures_or_claims_that_break_are_noted():
         raise Missing("no curve")
 
     found = gather((Part("one", "One", "", (chapter("bad", study, claims=bad, figures=bad),)),), ASK, Answers(fly))
-    (told,) = tell(found).values()
-    assert told.notes == (("bad", "no curve"),)
-    assert [finding.id for finding in told.findings] == ["chapter-bad"]
+    (results,) = evaluate(found).values()
+    assert results.notes == (("bad", "no curve"),)
+    assert [finding.id for finding in results.findings] == ["chapter-bad"]

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from engine_check.solver import ENGINES
+from engine_check.engines import ENGINES
 from flipproof.chapters.reference.chapter import witnessed
 from flipproof.chapters.solvers import FREE
 from flipproof.frame.chapter import (

@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from engine_check.solver import ENGINES
+from engine_check.engines import ENGINES
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, percent, study_difference
 from flipproof.chapters.predictability.chapter import parting_words
 from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, WITNESSES
@@ -81,8 +81,8 @@ class Differences(NamedTuple):
 def study(ask: Ask) -> Study[Differences]:
     """Compare the pairs; a size that is asked for cheap solvers only does without bands and finer cuts.
 
-    Schemes and equations fly the throw again at ``FINER`` times the slices; a full report adds the engine, its slowest
-    run.
+    Schemes and equations fly the throw again at ``FINER`` times the slices; an engine would be certified anew, which
+    costs more than all of them together.
     """
     runs = dict(ask.solvers)
     if ask.size == "check":
@@ -91,8 +91,7 @@ def study(ask: Ask) -> Study[Differences]:
         bands: dict[str, float] = {}
         more: dict[str, Run] = {}
     else:
-        again = (*((ENGINE,) if ask.size == "full" else ()), *SCHEMES, *LADDER)
-        more = {name: finer(runs[name]) for name in again}
+        more = {name: finer(runs[name]) for name in (*SCHEMES, *LADDER)}
         more |= {name: replace(more[name], settings={**more[name].settings, "store": "summary"}) for name in SCHEMES}
         calls = band_calls(runs)
         flights = yield [*more.values(), *runs.values(), *calls.values()]

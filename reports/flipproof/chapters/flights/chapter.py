@@ -9,14 +9,14 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from engine_check.solver import ENGINES
+from engine_check.engines import ENGINES
 from flipproof.chapters.solvers import FLIGHTS, LIMITS, OTHERS, SCHEMES
 from flipproof.figures.style import new_figure, shared_legend, shown_name, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Exhibit, Made, Study, Touch
 from flipproof.frame.solvers import find
 from flipproof.output.columns import curves_csv, json_ready
+from flipproof.output.motion import motion_data
 from flipproof.output.tables import trajectory_csv
-from flipproof.page.motion import motion_data
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray

@@ -23,7 +23,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from engine_check.solver import ENGINES
+from engine_check.engines import ENGINES
 from flipproof.chapters.predictability.chapter import (
     HORIZON_BAND,
     SIZE_LINES,
@@ -31,14 +31,13 @@ from flipproof.chapters.predictability.chapter import (
     plan_predictability,
 )
 from flipproof.chapters.solvers import ENGINE, FREE
-from flipproof.curves.growth import Growth, first_crossing, fit_growth
+from flipproof.curves.growth import Spread, earliest_horizon
 from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, observed, regression
 from flipproof.frame.flights import attempt
 from flipproof.frame.solvers import Made, Run, find
 from flipproof.output.columns import curves_csv
 from slicemodel import Scenario, Trajectory
-from slicemodel.trajectory import FloatArray
 
 Kind = Literal["angle", "release", "order"]
 
@@ -65,33 +64,19 @@ class Level(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ensemble:
-    """Flights that differ in one small thing.
+class Ensemble(Spread):
+    """Flights that differ in one small thing; ``width`` is (largest - smallest omega) / |omega_0|.
 
     Parameters
     ----------
     size : of the change [rad], and of omega_0 as a fraction; NaN for another order, which has none
     members, slices : how many flights, the unchanged one included, and of how many slices
-    t, width : (P,) - times [s] and (largest - smallest omega) / |omega_0|; infinite where a member has ended
-    horizon : first time the width exceeds HORIZON_BAND [s]; None: never
-    growth : of the width, up to the horizon
-    ended : where the first member ends, if that is before the end of the throw [s]
     """
 
     kind: Kind
     size: float
     members: int
     slices: int
-    t: FloatArray
-    width: FloatArray
-    horizon: float | None
-    growth: Growth
-    ended: float | None
-
-    @property
-    def largest(self) -> float:
-        """Largest width of the flight, fraction of omega_0; infinite if a member has ended early."""
-        return float(self.width.max())
 
     @property
     def what(self) -> str:
@@ -121,7 +106,7 @@ class Horizon:
     @property
     def horizon(self) -> float | None:
         """Earliest horizon of all ensembles [s]; None: there is none up to the end."""
-        return min((e.horizon for e in self.ensembles if e.horizon is not None), default=None)
+        return earliest_horizon(self.ensembles)
 
     def of_kind(self, *kinds: Kind) -> list[Ensemble]:
         """Return the ensembles of these kinds, each in order of their size."""
@@ -196,20 +181,10 @@ def study_ensemble(kind: Kind, size: float, members: Sequence[Trajectory]) -> En
     width = np.full(len(t), np.inf)
     omega = [member.omega[:shortest] for member in members]
     width[:shortest] = np.ptp(omega, axis=0) / abs(members[0].scenario.omega0)
-    horizon = first_crossing(t, width, HORIZON_BAND)
     # A member that is the longest but still stopped early ends the ensemble as well.
     stopped = [float(member.t[-1]) for member in members if member.status not in ("ok", "escaped")]
-    return Ensemble(
-        kind=kind,
-        size=size,
-        members=len(members),
-        slices=members[0].scenario.n_slices,
-        t=t,
-        width=width,
-        horizon=horizon,
-        growth=fit_growth(t, width, stop=math.inf if horizon is None else horizon),
-        ended=min(stopped, default=None),
-    )
+    slices, ended = members[0].scenario.n_slices, min(stopped, default=None)
+    return Ensemble.of(t, width, HORIZON_BAND, kind=kind, size=size, members=len(members), slices=slices, ended=ended)
 
 
 def study(ask: Ask) -> Study[tuple[Horizon, ...]]:

@@ -8,7 +8,6 @@ amplification is therefore stated for every size and never averaged away. Nothin
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -21,7 +20,7 @@ from matplotlib.lines import Line2D
 
 from flipproof.chapters.alignment.study import MIN_SPEED, count_key, ordinal
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, percent
-from flipproof.curves.growth import Growth, first_crossing, fit_growth
+from flipproof.curves.growth import Spread, earliest_horizon, first_crossing, fit_growth
 from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, judged, observed
 from flipproof.frame.flights import Outcome, attempt, known
@@ -69,36 +68,29 @@ class Predictability:
 
     Parameters
     ----------
-    sizes, t : (S,) sizes of the changes, rising; (P,) times [s]
-    spread : (S, P) - max |omega_member - omega| / |omega_0| over the members; infinite where a member has ended
-    horizons : when the spread first exceeds ``HORIZON_BAND`` [s]; None: predictable to the end
+    sizes : (S,) - sizes of the changes, rising
+    spreads : max |omega_member - omega| / |omega_0| over the members of each size
     round_off_horizon : the same for a change of the size of round-off, amplified as the smallest change is; it means
         something only while the flight is smooth
-    growth : of the spread after the smallest change, up to its horizon
     rough_from : first time at which amplifications of two sizes differ by more than a factor of 10 [s]: the flight is
         not smooth there, or the solver's own error exceeds the smallest change
-    ended : where the run ends, if that is before the end of the throw [s]
     """
 
     solver: str
     sizes: FloatArray
-    t: FloatArray
-    spread: FloatArray
-    horizons: tuple[float | None, ...]
+    spreads: tuple[Spread, ...]
     round_off_horizon: float | None
-    growth: Growth
     rough_from: float | None
-    ended: float | None
 
     @property
     def amplification(self) -> FloatArray:
         """Largest spread over size of the change for every size, shape (S,); 1 if it is never amplified."""
-        return np.asarray((self.spread / self.sizes[:, np.newaxis]).max(axis=1))
+        return np.array([spread.largest for spread in self.spreads]) / self.sizes
 
     @property
     def horizon(self) -> float | None:
         """Earliest horizon of all sizes [s]; None: predictable to the end for all of them."""
-        return min((time for time in self.horizons if time is not None), default=None)
+        return earliest_horizon(self.spreads)
 
     @property
     def words(self) -> str:
@@ -110,18 +102,19 @@ class Predictability:
         words = f"{self.solver}: the flight amplifies {each}"
         if self.horizon is None:
             words += f"; none of these changes moves ω by {HORIZON_BAND:g} of ω₀ up to the end of the flight"
-        for size, time in zip(self.sizes, self.horizons, strict=True):
-            if time is not None:
+        for size, spread in zip(self.sizes, self.spreads, strict=True):
+            if (time := spread.horizon) is not None:
                 words += f"; a change by {size:.0e} moves ω by {HORIZON_BAND:g} of ω₀ at {time * 1e3:.1f} ms"
-        words += f"; the effect of a change by {self.sizes[0]:.0e} {self.growth.words}"
+        smallest = self.spreads[0]
+        words += f"; the effect of a change by {self.sizes[0]:.0e} {smallest.growth.words}"
         if self.rough_from is not None:
             words += (
-                f" and reaches {self.spread[0].max():.1e} of ω₀; from {self.rough_from * 1e3:.1f} ms on the factor "
+                f" and reaches {smallest.largest:.1e} of ω₀; from {self.rough_from * 1e3:.1f} ms on the factor "
                 "depends on the size of the change, so that the effect of round-off cannot be extrapolated"
             )
         elif self.round_off_horizon is not None:
             words += f"; even round-off would move ω by that much at {self.round_off_horizon * 1e3:.1f} ms"
-        return words + (f"; the run ends at {self.ended * 1e3:.1f} ms" if self.ended is not None else "")
+        return words + (f"; the run ends at {smallest.ended * 1e3:.1f} ms" if smallest.ended is not None else "")
 
 
 def plan_predictability(
@@ -154,7 +147,7 @@ def study_predictability(base: Trajectory, members: Sequence[Sequence[Trajectory
 
     sizes = np.array([max(size(run.scenario) for run in level) for level in members])
     spread = np.array([np.max([apart(run) for run in level], axis=0) for level in members])
-    horizons = tuple(first_crossing(base.t, row, HORIZON_BAND) for row in spread)
+    ended = None if base.status in ("ok", "escaped") else float(base.t[-1])
     # A spread beyond a tenth of omega_0 says nothing about smoothness: a larger change has merely less room.
     amplification = np.where(spread <= 0.1, spread / sizes[:, np.newaxis], np.nan)
     with np.errstate(invalid="ignore"):
@@ -163,13 +156,9 @@ def study_predictability(base: Trajectory, members: Sequence[Sequence[Trajectory
     return Predictability(
         solver=base.label,
         sizes=sizes,
-        t=base.t,
-        spread=spread,
-        horizons=horizons,
+        spreads=tuple(Spread.of(base.t, row, HORIZON_BAND, ended=ended) for row in spread),
         round_off_horizon=first_crossing(base.t, spread[0] / sizes[0] * round_off, HORIZON_BAND),
-        growth=fit_growth(base.t, spread[0], stop=math.inf if horizons[0] is None else horizons[0]),
         rough_from=first_crossing(base.t, np.nan_to_num(ratio, nan=1.0), 10.0),
-        ended=None if base.status in ("ok", "escaped") else float(base.t[-1]),
     )
 
 
@@ -219,9 +208,9 @@ def figures(found: Found) -> Iterator[Exhibit]:
         data=(studies,),
         table=curves_csv(
             {
-                f"spread of omega/omega_0 {study.solver}, release changed by {size:.0e} [1]": (study.t, row)
+                f"spread of omega/omega_0 {study.solver}, release changed by {size:.0e} [1]": (spread.t, spread.width)
                 for study in studies
-                for size, row in zip(study.sizes, study.spread, strict=True)
+                for size, spread in zip(study.sizes, study.spreads, strict=True)
             }
         ),
     )
@@ -235,10 +224,13 @@ def figure_predictability(studies: Sequence[Predictability]) -> Figure:
     for k, (axes, study) in enumerate(zip(panels, studies, strict=True)):
         colour = solver_style(study.solver, k)["color"]
         axes.axhline(HORIZON_BAND, color="#444444", linewidth=1.0, linestyle=":")
-        for row, horizon, line in zip(study.spread, study.horizons, cycle(SIZE_LINES), strict=False):
-            axes.plot(study.t, np.where(np.isfinite(row), row, np.nan), color=colour, linestyle=line, linewidth=1.3)
-            if horizon is not None:
-                axes.plot(horizon, HORIZON_BAND, "o", color=colour, markeredgecolor="white", markersize=7, zorder=4)
+        for spread, line in zip(study.spreads, cycle(SIZE_LINES), strict=False):
+            shown = np.where(np.isfinite(spread.width), spread.width, np.nan)
+            axes.plot(spread.t, shown, color=colour, linestyle=line, linewidth=1.3)
+            if spread.horizon is not None:
+                axes.plot(
+                    spread.horizon, HORIZON_BAND, "o", color=colour, markeredgecolor="white", markersize=7, zorder=4
+                )
         axes.set_yscale("log")
         axes.set_title(study.solver, fontsize=10, loc="left", color=colour)
         axes.set_xlabel("time t [s]")

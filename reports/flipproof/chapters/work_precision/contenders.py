@@ -25,7 +25,7 @@ from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
-from engine_check.solver import ENGINES
+from engine_check.engines import ENGINES
 from flipproof.chapters.solvers import LIMITS
 from flipproof.frame.solvers import Run
 from flipproof.frame.twins import usual_rest_speed

@@ -5,7 +5,7 @@
   const start = { ...fixed, g, theta0, fill, gamma, e, omega0 }, chart = window.flipproofChart, live = window.flipproofLive;
   const NAMES = { eq8: "Eq. 8", free: "free flight", rods: "rods", still: "Eq. 8, no gravity", bare: "Eq. 8, no gravity, no drag" };
   const COLOURS = { eq8: "eq8", free: "free-flight", rods: "rods", still: "eq8", bare: "eq8" };
-  const FRAMES = 251, SLOW = 9, BOTTLES = 250, CURVES = 110;
+  const FRAMES = 251, SLOW = 9;
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const percent = (share) => `${Number((100 * share).toPrecision(2))} %`;
 
@@ -30,6 +30,7 @@
 
   function scene(root) {
     const solvers = root.dataset.bottles.split(" "), usual = start;
+    const [BOTTLES, CURVES] = root.closest(".idea") ? [190, 95] : [250, 110];
     const canvas = root.querySelector("canvas"), slider = root.querySelector("input"), button = root.querySelector(".gravity");
     const said = root.querySelector("[role=status]"), pen = canvas.getContext("2d");
     let thrown = usual, before = null, now = [], frame = FRAMES - 1, playing = 0;

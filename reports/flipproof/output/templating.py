@@ -5,7 +5,7 @@ from __future__ import annotations
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from flipproof.figures.spoken import spoken
-from flipproof.page.inline import data_uri, shape
+from flipproof.output.inline import data_uri, shape
 
 
 def environment() -> Environment:
