@@ -86,7 +86,7 @@ FAULTS = (
      "film/test_film_estimate.py"),
     ("reports/flipproof/film/likelihood.py", "centre + (length * (1 - r))", "centre + (length * r)",
      "film/test_film_estimate.py"),
-    ("reports/flipproof/output/motion.py", "- 0.5 * scenario.gravity", "- scenario.gravity", "test_motion.py"),
+    ("reports/flipproof/output/motion.py", "-3.0, 3.0) / POSITION_STEP", "-3.0, 3.0) / 2e-4", "test_motion.py"),
     ("reports/flipproof/sweep/loop.py", "chunk[:middle], chunk[middle:]", "chunk[:middle], chunk[middle + 1 :]",
      "test_sweep.py"),
     ("reports/flipproof/check/diff.py", "return sum(abs(band) for band in",

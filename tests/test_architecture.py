@@ -171,7 +171,7 @@ def test_the_frame_knows_no_subject_and_chapters_are_named_once():
 FLOORS = (
     ("figures",),
     ("frame", "output", "curves"),
-    ("foreign", "bounce", "animate"),
+    ("foreign", "bounce"),
     ("sweep",),
     ("landing", "film"),
     ("chapters", "paper"),

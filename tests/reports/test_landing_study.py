@@ -534,13 +534,6 @@ def test_land_says_touch_laws_and_certificate(capsys):
     assert "below the saddle" in words
 
 
-def test_land_films_water_beside_ice(tmp_path, capsys):
-    film = tmp_path / "landing.gif"
-    assert main(["land", "--slices", "4", "--slow", "0.5", "--fps", "10", "--film", str(film), "--quiet"]) == 0
-    assert film.read_bytes()[:6] == b"GIF89a"
-    assert "3 bottles" in capsys.readouterr().out
-
-
 def test_an_outcome_that_no_program_certifies_is_told_with_its_reason():
     rows = land_throw(THROW, Table(height=-0.3))
     lost = replace(rows[0].outcome, outcome="undecided", certified=None, margin=None, slid=None, reason="it is open")
@@ -558,8 +551,6 @@ def test_an_outcome_that_no_program_certifies_is_told_with_its_reason():
         (["land", "--law", "after"], "law = 'after' is unknown; known: together, in-turn"),
         (["land", "--programs", "box2d"], "program = 'box2d' is unknown"),
         (["land", "--slices", "0"], "'0' is not a whole number of at least 1"),
-        (["land", "--slow", "0", "--film", "x.gif"], "--slow 0 is outside (0, inf)"),
-        (["land", "--film", "x.txt"], "--film x.txt: the name ends in .txt (admissible: .gif, .mp4)"),
         (["upright", "--out", "x", "--throws", "0"], "'0' is not a whole number of at least 1"),
         (["upright", "--out", "x", "--fillings", "0.2,1.2"], "1.2 is outside (0, 1]"),
         (["upright", "--out", "x", "--families", "C"], "--families 'C' is unknown"),

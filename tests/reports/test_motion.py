@@ -15,9 +15,7 @@ from flipproof.output.motion import (
     FRAMES,
     MAX_SLICES,
     POSITION_STEP,
-    cap_and_base,
     drawn_slices,
-    flight_of,
     motion_data,
 )
 from flipproof.output.templating import environment
@@ -59,25 +57,6 @@ def rendered(data):
     templates = environment()
     assets = {file.name: file.read_text(encoding="utf-8") for file in ASSETS.iterdir()}
     return templates.get_template("motion.html.j2").render(motion=data, assets=assets)
-
-
-def test_the_centre_of_mass_of_every_drawn_bottle_is_on_the_parabola_and_the_cap_starts_at_the_origin():
-    flight = flight_of(flown(), np.linspace(0.0, THROW.duration, 50))
-    cap, base = cap_and_base(THROW, flight)
-    centre = cap + (base - cap) * (flight.r_cm / THROW.bottle.length)[:, np.newaxis]
-    t = flight.t
-    assert cap[0] == pytest.approx([0.0, 0.0], abs=1e-15)
-    assert centre[:, 0] - centre[0, 0] == pytest.approx(0.6 * t, abs=1e-12)
-    assert centre[:, 1] - centre[0, 1] == pytest.approx(1.8 * t - 9.81 * t * t / 2, abs=1e-12)
-    assert np.hypot(*(base - cap).T) == pytest.approx(THROW.bottle.length)
-    angle = np.unwrap(np.arctan2(base[:, 0] - cap[:, 0], cap[:, 1] - base[:, 1]))
-    assert angle == pytest.approx(flight.theta)
-
-
-def test_a_standing_bottle_has_its_base_below_its_cap():
-    upright = replace(THROW, theta0=0.0)
-    cap, base = cap_and_base(upright, flight_of(flown(scenario=upright), np.array([0.0])))
-    assert base[0] == pytest.approx(cap[0] + [0.0, -THROW.bottle.length])
 
 
 def test_the_page_holds_every_flight_to_the_steps_it_states():

@@ -6,7 +6,6 @@ import argparse
 import math
 import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, Final
 
 from flipproof.cli.arguments import (
@@ -20,7 +19,6 @@ from flipproof.cli.arguments import (
     reader,
     sides,
 )
-from flipproof.cli.progress import progress_bar
 from flipproof.cli.sweeps import add_store, fill
 
 SLICES: Final = 20
@@ -49,10 +47,6 @@ def add_landing(commands: Any) -> None:
     land.add_argument("--law", metavar="NAME", help="together or in-turn (default: both)")
     land.add_argument("--programs", default="ode_reference", metavar="A,B", help="ode_reference, mujoco (%(default)s)")
     land.add_argument("--slices", type=count, default=SLICES, metavar="N", help="slices (%(default)s)")
-    land.add_argument("--film", type=Path, metavar="FILE", help="also write water beside ice as .gif or .mp4")
-    land.add_argument("--slow", type=number, default=9.6, metavar="X", help="times slower than it is (%(default)s)")
-    land.add_argument("--fps", type=count, default=25, metavar="N", help="frames per second (%(default)s)")
-    land.add_argument("--quiet", action="store_true", help="no progress")
 
     upright = add_command(
         commands, "upright", "Count how many scattered throws end upright, or go on with it.", command_upright
@@ -93,10 +87,6 @@ def command_land(options: argparse.Namespace) -> int:
     from flipproof.landing.throw import land_throw, told
     from slicemodel import Table
 
-    if options.film:
-        from flipproof.animate import check_target
-
-        check_target(options.film, "--film")
     Table(height=0.0, restitution=options.restitution, friction=options.friction)
     height = options.height
     if options.aim:
@@ -108,25 +98,7 @@ def command_land(options: argparse.Namespace) -> int:
     table = Table(height=height, restitution=options.restitution, friction=options.friction)
     rows = beside(land_throw, throw, table, options.law, [name.strip() for name in options.programs.split(",")])
     print(told(rows, table))
-    if options.film:
-        _film(options, rows, table)
     return 0
-
-
-def _film(options: argparse.Namespace, rows: Any, table: Any) -> None:
-    from flipproof.animate import MAX_FRAMES, FilmError, check_pace, write_pictures
-    from flipproof.landing.film import draw_landing, film_times, shown
-    from flipproof.landing.work import REFERENCE
-
-    check_pace(options.slow, options.fps)
-    chosen = [row for row in rows if row.program == REFERENCE] or list(rows)
-    bottles = [shown(row, table) for row in chosen]
-    times = film_times(bottles, options.slow, options.fps)
-    if len(times) > MAX_FRAMES:
-        raise FilmError(f"--slow {options.slow:g} makes {len(times)} frames (admissible: at most {MAX_FRAMES})")
-    with progress_bar("drawing", "frame", quiet=options.quiet) as step:
-        write_pictures(draw_landing(bottles, times, options.slow), len(times), options.fps, options.film, step)
-    print(f"{options.film}: {len(times)} frames, {len(bottles)} bottles ({options.slow:g} times slower)")
 
 
 def command_upright(options: argparse.Namespace) -> int:

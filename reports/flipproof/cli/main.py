@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any, Final, NoReturn
 
 from flipproof.cli import signals
-from flipproof.cli.animate import add_animate
 from flipproof.cli.arguments import (
     SCENARIO_HELP,
     OneLineParser,
@@ -203,7 +202,6 @@ def parser() -> argparse.ArgumentParser:
     add_checks(commands)
     add_sweeps(commands)
     add_film(commands)
-    add_animate(commands)
     add_landing(commands)
     add_foreign(commands)
     add_bounce(commands)

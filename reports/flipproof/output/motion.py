@@ -1,4 +1,4 @@
-r"""The flights as frames: what the page's player and ``flipproof animate`` draw.
+r"""The flights as frames: what the page's player draws.
 
 ::
 
@@ -95,21 +95,6 @@ def drawn_slices(n_slices: int) -> NDArray[np.int64]:
 def release_point(scenario: Scenario, r_cm: float) -> FloatArray:
     """Return where C_M is at release if the cap is at the origin, shape (2,) [m]."""
     return r_cm * np.array([np.sin(scenario.theta0), -np.cos(scenario.theta0)])
-
-
-def parabola(scenario: Scenario, start: FloatArray, t: ArrayLike) -> FloatArray:
-    """Return C_M in the lab frame, shape (F, 2) [m] (Eq. 2a, 2b)."""
-    times = np.asarray(t, dtype=np.float64)
-    v_x, v_y = scenario.launch_velocity
-    return np.stack([start[0] + v_x * times, start[1] + v_y * times - 0.5 * scenario.gravity * times * times], axis=-1)
-
-
-def cap_and_base(scenario: Scenario, flight: Flight) -> tuple[FloatArray, FloatArray]:
-    """Return cap and base in the lab frame, shape (F, 2) each [m]."""
-    centre = parabola(scenario, release_point(scenario, float(flight.r_cm[0])), flight.t)
-    along = np.stack([np.sin(flight.theta), -np.cos(flight.theta)], axis=-1)
-    to_base = (scenario.bottle.length - flight.r_cm)[:, np.newaxis]
-    return centre - flight.r_cm[:, np.newaxis] * along, centre + to_base * along
 
 
 def motion_data(throw: Scenario, made: Mapping[str, Made]) -> dict[str, Any] | None:
