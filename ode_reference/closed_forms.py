@@ -2,7 +2,7 @@
 
 Each ``case_*`` takes the name of a model and returns an ``ExactCase``; ``CASES`` lists them all. Most live in a tube
 too heavy to feel the water (``ode_reference.heavy_tube``), where the slices are independent of each other; the
-symmetric pair, the elliptic case and ``first_integral`` hold in a free bottle.
+symmetric pair and the elliptic case hold in a free bottle.
 """
 
 from __future__ import annotations
@@ -297,28 +297,3 @@ CASES: Final[tuple[Callable[[str], ExactCase], ...]] = (
     case_elliptic,
 )
 """Every exact case; each takes the name of any rung of the ladder."""
-
-
-def first_integral(model: str, scenario: Scenario, r: FloatArray, v: FloatArray) -> FloatArray:
-    """Return the quantity [J] that a model keeps without gravity, and Eq. 8 also without drag; shape (P,).
-
-    E = m/2 sum v_i^2 + (J_0 omega_0)^2 / 2J, plus gamma^2 J / 2 for "published-limit". Proof: with m sum s_i +
-    M_b (L/2 - r_CM) = 0 the derivative of J is 2 m sum s_i v_i, hence dE/dt = m sum v_i (v_i' - omega^2 s_i).
-    Impacts with e = 1 and rests at v = 0 keep it. v_i is the velocity relative to the bottle, so that E is *not* the
-    energy of bottle and water: Eq. 8 keeps this one because it leaves out the acceleration of its own origin.
-
-    Parameters
-    ----------
-    r, v : array, shape (P, N) [m], [m/s]
-    """
-    bottle, m = scenario.bottle, scenario.slice_mass
-
-    def inertia(positions: FloatArray) -> FloatArray:
-        # Steiner's theorem from the tube's centre, where the solver sums about C_M
-        x = positions - bottle.length / 2
-        about_centre = m * (x**2).sum(axis=-1) + bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
-        return np.asarray(about_centre - (m * x.sum(axis=-1)) ** 2 / scenario.total_mass)
-
-    j, j0 = inertia(r), float(inertia(scenario.initial_positions()))
-    extra = scenario.damping_rate**2 * j / 2 if model == "published-limit" else 0.0
-    return np.asarray(m / 2 * (v**2).sum(axis=-1) + (j0 * scenario.omega0) ** 2 / (2 * j) + extra)

@@ -6,7 +6,7 @@ the model believes:
     E = m/2 sum (r_i' - r'_CM)^2 + M_b/2 r'_CM^2 + (J omega)^2 / 2J = m/2 sum r_i'^2 - M/2 r'_CM^2 + L^2 / 2J,
 
 with s_b' = -r'_CM the velocity of the tube. The kinetic energy m/2 sum r_i'^2 that Eq. 8 keeps without drag is not an
-energy of the bottle (``closed_forms.first_integral``). With J' = 2 m sum s_i r_i', a term T_i of r_i'' has the power
+energy of the bottle. With J' = 2 m sum s_i r_i', a term T_i of r_i'' has the power
 m sum_free (r_i' - r'_CM) T_i, the rotation -omega^2 m sum s_i r_i'. Summed with the general equation of
 ``combinations`` (k^2 = omega^2 - kappa, S = sum_free s_i, V = sum r_i', n_h resting slices, M_c with them):
 

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import rods_by_events
+from landing_forms import Block, corner_ratio, ends_upright
+from scipy.integrate import quad
 
 import engine_check
 import ode_reference
 from ode_reference.landing import path, world_of
-from ode_reference.landing_forms import Block, corner_ratio, critical_share, ends_upright, quarter_period
 from slicemodel import Bottle, Outcome, Scenario, ScenarioError, Table, Touch, touch
 from slicemodel.observables import static_toppling_angle
 
@@ -19,6 +20,34 @@ ICE = Scenario(n_slices=10, frozen=True)
 WATER = Scenario(n_slices=10, drag=0.0)
 ROUGH = 50.0
 """Friction at which nothing slips."""
+
+
+def quarter_period(block, tilt):
+    """Return the time in which a block released on its rim at ``tilt``, in (0, alpha), falls on its base [s].
+
+    The integral of dtheta / sqrt(2 M g rho/I (cos(alpha - tilt) - cos(alpha - theta))), with theta = tilt - u^2, which
+    is smooth at the start.
+    """
+    scale = 2 * block.saddle / block.about_rim
+    lean = block.toppling - tilt
+
+    def slowness(u):
+        if u == 0.0:
+            return 2 / math.sqrt(scale * math.sin(lean))
+        # cos(lean) - cos(lean + u^2) without loss of digits
+        fallen = 2 * math.sin(lean + u * u / 2) * math.sin(u * u / 2)
+        return 2 * u / math.sqrt(scale * fallen)
+
+    return quad(slowness, 0.0, math.sqrt(tilt), epsabs=1e-13, epsrel=1e-12)[0]
+
+
+def critical_share(restitution_table, restitution_water):
+    """Return phi* = e_t / ((1 + e_t)(1 + e)), the share of the mass aloft that takes a flat bounce from the bottle.
+
+    The bottle leaves the table at e_t v, meets the slice that still falls at v, and moves on at
+    (e_t - phi (1 + e_t)(1 + e)) v.
+    """
+    return restitution_table / ((1 + restitution_table) * (1 + restitution_water))
 
 
 def at_rest(scenario, tilt=0.0, omega=0.0, velocity=(0.0, 0.0), r=None, v=None):

@@ -8,6 +8,7 @@ from contextlib import nullcontext
 from dataclasses import replace
 
 import pytest
+from landing_forms import Block
 from made_up import command
 from matplotlib.collections import QuadMesh
 
@@ -39,7 +40,6 @@ from flipproof.presets.upright import make_upright
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.work import keyed
 from ode_reference import fly, land
-from ode_reference.landing_forms import Block
 from slicemodel import Scenario, Table
 from slicemodel.scenario import ScenarioError
 

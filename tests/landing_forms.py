@@ -1,4 +1,4 @@
-r"""Closed forms of the landing of a rigid bottle (ice), and of one slice aloft; nothing here is used by the solvers.
+r"""Closed forms of the landing of a rigid bottle (ice), and of one slice aloft; which the solvers do not use.
 
    C_M o                    z height of C_M over the base, rho^2 = z^2 + R^2, J about C_M, I = J + M rho^2 about a
       /|                    rim. (x, y) is the place of C_M from the rim that touches; the bottle turns about it
@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-
-from scipy.integrate import quad
 
 from slicemodel.scenario import Scenario
 
@@ -72,34 +70,6 @@ def corner_ratio(block: Block) -> float:
     Angular momentum about the new rim. It is Housner's 1 - 1.5 sin^2 alpha for a uniform block.
     """
     return (block.inertia + block.mass * (block.height**2 - block.radius**2)) / block.about_rim
-
-
-def quarter_period(block: Block, tilt: float) -> float:
-    """Return the time in which a block released on its rim at ``tilt``, in (0, alpha), falls on its base [s].
-
-    The integral of dtheta / sqrt(2 M g rho/I (cos(alpha - tilt) - cos(alpha - theta))), with theta = tilt - u^2, which
-    is smooth at the start.
-    """
-    scale = 2 * block.saddle / block.about_rim
-    lean = block.toppling - tilt
-
-    def slowness(u: float) -> float:
-        if u == 0.0:
-            return 2 / math.sqrt(scale * math.sin(lean))
-        # cos(lean) - cos(lean + u^2) without loss of digits
-        fallen = 2 * math.sin(lean + u * u / 2) * math.sin(u * u / 2)
-        return 2 * u / math.sqrt(scale * fallen)
-
-    return float(quad(slowness, 0.0, math.sqrt(tilt), epsabs=1e-13, epsrel=1e-12)[0])
-
-
-def critical_share(restitution_table: float, restitution_water: float) -> float:
-    """Return phi* = e_t / ((1 + e_t)(1 + e)), the share of the mass aloft that takes a flat bounce from the bottle.
-
-    The bottle leaves the table at e_t v, meets the slice that still falls at v, and moves on at
-    (e_t - phi (1 + e_t)(1 + e)) v.
-    """
-    return restitution_table / ((1 + restitution_table) * (1 + restitution_water))
 
 
 def ends_upright(block: Block, tilt: float, omega: float, velocity: tuple[float, float]) -> bool | None:
