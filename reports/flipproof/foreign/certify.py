@@ -31,6 +31,7 @@ CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
         "start": checks_basic.check_start,
         "inputs": checks_basic.check_inputs,
         "refinement": checks_measured.check_refinement,
+        "times": checks_basic.check_times,
         "ice": checks_basic.check_ice,
         "angle": checks_basic.check_angle,
         "definitions": checks_basic.check_definitions,

@@ -13,7 +13,7 @@ import numpy as np
 from flipproof.curves.order import observed_order
 from flipproof.foreign.checking import SMOOTH, THROW, Found, Making, NotApplicableError, ask_of, shift
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
-from flipproof.foreign.place import curve, name_of, placing, switches_of
+from flipproof.foreign.place import curve, placing
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
@@ -89,7 +89,9 @@ def check_refinement(traits: Traits) -> Making:
     holds, weak = bool(moved) and not ended, ""
     if not holds and traits.refined_by == "rtol":
         error = yield from _error(traits, answers[-1])
-        if error is not None and error <= max(ACCURATE, 1024 * traits.epsilon):
+        if error is None and traits.equation:
+            holds, weak = True, "whether it is accurate is told by the check of the equation"
+        elif error is not None and error <= max(ACCURATE, 1024 * traits.epsilon):
             holds, weak = True, f"{error:.1g} of omega_0 off, whatever rtol is: something else limits the step"
     came = f"changes of {', '.join(f'{c:.2g}' for c in changes)} of omega_0 from level to level"
     if not moved:
@@ -113,10 +115,7 @@ ACCURATE: Final = 1e-10
 def _error(traits: Traits, answer: Answer) -> Generator[Sequence[Ask], Sequence[Answer], float | None]:
     """Return how far omega is from that of the equation that the solver solves; None if that is not known."""
     place = yield from placing(traits)
-    equation = traits.equation or place.equation
-    if not place.on_lattice or place.equation != name_of(switches_of(equation)):
-        return None
-    return shift(answer, curve(equation, THROW, answer.t), THROW.omega0)
+    return shift(answer, curve(place.equation, THROW, answer.t), THROW.omega0) if place.on_lattice else None
 
 
 def _change(one: Answer, other: Answer) -> float:
@@ -271,21 +270,34 @@ RESTITUTION_ROOM: Final = 0.003
 """The restitution asked for, and how far a measured one may be from it."""
 
 
+PLACE_ROOM: Final = 0.004
+"""How far beyond or before its end a slice may turn, fraction of the bottle's length: one that waits for the grid."""
+
+
 @dataclass(frozen=True, slots=True)
 class Rebound:
-    """One impact as it was measured: ``speed`` before it [m/s], ``restitution``, at ``time`` [s]."""
+    """One impact as it was measured: ``speed`` before it [m/s], ``restitution``, at ``time`` [s].
+
+    ``beyond`` is how far the slice turns beyond its end, as a fraction of the bottle's length.
+    """
 
     end: str
     spin: float
     speed: float
     restitution: float
     time: float
+    beyond: float
     room: float = 0.0
 
     @property
     def holds(self) -> bool:
-        """Whether the restitution is the one asked for."""
-        return abs(self.restitution - RESTITUTION) <= self.room
+        """Whether the restitution is the one asked for, and the slice turns at its end."""
+        return abs(self.restitution - RESTITUTION) <= self.room and not self.misplaced
+
+    @property
+    def misplaced(self) -> bool:
+        """Whether the slice turns elsewhere than at its end."""
+        return not abs(self.beyond) <= PLACE_ROOM + self.room / 2
 
 
 def throw_of(spin: float) -> Scenario:
@@ -327,7 +339,8 @@ def measure(answer: Answer, scenario: Scenario, end: str) -> Rebound | None:
     fast, slow = float(np.polyval(np.polyder(before), s)) / step, float(np.polyval(np.polyder(after), s)) / step
     if not fast > 0.0:  # it jumped, or stood still
         return None
-    return Rebound(end, scenario.omega0, fast, -slow / fast, float(answer.t[k]))
+    beyond = (float(np.polyval(before, s)) - wall) / scenario.bottle.length
+    return Rebound(end, scenario.omega0, fast, -slow / fast, float(answer.t[k]), beyond)
 
 
 def check_restitution(traits: Traits) -> Making:
@@ -352,6 +365,11 @@ def check_restitution(traits: Traits) -> Making:
         speeds = [r.speed for r in curve]
         came += f" where it is farthest off, at {min(speeds):.2g} to {max(speeds):.2g} m/s"
         where = f"{len(curve)} first impacts"
+    elif all(r.misplaced for r in wrong if r.end == wrong[0].end):
+        expected = "r = h/2 at the cap, L - h/2 at the base, h the height of a slice"
+        came = f"slices turn {abs(wrong[0].beyond):.2g} of L {'beyond' if wrong[0].beyond > 0 else 'before'} that"
+        where = f"{wrong[0].end}, {wrong[0].speed:.3g} m/s"
+        advice = "a slice strikes when its surface does: h = water mass / capacity x L / N"
     elif (threshold := (yield from _threshold(traits, curve))) is not None:
         low, high = threshold
         facts["threshold"] = [low, high]

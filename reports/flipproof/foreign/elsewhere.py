@@ -32,7 +32,7 @@ from flipproof.foreign.place import name_of, placing, switches_of
 from flipproof.frame.twins import usual_rest_speed
 from ode_reference.switches import Switches
 from slicemodel import Bottle, Scenario, Trajectory
-from slicemodel.trajectory import FloatArray
+from slicemodel.trajectory import FloatArray, Impacts
 
 SEED: Final = 26
 """Seed of the throws where none is named."""
@@ -52,7 +52,7 @@ STRAY: Final = 0.03
 """Share of the values of v that may be off: a slice turns round at an impact, and an output time may lie beside it."""
 
 LEVELS: Final = ((-1.3, -1.9, -2.6), (1, 0.4, -0.3), (3, 2.4, 1.7))
-"""Levels of refinement, finer ones where coarser ones leave an own error that counts.
+"""Levels of refinement, finer ones where coarser ones leave an own error that counts, or hide it.
 
 No step of one is a multiple of another's, so that none shares the luck of its grid.
 """
@@ -123,6 +123,12 @@ class Knobs:
 
 PAPER: Final = Knobs()
 
+WHOLE: Final = Knobs(damping=8.0, filling=0.45)
+"""A throw with weight, drag, and impacts on both ends."""
+
+UNREFINED: Final = 0.003
+"""Own error, fraction of omega_0, granted on ``WHOLE`` to a solver that cannot be refined."""
+
 WORDS: Final[Mapping[str, tuple[str, str]]] = {
     "restitution": ("e = {:.3g}", "take the restitution from the throw, at both ends and also when it is 0 or 1"),
     "slices": ("N = {}", "every slice moves, also the ninth, the last one of a loop over blocks, and a single one"),
@@ -173,6 +179,12 @@ FACTORS: Final[Mapping[str, tuple[Any, ...]]] = MappingProxyType(
 """What is varied, and its levels: ``damping`` as a fraction of omega_0, ``pull`` the weight as a fraction of the
 largest centrifugal force, omega_0^2 L / 2, ``ratio`` the bottle's mass over that of the water: at any spin drag holds
 slices, and weight lifts them, in some throws. What stands in brackets is one level and is taken in turn."""
+
+FULL: Final = replace(PAPER, mass=0.05, filling=1.0, damping=0.0, gravity=0.0, theta0=0.7, omega0=-12.0, angle=4.0)
+"""A light full bottle: of its four slices two rest on the ends, and two strike both ends at one instant.
+
+Where the tube recoils, rounding decides whether a solver answers these hits together or in turn: neither is accused.
+"""
 
 COUNT: Final = 16
 """Throws of a seed: eight of nine pairs of levels of two factors occur together in one of them, all levels do."""
@@ -295,7 +307,8 @@ def scales(ask: Ask, truth: Trajectory) -> dict[str, float]:
 class Judged:
     """What is wrong on one throw: field -> (difference, room, time), fractions of its scale.
 
-    ``own`` is the solver's own error of omega where it was judged, ``error`` says why there is no answer.
+    ``own`` is the solver's own error of omega where it was judged, ``error`` says why there is no answer, ``since``
+    up to which impact it is right.
     """
 
     wrong: Mapping[str, tuple[float, float, float]]
@@ -303,6 +316,7 @@ class Judged:
     largest: float = 0.0
     share: float = 1.0
     error: str = ""
+    since: str = ""
 
     @property
     def farthest(self) -> float:
@@ -340,6 +354,7 @@ def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, un
         rooms[name] = floor + OWN * owns[name] + BAND * sum(summed(sizes(truth, twin, name)) for twin in twins)
     clear = rooms["omega"] <= BLURRED
     wrong: dict[str, tuple[float, float, float]] = {}
+    first = float(ask.times[-1])
     for name in given:
         off = sizes(mine, truth, name)[clear]
         room = rooms[name][clear]
@@ -353,25 +368,85 @@ def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, un
         k = int(np.argmax(rows / room))
         if not rows[k] <= room[k]:
             wrong[name] = float(rows[k]), float(room[k]), float(ask.times[k])
+            first = min(first, float(ask.times[:reached][clear][np.argmax(rows > room)]))
+    if mine.impacts is not None and clear.any():
+        room_of_r = rooms.get("r", rooms["omega"])[clear]
+        if late := _unmatched(ask, mine.impacts, truth.impacts or NO_IMPACTS, room_of_r, ask.times[:reached][clear]):
+            wrong["impacts"] = late
     return Judged(
         wrong=wrong,
         own=float(np.max(owns["omega"][clear])) if clear.any() else float(owns["omega"].min()),
         largest=float(np.max(sizes(mine, truth, "omega")[clear], initial=0.0)),
         share=float(np.mean(clear)) * reached / len(ask.times),
+        since=_since(ask, truth.impacts or NO_IMPACTS, first) if wrong else "",
     )
+
+
+def _since(ask: Ask, impacts: Impacts, first: float) -> str:
+    """Return up to which impact an answer is right that is wrong at ``first`` [s], as a phrase."""
+    right = np.max(ask.times[ask.times < first], initial=0.0)
+    before = int(np.sum(impacts.time <= right))
+    between = np.flatnonzero((impacts.time > right) & (impacts.time < first))
+    if not between.size:
+        return f"{before} impacts before it was wrong" if before else "before the first impact"
+    k = int(between[0])
+    which = f"slice {impacts.slice[k]} on the {'base' if impacts.end[k] > 0 else 'cap'} at {impacts.time[k]:.3g} s"
+    return f"after {f'{before} impacts that were right, ' if before else ''}the impact of {which}"
+
+
+NO_IMPACTS: Final = Impacts(np.empty(0), np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0))
+
+FAINT: Final = 0.02
+"""Speed, fraction of L omega_0, below which an impact need not be answered: a slice may rest there."""
+
+
+def _unmatched(
+    ask: Ask, mine: Impacts, truth: Impacts, room_of_r: FloatArray, times: FloatArray
+) -> tuple[float, float, float] | None:
+    """Return difference, room and time of the impact that is farthest beyond its room from any of the other list.
+
+    Impacts of one slice on one end are matched by time and number, up to the last of ``times``; a slice that is
+    ``room_of_r`` off is late by as much over its speed. Fractions of the flight; None if every impact has its match.
+    """
+    throw, found = ask.scenario, []
+    faint = FAINT * throw.bottle.length * abs(throw.omega0)
+    for one, other in ((mine, truth), (truth, mine)):
+        for k in np.flatnonzero(one.speed_before > faint):
+            when, at = one.time[k], int(np.searchsorted(times, one.time[k]))
+            if at == len(times):
+                continue
+            late = float(room_of_r[at]) * throw.bottle.length / one.speed_before[k]
+            room = FLOOR + late / throw.duration
+            near, others = (
+                np.sort(np.abs(hits.time[(hits.slice == one.slice[k]) & (hits.end == one.end[k])] - when))
+                / throw.duration
+                for hits in (one, other)
+            )
+            count = int(np.sum(near <= room))
+            off = float(others[count - 1]) if count <= len(others) else 1.0
+            if off > 2 * room and when + 2 * room * throw.duration < times[-1]:
+                found.append((off, 2 * room, float(when)))
+    return max(found, key=lambda one: one[0] / one[1], default=None)
 
 
 Judging = Generator[Sequence[Ask], Sequence[Answer], list[Judged]]
 
 
-def judging(traits: Traits, throws: Sequence[Knobs], seed: int, equation: str, unrefined: float) -> Judging:
+def judging(
+    traits: Traits,
+    throws: Sequence[Knobs],
+    seed: int,
+    equation: str,
+    unrefined: float,
+    all_levels: Sequence[Sequence[float]] = LEVELS,
+) -> Judging:
     """Ask for throws, at three levels if the solver can be refined and at finer ones if need be, and judge each.
 
     Ice has an answer without an error of the step: one level is enough.
     """
     asks, judged = [knobs.ask(seed) for knobs in throws], {}
     left = list(range(len(asks)))
-    for levels in LEVELS if traits.refined_by else ((0,),):
+    for levels in all_levels if traits.refined_by else ((0,),):
         refined = {
             k: [
                 replace(asks[k], effort=effort_of(traits, asks[k].scenario, level))
@@ -393,6 +468,20 @@ def judging(traits: Traits, throws: Sequence[Knobs], seed: int, equation: str, u
     return [judged[k] for k in range(len(asks))]
 
 
+def confirmed(
+    traits: Traits, knobs: Knobs, judged: Judged, seed: int, equation: str, unrefined: float
+) -> Generator[Sequence[Ask], Sequence[Answer], Judged]:
+    """Return the judgement of a throw that is wrong at the finest levels, too.
+
+    A step that something else limits, such as an output time or a longest step, is the same at all coarse levels: its
+    error does not show there as a change.
+    """
+    if traits.refined_by is None or knobs.frozen or judged.error:
+        return judged
+    (judged,) = yield from judging(traits, [knobs], seed, equation, unrefined, LEVELS[-1:])
+    return judged
+
+
 def check_elsewhere(traits: Traits, seed: int = SEED) -> Making:
     """Other bottles, fillings, slices, starts, spins and times: every field is that of the equation."""
     found = yield from placing(traits)
@@ -408,6 +497,12 @@ def check_elsewhere(traits: Traits, seed: int = SEED) -> Making:
     )
     wrong = [(knobs, judged) for knobs, judged in flights if judged.farthest > (0.0 if knobs.frozen else usual)]
     wrong = [one for one in wrong if not one[0].frozen] or wrong
+    wrong.sort(key=lambda one: -one[1].excess)
+    while wrong:
+        finest = yield from confirmed(traits, *wrong[0], seed, equation, unrefined)
+        if finest.wrong:
+            break
+        wrong = wrong[1:]
     own = max((judged.own for _, judged in flights if not judged.error), default=0.0)
     facts = {
         "seed": seed,
@@ -417,14 +512,20 @@ def check_elsewhere(traits: Traits, seed: int = SEED) -> Making:
         ],
     }
     expected = f"{equation} in every field, on {len(flights)} throws of seed {seed}"
+    (full,) = yield from judging(traits, [FULL], seed, equation, unrefined)
+    in_turn = bool(full.wrong) and not full.error and switches_of(equation).recoil
+    if full.wrong and not in_turn and not wrong:
+        wrong = [(FULL, full)]
     if not wrong:
         largest = max(judged.largest for _, judged in flights)
         blurred = sum(judged.share < 0.3 for _, judged in flights)
         weak = own > WEAK or blurred > len(flights) // 2
         words = f"its own error, {own:.2g} of omega_0, hides mistakes smaller than {OWN * own:.2g}" if weak else ""
+        if in_turn:
+            words = f"a full bottle with hits on both ends at one instant: {_wrong_words(full)}; in turn, not together?"
         came = f"at most {largest:.2g} of omega_0 off, its own error {own:.2g}"
         return Found(holds=True, expected=expected, came=came, weak=words, facts=facts)
-    came, advice = yield from bisected(traits, *min(wrong, key=lambda one: -one[1].excess), seed, equation, unrefined)
+    came, advice = yield from bisected(traits, *wrong[0], seed, equation, unrefined)
     where = f"{len(wrong)} of {len(flights)} throws"
     return Found(holds=False, expected=expected, came=came, where=where, advice=advice, facts=facts)
 
@@ -459,16 +560,23 @@ def bisected(
     return f"{ice}{lost} where {', '.join(said(knobs, name) for name in names)}", _field_advice(judged)
 
 
+def on_the_paper(traits: Traits, equation: str) -> Generator[Sequence[Ask], Sequence[Answer], str]:
+    """Return what is wrong on a throw with drag and impacts on both ends, beyond the solver's own error; or nothing."""
+    (judged,) = yield from judging(traits, [WHOLE], 0, equation, UNREFINED)
+    if judged.wrong:
+        judged = yield from confirmed(traits, WHOLE, judged, 0, equation, UNREFINED)
+    return _wrong_words(judged) if "omega" in judged.wrong else ""
+
+
 def simplified(traits: Traits, equation: str) -> Generator[Sequence[Ask], Sequence[Answer], str]:
     """Return without what a throw is right, if anything tells: weight, drag, impacts; and what to look at then."""
-    whole = Knobs(damping=8.0, filling=0.45)
     simpler = {
-        "weight": replace(whole, gravity=0.0),
-        "drag": replace(whole, damping=0.0),
-        "impacts": replace(whole, angle=1.0),
-        "all": replace(whole, gravity=0.0, damping=0.0, angle=1.0),
+        "weight": replace(WHOLE, gravity=0.0),
+        "drag": replace(WHOLE, damping=0.0),
+        "impacts": replace(WHOLE, angle=1.0),
+        "all": replace(WHOLE, gravity=0.0, damping=0.0, angle=1.0),
     }
-    first, *others = yield from judging(traits, [whole, *simpler.values()], 0, equation, 0.003)
+    first, *others = yield from judging(traits, [WHOLE, *simpler.values()], 0, equation, UNREFINED)
     if not first.wrong:
         return ""
     right = {name for name, judged in zip(simpler, others, strict=True) if not judged.wrong}
@@ -495,9 +603,11 @@ def _wrong_words(judged: Judged) -> str:
     worst = sorted(judged.wrong, key=lambda name: judged.wrong[name][0] / judged.wrong[name][1], reverse=True)
     off, room, time = judged.wrong[worst[0]]
     units = {"omega": "omega_0", "theta": "the angle turned", "inertia": "the largest J", "v": "L omega_0"}
-    unit = units.get(worst[0], "L")
+    unit = {**units, "impacts": "the flight"}.get(worst[0], "L")
     also = f", and {', '.join(worst[1:])}" if len(worst) > 1 else ""
-    return f"{worst[0]} is {off:.2g} of {unit} off (room {room:.1g}) at t = {time:.3g} s{also}"
+    is_off = f"{'are' if worst[0] == 'impacts' else 'is'} {off:.2g} of {unit} off (room {room:.1g})"
+    since = f", first {judged.since}" if judged.since else ""
+    return f"{worst[0]} {is_off} at t = {time:.3g} s{also}{since}"
 
 
 def _field_advice(judged: Judged, before: str = "") -> str:

@@ -48,7 +48,7 @@ SURE: Final = 4.0
 
 
 LEVELS: Final = ((-1, -2, -3), (1, 0, -1), (3, 2, 1))
-"""Levels of refinement, finer ones where coarser ones are not ``SETTLED``."""
+"""Levels of refinement, finer ones where coarser ones are not ``SETTLED`` on an equation."""
 
 SETTLED: Final = 2e-5
 """Change under refinement, fraction of omega_0, below which finer steps tell nothing more."""
@@ -162,6 +162,7 @@ def place(runner: Runner) -> Place:
 def placing(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], Place]:
     """Yield the asks by which a solver is placed, at three levels and at finer ones if need be; return its place."""
     changes: list[float | None] = [None] * len(THROWS)
+    references = lattice()
     for levels in LEVELS if traits.refined_by is not None else ((0,),):
         try:
             answers = yield [ask_of(traits, throw, level) for level in levels for throw in THROWS]
@@ -174,10 +175,10 @@ def placing(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], Place]
         steps = [_apart(a, b) for a, b in pairwise([curves, *coarser])]
         if steps:
             changes = [max(of_throw) for of_throw in zip(*steps, strict=True)]
-            if max(map(max, steps)) <= SETTLED:
-                break
-    references = lattice()
-    distances = {s: max(_apart(curves, reference)) for s, reference in references.items()}
+        distances = {s: max(_apart(curves, reference)) for s, reference in references.items()}
+        # Where something else limits the step, coarse levels differ by less than their error.
+        if steps and max(map(max, steps)) <= SETTLED and min(distances.values()) <= _room(0.0, 0.0, traits.epsilon):
+            break
     nearest = min(distances, key=lambda s: (distances[s], s.name))
     following = min((s for s in distances if s != nearest), key=lambda s: (distances[s], s.name))
     moved = max(float(np.max(np.abs(c - 1.0))) for c in curves)

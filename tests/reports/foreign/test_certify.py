@@ -16,8 +16,20 @@ from planted.subject import Subject
 import ode_reference
 from flipproof.foreign import checks_measured
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, WEAK, certify, findings_of
-from flipproof.foreign.contract import Ask, ForeignError, started
-from flipproof.foreign.elsewhere import COUNT, FACTORS, PAPER, SEED, designed, drawn
+from flipproof.foreign.checking import drive
+from flipproof.foreign.contract import IMPACT, Ask, ForeignError, started
+from flipproof.foreign.elsewhere import (
+    COUNT,
+    FACTORS,
+    FULL,
+    PAPER,
+    SEED,
+    WHOLE,
+    confirmed,
+    designed,
+    drawn,
+    judging,
+)
 from flipproof.foreign.solving import opened
 from flipproof.foreign.specs import load
 from flipproof.frame.solvers import solve
@@ -79,13 +91,50 @@ class AlwaysHalf(Subject):
         return 0.5
 
 
-MINE = (InitialOmega, EffortIgnored, InertiaAboutTheCap, HalfSpeed, WeightBelowNine, AlwaysHalf, IceForward)
+class Overshoot(Subject):
+    """Whole steps are made until the time asked is passed."""
+
+    def solve(self, ask):
+        h = ask.effort
+        found = super().solve(replace(ask, times=np.ceil(ask.times / h - 1e-9) * h))
+        return found | {"t": ask.times}
+
+
+class CappedEuler(MISTAKES["Euler"]):
+    """Euler's method, whose steps are never longer than 0.3 ms."""
+
+    order = 1.0
+
+    def steps(self, span, dt):
+        return super().steps(span, min(dt, 3e-4))
+
+
+class ThickEnds(Subject):
+    """What is within 3 mm of an end touches it."""
+
+    def meet(self, y, _striking):
+        r = y[1 : self.n + 1]
+        near = (r > self.high - 3e-3).astype(int) - (r < self.low + 3e-3)
+        return super().meet(y, np.where(self.side == 0, near, 0))
+
+
+class HitsReported(Subject):
+    """Impacts are answered, too; a mistake spoils the list."""
+
+    def solve(self, ask):
+        truth = ode_reference.solve(started(ask), "free-flight", ask.times).impacts
+        rows = [tuple(getattr(truth, name)[k] for name in IMPACT) for k in range(len(truth.time))]
+        return super().solve(ask) | {"impacts": self.spoil(rows)}
+
+
+MINE = (Overshoot, InitialOmega, EffortIgnored, InertiaAboutTheCap, HalfSpeed, WeightBelowNine, AlwaysHalf, IceForward)
 
 SEES = {
     "digits": "SinglePrecision",
     "start": "LateStart",
     "determinism": "Noise",
     "inputs": "AlwaysHalf",
+    "times": "Overshoot",
     "refinement": "EffortIgnored",
     "ice": "IceMoves",
     "angle": "Degrees",
@@ -278,6 +327,55 @@ def test_slices_that_jump_have_no_speed_and_break_no_check():
 
     result = result_of("restitution", Staircase)
     assert result.verdict in (FAILED, IDLE)
+
+
+def judged(kind, knobs):
+    solver = InProcess(kind(), "x")
+    (found,) = drive(judging(solver.traits, [knobs], SEED, "free-flight", 0.01), solver)
+    return solver, found
+
+
+def test_a_step_that_is_capped_hides_its_error_and_is_not_accused_of_it():
+    solver, found = judged(CappedEuler, WHOLE)
+    assert found.own == 0.0  # all coarse levels take the same steps
+    assert "omega" in found.wrong
+    assert not drive(confirmed(solver.traits, WHOLE, found, SEED, "free-flight", 0.01), solver).wrong
+    (result,) = certify(solver, ["equation"]).results
+    assert result.verdict in (PASSED, WEAK), result.line
+
+
+def test_hits_on_both_ends_at_one_instant_are_asked_for_and_accuse_nobody():
+    _, in_turn = judged(Subject, FULL)  # rounding parts the two hits
+    assert in_turn.wrong["omega"][0] > 0.1
+    solver = InProcess(patches("right")["free_flight_rk4"].solver(), "x")
+    (together,) = drive(judging(solver.traits, [FULL], SEED, "free-flight", 0.01), solver)
+    assert not together.wrong
+
+
+@pytest.mark.parametrize(
+    ("spoil", "wrong"),
+    [
+        (lambda rows: rows, False),
+        (lambda rows: rows[:8] + rows[9:], True),
+        (lambda rows: rows[:9] + rows[8:], True),
+        (lambda rows: [(t + 2e-3, *row) for t, *row in rows], True),
+        (lambda rows: [(t, i, -end, *row) for t, i, end, *row in rows], True),
+        (lambda rows: [(t, (i + 1) % 4, *row) for t, i, *row in rows], True),
+    ],
+)
+def test_impacts_are_held_to_the_reference_in_number_place_and_time(spoil, wrong):
+    _, found = judged(type("Kind", (HitsReported,), {"spoil": staticmethod(spoil)}), WHOLE)
+    assert set(found.wrong) == ({"impacts"} if wrong else set())
+
+
+def test_what_an_impact_spoils_is_named_as_the_impacts():
+    (result,) = certify(InProcess(MISTAKES["WallsAtTheEnds"](), "x"), ["restitution"]).results
+    assert "slices turn" in result.line
+    assert "h = water mass / capacity x L / N" in result.line
+    equation, gravity = certify(InProcess(ThickEnds(), "x"), ["equation", "gravity"]).results
+    assert "look at impacts" in equation.line
+    assert gravity.verdict != FAILED
+    assert result_of("inputs", Subject, restitution=lambda s, _, side: s.e * (side > 0)).verdict == PASSED
 
 
 def test_throws_are_drawn_anew_by_a_seed():
