@@ -103,7 +103,8 @@ window.flipproofChart ??= (() => {
   }
 
   // Draws {x: {low, high, label}, y: {low, high, label, log}, right, lines: [{name, x, y, label, faint}]}; returns both
-  // scales. What lies outside of the axes is cut off.
+  // scales. What lies outside of the axes is cut off. The path of a line that comes again with the same axes is kept.
+  const paths = new WeakMap();
   function draw(svg, height, plot) {
     const right = plot.right ?? MARGIN.right;
     const width = Math.max(240, Math.round(svg.clientWidth || svg.parentElement.clientWidth));
@@ -135,10 +136,16 @@ window.flipproofChart ??= (() => {
       const beyond = line.x.findIndex((value) => value >= plot.x.high);
       return beyond < 0 ? line.x.length - 1 : beyond;
     };
+    const tenth = (pixels) => Math.round(10 * pixels) / 10;
+    const axes = [width, height, right, ...[plot.x, plot.y].flatMap((axis) => [axis.low, axis.high])].join(" ");
     for (const line of plot.lines) {
       let path = "";
-      for (let k = first(line), end = Math.min(last(line), line.y.length - 1); k <= end; k++) {
-        if (Number.isFinite(line.y[k])) path += `${path ? "L" : "M"}${x(line.x[k]).toFixed(1)} ${y(line.y[k]).toFixed(1)}`;
+      if (paths.get(line)?.axes === axes) ({ path } = paths.get(line));
+      else {
+        for (let k = first(line), end = Math.min(last(line), line.y.length - 1); k <= end; k++) {
+          if (Number.isFinite(line.y[k])) path += `${path ? "L" : "M"}${tenth(x(line.x[k]))} ${tenth(y(line.y[k]))}`;
+        }
+        paths.set(line, { axes, path });
       }
       element("path", {
         class: line.faint ? "chart-line chart-faint" : "chart-line", d: path, "data-line": line.name, "stroke-dasharray": dash(line),

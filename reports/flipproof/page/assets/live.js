@@ -45,6 +45,23 @@ window.flipproofLive = (() => {
     return omega;
   }
 
+  // One stage of a step, for all slices: writes accelerations a, and places and speeds after a time `part` of the next stage.
+  function stage(y, v, at, speeds, side, a, nextY, nextV, part, { spring, centre, push }, drag) {
+    for (let i = 0; i < y.length; i++) {
+      const speed = speeds[i], pull = side[i] ? 0 : spring * (at[i] - centre) + push - drag * speed;
+      a[i] = pull;
+      nextY[i] = y[i] + part * speed;
+      nextV[i] = v[i] + part * pull;
+    }
+  }
+  // Writes places and speeds after a whole step of four stages.
+  function combine(y, v, [v0, v1, v2, v3], [a0, a1, a2, a3], h, nextY, nextV) {
+    for (let i = 0; i < y.length; i++) {
+      nextY[i] = y[i] + (h / 6) * (v0[i] + 2 * (v1[i] + v2[i]) + v3[i]);
+      nextV[i] = v[i] + (h / 6) * (a0[i] + 2 * (a1[i] + a2[i]) + a3[i]);
+    }
+  }
+
   // Omega of Eq. 8, or of free flight, at equal times. A slice slower than `rest` that its end presses on rests there.
   // `seen` hears at each of these times the places of the slices, the angle and the centre of mass.
   function flow(thrown, free, points = 1000, seen = null, parts = free ? 2 : 1, rest = free ? 1e-3 : 1e-5) {
@@ -83,27 +100,20 @@ window.flipproofLive = (() => {
         const at = k ? ys[k] : y, speeds = k ? vs[k] : v, a = as[k], nextY = ys[k + 1], nextV = vs[k + 1], part = PART[k] * h;
         angle += WEIGHT[k] * h * weigh(at, speeds, k ? theta + PART[k - 1] * h * felt.spin : theta);
         if (!k) felt.began = felt.spin;
-        const { spring, centre, push } = felt;
-        for (let i = 0; i < n; i++) {
-          a[i] = side[i] ? 0 : spring * (at[i] - centre) + push - drag * speeds[i];
-          nextY[i] = y[i] + part * speeds[i];
-          nextV[i] = v[i] + part * a[i];
-        }
+        stage(y, v, at, speeds, side, a, nextY, nextV, part, felt, drag);
       }
-      for (let i = 0; i < n; i++) {
-        y1[i] = y[i] + (h / 6) * (v[i] + 2 * (vs[1][i] + vs[2][i]) + vs[3][i]);
-        v1[i] = v[i] + (h / 6) * (as[0][i] + 2 * (as[1][i] + as[2][i]) + as[3][i]);
-      }
+      combine(y, v, [v, vs[1], vs[2], vs[3]], as, h, y1, v1);
       return angle;
     }
-    // When, as a share x of h, slice i first is beyond its end on the cubic y + x (b + x (c2 + x c3)); 2 if never.
-    function crossing(i, h) {
+    // When, as a share x of h, slice i first is beyond its end on the cubic y + x (b + x (c2 + x c3)); 2 if never, or not
+    // before another slice is.
+    function crossing(i, h, before) {
       const end = Math.sign(y1[i]), from = end * y[i] - wall, to = end * y1[i] - wall, b = h * end * v[i], d = h * end * v1[i];
       if (to <= 0 && !(b > 0 && d < 0)) return 2;
       const c2 = 3 * (to - from) - 2 * b - d, c3 = b + d - 2 * (to - from), beyond = (x) => from + x * (b + x * (c2 + x * c3)) > 0;
       // Who turns back within the step is farthest out where its speed is zero.
       let low = 0, high = to > 0 ? 1 : Math.min(1, b / (Math.sqrt(Math.max(0, c2 * c2 - 3 * c3 * b)) - c2));
-      if (!beyond(high)) return 2;
+      if (!beyond(high) || (before < high && !beyond(before))) return 2;
       for (let k = 0; k < 54; k++) {
         const middle = (low + high) / 2;
         if (beyond(middle)) high = middle;
@@ -168,7 +178,7 @@ window.flipproofLive = (() => {
         });
         for (let i = 0; i < n; i++) {
           if (side[i] || (Math.abs(y1[i]) <= wall && v[i] * v1[i] > 0)) continue;
-          const here = crossing(i, left);
+          const here = crossing(i, left, when);
           if (here < when || (here === when && struck < 0)) { when = here; struck = i; }
         }
         for (let i = 0; i < n && when < 1; i++) {

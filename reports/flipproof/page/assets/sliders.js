@@ -15,11 +15,14 @@
   const solvers = { "published-python": [program, 1000], eq8: [eq8, 251], "free-flight": [free, 251], column: [column, 251], rods: [rods, 251] };
   const flown = (set) => Object.fromEntries(Object.entries(solvers).map(([name, [solve, points]]) => [name, solve({ ...fixed, ...set }, points)]));
   // The throw with the gravity of the report is solved anew when something else than gravity is changed.
-  let usual = { key: "", curves: null };
+  let usual = { key: "" };
   function unchanged(set) {
     const key = JSON.stringify(set);
-    if (usual.key !== key) usual = { key, curves: flown(set) };
-    return usual.curves;
+    if (usual.key !== key) {
+      const curves = flown(set);
+      usual = { key, curves, lines: lines(curves, () => ({ faint: true })) };
+    }
+    return usual;
   }
   // Of curves with more and with fewer points, at the times of the one with fewer.
   const percent = (one, other) => {
@@ -29,20 +32,24 @@
     return `${Number((100 * worst).toPrecision(2))} %`;
   };
 
+  const times = new Map();
+  function line(name, whole) { // of the program every third point
+    const omega = name === "published-python" ? whole.filter((_, k) => k % 3 === 0) : whole, { length } = omega;
+    if (!times.has(length)) times.set(length, Array.from(omega, (_, k) => (k * fixed.duration) / (length - 1)));
+    return { name, x: times.get(length), y: omega.map((value) => value / thrown.omega0) };
+  }
+  const lines = (curves, look) => Object.keys(names).map((name) => ({ ...line(name, curves[name]), ...look(name) }));
+
   function draw() {
-    const began = performance.now(), changed = thrown.g !== start.g, before = unchanged({ ...thrown, g: start.g });
+    const began = performance.now(), changed = thrown.g !== start.g;
+    const { curves: before, lines: behind } = unchanged({ ...thrown, g: start.g });
     // Free flight, column and rods are solved again too: that they do not change is what is to be seen.
     const now = changed ? flown(thrown) : before;
-    const line = (name, whole) => { // of the program every third point
-      const omega = name === "published-python" ? whole.filter((_, k) => k % 3 === 0) : whole;
-      return { name, x: Array.from(omega, (_, k) => (k * fixed.duration) / (omega.length - 1)), y: Array.from(omega, (value) => value / thrown.omega0) };
-    };
-    const lines = (curves, look) => Object.keys(names).map((name) => ({ ...line(name, curves[name]), ...look(name) }));
-    const plot = { behind: changed ? lines(before, () => ({ faint: true })) : [], lines: lines(now, (name) => ({ label: names[name] })) };
+    const plot = { behind: changed ? behind : [], lines: lines(now, (name) => ({ label: names[name] })) };
     const high = [...plot.behind, ...plot.lines].reduce((most, { y }) => Math.max(most, ...y.filter(Number.isFinite)), 1);
     const y = { low: 0, high: Math.min(3, high), label: "angular velocity ω / ω₀ [1]" };
     if (touched) touched.change({ ...plot, y });
-    else touched = window.flipproofTouch.touch(find("omega"), 340, { x: { low: 0, high: fixed.duration, label: "time t [s]" }, y, right: 84, ...plot });
+    else touched = window.flipproofTouch.touch(find("omega"), 290, { x: { low: 0, high: fixed.duration, label: "time t [s]" }, y, right: 84, ...plot });
     for (const input of inputs) {
       input.value = thrown[input.name] / (scale[input.name] ?? 1);
       const text = `${chart.shown(Number(input.value), Number(input.dataset.digits))}${input.dataset.unit === "°" ? "" : " "}${input.dataset.unit}`.trim();
@@ -55,17 +62,20 @@
       : `At worst off free flight, as a share of ω₀: ${apart(() => now["free-flight"]).join(", ")}.`;
     drawn = { thrown: { ...fixed, ...thrown }, curves: now, before, milliseconds: performance.now() - began };
   }
-  function set(change, remember = true) {
+  function set(change) {
     thrown = { ...thrown, ...change };
-    if (remember) window.flipproofState.link("live", Object.fromEntries(Object.entries(thrown).filter(([name, value]) => value !== start[name])));
     if (!waiting) requestAnimationFrame(() => { waiting = false; draw(); });
     waiting = true;
   }
-  for (const input of inputs) input.addEventListener("input", () => set({ [input.name]: Number(input.value) * (scale[input.name] ?? 1) }));
-  find("reset").addEventListener("click", () => set(start));
+  const remember = () => window.flipproofState.link("live", Object.fromEntries(Object.entries(thrown).filter(([name, value]) => value !== start[name])));
+  for (const input of inputs) {
+    input.addEventListener("input", () => set({ [input.name]: Number(input.value) * (scale[input.name] ?? 1) }));
+    input.addEventListener("change", remember);
+  }
+  find("reset").addEventListener("click", () => { set(start); remember(); });
   function recall() {
     const asked = Object.entries(window.flipproofState.linked("live")).map(([name, text]) => [name, Number(text)]);
-    set({ ...start, ...Object.fromEntries(asked.filter(([name, value]) => name in start && Number.isFinite(value))) }, false);
+    set({ ...start, ...Object.fromEntries(asked.filter(([name, value]) => name in start && Number.isFinite(value))) });
   }
   window.addEventListener("hashchange", () => { if (location.hash.startsWith("#live?")) recall(); });
   window.addEventListener("load", () => setTimeout(recall, 0));
@@ -77,7 +87,7 @@
       if (!way) return;
       event.preventDefault();
       slider.value = String(Number(slider.value) + way * Number(slider.dataset.keys));
-      slider.dispatchEvent(new Event("input", { bubbles: true }));
+      for (const kind of ["input", "change"]) slider.dispatchEvent(new Event(kind, { bubbles: true }));
     });
   }
 
