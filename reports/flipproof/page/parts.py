@@ -27,7 +27,6 @@ STORY: Final[Mapping[str, str]] = {
     "overlap-idea": "Water cannot overlap",
     "answer": "Is Eq. 8 right?",
     "live": "Throw it yourself",
-    "shares": "Why the program is off",
     "bottles": "Other bottles",
     "survives": "What survives",
     "sure": "How sure we are",
@@ -35,6 +34,10 @@ STORY: Final[Mapping[str, str]] = {
 """Screen of the story -> its name in the contents, in the order of the page."""
 
 BEHIND: Final[Mapping[str, tuple[str, str]]] = {
+    "detail": (
+        "The story in detail",
+        "Why the program is off, what survives, and every witness, with the numbers that the story leaves out.",
+    ),
     "findings": ("All findings", "Every claim and every observation of this report, to search and to link to."),
     "solvers": ("Every solver", "What each solver solves, how it ended on this throw, and why what failed did."),
     "glossary": ("Glossary", "Every name and symbol of this report in one plain sentence."),

@@ -104,8 +104,7 @@ def render(
         live=live_data(gathered.ask.throw),
     )
     parts = sections(gathered, results, templates)
-    left_out = {"shares": not facts.shares, "bottles": not facts.map}
-    screens = [(id_, words) for id_, words in STORY.items() if not left_out.get(id_)]
+    screens = [(id_, words) for id_, words in STORY.items() if id_ != "bottles" or facts.map]
     body = (*parts, *behind(parts, templates, context))
     rest = [("evidence", "The verdict in numbers"), *((section.id, section.title) for section in body)]
     return {

@@ -40,7 +40,7 @@
 
     function draw() {
       const width = Math.max(280, Math.round(svg.clientWidth || svg.parentElement.clientWidth)), nx = data.fills.length, ny = data.dampings.length;
-      const w = (width - edge.left - edge.right) / nx, h = Math.max(11, Math.min(22, w * 0.55)), height = edge.top + ny * h + edge.bottom;
+      const w = (width - edge.left - edge.right) / nx, h = Math.max(11, Math.min(20, w * 0.5)), height = edge.top + ny * h + edge.bottom;
       svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
       svg.setAttribute("height", height);
       svg.replaceChildren();

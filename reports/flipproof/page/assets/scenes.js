@@ -30,7 +30,7 @@
 
   function scene(root) {
     const solvers = root.dataset.bottles.split(" "), usual = start;
-    const [BOTTLES, CURVES] = root.closest(".idea") ? [190, 95] : [250, 110];
+    const [BOTTLES, CURVES] = root.closest(".idea") ? [165, 85] : [235, 95];
     const canvas = root.querySelector("canvas"), slider = root.querySelector("input"), button = root.querySelector(".gravity");
     const said = root.querySelector("[role=status]"), pen = canvas.getContext("2d");
     let thrown = usual, before = null, now = [], frame = FRAMES - 1, playing = 0;
