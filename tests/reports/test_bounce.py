@@ -3,6 +3,8 @@
 import json
 import subprocess
 import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -301,8 +303,8 @@ def test_a_program_that_names_no_places_is_started_once_and_asked_line_by_line(t
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (("print(flush=True)", "sys.exit('no license')"), "exit status 1.*no license"),
-        (("for line", "sys.exit(0)\nfor line"), "exit status 0.*version = 3.1"),
+        (("print(flush=True)", "sys.exit('no license')"), "ended with status 1.*no license"),
+        (("for line", "sys.exit(0)\nfor line"), "ended with status 0.*version = 3.1"),
         (("print(flush=True)", "sys.stdin.read()"), "is the output flushed"),
         (("t,y,v", "t,x,v"), "first line is 't,x,v'"),
         (("range(round(duration / dt) + 1)", "()"), "nothing follows"),
@@ -316,3 +318,28 @@ def test_a_kept_program_that_does_not_answer_is_named_in_one_line(tmp_path, monk
     with pytest.raises(AdapterError, match=words) as error:
         load(f"cmd:{sys.executable} {program}").drop(1.0, 0.0, 0.5, 9.81, 0.01, 0.1)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are found by /proc")
+@pytest.mark.parametrize("places", ["", " {height} {speed} {restitution} {gravity} {dt} {duration}"])
+def test_a_program_does_not_outlive_a_killed_flipproof(tmp_path, places):
+    """Neither one that is asked line by line nor one that is started once a flight, though both ignore their input."""
+    program, note = tmp_path / "kept.py", tmp_path / "pid"
+    program.write_text(f"import os, time\nopen({str(note)!r}, 'w').write(f'{{os.getpid()}}\\n')\ntime.sleep(600)\n")
+    spec = f"cmd:{sys.executable} {program}{places}"
+    words = [sys.executable, "-m", "flipproof", "bounce", spec]
+    flipproof = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _until(lambda: note.exists() and note.read_text().endswith("\n"))
+    lives = Path("/proc") / note.read_text().strip()
+    assert lives.exists()
+    flipproof.kill()
+    flipproof.wait()
+    _until(lambda: not lives.exists() or "\nState:\tZ" in (lives / "status").read_text())
+
+
+def _until(condition):
+    for _ in range(600):
+        if condition():
+            return
+        time.sleep(0.1)
+    raise AssertionError("not within a minute")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import io
+import os
 import shlex
 import subprocess
 import tempfile
@@ -15,6 +17,7 @@ import numpy as np
 
 from flipproof.bounce import engines
 from flipproof.bounce.adapter import BUILT_IN, PLACES, TIMEOUT, Adapter, AdapterError, Drop, FloatArray
+from flipproof.foreign.processes import KEPT, end, ending, half_of_memory, last_line, start
 from slicemodel.scenario import shortened, unknown_name
 
 
@@ -82,42 +85,41 @@ def _command(words: list[str], settings: dict[str, str]) -> Drop:
 def _once(words: list[str]) -> Callable[[list[str]], str]:
     def answer(asked: list[str]) -> str:
         given = dict(zip(PLACES, asked, strict=True))
-        try:
-            done = subprocess.run(
-                [word.format(**given) for word in words], capture_output=True, text=True, timeout=TIMEOUT, check=False
-            )
-        except (OSError, subprocess.TimeoutExpired) as error:
-            raise AdapterError(f"cmd: {shortened(str(error), 200)}") from None
-        if done.returncode:
-            raise AdapterError(f"cmd: exit status {done.returncode}: {shortened(done.stderr, 200)}")
-        return done.stdout
+        with tempfile.TemporaryFile() as errors:
+            program = _start([word.format(**given) for word in words], subprocess.DEVNULL, errors)
+            try:
+                printed, _ = program.communicate(timeout=TIMEOUT)
+            except subprocess.TimeoutExpired:
+                raise AdapterError(f"cmd: no answer within {TIMEOUT:g} s") from None
+            finally:
+                end(program)
+            if program.returncode:
+                raise AdapterError(f"cmd: it {ending(program.returncode)}: {_last_line(errors)}")
+            return printed.decode(errors="replace")
 
     return answer
 
 
 def _kept(words: list[str]) -> Callable[[list[str]], str]:
     """Start a program that reads a flight a line and ends each answer with an empty line."""
-    errors = tempfile.TemporaryFile("w+")  # noqa: SIM115
-    try:
-        program = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, text=True)
-    except OSError as error:
-        raise AdapterError(f"cmd: {shortened(str(error), 200)}") from None
+    errors = tempfile.TemporaryFile()  # noqa: SIM115
+    program = _start(words, subprocess.PIPE, errors)
+    assert isinstance(program.stdin, io.RawIOBase)
+    assert isinstance(program.stdout, io.RawIOBase)
+    given, answers = program.stdin, io.TextIOWrapper(io.BufferedReader(program.stdout), errors="replace")
     late = threading.Event()
 
     def stop() -> None:
         late.set()
-        program.kill()
+        end(program)
 
     def answer(asked: list[str]) -> str:
-        assert program.stdin is not None
-        assert program.stdout is not None
         clock, lines = threading.Timer(TIMEOUT, stop), []
         clock.start()
         try:
             with contextlib.suppress(BrokenPipeError):  # it has ended: what it said is still there
-                program.stdin.write(" ".join(asked) + "\n")
-                program.stdin.flush()
-            while (line := program.stdout.readline()).strip():
+                given.write(" ".join(asked).encode() + b"\n")
+            while (line := answers.readline()).strip():
                 lines.append(line)
         finally:
             clock.cancel()
@@ -130,20 +132,29 @@ def _kept(words: list[str]) -> Callable[[list[str]], str]:
                 "is the output flushed?"
             )
         status = program.wait()
-        errors.seek(0)
-        said = errors.read().strip() or said
         raise AdapterError(
-            f"cmd: names no {{height}}, so that it is asked line by line, but it ended (exit status {status}) "
-            f"before an empty line: {shortened(said, 200)!r}"
+            f"cmd: names no {{height}}, so that it is asked line by line, but it {ending(status)} "
+            f"before an empty line: {_last_line(errors) or shortened(said, 200)!r}"
         )
 
-    weakref.finalize(answer, _end, program, errors)
+    weakref.finalize(answer, _close, program, given, answers, errors)
     return answer
 
 
-def _end(program: subprocess.Popen[str], errors: IO[str]) -> None:
-    program.kill()
-    program.wait()
-    for stream in (program.stdin, program.stdout, errors):
+def _start(words: list[str], stdin: int, errors: IO[bytes]) -> subprocess.Popen[bytes]:
+    try:
+        return start(words, half_of_memory(), stdin=stdin, stdout=subprocess.PIPE, stderr=errors)
+    except OSError as error:
+        raise AdapterError(f"cmd: {words[0]} cannot be started ({error.strerror or error})") from None
+
+
+def _last_line(errors: IO[bytes]) -> str:
+    errors.seek(max(0, errors.seek(0, os.SEEK_END) - KEPT))
+    return shortened(last_line(errors.read()), 200)
+
+
+def _close(program: subprocess.Popen[bytes], *streams: IO[Any]) -> None:
+    end(program)
+    for stream in streams:
         with contextlib.suppress(OSError):
-            stream.close()  # type: ignore[union-attr]
+            stream.close()
