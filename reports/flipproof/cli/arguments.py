@@ -115,7 +115,7 @@ count = reader("a whole number of at least 1", digits, lambda value: value >= 1)
 number = reader("a number in (-1e6, 1e6)", float, lambda value: abs(value) < 1e6)
 
 
-WRITTEN: Final = ("out", "json", "junit", "html", "export", "film", "plot")
+WRITTEN: Final = ("out", "json", "junit", "badge", "html", "export", "film", "plot")
 """Options that name what a command writes, whichever command it is."""
 
 

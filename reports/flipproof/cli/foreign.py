@@ -48,6 +48,7 @@ def add_foreign(commands: Any) -> None:
     certify.add_argument("--seed", type=int, metavar="K", help="draw other throws for the check elsewhere")
     add_json(certify, "the passport (traits, results, versions)")
     certify.add_argument("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML")
+    certify.add_argument("--badge", type=Path, metavar="FILE", help="draw verdict and domain as SVG, for a README")
 
     place = add_command(commands, "place", "Find out which equation a solver solves, and how well.", command_place)
     _add_spec(place)
@@ -117,14 +118,16 @@ def _opened(options: argparse.Namespace, **given: Any) -> Any:
 
 def command_certify(options: argparse.Namespace) -> int:
     """Print one line a check; return 1 if one failed, or if answers are missing."""
+    from flipproof.foreign.badge import badge
     from flipproof.foreign.certify import certify, findings_of
     from flipproof.foreign.contract import check_equation
     from flipproof.foreign.elsewhere import SEED
     from flipproof.foreign.files import Folder
+    from flipproof.output.folder import write_text
 
     if options.equation is not None:
         check_equation(options.equation)
-    check_outputs(options, "json", "junit")
+    check_outputs(options, "json", "junit", "badge")
     names = ("name", "refined_by", "precision", "order")
     given = {name: value for name in names if (value := getattr(options, name)) is not None}
 
@@ -136,6 +139,8 @@ def command_certify(options: argparse.Namespace) -> int:
         found = certify(runner, equation=options.equation, seed=seed, say=lambda result: say(result.line))
         write_json(options.json, found.to_mapping())
         write_junit(options.junit, findings_of(found), f"flipproof certify {found.traits.name}")
+        if options.badge:
+            write_text(options.badge, badge(found))
     say(found.conclusion)
     waiting = len(runner.waiting) if isinstance(runner, Folder) else 0
     if waiting:

@@ -9,6 +9,8 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any, Final
 
+import numpy as np
+
 from flipproof.foreign import checks_basic, checks_measured, elsewhere
 from flipproof.foreign.checking import Check, Found, NotApplicableError, drive
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Runner, Traits, WaitingError
@@ -131,20 +133,25 @@ class Certificate:
         }
 
 
-VARIED: Final[Mapping[str, tuple[str, Callable[[Ask], float]]]] = MappingProxyType(
+VARIED: Final[Mapping[str, tuple[str, Callable[[Ask], Any]]]] = MappingProxyType(
     {
         "slices": ("N", lambda ask: ask.scenario.n_slices),
         "restitution": ("e", lambda ask: ask.scenario.restitution),
         "filling": ("filling", lambda ask: ask.scenario.fill_fraction),
         "bottle mass": ("M_b [kg]", lambda ask: ask.scenario.bottle.mass),
         "bottle length": ("L [m]", lambda ask: ask.scenario.bottle.length),
+        "bottle radius": ("R [m]", lambda ask: ask.scenario.bottle.radius),
+        "angle at release": ("theta_0 [rad]", lambda ask: ask.scenario.theta0),
         "spin": ("omega_0 [rad/s]", lambda ask: ask.scenario.omega0),
         "damping": ("alpha / m [1/s]", lambda ask: 2 * ask.scenario.damping_rate),
         "gravity": ("g [m/s^2]", lambda ask: ask.scenario.gravity),
         "duration": ("T [s]", lambda ask: ask.scenario.duration),
+        "output times": ("output times", lambda ask: len(ask.times)),
+        "first output time": ("from t [s]", lambda ask: ask.times[0]),
+        "time between outputs": ("apart by [s]", lambda ask: np.diff(ask.times) if len(ask.times) > 1 else ask.times),
     }
 )
-"""What says where a verdict is true: how it is printed, and its value in an ask."""
+"""What says where a verdict is true: how it is printed, and its value or values in an ask."""
 
 
 def domain_text(domain: Mapping[str, tuple[float, float]]) -> str:
@@ -174,9 +181,8 @@ class _Asked(Runner):
         """Return the answer, also to what was asked before."""
         answer = self.runner(ask)
         for name, (_, value) in VARIED.items():
-            here = float(value(ask))
-            low, high = self.domain.get(name, (here, here))
-            self.domain[name] = min(low, here), max(high, here)
+            here = np.append(value(ask), self.domain.get(name, ()))
+            self.domain[name] = float(here.min()), float(here.max())
         return answer
 
 

@@ -252,7 +252,7 @@ def test_a_signal_to_its_parent_is_the_failure_of_the_solver(leaves):
     status, out, passport = certified(leaves, "terminates")
     assert status == 1
     assert SIGNALLED in out
-    assert passport["conclusion"].startswith("22 checks: ")
+    assert passport["conclusion"].startswith("23 checks: ")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="no shell waits for the solver")

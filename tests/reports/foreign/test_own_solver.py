@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
@@ -45,11 +46,17 @@ def test_certify_writes_passport_and_verdicts_and_says_so(folder, capsys, monkey
     from flipproof.foreign import certify as suite
 
     monkeypatch.setattr(suite.certify, "__defaults__", (("shape", "start", "ice", "mirror"),))
-    status, out, _ = run(capsys, "certify", "mine.py:solve", "--json", "p.json", "--junit", "v.xml")
+    files = ("--json", "p.json", "--junit", "v.xml", "--badge", "b.svg")
+    status, out, _ = run(capsys, "certify", "mine.py:solve", *files)
     assert status == 0
     assert out.splitlines()[-1].startswith("4 checks: 4 passed, 0 failed; asked were N ")
     assert json.loads((folder / "p.json").read_text())["conclusion"] == out.splitlines()[-1]
     assert "<testsuite" in (folder / "v.xml").read_text()
+    drawn = ET.parse(folder / "b.svg").getroot()
+    title, words = drawn[0].text, drawn[-1][-1].text
+    assert title.endswith(out.splitlines()[-1])
+    assert words.startswith("no equation: passed (N ")
+    assert all(f"{name} " in title for name in ("theta_0 [rad]", "R [m]", "output times"))
     (folder / "mine.py").write_text("def solve(ask):\n    return 5\n")
     assert run(capsys, "certify", "mine.py:solve")[0] == 1
 
