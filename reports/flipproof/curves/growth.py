@@ -84,22 +84,23 @@ class Spread:
     ----------
     t, width : (P,) - times [s] and width; infinite where a curve has ended
     horizon : first time the width exceeds the band [s]; None: never
-    growth : of the width, up to the horizon
     ended : where the first curve ends, if that is early [s]
     """
 
     t: FloatArray
     width: FloatArray
     horizon: float | None
-    growth: Growth
     ended: float | None
 
     @classmethod
     def of(cls, t: FloatArray, width: FloatArray, band: float, **more: Any) -> Self:
-        """Return the spread with its horizon and growth; ``more`` are the other fields."""
-        horizon = first_crossing(t, width, band)
-        growth = fit_growth(t, width, stop=math.inf if horizon is None else horizon)
-        return cls(t=t, width=width, horizon=horizon, growth=growth, **more)
+        """Return the spread with its horizon; ``more`` are the other fields."""
+        return cls(t=t, width=width, horizon=first_crossing(t, width, band), **more)
+
+    @property
+    def growth(self) -> Growth:
+        """Growth of the width up to the horizon, fitted when it is asked for."""
+        return fit_growth(self.t, self.width, stop=math.inf if self.horizon is None else self.horizon)
 
     @property
     def largest(self) -> float:
