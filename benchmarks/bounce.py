@@ -1,7 +1,7 @@
 """Measure every engine that is installed and write the table of docs/bounce.md.
 
     npm install --no-save --prefix examples/bounce planck @dimforge/rapier2d-compat matter-js cannon-es jolt-physics
-    pip install pymunk mujoco Box2D dartpy pybullet
+    pip install pymunk mujoco Box2D dartpy pybullet newton
     python benchmarks/bounce.py [--json FILE.json]
 
 Engines that are missing are left out and named; ``--only`` prints without writing.
@@ -40,6 +40,10 @@ ENGINES = {
     "cannon-es, set": f"cmd:node {HERE}/cannon.mjs set",
     "Jolt": f"cmd:node {HERE}/jolt.mjs",
     "Jolt, set": f"cmd:node {HERE}/jolt.mjs set",
+    "Newton XPBD": f"{HERE}/newton_warp.py:xpbd",
+    "Newton XPBD, set": f"{HERE}/newton_warp.py:xpbd_set",
+    "Newton Steel": f"{HERE}/newton_warp.py:steel",
+    "Newton Steel, set": f"{HERE}/newton_warp.py:steel_set",
 }
 """Name in the table -> adapter; "set" asks for settings that suit bouncing."""
 
@@ -62,6 +66,8 @@ def row(name: str, made: Passport) -> str:
     if least is not None:
         slow = "slower than" if "no rebound is slower" in made["restitution"].remark else "below"
         dead = f"{slow} {least:.2g} m/s"
+    elif not any(ratio > 0.25 for speeds in law["measured"][-1] for ratio in speeds):
+        dead = "at any speed"
     slope = order["order"]
     low, high = rest["lowest_m"] * 1e3, rest["highest_m"] * 1e3
     cells = (
@@ -69,7 +75,7 @@ def row(name: str, made: Passport) -> str:
         f"{law['largest_difference']:.1e}",
         f"{law['phase_spread']:.1e}",
         dead,
-        f"{abs(min(kept['kept'])):.3f} to {max(kept['kept']):.3f}",
+        f"{abs(min(kept['kept'])):.3f} to {abs(max(kept['kept'])):.3f}",
         f"{order['errors_m'][2] * 1e3:.1f} mm off, " + (f"order {slope:.1f}" if slope > 0.1 else "no order"),
         f"hops {high - low:.2g}" if high - low > 1 else f"{low:.3f}".replace("-0.000", "0.000"),
         f"float{made['precision'].numbers['bits']}",

@@ -1,8 +1,7 @@
 // cannon-es, for `flipproof bounce cmd:'node cannon.mjs [set]'`.
 import * as CANNON from "cannon-es";
-import { BEST, serve, version } from "./serve.mjs";
+import { BEST, RADIUS, serve, version } from "./serve.mjs";
 
-const RADIUS = 0.1;
 const [contactEquationStiffness, contactEquationRelaxation] = BEST ? [1e12, 1e3] : [1e7, 3];
 
 function flight(height, speed, restitution, gravity, dt) {

@@ -1,8 +1,7 @@
 // Planck, for `flipproof bounce cmd:'node planck.mjs [set]'`. Of the two restitutions it takes the larger.
 import { Box, Circle, Settings, Vec2, World } from "planck";
-import { BEST, serve, version } from "./serve.mjs";
+import { BEST, RADIUS, serve, version } from "./serve.mjs";
 
-const RADIUS = 0.1;
 if (BEST) Object.assign(Settings, { velocityThreshold: 0, linearSlop: 1e-5 });
 
 function flight(height, speed, restitution, gravity, dt) {

@@ -1,8 +1,7 @@
 // Rapier 2D, for `flipproof bounce cmd:'node rapier.mjs [set]'`.
 import RAPIER from "@dimforge/rapier2d-compat";
-import { BEST, serve, version } from "./serve.mjs";
+import { BEST, RADIUS, serve, version } from "./serve.mjs";
 
-const RADIUS = 0.1;
 const { RigidBodyDesc, ColliderDesc, CoefficientCombineRule } = RAPIER;
 await RAPIER.init();
 

@@ -3,6 +3,7 @@ import { readFileSync } from "node:fs";
 import { createInterface } from "node:readline";
 
 export const BEST = process.argv[2] === "set"; // settings for bouncing instead of those it comes with
+export const RADIUS = 0.1; // of the ball [m]
 
 export function version(name) {
   return JSON.parse(readFileSync(new URL(`node_modules/${name}/package.json`, import.meta.url))).version;
