@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from flipproof.chapters import parts
-from flipproof.chapters.solvers import CERTIFIED, solver_runs
+from flipproof.chapters.solvers import CERTIFIED, Guest, solver_runs
 from flipproof.frame.chapter import Ask, Part, Size
 from flipproof.frame.exhibit import Exhibit, drawn
 from flipproof.frame.findings import Finding
@@ -50,15 +50,24 @@ class Report:
         return tuple(finding for finding in self.findings if finding.failed)
 
 
-def ask_of(scenario: Scenario, size: Size, slices: int | None = None, certified: tuple[str, ...] | None = None) -> Ask:
+def ask_of(
+    scenario: Scenario,
+    size: Size,
+    slices: int | None = None,
+    certified: tuple[str, ...] | None = None,
+    guests: tuple[Guest, ...] = (),
+) -> Ask:
     """Return what a report of a throw asks of its chapters.
 
     ``slices`` are those at which solvers are compared; None: SLICES, or the scenario's own if they are fewer.
-    ``certified`` are the witnesses that are certified; None: those of the size.
+    ``certified`` are the witnesses that are certified; None: those of the size. ``guests`` that could be loaded fly
+    beside the other solvers.
     """
     throw = scenario.with_slices(slices or min(SLICES, scenario.n_slices))
-    ask = Ask(scenario=scenario, throw=throw, size=size)
-    return replace(ask, solvers=solver_runs(throw, ask.steps, CERTIFIED[size] if certified is None else certified))
+    known = {guest.label: guest for guest in guests if guest.traits is not None}
+    ask = Ask(scenario=scenario, throw=throw, size=size, guests=known)
+    solvers = solver_runs(throw, ask.steps, CERTIFIED[size] if certified is None else certified)
+    return replace(ask, solvers=solvers | {label: guest.run(throw) for label, guest in known.items()})
 
 
 def gather_report(

@@ -1,6 +1,7 @@
-"""Guests of a report: certified, held against the ladder, hostile ones named with their reasons, nothing lost."""
+"""Guests of a report: certified, flown beside all other solvers; hostile ones named with their reasons."""
 
 import json
+import os
 import pickle
 import re
 import shutil
@@ -12,30 +13,20 @@ import pytest
 
 from flipproof.build import ask_of
 from flipproof.chapters import chapters_named
-from flipproof.chapters.guests.chapter import claim_guests, draw_guests, summarise
-from flipproof.chapters.guests.study import (
-    FREE,
-    SPARSE,
-    Guests,
-    energy_of,
-    received,
-    split,
-    study_guests,
-    switches_made,
-    visit,
-    with_split,
-)
-from flipproof.chapters.waterfall.study import equation_run
+from flipproof.chapters.guests.chapter import summarise
+from flipproof.chapters.guests.study import FREE, energy_of, start_of
+from flipproof.chapters.solvers import SPARSE, facts_of, invited
+from flipproof.chapters.waterfall.chapter import figure_waterfall
 from flipproof.cli import main as cli
 from flipproof.foreign import certify as suite
 from flipproof.foreign.contract import Traits
 from flipproof.foreign.specs import content_of, load
 from flipproof.frame.exhibit import drawn
-from flipproof.frame.flights import Call, Flights
+from flipproof.frame.flights import Call, ChapterError
 from flipproof.frame.gather import evaluate, gather
-from flipproof.frame.pool import SerialExecutor, make_all, workers
+from flipproof.frame.pool import SerialExecutor, workers
 from flipproof.frame.run_store import RunStore
-from flipproof.frame.solvers import Made, Missing, solve
+from flipproof.frame.solvers import solve
 from flipproof.output.summary import summary_text
 from ode_reference.models import MODELS
 from slicemodel import Scenario
@@ -46,90 +37,131 @@ RK4 = f"{ROOT / 'examples' / 'foreign' / 'rk4.py'}:Eq8"
 HOSTILE = ROOT / "tests" / "reports" / "foreign" / "hostile.py"
 THROW = Scenario(n_slices=5, duration=0.2)
 TIMES = np.linspace(0.0, THROW.duration, 1000)
-RUNGS = ("eq8", "eq8-weightless", "free-flight")
+CHAPTERS = ("guests", "differences", "ice", "flights", "agreement")
+
+
+class Reported:
+    """What the chapters of a small report say with guests in it."""
+
+    def __init__(self, *specs, chapters=CHAPTERS[:3], late=(), pool=None, store=None):
+        self.guests = (*invited(late, 1.0), *invited(specs))
+        ask = ask_of(THROW, "check", guests=self.guests)
+        work = {"guests": self.guests, "flights": None, "agreement": None}
+        pool = pool or SerialExecutor()
+        self.gathered = gather(chapters_named(*chapters), ask, pool, work=work, store=store)
+        self.results = evaluate(self.gathered)
+        findings = [finding for each in self.results.values() for finding in each.findings]
+        self.findings = {finding.id: finding for finding in findings if finding.id.startswith("guest-")}
+        assert len(self.findings) == sum(finding.id.startswith("guest-") for finding in findings)
+
+    @property
+    def failed(self):
+        return [finding for finding in self.findings.values() if finding.failed]
+
+    @property
+    def visits(self):
+        return self.gathered.found("guests")
+
+    def figures(self):
+        return {figure.name: figure for each in self.results.values() for figure in each.figures}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_checks():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(suite.certify, "__defaults__", (("shape", "ice"),))
+        yield
 
 
 @pytest.fixture(scope="module")
-def ladder():
-    return {rung: solve(rung, THROW, times=TIMES) for rung in RUNGS}
+def reported():
+    return Reported(RK4, RK4.replace(":Eq8", ":Weightless"), chapters=CHAPTERS)
 
 
-@pytest.fixture(autouse=True)
-def few_checks(monkeypatch):
-    monkeypatch.setattr(suite.certify, "__defaults__", (("shape", "ice"),))
-
-
-@pytest.fixture
-def studied(ladder):
-    return study_guests([visit(RK4, THROW, TIMES)], ladder, dict.fromkeys(RUNGS, 1e-9))
-
-
-def test_a_guest_is_held_against_every_equation(studied):
-    (guest,) = studied.guests
-    assert guest.equation == "eq8"
-    assert guest.differences["eq8"].largest < 1e-3 < guest.differences["free-flight"].largest
-    assert guest.visit.ice.largest == 0.0
-    assert studied.agreement.pair("naive RK4", "eq8").largest == guest.differences["eq8"].largest
-
-
-def test_errors_fall_with_effort_on_times_that_all_efforts_share(studied):
-    (guest,) = studied.guests
-    assert [len(one.run.t) for one in guest.visit.efforts] == [len(TIMES[::SPARSE])] * 4
-    assert guest.errors[-1] < 0.1 * guest.errors[0]
-    assert 0.0 < guest.band < guest.errors[0]
-
-
-def test_times_printed_with_nine_digits_change_no_error(tmp_path, ladder):
-    shutil.copy(RK4.rpartition(":")[0], tmp_path)
-    (tmp_path / "printed.py").write_text(
-        "import rk4\n\n\nclass Eq8(rk4.Eq8):\n    def solve(self, ask):\n        found = super().solve(ask)\n"
-        "        return {**found, 't': [float(f'{t:.9f}') for t in ask.times]}\n"
+def mine(folder, name, body):
+    """Write a solver that changes rk4.py, and return its spec."""
+    shutil.copy(RK4.rpartition(":")[0], folder)
+    (folder / f"{name}.py").write_text(
+        f"import rk4\nfrom dataclasses import replace\n\n\nclass Eq8(rk4.Eq8):\n    def solve(self, ask):\n{body}"
     )
-    visits = [visit(f"{tmp_path / name}:Eq8", THROW, TIMES) for name in ("rk4.py", "printed.py")]
-    exact, printed = study_guests(visits, ladder, {}).guests
-    assert len(exact.errors) == 4
-    assert printed.errors == exact.errors
-    assert printed.band == exact.band
+    return f"{folder / name}.py:Eq8"
 
 
-def test_a_ladder_that_lacks_a_time_of_a_guest_is_refused(ladder):
-    one = visit(RK4, THROW, TIMES)
-    sparse = {rung: solve(rung, THROW, times=TIMES[:: 2 * SPARSE]) for rung in ladder}
-    with pytest.raises(Missing, match=r"has 19 of the 38 times of naive RK4; all are needed"):
-        study_guests([replace(one, flight=None, traits=replace(one.traits, equation="eq8"))], sparse, {})
+def curve_of(folder, fmt="%.18g"):
+    """Write the flight of Eq. 8 as a curve, and return its spec."""
+    run = solve("eq8", THROW, times=TIMES)
+    rows = np.column_stack([run.t, run.theta, run.omega])
+    np.savetxt(folder / "curve.csv", rows, delimiter=",", header="t,theta,omega", comments="", fmt=fmt)
+    return f"csv:{folder / 'curve.csv'}"
 
 
-def test_findings_have_ids_of_their_own_and_visits_travel(studied):
-    twice = replace(studied, guests=(*studied.guests, *studied.guests))
-    assert isinstance(twice, Guests)
-    findings = list(claim_guests(studied))
-    ids = [finding.id for finding in findings]
-    assert len(set(ids)) == len(ids)
+def test_a_guest_flies_beside_all_other_solvers(reported):
+    flown = reported.gathered.found("flights")
+    assert [run.label for run in flown.drawn][-2:] == ["naive RK4", "naive RK4, no gravity"]
+    assert flown.tables["naive RK4"] == "trajectories/guest-naive-rk4/data.csv"
+    assert all("naive RK4" in reported.figures()[name].table for name in ("omega", "theta", "centre-of-mass", "slices"))
+    pairs = {d.second: d for d in reported.gathered.found("differences").pairs}
+    assert pairs["naive RK4"].first == "eq8"
+    assert pairs["naive RK4, no gravity"].first == "eq8-weightless"
+    assert reported.findings["guest-naive-rk4-eq8"].value == pairs["naive RK4"].largest < 1e-3
+    assert reported.findings["guest-naive-rk4-ice"].value == 0.0
+    assert "ice" in reported.figures()
+    pair = reported.gathered.found("agreement")["eq8"].pair("naive RK4", "eq8")
+    assert pair.largest == pytest.approx(pairs["naive RK4"].largest, abs=1e-12)
+
+
+def test_errors_fall_with_effort_on_times_that_all_efforts_share(reported):
+    visit, _ = reported.visits
+    guest = visit.guest
+    assert [len(run.settings["times"]) for run in guest.efforts(THROW)] == [len(TIMES[::SPARSE])] * 4
+    errors = [one.error for one in visit.refined]
+    assert len(errors) == 4
+    assert errors[-1] < 0.1 * errors[0]
+    assert 0.0 < visit.band < errors[0]
+
+
+def test_times_printed_with_nine_digits_change_no_error(tmp_path):
+    body = "        found = super().solve(ask)\n        return {**found, 't': [float(f'{t:.9f}') for t in ask.times]}\n"
+    printed = mine(tmp_path, "printed", body)
+    (tmp_path / "whole.py").write_text((tmp_path / "rk4.py").read_text())
+    exact, other = Reported(f"{tmp_path / 'whole.py'}:Eq8", printed, chapters=("guests",)).visits
+    assert [one.error for one in exact.refined] == [one.error for one in other.refined]
+    assert other.band == exact.band
+
+
+def test_findings_have_ids_of_their_own_and_guests_travel(reported):
+    ids = list(reported.findings)
     assert ids[0] == "guest-naive-rk4-certify-shape"
     assert not any(re.search(r"\s", name) for name in ids)
-    assert not any(finding.failed for finding in findings)
-    assert pickle.loads(pickle.dumps(studied.guests[0].visit)).spec == RK4
+    assert not reported.failed
+    assert pickle.loads(pickle.dumps(reported.visits[0])).guest.spec == RK4
 
 
-def test_the_flight_that_is_shown_is_held_to_the_equation_of_the_guest(tmp_path, studied, ladder):
-    (right,) = (finding for finding in claim_guests(studied) if finding.id == "guest-naive-rk4-flight")
+def test_the_flight_that_is_shown_is_held_to_the_equation_of_the_guest(tmp_path, reported):
+    right = reported.findings["guest-naive-rk4-flight"]
     assert right.kind == "regression"
-    assert right.value == studied.guests[0].differences["eq8"].largest
     assert "N = 5" in right.note
-    shutil.copy(RK4.rpartition(":")[0], tmp_path)
-    (tmp_path / "few.py").write_text(
-        "import rk4\nfrom dataclasses import replace\n\n\nclass Eq8(rk4.Eq8):\n    def solve(self, ask):\n"
+    body = (
         "        more = 1.0 if ask.scenario.n_slices < 5 else 2.0  # wrong where there are five slices\n"
         "        return super().solve(replace(ask, scenario=replace(ask.scenario, drag=more * ask.scenario.drag)))\n"
     )
-    wrong = study_guests([visit(f"{tmp_path / 'few.py'}:Eq8", THROW, TIMES)], ladder, {})
-    assert [finding.id for finding in claim_guests(wrong) if finding.failed] == ["guest-naive-rk4-flight"]
+    assert [one.id for one in Reported(mine(tmp_path, "few", body)).failed] == ["guest-naive-rk4-flight"]
 
 
-def test_solvers_of_one_name_are_told_apart(ladder):
-    one = visit(RK4, THROW, TIMES)
-    found = study_guests([one, one], ladder, {})
+def test_solvers_of_one_name_are_told_apart(tmp_path):
+    shutil.copy(RK4.rpartition(":")[0], tmp_path)
+    found = Reported(RK4, f"{tmp_path / 'rk4.py'}:Eq8", chapters=("guests", "differences", "flights"))
+    labels = [guest.label for guest in found.guests]
+    assert labels == ["naive RK4", f"naive RK4 ({tmp_path / 'rk4.py'}:Eq8)"]
     assert len({guest.slug for guest in found.guests}) == 2
+    assert [run.label for run in found.gathered.found("flights").drawn][-2:] == labels
+    assert len(set(found.gathered.found("flights").tables.values())) == len(found.gathered.found("flights").tables)
+
+
+def test_a_guest_does_not_take_the_name_of_one_of_our_own(tmp_path):
+    (tmp_path / "eq8").write_text("t,theta,omega\n0,0,20\n0.2,4,20\n")
+    (guest,) = invited([f"csv:{tmp_path / 'eq8'}"])
+    assert guest.label == f"eq8 (csv:{tmp_path / 'eq8'})"
 
 
 def test_energy_falls_in_free_flight_and_is_that_of_turning_in_ice():
@@ -138,66 +170,48 @@ def test_energy_falls_in_free_flight_and_is_that_of_turning_in_ice():
     np.testing.assert_allclose(energy_of(solve("eq8", replace(THROW, frozen=True), times=TIMES)), 1.0, rtol=1e-12)
 
 
-def test_every_figure_is_drawn_with_its_numbers(studied):
-    exhibits = drawn(tuple(draw_guests(studied)), SerialExecutor())
-    assert [exhibit.name for exhibit in exhibits] == [
-        "guests-omega", "guests-differences", "guests-convergence", "guests-ice-energy",
-    ]  # fmt: skip
+def test_every_figure_is_drawn_with_its_numbers(reported):
+    names = ["guests-convergence", "guest-naive-rk4-waterfall", "guest-naive-rk4-no-gravity-waterfall", "ice", "omega"]
+    exhibits = drawn([reported.figures()[name] for name in names], SerialExecutor())
     assert all(exhibit.table.count("\n") > 1 for exhibit in exhibits)
 
 
-def test_a_curve_in_a_file_is_compared_and_not_certified(tmp_path, ladder):
-    file = tmp_path / "curve.csv"
-    run = ladder["eq8"]
-    np.savetxt(file, np.column_stack([run.t, run.theta, run.omega]), delimiter=",", header="t,theta,omega", comments="")
-    (guest,) = study_guests([visit(f"csv:{file}", THROW, TIMES)], ladder, {}).guests
-    assert guest.differences["eq8"].largest < 1e-12
-    assert guest.visit.problems == {"certificate": "a curve in a file cannot be asked"}
-    assert not any(finding.failed for finding in claim_guests(Guests(guests=(guest,))))
+def test_a_curve_in_a_file_is_compared_and_not_certified(tmp_path):
+    found = Reported(curve_of(tmp_path), chapters=CHAPTERS)
+    assert found.findings["guest-curve-csv-eq8"].value < 1e-12
+    assert found.visits[0].problems == {"certificate": "a curve in a file cannot be asked"}
+    assert not found.failed
+    assert "guest-curve-csv-ice" not in found.findings
+    assert "curve.csv" not in found.figures()["centre-of-mass"].table
 
 
-def test_a_curve_printed_with_fifteen_decimals_agrees_with_its_equation(tmp_path, ladder):
-    file = tmp_path / "curve.csv"
-    run = ladder["eq8"]
-    rows = np.column_stack([run.t, run.theta, run.omega])
-    np.savetxt(file, rows, delimiter=",", header="t,theta,omega", comments="", fmt="%.15f")
-    found = study_guests([visit(f"csv:{file}", THROW, TIMES)], ladder, {})
-    assert found.agreement.pair("curve.csv", "eq8").largest < 1e-12
+def test_a_curve_printed_with_fifteen_decimals_agrees_with_its_equation(tmp_path):
+    found = Reported(curve_of(tmp_path, "%.15f"), chapters=("guests", "differences"))
+    assert found.findings["guest-curve-csv-eq8"].value < 1e-12
 
 
 @pytest.mark.parametrize("name", ["raises", "segfaults", "not_a_number", "hangs", "returns_none", "not_a_solver"])
-def test_a_hostile_guest_is_named_with_its_reason(tmp_path, ladder, name):
+def test_a_hostile_guest_is_named_with_its_reason(tmp_path, name):
     shutil.copy(HOSTILE, tmp_path)
-    spec = f"{tmp_path / 'hostile.py'}:{name}"
-    found = study_guests([visit(spec, THROW, TIMES, 1.0), visit(RK4, THROW, TIMES)], ladder, {})
-    bad, good = found.guests
-    failed = [finding for finding in claim_guests(found) if finding.failed]
-    assert failed
-    assert all(finding.id.startswith(f"guest-{bad.slug}-") for finding in failed)
+    found = Reported(RK4, late=[f"{tmp_path / 'hostile.py'}:{name}"])
+    bad, good = found.visits
+    assert found.failed
+    assert all(finding.id.startswith(f"guest-{bad.guest.slug}-") for finding in found.failed)
     pattern = load(f"{HOSTILE}:WRONG").get(name, "5 is neither callable").replace("2 s", "1 s")
-    assert any(re.search(pattern, finding.note) for finding in failed)
-    assert bad.run is None
-    assert good.run is not None
+    assert any(re.search(pattern, finding.note) for finding in found.failed)
+    assert bad.waterfall.found is None
+    assert good.waterfall.found is not None
     assert json.dumps(summarise(bad), allow_nan=False)
-
-
-def test_a_solver_that_is_late_twice_is_not_asked_again(tmp_path):
-    shutil.copy(HOSTILE, tmp_path)
-    found = visit(f"{tmp_path / 'hostile.py'}:hangs", THROW, TIMES, 0.5)
-    assert found.problems["flight"] == "not asked: 2 runs in a row gave no answer in time"
 
 
 def test_a_guest_is_asked_anew_though_the_store_has_the_ladder(tmp_path):
     shutil.copy(RK4.rpartition(":")[0], tmp_path)
     file = tmp_path / "rk4.py"
-    ask = ask_of(THROW, "quick", certified=())
     labels, kept = [], []
     for name in ("one", "other"):
         file.write_text(file.read_text().replace("naive RK4" if name == "one" else "one", name))
         with RunStore(tmp_path / "runs.sqlite", slow=0.0) as store:
-            work = {"guests": ((f"{file}:Eq8",), None)}
-            found = gather(chapters_named("guests"), ask, SerialExecutor(), work=work, store=store).found("guests")
-            labels += [guest.label for guest in found.guests]
+            labels += [guest.label for guest in Reported(f"{file}:Eq8", chapters=("guests",), store=store).guests]
             kept.append(len(store.found))
     assert labels == ["one", "other"]
     assert kept[0] == 0 < kept[1]
@@ -208,20 +222,14 @@ def test_a_report_without_guests_has_no_such_chapter():
     assert not evaluate(gathered)
 
 
-def test_a_dead_worker_costs_its_guest(ladder):
-    call = Call(die, label="guest x", timed=True)
+def test_a_dead_worker_costs_its_guest(monkeypatch):
+    death = Call(os._exit, (3,), "guest naive RK4", timed=True)
+    monkeypatch.setattr("flipproof.chapters.guests.study.Call", lambda *_, **__: death)
     with workers(1) as pool:
-        flights = Flights(*make_all(pool, [], lambda *_: None, [call]))
-    (found,) = received({"x": call}, flights)
-    assert "guest x: the worker process died" in found.problems["solver"]
-    (guest,) = study_guests([found], ladder, {}).guests
-    assert guest.label == "x"
-
-
-def die():
-    import os
-
-    os._exit(3)
+        found = Reported(RK4, chapters=("guests",), pool=pool)
+    (lost,) = found.failed
+    assert lost.id == "guest-naive-rk4-certificate-missing"
+    assert "guest naive RK4: the worker process died" in lost.note
 
 
 @pytest.mark.parametrize(
@@ -253,11 +261,10 @@ def test_check_certifies_guests_too_and_fails_with_them(tmp_path, capsys):
     assert all(any(f"-certify-{name}: 0; " in one for one in failed) for name in ("shape", "ice"))
 
 
-def test_check_holds_a_guest_to_what_the_baseline_found_of_it(tmp_path, capsys, ladder):
+def test_check_holds_a_guest_to_what_the_baseline_found_of_it(tmp_path, capsys):
     shutil.copy(RK4.rpartition(":")[0], tmp_path)
     file, spec = tmp_path / "rk4.py", f"{tmp_path / 'rk4.py'}:Eq8"
-    found = study_guests([visit(spec, THROW, TIMES)], ladder, dict.fromkeys(RUNGS, 1e-9))
-    findings = [one.to_mapping() for one in claim_guests(found)]
+    findings = [one.to_mapping() for one in Reported(spec).findings.values()]
     (old,) = [one["value"] for one in findings if one["id"] == "guest-naive-rk4-eq8"]
     summary = {"version": 2, "scenario": THROW.to_mapping(), "slices": 5, "size": "quick", "findings": findings}
     (tmp_path / "summary.json").write_text(summary_text(summary))
@@ -282,76 +289,46 @@ def test_check_refuses_a_guest_that_is_a_curve_or_named_twice(tmp_path, capsys):
         assert words in capsys.readouterr().err
 
 
-def test_a_report_splits_what_leads_from_a_guest_to_free_flight():
-    specs = (RK4, RK4.replace(":Eq8", ":Weightless"))
-    ask = ask_of(THROW, "quick", certified=())
-    found = gather(chapters_named("guests"), ask, SerialExecutor(), work={"guests": (specs, None)}).found("guests")
-    eq8, weightless = (guest.split for guest in found.guests)
-    assert set(eq8.bars) == {"weightless", "origin", "recoil"}
-    assert set(weightless.bars) == {"origin", "recoil"}
+def test_what_leads_from_a_guest_to_free_flight_is_split(reported):
     free = plateau(TIMES, solve("free-flight", THROW, times=TIMES).omega, THROW.omega0)
-    for one in (eq8, weightless):
-        assert one.end == pytest.approx(free, abs=1e-12)
-        assert one.start + sum(one.bars.values()) + one.rest == pytest.approx(one.end, abs=1e-15)
-        assert abs(one.rest) < 1e-3 < abs(one.end - one.start)
-        assert set(one.ranges) == set(one.bars)
-        assert all(low <= one.bars[name] <= high for name, (low, high) in one.ranges.items())
+    for visit, names in zip(reported.visits, ({"weightless", "origin", "recoil"}, {"origin", "recoil"}), strict=True):
+        found, data = visit.waterfall.found, summarise(visit)["waterfall"]
+        rest, *bars = found.bars
+        assert set(data["bars"]) == names
+        assert found.end == pytest.approx(free, abs=1e-12)
+        assert found.start + sum(bar.average for bar in found.bars) == pytest.approx(found.end, abs=1e-15)
+        assert abs(rest.average) < 1e-3 < abs(found.total)
+        assert all(bar.low <= bar.average <= bar.high for bar in bars)
+        assert reported.findings[f"guest-{visit.guest.slug}-waterfall"].value == found.total
+        level, axes = found.start, figure_waterfall(found).axes[0]
+        for patch, bar in zip(axes.patches[2:], found.bars, strict=False):
+            assert (patch.get_x(), patch.get_width()) == pytest.approx((level, bar.average), abs=1e-12)
+            level += bar.average
+        assert axes.get_yticklabels()[0].get_text() == visit.guest.label
     # Each order of mending two assumptions is one of two: the mean is the middle of the range.
-    assert all(share == pytest.approx(sum(weightless.ranges[name]) / 2) for name, share in weightless.bars.items())
-    check_waterfalls(found)
-    ids = {finding.id: finding for finding in claim_guests(found)}
-    assert ids["guest-naive-rk4-waterfall"].value == eq8.end - eq8.start
-    assert f"{eq8.bars['weightless']:+.3g}" in ids["guest-naive-rk4-waterfall"].note
-    # Schemes and engines are compared with the guests, too.
-    assert {"eq8", "free-flight", "published-python", "midpoint", "pymunk"} <= set(found.agreement.names)
-    assert found.agreement.pair("naive RK4", "exact-step").largest < 0.1
-    assert found.facts["naive RK4"] == f"{RK4}, files {content_of(RK4):.12}"
-    page = chapters_named("guests")[0].chapters[0].page(found)
-    assert [guest.label for guest in page["compared"]] == [guest.label for guest in page["splits"]]
+    assert all(bar.average == pytest.approx((bar.low + bar.high) / 2) for bar in bars)
+    assert facts_of(reported.guests)["naive RK4"] == f"{RK4}, files {content_of(RK4):.12}"
 
 
-def check_waterfalls(found):
-    """In the figure every bar begins where the one before ends, from the guest to free flight."""
-    (exhibit,) = [one for one in draw_guests(found) if one.name == "guests-waterfall"]
-    figure = exhibit.maker(*exhibit.data)
-    assert len(figure.axes) == 2 * len(found.guests)
-    for axes, guest in zip(figure.axes[::2], found.guests, strict=True):
-        level = guest.split.start
-        assert len(axes.patches) == len(guest.split.bars) + 1
-        for bar, share in zip(axes.patches, [guest.split.rest, *guest.split.bars.values()], strict=True):
-            assert bar.get_x() == pytest.approx(level, abs=1e-12)
-            assert bar.get_width() == pytest.approx(share, abs=1e-12)
-            level += share
-        assert level == pytest.approx(guest.split.end, abs=1e-12)
-        assert guest.label in exhibit.alt
-        assert f"the rest {guest.split.rest:+.2g}" in exhibit.alt
-    rows = [row.split(",") for row in exhibit.table.splitlines()]
-    assert sum(row[2] == "the rest" for row in rows) == len(found.guests)
+def test_a_guest_without_an_equation_or_with_the_wrong_one_has_its_rest(tmp_path, reported):
+    def started(equation, nearest):
+        visit = reported.visits[0]
+        guest = replace(visit.guest, traits=Traits(name="mine", equation=equation))
+        return start_of(replace(visit, guest=guest, equation=nearest))
 
-
-def test_a_guest_without_an_equation_or_with_the_wrong_one_has_its_rest(ladder):
-    declared = switches_made(Traits(name="mine", equation="exact-step"), None, "free-flight")
-    assert declared == MODELS["eq8"].switches
-    assert switches_made(Traits(name="mine", equation="paper-typeset"), None, "eq8") is None
-    assert switches_made(Traits(name="mine"), None, None) is None
-    assert switches_made(Traits(name="mine"), None, "eq8") == declared
+    assert started("exact-step", "free-flight") == MODELS["eq8"].switches
+    assert started("paper-typeset", "eq8") is None
+    assert started(None, "") is None
+    assert started(None, "eq8") == MODELS["eq8"].switches
     # A guest of Eq. 8 that declares free flight: all of the difference is the rest.
-    run = ladder["eq8"]
-    made = Made(equation_run(THROW, FREE), ladder["free-flight"], 0.0)
-    found = split(run, FREE, Flights({made.run: made}))
-    assert found.bars == {}
-    assert found.rest == found.end - found.start
-    with pytest.raises(Missing):
-        split(run, MODELS["eq8"].switches, Flights({made.run: made}))
+    spec = mine(tmp_path, "wrong", "        return super().solve(ask)\n    equation = 'free-flight'\n")
+    found = Reported(spec, chapters=("guests",)).visits[0]
+    assert start_of(found) == FREE
+    (rest,) = found.waterfall.found.bars
+    assert rest.average == found.waterfall.found.total
 
 
-def test_bars_that_miss_the_whole_are_a_mistake_of_the_program(ladder, monkeypatch):
-    start = replace(FREE, recoil=False)
-    flown = {equation_run(THROW, start): ladder["eq8"], equation_run(THROW, FREE): ladder["free-flight"]}
-    flights = Flights({run: Made(run, flight, 0.0) for run, flight in flown.items()})
-    found = split(ladder["eq8-weightless"], start, flights)
-    assert found.start + found.rest + found.bars["recoil"] == pytest.approx(found.end, abs=1e-15)
-    monkeypatch.setattr("flipproof.chapters.guests.study.mean", lambda changes: 0.9 * changes[0][1])
-    (guest,) = study_guests([visit(RK4, THROW, TIMES)], ladder, {}).guests
-    with pytest.raises(ArithmeticError, match="rest and bars miss"):
-        with_split(guest, start, flights)
+def test_bars_that_miss_the_whole_are_a_mistake_of_the_program(monkeypatch):
+    monkeypatch.setattr("flipproof.chapters.waterfall.study.mean", lambda changes: 0.9 * changes[0][1])
+    with pytest.raises(ChapterError, match="ArithmeticError: the bars miss"):
+        Reported(RK4, chapters=("guests",))

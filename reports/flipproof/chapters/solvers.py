@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Final
+import re
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
 
 from engine_check.certificate import DEFAULT_TOLERANCE
 from engine_check.engines import ENGINES
+from flipproof.foreign.contract import Traits
+from flipproof.foreign.files import File
+from flipproof.foreign.solving import opened
+from flipproof.foreign.specs import content_of, is_foreign
+from flipproof.frame.flights import Flights
 from flipproof.frame.solvers import Run
 from ode_reference.models import LADDER
-from slicemodel import Scenario, schemes
+from slicemodel import Scenario, Trajectory, schemes
+from slicemodel.trajectory import FloatArray, output_times
 
 ENGINE: Final = "pymunk"
 FREE: Final = LADDER[-1]
@@ -48,3 +59,97 @@ def solver_runs(throw: Scenario, steps: int, certified: tuple[str, ...]) -> dict
         runs[name] = Run(name, throw, accuracy, name)
     runs |= {model: Run(model, throw, {}, model) for model in reversed(LADDER)}
     return runs | {scheme: Run(scheme, throw, {"steps": steps}, scheme) for scheme in (*SCHEMES, *OTHER_SCHEMES)}
+
+
+# ---------------------------------------------------------------------- solvers of other people
+
+LEVELS: Final = (-4, -2, 0, 2)
+"""Levels of refinement at which a guest flies the throw; at the finest it also flies beside all other solvers."""
+
+SPARSE: Final = 27
+"""Every so many output times are asked for at ``LEVELS``: a solver makes at least one step from each to the next."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Guest:
+    """A solver of somebody else in a report, whose runs are runs like all others.
+
+    Parameters
+    ----------
+    spec : str
+    label : str - its name; with its spec, if another solver has that name
+    slug : str - the name in ids, files and anchors
+    timeout : float or None - seconds that one run may take; None: as it says
+    content : str - SHA-256 of its files
+    traits : Traits or None - what it says of itself; None if it cannot be loaded, for the reason ``problem``
+    curve : bool - whether it is a curve in a file, which cannot be asked for another throw
+    """
+
+    spec: str
+    label: str
+    slug: str
+    timeout: float | None = None
+    content: str = ""
+    traits: Traits | None = None
+    problem: str = ""
+    curve: bool = False
+
+    def run(self, throw: Scenario, level: int = LEVELS[-1], times: FloatArray | None = None) -> Run:
+        """Return its run of a throw."""
+        settings: dict[str, Any] = {"label": self.label, "level": level}
+        settings |= {} if times is None else {"times": times}
+        settings |= {} if self.timeout is None else {"timeout": self.timeout}
+        return Run(self.spec, throw, settings, self.label if times is None else f"{self.label}, level {level}")
+
+    def efforts(self, throw: Scenario) -> list[Run]:
+        """Return its runs at ``LEVELS``, if it can be refined."""
+        refined = self.traits is not None and self.traits.refined_by is not None
+        times = output_times(throw, None)[::SPARSE]
+        return [self.run(throw, level, times) for level in LEVELS] if refined else []
+
+    def band(self, throw: Scenario, flights: Flights) -> float | None:
+        """Return the largest change of omega between its two finest efforts, fraction of omega_0; None if unknown."""
+        flown = [flights.trajectory(run) for run in self.efforts(throw)[-2:]]
+        if not flown or flown[0] is None or flown[1] is None:
+            return None
+        return float(np.max(np.abs(flown[1].omega - flown[0].omega)) / abs(throw.omega0))
+
+    def equation(self, ladder: Mapping[str, Trajectory], flight: Trajectory | None) -> str:
+        """Return the rung that it declares, else the nearest to its flight; empty if there is neither."""
+        declared = self.traits.equation if self.traits is not None else None
+        if declared in LADDER or flight is None:
+            return declared if declared in LADDER else ""
+        off = {rung: np.interp(flight.t, run.t, run.omega) - flight.omega for rung, run in ladder.items()}
+        return min(off, key=lambda rung: float(np.max(np.abs(off[rung]))), default="")
+
+
+def invited(specs: Sequence[str], timeout: float | None = None) -> tuple[Guest, ...]:
+    """Load the solvers that specs name, and return what each says of itself, or why it says nothing."""
+    found: list[Guest] = []
+    for k, spec in enumerate(specs):
+        given: dict[str, Any] = {"spec": spec, "timeout": timeout}
+        name = spec
+        try:
+            given["content"] = content_of(spec)
+            with closing(opened(spec, timeout, curves=True)) as runner:
+                given |= {"traits": runner.traits, "curve": isinstance(runner, File)}
+                name = runner.traits.name
+        except ValueError as error:
+            given["problem"] = str(error)
+        taken = not is_foreign(name) or any(name == guest.label for guest in found)
+        label = f"{name} ({spec})" if taken else name
+        slug = re.sub(r"[^a-z0-9]+", "-", label.lower()).strip("-")
+        slug = slug if 0 < len(slug) <= 60 else f"solver-{k + 1}"
+        slug += f"-{k + 1}" if any(slug == guest.slug for guest in found) else ""
+        found.append(Guest(label=label, slug=slug, **given))
+    return tuple(found)
+
+
+def facts_of(guests: Sequence[Guest]) -> dict[str, str]:
+    """Return which code each guest is, for the provenance."""
+    facts = {}
+    for guest in guests:
+        distribution = guest.traits.distribution if guest.traits is not None else ""
+        files = f"files {guest.content:.12}" if guest.content else ""
+        facts[guest.label] = ", ".join(part for part in (guest.spec, distribution, files) if part)
+    return facts

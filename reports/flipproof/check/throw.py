@@ -23,6 +23,7 @@ from typing import Any, Final
 
 from flipproof.build import ask_of
 from flipproof.chapters import chapters_named, parts
+from flipproof.chapters.solvers import Guest, invited
 from flipproof.check.diff import LEAST, ROUND_OFF, TOLERANCE, bands, number, read_summary, scenario_changes
 from flipproof.frame.findings import Finding, interval_text
 from flipproof.frame.gather import evaluate, gather
@@ -93,15 +94,15 @@ def check(
     throw = scenario.with_slices(slices)
     found: list[Finding] = []
     seconds: dict[str, float] = {}
-    asked: list[tuple[str, Any]] = [(group, None) for group in groups]
-    asked += [("guests", (tuple(guests), timeout))] if guests else []
+    asked: list[tuple[str, tuple[Guest, ...]]] = [(group, ()) for group in groups]
+    asked += [("guests", invited(guests, timeout))] if guests else []
     began = time.perf_counter()
-    for group, work in asked:
-        for finding in findings_of(group, throw, store, work):
+    for group, others in asked:
+        for finding in findings_of(group, throw, store, others):
             began, seconds[finding.id] = time.perf_counter(), time.perf_counter() - began
             was = known.get(finding.id)
-            moves = group == "thresholds" or (work is not None and finding.kind != "regression")
-            if moves and (was is None or (work is not None and was["value"] is None)):
+            moves = group == "thresholds" or (group == "guests" and finding.kind != "regression")
+            if moves and (was is None or (group == "guests" and was["value"] is None)):
                 continue
             held, needs = finding, _threshold(finding.admissible, finding.value)
             if was is not None:
@@ -167,10 +168,12 @@ def groups() -> dict[str, tuple[str, ...]]:
     return dict([*first, *((name, (name,)) for name in quick if name not in known), last])
 
 
-def findings_of(group: str, throw: Scenario, store: RunStore | None = None, work: Any = None) -> Iterator[Finding]:
-    """Yield the findings of a group's chapters, or of a chapter given its ``work``; runs are made in this process."""
-    chapters = groups()[group] if work is None else (group,)
-    ask = ask_of(throw, "check", throw.n_slices)
-    amounts = None if work is None else {group: work}
-    for each in evaluate(gather(chapters_named(*chapters), ask, SerialExecutor(), work=amounts, store=store)).values():
-        yield from each.findings
+def findings_of(
+    group: str, throw: Scenario, store: RunStore | None = None, guests: tuple[Guest, ...] = ()
+) -> Iterator[Finding]:
+    """Yield the findings of a group's chapters, or those about ``guests`` alone; runs are made in this process."""
+    chapters = ("guests", "differences", "ice") if guests else groups()[group]
+    ask = ask_of(throw, "check", throw.n_slices, guests=guests)
+    work = {"guests": guests} if guests else None
+    for each in evaluate(gather(chapters_named(*chapters), ask, SerialExecutor(), work=work, store=store)).values():
+        yield from (finding for finding in each.findings if not guests or finding.id.startswith("guest-"))

@@ -232,25 +232,26 @@ def command_report(options: argparse.Namespace) -> int:
 
     from flipproof.build import ask_of, build, gather_report, write
     from flipproof.chapters import parts
+    from flipproof.chapters.solvers import facts_of, invited
     from flipproof.film.measured import part_measured
     from flipproof.frame.gather import Stages
     from flipproof.frame.pool import workers
     from flipproof.output.provenance import provenance
 
     began = time.perf_counter()
-    ask = ask_of(scenario, "quick" if options.quick else "full", options.slices)
+    guests = invited(options.guests, options.timeout)
+    ask = ask_of(scenario, "quick" if options.quick else "full", options.slices, guests=guests)
     with replaced_folder(options.out, "report") as folder:
         with store_of(options) as store, workers(options.jobs) as pool, ReportProgress(ask.size) as bar:
             contents = parts() if measurement is None else (part_measured(measurement), *parts())
-            work = {"guests": (tuple(options.guests), options.timeout)} if options.guests else {}
+            work = {"guests": guests} if guests else {}
             gathered = gather_report(ask, bar.show, Stages(bar.begin), store, pool, contents=contents, work=work)
-            guests = gathered.found("guests")
-            facts = provenance(command_line()) | store.facts() | ({} if guests is None else guests.facts)
+            facts = provenance(command_line()) | store.facts() | facts_of(guests)
             report = build(gathered, facts, store.remembering(pool), bar.show, png=options.png)
         write(report, folder)
-    for guest in guests.guests if guests is not None else ():
-        found = guest.visit.certificate
-        print(f"{guest.label}: {found.conclusion if found else '; '.join(guest.visit.problems.values())}")
+    for visit in gathered.found("guests") or ():
+        found = visit.certificate.found
+        print(f"{visit.guest.label}: {found.conclusion if found else '; '.join(visit.problems.values())}")
     print(f"Cache: {store.whereabouts()}")
     _print_report(report, options.out, time.perf_counter() - began)
     if options.open:

@@ -324,8 +324,8 @@ def _impacts_of(given: object, n_slices: int) -> Impacts:
     return Impacts(**arrays)  # type: ignore[arg-type]
 
 
-def trajectory_of(ask: Ask, answer: Answer, traits: Traits) -> Trajectory:
-    """Return an answer as a Trajectory of method ``traits.name``, for comparison with every other solver.
+def trajectory_of(ask: Ask, answer: Answer, name: str, **diagnostics: Any) -> Trajectory:
+    """Return an answer as a Trajectory of method ``name``, for comparison with every other solver.
 
     ``diagnostics["not_given"]`` names what the solver did not give: inertia is then what the conserved angular momentum
     implies, J_0 omega_0 / omega, and r_cm what it was at release; neither is shown or compared.
@@ -342,14 +342,14 @@ def trajectory_of(ask: Ask, answer: Answer, traits: Traits) -> Trajectory:
     return Trajectory(
         scenario=ask.scenario,
         solver="foreign",
-        method=traits.name,
-        **{name: getattr(answer, name) for name in (*REQUIRED, "impacts")},
+        method=name,
+        **{field: getattr(answer, field) for field in (*REQUIRED, "impacts")},
         r=r,
         v=v,
         r_cm=r_cm,
         inertia=inertia,
-        settings={"spec": traits.name, "effort": ask.effort, **ask.options},
-        diagnostics={"not_given": [name for name in PER_TIME if getattr(answer, name) is None]},
+        settings={"spec": name, "effort": ask.effort, **ask.options},
+        diagnostics={"not_given": [field for field in PER_TIME if getattr(answer, field) is None], **diagnostics},
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import math
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -36,25 +37,39 @@ __all__ = ["Own", "check_spec", "is_spec", "opened", "solve"]
 
 
 def solve(
-    scenario: Scenario, *, spec: str, times: FloatArray | None = None, effort: float | None = None, **options: Any
+    scenario: Scenario,
+    *,
+    spec: str,
+    times: FloatArray | None = None,
+    effort: float | None = None,
+    level: float = 0,
+    timeout: float | None = None,
+    label: str = "",
+    **options: Any,
 ) -> Trajectory:
     """Run the solver that a spec names, in a process of its own that serves the next run, too.
 
-    Raises ForeignError if it gives no answer.
+    ``diagnostics["seconds"]`` is how long it took to answer. Raises ForeignError if it gives no answer.
 
     Parameters
     ----------
     times : array, optional - output times [s]; 1000 uniform ones by default
-    effort : float, optional - the number that the solver's ``refined_by`` names; a thousandth of the flight by default
+    effort : float, optional - the number that the solver's ``refined_by`` names; by default that of ``level``
+    level : float - refinement: 0 is a thousandth of the flight, each level halves the step
+    timeout : float, optional - seconds that the run may take, instead of what the solver says
+    label : str - the method's name, instead of what the solver says
     options : passed to the solver by name
     """
-    runner = _runner(spec, content_of(spec))
-    given = effort_of(runner.traits, scenario, 0) if effort is None else effort
+    runner = _runner(spec, content_of(spec), timeout)
+    given = effort_of(runner.traits, scenario, level) if effort is None else effort
     ask = Ask.of(scenario, output_times(scenario, times), given, **options)
+    began = time.perf_counter()
     try:
-        return trajectory_of(ask, runner(ask), runner.traits)
+        answer = runner(ask)
     except ForeignError as error:
         raise type(error)(f"{spec}: {error}") from None
+    seconds = time.perf_counter() - began
+    return trajectory_of(ask, answer, label or runner.traits.name, seconds=seconds)
 
 
 def opened(
@@ -88,17 +103,18 @@ def opened(
     return Isolated(spec, timeout, memory)
 
 
-_RUNNERS: Final[dict[str, tuple[str, Runner]]] = {}
-"""The process of every solver that has been run, by spec, with the content of its files."""
+_RUNNERS: Final[dict[tuple[str, float | None], tuple[str, Runner]]] = {}
+"""The process of every solver that has been run, by spec and time limit, with the content of its files."""
 
 
-def _runner(spec: str, content: str) -> Runner:
+def _runner(spec: str, content: str, timeout: float | None) -> Runner:
     """Return the process of a solver; one whose files have changed gets another, and its old process ends."""
-    if spec in _RUNNERS and _RUNNERS[spec][0] != content:
-        _RUNNERS.pop(spec)[1].close()
-    if spec not in _RUNNERS:
-        _RUNNERS[spec] = content, opened(spec, curves=True)
-    return _RUNNERS[spec][1]
+    key = spec, timeout
+    if key in _RUNNERS and _RUNNERS[key][0] != content:
+        _RUNNERS.pop(key)[1].close()
+    if key not in _RUNNERS:
+        _RUNNERS[key] = content, opened(spec, timeout, curves=True)
+    return _RUNNERS[key][1]
 
 
 @atexit.register

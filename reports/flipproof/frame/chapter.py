@@ -43,6 +43,7 @@ class Ask:
     work : the chapter's own amount of work at this ``size``
     steps : points of a scheme's grid
     solvers : name -> how each solver flies the throw; chapters that look at one flight ask for the same run
+    guests : name -> what is known of each of these solvers that is somebody else's (``chapters.solvers.Guest``)
     """
 
     scenario: Scenario
@@ -52,6 +53,7 @@ class Ask:
     steps: int = 1000
     reference: Scenario = REFERENCE
     solvers: Mapping[str, Run] = field(default_factory=dict)
+    guests: Mapping[str, Any] = field(default_factory=dict)
 
 
 Study = Generator[Iterable[Run | Call], Flights, F]

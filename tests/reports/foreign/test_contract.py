@@ -157,14 +157,13 @@ def test_own_times_must_increase():
 
 
 def test_a_trajectory_of_an_answer():
-    traits = Traits(name="mine")
-    made = trajectory_of(ASK, answer_of(ASK, CURVE | {"r": R, "v": 0 * R}), traits)
+    made = trajectory_of(ASK, answer_of(ASK, CURVE | {"r": R, "v": 0 * R}), "mine")
     assert isinstance(made, Trajectory)
     assert (made.label, made.diagnostics["not_given"]) == ("mine", [])
-    implied = trajectory_of(ASK, answer_of(ASK, CURVE | {"r_cm": ASK.times}), traits)
+    implied = trajectory_of(ASK, answer_of(ASK, CURVE | {"r_cm": ASK.times}), "mine")
     assert implied.diagnostics["not_given"] == ["inertia"]
     np.testing.assert_allclose(implied.inertia * implied.omega, implied.inertia[0] * implied.omega[0], rtol=1e-14)
-    bare = trajectory_of(ASK, answer_of(ASK, CURVE | {"omega": 0 * ASK.times}), traits)
+    bare = trajectory_of(ASK, answer_of(ASK, CURVE | {"omega": 0 * ASK.times}), "mine")
     assert bare.diagnostics["not_given"] == ["r_cm", "inertia"]
     assert trajectory_csv(bare).splitlines()[0] == "t,theta,omega"
     assert set(Curve.of(bare).series) == {"omega", "theta"}

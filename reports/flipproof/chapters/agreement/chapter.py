@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -127,17 +128,35 @@ def study(ask: Ask) -> Study[Mapping[str, Agreement]]:
         runs[equation] = {
             equation: ask.solvers[equation],
             SOLVE_IVP: Run(equation, ask.throw, settings, f"{equation}, {SOLVE_IVP}"),
-            **{name: ask.solvers[name] for name in engines if name in ask.solvers},
+            **{name: ask.solvers[name] for name in (*engines, *solving(ask, equation)) if name in ask.solvers},
         }
         coarser[equation] = Run(equation, ask.throw, coarse, f"{equation}, {SOLVE_IVP}, coarser")
     every = [run for each in runs.values() for run in each.values()]
+    every += [run for guest in ask.guests.values() for run in guest.efforts(ask.throw)]
     calls = {name: omega_band_call(each[name]) for name, each in runs.items()}
     flights = yield [*every, *coarser.values(), *calls.values()]
-    return {name: agreement_on(name, each, coarser[name], calls[name], flights) for name, each in runs.items()}
+    guests = {label: guest.band(ask.throw, flights) for label, guest in ask.guests.items()}
+    bands = {label: band for label, band in guests.items() if band is not None}
+    return {name: agreement_on(name, each, coarser[name], calls[name], flights, bands) for name, each in runs.items()}
 
 
-def agreement_on(equation: str, runs: Mapping[str, Run], coarser: Run, own_band: Call, flights: Flights) -> Agreement:
-    """Compare the solvers of one equation, each within its own band, up to the horizon of the engines."""
+def solving(ask: Ask, equation: str) -> list[str]:
+    """Return the guests that declare an equation."""
+    return [label for label, guest in ask.guests.items() if guest.traits.equation == equation]
+
+
+def agreement_on(
+    equation: str,
+    runs: Mapping[str, Run],
+    coarser: Run,
+    own_band: Call,
+    flights: Flights,
+    guests: Mapping[str, float] = MappingProxyType({}),
+) -> Agreement:
+    """Compare the solvers of one equation, each within its own band, up to the horizon of the engines.
+
+    ``guests`` are the bands of guests, by their names.
+    """
     made = {name: run for name, run in flights.trajectories(runs).items() if run.ok}
     bands: dict[str, FloatArray] = {
         name: run.diagnostics["omega_band"] for name, run in made.items() if "omega_band" in run.diagnostics
@@ -148,6 +167,7 @@ def agreement_on(equation: str, runs: Mapping[str, Run], coarser: Run, own_band:
     if SOLVE_IVP in made and witness.found is not None:
         bands[SOLVE_IVP] = witness.found
     certificates = [made[name].diagnostics["certificate"] for name in bands if name not in (equation, SOLVE_IVP)]
+    bands |= {name: np.asarray(band) for name, band in guests.items()}
     until = min((each["horizon"] for each in certificates if each["horizon"] is not None), default=np.inf)
     return study_agreement({name: run for name, run in made.items() if name in bands}, bands, until=until)
 

@@ -6,6 +6,7 @@ import textwrap
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -14,18 +15,33 @@ from matplotlib.figure import Figure
 from engine_check.engines import ENGINES
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, percent, study_difference
 from flipproof.chapters.predictability.chapter import parting_words
-from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, WITNESSES
+from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, WITNESSES, Guest
 from flipproof.figures.spoken import spoken
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import Absent, Ask, Band, Call, Chapter, Claims, Exhibit, Run, Study, Touch, observed
+from flipproof.frame.chapter import (
+    Absent,
+    Ask,
+    Band,
+    Call,
+    Chapter,
+    Claims,
+    Exhibit,
+    Finding,
+    Run,
+    Study,
+    Touch,
+    observed,
+    regression,
+)
 from flipproof.frame.equations import NAMES
 from flipproof.frame.findings import Rule
 from flipproof.frame.flights import Flights, attempt, known
-from flipproof.frame.solvers import find, finer
+from flipproof.frame.solvers import finer
 from flipproof.frame.twins import BAND_WORDS, omega_band_call
 from flipproof.output.columns import curves_csv
 from ode_reference.models import LADDER, MODELS, ladder_of
 from ode_reference.motion import Model
+from slicemodel import Trajectory
 
 TOTAL: Final = "published program to free flight"
 BY_ENGINE: Final = "free flight, event-driven and by an engine"
@@ -70,33 +86,37 @@ class Differences(NamedTuple):
     """Every pair both of whose flights were made, how each difference grows, and up to when free flight goes.
 
     ``ended`` says where free flight stopped early, "" if it did not; ``missing`` why a pair could not be compared.
+    ``guests`` are those of the pairs, by name, each with its own band.
     """
 
     pairs: tuple[Difference, ...]
     growths: tuple[str, ...]
     ended: str
     missing: Mapping[tuple[str, str, str], str]
+    guests: Mapping[str, tuple[Guest, float | None]] = MappingProxyType({})
 
 
 def study(ask: Ask) -> Study[Differences]:
     """Compare the pairs; a size that is asked for cheap solvers only does without bands and finer cuts.
 
     Schemes and equations fly the throw again at ``FINER`` times the slices; an engine would be certified anew, which
-    costs more than all of them together.
+    costs more than all of them together. A guest is compared with its own equation, or with the nearest.
     """
     runs = dict(ask.solvers)
+    efforts = [run for guest in ask.guests.values() for run in guest.efforts(ask.throw)]
+    calls = band_calls(runs) if ask.guests or ask.size != "check" else {}
+    more: dict[str, Run] = {}
     if ask.size == "check":
-        runs = {name: run for name, run in runs.items() if find(run.solver).package != "engine_check"}
-        flights = yield [runs[name] for _, *pair in PAIRS if set(pair) <= set(runs) for name in pair]
-        bands: dict[str, float] = {}
-        more: dict[str, Run] = {}
+        runs = {name: run for name, run in runs.items() if name in (*SCHEMES, *LADDER, *ask.guests)}
     else:
         more = {name: finer(runs[name]) for name in (*SCHEMES, *LADDER)}
         more |= {name: replace(more[name], settings={**more[name].settings, "store": "summary"}) for name in SCHEMES}
-        calls = band_calls(runs)
-        flights = yield [*more.values(), *runs.values(), *calls.values()]
-        bands = run_bands(runs, calls, flights)
+    flights = yield [*more.values(), *runs.values(), *calls.values(), *efforts]
     flown = flights.trajectories(runs)
+    guests = {label: (guest, guest.band(ask.throw, flights)) for label, guest in ask.guests.items()}
+    bands = run_bands(runs, calls, flights) if calls else {}
+    bands |= {label: band for label, (_, band) in guests.items() if band is not None}
+    pairs = (*PAIRS, *guest_pairs(ask, flown))
     refined = {name: run for name, run in flights.trajectories(more).items() if run.ok}
 
     def compared(name: str, first: str, second: str) -> Difference:
@@ -113,14 +133,22 @@ def study(ask: Ask) -> Study[Differences]:
         located = flown.get(LIMITS.get(difference.first, difference.first))
         return parting_words(difference, None if located is None else located.impacts)
 
-    tried = {pair: attempt(compared, *pair) for pair in PAIRS if set(pair[1:]) <= set(runs)}
-    pairs = tuple(known(tried).values())
-    growths = tuple(growth(difference) for difference in pairs if difference.parting_time is not None)
+    tried = {pair: attempt(compared, *pair) for pair in pairs if set(pair[1:]) <= set(runs)}
+    made = tuple(known(tried).values())
+    growths = tuple(growth(difference) for difference in made if difference.parting_time is not None)
     free, ended = flown.get(FREE), ""
     if free is not None and not free.ok:
         ended = f"up to t = {1e3 * free.t[-1]:.0f} ms, where {free.method} {free.status}"
     missing = {pair: outcome.reason for pair, outcome in tried.items() if outcome.reason}
-    return Differences(pairs, growths, ended, missing)
+    return Differences(made, growths, ended, missing, guests)
+
+
+def guest_pairs(ask: Ask, flown: Mapping[str, Trajectory]) -> Iterator[tuple[str, str, str]]:
+    """Yield a pair a guest: the equation that it declares, or else the nearest of the ladder, and the guest."""
+    ladder = {rung: flown[rung] for rung in LADDER if rung in flown}
+    for label, guest in ask.guests.items():
+        rung = guest.equation(ladder, flown.get(label)) or FREE
+        yield f"{spoken(rung)} and {label}", rung, label
 
 
 def band_calls(runs: Mapping[str, Run]) -> dict[str, Call]:
@@ -145,13 +173,32 @@ def run_bands(runs: Mapping[str, Run], calls: Mapping[str, Call], flights: Fligh
 def claims(found: Differences) -> Claims:
     """Yield the largest difference of every pair: an observation with a band and a moment, and no share."""
     for d in found.pairs:
+        if d.second in found.guests:
+            yield from claim_guest(d, *found.guests[d.second])
+            continue
         more = "" if d.finer is None else f"; {d.finer[1]:.3g} at N = {d.finer[0]}"
         note = f"largest difference of this pair, at t = {d.largest_time * 1e3:.1f} ms, N = {d.slices}{more}"
         id_, title = _id(d.first, d.second), f"{d.name}: {d.first} against {d.second}"
         rule: Rule = "twins and refinement" if {d.first, d.second} & set(WITNESSES) else "twins"
         yield observed(id_, title, d.largest, "of ω₀", f"{note}; {d.moment}", band=Band.of(d.band, rule))
     for (name, first, second), reason in found.missing.items():
-        yield Absent(_id(first, second), name, reason, "observation")
+        if second in found.guests:
+            yield Absent(f"guest-{found.guests[second][0].slug}-flight", name, reason)
+        else:
+            yield Absent(_id(first, second), name, reason, "observation")
+
+
+def claim_guest(d: Difference, guest: Guest, own: float | None) -> Iterator[Finding]:
+    """Yield how far a guest is from its equation; of one that it declares, that its own error explains it."""
+    band = Band.of(d.band, "twins and refinement")
+    title, note = f"{d.second} and {d.first}: largest difference in ω", f"at t = {d.largest_time:.4g} s"
+    yield observed(f"guest-{guest.slug}-{d.first}", title, d.largest, "of ω₀", note, band=band)
+    if guest.traits is not None and guest.traits.equation == d.first:
+        room = 0.09 if own is None else 1e-3 + 5 * (d.band or 0.0)
+        words = "it cannot be refined" if own is None else f"its own change between its finest efforts is {own:.2g}"
+        title = f"{d.second}: largest difference in ω from {d.first}, the equation that it declares"
+        note = f"N = {d.slices}, t = {d.largest_time:.4g} s; {words}"
+        yield regression(f"guest-{guest.slug}-flight", title, d.largest, "of ω₀", (0.0, room), note)
 
 
 def _id(first: str, second: str) -> str:

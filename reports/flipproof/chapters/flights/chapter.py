@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from engine_check.engines import ENGINES
-from flipproof.chapters.solvers import FLIGHTS, LIMITS, OTHERS, SCHEMES
+from flipproof.chapters.solvers import FLIGHTS, LIMITS, OTHERS, SCHEMES, Guest
 from flipproof.figures.style import new_figure, shared_legend, shown_name, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Exhibit, Made, Study, Touch
 from flipproof.frame.solvers import find
@@ -33,11 +34,24 @@ class Flown(NamedTuple):
 
     throw: Scenario
     made: Mapping[str, Made]
+    guests: Mapping[str, Guest] = MappingProxyType({})
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """The solvers whose flights are drawn."""
+        return (*FLIGHTS, *self.guests)
 
     @property
     def drawn(self) -> list[Trajectory]:
         """The flights that are drawn."""
-        return [run for name in FLIGHTS if (run := self.made[name].trajectory) is not None]
+        return [run for name in self.shown if (run := self.made[name].trajectory) is not None]
+
+    @property
+    def tables(self) -> dict[str, str]:
+        """The file of the trajectory of every solver that flew, by its name."""
+        names = {name: f"guest-{guest.slug}" for name, guest in self.guests.items()}
+        flown = [name for name, made in self.made.items() if made.trajectory is not None]
+        return {name: f"trajectories/{names.get(name, name)}/data.csv" for name in flown}
 
     @property
     def rows(self) -> list[dict[str, Any]]:
@@ -53,7 +67,8 @@ class Flown(NamedTuple):
 def study(ask: Ask) -> Study[Flown]:
     """Fly the throw with every solver that can."""
     flights = yield ask.solvers.values()
-    return Flown(ask.throw, {name: flights[ask.solvers[name]] for name in (*FLIGHTS, *OTHERS) if name in ask.solvers})
+    names = [name for name in (*FLIGHTS, *OTHERS, *ask.guests) if name in ask.solvers]
+    return Flown(ask.throw, {name: flights[ask.solvers[name]] for name in names}, ask.guests)
 
 
 def solver_row(name: str, made: Made) -> dict[str, Any]:
@@ -143,6 +158,8 @@ def _over_time(
     flights: Sequence[Trajectory], name: str, title: str, *, caption: str, alt: str, column: str, unit: str, label: str
 ) -> Exhibit:
     """Return the figure of one quantity; ``unit`` is that of its differences, in words."""
+    field = "r_cm" if name == "centre-of-mass" else name
+    flights = [run for run in flights if field not in run.diagnostics.get("not_given", ())]
     curves = {run.label: (run.t, values_of(run, name)) for run in flights}
     ends = {label: float(values[-1]) for label, (_, values) in curves.items()}
     angle = name == "theta"
@@ -226,11 +243,7 @@ CHAPTER: Final = Chapter(
     title="The flights",
     study=study,
     figures=figures,
-    page=lambda found: {"rows": found.rows, "drawn": FLIGHTS},
+    page=lambda found: {"rows": found.rows, "drawn": found.shown, "tables": found.tables},
     summary=lambda found: {"solvers": found.rows},
-    tables=lambda found: {
-        f"trajectories/{name}/data.csv": trajectory_csv(made.trajectory)
-        for name, made in found.made.items()
-        if made.trajectory is not None
-    },
+    tables=lambda found: {file: trajectory_csv(found.made[name].flight) for name, file in found.tables.items()},
 )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import cycle
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -12,7 +14,19 @@ from matplotlib.figure import Figure
 from flipproof.chapters.solvers import ENGINE
 from flipproof.curves.order import observed_order
 from flipproof.figures.style import STYLES, new_figure, shared_legend, styled
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged, regression
+from flipproof.frame.chapter import (
+    Ask,
+    Chapter,
+    Claims,
+    Exhibit,
+    Finding,
+    Made,
+    Run,
+    Study,
+    judged,
+    observed,
+    regression,
+)
 from flipproof.output.columns import curves_csv
 from slicemodel import Trajectory
 from slicemodel.trajectory import FloatArray
@@ -35,10 +49,15 @@ class Drift(NamedTuple):
 
 
 class Ice(NamedTuple):
-    """Frozen runs by label: of every solver, and of an engine whose masses joints hold, the step halved twice."""
+    """Frozen runs by label: of every solver, of an engine whose masses joints hold, the step halved twice; of guests.
+
+    ``slugs`` are the guests' names in ids.
+    """
 
     rigid: Mapping[str, Made]
     welded: Mapping[str, Made]
+    guests: Mapping[str, Made] = MappingProxyType({})
+    slugs: Mapping[str, str] = MappingProxyType({})
 
 
 def study(ask: Ask) -> Study[Ice]:
@@ -55,8 +74,13 @@ def study(ask: Ask) -> Study[Ice]:
     for dt in float(times[1]) / np.array([1, 2, 4]) if ask.work else ():
         label = f"{ENGINE} welded, Δt = {dt:.2g} s"
         welded[label] = Run(ENGINE, few, {"ice": "welded", "dt": float(dt), "times": times}, f"ice, {label}")
-    flights = yield [*rigid.values(), *welded.values()]
-    return Ice(*({label: flights[run] for label, run in runs.items()} for runs in (rigid, welded)))
+    asked = {label: guest for label, guest in ask.guests.items() if not guest.curve}
+    guests = {label: guest.run(ice, 0) for label, guest in asked.items()}
+    flights = yield [*rigid.values(), *welded.values(), *guests.values()]
+    rigid_made, welded_made, guests_made = (
+        {label: flights[run] for label, run in runs.items()} for runs in (rigid, welded, guests)
+    )
+    return Ice(rigid_made, welded_made, guests_made, {label: guest.slug for label, guest in asked.items()})
 
 
 def measure(label: str, run: Trajectory) -> Drift:
@@ -72,6 +96,14 @@ def claims(found: Ice) -> Claims:
     if found.welded:
         title = "drift of welded ice"
         yield judged(claim_welded_order, *found.welded.values(), id="ice-welded-order", title=title)
+    for label, made in found.guests.items():
+        id_, title = f"guest-{found.slugs[label]}-ice", f"{label}: drift of ω in ice on this throw"
+        yield judged(observe_ice, id_, title, made, id=id_, title=title)
+
+
+def observe_ice(id_: str, title: str, run: Trajectory) -> Finding:
+    """Of a guest the suite claims it, on another throw."""
+    return observed(id_, title, measure("", run).largest, "of ω₀")
 
 
 def claim_ice(id_: str, title: str, run: Trajectory) -> Finding:
@@ -92,7 +124,7 @@ def claim_welded_order(*runs: Trajectory) -> Finding:
 
 def figures(found: Ice) -> Iterator[Exhibit]:
     """Yield the drifts over time."""
-    runs = {**found.rigid, **found.welded}
+    runs = {**found.rigid, **found.welded, **found.guests}
     drifts = [measure(label, made.flight) for label, made in runs.items() if made.trajectory is not None]
     if not drifts:
         return
@@ -115,7 +147,7 @@ def draw(drifts: Sequence[Drift]) -> Figure:
     """Draw the drifts on a logarithmic scale with a floor; each that is zero gets a line of its own above it."""
     figure, axes = new_figure(size=(8.0, 4.3))
     least = 1e-18  # that is drawn
-    others = iter(("#882255", "#CC79A7", "#E69F00"))
+    others = cycle(("#882255", "#CC79A7", "#E69F00"))
     exact = 0
     for ice in drifts:
         floor = least * 3.0**exact

@@ -92,11 +92,11 @@ def figures(found: tuple[Waterfall, ...]) -> Iterator[Exhibit]:
         f"From there to water as one column, which cannot overlap: {waterfall.overlap:+.3f}.",
         maker=figure_waterfall,
         data=(waterfall,),
-        table=_bars_csv(waterfall),
+        table=bars_csv(waterfall),
     )
 
 
-def _bars_csv(waterfall: Waterfall) -> str:
+def bars_csv(waterfall: Waterfall) -> str:
     """Return every bar in three orders, between the two ends."""
     unit = waterfall.observable.unit
     return rows_csv(
@@ -104,7 +104,7 @@ def _bars_csv(waterfall: Waterfall) -> str:
          f"mean of all orders [{unit}]", f"band of the mean [{unit}]", f"least of all orders [{unit}]",
          f"largest of all orders [{unit}]"),
         (
-            ("(published program)", waterfall.start, None, waterfall.start, waterfall.start, None, None, None),
+            (f"({waterfall.solver})", waterfall.start, None, waterfall.start, waterfall.start, None, None, None),
             *((b.name, b.forward, b.forward_band, b.backward, b.average, b.average_band, b.low, b.high)
               for b in waterfall.bars),
             ("(free flight)", waterfall.end, waterfall.end_band, waterfall.end, waterfall.end, waterfall.end_band,
@@ -122,7 +122,7 @@ def figure_waterfall(waterfall: Waterfall) -> Figure:
     Below, hatched: what forbidding overlap changes, from free flight to the column.
     """
     figure, (ladder, orders) = new_figure(1, 2, size=(8.0, 4.9), sharey=True, width_ratios=(1.5, 1.0))
-    names = ["published program", *(bar.name for bar in waterfall.bars), "free flight"]
+    names = [waterfall.solver, *(bar.name for bar in waterfall.bars), "free flight"]
     places = list(range(len(names), 0, -1))
     ladder.barh(places[0], waterfall.start, color=WHOLE, height=0.6)
     ladder.barh(places[-1], waterfall.end, color=WHOLE, height=0.6, xerr=waterfall.end_band, capsize=3)

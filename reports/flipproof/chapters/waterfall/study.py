@@ -15,9 +15,10 @@ minus free flight is a difference of two models.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from flipproof.frame.equations import NAMES, canonical
@@ -109,7 +110,7 @@ class Waterfall:
 
     ``column`` is the observable of water that cannot overlap, in the margin of the split; ``finer_end`` that of free
     flight at ``FINER`` times the slices, None if that was not computed. ``groupings`` are fair shares in other counts
-    of what is one change, by the names of ``GROUPINGS``.
+    of what is one change, by the names of ``GROUPINGS``. ``solver`` is where the split begins.
     """
 
     observable: Observable
@@ -122,10 +123,11 @@ class Waterfall:
     column: float
     finer_end: float | None = None
     groupings: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    solver: str = "published program"
 
     @property
     def total(self) -> float:
-        """Free flight minus published program."""
+        """Free flight minus the solver."""
         return self.end - self.start
 
     @property
@@ -203,34 +205,12 @@ def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) 
     alike = dict.fromkeys(("forward", "backward", "average", "low", "high"), step)
     alike |= dict.fromkeys(("forward_band", "average_band"), bands[none])
     bars = [Bar(name=STEP, finer=more[none] - observed[finer(program)] if more else None, **alike)]
-    order = list(NAMES)
-    finer_shares = fair_shares(NAMES, lambda made: more[mended(made)]) if more else {}
-    for (k, name), changes in zip(
-        enumerate(order), changes_of(NAMES, lambda made: values[mended(made)]).values(), strict=True
-    ):
-        before, after = order[:k], order[k + 1 :]
-        bars.append(
-            Bar(
-                name=NAMES[name],
-                forward=values[mended([*before, name])] - values[mended(before)],
-                backward=values[mended([*after, name])] - values[mended(after)],
-                average=mean(changes),
-                low=min(change for _, change in changes),
-                high=max(change for _, change in changes),
-                forward_band=bands[mended(before)] + bands[mended([*before, name])],
-                average_band=sum(
-                    weight * (bands[mended(chosen)] + bands[mended([*chosen, name])])
-                    for chosen, weight in sets_before(name, NAMES)
-                ),
-                finer=finer_shares.get(name),
-            )
-        )
-    total = values[everything] - start
-    residual = max(
-        abs(total - sum(getattr(bar, split) for bar in bars)) for split in ("forward", "backward", "average")
+    bars += bars_of(
+        tuple(NAMES),
+        lambda made: values[mended(made)],
+        lambda made: bands[mended(made)],
+        fair_shares(NAMES, lambda made: more[mended(made)]) if more else {},
     )
-    if not residual <= 1e-12 * (1.0 + abs(start) + sum(abs(bar.average) for bar in bars)):
-        raise ArithmeticError(f"{observable.name}: the bars miss the total by {residual:.3g} {observable.unit}")
     return Waterfall(
         observable=observable,
         slices=program.scenario.n_slices,
@@ -238,13 +218,51 @@ def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) 
         end=values[everything],
         end_band=bands[everything],
         bars=tuple(bars),
-        residual=residual,
+        residual=missed_by(bars, start, values[everything]),
         column=observed[column_run(program.scenario)],
         finer_end=more[everything] if more else None,
         groupings={
             words: grouped_shares(groups, lambda made: values[mended(made)]) for words, groups in GROUPINGS.items()
         },
     )
+
+
+def bars_of(
+    order: Sequence[str],
+    value: Callable[[Sequence[str]], float],
+    band: Callable[[Sequence[str]], float],
+    finer_shares: Mapping[str, float] = MappingProxyType({}),
+) -> list[Bar]:
+    """Return a bar an assumption; ``value`` and ``band`` are of the equation in which some of them are mended."""
+    bars = []
+    for k, (name, changes) in enumerate(changes_of(order, value).items()):
+        before, after = order[:k], order[k + 1 :]
+        bars.append(
+            Bar(
+                name=NAMES[name],
+                forward=value([*before, name]) - value(before),
+                backward=value([*after, name]) - value(after),
+                average=mean(changes),
+                low=min(change for _, change in changes),
+                high=max(change for _, change in changes),
+                forward_band=band(before) + band([*before, name]),
+                average_band=sum(
+                    weight * (band(chosen) + band([*chosen, name])) for chosen, weight in sets_before(name, order)
+                ),
+                finer=finer_shares.get(name),
+            )
+        )
+    return bars
+
+
+def missed_by(bars: Sequence[Bar], start: float, end: float) -> float:
+    """Return by how much bars miss the whole; more than round-off raises an ArithmeticError."""
+    residual: float = max(
+        abs(end - start - sum(getattr(bar, split) for bar in bars)) for split in ("forward", "backward", "average")
+    )
+    if not residual <= 1e-12 * (1.0 + abs(start) + sum(abs(bar.average) for bar in bars)):
+        raise ArithmeticError(f"the bars miss the total by {residual:.3g}")
+    return residual
 
 
 def mended(names: Iterable[str]) -> Switches:
