@@ -45,15 +45,15 @@ def first_zero(h: float, gap: tuple[float, float], rate: tuple[float, float]) ->
     kept = 0
     for _ in range(ITERATIONS):
         middle = (low * below - high * above) / (below - above)
-        found = value(middle)
-        if found > 0.0:
-            low, above = middle, found
+        at_middle = value(middle)
+        if at_middle > 0.0:
+            low, above = middle, at_middle
             below = below / 2 if kept == 1 else below
             kept = 1
         else:
-            high, below = middle, found
+            high, below = middle, at_middle
             above = above / 2 if kept == -1 else above
             kept = -1
-        if found == 0.0 or high - low <= RESOLUTION * h:
+        if at_middle == 0.0 or high - low <= RESOLUTION * h:
             break
     return middle

@@ -324,15 +324,15 @@ def _trial(runs: Runs, tolerance: float, dt: float, iterations: int | None) -> t
         return refused("diverged", run.message, _reached(run)), RAISE in run.message
     iterated = (ITERATED,) if iterations is not None else ()
     for role in (DOUBLE, EARLIER, BENT, *iterated):
-        found = _changed(runs, role, run, dt, iterations)
-        if isinstance(found, Trajectory):
-            return refused("diverged", f"{role}: {found.message}", _reached(found)), RAISE in found.message
+        change = _changed(runs, role, run, dt, iterations)
+        if isinstance(change, Trajectory):
+            return refused("diverged", f"{role}: {change.message}", _reached(change)), RAISE in change.message
         limit = tolerance * LIMITS.get(role, 1.0)
         # Written as "not below", because NaN passes every "above" test.
-        beyond = ~(found < limit)
+        beyond = ~(change < limit)
         if beyond.any():
             horizon = float(run.t[beyond.argmax()])
-            words = f"{role} moves omega by {found.max():.2g} omega_0, by {limit:g} or more from t = {horizon:.4g} s"
+            words = f"{role} moves omega by {change.max():.2g} omega_0, by {limit:g} or more from t = {horizon:.4g} s"
             return refused("not-converged", words, horizon), role == ITERATED
     return replace(refused("certified", "", 0.0), horizon=None), False
 

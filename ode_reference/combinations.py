@@ -79,10 +79,10 @@ def acceleration_of(switches: Switches) -> Acceleration:
             common += damping * throw.centre_of_mass_velocity(v)
         if switches.origin:
             common -= _origin(throw, spring, damping, weight, s, v, free)
-        found: FloatArray = s * spring
-        found -= damping * v
-        found += common
-        return found
+        rates: FloatArray = s * spring
+        rates -= damping * v
+        rates += common
+        return rates
 
     return acceleration
 

@@ -137,7 +137,7 @@ def resolve(
     slow = np.where(np.abs(v[touching]) < rest_speed, side, FREE)
     groups = [(end, touching[slow == end]) for end in (BASE, CAP) if end != lets_go and (slow == end).any()]
     none_stays = Outcome(y, y, np.zeros(n, dtype=np.int64))
-    found: Outcome | None = None
+    first: Outcome | None = None
     for choice in list(product((True, False), repeat=len(groups)))[:-1]:
         stays: SideArray = np.zeros(n, dtype=np.int64)
         for (end, members), stay in zip(groups, choice, strict=True):
@@ -148,10 +148,10 @@ def resolve(
         pressed = [end * float(a[members[0]]) >= 0 for end, members in groups]
         if all(push for push, stay in zip(pressed, choice, strict=True) if stay):
             # Rounding at a group that is neither pressed nor pulled can spoil every choice in which all is right.
-            found = found or Outcome(settled, y, stays)
+            first = first or Outcome(settled, y, stays)
             if pressed == list(choice):
                 return Outcome(settled, y, stays)
-    return found or none_stays
+    return first or none_stays
 
 
 def _stuck(v: FloatArray, stays: SideArray, mass_ratio: float) -> FloatArray:

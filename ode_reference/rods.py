@@ -273,8 +273,8 @@ def _states(
     return states, piles, arrival
 
 
-def _fill(piles: Piles, found: Piles, where: Any) -> None:
-    for whole, part in zip(piles, found, strict=True):
+def _fill(piles: Piles, parts: Piles, where: Any) -> None:
+    for whole, part in zip(piles, parts, strict=True):
         whole[where] = part
 
 

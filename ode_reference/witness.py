@@ -112,7 +112,7 @@ def integrate(
 
 Event = Callable[[float, FloatArray], float]
 
-Found = tuple[str, int]
+LocatedEvent = tuple[str, int]
 """What ends a segment: "wall" or "release", and the end."""
 
 
@@ -179,11 +179,11 @@ class _Flight:
             return
         path = segment.sol
         self.counts["steps"] += len(segment.t) - 1
-        found = [name for (name, _), times in zip(watch, segment.t_events, strict=True) if len(times)]
+        events = [name for (name, _), times in zip(watch, segment.t_events, strict=True) if len(times)]
         end, y = float(segment.t[-1]), segment.y[:, -1].copy()
         missed = self._first_missed(segment.t, path)
         if missed is not None:
-            end, found = missed[0], [missed[1]]
+            end, events = missed[0], [missed[1]]
             y = path(end)
         self._record(end, path)
         if self.ledger is not None:
@@ -191,8 +191,8 @@ class _Flight:
                 if stop > begin:
                     self.ledger.smooth(begin, stop, path(nodes(begin, stop)))
         self.t, self.y = end, self._mirrored(y) if self.mirrored else y
-        if found:
-            self._meet(self._struck(found), *(side for kind, side in found if kind == "release"))
+        if events:
+            self._meet(self._struck(events), *(side for kind, side in events if kind == "release"))
         elif segment.status < 0 and not self._overflowed():
             self._stall(segment.message)
 
@@ -230,9 +230,9 @@ class _Flight:
 
     # ------------------------------------------------------------------ events
 
-    def _events(self) -> list[tuple[Found, Event]]:
+    def _events(self) -> list[tuple[LocatedEvent, Event]]:
         """Return what ends a segment that starts now: what it is called, and a function that changes sign there."""
-        events: list[tuple[Found, Event]] = []
+        events: list[tuple[LocatedEvent, Event]] = []
         for side in (BASE, CAP):
             events.append((("wall", side), self._foremost(side)))
             members = np.flatnonzero(self.resting == side)
@@ -267,17 +267,17 @@ class _Flight:
         """Return what falls through zero when the end ``side`` no longer presses; ``member`` speaks for all there."""
         return lambda _, y: side * float(self.motion.acceleration(y, self.motion.free)[1][member])
 
-    def _struck(self, found: list[Found]) -> SideArray:
-        """Return the end that each free slice strikes now, the one that has been found included."""
+    def _struck(self, events: list[LocatedEvent]) -> SideArray:
+        """Return the end that each free slice strikes now, the one that was located included."""
         free, r = ~self.motion.held, self.y[1 : self.n + 1]
         struck = self.ends.struck(self.t, r, self.y[self.n + 1 :], free)
-        for kind, side in found:
+        for kind, side in events:
             if kind == "wall" and not (struck == side).any():
                 # Located there, even if round-off now calls it a hair away from contact or from approach.
                 struck[np.argmax(np.where(free, self.ends.beyond(side, r), -np.inf))] = side
         return struck
 
-    def _first_missed(self, t: FloatArray, path: Callable[[Any], FloatArray]) -> tuple[float, Found] | None:
+    def _first_missed(self, t: FloatArray, path: Callable[[Any], FloatArray]) -> tuple[float, LocatedEvent] | None:
         """Return time and name of the first passage or release in this segment that no event reported, or None.
 
         ``solve_ivp`` looks at events where its steps end. A slice that passes an end and is back inside by then, or
@@ -290,7 +290,7 @@ class _Flight:
         if len(times) < 2 or not times[-1] > times[0]:
             return None
         states, dt = path(times), np.diff(times)
-        passages: list[tuple[float, Found]] = []
+        passages: list[tuple[float, LocatedEvent]] = []
         for side in (BASE, CAP):
             beyond, speed = self.ends.beyond(side, states[1 : n + 1]), side * states[n + 1 :]
             # One that turns back within a part rises by less than its first speed times the part, if it bends inward
@@ -300,8 +300,8 @@ class _Flight:
             out = np.zeros_like(turns)
             out[:, :-1] = beyond[:, 1:-1] > self.ends.reach
             for i, k in np.argwhere((turns | out) & free[:, None]).tolist():
-                found = self._passage(side, i, float(times[k]), float(times[k + 1]), path)
-                passages.append((found, ("wall", side)))
+                time = self._passage(side, i, float(times[k]), float(times[k + 1]), path)
+                passages.append((time, ("wall", side)))
             passages.append((self._lost_push(side, times, states, path), ("release", side)))
         passages = [passage for passage in passages if passage[0] < t[-1]]
         return min(passages, default=None)

@@ -91,15 +91,15 @@ class _Cache(FunctionCache):
     """numba's cache of a function; files that are damaged are thrown away and made again."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        found = None
+        overload = None
         try:
-            found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            overload = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception:  # unpickling raises whatever the damage leads to
             with suppress(OSError):
                 self.flush()  # type: ignore[no-untyped-call]
-        if found is None:
+        if overload is None:
             LOGGER.info("compiling %s", self._py_func.__name__)
-        return found
+        return overload
 
 
 def cache_of_sources(function: Callable[..., Any], elsewhere: tuple[Path, ...]) -> Any:

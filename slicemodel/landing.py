@@ -190,12 +190,12 @@ def touch(trajectory: Trajectory, table: Table) -> Touch:
     scenario, t = trajectory.scenario, trajectory.t
     if len(trajectory.r) != len(t):
         raise ScenarioError("the trajectory holds no slices (stored as a summary): solve it in full")
-    found = landing(trajectory, table.height)
-    if found is None:
+    crossing = landing(trajectory, table.height)
+    if crossing is None:
         raise ScenarioError(
             f"table.height = {table.height:g} m is not reached from above within the flight of {t[-1]:g} s"
         )
-    now = found.moment
+    now = crossing.moment
     k = int(np.clip(np.searchsorted(t, now.time, side="right") - 1, 0, len(t) - 2))
     share = (now.time - t[k]) / (t[k + 1] - t[k])
     r, v = ((1.0 - share) * values[k] + share * values[k + 1] for values in (trajectory.r, trajectory.v))

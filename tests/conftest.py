@@ -57,7 +57,7 @@ def pytest_collection_modifyitems(items):
         made = item._fixtureinfo.name2fixturedefs
         if not made.keys().isdisjoint(("gathered", "folder", "browser")):
             item.add_marker(pytest.mark.xdist_group("evidence"))
-        elif any(found[-1].scope == "module" for found in made.values()):
+        elif any(result[-1].scope == "module" for result in made.values()):
             item.add_marker(pytest.mark.xdist_group(item.path.stem))
 
 

@@ -111,8 +111,8 @@ def test_text_is_cut_by_one_function():
     """A text that is cut at a number of characters ends inside a word; ``shortened`` ends it between two."""
     for file in (file for room in ROOMS for file in files_of(room)):
         for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), start=1):
-            found = re.search(r"(?<!hexdigest\(\))\[:\d\d+\]|\[-\d\d\d+:\]|!r:\.\d", line)
-            assert not found, f"{file.name}, line {number}: {line.strip()}"
+            result = re.search(r"(?<!hexdigest\(\))\[:\d\d+\]|\[-\d\d\d+:\]|!r:\.\d", line)
+            assert not result, f"{file.name}, line {number}: {line.strip()}"
 
 
 @pytest.mark.parametrize("room", ROOMS)

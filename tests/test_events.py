@@ -44,25 +44,25 @@ def test_a_problem_made_again_is_the_frozen_one_within_its_bands(name):
     assert np.all(np.abs(np.subtract(made["omega"], frozen["omega"])) <= frozen["omega_band"][-1])
     theirs = frozen["impacts"]
     rows = list(zip(*(made["impacts"][key] for key in ("time", "slice", "end")), strict=True))
-    found = score.score({**frozen, "impacts": theirs}, lambda _: (rows, made["omega"]))
-    assert found.matched == found.impacts == found.answered
-    assert found.time <= max([1e-12, *theirs["time_band"]])
+    result = score.score({**frozen, "impacts": theirs}, lambda _: (rows, made["omega"]))
+    assert result.matched == result.impacts == result.answered
+    assert result.time <= max([1e-12, *theirs["time_band"]])
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_solve_ivp_finds_every_impact_and_no_other(name):
-    found = score.score(PROBLEMS[name], SOLVE, 1e-12)
-    assert found.matched == found.impacts == found.answered
-    assert found.time < 1e-7
-    assert found.omega < 1e-6
+    result = score.score(PROBLEMS[name], SOLVE, 1e-12)
+    assert result.matched == result.impacts == result.answered
+    assert result.time < 1e-7
+    assert result.omega < 1e-6
 
 
 @pytest.mark.parametrize("name", ["simultaneous-7", "grazing-3", "zeno-1", "resting-3", "chaotic-1"])
 def test_heyoka_finds_every_impact_within_a_picosecond_or_two(name):
     pytest.importorskip("heyoka")
-    found = score.score(PROBLEMS[name], score.adapter(EVENTS / "heyoka_taylor.py"), 1e-15)
-    assert found.matched == found.impacts == found.answered
-    assert found.time < 1e-11
+    result = score.score(PROBLEMS[name], score.adapter(EVENTS / "heyoka_taylor.py"), 1e-15)
+    assert result.matched == result.impacts == result.answered
+    assert result.time < 1e-11
 
 
 @pytest.mark.parametrize(
@@ -70,15 +70,15 @@ def test_heyoka_finds_every_impact_within_a_picosecond_or_two(name):
 )
 def test_diffrax_finds_simultaneous_hits_and_misses_a_faint_one(name, whole):
     pytest.importorskip("diffrax")
-    found = score.score(PROBLEMS[name], score.adapter(EVENTS / "diffrax_event.py"), 1e-13)
-    assert (found.matched == found.impacts == found.answered) is whole
-    assert found.time < 1e-8
+    result = score.score(PROBLEMS[name], score.adapter(EVENTS / "diffrax_event.py"), 1e-13)
+    assert (result.matched == result.impacts == result.answered) is whole
+    assert result.time < 1e-8
 
 
 @pytest.mark.parametrize("name", ["grazing-1", "grazing-3"])
 def test_a_solver_that_looks_only_between_steps_misses_the_faint_hit(name):
-    found = score.score(PROBLEMS[name], partial(SOLVE, turns=False), 1e-13)
-    assert found.matched < found.impacts
+    result = score.score(PROBLEMS[name], partial(SOLVE, turns=False), 1e-13)
+    assert result.matched < result.impacts
 
 
 def test_answers_that_are_wrong_lose_their_points():

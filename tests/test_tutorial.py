@@ -45,10 +45,10 @@ def test_the_fit_finds_the_throw_and_the_equation(lesson):
     assert best["explains"]
     assert not other["explains"]
     assert best["evidence"] - other["evidence"] > 30
-    found = {parameter["name"]: parameter for parameter in best["parameters"]}
-    assert found["gamma"]["value"] == pytest.approx(5.0, rel=0.1, abs=0.0)
-    assert found["omega0"]["value"] == pytest.approx(20.0, rel=0.03, abs=0.0)
+    result = {parameter["name"]: parameter for parameter in best["parameters"]}
+    assert result["gamma"]["value"] == pytest.approx(5.0, rel=0.1, abs=0.0)
+    assert result["omega0"]["value"] == pytest.approx(20.0, rel=0.03, abs=0.0)
     # A millimetre explains it, as the page says.
-    assert found["noise"]["low"] < 1e-3 < found["noise"]["high"]
+    assert result["noise"]["low"] < 1e-3 < result["noise"]["high"]
     # One estimate, whichever command is asked.
     assert track["fits"][0]["parameters"] == best["parameters"]

@@ -57,15 +57,15 @@ def fly(
         r[0] = scenario.initial_positions() + moved  # to the last digit, as output at release
     # Impacts of one instant in the order of the slices.
     impacts = Impacts(*hits[np.lexsort((hits[:, 2], hits[:, 0]))].T[1:])
-    found: dict[str, Any] = {name: int(now[name]) for name in ("steps", "impacts", "rests", "releases")}
-    found |= {"evaluations": found["steps"], "grazes": grazes(impacts, float(now.rest_speed))}
-    found["opposite_hits"] = opposite_hits(impacts)
-    found |= {name: float(now[name]) for name in ("largest_snap", "wronskian_error", "inertia_error")}
+    counters: dict[str, Any] = {name: int(now[name]) for name in ("steps", "impacts", "rests", "releases")}
+    counters |= {"evaluations": counters["steps"], "grazes": grazes(impacts, float(now.rest_speed))}
+    counters["opposite_hits"] = opposite_hits(impacts)
+    counters |= {name: float(now[name]) for name in ("largest_snap", "wronskian_error", "inertia_error")}
     if now.ledger:
         ledger = {name: float(now[f"work_{name}"]) for name in layout.WORKS}
         initial, final = float(now.initial), float(now.final)
         residual = final - initial - sum(ledger.values())
-        found["energy"] = {"initial": initial, "final": final, **ledger, "residual": residual}
+        counters["energy"] = {"initial": initial, "final": final, **ledger, "residual": residual}
     return Trajectory(
         scenario=scenario,
         solver="ode_reference",
@@ -82,7 +82,7 @@ def fly(
         message=message(now, scenario, settings["model"], impacts),
         reason=messages.STIFF if now.status == STALLED and is_stiff(now, scenario, impacts) else "",
         settings=settings,
-        diagnostics=found,
+        diagnostics=counters,
     )
 
 

@@ -43,11 +43,11 @@ def simultaneous(now, points, row, e):
             if (1.0 + e) * x - end * gained > 0.0:
                 total += points[COUNT, k] * end * (1.0 + e) * x
                 pushed += points[COUNT, k]
-        found = now.ratio * total / (1.0 + now.ratio * pushed)
-        if found == gained:
+        updated = now.ratio * total / (1.0 + now.ratio * pushed)
+        if updated == gained:
             break
-        low, high = (gained, high) if found > gained else (low, gained)
-        gained = found if low < found < high else 0.5 * (low + high)
+        low, high = (gained, high) if updated > gained else (low, gained)
+        gained = updated if low < updated < high else 0.5 * (low + high)
     for k in range(now.hits):
         end, x = points[END, k], points[row, k]
         points[AFTER, k] = -e * x if (1.0 + e) * x - end * gained > 0.0 else min(x - end * gained, 0.0)

@@ -20,10 +20,10 @@ A, B, Z, THETA, OMEGA, SQUARE, J, FORCE, PULL, U_A, V_B, COS, SIN, SHARE = range
 @inner
 def product(table, first, second, k):
     """Return the coefficient k of the product of two rows."""
-    found = 0.0
+    total = 0.0
     for j in range(k + 1):
-        found += table[first, j] * table[second, k - j]
-    return found
+        total += table[first, j] * table[second, k - j]
+    return total
 
 
 @inner
@@ -80,11 +80,11 @@ def expand(now, table, h):
 @inner
 def value(table, row, order, x):
     """Return the polynomial in a row at ``x``, a fraction of the step, and its derivative with respect to ``x``."""
-    found = slope = 0.0
+    power_sum = slope = 0.0
     for k in range(order, -1, -1):
-        slope = slope * x + found
-        found = found * x + table[row, k]
-    return found, slope
+        slope = slope * x + power_sum
+        power_sum = power_sum * x + table[row, k]
+    return power_sum, slope
 
 
 @inner

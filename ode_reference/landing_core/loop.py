@@ -41,7 +41,7 @@ def land(q, s, w, dt, longest, fly, world, every, record):
     x, y, pn, pt = np.empty(n), np.empty(n), np.empty(4), np.empty(4)
     q1, s1, w1 = np.empty(6), np.empty(n), np.empty(n)
     near = world.touching * 2 * world.half
-    found = LOCATED * 2 * world.half
+    tolerance = LOCATED * 2 * world.half
     t, rise = 0.0, 0.0
     steps, impacts, unresolved, bounces = 0, 0, 0, 0
     aloft, still = False, 0
@@ -99,7 +99,7 @@ def land(q, s, w, dt, longest, fly, world, every, record):
             gaps(s1, q1, world, late)
             again, crossed, until = False, False, h
             for k in range(count):
-                if closed[k] or late[k] >= -found or late[k] >= gap[k]:
+                if closed[k] or late[k] >= -tolerance or late[k] >= gap[k]:
                     continue
                 if gap[k] <= near:
                     closed[k] = True
@@ -124,7 +124,7 @@ def land(q, s, w, dt, longest, fly, world, every, record):
                         least = min(least, late[k])
                         if ahead[k] < 0.0:
                             early = min(early, late[k] / -ahead[k])
-                if abs(least) <= found or high - low < 1e-15:
+                if abs(least) <= tolerance or high - low < 1e-15:
                     break
                 if least > 0.0:
                     low = h

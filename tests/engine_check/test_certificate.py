@@ -26,8 +26,8 @@ LIGHT = replace(
 """Few slices that rest on the ends at high omega: the engine lets them creep at order dt."""
 
 
-def roles(found):
-    return [level.role for level in found.history]
+def roles(result):
+    return [level.role for level in result.history]
 
 
 @pytest.fixture(scope="module")
@@ -101,49 +101,49 @@ def free_flight(scenario):
     ids=["light", "light, dry", "pair", "ten, dry"],
 )
 def test_certified_runs_are_free_flight_within_their_bands(scenario):
-    found = certify(scenario, times=TIMES)
-    assert found.ok, found.reason
+    verdict = certify(scenario, times=TIMES)
+    assert verdict.ok, verdict.reason
     exact, band = free_flight(scenario)
-    error = np.abs(found.trajectory.omega - exact) / scenario.omega0
+    error = np.abs(verdict.trajectory.omega - exact) / scenario.omega0
     assert np.max(error) <= 3e-3
-    assert np.mean(error <= found.band + band) >= 0.95
+    assert np.mean(error <= verdict.band + band) >= 0.95
 
 
 def test_creep_of_resting_slices_is_refined_away_by_the_step_alone():
     """(1 - e) / (2 (1 + e)) omega^2 |r - L/2| dt: at 1e-4 s omega is 0.9 % off, at the certified step 0.2 %."""
-    found = certify(LIGHT, times=TIMES)
-    assert found.ok
-    assert found.settings["dt"] <= 2e-5
-    assert found.settings["iterations"] == 50
-    assert found.order == pytest.approx(1.0, abs=0.15)
+    verdict = certify(LIGHT, times=TIMES)
+    assert verdict.ok
+    assert verdict.settings["dt"] <= 2e-5
+    assert verdict.settings["iterations"] == 50
+    assert verdict.order == pytest.approx(1.0, abs=0.15)
     exact, _ = free_flight(LIGHT)
-    assert np.mean(np.abs(found.richardson - exact)) < np.mean(np.abs(found.trajectory.omega - exact)) / 5
+    assert np.mean(np.abs(verdict.richardson - exact)) < np.mean(np.abs(verdict.trajectory.omega - exact)) / 5
 
 
 def test_impacts_that_share_a_step_are_not_certified_away():
     """Dry, N = 20, e = 0.35: two impacts at 0.1283 s lie 6e-6 s apart; no halving at 1e-5 s shows that they swap."""
     dry = replace(Scenario(restitution=0.35).with_slices(20), drag=0.0)
-    found = certify(dry, times=TIMES, levels=2)
-    assert found.status == "not-converged"
-    assert found.horizon is not None
-    assert found.horizon < 0.25
+    verdict = certify(dry, times=TIMES, levels=2)
+    assert verdict.status == "not-converged"
+    assert verdict.horizon is not None
+    assert verdict.horizon < 0.25
     exact, band = free_flight(dry)
-    error = np.abs(found.trajectory.omega - exact) / dry.omega0
+    error = np.abs(verdict.trajectory.omega - exact) / dry.omega0
     assert np.max(error) > 3e-3
-    assert np.mean(error <= found.band + band) >= 0.95
-    assert "moves omega" in found.reason
+    assert np.mean(error <= verdict.band + band) >= 0.95
+    assert "moves omega" in verdict.reason
 
 
 def test_an_exchange_of_impacts_that_half_the_step_does_not_show_is_seen_by_another_bottle():
     """Dry, N = 20, e = 0: halving 1.25e-4 s changes 1e-3 omega_0, yet both steps are off by 2.6e-3 from 0.34 s on."""
     dry = replace(Scenario(restitution=0.0).with_slices(20), drag=0.0)
-    found = certify(dry, times=TIMES, levels=2)
-    half = [level.change for level in found.history if level.role == "on trial"][-1]
+    verdict = certify(dry, times=TIMES, levels=2)
+    half = [level.change for level in verdict.history if level.role == "on trial"][-1]
     exact, band = free_flight(dry)
-    error = np.abs(found.trajectory.omega - exact) / dry.omega0
+    error = np.abs(verdict.trajectory.omega - exact) / dry.omega0
     assert half < 0.6 * np.max(error)
     assert np.max(error) <= 3e-3
-    assert np.mean(error <= found.band + band) >= 0.95
+    assert np.mean(error <= verdict.band + band) >= 0.95
 
 
 def test_impacts_that_every_step_answers_in_the_wrong_order_widen_the_band():
@@ -151,13 +151,13 @@ def test_impacts_that_every_step_answers_in_the_wrong_order_widen_the_band():
     bottle = Bottle(length=0.309, radius=0.03, mass=0.043, capacity=1.0)
     throw = Scenario(bottle=bottle, water_mass=0.35, n_slices=7, drag=0.0, restitution=0.2, omega0=26.8, duration=0.26)
     times = np.linspace(0.0, 0.26, 201)
-    found = certify(throw, times=times)
-    assert found.ok, found.reason
+    verdict = certify(throw, times=times)
+    assert verdict.ok, verdict.reason
     exact = ode_reference.solve(throw, model="free-flight", times=times).omega
-    error = np.abs(found.trajectory.omega - exact) / throw.omega0
-    assert error.max() > 3 * found.tolerance
-    assert np.mean(error <= found.band) >= 0.95
-    assert SHAKEN in found.to_mapping()["band_reason"]
+    error = np.abs(verdict.trajectory.omega - exact) / throw.omega0
+    assert error.max() > 3 * verdict.tolerance
+    assert np.mean(error <= verdict.band) >= 0.95
+    assert SHAKEN in verdict.to_mapping()["band_reason"]
 
 
 def test_a_grid_moved_by_half_a_step_is_as_exact_until_it_answers_a_hit_at_another_time():
@@ -175,22 +175,22 @@ def test_a_grid_moved_by_half_a_step_is_as_exact_until_it_answers_a_hit_at_anoth
 
 def test_a_run_beside_it_that_diverged_leaves_no_band(monkeypatch):
     monkeypatch.setattr(Runs, "shake", lambda self, *_: replace(self.known(*_), message="it burst"))
-    found = certify(SHORT, times=[0.0, 0.02])
-    assert np.isnan(found.largest_band)
-    assert "it burst" in found.to_mapping()["band_reason"]
+    verdict = certify(SHORT, times=[0.0, 0.02])
+    assert np.isnan(verdict.largest_band)
+    assert "it burst" in verdict.to_mapping()["band_reason"]
 
 
 def test_a_change_that_is_not_a_number_is_not_below_the_tolerance(monkeypatch):
     monkeypatch.setattr(Runs, "apart", lambda *_: np.array([math.nan]))
-    found = certify(SHORT, times=[0.0, 0.02], levels=1)
-    assert found.status == "not-converged"
-    assert "moves omega by nan" in found.reason
+    verdict = certify(SHORT, times=[0.0, 0.02], levels=1)
+    assert verdict.status == "not-converged"
+    assert "moves omega by nan" in verdict.reason
 
 
 def test_a_change_that_vanishes_faster_than_any_order_is_not_trusted():
-    found = certify(replace(Scenario().with_slices(10), drag=0.0), times=TIMES, levels=1)
-    assert found.status == "not-converged"
-    assert found.reason.startswith(EARLIER)
+    verdict = certify(replace(Scenario().with_slices(10), drag=0.0), times=TIMES, levels=1)
+    assert verdict.status == "not-converged"
+    assert verdict.reason.startswith(EARLIER)
 
 
 def test_without_impact_or_error_the_order_is_not_observable_and_says_why():
@@ -217,21 +217,21 @@ def test_a_run_that_diverges_is_recorded_and_iterations_are_refined_past_it(monk
     """Seeded: an eighth of the iterations that are enough."""
     fifty = replace(Scenario().with_slices(50), duration=0.04)
     monkeypatch.setattr(engine_pymunk, "enough_iterations", lambda _scenario: 16)
-    found = certify(fifty, times=np.linspace(0.0, 0.04, 41), levels=8)
-    assert found.ok, found.reason
-    assert found.settings["iterations"] >= 32
-    failed = [level for level in found.history if level.status == "diverged"]
+    verdict = certify(fifty, times=np.linspace(0.0, 0.04, 41), levels=8)
+    assert verdict.ok, verdict.reason
+    assert verdict.settings["iterations"] >= 32
+    failed = [level for level in verdict.history if level.status == "diverged"]
     assert failed
     assert all(level.message and level.change is None for level in failed)
 
 
 def test_a_budget_that_ends_is_a_result():
-    found = certify(LIGHT, times=TIMES, levels=1)
-    assert found.status == "not-converged"
-    assert found.reason.startswith(DOUBLE)
-    assert found.horizon is not None
-    assert 0.0 < found.horizon < 0.5
-    assert len(found.trajectory.t) == len(TIMES)
+    verdict = certify(LIGHT, times=TIMES, levels=1)
+    assert verdict.status == "not-converged"
+    assert verdict.reason.startswith(DOUBLE)
+    assert verdict.horizon is not None
+    assert 0.0 < verdict.horizon < 0.5
+    assert len(verdict.trajectory.t) == len(TIMES)
 
 
 def test_coarsest_steps_divide_the_output_interval():
@@ -304,9 +304,9 @@ def speed_at_the_end():
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_every_engine_returns_e_times_the_known_speed(engine):
-    found = measure_restitution(engine)
-    assert len(found) == 10
-    for rebound in found:
+    result = measure_restitution(engine)
+    assert len(result) == 10
+    for rebound in result:
         assert rebound.speed_in == pytest.approx(speed_at_the_end(), rel=3e-3, abs=0.0)
         assert rebound.measured == pytest.approx(rebound.asked, abs=5e-5 if rebound.asked else 3e-3)
         assert rebound.holds
@@ -383,11 +383,11 @@ def test_a_fault_that_passes_the_read_back_is_refused_by_the_certificate(seed, f
     throw = replace(TEN, duration=0.05)
     assert certify(throw, times=TIMES[:26], levels=2).ok
     seed(fault)
-    found = certify(throw, times=TIMES[:26], levels=2)
+    verdict = certify(throw, times=TIMES[:26], levels=2)
     status, words = FAULTS[fault]
-    assert found.status == status, found.reason
-    assert re.search(words, found.reason), found.reason
-    json.dumps(found.to_mapping(), allow_nan=False)
+    assert verdict.status == status, verdict.reason
+    assert re.search(words, verdict.reason), verdict.reason
+    json.dumps(verdict.to_mapping(), allow_nan=False)
 
 
 def caps_not_in_the_space(world):

@@ -59,13 +59,13 @@ def free_flight(scenario, free, resting, times):
 
 
 def errors(runs, reference, slices):
-    found = {}
+    results = {}
     for name, exact in reference.items():
         values = [getattr(run, name) for run in runs]
         if name in "rv":
             values = [value[:, slices] for value in values]
-        found[name] = np.array([np.max(np.abs(value - exact)) for value in values])
-    return found
+        results[name] = np.array([np.max(np.abs(value - exact)) for value in values])
+    return results
 
 
 def assert_order(error, order, within):
@@ -113,10 +113,10 @@ def test_a_pair_with_one_slice_resting_on_the_base(restitution, drag, order, wit
     resting, free = scenario.initial_positions()
     reference = free_flight(scenario, [free], [resting], times)
     runs = [solve(scenario, dt=dt, times=times) for dt in STEPS]
-    found = errors(runs, reference, slice(1, 2))
+    result = errors(runs, reference, slice(1, 2))
     for name in ("theta", "omega"):
-        assert_order(found[name], order, within)
-    assert found["omega"][-1] < (1e-5 if order == 2 else 1e-2)
+        assert_order(result[name], order, within)
+    assert result["omega"][-1] < (1e-5 if order == 2 else 1e-2)
 
 
 def test_the_centre_of_mass_flies_a_parabola(afloat):

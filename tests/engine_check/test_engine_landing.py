@@ -157,11 +157,11 @@ def test_ice_in_the_engine_lies_as_in_the_reference():
 def test_a_mirrored_touch_lands_as_its_mirror_image(law):
     """A bottle that slides to the left stands on the table as one that slides to the right does."""
     for tilt, omega, velocity in ((0.05, 1.0, (1.0, -0.5)), (0.1, 0.5, (1.0, -0.3))):
-        found = []
+        results = []
         for side in (1, -1):
             start = at_rest(replace(WATER, n_slices=3), side * tilt, side * omega, (side * velocity[0], velocity[1]))
-            found.append(landed(World(start, FLAT, 2e-4, law, "exclude"), start.scenario, 2e-4))
-        right, left = found
+            results.append(landed(World(start, FLAT, 2e-4, law, "exclude"), start.scenario, 2e-4))
+        right, left = results
         assert (left.outcome, left.time) == (right.outcome, right.time)
         assert left.slid == pytest.approx(-right.slid, rel=1e-7, abs=0)
 
@@ -222,8 +222,8 @@ def test_near_an_edge_between_outcomes_the_engine_certifies_nothing_false(law):
         middle = (low + high) / 2
         low, high = (middle, high) if truth(middle) == ends[k] else (low, middle)
     for factor in (low - 0.03, low - 2e-3, high + 2e-3, high + 0.04):
-        found = engine_check.land(replace(start, omega=factor * start.omega), FLAT, dt=STEP, law=law)
-        assert found.outcome in (truth(factor), "undecided")
+        result = engine_check.land(replace(start, omega=factor * start.omega), FLAT, dt=STEP, law=law)
+        assert result.outcome in (truth(factor), "undecided")
     assert not engine_check.land(replace(start, omega=middle * start.omega), FLAT, dt=STEP, law=law).decided
 
 

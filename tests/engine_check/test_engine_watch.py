@@ -79,10 +79,10 @@ def residuals(state):
 
 
 def test_an_exact_state_has_no_residual():
-    found = residuals(rigid(FIFTY))
-    assert set(found) == set(BANDS)
-    assert max(found.values()) < 1e-13
-    assert watch.broken(found, 0.5) == ""
+    result = residuals(rigid(FIFTY))
+    assert set(result) == set(BANDS)
+    assert max(result.values()) < 1e-13
+    assert watch.broken(result, 0.5) == ""
 
 
 def moved(state, row, along, across):
@@ -110,14 +110,14 @@ def kicked(state, row, amount):
     ],
 )
 def test_each_fault_leaves_its_own_band(fault, name):
-    found = residuals(fault(rigid(FIFTY)))
-    assert not found[name] <= BANDS[name].limit
-    assert watch.broken({**dict.fromkeys(BANDS, 0.0), name: found[name]}, 0.5).startswith(name.replace("_", " "))
+    result = residuals(fault(rigid(FIFTY)))
+    assert not result[name] <= BANDS[name].limit
+    assert watch.broken({**dict.fromkeys(BANDS, 0.0), name: result[name]}, 0.5).startswith(name.replace("_", " "))
 
 
 def test_a_slice_past_the_middle_of_a_cap_has_tunnelled():
-    found = residuals(moved(rigid(FIFTY), 1, 0.1, 0.0))
-    assert "tunnelled" in watch.broken({**dict.fromkeys(BANDS, 0.0), "penetration": found["penetration"]}, 0.5)
+    result = residuals(moved(rigid(FIFTY), 1, 0.1, 0.0))
+    assert "tunnelled" in watch.broken({**dict.fromkeys(BANDS, 0.0), "penetration": result["penetration"]}, 0.5)
 
 
 def test_thin_caps_are_tunnelled_and_the_run_says_so(monkeypatch):

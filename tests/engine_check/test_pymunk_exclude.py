@@ -258,15 +258,15 @@ def test_a_full_bottle_of_eight_slices_is_ice_at_the_papers_restitution():
 def test_a_full_bottle_drifts_at_first_order_by_its_creep(restitution):
     """J grows by 2 s dr at both ends: d omega / omega = - 2 creep m sum |s| / J, J that of bottle and water."""
     scenario = full(4, restitution)
-    found = [drift(scenario, dt=dt) for dt in (2e-4, 1e-4, 5e-5)]
-    ratios = np.array(found[:-1]) / found[1:]
-    assert np.all(np.abs(ratios - 2.0) < 0.1), (found, ratios)
+    result = [drift(scenario, dt=dt) for dt in (2e-4, 1e-4, 5e-5)]
+    ratios = np.array(result[:-1]) / result[1:]
+    assert np.all(np.abs(ratios - 2.0) < 0.1), (result, ratios)
     reach = scenario.r_max - scenario.bottle.length / 2
     creep = (1 - restitution) / (2 * (1 + restitution)) * scenario.omega0**2 * reach * 5e-5 * 0.5
     s = np.abs(scenario.initial_positions() - scenario.bottle.length / 2)
     tube = scenario.bottle.mass * (scenario.bottle.radius**2 / 2 + scenario.bottle.length**2 / 12)
     inertia = tube + scenario.slice_mass * float(s @ s)
-    assert found[-1] == pytest.approx(2 * creep * scenario.slice_mass * s.sum() / inertia, rel=0.1, abs=0.0)
+    assert result[-1] == pytest.approx(2 * creep * scenario.slice_mass * s.sum() / inertia, rel=0.1, abs=0.0)
 
 
 def test_overlap_is_what_slows_the_papers_full_bottle():
@@ -279,13 +279,13 @@ def test_overlap_is_what_slows_the_papers_full_bottle():
 
 def assert_first_order(scenario, omega, times, steps, rate=FIRST_ORDER, **settings):
     """The largest |omega - exact| / |omega_0| is within ``rate`` times the step, and falls with it."""
-    found = []
+    results = []
     for dt in steps:
         run = solve(scenario, times=times, slices="exclude", dt=dt, **settings)
         assert run.ok, run.message
-        found.append(float(np.max(np.abs(run.omega - omega))) / abs(scenario.omega0))
-        assert found[-1] < rate * dt, (dt, found)
-    assert found[-1] < 0.5 * found[0], found
+        results.append(float(np.max(np.abs(run.omega - omega))) / abs(scenario.omega0))
+        assert results[-1] < rate * dt, (dt, results)
+    assert results[-1] < 0.5 * results[0], results
 
 
 @pytest.mark.parametrize(("n", "water_mass"), [(2, 0.5), (2, 0.9), (3, 0.5), (5, 0.5), (10, 0.3)])

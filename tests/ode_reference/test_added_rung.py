@@ -47,13 +47,13 @@ def register(monkeypatch):
 
 def test_the_rung_flies_by_default_as_its_own_right_hand_side_is_integrated(rung, register):
     name = register(rung)
-    found, own = (ode_reference.solve(THROW, name, TIMES, method=method) for method in ("taylor", "DOP853"))
-    assert found.ok
+    result, own = (ode_reference.solve(THROW, name, TIMES, method=method) for method in ("taylor", "DOP853"))
+    assert result.ok
     assert own.ok
-    assert len(found.impacts) > 10
-    np.testing.assert_allclose(found.omega, own.omega, rtol=0, atol=1e-6 * THROW.omega0)
+    assert len(result.impacts) > 10
+    np.testing.assert_allclose(result.omega, own.omega, rtol=0, atol=1e-6 * THROW.omega0)
     drags = ode_reference.solve(THROW, "eq8-wall", TIMES)
-    assert np.abs(found.omega - drags.omega).max() > 0.01 * THROW.omega0
+    assert np.abs(result.omega - drags.omega).max() > 0.01 * THROW.omega0
 
 
 OTHERS = [s for s in Switches.every() if replace(s, drag_on_centre=False, recoil=False) != Switches(roots=True)]
@@ -192,8 +192,8 @@ def test_a_drag_law_of_ones_own_is_flown_without_being_registered_and_never_by_t
     # One slice alone, thrown outward: integrated here by another method, before it strikes.
     one = Scenario(n_slices=1, water_mass=0.05)
     times = np.linspace(0.0, 0.02, 21)
-    found = ode_reference.solve(one, law, times, method="DOP853")
+    run = ode_reference.solve(one, law, times, method="DOP853")
     other = ode_reference.solve(one, law, times, method="Radau", rtol=1e-9, max_step=1e-3)
-    np.testing.assert_allclose(found.omega, other.omega, rtol=0, atol=1e-7 * one.omega0)
+    np.testing.assert_allclose(run.omega, other.omega, rtol=0, atol=1e-7 * one.omega0)
     with pytest.raises(ValueError, match="quadratic-drag"):
         ode_reference.solve(THROW, law)

@@ -92,11 +92,11 @@ def flown_without_numba(fault, model):
     return json.loads(done.stdout)
 
 
-def agrees(found, reference):
+def agrees(result, reference):
     """Return whether a list of impacts is that of the reference: slices, ends, times to 1e-8 s."""
-    time, slices, ends = (np.array(column) for column in found["hits"])
+    time, slices, ends = (np.array(column) for column in result["hits"])
     hits = reference.impacts
-    if found["status"] != "ok" or len(time) != len(hits):
+    if result["status"] != "ok" or len(time) != len(hits):
         return False
     same = np.array_equal(slices, hits.slice) and np.array_equal(ends, hits.end)
     return bool(same and np.abs(time - hits.time).max() < 1e-8)
@@ -112,10 +112,10 @@ def integrated():
 
 @pytest.mark.parametrize("model", THROWS)
 def test_a_sound_flow_has_the_impacts_of_the_integration(model, integrated):
-    found = flown_without_numba("none", model)
-    assert agrees(found, integrated[model])
+    result = flown_without_numba("none", model)
+    assert agrees(result, integrated[model])
     compiled = solve(THROWS[model], model)
-    np.testing.assert_allclose(found["hits"][0], compiled.impacts.time, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(result["hits"][0], compiled.impacts.time, rtol=0, atol=1e-10)
 
 
 @pytest.mark.parametrize(

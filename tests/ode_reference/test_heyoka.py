@@ -19,7 +19,7 @@ def test_heyoka_finds_the_impacts_of_the_reduced_flow(monkeypatch, model):
     from heyoka_witness import fly
 
     case = Case(Scenario().with_slices(4), model)
-    found, ours = fly(case), flow(case)
-    assert len(found.impacts) == len(ours.impacts) > 15
-    assert first_parting(found, ours) == ""
-    assert found.omega == pytest.approx(ours.omega[-1], rel=1e-11, abs=0.0)
+    result, ours = fly(case), flow(case)
+    assert len(result.impacts) == len(ours.impacts) > 15
+    assert first_parting(result, ours) == ""
+    assert result.omega == pytest.approx(ours.omega[-1], rel=1e-11, abs=0.0)

@@ -16,10 +16,10 @@ BAND = 1e-7
 PAPER = [("eq8", 20), ("eq8", 50), ("published-limit", 20), ("published-limit", 50)]
 
 
-def largest_difference(found, reference):
-    assert found.ok, found.message
+def largest_difference(result, reference):
+    assert result.ok, result.message
     assert reference.ok, reference.message
-    return np.abs(found.omega - reference.omega).max() / abs(reference.scenario.omega0)
+    return np.abs(result.omega - reference.omega).max() / abs(reference.scenario.omega0)
 
 
 @pytest.mark.parametrize(("model", "n_slices"), PAPER)
@@ -102,13 +102,13 @@ def test_final_omega_of_the_papers_throw(paper_runs, model, omega):
 
 @pytest.mark.parametrize("rest_speed", [1e-4, 1e-5, 1e-6, 1e-7])
 def test_hard_case_keeps_all_its_impacts(hard_scenario, rest_speed):
-    found = solve(hard_scenario, rest_speed=rest_speed)
-    assert found.omega[-1] == pytest.approx(15.947334, abs=5e-7)
+    flight = solve(hard_scenario, rest_speed=rest_speed)
+    assert flight.omega[-1] == pytest.approx(15.947334, abs=5e-7)
     # The rest speed decides how many of the last, faint bounces are made, and never how many loud ones.
-    assert (found.impacts.speed_before > 1e-3).sum() == 116
+    assert (flight.impacts.speed_before > 1e-3).sum() == 116
 
 
 def test_hard_case_with_unbounded_steps_loses_no_impact(hard_scenario):
-    found = solve(hard_scenario, method="DOP853", rtol=1e-9, max_step=hard_scenario.duration)
-    assert found.omega[-1] == pytest.approx(15.947334, abs=1e-6)
-    assert (found.impacts.speed_before > 1e-3).sum() == 116
+    flight = solve(hard_scenario, method="DOP853", rtol=1e-9, max_step=hard_scenario.duration)
+    assert flight.omega[-1] == pytest.approx(15.947334, abs=1e-6)
+    assert (flight.impacts.speed_before > 1e-3).sum() == 116

@@ -29,13 +29,13 @@ def by_definition(scenario, r, v, omega):
 @pytest.mark.parametrize("model", LADDER)
 def test_ledger_closes_and_agrees_with_the_energy_by_definition(model, law):
     scenario = Scenario().with_slices(20)
-    found = solve(scenario, model, impact_law=law, energy=True)
-    ledger = found.diagnostics["energy"]
+    flight = solve(scenario, model, impact_law=law, energy=True)
+    ledger = flight.diagnostics["energy"]
     assert set(ledger) == {"initial", "final", "residual", *WORKS}
     assert abs(ledger["residual"]) < 1e-9 * ledger["initial"]
     for key, k in (("initial", 0), ("final", -1)):
         assert ledger[key] == pytest.approx(
-            by_definition(scenario, found.r[k], found.v[k], found.omega[k]), rel=1e-12, abs=0.0
+            by_definition(scenario, flight.r[k], flight.v[k], flight.omega[k]), rel=1e-12, abs=0.0
         )
     assert ledger["impacts"] < 0.0
     if model == "free-flight":
@@ -74,22 +74,22 @@ def test_what_the_ladder_mends_is_what_the_ledger_no_longer_books():
 @pytest.mark.parametrize("law", LAWS)
 def test_free_flight_without_loss_keeps_its_energy(law):
     scenario = Scenario(n_slices=12, drag=0.0, restitution=1.0)
-    found = solve(scenario, "free-flight", impact_law=law, rest_speed=1e-8, energy=True)
-    ledger = found.diagnostics["energy"]
-    assert found.ok
-    assert len(found.impacts) > 30
+    flight = solve(scenario, "free-flight", impact_law=law, rest_speed=1e-8, energy=True)
+    ledger = flight.diagnostics["energy"]
+    assert flight.ok
+    assert len(flight.impacts) > 30
     assert ledger["final"] == pytest.approx(ledger["initial"], rel=1e-9, abs=0.0)
     assert abs(ledger["impacts"]) < 1e-9 * ledger["initial"]
 
 
 def test_drag_takes_alpha_times_the_square_of_every_speed_along_the_wall():
     scenario = Scenario(duration=0.02).with_slices(20)
-    found = solve(scenario, "free-flight", energy=True, times=np.linspace(0, 0.02, 4001))
-    power = scenario.drag * (found.v**2).sum(axis=1)
-    assert found.diagnostics["energy"]["drag"] == pytest.approx(-np.trapezoid(power, found.t), rel=1e-5, abs=0.0)
+    flight = solve(scenario, "free-flight", energy=True, times=np.linspace(0, 0.02, 4001))
+    power = scenario.drag * (flight.v**2).sum(axis=1)
+    assert flight.diagnostics["energy"]["drag"] == pytest.approx(-np.trapezoid(power, flight.t), rel=1e-5, abs=0.0)
 
 
 def test_without_being_asked_no_ledger_is_kept():
-    found = solve(Scenario(duration=0.05, n_slices=5))
-    assert "energy" not in found.diagnostics
-    assert found.settings["energy"] is False
+    flight = solve(Scenario(duration=0.05, n_slices=5))
+    assert "energy" not in flight.diagnostics
+    assert flight.settings["energy"] is False

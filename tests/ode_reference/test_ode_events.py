@@ -124,8 +124,8 @@ def test_slice_that_turns_twice_within_one_step_is_found_at_its_first_contact():
 
 def test_the_earliest_of_several_is_returned_even_if_another_is_deeper():
     times = [math.sqrt(0.2), (1 - math.sqrt(1 - 0.36)) / 1.8, (1 - math.sqrt(1 - 4 * 6.2 * 0.04)) / 12.4]
-    found = first_wall([0.5, 0.0, 2.0], [0.8, 1.0, -0.9], [0.14, -1.0, 6.2], stop=0.9)
-    assert found == (pytest.approx(min(times), abs=BLUR), 2)
+    result = first_wall([0.5, 0.0, 2.0], [0.8, 1.0, -0.9], [0.14, -1.0, 6.2], stop=0.9)
+    assert result == (pytest.approx(min(times), abs=BLUR), 2)
     assert int(np.argmin(times)) == 2
 
 
@@ -224,29 +224,29 @@ def test_resting_slice_is_released_at_once_when_an_impact_turns_the_push_around(
 def test_first_slice_is_released_at_once_when_nothing_presses_it():
     # Upside down and slow: gravity pulls every slice to the cap from the first instant on.
     scenario = Scenario(n_slices=5, theta0=math.pi, omega0=3.0, drag=0.1, duration=0.1)
-    found = solve(scenario)
-    assert np.all(found.r[-1] < scenario.initial_positions() - 1e-3)
-    assert found.diagnostics["rests"] == 0
+    flight = solve(scenario)
+    assert np.all(flight.r[-1] < scenario.initial_positions() - 1e-3)
+    assert flight.diagnostics["rests"] == 0
 
 
 def test_full_bottle_rests_at_both_ends_from_the_start():
     # With twelve slices round-off leaves the last one 5e-17 m short of the cap: contact all the same, not an impact.
     scenario = Scenario(water_mass=1.0, n_slices=12, drag=0.1, gravity=0.0, duration=0.05)
-    found = solve(scenario)
-    np.testing.assert_allclose(found.r[:, 0], scenario.r_max, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(found.r[:, -1], scenario.r_min, rtol=0, atol=1e-15)
-    np.testing.assert_array_equal(found.v[:, [0, -1]], 0.0)
-    assert not np.isin(found.impacts.slice, [0, 11]).any()
+    flight = solve(scenario)
+    np.testing.assert_allclose(flight.r[:, 0], scenario.r_max, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(flight.r[:, -1], scenario.r_min, rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(flight.v[:, [0, -1]], 0.0)
+    assert not np.isin(flight.impacts.slice, [0, 11]).any()
 
 
 def test_rebounds_accumulate_rest_and_are_released_again(paper_runs):
-    found = paper_runs("eq8", 50)
-    assert found.diagnostics["rests"] > 5
-    assert found.diagnostics["releases"] > 5
-    assert found.diagnostics["largest_snap"] < 1e-15
-    for hit in list(found.impacts):
+    result = paper_runs("eq8", 50)
+    assert result.diagnostics["rests"] > 5
+    assert result.diagnostics["releases"] > 5
+    assert result.diagnostics["largest_snap"] < 1e-15
+    for hit in list(result.impacts):
         assert hit.speed_after in (0.0, pytest.approx(0.5 * hit.speed_before, rel=1e-14, abs=0.0))
-    assert np.all(np.diff(found.impacts.time) >= 0)
+    assert np.all(np.diff(result.impacts.time) >= 0)
 
 
 scenarios = st.builds(
@@ -268,12 +268,12 @@ def test_no_slice_is_ever_outside_and_every_impact_obeys_the_law(scenario, model
     settings = {"method": "DOP853", "max_step": None if bounded else 0.3} if integrated else {}
     # With e = 1 and strong drag slices hop faster and faster: a few thousand impacts of such a run are enough.
     with patch.multiple(ode_reference.witness, WATCH=10_000, STEP_LIMIT=2_000):
-        found = solve(scenario, model, times=np.linspace(0, 0.3, 200), **settings)
-    assert found.status in ("ok", "stalled")
-    assert found.ok or "chatter" in found.message
-    assert found.r.min() >= scenario.r_min - 1e-12
-    assert found.r.max() <= scenario.r_max + 1e-12
-    hits = found.impacts
+        flight = solve(scenario, model, times=np.linspace(0, 0.3, 200), **settings)
+    assert flight.status in ("ok", "stalled")
+    assert flight.ok or "chatter" in flight.message
+    assert flight.r.min() >= scenario.r_min - 1e-12
+    assert flight.r.max() <= scenario.r_max + 1e-12
+    hits = flight.impacts
     stuck = hits.speed_after == 0.0
     if model != "free-flight":  # where the end may run away from a slice, or be run into twice
         np.testing.assert_allclose(
@@ -281,5 +281,5 @@ def test_no_slice_is_ever_outside_and_every_impact_obeys_the_law(scenario, model
         )
         assert np.all(scenario.restitution * hits.speed_before[stuck] < 1e-5)
     # With recoil slices that strike within a small distance of each other strike together.
-    assert found.diagnostics["largest_snap"] < (1e-12 if model == "free-flight" else 1e-13)
-    np.testing.assert_allclose(found.omega * found.inertia, found.omega[0] * found.inertia[0], rtol=1e-14)
+    assert flight.diagnostics["largest_snap"] < (1e-12 if model == "free-flight" else 1e-13)
+    np.testing.assert_allclose(flight.omega * flight.inertia, flight.omega[0] * flight.inertia[0], rtol=1e-14)

@@ -69,7 +69,7 @@ def test_smooth_motion_is_that_of_beads_on_a_tube_that_falls_through_the_lab(gra
     )
     first = solve(scenario, "free-flight").impacts.time[0]
     times = np.linspace(0.0, 0.95 * first, 20)
-    found = solve(scenario, "free-flight", times=times)
+    flight = solve(scenario, "free-flight", times=times)
     n, angle, spin = 3, scenario.theta0, scenario.omega0
     along, across = np.array([np.sin(angle), -np.cos(angle)]), np.array([np.cos(angle), np.sin(angle)])
     places = [*scenario.initial_positions(), scenario.bottle.length / 2]
@@ -84,13 +84,13 @@ def test_smooth_motion_is_that_of_beads_on_a_tube_that_falls_through_the_lab(gra
         rtol=1e-11,
         atol=1e-13,
     )
-    np.testing.assert_allclose(found.theta, path.y[2 * n + 2], rtol=0, atol=1e-9)
-    np.testing.assert_allclose(found.omega, path.y[-1], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(flight.theta, path.y[2 * n + 2], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(flight.omega, path.y[-1], rtol=0, atol=1e-8)
     for p, angle in enumerate(path.y[2 * n + 2]):
         along = np.array([np.sin(angle), -np.cos(angle)])
         tube = path.y[2 * n : 2 * n + 2, p]
         lab = [along @ (path.y[2 * i : 2 * i + 2, p] - tube) + scenario.bottle.length / 2 for i in range(n)]
-        np.testing.assert_allclose(found.r[p], lab, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(flight.r[p], lab, rtol=0, atol=1e-9)
 
 
 def impulses(x, side, e, ratio):
@@ -214,9 +214,9 @@ def test_an_independent_program_agrees_through_impacts_rests_and_releases(law, n
     times = np.linspace(0.0, 0.25, 26)
     other = omega_by_tube_and_slices(scenario, times, law, 1e-3)
     for method in ("taylor", "DOP853"):
-        found = solve(scenario, "free-flight", times, method=method, impact_law=law, rest_speed=1e-3)
-        assert len(found.impacts) >= 1
-        np.testing.assert_allclose(found.omega, other, rtol=0, atol=1e-9 * 20.0)
+        flight = solve(scenario, "free-flight", times, method=method, impact_law=law, rest_speed=1e-3)
+        assert len(flight.impacts) >= 1
+        np.testing.assert_allclose(flight.omega, other, rtol=0, atol=1e-9 * 20.0)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -236,10 +236,10 @@ def test_momentum_is_kept_at_every_event_of_a_run(law, monkeypatch):
 
     real = ode_reference.witness.resolve
     monkeypatch.setattr(ode_reference.witness, "resolve", watched)
-    found = solve(scenario, "free-flight", method="DOP853", impact_law=law)
+    flight = solve(scenario, "free-flight", method="DOP853", impact_law=law)
     assert len(seen) > 200
     assert max(seen) < 1e-12
-    spin = found.omega * found.inertia
+    spin = flight.omega * flight.inertia
     np.testing.assert_allclose(spin, spin[0], rtol=1e-13)
 
 

@@ -21,7 +21,7 @@ def by_enumeration(x, side, e, ratio):
     """All solutions of the complementarity problem, as impulses per slice mass, one linear system per active set."""
     k = len(x)
     matrix = np.eye(k) + ratio * np.outer(side, side)
-    found = []
+    results = []
     for active in product((False, True), repeat=k):
         on = np.array(active)
         p = np.zeros(k)
@@ -30,8 +30,8 @@ def by_enumeration(x, side, e, ratio):
         w = matrix @ p - (1 + e) * x
         scale = 1e-12 * (1 + np.abs(x).max())
         if np.all(p >= -scale) and np.all(w >= -scale):
-            found.append(p)
-    return found
+            results.append(p)
+    return results
 
 
 def kinetic(x, side, tube, ratio):

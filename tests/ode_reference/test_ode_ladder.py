@@ -90,14 +90,14 @@ def test_the_mean_of_twins_converges_within_the_band_of_free_flight(law):
 @pytest.mark.parametrize(("law", "omega"), [("simultaneous", 7.4761), ("sequential", 3.3151)])
 def test_two_slices_tell_the_impact_laws_apart(law, omega):
     scenario = Scenario(n_slices=2, drag=0.0, duration=0.3)
-    found = [
+    result = [
         solve(scenario, "free-flight", method="DOP853", impact_law=law, rtol=rtol, rest_speed=rest, times=[0.3]).omega[
             0
         ]
         for rtol, rest in ((1e-10, 1e-3), (1e-12, 1e-6))
     ]
-    assert found[0] == pytest.approx(found[1], rel=1e-9, abs=0.0)
-    assert found[1] == pytest.approx(omega, abs=5e-5)
+    assert result[0] == pytest.approx(result[1], rel=1e-9, abs=0.0)
+    assert result[1] == pytest.approx(omega, abs=5e-5)
 
 
 @pytest.mark.arithmetic
@@ -112,8 +112,8 @@ def test_free_flight_of_the_papers_throw_ends_where_the_engines_end(law):
     # After half of the impacts the flights are still the same, and so are the two methods: by then a change of omega_0
     # has grown four-hundredfold, and so has the error of a step.
     for method in ({}, {"method": "DOP853", "rtol": 1e-12}):
-        found = solve(Scenario().with_slices(50), "free-flight", [0.15], **method, impact_law=law)
-        assert found.omega[0] == pytest.approx(5.382677, abs=1e-6)
+        flight = solve(Scenario().with_slices(50), "free-flight", [0.15], **method, impact_law=law)
+        assert flight.omega[0] == pytest.approx(5.382677, abs=1e-6)
 
 
 FILLINGS = (0.1, 0.25, 0.5, 0.75, 1.0)
@@ -131,23 +131,23 @@ PLATEAUS_WITH_RECOIL = {
 
 
 def plateau(fill, model, **options):
-    found = solve(Scenario(water_mass=fill, n_slices=100, drag=0.1 * fill), model, **options)
-    assert found.ok, found.message
-    return observables.plateau(found.t, found.omega, 20.0)
+    flight = solve(Scenario(water_mass=fill, n_slices=100, drag=0.1 * fill), model, **options)
+    assert flight.ok, flight.message
+    return observables.plateau(flight.t, flight.omega, 20.0)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("model", PLATEAUS)
 def test_plateau_at_five_fillings_without_recoil(model):
-    found = [plateau(fill, model) for fill in FILLINGS]
-    np.testing.assert_allclose(found, PLATEAUS[model], rtol=0, atol=5e-4)
+    result = [plateau(fill, model) for fill in FILLINGS]
+    np.testing.assert_allclose(result, PLATEAUS[model], rtol=0, atol=5e-4)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_plateau_at_five_fillings_with_recoil(law):
-    found = [plateau(fill, "free-flight", impact_law=law) for fill in FILLINGS]
-    np.testing.assert_allclose(found, PLATEAUS_WITH_RECOIL[law], rtol=0, atol=3e-3)
+    result = [plateau(fill, "free-flight", impact_law=law) for fill in FILLINGS]
+    np.testing.assert_allclose(result, PLATEAUS_WITH_RECOIL[law], rtol=0, atol=3e-3)
 
 
 @pytest.mark.parametrize("model", ["eq8-weightless", "free-flight"])

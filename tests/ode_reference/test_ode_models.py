@@ -107,10 +107,10 @@ def test_manufactured_solution_is_recovered(model):
         return derivative
 
     r, v, _ = made(0.0)
-    found = solve_ivp(forced, (0.0, 0.2), [0.7, *r, *v], method="DOP853", rtol=1e-11, atol=1e-13)
+    result = solve_ivp(forced, (0.0, 0.2), [0.7, *r, *v], method="DOP853", rtol=1e-11, atol=1e-13)
     r, v, _ = made(0.2)
-    np.testing.assert_allclose(found.y[1:7, -1], r, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(found.y[7:, -1], v, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(result.y[1:7, -1], r, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(result.y[7:, -1], v, rtol=0, atol=1e-9)
 
 
 def test_centre_of_mass_and_inertia_agree_with_the_shared_definitions():

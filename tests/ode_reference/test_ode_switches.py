@@ -68,21 +68,21 @@ def test_a_name_that_states_no_switches_is_refused(name):
 @pytest.mark.parametrize("switches", Switches.every(), ids=lambda s: s.name)
 def test_every_combination_runs_and_closes_its_energy_ledger(switches):
     scenario = Scenario(n_slices=8, drag=0.625, duration=0.25)
-    found = pickle.loads(pickle.dumps(solve(scenario, switches, times=[0.1, 0.25], energy=True)))
-    assert found.ok, found.message
-    assert found.method == found.settings["model"] == switches.name
-    again = solve(scenario, **found.settings, times=[0.1, 0.25])
-    np.testing.assert_array_equal(again.r, found.r)
-    ledger = found.diagnostics["energy"]
+    result = pickle.loads(pickle.dumps(solve(scenario, switches, times=[0.1, 0.25], energy=True)))
+    assert result.ok, result.message
+    assert result.method == result.settings["model"] == switches.name
+    again = solve(scenario, **result.settings, times=[0.1, 0.25])
+    np.testing.assert_array_equal(again.r, result.r)
+    ledger = result.diagnostics["energy"]
     assert abs(ledger["residual"]) < 1e-9 * ledger["initial"]
 
 
 @pytest.mark.parametrize("name", LADDER)
 def test_a_rung_and_its_switches_make_the_same_run(name):
     scenario = Scenario(n_slices=8, drag=0.625, duration=0.25)
-    found, general = solve(scenario, name), solve(scenario, MODELS[name].switches)
-    np.testing.assert_allclose(general.omega, found.omega, rtol=1e-7)
-    assert abs(len(general.impacts) - len(found.impacts)) <= 2
+    result, general = solve(scenario, name), solve(scenario, MODELS[name].switches)
+    np.testing.assert_allclose(general.omega, result.omega, rtol=1e-7)
+    assert abs(len(general.impacts) - len(result.impacts)) <= 2
 
 
 def test_switches_without_effect_make_no_difference():
@@ -113,5 +113,5 @@ def test_origin_is_newtons_law_for_the_tube(switches, held):
     on_tube = throw.bottle_mass * spring * (throw.half_length - r_cm) + sum(m * rub * v[i] for i in range(6))
     body = (on_tube + sum(on_slice[i] for i in held)) / (throw.bottle_mass + m * len(held))
     expected = [force / m - body for force in on_slice]
-    found = model_of(switches).acceleration(throw, theta, omega, s, v, free)
-    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-10)
+    result = model_of(switches).acceleration(throw, theta, omega, s, v, free)
+    np.testing.assert_allclose(result, expected, rtol=1e-10, atol=1e-10)

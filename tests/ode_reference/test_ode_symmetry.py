@@ -26,21 +26,21 @@ def full_bottle(n_slices, restitution, damping_rate):
 @pytest.mark.parametrize("n_slices", [4, 5, 12, 21])
 def test_a_full_bottle_stays_its_own_mirror_image(n_slices, restitution, damping_rate):
     scenario = full_bottle(n_slices, restitution, damping_rate)
-    found = solve(scenario, "free-flight", times=np.linspace(0.0, 0.5, 101))
-    assert found.ok, found.message
-    assert np.abs(found.r + found.r[:, ::-1] - scenario.bottle.length).max() < 1e-9
-    assert len(found.impacts) >= 2
+    flight = solve(scenario, "free-flight", times=np.linspace(0.0, 0.5, 101))
+    assert flight.ok, flight.message
+    assert np.abs(flight.r + flight.r[:, ::-1] - scenario.bottle.length).max() < 1e-9
+    assert len(flight.impacts) >= 2
     # Every impact has its image at the other end, and both count as one instant.
-    instants = np.concatenate([[0.0], found.impacts.time])
-    assert found.diagnostics["opposite_hits"] == np.count_nonzero(np.diff(instants) > TOGETHER)
-    assert np.count_nonzero(found.impacts.end == 1) * 2 == len(found.impacts)
+    instants = np.concatenate([[0.0], flight.impacts.time])
+    assert flight.diagnostics["opposite_hits"] == np.count_nonzero(np.diff(instants) > TOGETHER)
+    assert np.count_nonzero(flight.impacts.end == 1) * 2 == len(flight.impacts)
 
 
 @pytest.mark.parametrize(("n_slices", "restitution", "omega"), [(4, 1.0, 14.744493), (20, 0.9, 12.387855)])
 def test_a_full_bottle_without_drag_ends_where_independent_programs_end(n_slices, restitution, omega):
     # A Taylor integrator and a rigid-body engine; hits split into two instants end at 16.2836 and 11.9385.
-    found = solve(full_bottle(n_slices, restitution, 0.0), "free-flight", times=[0.5])
-    assert found.omega[0] == pytest.approx(omega, abs=6e-7)
+    flight = solve(full_bottle(n_slices, restitution, 0.0), "free-flight", times=[0.5])
+    assert flight.omega[0] == pytest.approx(omega, abs=6e-7)
 
 
 @pytest.mark.parametrize("method", ["taylor", "DOP853"])
@@ -55,19 +55,19 @@ def test_a_full_bottle_stays_its_own_mirror_image_for_many_turns(method, n_slice
     rad/s by "taylor", with every check passed.
     """
     scenario = replace(full_bottle(n_slices, 1.0, 0.0), duration=duration)
-    found = solve(scenario, "free-flight", times=np.linspace(0.0, duration, 11), method=method)
-    assert found.ok, found.message
-    assert found.omega[-1] == pytest.approx(omega, abs=1e-10 if method == "taylor" else 2e-6)
-    assert len(found.impacts) == impacts == 2 * found.diagnostics["opposite_hits"]
-    assert np.abs(found.r + found.r[:, ::-1] - scenario.bottle.length).max() < 1e-13
+    flight = solve(scenario, "free-flight", times=np.linspace(0.0, duration, 11), method=method)
+    assert flight.ok, flight.message
+    assert flight.omega[-1] == pytest.approx(omega, abs=1e-10 if method == "taylor" else 2e-6)
+    assert len(flight.impacts) == impacts == 2 * flight.diagnostics["opposite_hits"]
+    assert np.abs(flight.r + flight.r[:, ::-1] - scenario.bottle.length).max() < 1e-13
 
 
 @pytest.mark.parametrize("method", ["taylor", "DOP853"])
 def test_the_sequential_law_breaks_the_symmetry_of_a_full_bottle(method):
     """Of two slices that strike together the first one strikes first; both methods keep to that."""
     scenario = full_bottle(6, 0.9, 0.0)
-    found = solve(scenario, "free-flight", times=[0.5], impact_law="sequential", method=method)
-    assert abs(found.r + found.r[:, ::-1] - scenario.bottle.length).max() > 1e-3
+    flight = solve(scenario, "free-flight", times=[0.5], impact_law="sequential", method=method)
+    assert abs(flight.r + flight.r[:, ::-1] - scenario.bottle.length).max() > 1e-3
 
 
 def test_instants_at_which_both_ends_are_struck_are_counted():

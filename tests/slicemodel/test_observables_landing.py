@@ -163,34 +163,34 @@ def upright_flight(tilt=0.0):
 
 def test_landing_time_of_an_upright_bottle_by_hand():
     # Its base starts at y = -1 and moves by 10 t - 5 t^2: level with the release again at t = 2.
-    found = landings.landing(upright_flight(), -1.0)
-    assert found.moment.time == pytest.approx(2.0, abs=1e-8)
-    assert found.end == "base"
-    assert found.moment.v_cm_lab == pytest.approx((1.0, -10.0))
-    assert found.moment.upright
-    assert found.moment.margin == pytest.approx(math.atan(0.1 / 0.3))
+    outcome = landings.landing(upright_flight(), -1.0)
+    assert outcome.moment.time == pytest.approx(2.0, abs=1e-8)
+    assert outcome.end == "base"
+    assert outcome.moment.v_cm_lab == pytest.approx((1.0, -10.0))
+    assert outcome.moment.upright
+    assert outcome.moment.margin == pytest.approx(math.atan(0.1 / 0.3))
     # A table 3 m above the base at release: 10 t - 5 t^2 = 3 on the way down.
-    found = landings.landing(upright_flight(), 2.0)
-    assert found.moment.time == pytest.approx(1 + math.sqrt(0.4), abs=1e-8)
+    outcome = landings.landing(upright_flight(), 2.0)
+    assert outcome.moment.time == pytest.approx(1 + math.sqrt(0.4), abs=1e-8)
 
 
 def test_tilted_bottle_lands_on_its_rim():
     tilt = 0.2
-    found = landings.landing(upright_flight(tilt), -1.0)
+    outcome = landings.landing(upright_flight(tilt), -1.0)
     lowest = -math.cos(tilt) - 0.1 * math.sin(tilt)  # of the rim at release; its axis passes through O
     drop = lowest + 1.0
-    assert found.moment.time == pytest.approx(1 + math.sqrt(1 + drop / 5.0), abs=1e-8)
-    assert found.moment.margin == pytest.approx(math.atan(0.1 / 0.3) - tilt)
-    assert found.moment.upright
+    assert outcome.moment.time == pytest.approx(1 + math.sqrt(1 + drop / 5.0), abs=1e-8)
+    assert outcome.moment.margin == pytest.approx(math.atan(0.1 / 0.3) - tilt)
+    assert outcome.moment.upright
     assert not landings.landing(upright_flight(0.4), -1.0).moment.upright
     assert not landings.landing(upright_flight(-0.4), -1.0).moment.upright
 
 
 def test_bottle_that_comes_down_on_its_cap_does_not_stand():
-    found = landings.landing(upright_flight(math.pi), -1.0)
-    assert found.end == "cap"
-    assert not found.moment.upright
-    assert found.moment.margin < -math.pi / 2
+    outcome = landings.landing(upright_flight(math.pi), -1.0)
+    assert outcome.end == "cap"
+    assert not outcome.moment.upright
+    assert outcome.moment.margin < -math.pi / 2
 
 
 def test_table_out_of_reach():
@@ -202,5 +202,5 @@ def test_table_out_of_reach():
 
 def test_bottle_released_below_the_table_rises_over_it_first():
     # Its base starts at y = -1, 0.2 m below the table: up through it, and down at 10 t - 5 t^2 = 0.2.
-    found = landings.landing(upright_flight(), -0.8)
-    assert found.moment.time == pytest.approx(1 + math.sqrt(1 - 0.04), abs=1e-8)
+    outcome = landings.landing(upright_flight(), -0.8)
+    assert outcome.moment.time == pytest.approx(1 + math.sqrt(1 - 0.04), abs=1e-8)

@@ -16,9 +16,9 @@ def valley(points: int) -> tuple[np.ndarray, np.ndarray]:
 
 def test_the_papers_average_takes_as_many_points_on_either_side():
     t = np.arange(7.0)
-    found = plateau_of_points(t, np.array([20.0, 12.0, 6.0, 2.0, 4.0, 8.0, 10.0]), 20.0, points=3)
-    assert found.level == pytest.approx((6.0 + 2.0 + 4.0) / 3 / 20.0)
-    assert (found.begin, found.end) == (2.0, 4.0)
+    result = plateau_of_points(t, np.array([20.0, 12.0, 6.0, 2.0, 4.0, 8.0, 10.0]), 20.0, points=3)
+    assert result.level == pytest.approx((6.0 + 2.0 + 4.0) / 3 / 20.0)
+    assert (result.begin, result.end) == (2.0, 4.0)
     assert PLATEAU_POINTS >= 20
 
 
@@ -38,9 +38,9 @@ def test_its_level_depends_on_the_grid_and_the_other_does_not():
     assert by_points[0] == pytest.approx(0.2 + 0.01 * 110 / 21)
     assert by_points[1] == pytest.approx(0.2 + 0.001 * 110 / 21)
     by_width = [plateau_of_width(*valley(n), 1.0, 0.1) for n in (11, 101, 1001)]
-    for found in by_width[1:]:
-        assert found.level == pytest.approx(0.2 + 0.1 / 4)
-        assert (found.begin, found.end) == (pytest.approx(0.55), pytest.approx(0.65))
+    for result in by_width[1:]:
+        assert result.level == pytest.approx(0.2 + 0.1 / 4)
+        assert (result.begin, result.end) == (pytest.approx(0.55), pytest.approx(0.65))
     assert by_width[0].level == pytest.approx(0.225)
 
 
@@ -49,9 +49,9 @@ def test_the_window_may_be_wider_than_a_spacing_and_as_wide_as_the_flight():
     omega = np.array([4.0, 1.0, 4.0])
     assert plateau_of_width(t, omega, 2.0, 2.0).level == pytest.approx((1.25 + 3.75) / 2.0 / 2.0)
     # Of width 1 the edges stand at equal omega: left by a, right by 3a of the bottom, a = 1/4.
-    found = plateau_of_width(t, omega, 2.0, 1.0)
-    assert found.begin == pytest.approx(0.25)
-    assert found.level == pytest.approx(1.75 / 2.0)
+    result = plateau_of_width(t, omega, 2.0, 1.0)
+    assert result.begin == pytest.approx(0.25)
+    assert result.level == pytest.approx(1.75 / 2.0)
     for width in (0.0, -1.0, 2.1, float("nan")):
         with pytest.raises(ValueError, match=r"width = .* s is outside \(0, 2\] s"):
             plateau_of_width(t, omega, 2.0, width)
@@ -74,9 +74,9 @@ def test_it_takes_the_lower_mean_and_not_the_lower_point():
 def test_no_window_of_that_width_has_a_lower_mean(values, share):
     t = np.cumsum(1.0 + 0.3 * np.sin(np.arange(len(values))))
     width = share * (t[-1] - t[0])
-    found = plateau_of_width(t, values, 1.0, width)
-    assert found.begin >= t[0] - 1e-12
-    assert found.end <= t[-1] + 1e-9
+    result = plateau_of_width(t, values, 1.0, width)
+    assert result.begin >= t[0] - 1e-12
+    assert result.end <= t[-1] + 1e-9
     fine = np.union1d(np.linspace(t[0], t[-1], 4001), t)
     curve = np.interp(fine, t, values)
     area = np.concatenate(([0.0], np.cumsum(np.diff(fine) * (curve[1:] + curve[:-1]) / 2)))
@@ -84,8 +84,8 @@ def test_no_window_of_that_width_has_a_lower_mean(values, share):
     means = (np.interp(starts + width, fine, area) - np.interp(starts, fine, area)) / width
     # Between points of the fine grid its integral is a chord, high or low by at most this much.
     chord = 10.0 * (fine[1] - fine[0]) / width
-    assert found.level <= means.min() + chord
-    assert found.level >= means.min() - 0.1
+    assert result.level <= means.min() + chord
+    assert result.level >= means.min() - 0.1
 
 
 @settings(deadline=None, derandomize=True, max_examples=60)
