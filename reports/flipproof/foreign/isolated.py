@@ -17,7 +17,7 @@ import selectors
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -101,9 +101,7 @@ class Isolated(Runner):
             raise ForeignError(f"{self.spec}: {error}") from None
         return traits
 
-    def _exchange(
-        self, header: dict[str, Any], arrays: dict[str, Any], limit: float, most: int
-    ) -> tuple[dict[str, Any], dict[str, Any]]:
+    def _exchange(self, header: dict[str, Any], arrays: dict[str, Any], limit: float, most: int) -> Frame:
         """Send one frame and return the one that comes back within ``limit`` seconds."""
         process = self._process
         assert process is not None
@@ -116,7 +114,7 @@ class Isolated(Runner):
                 ready.register(process.stdin, selectors.EVENT_WRITE)
                 for stream in (process.stdout, process.stderr):
                     ready.register(stream, selectors.EVENT_READ)  # type: ignore[arg-type]
-                while not whole(answer, most):
+                while (received := parsed(answer, most)) is None:
                     dead = process.poll() is not None
                     left = deadline - time.monotonic()
                     if left <= 0:
@@ -141,7 +139,7 @@ class Isolated(Runner):
                             self._printed = (self._printed + part)[-KEPT:]
                         else:
                             answer += part
-            return receive(io.BytesIO(answer), most)
+                return received
         except (BrokenFrameError, OSError, MemoryError) as error:
             how = self._ending(error)
             self.close()
@@ -172,7 +170,7 @@ def refuse_built_in(name: str) -> None:
 
 def serve() -> None:
     """Call one solver for the asks that come in, and send its checked answers, until the other side goes away."""
-    inbox = os.fdopen(os.dup(0), "rb")
+    inbox = functools.partial(os.read, os.dup(0))
     outbox = os.fdopen(os.dup(1), "wb")
     empty = os.open(os.devnull, os.O_RDONLY)
     os.dup2(empty, 0)
@@ -227,6 +225,10 @@ class BrokenFrameError(EOFError):
     """The other side went away, or sent what is no frame; the message says which."""
 
 
+Frame = tuple[dict[str, Any], dict[str, FloatArray]]
+"""A header, and arrays by name."""
+
+
 def send(stream: BinaryIO, header: Mapping[str, Any], arrays: Mapping[str, FloatArray]) -> None:
     """Write one frame."""
     shapes = {name: list(array.shape) for name, array in arrays.items()}
@@ -238,48 +240,35 @@ def send(stream: BinaryIO, header: Mapping[str, Any], arrays: Mapping[str, Float
     stream.flush()
 
 
-def whole(received: bytearray, most: int) -> bool:
-    """Return whether a frame has come to its end, or is none: ``receive`` says which."""
-    if len(received) < 8:
-        return False
+def receive(read: Callable[[int], bytes], most: int) -> Frame:
+    """Read one frame of at most ``most`` bytes of numbers; raises BrokenFrameError."""
+    received = bytearray()
+    while (frame := parsed(received, most)) is None:
+        part = read(1 << 20)
+        if not part:
+            raise BrokenFrameError("the stream ended")
+        received += part
+    return frame
+
+
+def parsed(received: bytearray, most: int) -> Frame | None:
+    """Return the frame that bytes hold, None if it has not come to its end; raises BrokenFrameError if it is none."""
     size = int.from_bytes(received[:8], "little")
     if size > 1 << 20:
-        return True
-    if len(received) < 8 + size:
-        return False
-    try:
-        shapes = json.loads(received[8 : 8 + size])["arrays"].values()
-        counts = [math.prod(int(k) for k in shape) for shape in shapes]
-    except (ValueError, KeyError, AttributeError, TypeError, RecursionError):
-        return True
-    return min(counts, default=0) < 0 or 8 * sum(counts) > most or len(received) >= 8 + size + 8 * sum(counts)
-
-
-def receive(stream: BinaryIO, most: int) -> tuple[dict[str, Any], dict[str, FloatArray]]:
-    """Read one frame of at most ``most`` bytes of numbers; raises BrokenFrameError."""
-    size = int.from_bytes(_exactly(stream, 8), "little")
-    if size > 1 << 20:
         raise BrokenFrameError("what came is no frame")
+    if len(received) < 8 + max(size, 1):
+        return None
     try:
-        header = json.loads(_exactly(stream, size))
+        header = json.loads(received[8 : 8 + size])
         shapes = {str(name): tuple(int(k) for k in shape) for name, shape in header.pop("arrays").items()}
     except (ValueError, KeyError, AttributeError, TypeError, RecursionError):
         raise BrokenFrameError("what came is no frame") from None
-    sizes = {name: 8 * int(np.prod(shape, dtype=np.int64)) for name, shape in shapes.items()}
-    if min(sizes.values(), default=0) < 0 or sum(sizes.values()) > most:
+    counts = {name: math.prod(shape) for name, shape in shapes.items()}
+    if any(k < 0 for shape in shapes.values() for k in shape) or 8 * sum(counts.values()) > most:
         raise BrokenFrameError(f"the answer is larger than {most} bytes")
-    arrays = {
-        name: np.frombuffer(_exactly(stream, sizes[name]), dtype="<f8").reshape(shape) for name, shape in shapes.items()
-    }
-    return header, arrays
-
-
-def _exactly(stream: BinaryIO, count: int) -> bytes:
-    parts = []
-    while count:
-        part = stream.read(min(count, 1 << 24))
-        if not part:
-            raise BrokenFrameError("the stream ended")
-        parts.append(part)
-        count -= len(part)
-    return b"".join(parts)
+    at = 8 + size
+    if len(received) < at + 8 * sum(counts.values()):
+        return None
+    numbers = np.frombuffer(bytes(received[at:]), dtype="<f8", count=sum(counts.values()))
+    parts = np.split(numbers, np.cumsum(list(counts.values()))[:-1])
+    return header, {name: part.reshape(shapes[name]) for name, part in zip(shapes, parts, strict=False)}
