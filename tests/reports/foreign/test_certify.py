@@ -378,6 +378,23 @@ def test_what_an_impact_spoils_is_named_as_the_impacts():
     assert result_of("inputs", Subject, restitution=lambda s, _, side: s.e * (side > 0)).verdict == PASSED
 
 
+def test_a_rest_that_holds_too_long_is_seen_and_named():
+    held = replace(
+        patches("right")["eq8_as_switches"],
+        base="eq8",
+        changes=(
+            (
+                "            if after < -1e-7:\n",
+                "            self.lifted = getattr(self, 'lifted', self.t) if after < -1e-7 else self.t + used\n"
+                "            if after < -1e-7 and self.t + used - self.lifted >= 0.007:\n",
+            ),
+        ),
+    )
+    (result,) = certify(InProcess(held.solver(), "x"), ["equation"]).results
+    assert result.verdict == FAILED
+    assert "look at when slices rest on an end and weight lifts them" in result.line
+
+
 def test_throws_are_drawn_anew_by_a_seed():
     assert drawn(1) == drawn(1) != drawn(2)
     for seed in range(10):
