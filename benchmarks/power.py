@@ -81,15 +81,16 @@ def main() -> int:
     """Print a line a mistake and the rate of each list."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("words", nargs="*")
+    parser.add_argument("--lists", nargs="+", choices=LISTS, default=list(LISTS), help="these alone, in this order")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     options = parser.parse_args()
     places = [
         (group, name)
-        for group, planted in LISTS.items()
-        for name, one in planted.items()
+        for group in options.lists
+        for name, one in LISTS[group].items()
         if not options.words or any(word in f"{name} {words_of(one)}" for word in options.words)
     ]
-    seen: dict[str, list[bool]] = {group: [] for group in LISTS}
+    seen: dict[str, list[bool]] = {group: [] for group in options.lists}
     wrong = 0
     with ProcessPoolExecutor(options.jobs) as pool:
         for (group, name), (check, line, seconds) in zip(places, pool.map(judged, places), strict=True):
