@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -14,16 +15,41 @@ from slicemodel import Scenario
 THROW = Scenario(omega0=-12.0, theta0=0.7).with_slices(4)
 
 
-def read_back(folder):
-    return subprocess.run([sys.executable, str(folder / "readback.py"), "mujoco"], capture_output=True, text=True)
+def read_back(folder, engine="mujoco"):
+    return subprocess.run([sys.executable, str(folder / "readback.py"), engine], capture_output=True, text=True)
 
 
-def test_mujoco_reads_every_mass_and_inertia_back(tmp_path):
-    pytest.importorskip("mujoco")
-    write_scene(THROW, tmp_path)
-    done = read_back(tmp_path)
+@pytest.mark.parametrize(
+    ("engine", "form"),
+    [
+        ("mujoco", "mjcf"),
+        ("pinocchio", "mjcf"),
+        ("newton", "mjcf"),
+        ("pinocchio", "urdf"),
+        ("newton", "urdf"),
+        ("pybullet", "urdf"),
+    ],
+)
+def test_an_engine_reads_every_mass_and_inertia_back(tmp_path, engine, form):
+    pytest.importorskip(engine)
+    write_scene(THROW, tmp_path, form)
+    done = read_back(tmp_path, engine)
     assert done.returncode == 0, done.stderr
     assert "5 bodies" in done.stdout
+
+
+def test_the_joints_of_a_urdf_are_those_of_the_throw(tmp_path):
+    write_scene(THROW, tmp_path, "urdf")
+    robot = ElementTree.parse(tmp_path / "scene.urdf").getroot()
+    joints = robot.findall("joint")
+    assert [joint.find("child").get("link") for joint in joints] == [f"slice_{i}" for i in range(4)]
+    for joint in joints:
+        limit, damping = joint.find("limit"), joint.find("dynamics").get("damping")
+        assert (joint.get("type"), joint.find("parent").get("link")) == ("prismatic", "tube")
+        assert (float(limit.get("lower")), float(limit.get("upper"))) == (THROW.r_min, THROW.r_max)
+        assert float(damping) == THROW.drag
+        place, axis = (np.array(joint.find(tag).get("xyz").split(), float) for tag in ("origin", "axis"))
+        assert np.array_equal(place + THROW.bottle.length * axis, [0.0, -THROW.bottle.length / 2, 0.0])
 
 
 @pytest.mark.parametrize("name", ["mass", "diaginertia"])

@@ -5,6 +5,7 @@
 
 Joints, masses, moments of inertia and the keyframe ``release`` are exact. A point has no moment of inertia, which most
 engines refuse: a slice gets ``SLICE_INERTIA``. Restitution cannot be said in MJCF: the limits are the engine's own.
+In URDF the tube is the root, which the engine leaves free; it has no keyframe: the release stands in scene.json alone.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ SLICE_INERTIA: Final = 1e-12
 """Moment of inertia of a slice about its own centre [kg m^2]: 1e-9 of that of the paper's bottle."""
 
 
-def write_scene(throw: Scenario, folder: Path) -> None:
-    """Write scene.xml, scene.json (masses, inertias, release, impacts), answers.csv and readback.py into a folder.
+def write_scene(throw: Scenario, folder: Path, form: str = "mjcf") -> None:
+    """Write scene.xml or scene.urdf, scene.json (masses, inertias, release, impacts), answers.csv and readback.py.
 
     The answers are free flight by ``ode_reference``. Raises ValueError for ice, whose slices have no joints, and
     OSError if the folder cannot be written.
@@ -43,9 +44,17 @@ def write_scene(throw: Scenario, folder: Path) -> None:
     qvel = [drift_x + throw.omega0 * off * cosine, drift_y + throw.omega0 * off * sine, throw.omega0]
     qvel += [0.0] * throw.n_slices
     impacts = [asdict(hit) for hit in flight.impacts or ()]
-    facts = {"scenario": throw.to_mapping(), "bodies": bodies, "qpos": qpos, "qvel": qvel, "impacts": impacts}
+    scene = "scene.urdf" if form == "urdf" else "scene.xml"
+    facts = {
+        "scene": scene,
+        "scenario": throw.to_mapping(),
+        "bodies": bodies,
+        "qpos": qpos,
+        "qvel": qvel,
+        "impacts": impacts,
+    }
     folder.mkdir(parents=True, exist_ok=True)
-    write_text(folder / "scene.xml", _mjcf(throw, bodies, qpos, qvel))
+    write_text(folder / scene, _urdf(throw, bodies) if form == "urdf" else _mjcf(throw, bodies, qpos, qvel))
     write_text(folder / "scene.json", json.dumps(json_ready(facts), indent=1) + "\n")
     write_text(folder / "answers.csv", trajectory_csv(flight))
     write_text(folder / "readback.py", Path(__file__).with_name("scene_readback.py").read_text(encoding="utf-8"))
@@ -80,3 +89,18 @@ def _mjcf(throw: Scenario, bodies: dict[str, list[float]], qpos: list[float], qv
  <keyframe><key name="release" qpos="{numbers(*qpos)}" qvel="{numbers(*qvel)}"/></keyframe>
 </mujoco>
 """
+
+
+def _urdf(throw: Scenario, bodies: dict[str, list[float]]) -> str:
+    links = [
+        f'<link name="{name}"><inertial><mass value="{mass!r}"/>'
+        f'<inertia ixx="{ixx!r}" iyy="{iyy!r}" izz="{izz!r}" ixy="0" ixz="0" iyz="0"/></inertial></link>\n'
+        for name, (mass, ixx, iyy, izz) in bodies.items()
+    ]
+    joints = [
+        f'<joint name="r_{i}" type="prismatic"><parent link="tube"/><child link="slice_{i}"/>'
+        f'<origin xyz="0 {throw.bottle.length / 2!r} 0"/><axis xyz="0 -1 0"/><dynamics damping="{throw.drag!r}"/>'
+        f'<limit lower="{throw.r_min!r}" upper="{throw.r_max!r}" effort="1e9" velocity="1e9"/></joint>\n'
+        for i in range(throw.n_slices)
+    ]
+    return f'<robot name="flipproof">\n{"".join(links + joints)}</robot>\n'

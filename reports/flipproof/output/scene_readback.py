@@ -1,6 +1,6 @@
-"""Read scene.xml beside this file into an engine and compare masses and moments of inertia with scene.json.
+"""Read the scene beside this file into an engine and compare masses and moments of inertia with scene.json.
 
-    python readback.py mujoco        (or pinocchio, or newton, which holds single precision)
+    python readback.py mujoco        (scene.xml; scene.xml or scene.urdf: pinocchio, newton; scene.urdf: pybullet)
 
 Prints the largest relative difference; the exit status is 1 if it is above 1e-6. Needs the engine and NumPy.
 """
@@ -25,18 +25,29 @@ def held(engine: str, scene: str) -> Any:
     if engine == "pinocchio":
         import pinocchio
 
-        bodies = list(pinocchio.buildModelFromMJCF(scene).inertias)[1:]
+        urdf = scene.endswith("urdf")
+        free = (pinocchio.JointModelFreeFlyer(),)
+        model = pinocchio.buildModelFromUrdf(scene, *free) if urdf else pinocchio.buildModelFromMJCF(scene)
+        bodies = list(model.inertias)[1:]
         return np.array([[body.mass, *np.diag(body.inertia)] for body in bodies])
+    if engine == "pybullet":
+        import pybullet
+
+        pybullet.connect(pybullet.DIRECT)
+        body = pybullet.loadURDF(scene, flags=pybullet.URDF_USE_INERTIA_FROM_FILE)
+        facts = [pybullet.getDynamicsInfo(body, link) for link in range(-1, pybullet.getNumJoints(body))]
+        return np.array([[mass, *moments] for mass, _, moments, *_ in facts])
     import newton
 
     builder = newton.ModelBuilder()
-    builder.add_mjcf(scene)
+    (builder.add_urdf if scene.endswith("urdf") else builder.add_mjcf)(scene)
     return np.column_stack([builder.body_mass, [np.diag(np.reshape(body, (3, 3))) for body in builder.body_inertia]])
 
 
 if __name__ == "__main__":
-    meant = np.array(list(json.loads((HERE / "scene.json").read_text(encoding="utf-8"))["bodies"].values()))
-    found = held(sys.argv[1], str(HERE / "scene.xml"))
+    facts = json.loads((HERE / "scene.json").read_text(encoding="utf-8"))
+    meant = np.array(list(facts["bodies"].values()))
+    found = held(sys.argv[1], str(HERE / facts["scene"]))
     apart = float(np.abs(found / meant - 1).max()) if found.shape == meant.shape else np.inf
     print(f"{sys.argv[1]}: {len(found)} bodies of {len(meant)}, masses and inertias within {apart:.1e}")
     sys.exit(not apart <= 1e-6)
