@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -80,11 +80,13 @@ def drawn(
     # The figures with most to draw first, so that no worker is left with a long one at the end.
     order = sorted(exhibits, key=lambda exhibit: -len(exhibit.table or ""))
     pending = {exhibit.name: pool.submit(_draw, exhibit.maker, exhibit.data, png) for exhibit in order}
+    names = {future: name for name, future in pending.items()}
+    for count, future in enumerate(as_completed(names), start=1):
+        progress(count, len(exhibits), names[future])
     finished = []
     for exhibit in exhibits:
         with chapter_errors(f"figure {exhibit.name!r}"):
             finished.append(replace(exhibit, drawn=pending[exhibit.name].result()))
-        progress(len(finished), len(exhibits), exhibit.name)
     return tuple(finished)
 
 

@@ -16,8 +16,13 @@ from slicemodel import Scenario
 Progress = Callable[[int, int, str], None]
 """Called with the work that is done, the work that is planned, and the name of what was made last."""
 
-COSTS: Final = {"certificate": 4000, "call": 20, "slow": 20, "quick": 1}
-"""Ratios of measured mean times: a certified run, a call, another run with a job of its own, any other run."""
+COSTS: Final = {"certificate": 4000, "witness": 100, "engine": 50, "call": 20, "slow": 7, "quick": 1}
+"""Ratios of measured mean times: a certified run, one by SciPy, one by an engine with many slices, a call, another run
+by an engine, any other run.
+"""
+
+FEW: Final = 20
+"""Slices with which an engine's run is not long."""
 
 GROUP = 8
 """Runs of a group: sending a quick one away alone would cost as much as making it."""
@@ -106,9 +111,13 @@ def _kind(run: Run) -> str:
 
     Exceptions are those by a ``method`` of SciPy's; and a ``tolerance`` asks an engine for a certificate.
     """
-    if find(run.solver).package in ("slicemodel", "ode_reference") and "method" not in run.settings:
+    if "method" in run.settings:
+        return "witness"
+    if find(run.solver).package in ("slicemodel", "ode_reference"):
         return "quick"
-    return "certificate" if "tolerance" in run.settings else "slow"
+    if "tolerance" in run.settings:
+        return "certificate"
+    return "engine" if run.scenario.n_slices > FEW else "slow"
 
 
 def make_each(runs: Iterable[Run]) -> list[Made]:

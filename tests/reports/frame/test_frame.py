@@ -1,6 +1,8 @@
 """What drives chapters: waves, equal runs made once, what is missing, in what order all of it stands."""
 
 import dataclasses
+import threading
+from concurrent.futures import Executor, Future
 
 import numpy as np
 import pytest
@@ -186,6 +188,34 @@ def test_a_mistake_of_the_program_is_no_evidence_that_is_missing(part, place):
             next(iter(evaluate(gather((Part("one", "One", "", (part,)),), ASK, Answers(fly))).values())).figures,
             SerialExecutor(),
         )
+
+
+def test_a_figure_counts_as_soon_as_it_is_drawn():
+    """Whatever stands first on the page; the bar of a report moves with it."""
+
+    class LastComesFirst(Executor):
+        """Makes every call at once but the first, which is answered when the others are."""
+
+        first = None
+
+        def submit(self, *_, **__):
+            answer = Future()
+            if self.first is None:
+                self.first = answer
+                threading.Timer(0.5, answer.set_result, [None]).start()
+            else:
+                answer.set_result(None)
+            return answer
+
+    figures = [
+        Exhibit(name=name, title="", caption="", alt="", maker=dict, data=(), table=table)
+        for name, table in (("long", "1,2,3"), ("b", "1"), ("c", "1"))
+    ]
+    shown = []
+    made = drawn(figures, LastComesFirst(), lambda count, planned, name: shown.append((count, planned, name)))
+    assert [figure.name for figure in made] == ["long", "b", "c"]
+    assert [(count, planned) for count, planned, _ in shown] == [(1, 3), (2, 3), (3, 3)]
+    assert shown[-1][2] == "long"
 
 
 def test_figures_or_claims_that_break_are_noted():
